@@ -1,0 +1,35 @@
+ThisBuild / organization := "colonnade"
+ThisBuild / version      := "0.1.0-SNAPSHOT"
+ThisBuild / scalaVersion := "2.13.15"
+ThisBuild / licenses     := Seq("Apache-2.0" -> url("https://www.apache.org/licenses/LICENSE-2.0"))
+
+val chiselVersion = "6.7.0"
+
+lazy val colonnade = (project in file("."))
+  .settings(
+    name := "colonnade",
+    libraryDependencies ++= Seq(
+      "org.chipsalliance"    %% "chisel"     % chiselVersion,
+      "com.lihaoyi"          %% "upickle"    % "3.1.0",
+      "edu.berkeley.cs"      %% "chiseltest" % "6.0.0" % Test
+    ),
+    addCompilerPlugin("org.chipsalliance" % "chisel-plugin" % chiselVersion cross CrossVersion.full),
+    scalacOptions ++= Seq(
+      "-deprecation",
+      "-feature",
+      "-unchecked",
+      "-Xcheckinit",
+      "-Xfatal-warnings",
+      "-Xlint:unused,infer-any,missing-interpolator",
+      "-language:reflectiveCalls",
+      "-Ymacro-annotations"
+    ),
+    // Elaboration recurses deeply; a fork also keeps the simulators' memory out of sbt.
+    Test / fork               := true,
+    Test / javaOptions        ++= Seq("-Xmx4g", "-Xss16m"),
+    Test / testForkedParallel := true,
+    Test / testOptions        += Tests.Argument(TestFrameworks.ScalaTest, "-oD")
+  )
+
+// Two suites at a time: a simulator in each wants a core of its own.
+Global / concurrentRestrictions += Tags.limit(Tags.Test, 2)

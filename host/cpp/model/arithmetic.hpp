@@ -1,0 +1,64 @@
+// Exact integer arithmetic of the datapaths: the rules of docs/numbers.md, "Rounding".
+#pragma once
+#include <cstdint>
+
+namespace colonnade {
+
+using Wide = __int128;
+using UnsignedWide = unsigned __int128;
+
+/// Bits needed to hold x: 0 for 0.
+inline int bitLength(UnsignedWide x) {
+    const auto high = static_cast<std::uint64_t>(x >> 64), low = static_cast<std::uint64_t>(x);
+    return high ? 128 - __builtin_clzll(high) : low ? 64 - __builtin_clzll(low) : 0;
+}
+
+inline UnsignedWide magnitude(Wide x) { return x < 0 ? -static_cast<UnsignedWide>(x) : static_cast<UnsignedWide>(x); }
+
+/// Drops `bits` low bits towards minus infinity; shifts left where `bits` is negative.
+template <class Integer> Integer floorShift(Integer x, int bits) {
+    if (bits <= 0) return x * (Integer(1) << -bits);
+    return bits >= static_cast<int>(8 * sizeof(Integer)) ? (x < 0 ? Integer(-1) : Integer(0)) : x >> bits;
+}
+
+/// Drops `bits` low bits to nearest, ties to even; shifts left where `bits` is not positive.
+template <class Integer> Integer nearestEven(Integer x, int bits) {
+    if (bits <= 0) return floorShift(x, bits);
+    const Integer quotient = x >> bits, rest = x - (quotient << bits), half = Integer(1) << (bits - 1);
+    return quotient + ((rest > half || (rest == half && (quotient & 1))) ? 1 : 0);
+}
+
+template <class Integer> Integer clamp(Integer x, Integer low, Integer high) { return x < low ? low : x > high ? high : x; }
+
+/// Largest value of a signed number of `bits` bits.
+inline Wide largest(int bits) { return (Wide(1) << (bits - 1)) - 1; }
+
+/// x = mantissa * 2^(exponent - bits), the mantissa's top bit set (floored); both 0 for x = 0.
+struct Normalised {
+    std::uint64_t mantissa;
+    int exponent;
+};
+
+inline Normalised normalise(UnsignedWide x, int bits) {
+    const int exponent = bitLength(x);
+    const int drop = exponent - bits;
+    return {static_cast<std::uint64_t>(drop >= 0 ? x >> drop : x << -drop), exponent};
+}
+
+/// floor(numerator * 2^digits / denominator), of two mantissas of at most 32 bits.
+inline std::uint64_t divide(std::uint64_t numerator, std::uint64_t denominator, int digits) {
+    if (denominator == 0) return 0;
+    return (numerator << digits) / denominator;
+}
+
+/// floor(sqrt(radicand)), bit by bit.
+inline std::uint64_t squareRoot(std::uint64_t radicand) {
+    std::uint64_t root = 0;
+    for (int bit = 31; bit >= 0; --bit) {
+        const std::uint64_t trial = root | (std::uint64_t(1) << bit);
+        if (static_cast<UnsignedWide>(trial) * trial <= radicand) root = trial;
+    }
+    return root;
+}
+
+} // namespace colonnade

@@ -1,0 +1,202 @@
+// What the manifest says: number formats, record layouts, register values. Nothing here repeats a width or an offset.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "arithmetic.hpp"
+
+namespace colonnade {
+
+using Vector = std::array<std::int64_t, 3>;
+
+inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, const std::string& key) {
+    const auto found = values.find(key);
+    if (found == values.end()) throw std::invalid_argument("the manifest names no value '" + key + "'");
+    return found->second;
+}
+
+/// The manifest's `numbers` (docs/numbers.md), and the few configuration values a traversal depends on.
+struct Numbers {
+    int vertexBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
+        entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits,
+        boxPadLog, normalFraction, colourBits, lightFraction;
+    int arity, trianglesPerRecord, stackDepth;
+    bool bvh;
+
+    explicit Numbers(const std::map<std::string, std::int64_t>& values) {
+        const auto take = [&](const char* key) { return static_cast<int>(lookUp(values, key)); };
+        vertexBits = take("vertexBits");
+        gridBits = take("gridBits");
+        gridFraction = take("gridFraction");
+        sceneBits = take("sceneBits");
+        mantissaBits = take("mantissaBits");
+        shearFraction = take("shearFraction");
+        shearDigits = take("shearDigits");
+        reciprocalFraction = take("reciprocalFraction");
+        reciprocalDigits = take("reciprocalDigits");
+        entrySlackShift = take("entrySlackShift");
+        entryBits = take("entryBits");
+        weightBits = take("weightBits");
+        distanceDigits = take("distanceDigits");
+        barycentricBits = take("barycentricBits");
+        shadeBits = take("shadeBits");
+        radicandBits = take("radicandBits");
+        cosineFraction = take("cosineFraction");
+        boxDistanceBits = take("boxDistanceBits");
+        boxPadLog = take("boxPadLog");
+        normalFraction = take("normalFraction");
+        colourBits = take("colourBits");
+        lightFraction = take("lightFraction");
+        arity = take("arity");
+        trianglesPerRecord = take("trianglesPerRecord");
+        stackDepth = take("stackDepth");
+        bvh = take("bvh") != 0;
+    }
+
+    /// Units by which a box is widened.
+    std::int64_t boxPad() const { return std::int64_t(1) << boxPadLog; }
+    /// The limit on t of a ray that has none.
+    std::int64_t farthest() const { return static_cast<std::int64_t>(largest(gridBits)); }
+};
+
+/// Where a field lies in its record.
+struct Field {
+    int offset, width;
+    bool isSigned;
+
+    std::int64_t read(const std::uint8_t* record) const {
+        std::uint64_t bits = 0;
+        for (int bit = 0; bit < width; ++bit) {
+            const int position = offset + bit;
+            bits |= static_cast<std::uint64_t>((record[position / 8] >> (position % 8)) & 1) << bit;
+        }
+        if (isSigned && width < 64 && (bits >> (width - 1))) bits |= ~std::uint64_t(0) << width;
+        return static_cast<std::int64_t>(bits);
+    }
+};
+
+using Layout = std::map<std::string, Field>;
+
+enum class Child : std::uint8_t { empty = 0, node = 1, leaf = 2, illegal = 3 };
+
+struct Node {
+    Vector origin;
+    std::array<int, 3> exponent;
+    std::array<Child, 4> kinds;
+    std::array<std::array<std::int32_t, 3>, 4> low, high;
+    std::uint32_t firstChild, firstTriangles;
+};
+
+struct Triangles {
+    std::uint32_t firstTriangle;
+    int count;
+    std::array<std::array<Vector, 3>, 2> vertices;
+};
+
+struct Face {
+    std::array<Vector, 3> normals;
+    Vector geometricNormal;
+    int material;
+};
+
+/// Reads records by the manifest's layouts. The decoders hold resolved fields, so that a million records decode quickly.
+class RecordDecoder {
+public:
+    RecordDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers)
+        : arity_(numbers.arity), trianglesPerRecord_(numbers.trianglesPerRecord) {
+        const Layout& node = layouts.at("node");
+        origin_ = vectorOf(node, "origin");
+        exponent_ = vectorOf(node, "exponent");
+        firstChild_ = node.at("firstChild");
+        firstTriangles_ = node.at("firstTriangles");
+        for (int child = 0; child < arity_; ++child) {
+            const std::string index = "[" + std::to_string(child) + "]";
+            kinds_.push_back(node.at("kinds" + index));
+            low_.push_back(vectorOf(node, "low" + index));
+            high_.push_back(vectorOf(node, "high" + index));
+        }
+        const Layout& triangles = layouts.at("triangles");
+        firstTriangle_ = triangles.at("firstTriangle");
+        count_ = triangles.at("count");
+        for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
+            vertices_.push_back(vectorOf(triangles, "vertices[" + std::to_string(vertex) + "]"));
+        const Layout& attributes = layouts.at("attributes");
+        for (int face = 0; attributes.count("faces[" + std::to_string(face) + "].material"); ++face) {
+            const std::string prefix = "faces[" + std::to_string(face) + "].";
+            FaceFields fields;
+            for (int corner = 0; corner < 3; ++corner)
+                fields.normals[corner] = vectorOf(attributes, prefix + "normals[" + std::to_string(corner) + "]");
+            fields.geometricNormal = vectorOf(attributes, prefix + "geometricNormal");
+            fields.material = attributes.at(prefix + "material");
+            faces_.push_back(fields);
+        }
+    }
+
+    int facesPerRecord() const { return static_cast<int>(faces_.size()); }
+
+    Node node(const std::uint8_t* record) const {
+        Node result{};
+        result.origin = read(origin_, record);
+        const Vector exponent = read(exponent_, record);
+        for (int axis = 0; axis < 3; ++axis) result.exponent[axis] = static_cast<int>(exponent[axis]);
+        result.firstChild = static_cast<std::uint32_t>(firstChild_.read(record));
+        result.firstTriangles = static_cast<std::uint32_t>(firstTriangles_.read(record));
+        for (int child = 0; child < arity_; ++child) {
+            result.kinds[child] = static_cast<Child>(kinds_[child].read(record));
+            const Vector low = read(low_[child], record), high = read(high_[child], record);
+            for (int axis = 0; axis < 3; ++axis) {
+                result.low[child][axis] = static_cast<std::int32_t>(low[axis]);
+                result.high[child][axis] = static_cast<std::int32_t>(high[axis]);
+            }
+        }
+        return result;
+    }
+
+    Triangles triangles(const std::uint8_t* record) const {
+        Triangles result{};
+        result.firstTriangle = static_cast<std::uint32_t>(firstTriangle_.read(record));
+        result.count = static_cast<int>(count_.read(record));
+        if (result.count > trianglesPerRecord_) result.count = trianglesPerRecord_;
+        for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
+            result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
+        return result;
+    }
+
+    Face face(const std::uint8_t* record, int slot) const {
+        const FaceFields& fields = faces_[slot];
+        Face result{};
+        for (int corner = 0; corner < 3; ++corner) result.normals[corner] = read(fields.normals[corner], record);
+        result.geometricNormal = read(fields.geometricNormal, record);
+        result.material = static_cast<int>(fields.material.read(record));
+        return result;
+    }
+
+private:
+    using VectorFields = std::array<Field, 3>;
+    struct FaceFields {
+        std::array<VectorFields, 3> normals;
+        VectorFields geometricNormal;
+        Field material;
+    };
+
+    static VectorFields vectorOf(const Layout& layout, const std::string& name) {
+        return {layout.at(name + ".x"), layout.at(name + ".y"), layout.at(name + ".z")};
+    }
+    static Vector read(const VectorFields& fields, const std::uint8_t* record) {
+        return {fields[0].read(record), fields[1].read(record), fields[2].read(record)};
+    }
+
+    int arity_, trianglesPerRecord_;
+    VectorFields origin_, exponent_;
+    Field firstChild_, firstTriangles_, firstTriangle_, count_;
+    std::vector<Field> kinds_;
+    std::vector<VectorFields> low_, high_, vertices_;
+    std::vector<FaceFields> faces_;
+};
+
+} // namespace colonnade

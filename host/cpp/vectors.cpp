@@ -1,0 +1,190 @@
+// Expected values for the RTL's specs: reads one question a line from standard input, answers each with one line of integers.
+//
+//   numbers key=value ...                                   (first line; no answer)
+//   setup  isShadow origin[3] direction[3] low[3] high[3] -> enters axis negative[3] origin[3] boxOrigin[3] shear[2] reciprocal[2] exponent[2] entry limit
+//   box    axis negative[3] boxOrigin[3] reciprocal[2] exponent[2] limit, origin[3] exponent[3] firstChild firstTriangles (kind low[3] high[3])*arity
+//                                                         -> tests count (slot near)*count
+//   triangle axis negative[3] origin[3] shear[2] vertices[9] -> isHit t weights[3] backSide
+//   limit  t                                              -> limitUnits
+//   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] light[3] colour[3] ambient[3] albedo[3] offset flat shadows
+//                                                         -> lit[3] ambient[3] needsShadowRay origin[3] toLight[3]
+#include <algorithm>
+#include <iostream>
+#include <sstream>
+
+#include "model/frame.hpp"
+
+namespace {
+
+using namespace colonnade;
+
+class Question {
+public:
+    explicit Question(std::istream& words) : words_(words) {}
+    Wide wide() {
+        std::string word;
+        if (!(words_ >> word)) throw std::invalid_argument("a question is too short");
+        const bool isNegative = word[0] == '-';
+        UnsignedWide value = 0;
+        for (std::size_t i = isNegative; i < word.size(); ++i) value = value * 10 + static_cast<unsigned>(word[i] - '0');
+        return isNegative ? -static_cast<Wide>(value) : static_cast<Wide>(value);
+    }
+    std::int64_t number() { return static_cast<std::int64_t>(wide()); }
+    Vector vector() {
+        Vector v;
+        for (auto& component : v) component = number();
+        return v;
+    }
+    WideVector wideVector() {
+        WideVector v;
+        for (auto& component : v) component = wide();
+        return v;
+    }
+
+private:
+    std::istream& words_;
+};
+
+class Answer {
+public:
+    Answer& operator<<(Wide value) {
+        std::string digits;
+        for (UnsignedWide rest = magnitude(value); rest != 0 || digits.empty(); rest /= 10) digits += static_cast<char>('0' + static_cast<int>(rest % 10));
+        if (value < 0) digits += '-';
+        std::reverse(digits.begin(), digits.end());
+        text_ += text_.empty() ? digits : " " + digits;
+        return *this;
+    }
+    template <class Values> Answer& all(const Values& values) {
+        for (const auto value : values) *this << static_cast<Wide>(value);
+        return *this;
+    }
+    void print() const { std::cout << text_ << '\n'; }
+
+private:
+    std::string text_;
+};
+
+void askHeading(Question& ask, Ray& ray) {
+    ray.enters = true;
+    ray.axis = static_cast<int>(ask.number());
+    for (auto& sign : ray.negative) sign = ask.number() != 0;
+}
+
+Ray askTriangleRay(Question& ask) {
+    Ray ray{};
+    askHeading(ask, ray);
+    ray.origin = ask.vector();
+    for (auto& shear : ray.shear) shear = ask.number();
+    return ray;
+}
+
+void answerSetUp(Question& ask, const Numbers& n) {
+    const bool isShadow = ask.number() != 0;
+    RayRequest request{ask.wideVector(), {}, 0, 0};
+    request.direction = ask.wideVector();
+    request.limit = isShadow ? static_cast<Wide>(magnitude(request.direction[dominantAxis(request.direction)])) : Wide(n.farthest());
+    Bounds bounds{ask.vector(), {}};
+    bounds.high = ask.vector();
+    const Ray ray = setUp(request, bounds, n);
+    Answer answer;
+    answer << ray.enters << ray.axis;
+    answer.all(ray.negative).all(ray.origin).all(ray.boxOrigin).all(ray.shear).all(ray.reciprocal).all(ray.exponent);
+    answer << ray.entry << ray.limit;
+    answer.print();
+}
+
+void answerBox(Question& ask, const Numbers& n) {
+    Ray ray{};
+    askHeading(ask, ray);
+    ray.boxOrigin = ask.vector();
+    for (auto& reciprocal : ray.reciprocal) reciprocal = ask.number();
+    for (auto& exponent : ray.exponent) exponent = static_cast<int>(ask.number());
+    const std::int64_t limit = ask.number();
+    Node node{};
+    node.origin = ask.vector();
+    for (auto& exponent : node.exponent) exponent = static_cast<int>(ask.number());
+    node.firstChild = static_cast<std::uint32_t>(ask.number());
+    node.firstTriangles = static_cast<std::uint32_t>(ask.number());
+    for (int child = 0; child < n.arity; ++child) {
+        node.kinds[child] = static_cast<Child>(ask.number());
+        for (auto& low : node.low[child]) low = static_cast<std::int32_t>(ask.number());
+        for (auto& high : node.high[child]) high = static_cast<std::int32_t>(ask.number());
+    }
+    std::array<Entered, 4> entered;
+    std::uint64_t tests = 0;
+    const int count = testBoxes(ray, node, limit, n, entered, tests);
+    Answer answer;
+    answer << static_cast<Wide>(tests) << count;
+    for (int i = 0; i < count; ++i) answer << entered[i].slot << entered[i].near;
+    answer.print();
+}
+
+void answerTriangle(Question& ask, const Numbers& n) {
+    const Ray ray = askTriangleRay(ask);
+    std::array<Vector, 3> vertices;
+    for (auto& vertex : vertices) vertex = ask.vector();
+    Hit hit{false, n.farthest(), ~std::uint64_t(0), {}, false};
+    testTriangle(ray, vertices, 0, n, hit);
+    Answer answer;
+    answer << hit.found << (hit.found ? hit.t : 0);
+    answer.all(hit.weights) << hit.backSide;
+    answer.print();
+}
+
+void answerShade(Question& ask, const Numbers& n) {
+    const Ray ray = askTriangleRay(ask);
+    Hit hit{true, ask.number(), 0, {}, false};
+    for (auto& weight : hit.weights) weight = ask.number();
+    hit.backSide = ask.number() != 0;
+    Face face{};
+    for (auto& normal : face.normals) normal = ask.vector();
+    face.geometricNormal = ask.vector();
+    Lighting lighting{};
+    lighting.lightPosition = ask.wideVector();
+    lighting.lightColour = ask.vector();
+    lighting.ambient = ask.vector();
+    lighting.albedo = {ask.vector()};
+    lighting.shadowOffset = ask.number();
+    lighting.flat = ask.number() != 0;
+    lighting.shadows = ask.number() != 0;
+    const Shading shading = shade(ray, hit, face, lighting, n);
+    Answer answer;
+    answer.all(shading.lit).all(shading.ambient) << shading.needsShadowRay;
+    answer.all(shading.shadowRay.origin).all(shading.shadowRay.direction);
+    answer.print();
+}
+
+std::map<std::string, std::int64_t> readNumbers(std::istream& words) {
+    std::map<std::string, std::int64_t> values;
+    for (std::string pair; words >> pair;) {
+        const auto equals = pair.find('=');
+        values[pair.substr(0, equals)] = std::stoll(pair.substr(equals + 1));
+    }
+    return values;
+}
+
+} // namespace
+
+int main() try {
+    std::string line, kind;
+    std::getline(std::cin, line);
+    std::istringstream first(line);
+    first >> kind;
+    const Numbers numbers(readNumbers(first));
+    while (std::getline(std::cin, line)) {
+        std::istringstream words(line);
+        words >> kind;
+        Question ask(words);
+        if (kind == "setup") answerSetUp(ask, numbers);
+        else if (kind == "box") answerBox(ask, numbers);
+        else if (kind == "triangle") answerTriangle(ask, numbers);
+        else if (kind == "shade") answerShade(ask, numbers);
+        else if (kind == "limit") (Answer() << limitUnits(ask.number(), numbers)).print();
+        else throw std::invalid_argument("unknown question '" + kind + "'");
+    }
+    return 0;
+} catch (const std::exception& problem) {
+    std::cerr << "vectors: " << problem.what() << '\n';
+    return 2;
+}

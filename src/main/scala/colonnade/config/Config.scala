@@ -1,0 +1,92 @@
+package colonnade.config
+
+/** Shape of the array.
+  *
+  * @param rows     render units that share one column memory (N)
+  * @param columns  columns side by side (M)
+  * @param contexts rays in flight in each render unit
+  */
+final case class ArrayConfig(rows: Int, columns: Int, contexts: Int) {
+  Require.atLeast("array.rows", rows, 1)
+  Require.atLeast("array.columns", columns, 1)
+  Require.within("array.contexts", contexts, 1, 16)
+}
+
+/** Operand widths, the paper's mixed precision: `32b32s64d` is mac 32, sqrt 32, div 64.
+  *
+  * @param mac  multiply-accumulate operands
+  * @param sqrt radicand of the square root
+  * @param div  dividend of a division
+  */
+final case class PrecisionConfig(mac: Int, sqrt: Int, div: Int) {
+  Require.within("precision.mac", mac, 16, 64)
+  Require.within("precision.sqrt", sqrt, 16, 64)
+  Require.within("precision.div", div, 16, 64)
+
+  override def toString: String = s"${mac}b${sqrt}s${div}d"
+}
+
+/** Geometry records and the acceleration structure.
+  *
+  * @param vertexBits         a vertex coordinate, unsigned, in the object's cube
+  * @param boxBits            a child box's coordinate relative to its node
+  * @param triangleBits       operands of the triangle test; `precision.mac` unless set
+  * @param arity              children of a node
+  * @param trianglesPerRecord triangles of one leaf record
+  * @param bvh                false: every ray tests every triangle (the exhaustive baseline)
+  */
+final case class GeometryConfig(
+    vertexBits:         Int,
+    boxBits:            Int,
+    triangleBits:       Option[Int],
+    arity:              Int,
+    trianglesPerRecord: Int,
+    bvh:                Boolean
+) {
+  Require.within("geometry.vertexBits", vertexBits, 10, 24)
+  Require.within("geometry.boxBits", boxBits, 4, 12)
+  triangleBits.foreach(Require.within("geometry.triangleBits", _, 16, 64))
+  Require.oneOf("geometry.arity", arity, Seq(2, 4))
+  Require.oneOf("geometry.trianglesPerRecord", trianglesPerRecord, Seq(1, 2))
+}
+
+/** The memory that the render units of a column share.
+  *
+  * @param depth       records
+  * @param banks       independent banks, interleaved by record address
+  * @param stackDepth  traversal stack entries of each context
+  * @param snooping    every context that waits for a record takes it when anybody reads it
+  * @param readLatency cycles from an accepted read to its record
+  */
+final case class ColumnBvhMemoryConfig(depth: Int, banks: Int, stackDepth: Int, snooping: Boolean, readLatency: Int) {
+  Require.within("columnBvhMemory.depth", depth, 16, 1 << 22)
+  Require.oneOf("columnBvhMemory.banks", banks, Seq(1, 2, 4))
+  Require.within("columnBvhMemory.stackDepth", stackDepth, 4, 256)
+  Require.within("columnBvhMemory.readLatency", readLatency, 1, 16)
+}
+
+/** What a frame may hold.
+  *
+  * @param maxWidth  widest frame, pixels
+  * @param maxHeight highest frame, pixels
+  * @param tileSize  edge of the square tiles handed to columns, pixels
+  * @param materials entries of the material table
+  * @param hits      the pixel stream also carries the hit triangle and its distance
+  */
+final case class FrameConfig(maxWidth: Int, maxHeight: Int, tileSize: Int, materials: Int, hits: Boolean) {
+  Require.within("frame.maxWidth", maxWidth, 8, 4096)
+  Require.within("frame.maxHeight", maxHeight, 8, 4096)
+  Require.oneOf("frame.tileSize", tileSize, Seq(4, 8, 16, 32))
+  Require.within("frame.materials", materials, 1, 256)
+}
+
+/** A whole generator configuration: immutable, checked at construction. */
+final case class ColonnadeConfig(
+    array:           ArrayConfig,
+    precision:       PrecisionConfig,
+    geometry:        GeometryConfig,
+    columnBvhMemory: ColumnBvhMemoryConfig,
+    frame:           FrameConfig
+) {
+  val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
+}

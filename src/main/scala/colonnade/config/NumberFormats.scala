@@ -1,0 +1,110 @@
+package colonnade.config
+
+/** Every derived width and constant of the datapaths, by the rules of docs/numbers.md.
+  *
+  * The manifest carries [[entries]]; model, packer and harness take them from there and derive nothing themselves.
+  */
+final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionConfig, frame: FrameConfig) {
+  import NumberFormats._
+
+  val vertexBits: Int = geometry.vertexBits
+  val boxBits:    Int = geometry.boxBits
+  val macBits:    Int = precision.mac
+
+  /** A position or distance near the object: signed, [[gridFraction]] fraction bits (negative when narrow). */
+  val gridBits:     Int = geometry.triangleBits.getOrElse(precision.mac)
+  val gridFraction: Int = gridBits - vertexBits - 3
+
+  /** A position anywhere in the scene: signed, same step as the grid. */
+  val sceneBits:      Int = gridBits + reachBits
+  val coordinateBits: Int = bitLength(frame.maxWidth.max(frame.maxHeight))
+  val directionBits:  Int = (macBits + coordinateBits + 2).max(sceneBits + 1)
+  val mantissaBits:   Int = precision.div / 2
+
+  val shearFraction:      Int = gridBits - 2
+  val shearDigits:        Int = shearFraction.min(mantissaBits)
+  val reciprocalFraction: Int = vertexBits + 2
+  val reciprocalDigits:   Int = reciprocalFraction.min(mantissaBits)
+  val entrySlackShift:    Int = (reciprocalDigits - 3).max(1)
+  val entryBits:          Int = vertexBits + reachBits + 3
+
+  val weightBits:      Int = mantissaBits.min(gridBits - 1)
+  val distanceDigits:  Int = gridBits.min(mantissaBits)
+  val barycentricBits: Int = weightBits.min(colourBits)
+
+  /** Magnitude bits of a vector component in the shader's dot products: a cosine good to [[colourBits]] needs no more than 18. */
+  val shadeBits:      Int = macBits.min(colourBits + 6)
+  val radicandBits:   Int = precision.sqrt / 2 * 2
+  val cosineFraction: Int = mantissaBits.min(colourBits + 4)
+
+  /** Signed distances of the box test, in units. */
+  val boxDistanceBits: Int = vertexBits + 3
+
+  /** Log2 of the units by which a box is widened: the sum of all roundings between a box and the triangles in it. */
+  val boxPadLog: Int = {
+    val reach = 1.5 * power(vertexBits)
+    val step  = power(-gridFraction)
+    val sum   =
+      step * (if (gridFraction < 0) 2.0 else 0.5) +
+        power(vertexBits + 4 - weightBits) +
+        reach * (power(-shearDigits) + power(1 - mantissaBits)) +
+        reach * (power(1 - reciprocalDigits) + power(2 - mantissaBits)) +
+        reach * power(-reciprocalFraction) +
+        (if (gridFraction > 0) 0.5 else 0.0) +
+        step + power(vertexBits + 1) * (power(1 - distanceDigits) + power(2 - mantissaBits))
+    math.ceil(math.log(sum) / math.log(2)).toInt.max(1)
+  }
+
+  /** All values by their manifest key. */
+  def entries: Seq[(String, Int)] = Seq(
+    "vertexBits"         -> vertexBits,
+    "boxBits"            -> boxBits,
+    "macBits"            -> macBits,
+    "gridBits"           -> gridBits,
+    "gridFraction"       -> gridFraction,
+    "sceneBits"          -> sceneBits,
+    "coordinateBits"     -> coordinateBits,
+    "directionBits"      -> directionBits,
+    "mantissaBits"       -> mantissaBits,
+    "shearFraction"      -> shearFraction,
+    "shearDigits"        -> shearDigits,
+    "reciprocalFraction" -> reciprocalFraction,
+    "reciprocalDigits"   -> reciprocalDigits,
+    "entrySlackShift"    -> entrySlackShift,
+    "entryBits"          -> entryBits,
+    "weightBits"         -> weightBits,
+    "distanceDigits"     -> distanceDigits,
+    "barycentricBits"    -> barycentricBits,
+    "shadeBits"          -> shadeBits,
+    "radicandBits"       -> radicandBits,
+    "cosineFraction"     -> cosineFraction,
+    "boxDistanceBits"    -> boxDistanceBits,
+    "boxPadLog"          -> boxPadLog,
+    "normalBits"         -> normalBits,
+    "normalFraction"     -> normalFraction,
+    "colourBits"         -> colourBits,
+    "lightBits"          -> lightBits,
+    "lightFraction"      -> lightFraction
+  )
+}
+
+object NumberFormats {
+
+  /** The scene reaches this many doublings beyond the object's cube. */
+  val reachBits: Int = 8
+
+  /** A stored normal component: signed, [[normalFraction]] fraction bits. */
+  val normalBits:     Int = 12
+  val normalFraction: Int = 11
+
+  /** A linear colour channel, unsigned; all ones is 1.0. */
+  val colourBits: Int = 12
+
+  /** A light's intensity per channel, unsigned. */
+  val lightBits:     Int = 16
+  val lightFraction: Int = 12
+
+  def bitLength(value: Int): Int = 32 - Integer.numberOfLeadingZeros(value)
+
+  private def power(exponent: Int): Double = math.pow(2, exponent)
+}

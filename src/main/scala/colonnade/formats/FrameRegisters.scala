@@ -1,0 +1,198 @@
+package colonnade.formats
+
+import chisel3._
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.numbers.{Fixed, FixedPointFormat}
+
+import scala.collection.immutable.SeqMap
+
+/** A rectangle of pixels; `x1` and `y1` are exclusive. */
+final class PixelRect(coordinateBits: Int) extends Bundle {
+  val x0 = UInt(coordinateBits.W)
+  val y0 = UInt(coordinateBits.W)
+  val x1 = UInt(coordinateBits.W)
+  val y1 = UInt(coordinateBits.W)
+}
+
+/** A record, not a bundle: Chisel keeps the name `width` for itself. */
+final class FrameSettings(numbers: NumberFormats) extends Record {
+
+  /** Called `width` and `height` outside. */
+  val pixelsWide = UInt(numbers.coordinateBits.W)
+  val pixelsHigh = UInt(numbers.coordinateBits.W)
+
+  /** The only pixels whose rays may meet the object. */
+  val objectRect = new PixelRect(numbers.coordinateBits)
+
+  /** A position of the camera or the light, shifted left by this, is in grid steps. */
+  val unitShift = UInt(NumberFormats.bitLength(numbers.sceneBits).W)
+
+  /** A frame that takes longer ends with an error. Cycles in which the pixel sink stalls do not count. */
+  val watchdogCycles = UInt(32.W)
+
+  val elements: SeqMap[String, Data] = FrameRegisters.fields(
+    "width"          -> pixelsWide,
+    "height"         -> pixelsHigh,
+    "objectRect"     -> objectRect,
+    "unitShift"      -> unitShift,
+    "watchdogCycles" -> watchdogCycles
+  )
+}
+
+/** The ray of pixel (x, y) has the direction `(direction << stepShift) + x · stepX + y · stepY`.
+  *
+  * A record, not a bundle: Chisel keeps the name `direction` for itself.
+  */
+final class Camera(numbers: NumberFormats) extends Record {
+  private def vector = Vec3(SInt(numbers.macBits.W))
+
+  val position = vector
+
+  /** Towards the picture's first pixel; called `direction` outside. */
+  val towards   = vector
+  val stepX     = vector
+  val stepY     = vector
+  val stepShift = UInt(NumberFormats.bitLength(numbers.coordinateBits).W)
+
+  val elements: SeqMap[String, Data] = FrameRegisters.fields(
+    "position"  -> position,
+    "direction" -> towards,
+    "stepX"     -> stepX,
+    "stepY"     -> stepY,
+    "stepShift" -> stepShift
+  )
+}
+
+final class Light(numbers: NumberFormats) extends Bundle {
+  val position = Vec3(SInt(numbers.macBits.W))
+  val colour   = Rgb(FrameRegisters.intensity)
+
+  /** How far a shadow ray starts from the surface, in grid steps along the normal. */
+  val shadowOffset = UInt((numbers.gridBits - 2).W)
+}
+
+final class Shading extends Bundle {
+
+  /** Shade with geometric normals, not with the vertices'. */
+  val flat = Bool()
+
+  /** Send shadow rays. */
+  val shadows = Bool()
+}
+
+final class Material extends Bundle {
+  val albedo = Rgb(FrameRegisters.colour)
+}
+
+/** The object's box: inclusive, in vertex units. */
+final class Bounds(numbers: NumberFormats) extends Bundle {
+  val low  = Vec3(UInt(numbers.vertexBits.W))
+  val high = Vec3(UInt(numbers.vertexBits.W))
+}
+
+/** Where the sections of the column BVH memory lie: nodes, then triangles, then attributes. */
+final class SceneMap(countBits: Int) extends Bundle {
+
+  /** Records in all. */
+  val recordCount     = UInt(countBits.W)
+  val triangleBase    = UInt(countBits.W)
+  val triangleRecords = UInt(countBits.W)
+  val attributeBase   = UInt(countBits.W)
+}
+
+/** What the host writes before a frame. Constant while a frame runs. */
+final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
+  private val numbers = config.numbers
+
+  val frame      = new FrameSettings(numbers)
+  val camera     = new Camera(numbers)
+  val light      = new Light(numbers)
+  val ambient    = Rgb(FrameRegisters.intensity)
+  val shading    = new Shading
+  val background = Rgb(FrameRegisters.colour)
+  val materials  = Vec(config.frame.materials, new Material)
+  val bounds     = new Bounds(numbers)
+  val scene      = new SceneMap(RecordFormats.idBits(config))
+}
+
+object FrameRegisters {
+
+  /** A light's intensity in one channel. */
+  def intensity: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightBits, NumberFormats.lightFraction))
+
+  /** A linear colour channel; all ones is 1.0. */
+  def colour: UInt = UInt(NumberFormats.colourBits.W)
+
+  /** A record's elements, given as in a bundle: the first is the most significant. */
+  private[formats] def fields(named: (String, Data)*): SeqMap[String, Data] = SeqMap(named.reverse: _*)
+}
+
+final class Status extends Bundle {
+  val busy = Bool()
+
+  /** The frame is complete; cleared by the next start. */
+  val done = Bool()
+}
+
+/** Sticky until the next start. */
+final class Errors extends Bundle {
+  val stackOverflow = Bool()
+  val illegalRecord = Bool()
+  val watchdog      = Bool()
+}
+
+/** What happened in the last frame. Sums over the array, except where a field says otherwise. */
+final class Counters extends Bundle {
+  private def counter = UInt(Counters.bits.W)
+
+  /** From start to the last pixel. */
+  val cycles      = counter
+  val raysPrimary = counter
+  val raysShadow  = counter
+
+  /** Rays of all kinds that entered the object's box. */
+  val raysInBox     = counter
+  val nodeReads     = counter
+  val boxTests      = counter
+  val triangleTests = counter
+
+  /** Triangle tests that were accepted. */
+  val hits = counter
+
+  /** Most entries that any stack held. */
+  val deepestStack = counter
+  val recordReads  = counter
+
+  /** Records that a context took from a read of another one. */
+  val snoopHits     = counter
+  val bankConflicts = counter
+
+  /** Unit cycles with work. */
+  val busyRaySetup     = counter
+  val busyBoxUnit      = counter
+  val busyTriangleUnit = counter
+  val busyShader       = counter
+
+  /** Context cycles by what a context waited for. */
+  val waitRecord   = counter
+  val waitUnit     = counter
+  val idleContexts = counter
+}
+
+object Counters {
+  val bits: Int = 48
+}
+
+/** What the host reads. */
+final class DeviceStatus extends Bundle {
+  val status   = new Status
+  val errors   = new Errors
+  val counters = new Counters
+}
+
+/** What the host pulses. */
+final class Control extends Bundle {
+
+  /** A write of 1 starts a frame. */
+  val start = Bool()
+}

@@ -1,0 +1,45 @@
+package colonnade.formats
+
+import colonnade.config.ColonnadeConfig
+
+/** How the host may use a register. */
+sealed abstract class Access(val label: String)
+
+object Access {
+  case object ReadWrite extends Access("rw")
+  case object ReadOnly  extends Access("ro")
+  case object WriteOnly extends Access("wo")
+}
+
+/** A number behind the register port.
+  *
+  * @param address of its lowest 32 bits, in words
+  * @param words   consecutive addresses it takes, low word first
+  */
+final case class Register(name: String, address: Int, words: Int, width: Int, signed: Boolean, access: Access)
+
+/** Addresses of all registers, in the order of their declaration: control, status, errors, counters, then
+  * [[FrameRegisters]]. Each number starts at a word of its own.
+  */
+object RegisterMap {
+
+  /** Bits of a word. */
+  val dataBits: Int = 32
+
+  def apply(config: ColonnadeConfig): Seq[Register] = {
+    val numbers = Seq(
+      (new Control, Access.WriteOnly),
+      (new DeviceStatus, Access.ReadOnly),
+      (new FrameRegisters(config), Access.ReadWrite)
+    ).flatMap { case (bundle, access) => Layout.leaves(bundle).map(_ -> access) }
+
+    val words     = numbers.map { case (number, _) => (number.width + dataBits - 1) / dataBits }
+    val addresses = words.scanLeft(0)(_ + _)
+    numbers.zip(words).zip(addresses).map { case (((number, access), count), address) =>
+      Register(number.name, address, count, number.width, number.signed, access)
+    }
+  }
+
+  /** Words in all. */
+  def size(registers: Seq[Register]): Int = registers.map(r => r.address + r.words).max
+}

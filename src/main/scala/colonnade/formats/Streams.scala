@@ -1,0 +1,36 @@
+package colonnade.formats
+
+import chisel3._
+import colonnade.config.ColonnadeConfig
+import colonnade.numbers.{Fixed, FixedPointFormat}
+
+/** What a primary ray met, for tests and for the host's `--hits`. */
+final class PixelHit(config: ColonnadeConfig) extends Bundle {
+
+  /** Packed triangle id; only of pixels with `isObject`. */
+  val triangle = UInt(RecordFormats.idBits(config).W)
+
+  /** Distance from the camera along the ray's dominant axis, in the grid: entry and t together. */
+  val distance = new Fixed(
+    FixedPointFormat.unsigned(config.numbers.sceneBits + 1, config.numbers.gridFraction)
+  )
+}
+
+/** A finished pixel as it leaves the device. */
+final class Pixel(config: ColonnadeConfig) extends Bundle {
+  val x = UInt(config.numbers.coordinateBits.W)
+  val y = UInt(config.numbers.coordinateBits.W)
+
+  /** Linear. */
+  val colour   = Rgb(FrameRegisters.colour)
+  val isObject = Bool()
+  val hit      = if (config.frame.hits) Some(new PixelHit(config)) else None
+}
+
+/** A record on its way into the column BVH memories. */
+final class Load(config: ColonnadeConfig) extends Bundle {
+  private val formats = new RecordFormats(config)
+
+  val address = UInt(formats.addressBits.W)
+  val record  = formats.record
+}

@@ -1,0 +1,62 @@
+package colonnade.numbers
+
+import chisel3._
+import chisel3.util.{log2Ceil, Cat}
+
+/** A number as a mantissa and an exponent: mantissa · 2^(exponent - mantissaBits), up to the bits floored away.
+  *
+  * @param mantissa its top bit is set, except for zero, where all are clear
+  * @param exponent the number's bit length
+  */
+final class Normalised(mantissaBits: Int, exponentBits: Int) extends Bundle {
+  val mantissa = UInt(mantissaBits.W)
+  val exponent = UInt(exponentBits.W)
+}
+
+/** Combinational: counts the leading zeros in a tree, then shifts them out in log2(width) steps. */
+object Normalise {
+
+  /** Bits of the exponent that [[apply]] gives for an operand of `width` bits. */
+  def exponentBits(width: Int): Int = log2Ceil(width + 1)
+
+  def apply(x: UInt, bits: Int): Normalised = {
+    val width         = x.getWidth
+    val (zero, zeros) = countLeadingZeros(x)
+    val shifted       = shiftLeft(x, zeros)
+    val result        = Wire(new Normalised(bits, exponentBits(width)))
+    result.mantissa := (if (bits <= width) shifted(width - 1, width - bits) else Cat(shifted, 0.U((bits - width).W)))
+    result.exponent := Mux(zero, 0.U, width.U(exponentBits(width).W) - zeros)
+    result
+  }
+
+  /** Position of the highest set bit plus one; 0 for zero. */
+  def bitLength(x: UInt): UInt = {
+    val (zero, zeros) = countLeadingZeros(x)
+    Mux(zero, 0.U(exponentBits(x.getWidth).W), x.getWidth.U(exponentBits(x.getWidth).W) - zeros)
+  }
+
+  /** Whether all bits are clear, and how many lead the highest set bit otherwise. */
+  def countLeadingZeros(x: UInt): (Bool, UInt) = {
+    val size = 1 << log2Ceil(x.getWidth)
+    // Padding at the low end does not change the count while a bit of x is set; for zero it means nothing.
+    tree(if (size == x.getWidth) x else Cat(x, 0.U((size - x.getWidth).W)))
+  }
+
+  private def tree(x: UInt): (Bool, UInt) =
+    if (x.getWidth == 1) (!x(0), 0.U(0.W))
+    else {
+      val half               = x.getWidth / 2
+      val (highZero, inHigh) = tree(x(2 * half - 1, half))
+      val (lowZero, inLow)   = tree(x(half - 1, 0))
+      val count              = Cat(highZero, Mux(highZero, inLow, inHigh))
+      (highZero && lowZero, if (half == 1) highZero.asUInt else count)
+    }
+
+  private def shiftLeft(x: UInt, by: UInt): UInt = {
+    val width = x.getWidth
+    (by.getWidth - 1 to 0 by -1).foldLeft(x) { (value, step) =>
+      val distance = 1 << step
+      if (distance >= width) value else Mux(by(step), (value << distance)(width - 1, 0), value)
+    }
+  }
+}

@@ -1,0 +1,111 @@
+package colonnade.ray
+
+import chisel3._
+import chisel3.util.log2Ceil
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.formats.Vec3
+import colonnade.numbers.{Fixed, FixedPointFormat}
+
+/** Formats of a ray's numbers (docs/numbers.md). */
+final class RayFormats(numbers: NumberFormats) {
+
+  /** A position or distance near the object. */
+  val grid: FixedPointFormat = FixedPointFormat.signed(numbers.gridBits, numbers.gridFraction)
+
+  /** A position anywhere in the scene. */
+  val scene: FixedPointFormat = FixedPointFormat.signed(numbers.sceneBits, numbers.gridFraction)
+
+  /** Slope against the dominant axis, magnitude at most 1. */
+  val shear: FixedPointFormat = FixedPointFormat.signed(numbers.gridBits, numbers.shearFraction)
+
+  /** Mantissa of a slope's reciprocal, between a half and two. */
+  val reciprocal: FixedPointFormat =
+    FixedPointFormat.unsigned(numbers.reciprocalFraction + 1, numbers.reciprocalFraction)
+
+  /** Signed whole units near the object: box origins and the box test's distances. */
+  val units: FixedPointFormat = FixedPointFormat.signed(numbers.boxDistanceBits, 0)
+
+  /** How far an origin is advanced: whole units. */
+  val entry: FixedPointFormat = FixedPointFormat.unsigned(numbers.entryBits, 0)
+
+  /** A barycentric weight for the shader, up to a common factor. */
+  val weight: FixedPointFormat = FixedPointFormat.unsigned(numbers.barycentricBits, numbers.barycentricBits)
+
+  val exponentBits: Int = NumberFormats.bitLength(numbers.reciprocalFraction)
+}
+
+/** Names a ray in flight in its render unit. */
+object Context {
+  def apply(config: ColonnadeConfig): UInt = UInt(log2Ceil(config.array.contexts.max(2)).W)
+}
+
+/** A ray as it is asked for. `towards` is its direction, of any scale. A shadow ray ends at origin + towards, the light. */
+final class RayRequest(config: ColonnadeConfig) extends Bundle {
+  private val numbers = config.numbers
+
+  val context   = Context(config)
+  val isShadow  = Bool()
+  val origin    = Vec3(new Fixed(new RayFormats(numbers).scene))
+  val towards   = Vec3(SInt(numbers.directionBits.W))
+}
+
+/** Which way a ray goes: its dominant axis (0, 1, 2) and the signs in its own frame, where x' and y' are the axes after
+  * the dominant one (cyclically) and z' is the dominant one.
+  */
+final class Heading extends Bundle {
+  val axis     = UInt(2.W)
+  val negative = Vec(3, Bool())
+}
+
+/** What the box test knows of a ray; numbers of its own frame. */
+final class BoxRay(numbers: NumberFormats) extends Bundle {
+  private val formats = new RayFormats(numbers)
+
+  val heading    = new Heading
+  val origin     = Vec(3, new Fixed(formats.units))
+  val reciprocal = Vec(2, new Fixed(formats.reciprocal))
+  val exponent   = Vec(2, UInt(formats.exponentBits.W))
+}
+
+/** What the triangle test and the shader know of a ray; numbers of its own frame. */
+final class TriangleRay(numbers: NumberFormats) extends Bundle {
+  private val formats = new RayFormats(numbers)
+
+  val heading = new Heading
+  val origin  = Vec(3, new Fixed(formats.grid))
+  val shear   = Vec(2, new Fixed(formats.shear))
+}
+
+/** The outcome of ray set-up. Without `enters` the rest is meaningless. */
+final class SetUpRay(config: ColonnadeConfig) extends Bundle {
+  private val numbers = config.numbers
+  private val formats = new RayFormats(numbers)
+
+  val context     = Context(config)
+  val isShadow    = Bool()
+  val enters      = Bool()
+  val boxRay      = new BoxRay(numbers)
+  val triangleRay = new TriangleRay(numbers)
+  val entry       = new Fixed(formats.entry)
+
+  /** Largest t that still counts, never negative. */
+  val limit = new Fixed(formats.grid)
+}
+
+object PermutedFrame {
+
+  /** Components of an object-space vector in the frame of a ray with the given dominant axis. */
+  def apply[T <: Data](vector: Vec3[T], axis: UInt): Seq[T] = {
+    val Seq(x, y, z) = vector.axes
+    Seq(Seq(y, z, x), Seq(z, x, y), Seq(x, y, z)).map { case Seq(first, second, third) =>
+      chisel3.util.MuxLookup(axis, third)(Seq(0.U -> first, 1.U -> second))
+    }
+  }
+
+  /** The inverse of [[apply]]. */
+  def back[T <: Data](permuted: Seq[T], axis: UInt): Vec3[T] = {
+    val Seq(x, y, z)         = permuted
+    def select(a: T, b: T, c: T): T = chisel3.util.MuxLookup(axis, c)(Seq(0.U -> a, 1.U -> b))
+    Vec3.of(select(z, y, x), select(x, z, y), select(y, x, z))
+  }
+}
