@@ -9,26 +9,34 @@ lazy val colonnade = (project in file("."))
   .settings(
     name := "colonnade",
     libraryDependencies ++= Seq(
-      "org.chipsalliance"    %% "chisel"     % chiselVersion,
-      "com.lihaoyi"          %% "upickle"    % "3.1.0",
-      "edu.berkeley.cs"      %% "chiseltest" % "6.0.0" % Test
+      "org.chipsalliance" %% "chisel"     % chiselVersion,
+      "com.lihaoyi"       %% "upickle"    % "3.1.0",
+      "edu.berkeley.cs"   %% "chiseltest" % "6.0.0" % Test
     ),
     addCompilerPlugin("org.chipsalliance" % "chisel-plugin" % chiselVersion cross CrossVersion.full),
     scalacOptions ++= Seq(
       "-deprecation",
       "-feature",
       "-unchecked",
-      "-Xcheckinit",
       "-Xfatal-warnings",
       "-Xlint:unused,infer-any,missing-interpolator",
       "-language:reflectiveCalls",
       "-Ymacro-annotations"
     ),
+    // The presets, so that they are found from any directory.
+    Compile / resourceGenerators += Def.task {
+      val presets = (baseDirectory.value / "configs" * "*.json").get()
+      val target  = (Compile / resourceManaged).value / "colonnade" / "configs"
+      presets.map { preset =>
+        IO.copyFile(preset, target / preset.getName)
+        target / preset.getName
+      }
+    }.taskValue,
     // Elaboration recurses deeply; a fork also keeps the simulators' memory out of sbt.
-    Test / fork               := true,
-    Test / javaOptions        ++= Seq("-Xmx4g", "-Xss16m"),
+    Test / fork := true,
+    Test / javaOptions ++= Seq("-Xmx4g", "-Xss16m"),
     Test / testForkedParallel := true,
-    Test / testOptions        += Tests.Argument(TestFrameworks.ScalaTest, "-oD")
+    Test / testOptions += Tests.Argument(TestFrameworks.ScalaTest, "-oD")
   )
 
 // Two suites at a time: a simulator in each wants a core of its own.

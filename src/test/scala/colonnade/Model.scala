@@ -14,8 +14,11 @@ object Model {
 
   /** Answers to questions in the form that vectors.cpp documents. */
   def answers(config: ColonnadeConfig, questions: Seq[Seq[BigInt]], kind: String): Seq[Seq[BigInt]] = {
-    val header = "numbers " + (config.numbers.entries ++ traversal(config)).map { case (key, value) => s"$key=$value" }.mkString(" ")
-    val text   = (header +: questions.map(question => (kind +: question.map(_.toString)).mkString(" "))).mkString("", "\n", "\n")
+    val header = "numbers " + (config.numbers.entries ++ traversal(config)).map { case (key, value) =>
+      s"$key=$value"
+    }.mkString(" ")
+    val text =
+      (header +: questions.map(question => (kind +: question.map(_.toString)).mkString(" "))).mkString("", "\n", "\n")
     val output = (Process(program.toString) #< new java.io.ByteArrayInputStream(text.getBytes(UTF_8))).!!
     val result = output.linesIterator.map(_.split(' ').toSeq.map(BigInt(_))).toSeq
     require(result.size == questions.size, s"${result.size} answers to ${questions.size} questions")
@@ -31,15 +34,26 @@ object Model {
 
   private lazy val program: Path = synchronized {
     val sources = Paths.get("host", "cpp")
-    val files   = Files.walk(sources).iterator.asScala.filter(p => p.toString.endsWith(".hpp") || p.endsWith("vectors.cpp")).toSeq.sorted
-    val digest  = MessageDigest.getInstance("SHA-256")
+    val files   = Files.walk(sources).iterator.asScala.filter(p =>
+      p.toString.endsWith(".hpp") || p.endsWith("vectors.cpp")
+    ).toSeq.sorted
+    val digest = MessageDigest.getInstance("SHA-256")
     files.foreach(file => digest.update(Files.readAllBytes(file)))
-    val name   = digest.digest().take(8).map(byte => f"$byte%02x").mkString
-    val built  = Paths.get("target", "model", s"vectors-$name")
+    val name  = digest.digest().take(8).map(byte => f"$byte%02x").mkString
+    val built = Paths.get("target", "model", s"vectors-$name")
     if (!Files.exists(built)) {
       Files.createDirectories(built.getParent)
       val fresh = Files.createTempFile(built.getParent, "vectors", "")
-      val exit  = Seq("g++", "-std=c++17", "-O2", "-I", sources.toString, sources.resolve("vectors.cpp").toString, "-o", fresh.toString).!
+      val exit  = Seq(
+        "g++",
+        "-std=c++17",
+        "-O2",
+        "-I",
+        sources.toString,
+        sources.resolve("vectors.cpp").toString,
+        "-o",
+        fresh.toString
+      ).!
       require(exit == 0, "the model did not compile: is g++ installed?")
       Files.move(fresh, built, StandardCopyOption.REPLACE_EXISTING)
     }

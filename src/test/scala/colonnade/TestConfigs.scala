@@ -14,7 +14,8 @@ object TestConfigs {
     FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, hits = true)
   )
 
-  def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig = tiny.copy(precision = PrecisionConfig(mac, sqrt, div))
+  def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig =
+    tiny.copy(precision = PrecisionConfig(mac, sqrt, div))
 
   /** Formats from the narrowest to the widest, for specs that follow the model. */
   val formats: Seq[ColonnadeConfig] = Seq(

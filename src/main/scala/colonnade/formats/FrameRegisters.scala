@@ -190,9 +190,13 @@ final class DeviceStatus extends Bundle {
   val counters = new Counters
 }
 
-/** What the host pulses. */
 final class Control extends Bundle {
 
   /** A write of 1 starts a frame. */
   val start = Bool()
+}
+
+/** What the host pulses. */
+final class HostCommands extends Bundle {
+  val control = new Control
 }

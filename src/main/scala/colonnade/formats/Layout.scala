@@ -13,29 +13,31 @@ final case class Field(name: String, offset: Int, width: Int, signed: Boolean, f
   def end: Int = offset + width
 }
 
-/** Where the numbers of a Chisel type lie in its bits, most significant first. Read off the definition itself, so that
-  * there is no other one.
+/** Where the numbers of a Chisel type lie in its bits. Read off the definition itself, so that there is no other one.
+  *
+  * Of a bundle the first declared element is the most significant; of a vector, element 0 is the least significant.
   */
 object Layout {
 
-  /** A flattened number before it has a place. */
-  final case class Leaf(name: String, width: Int, signed: Boolean, fraction: Int)
+  /** All numbers in the order of declaration. */
+  def of(data: Data): Seq[Field] = place(data, "", 0)
 
-  def of(data: Data): Seq[Field] = {
-    val numbers = leaves(data)
-    val offsets = numbers.scanRight(0)((number, below) => below + number.width).tail
-    numbers.zip(offsets).map { case (n, offset) => Field(n.name, offset, n.width, n.signed, n.fraction) }
-  }
-
-  /** Numbers in the order of `asUInt`: of a bundle the first declared, of a vector the last comes first. */
-  def leaves(data: Data, name: String = ""): Seq[Leaf] = data match {
-    case fixed: Fixed   => Seq(Leaf(name, fixed.format.width, fixed.format.signed, fixed.format.fraction))
+  private def place(data: Data, name: String, offset: Int): Seq[Field] = data match {
+    case fixed: Fixed =>
+      Seq(Field(name, offset, fixed.format.width, fixed.format.signed, fixed.format.fraction))
     case vector: Vec[_] =>
-      vector.zipWithIndex.reverse.flatMap { case (element: Data, i) => leaves(element, s"$name[$i]") }
+      val elements = vector.map(element => element: Data)
+      elements.zipWithIndex.flatMap { case (element, i) =>
+        place(element, s"$name[$i]", offset + i * element.getWidth)
+      }
     case record: Record =>
-      val prefix = if (name.isEmpty) "" else s"$name."
-      record.elements.toSeq.reverse.flatMap { case (field, element) => leaves(element, prefix + field) }
-    case signed: SInt => Seq(Leaf(name, signed.getWidth, signed = true, fraction = 0))
-    case other        => Seq(Leaf(name, other.getWidth, signed = false, fraction = 0))
+      val prefix            = if (name.isEmpty) "" else s"$name."
+      val (names, elements) = record.elements.toSeq.unzip
+      val offsets           = elements.scanLeft(offset)(_ + _.getWidth)
+      names.zip(elements).zip(offsets).reverse.flatMap { case ((field, element), at) =>
+        place(element, prefix + field, at)
+      }
+    case signed: SInt => Seq(Field(name, offset, signed.getWidth, signed = true, fraction = 0))
+    case other        => Seq(Field(name, offset, other.getWidth, signed = false, fraction = 0))
   }
 }

@@ -28,10 +28,10 @@ object RegisterMap {
 
   def apply(config: ColonnadeConfig): Seq[Register] = {
     val numbers = Seq(
-      (new Control, Access.WriteOnly),
+      (new HostCommands, Access.WriteOnly),
       (new DeviceStatus, Access.ReadOnly),
       (new FrameRegisters(config), Access.ReadWrite)
-    ).flatMap { case (bundle, access) => Layout.leaves(bundle).map(_ -> access) }
+    ).flatMap { case (bundle, access) => Layout.of(bundle).map(_ -> access) }
 
     val words     = numbers.map { case (number, _) => (number.width + dataBits - 1) / dataBits }
     val addresses = words.scanLeft(0)(_ + _)

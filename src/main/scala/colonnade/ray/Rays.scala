@@ -43,10 +43,10 @@ object Context {
 final class RayRequest(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
 
-  val context   = Context(config)
-  val isShadow  = Bool()
-  val origin    = Vec3(new Fixed(new RayFormats(numbers).scene))
-  val towards   = Vec3(SInt(numbers.directionBits.W))
+  val context  = Context(config)
+  val isShadow = Bool()
+  val origin   = Vec3(new Fixed(new RayFormats(numbers).scene))
+  val towards  = Vec3(SInt(numbers.directionBits.W))
 }
 
 /** Which way a ray goes: its dominant axis (0, 1, 2) and the signs in its own frame, where x' and y' are the axes after
@@ -104,7 +104,7 @@ object PermutedFrame {
 
   /** The inverse of [[apply]]. */
   def back[T <: Data](permuted: Seq[T], axis: UInt): Vec3[T] = {
-    val Seq(x, y, z)         = permuted
+    val Seq(x, y, z)                = permuted
     def select(a: T, b: T, c: T): T = chisel3.util.MuxLookup(axis, c)(Seq(0.U -> a, 1.U -> b))
     Vec3.of(select(z, y, x), select(x, z, y), select(y, x, z))
   }

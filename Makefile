@@ -1,0 +1,47 @@
+# Colonnade. `make setup` once (every target calls it), then `make render` or `make test`.
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.PHONY: help setup render test test-hardware test-host verify bench check format clean
+
+venv := .venv/bin
+SCENE ?= scenes/first-light.toml
+CONFIG ?= small
+SIZE ?= 640x480
+BENCH_CONFIG ?= edge
+
+help: ## what the targets do
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 24
+
+setup: ## install whatever is missing: system programs, .venv, sbt
+	@tools/setup
+
+render: setup ## render SCENE through the RTL of CONFIG at SIZE into out/render.png
+	@mkdir -p out
+	@$(venv)/colonnade render $(SCENE) --config $(CONFIG) --backend rtl --size $(SIZE) --output out/render.png --json out/render.json
+
+test: setup ## the hardware's specs (sbt test) and the host's tests (pytest)
+	@tools/test
+
+test-hardware: setup ## only sbt test
+	@tools/test hardware
+
+test-host: setup ## only pytest
+	@tools/test host
+
+verify: setup ## the full matrix: array shapes, precisions, meshes; long
+	@tools/verify
+
+bench: setup ## rays per cycle of the benchmark meshes
+	@$(venv)/colonnade bench --config $(BENCH_CONFIG)
+
+check: setup ## formatters, linters, types, golden manifests
+	@tools/check
+
+format: setup ## let the formatters rewrite the sources
+	@tools/sbt scalafmtAll
+	@$(venv)/ruff check --fix --select I host
+	@$(venv)/ruff format host
+
+clean: ## remove everything that was built, fetched or cached
+	@rm -rf .venv .tools .cache out target project/target project/project test_run_dir build host/build

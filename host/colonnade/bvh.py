@@ -1,0 +1,105 @@
+"""The acceleration structure over quantised triangles, built by the C++ half of the host."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+EMPTY, NODE, LEAF = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class TreeStatistics:
+    """What a tree costs.
+
+    Attributes:
+        nodes, leaves: Records of either kind.
+        depth: Nodes on the longest path.
+        stack_bound: Most siblings that can wait while one ray descends: the stack it may need.
+        cost: Records that a random ray through the root box reads, by the surface-area heuristic.
+        height_limit: Binary levels to which the tree was held so that the stack suffices; 0 where it was free.
+    """
+
+    nodes: int
+    leaves: int
+    depth: int
+    stack_bound: int
+    cost: float
+    height_limit: int
+
+
+@dataclass(frozen=True)
+class Bvh:
+    """A tree of n nodes with `arity` children, l leaves and m triangles.
+
+    A child's planes are ``origin + (low << exponent)`` and ``origin + (high << exponent)``, in vertex units.
+
+    Attributes:
+        origin: uint32 [n, 3], units.
+        exponent: uint8 [n, 3].
+        kinds: uint8 [n, arity]: EMPTY, NODE or LEAF.
+        low, high: uint16 [n, arity, 3].
+        first_child: uint32 [n], the node of the first NODE child; the others follow in slot order.
+        first_triangles: uint32 [n], the leaf of the first LEAF child; the others follow in slot order.
+        leaf_first, leaf_count: uint32 [l], packed id of a leaf's first triangle, and its triangles.
+        order: uint32 [m], the triangle (row of the faces) of each packed id.
+        statistics: What the tree costs.
+    """
+
+    origin: npt.NDArray[np.uint32]
+    exponent: npt.NDArray[np.uint8]
+    kinds: npt.NDArray[np.uint8]
+    low: npt.NDArray[np.uint16]
+    high: npt.NDArray[np.uint16]
+    first_child: npt.NDArray[np.uint32]
+    first_triangles: npt.NDArray[np.uint32]
+    leaf_first: npt.NDArray[np.uint32]
+    leaf_count: npt.NDArray[np.uint32]
+    order: npt.NDArray[np.uint32]
+    statistics: TreeStatistics
+
+
+def build_bvh(
+    vertices: npt.NDArray[np.int32],
+    faces: npt.NDArray[np.int32],
+    *,
+    triangles_per_record: int,
+    arity: int,
+    box_bits: int,
+    stack_depth: int,
+) -> Bvh:
+    """The tree over triangles of integer vertices.
+
+    The order of the triangles depends on neither arity nor box bits. When the tree that is best for the rays needs more
+    than ``stack_depth`` entries, more balanced ones are tried; the caller compares ``statistics.stack_bound``.
+
+    Args:
+        vertices: int32 [n, 3], units, from 0.
+        faces: int32 [m, 3], at least one.
+        triangles_per_record: Most triangles of a leaf.
+        arity: 2 or 4.
+        box_bits: Bits of a child's plane relative to its node.
+        stack_depth: Entries of the traversal stack.
+    """
+    from colonnade import _core
+
+    arrays: dict[str, Any] = _core.build_bvh(
+        np.ascontiguousarray(vertices, dtype=np.int32),
+        np.ascontiguousarray(faces, dtype=np.int32),
+        triangles_per_record,
+        arity,
+        box_bits,
+        stack_depth,
+    )
+    statistics = TreeStatistics(
+        nodes=len(arrays["kinds"]),
+        leaves=len(arrays["leaf_first"]),
+        depth=arrays.pop("depth"),
+        stack_bound=arrays.pop("stack_bound"),
+        cost=arrays.pop("cost"),
+        height_limit=arrays.pop("height_limit"),
+    )
+    return Bvh(statistics=statistics, **arrays)

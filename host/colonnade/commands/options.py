@@ -1,0 +1,54 @@
+"""Options that several subcommands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+#: A path argument; whether it exists is checked where it is read, with a message that says what it should be.
+FILE = click.Path(path_type=Path)
+
+
+def configuration_options(command: Command) -> Command:
+    """Add ``--config`` and ``--set``: which hardware is meant."""
+    command = click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="Change one field of the configuration, e.g. array.rows=4. May be repeated.",
+    )(command)
+    return click.option(
+        "--config",
+        default="small",
+        show_default=True,
+        metavar="C",
+        help="Hardware: a preset (tiny, small, edge), a JSON file, or a precision such as 32b32s64d.",
+    )(command)
+
+
+def json_option(command: Command) -> Command:
+    """Add ``--json``: the report for machines."""
+    return click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the report as JSON.")(command)
+
+
+def require_outputs(*paths: Path | None) -> None:
+    """Refuse output files that cannot be written, before the work starts."""
+    from colonnade.files import check_writable
+
+    for path in paths:
+        if path is not None:
+            check_writable(path)
+
+
+def finish(report: Mapping[str, Any], json_file: Path | None) -> None:
+    """Write the report where ``--json`` asks for it."""
+    if json_file is not None:
+        from colonnade.files import write_json
+
+        write_json(json_file, report)

@@ -1,0 +1,184 @@
+"""Runs the Chisel generator and keeps what it made, by content.
+
+The generator is compiled once per state of its sources, with sbt; every configuration after that is one run of plain
+Java. Results live in ``generator/SOURCES/KEY`` of the cache, where SOURCES stands for the generator's sources and KEY
+for the configuration, its overrides and the kind of output.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from colonnade.configuration import ConfigurationSource, find_configuration
+from colonnade.errors import UserError
+from colonnade.files import locked
+from colonnade.manifest import Manifest
+from colonnade.progress import QUIET, Progress
+from colonnade.toolchain import cache_directory, find_java, project_root
+
+#: States of the sources whose results are kept; older ones go once they have not been used for a day.
+KEPT_STATES = 4
+
+_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+
+
+@dataclass(frozen=True)
+class GeneratedDesign:
+    """What the generator wrote for one configuration.
+
+    Attributes:
+        dir: folder with ``manifest.json`` and, for a whole design, the SystemVerilog and ``filelist.f``.
+        manifest: the manifest, read.
+    """
+
+    dir: Path
+    manifest: Manifest
+
+
+def manifest_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
+    """The manifest of a configuration, without Verilog: all that packing, the model and placement need."""
+    return _cached(config, overrides, ("--manifest-only",), progress)
+
+
+def design_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
+    """The SystemVerilog and the manifest of a configuration: what a simulation is built from."""
+    return _cached(config, overrides, (), progress)
+
+
+def generate(
+    config: str,
+    overrides: Sequence[str],
+    output: Path,
+    manifest_only: bool = False,
+    black_box_memories: bool = False,
+    progress: Progress = QUIET,
+) -> GeneratedDesign:
+    """Generate into ``output``, a folder of the user's, which is replaced only by a complete result."""
+    if output.exists() and not output.is_dir():
+        raise UserError(f"{output} is a file: --output names a folder")
+    if output.is_dir() and any(output.iterdir()) and not (output / "manifest.json").is_file():
+        raise UserError(f"{output} is not empty and holds no generated design: name another --output")
+    options = ("--manifest-only",) * manifest_only + ("--black-box-memories",) * black_box_memories
+    design = _cached(config, overrides, options, progress)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    incoming = output.with_name(f".{output.name}.{os.getpid()}")
+    shutil.copytree(design.dir, incoming)
+    if output.exists():
+        shutil.rmtree(output)
+    incoming.rename(output)
+    return GeneratedDesign(output, design.manifest)
+
+
+def source_hash(root: Path) -> str:
+    """A short hash of everything the generator is compiled from."""
+    sources = [root / "build.sbt", root / "project" / "build.properties"]
+    sources += [*(root / "project").glob("*.sbt"), *(root / "project").glob("*.scala")]
+    sources += [path for path in (root / "src" / "main").rglob("*") if path.is_file()]
+    digest = hashlib.sha256()
+    for path in sorted(sources):
+        if path.is_file():
+            content = path.read_bytes()
+            digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode() + content)
+    return digest.hexdigest()[:20]
+
+
+def _cached(config: str, overrides: Sequence[str], options: tuple[str, ...], progress: Progress) -> GeneratedDesign:
+    root = project_root()
+    source = find_configuration(config, overrides, root)
+    state = cache_directory(root) / "generator" / source_hash(root)
+    design = state / _key(source, options)
+    if not (design / "manifest.json").is_file():
+        java = find_java()
+        with locked(state.parent / "lock"):
+            if not (design / "manifest.json").is_file():
+                classpath = _compiled(root, state, progress)
+                _run(root, java, classpath, source, options, design, progress)
+    return GeneratedDesign(design, Manifest.load(design / "manifest.json"))
+
+
+def _key(source: ConfigurationSource, options: Sequence[str]) -> str:
+    parts = [source.path.read_bytes(), *(part.encode() for part in (*source.overrides, *options))]
+    return hashlib.sha256(b"".join(f"{len(part)}:".encode() + part for part in parts)).hexdigest()[:20]
+
+
+def _compiled(root: Path, state: Path, progress: Progress) -> str:
+    """Compile the generator unless this state of it is compiled, and return its class path."""
+    recorded = state / "classpath"
+    if recorded.is_file():
+        os.utime(state)
+        return recorded.read_text()
+    log = state.parent / "sbt.log"
+    with progress.step("compiling the generator"), log.open("w") as stream:
+        status = subprocess.run(
+            [root / "tools" / "sbt", "compile", "export Runtime/fullClasspath"],
+            stdin=subprocess.DEVNULL,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            check=False,
+        ).returncode
+    lines = _ANSI.sub("", log.read_text(errors="replace")).splitlines()
+    if status != 0:
+        errors = [line.removeprefix("[error]").strip() for line in lines if line.startswith("[error]")]
+        first = errors[0] if errors else (lines[-1] if lines else f"sbt ended with status {status}")
+        raise UserError(f"the generator does not compile: {first} (all of it: {log})")
+    entries = next((line for line in reversed(lines) if ".jar" in line and os.pathsep in line), "").split(os.pathsep)
+    built = [entry for entry in entries if Path(entry).is_dir()]
+    if not built:
+        raise RuntimeError(f"sbt printed no class path: see {log}")
+    # A later compile overwrites sbt's own folder of classes: keep those of this state.
+    incoming = state.with_name(f".{state.name}.{os.getpid()}")
+    shutil.rmtree(incoming, ignore_errors=True)
+    incoming.mkdir(parents=True)
+    for index, folder in enumerate(built):
+        shutil.copytree(folder, incoming / f"classes{index}")
+        entries[entries.index(folder)] = str(state / f"classes{index}")
+    (incoming / "classpath").write_text(os.pathsep.join(entries))
+    shutil.rmtree(state, ignore_errors=True)
+    incoming.rename(state)
+    _forget_old_states(state.parent)
+    return os.pathsep.join(entries)
+
+
+def _run(
+    root: Path,
+    java: Path,
+    classpath: str,
+    source: ConfigurationSource,
+    options: Sequence[str],
+    design: Path,
+    progress: Progress,
+) -> None:
+    """One run of the generator; its error line becomes ours."""
+    sets = [argument for override in source.overrides for argument in ("--set", override)]
+    command = [str(java), *_java_options(root), "-cp", classpath, "colonnade.Generate"]
+    command += ["--config", str(source.path), "--output", str(design), *sets, *options]
+    with progress.step("generating the manifest" if "--manifest-only" in options else "generating the hardware"):
+        done = subprocess.run(command, cwd=root, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    if done.returncode == 2:
+        lines = [line for line in done.stderr.splitlines() if line.strip()] or ["the generator refused its input"]
+        raise UserError(re.sub(r"^(colonnade(\.Generate)?: )?error: ", "", lines[-1].strip()))
+    if done.returncode != 0 or not (design / "manifest.json").is_file():
+        log = design.parent / "generate.log"
+        log.write_text(done.stdout + done.stderr)
+        raise RuntimeError(f"the generator failed with status {done.returncode}: see {log}")
+
+
+def _java_options(root: Path) -> list[str]:
+    file = root / ".jvmopts"
+    lines = file.read_text().split("\n") if file.is_file() else ["-Xss16m"]
+    return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
+
+
+def _forget_old_states(folder: Path) -> None:
+    states = sorted((path for path in folder.iterdir() if path.is_dir()), key=lambda path: path.stat().st_mtime)
+    for state in states[:-KEPT_STATES]:
+        if time.time() - state.stat().st_mtime > 86_400:
+            shutil.rmtree(state, ignore_errors=True)

@@ -1,0 +1,52 @@
+"""Files of hits: which triangle each pixel's ray met, and how far away (`--hits FILE.npz`)."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from colonnade.errors import UserError
+from colonnade.files import replacing
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Hits:
+    """The hits of one frame.
+
+    Attributes:
+        triangle: int64 [height, width], index of the face in the mesh's file; -1 where the ray missed.
+        t: float64 [height, width], distance along the primary ray; not a number where the ray missed.
+    """
+
+    triangle: NDArray[np.int64]
+    t: NDArray[np.float64]
+
+
+def write_hits(path: Path, hits: Hits) -> None:
+    """Write the hits of a frame as a compressed npz file with the arrays `triangle` and `t`."""
+    import numpy as np
+
+    with replacing(path) as stream:
+        np.savez_compressed(stream, triangle=hits.triangle.astype(np.int64), t=hits.t.astype(np.float64))
+
+
+def read_hits(path: Path) -> Hits:
+    """Read the hits of a frame, or say what is wrong with the file."""
+    import numpy as np
+
+    if not path.is_file():
+        raise UserError(f"no hits file {path}: check the path")
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            triangle, t = np.asarray(arrays["triangle"]), np.asarray(arrays["t"])
+    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
+        raise UserError(f"{path} is no hits file: write one with colonnade render --hits") from error
+    if triangle.ndim != 2 or t.shape != triangle.shape or triangle.dtype.kind not in "iu":
+        raise UserError(f"{path} is no hits file: triangle and t are not two equal [height, width] arrays")
+    return Hits(triangle.astype(np.int64), t.astype(np.float64))

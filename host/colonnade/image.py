@@ -1,0 +1,173 @@
+"""The scene image: one file with the memory contents of a packed scene.
+
+Layout, little-endian: 8 bytes magic; uint32 length of the header; header as JSON; records; the face table, int32 for
+each packed id; SHA-256 of all that went before. The placement of camera, light and object is no part of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.bvh import TreeStatistics
+from colonnade.errors import UserError
+from colonnade.files import replacing
+from colonnade.manifest import Manifest
+from colonnade.meshes import Extent
+
+MAGIC = b"CLNDIMG1"
+FILE_NAME = "scene.image"
+_DIGEST_BYTES = 32
+_ADVICE = "pack the scene again"
+
+
+@dataclass(frozen=True)
+class ObjectFrame:
+    """How the mesh lies in the object's cube: ``unit_vertex = (vertex - offset) * scale``.
+
+    Attributes:
+        scale: Vertex units for one mesh unit.
+        offset: Mesh coordinates of the cube's corner (0, 0, 0).
+    """
+
+    scale: float
+    offset: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ImageHeader:
+    """What a scene image holds.
+
+    Attributes:
+        format_hash: Of the manifest it was packed for.
+        mesh: Name of the mesh.
+        source_triangles: Faces of the mesh's file.
+        triangles: Packed ones; ids run from 0.
+        record_bits, record_count: Of the column memory.
+        triangle_base, triangle_records, attribute_base: Sections, in records.
+        bounds_low, bounds_high: The object's tight box, vertex units, inclusive.
+        frame: How the mesh lies in the object's cube.
+        extent: Box and outline in mesh space, for framing.
+        tree: None for an image without nodes.
+    """
+
+    format_hash: str
+    mesh: str
+    source_triangles: int
+    triangles: int
+    record_bits: int
+    record_count: int
+    triangle_base: int
+    triangle_records: int
+    attribute_base: int
+    bounds_low: tuple[int, int, int]
+    bounds_high: tuple[int, int, int]
+    frame: ObjectFrame
+    extent: Extent
+    tree: TreeStatistics | None
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object; floats survive it unchanged."""
+        data = asdict(self)
+        data["extent"] = {name: np.asarray(value).tolist() for name, value in data["extent"].items()}
+        return data
+
+    @staticmethod
+    def from_json(data: dict[str, Any]) -> ImageHeader:
+        """The header of a JSON object that `to_json` made."""
+        values = dict(data)
+        values["bounds_low"] = tuple(values["bounds_low"])
+        values["bounds_high"] = tuple(values["bounds_high"])
+        frame = values["frame"]
+        values["frame"] = ObjectFrame(frame["scale"], tuple(frame["offset"]))
+        extent = {name: np.array(value, dtype=np.float64) for name, value in values["extent"].items()}
+        values["extent"] = Extent(**extent)
+        values["tree"] = TreeStatistics(**values["tree"]) if values["tree"] else None
+        return ImageHeader(**values)
+
+
+@dataclass(frozen=True)
+class SceneImage:
+    """Memory contents and header.
+
+    Attributes:
+        header: What it holds.
+        records: uint8 [record_count, record_bits / 8], little-endian.
+        source_faces: int32 [triangles], the face in the mesh's file of each packed id.
+    """
+
+    header: ImageHeader
+    records: npt.NDArray[np.uint8]
+    source_faces: npt.NDArray[np.int32]
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the file, or ``scene.image`` in a folder, which is made; returns its path. Whole or not at all."""
+        file = Path(path)
+        if file.is_dir() or not file.suffix:
+            try:
+                file.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise UserError(f"cannot make the folder {file}: {error.strerror}") from None
+            file = file / FILE_NAME
+        header = json.dumps(self.header.to_json(), separators=(",", ":"), sort_keys=True).encode()
+        parts = [MAGIC, struct.pack("<I", len(header)), header]
+        parts += [self.records.tobytes(), self.source_faces.astype("<i4").tobytes()]
+        digest = hashlib.sha256()
+        with replacing(file) as stream:
+            for part in parts:
+                digest.update(part)
+                stream.write(part)
+            stream.write(digest.digest())
+        return file
+
+    @staticmethod
+    def load(path: str | Path, manifest: Manifest | None = None) -> SceneImage:
+        """Reads a scene image; with a manifest, one that was packed for another format is refused."""
+        file = Path(path)
+        if file.is_dir():
+            file = file / FILE_NAME
+        try:
+            data = file.read_bytes()
+        except FileNotFoundError:
+            raise UserError(f"there is no scene image {file}: run colonnade pack first") from None
+        except OSError as error:
+            raise UserError(f"cannot read the scene image {file}: {error.strerror}") from None
+        if data[: len(MAGIC)] != MAGIC:
+            raise UserError(f"{file} is not a scene image")
+        header, start = _header(data, file)
+        records_end = start + header.record_count * header.record_bits // 8
+        faces_end = records_end + 4 * header.triangles
+        if len(data) < faces_end + _DIGEST_BYTES:
+            expected = faces_end + _DIGEST_BYTES
+            raise UserError(f"{file} is truncated ({len(data):,} of {expected:,} bytes): {_ADVICE}")
+        if len(data) > faces_end + _DIGEST_BYTES or hashlib.sha256(data[:faces_end]).digest() != data[faces_end:]:
+            raise UserError(f"{file} is corrupt (its checksum does not match): {_ADVICE}")
+        if manifest is not None and header.format_hash != manifest.format_hash:
+            raise UserError(
+                f"{file} was packed for another format ({header.format_hash[:12]}, the hardware has"
+                f" {manifest.format_hash[:12]}): pack the scene again for this configuration"
+            )
+        raw = np.frombuffer(data, dtype=np.uint8)
+        records = raw[start:records_end].reshape(header.record_count, header.record_bits // 8)
+        return SceneImage(header, records, np.frombuffer(data[records_end:faces_end], dtype="<i4").astype(np.int32))
+
+
+def _header(data: bytes, file: Path) -> tuple[ImageHeader, int]:
+    """The header and where the records begin."""
+    start = len(MAGIC) + 4
+    if len(data) < start:
+        raise UserError(f"{file} is truncated ({len(data)} bytes): {_ADVICE}")
+    (length,) = struct.unpack_from("<I", data, len(MAGIC))
+    if len(data) < start + length + _DIGEST_BYTES:
+        raise UserError(f"{file} is truncated ({len(data):,} bytes): {_ADVICE}")
+    try:
+        return ImageHeader.from_json(json.loads(data[start : start + length])), start + length
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise UserError(f"{file} is corrupt (its header cannot be read): {_ADVICE}") from None

@@ -1,0 +1,82 @@
+"""What a scene image holds, for `colonnade inspect` and the report of `colonnade pack`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+from colonnade.image import ImageHeader, SceneImage
+from colonnade.manifest import Manifest
+
+
+def describe(image: SceneImage) -> dict[str, Any]:
+    """Mesh, memory map and tree statistics as a JSON object."""
+    header = image.header
+    return {
+        "mesh": {
+            "name": header.mesh,
+            "triangles": header.triangles,
+            "source_triangles": header.source_triangles,
+            "low": header.extent.low.tolist(),
+            "high": header.extent.high.tolist(),
+        },
+        "object": {
+            "units_per_mesh_unit": header.frame.scale,
+            "offset": list(header.frame.offset),
+            "bounds_low": list(header.bounds_low),
+            "bounds_high": list(header.bounds_high),
+        },
+        "memory": {
+            "record_bits": header.record_bits,
+            "records": header.record_count,
+            "bytes": image.records.nbytes,
+            "sections": {name: {"first": first, "records": count} for name, first, count in sections(header)},
+        },
+        "tree": asdict(header.tree) if header.tree is not None else None,
+        "format_hash": header.format_hash,
+    }
+
+
+def sections(header: ImageHeader) -> list[tuple[str, int, int]]:
+    """The memory map: (name, first record, records)."""
+    return [
+        ("nodes", 0, header.triangle_base),
+        ("triangles", header.triangle_base, header.triangle_records),
+        ("attributes", header.attribute_base, header.record_count - header.attribute_base),
+    ]
+
+
+def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[str]:
+    """The description as lines of text; with a manifest also how full its memories are."""
+    dropped = header.source_triangles - header.triangles
+    lines = [
+        f"mesh        {header.mesh}: {header.triangles:,} triangles" + (f" ({dropped:,} dropped)" if dropped else "")
+    ]
+    lines.append(
+        f"box         {header.bounds_low} to {header.bounds_high} units, {header.frame.scale:.6g} units a mesh unit"
+    )
+    used = f"{header.record_count:,} records of {header.record_bits} bits"
+    if manifest is not None:
+        depth = int(manifest.memories["columnBvh"]["depth"])
+        used += f", {header.record_count / depth:.1%} of {depth:,}"
+    lines.append(f"memory      {used} ({header.record_count * header.record_bits // 8:,} bytes a column)")
+    lines += [f"  {name:<10}{count:>9,} records from {first:,}" for name, first, count in sections(header) if count]
+    tree = header.tree
+    if tree is None:
+        lines.append("tree        none: every ray tests every triangle")
+        return lines
+    stack = f"{tree.stack_bound} entries"
+    if manifest is not None:
+        stack += f" of {manifest.config['columnBvhMemory']['stackDepth']}"
+    lines.append(f"tree        {tree.nodes:,} nodes, {tree.leaves:,} leaves, depth {tree.depth}, stack bound {stack}")
+    lines.append(f"cost        {tree.cost:.2f} records for a random ray through the box")
+    if tree.height_limit:
+        lines.append(f"            held to {tree.height_limit} binary levels so that the stack suffices")
+    return lines
+
+
+def print_report(header: ImageHeader, manifest: Manifest | None = None, write: Callable[[str], None] = print) -> None:
+    """Writes `report_lines`, one call a line."""
+    for line in report_lines(header, manifest):
+        write(line)

@@ -1,0 +1,208 @@
+"""Triangle meshes: by name, or from a file that trimesh reads (OBJ, PLY, STL, OFF, GLB).
+
+Whatever the source, a mesh leaves here clean: vertices merged by position, no face without area, none twice, no
+vertex unused. Normals of the file are not used: smooth ones are made anew from the merged faces, weighted by angle.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade import solids, teapot
+from colonnade.errors import UserError
+from colonnade.surfaces import Faces, Floats, drop_faces, merge_rows, subdivide, vertex_normals
+
+#: File names that are taken for meshes.
+SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
+TEAPOT_LEVEL = 10
+TEAPOT_LIMIT = 200
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What framing needs of a mesh: its box and the vertices that lie outermost.
+
+    Attributes:
+        low, high: The box, float64 [3], mesh space.
+        outline: Vertices that are outermost in one of many directions, float64 [k, 3], mesh space.
+    """
+
+    low: Floats
+    high: Floats
+    outline: Floats
+
+    @property
+    def edge(self) -> float:
+        """Edge of the bounding cube, mesh units."""
+        return float((self.high - self.low).max())
+
+    @property
+    def centre(self) -> Floats:
+        """Centre of box and cube, float64 [3]."""
+        return (self.low + self.high) / 2
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A clean triangle mesh.
+
+    Attributes:
+        vertices: float64 [n, 3], mesh space.
+        faces: int32 [m, 3], counter-clockwise seen from outside.
+        vertex_normals: float64 [n, 3], unit length, or 0 where the faces cancel.
+        face_materials: uint8 [m], index into the material table.
+        source_faces: int32 [m], the face's number in the source, where dropped faces count too.
+        source_count: Faces of the source.
+        name: For reports.
+    """
+
+    vertices: Floats
+    faces: Faces
+    vertex_normals: Floats
+    face_materials: npt.NDArray[np.uint8]
+    source_faces: npt.NDArray[np.int32]
+    source_count: int
+    name: str
+
+    @cached_property
+    def extent(self) -> Extent:
+        """Box and outline."""
+        points, _ = solids.sphere(720)
+        directions = np.unique(points, axis=0)
+        outermost: set[int] = set()
+        for direction in directions[directions[:, 0] >= 0]:
+            reach = self.vertices @ direction
+            outermost |= {int(reach.argmax()), int(reach.argmin())}
+        return Extent(self.vertices.min(axis=0), self.vertices.max(axis=0), self.vertices[sorted(outermost)])
+
+
+def load_mesh(name_or_path: str | Path) -> Mesh:
+    """The mesh of that name, or in that file.
+
+    Names are ``teapot`` and ``teapot:LEVEL``, the solids (``sphere:TRIANGLES``, ``cube`` …), the well-known meshes
+    (``bunny`` …), and the files in the folders of the environment variable COLONNADE_MESHES without their suffix.
+
+    Raises:
+        UserError: There is no such mesh, or it cannot be rendered.
+    """
+    text = str(name_or_path)
+    if isinstance(name_or_path, str) and (built := _built_in(text)) is not None:
+        return clean_mesh(*built, name=text)
+    from colonnade import mesh_library
+
+    looks_like_path = os.sep in text or Path(text).suffix.lower() in SUFFIXES
+    if isinstance(name_or_path, str) and not looks_like_path and not Path(text).is_file():
+        found = mesh_library.find(text)
+        mesh = _read(found.path, found.subdivisions)
+        return replace(mesh, name=text)
+    return _read(Path(text), 0)
+
+
+def _built_in(name: str) -> tuple[Floats, Faces] | None:
+    """Teapot and solids; None for other names."""
+    base, colon, argument = name.partition(":")
+    if base in solids.PLAIN and not colon:
+        return solids.PLAIN[base]()
+    if base == "teapot":
+        return teapot.tessellate(_size(name, argument, TEAPOT_LEVEL, 1, TEAPOT_LIMIT, bool(colon)))
+    if base in solids.SIZED:
+        make, default, least, most = solids.SIZED[base]
+        return make(_size(name, argument, default, least, most, bool(colon)))
+    return None
+
+
+def _size(name: str, argument: str, default: int, least: int, most: int, given: bool) -> int:
+    if not given:
+        return default
+    if not argument.isascii() or not argument.isdigit() or not least <= int(argument) <= most:
+        raise UserError(f"mesh {name}: the number after the colon must be from {least} to {most:,}")
+    return int(argument)
+
+
+def _read(path: Path, subdivisions: int) -> Mesh:
+    """A mesh file, with each triangle cut into four at its midpoints ``subdivisions`` times."""
+    if not path.exists():
+        raise UserError(f"mesh file {path} does not exist")
+    if path.is_dir():
+        raise UserError(f"{path} is a folder: name a mesh file")
+    if path.suffix.lower() not in SUFFIXES:
+        raise UserError(f"{path}: a mesh file ends with one of {', '.join(SUFFIXES)}")
+    if path.stat().st_size == 0:
+        raise UserError(f"mesh file {path} is empty")
+    try:
+        geometry = _load_geometry(path)
+    except (UserError, ImportError):
+        raise
+    except Exception as error:  # whatever a reader makes of noise
+        raise UserError(f"{path} cannot be read as a mesh: {type(error).__name__}: {error}") from None
+    vertices, faces = geometry
+    if len(faces) == 0:
+        raise UserError(f"mesh {path} has no faces")
+    vertices, faces = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise UserError(f"{path} cannot be read as a mesh of triangles")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise UserError(f"mesh {path}: a face names a vertex that does not exist")
+    for _ in range(subdivisions):
+        vertices, faces = subdivide(vertices, faces)
+    return clean_mesh(vertices, faces.astype(np.int32), name=path.stem, where=str(path))
+
+
+def _load_geometry(path: Path) -> tuple[Any, Any]:
+    """Vertices and faces as trimesh reads them; the parts of a scene are joined."""
+    import logging
+
+    import trimesh
+
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
+    loaded: Any = trimesh.load_scene(path, process=False)
+    parts = [part for part in loaded.dump() if isinstance(part, trimesh.Trimesh)]
+    if not parts:
+        raise UserError(f"mesh {path} has no faces")
+    if len(parts) == 1:
+        return parts[0].vertices, parts[0].faces
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    vertices = np.concatenate([part.vertices for part in parts])
+    return vertices, np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)])
+
+
+def clean_mesh(vertices: Floats, faces: Faces, name: str, where: str | None = None) -> Mesh:
+    """A mesh from raw vertices [n, 3] and faces [m, 3]; ``where`` names the source in errors."""
+    label = f"mesh {where or name}"
+    if len(faces) == 0:
+        raise UserError(f"{label} has no faces")
+    if not np.isfinite(vertices).all():
+        bad = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
+        raise UserError(f"{label}: vertex {bad} is not a finite number: repair the file")
+    source_count = len(faces)
+    used, numbered = np.unique(faces, return_inverse=True)
+    vertices = vertices[used]
+    if np.abs(vertices).max() > 1e100:
+        raise UserError(f"{label} has coordinates beyond 1e100: scale it down")
+    merged, index = merge_rows(vertices + 0.0)
+    corners = index[numbered.reshape(-1, 3)]
+    edge = float((merged.max(axis=0) - merged.min(axis=0)).max())
+    if edge > 0:
+        keep = drop_faces((merged - merged.min(axis=0)) / edge, corners)
+    if edge == 0 or len(keep) == 0:
+        raise UserError(f"{label} has only degenerate triangles ({source_count:,}, none with an area)")
+    if edge < 1e-100:
+        raise UserError(f"{label} is smaller than 1e-100: scale it up")
+    used, kept = np.unique(corners[keep], return_inverse=True)
+    vertices, faces = merged[used], kept.reshape(-1, 3).astype(np.int32)
+    return Mesh(
+        vertices=vertices,
+        faces=faces,
+        vertex_normals=vertex_normals(vertices, faces),
+        face_materials=np.zeros(len(faces), dtype=np.uint8),
+        source_faces=keep.astype(np.int32),
+        source_count=source_count,
+        name=name,
+    )

@@ -1,0 +1,69 @@
+"""The bit-exact model as a backend: the frame the hardware renders, without its timing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from colonnade.frame import Frame
+from colonnade.image import SceneImage
+from colonnade.manifest import Manifest
+
+ROWS_AT_ONCE = 16
+
+
+def new_model(manifest: Manifest) -> Any:
+    """A ``colonnade._core.Model`` of the manifest's design, with empty memories."""
+    from colonnade import _core
+
+    config = manifest.config
+    numbers = {
+        **manifest.numbers,
+        "arity": config["geometry"]["arity"],
+        "trianglesPerRecord": config["geometry"]["trianglesPerRecord"],
+        "stackDepth": config["columnBvhMemory"]["stackDepth"],
+        "bvh": int(config["geometry"]["bvh"]),
+    }
+    layouts = {
+        name: {field.name: (field.offset, field.width, field.signed) for field in layout.fields.values()}
+        for name, layout in manifest.layouts.items()
+    }
+    return _core.Model(numbers, layouts)
+
+
+def load_scene(model: Any, image: SceneImage) -> None:
+    """Fills the model's column memory."""
+    model.load(image.records, image.header.triangle_base, image.header.attribute_base)
+
+
+def render_model(
+    manifest: Manifest,
+    image: SceneImage,
+    registers: Mapping[str, int],
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Frame:
+    """Renders one frame.
+
+    Args:
+        registers: Every rw register by name (``placement.placement``).
+        progress: Called with (rows done, rows in all).
+    """
+    model = new_model(manifest)
+    load_scene(model, image)
+    model.start(dict(registers))
+    height = registers["frame.height"]
+    bands = []
+    for first in range(0, height, ROWS_AT_ONCE):
+        bands.append(model.rows(first, min(first + ROWS_AT_ONCE, height)))
+        progress(min(first + ROWS_AT_ONCE, height), height)
+    pixels = {key: np.concatenate([band[key] for band in bands]) for key in bands[0]}
+    return Frame(
+        colour=pixels["colour"],
+        is_object=pixels["is_object"],
+        triangle=pixels["triangle"],
+        distance=pixels["distance"],
+        counters=model.counters(),
+        errors=[name for name, is_set in model.errors().items() if is_set],
+    )

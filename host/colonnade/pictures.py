@@ -1,0 +1,52 @@
+"""Pictures as files: linear colours to 8-bit sRGB PNG and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from colonnade.errors import UserError
+from colonnade.files import replacing
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+def encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Linear colours (any shape, 0.0 to 1.0, saturated) as 8-bit sRGB, rounded to nearest."""
+    import numpy as np
+
+    value = np.clip(linear, 0.0, 1.0)
+    curved = np.where(value <= 0.0031308, 12.92 * value, 1.055 * np.power(value, 1 / 2.4) - 0.055)
+    return np.rint(curved * 255.0).astype(np.uint8)
+
+
+def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """8-bit sRGB (any shape) as linear colours, 0.0 to 1.0."""
+    import numpy as np
+
+    value = encoded.astype(np.float64) / 255.0
+    return np.where(value <= 0.04045, value / 12.92, np.power((value + 0.055) / 1.055, 2.4))
+
+
+def write_png(path: Path, linear: NDArray[np.float64]) -> None:
+    """Write a picture of linear colours, float64 [height, width, 3], as an 8-bit sRGB PNG."""
+    from PIL import Image
+
+    with replacing(path) as stream:
+        Image.fromarray(encode_srgb(linear)).save(stream, format="PNG")
+
+
+def read_picture(path: Path) -> NDArray[np.uint8]:
+    """Read a picture as 8-bit sRGB, uint8 [height, width, 3]; transparency is dropped."""
+    import numpy as np
+    from PIL import Image, UnidentifiedImageError
+
+    if not path.is_file():
+        raise UserError(f"no picture {path}: check the path")
+    try:
+        with Image.open(path) as picture:
+            return np.asarray(picture.convert("RGB"))
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise UserError(f"{path} is no readable picture: {error}") from error

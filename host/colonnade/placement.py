@@ -1,0 +1,173 @@
+"""Placement: the values of the frame registers for a scene, as docs/numbers.md defines them.
+
+Camera and light are moved into the grid of the object's cube, so that the object itself never moves.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.errors import UserError
+from colonnade.image import ImageHeader
+from colonnade.manifest import Manifest
+from colonnade.scene import Scene
+from colonnade.viewpoint import FloatPlacement, float_placement
+
+__all__ = ["FloatPlacement", "float_placement", "placement", "registers_of"]
+
+Floats = npt.NDArray[np.float64]
+AXES = "xyz"
+CHANNELS = "rgb"
+
+#: Cycles a ray may take before a frame counts as hung; real ones take tens.
+WATCHDOG_CYCLES_PER_RAY = 4096
+
+
+def placement(scene: Scene, header: ImageHeader, manifest: Manifest, width: int, height: int) -> dict[str, int]:
+    """All rw registers of a frame by name; signed ones are signed integers.
+
+    Raises:
+        UserError: The frame, or the camera's or light's distance, is more than the hardware can hold.
+    """
+    limits = manifest.config["frame"]
+    for name, value, setting in (("wide", width, "maxWidth"), ("high", height, "maxHeight")):
+        if not 1 <= value <= int(limits[setting]):
+            raise UserError(
+                f"a frame of {width}x{height} is too {name}: it must be from 1 to {limits[setting]} pixels"
+                f" (frame.{setting})"
+                if value > 0
+                else f"a frame of {width}x{height} has no pixels"
+            )
+    return registers_of(float_placement(scene, header.extent, width, height), header, manifest)
+
+
+def registers_of(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
+    """The registers for a frame that was placed in floats."""
+    registers: dict[str, int] = {"frame.width": view.width, "frame.height": view.height}
+    registers |= _positions(view, header, manifest)
+    registers |= _directions(view, manifest)
+    registers |= _bounds(header)
+    registers |= _object_rectangle(view, registers, manifest)
+    registers |= _shading(view, header, manifest)
+    tests = 0 if manifest.bvh else 8 * header.triangle_records
+    cycles = 1_000_000 + 2 * view.width * view.height * (WATCHDOG_CYCLES_PER_RAY + tests)
+    registers["frame.watchdogCycles"] = min(cycles, (1 << 32) - 1)
+    return registers
+
+
+def _positions(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
+    """Camera and light in grid steps, shifted right by the least `unitShift` that lets them fit."""
+    numbers = manifest.numbers
+    reach = 1 << (numbers["sceneBits"] - 1)
+    offset = np.array(header.frame.offset)
+    steps: dict[str, Floats] = {}
+    for name, point in (("camera", view.origin), ("light", view.light)):
+        steps[name] = (point - offset) * header.frame.scale * 2.0 ** numbers["gridFraction"]
+        if not np.abs(steps[name]).max() < reach - 1:
+            edge = header.extent.edge * header.frame.scale * 2.0 ** numbers["gridFraction"]
+            raise UserError(
+                f"the {name} is {np.abs(steps[name]).max() / edge:,.0f} object-cube edges away, the hardware reaches"
+                f" {reach / edge:,.0f}: move it nearer"
+            )
+    shift, limit = 0, (1 << (numbers["macBits"] - 1)) - 1
+    while max(float(np.abs(np.rint(value / 2.0**shift)).max()) for value in steps.values()) > limit:
+        shift += 1
+    result = {"frame.unitShift": shift}
+    for name, value in steps.items():
+        result |= _vector(f"{name}.position", value / 2.0**shift)
+    return result
+
+
+def _directions(view: FloatPlacement, manifest: Manifest) -> dict[str, int]:
+    """Direction and steps, scaled so that the largest component over the picture is 2^(macBits − 2)."""
+    numbers = manifest.numbers
+    width_bits, most_shift = numbers["macBits"], numbers["coordinateBits"]
+    corners = [
+        view.direction + x * view.step_x + y * view.step_y
+        for x, y in itertools.product((0, view.width - 1), (0, view.height - 1))
+    ]
+    limit = float((1 << (width_bits - 1)) - 1) * (1 - 2.0**-50)
+    step = float(np.abs([view.step_x, view.step_y]).max())
+    scale = min(2.0 ** (width_bits - 2) / float(np.abs(corners).max()), (limit - 1) / step)
+    shift = 0
+    while shift < most_shift and step * scale * 2.0 ** (shift + 1) <= limit - 1:
+        shift += 1
+    result = {"camera.stepShift": shift} | _vector("camera.direction", view.direction * scale)
+    result |= _vector("camera.stepX", view.step_x * scale * 2.0**shift)
+    result |= _vector("camera.stepY", view.step_y * scale * 2.0**shift)
+    return result
+
+
+def _bounds(header: ImageHeader) -> dict[str, int]:
+    return {
+        **{f"bounds.low.{axis}": header.bounds_low[a] for a, axis in enumerate(AXES)},
+        **{f"bounds.high.{axis}": header.bounds_high[a] for a, axis in enumerate(AXES)},
+        "scene.recordCount": header.record_count,
+        "scene.triangleBase": header.triangle_base,
+        "scene.triangleRecords": header.triangle_records,
+        "scene.attributeBase": header.attribute_base,
+    }
+
+
+def _object_rectangle(view: FloatPlacement, registers: dict[str, int], manifest: Manifest) -> dict[str, int]:
+    """The pixels whose rays may meet the object: its box, padded as the hardware pads it, projected by the registers.
+
+    A box that reaches behind the camera takes the whole frame, one that is wholly behind it nothing.
+    """
+
+    def vector(name: str) -> Floats:
+        return np.array([float(registers[f"{name}.{axis}"]) for axis in AXES])
+
+    pad = 2.0 ** manifest.numbers["boxPadLog"] + 1
+    low, high = vector("bounds.low") - pad, vector("bounds.high") + pad
+    corners = np.array(
+        [[(low, high)[bit][axis] for axis, bit in enumerate(bits)] for bits in itertools.product((0, 1), repeat=3)]
+    )
+    origin = vector("camera.position") * 2.0 ** (registers["frame.unitShift"] - manifest.numbers["gridFraction"])
+    first = vector("camera.direction") * 2.0 ** registers["camera.stepShift"]
+    # A corner is met at origin + depth · (first + x · stepX + y · stepY).
+    basis = np.stack([vector("camera.stepX"), vector("camera.stepY"), first], axis=1)
+    solved = np.linalg.solve(basis / np.abs(first).max(), (corners - origin).T)
+    depth = solved[2] / np.abs(corners - origin).max()
+    rectangle = [0, 0, view.width, view.height]
+    if (depth < -1e-6).all():
+        rectangle = [0, 0, 0, 0]
+    elif (depth > 1e-6).all():
+        x, y = solved[0] / solved[2], solved[1] / solved[2]
+        limits = (view.width, view.height)
+        least = [int(np.clip(np.floor(v.min()) - 1, 0, most)) for v, most in zip((x, y), limits, strict=True)]
+        greatest = [int(np.clip(np.ceil(v.max()) + 2, 0, most)) for v, most in zip((x, y), limits, strict=True)]
+        empty = least[0] >= greatest[0] or least[1] >= greatest[1]
+        rectangle = [0, 0, 0, 0] if empty else least + greatest
+    return {f"frame.objectRect.{name}": value for name, value in zip(("x0", "y0", "x1", "y1"), rectangle, strict=True)}
+
+
+def _shading(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
+    numbers = manifest.numbers
+    white = (1 << numbers["colourBits"]) - 1
+    steps = view.shadow_offset * header.frame.scale * 2.0 ** numbers["gridFraction"]
+    most = min(2.0 ** (numbers["vertexBits"] - 2 + numbers["gridFraction"]), 2.0 ** (numbers["gridBits"] - 2) - 1)
+    result = {
+        "light.shadowOffset": int(np.clip(np.rint(steps), 1, max(1.0, most))),
+        "shading.flat": int(view.flat),
+        "shading.shadows": int(view.shadows),
+    }
+    light = 1 << numbers["lightFraction"]
+    most_light = (1 << numbers["lightBits"]) - 1
+    result |= _colour("light.colour", view.light_colour * light, most_light)
+    result |= _colour("ambient", view.ambient * light, most_light)
+    result |= _colour("background", view.background * white, white)
+    for index in range(int(manifest.config["frame"]["materials"])):
+        result |= _colour(f"materials[{index}].albedo", view.albedo * white * (index == 0), white)
+    return result
+
+
+def _vector(name: str, values: Floats) -> dict[str, int]:
+    return {f"{name}.{axis}": int(np.rint(values[a])) for a, axis in enumerate(AXES)}
+
+
+def _colour(name: str, values: Floats, most: int) -> dict[str, int]:
+    return {f"{name}.{channel}": min(most, int(np.rint(values[c]))) for c, channel in enumerate(CHANNELS)}

@@ -1,0 +1,130 @@
+"""Scenes: what to render, in TOML.
+
+Colours and intensities are linear. Lengths are in world units, those of the mesh unless ``[transform]`` says otherwise.
+A key that is not known is refused, so that a typing error cannot pass unnoticed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class MeshSource:
+    """Which mesh: a name (see `colonnade.meshes.load_mesh`) or a file."""
+
+    name: str | None = None
+    path: Path | None = None
+
+
+@dataclass(frozen=True)
+class Transform:
+    """World = rotate · scale · mesh + translate; degrees about x, then y, then z."""
+
+    rotate: Vector = (0.0, 0.0, 0.0)
+    scale: float = 1.0
+    translate: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Either a position, or a direction from which the object is framed.
+
+    Attributes:
+        position: World; None when framed.
+        target: What is in the middle of the picture, world; None is the centre of the object's cube.
+        direction: From the centre of the object's cube towards the camera; None when placed.
+        framing: Part of the picture's height that the object's outline takes, centred; less where its
+            width would not fit.
+        up: Which way is up.
+        fov: Vertical field of view, degrees.
+    """
+
+    position: Vector | None = None
+    target: Vector | None = None
+    direction: Vector | None = None
+    framing: float = 0.7
+    up: Vector = (0.0, 1.0, 0.0)
+    fov: float = 40.0
+
+
+@dataclass(frozen=True)
+class Light:
+    """A point light, either at a position or relative to camera and object.
+
+    Attributes:
+        position: World; None when relative.
+        offset: From the centre of the object's cube, in its edges: right, up, towards the camera.
+        colour: Intensity a channel; 1 lights a surface that faces it with its albedo.
+        shadows: Whether it casts any.
+        shadow_offset: How far from the surface a shadow ray starts, in edges of the object's cube.
+    """
+
+    position: Vector | None = None
+    offset: Vector = (1.2, 1.6, 1.5)
+    colour: Vector = (0.9, 0.9, 0.9)
+    shadows: bool = True
+    shadow_offset: float = 1 / 2048
+
+
+@dataclass(frozen=True)
+class Material:
+    """A diffuse surface; flat means geometric normals instead of the vertices'."""
+
+    albedo: Vector = (0.8, 0.8, 0.8)
+    flat: bool = False
+
+
+@dataclass(frozen=True)
+class Colour:
+    """A linear colour."""
+
+    colour: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class FrameSize:
+    """The picture's size unless the command line gives one, pixels."""
+
+    width: int = 640
+    height: int = 480
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One object, one camera, one light."""
+
+    mesh: MeshSource
+    transform: Transform = field(default_factory=Transform)
+    camera: Camera = field(default_factory=lambda: Camera(direction=(0.45, 0.35, 1.0)))
+    light: Light = field(default_factory=Light)
+    material: Material = field(default_factory=Material)
+    ambient: Colour = field(default_factory=lambda: Colour((0.1, 0.1, 0.1)))
+    background: Colour = field(default_factory=Colour)
+    frame: FrameSize = field(default_factory=FrameSize)
+
+    def with_mesh(self, name_or_path: str) -> Scene:
+        """The scene with another mesh: a name, or a path relative to the working directory."""
+        return replace(self, mesh=MeshSource(name=name_or_path))
+
+    @property
+    def mesh_source(self) -> str | Path:
+        """What `colonnade.meshes.load_mesh` takes."""
+        if self.mesh.path is not None:
+            return self.mesh.path
+        assert self.mesh.name is not None
+        return self.mesh.name
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Reads a scene file.
+
+    Raises:
+        UserError: It is missing, not TOML, or says something that has no meaning.
+    """
+    from colonnade.scene_file import read_scene
+
+    return read_scene(Path(path))

@@ -1,0 +1,221 @@
+"""The RTL as a backend: the emitted Verilog under Verilator, built once per design and run on a scene image."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from colonnade.errors import UserError
+from colonnade.files import locked
+from colonnade.frame import Frame
+from colonnade.generator import GeneratedDesign
+from colonnade.image import SceneImage
+from colonnade.manifest import Manifest
+from colonnade.progress import QUIET, Progress, Report
+from colonnade.toolchain import cache_directory, project_root, require_simulator
+
+#: One pixel as the harness writes it (``struct PixelBytes``).
+PIXEL = np.dtype(
+    [("colour", "<u2", 3), ("is_object", "u1"), ("is_seen", "u1"), ("triangle", "<u4"), ("distance", "<f8")]
+)
+
+VERILATOR_OPTIONS = (
+    "--cc --exe --build -O3 --noassert --x-assign fast --x-initial fast --threads 1 "
+    "--output-split 20000 --output-split-cfuncs 2000 -Wno-fatal --top-module Colonnade"
+).split()
+
+
+@dataclass(frozen=True)
+class Stalls:
+    """Disturbances of the harness that must not change a frame.
+
+    Attributes:
+        percent: Share of the cycles in which the pixel sink takes nothing.
+        seed: Of the choice of those cycles.
+    """
+
+    percent: int = 0
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Frames of one run of the simulator.
+
+    Attributes:
+        frames: One for each set of registers.
+        cycles_per_second: Simulated clock cycles in a second of the host's time, while rendering.
+    """
+
+    frames: list[Frame]
+    cycles_per_second: float
+
+
+def build_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path:
+    """The simulator of a design: compiled once, kept by the content of the Verilog and of the harness."""
+    verilator = require_simulator()
+    harness = Path(__file__).parent / "harness" / "harness.cpp"
+    sources = sorted(path for path in design.dir.iterdir() if path.suffix in (".sv", ".v"))
+    digest = hashlib.sha256(" ".join(VERILATOR_OPTIONS).encode())
+    for path in (harness, *sources):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    folder = cache_directory(project_root()) / "simulator" / digest.hexdigest()[:20]
+    program = folder / "simulator"
+    with locked(folder.parent / f"{folder.name}.lock"):
+        if not program.is_file():
+            with (
+                progress.step("building the simulator"),
+                tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as place,
+            ):
+                built = _build(verilator, design.manifest, harness, sources, Path(place), folder.parent)
+                folder.mkdir(exist_ok=True)
+                built.replace(program)
+    os.utime(program)
+    return program
+
+
+def _build(
+    verilator: Path, manifest: Manifest, harness: Path, sources: list[Path], place: Path, logs: Path
+) -> Path:
+    columns = int(manifest.config["array"]["columns"])
+    each = " ".join(f"DO({column})" for column in range(columns))
+    header = f"#pragma once\n#define EACH_COLUMN(DO) {each}\n" + _hit_distance(sources)
+    (place / "columns.hpp").write_text(header)
+    shutil.copy(harness, place / "harness.cpp")
+    command = [str(verilator), *VERILATOR_OPTIONS, "-j", "0", "--Mdir", str(place / "obj"), "-o", "simulator"]
+    command += ["-CFLAGS", f"-O2 -I{place}", *map(str, sources), str(place / "harness.cpp")]
+    log = logs / "build.log"
+    with log.open("w") as stream:
+        status = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=stream, stderr=subprocess.STDOUT, check=False)
+    program = place / "obj" / "simulator"
+    if status.returncode != 0 or not program.is_file():
+        raise RuntimeError(f"the simulator does not build (status {status.returncode}): see {log}")
+    return program
+
+
+def _hit_distance(sources: list[Path]) -> str:
+    """The name of the distance's port ends with its format, which the harness need not know."""
+    top = next(path for path in sources if path.stem == "Colonnade").read_text()
+    match = re.search(r"io_pixels_0_bits_hit_distance_\w+", top)
+    if match is None:
+        return ""
+    suffix = match.group(0).removeprefix("io_pixels_0_")
+    return f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_{suffix}\n"
+
+
+def render_rtl(
+    design: GeneratedDesign,
+    image: SceneImage,
+    registers: list[Mapping[str, int]],
+    stalls: Stalls | None = None,
+    progress: Progress = QUIET,
+) -> Simulated:
+    """Renders frames, one for each set of registers; the image is loaded once.
+
+    Raises:
+        RuntimeError: the hardware misbehaves (a pixel missing, twice, or outside the frame).
+    """
+    program = build_simulator(design, progress)
+    stalls = stalls or Stalls()
+    with tempfile.TemporaryDirectory(prefix="colonnade-") as place:
+        job, outputs = _write_job(Path(place), design.manifest, image, registers)
+        command = [str(program), "--stall", str(stalls.percent), "--seed", str(stalls.seed), str(job)]
+        with progress.step("rendering in the simulator") as report:
+            lines = _run(command, report)
+        return _collect(design.manifest, registers, outputs, lines)
+
+
+def _write_job(
+    place: Path, manifest: Manifest, image: SceneImage, registers: list[Mapping[str, int]]
+) -> tuple[Path, list[Path]]:
+    records = place / "records"
+    records.write_bytes(image.records.tobytes())
+    lines = [f"load {records} {manifest.record_bits // 8}"]
+    readable = [register for register in manifest.registers.values() if register.access == "ro"]
+    start = manifest.registers["control.start"].address
+    outputs = []
+    for number, values in enumerate(registers):
+        for name, value in values.items():
+            lines += [f"write {address} {word}" for address, word in manifest.registers[name].encode(value)]
+        outputs.append(place / f"pixels{number}")
+        lines.append(f"frame {outputs[-1]} {values['frame.width']} {values['frame.height']} {start}")
+        lines += [f"read {register.name} {register.address} {register.words}" for register in readable]
+    job = place / "job"
+    job.write_text("\n".join(lines) + "\n")
+    return job, outputs
+
+
+def _run(command: list[str], report: Report) -> list[str]:
+    """Output lines of the harness; its progress goes to ``report``."""
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        said: deque[str] = deque(maxlen=5)
+        for line in process.stderr:
+            if line.startswith("progress "):
+                report(float(line.split()[1]))
+            else:
+                said.append(line.strip())
+        output = process.stdout.read()
+    if process.returncode != 0:
+        raise RuntimeError(f"the simulated hardware failed (status {process.returncode}): {'; '.join(said)}")
+    return output.splitlines()
+
+
+def _collect(
+    manifest: Manifest, registers: list[Mapping[str, int]], outputs: list[Path], lines: list[str]
+) -> Simulated:
+    values: list[dict[str, int]] = []
+    cycles, seconds = 0, 0.0
+    for line in lines:
+        words = line.split()
+        if words[0] == "simulated":
+            values.append({})
+            cycles += int(words[1])
+            seconds += float(words[2])
+        elif words[0] == "value":
+            values[-1][words[1]] = int(words[2])
+    frames = [
+        _frame(manifest, settings, output, value)
+        for settings, output, value in zip(registers, outputs, values, strict=True)
+    ]
+    return Simulated(frames, cycles / seconds if seconds > 0 else 0.0)
+
+
+def _frame(manifest: Manifest, registers: Mapping[str, int], output: Path, values: Mapping[str, int]) -> Frame:
+    shape = registers["frame.height"], registers["frame.width"]
+    pixels = np.fromfile(output, dtype=PIXEL).reshape(shape)
+    errors = [name.removeprefix("errors.") for name, value in values.items() if name.startswith("errors.") and value]
+    missing = int((pixels["is_seen"] == 0).sum())
+    if missing and not errors:
+        raise RuntimeError(f"{missing:,} pixels of the frame never came")
+    is_object = pixels["is_object"] != 0
+    step = 2.0 ** -manifest.numbers["gridFraction"]
+    return Frame(
+        colour=np.ascontiguousarray(pixels["colour"]),
+        is_object=is_object,
+        triangle=np.where(is_object, pixels["triangle"].astype(np.int64), -1),
+        distance=pixels["distance"] * step,
+        counters={
+            name.removeprefix("counters."): value for name, value in values.items() if name.startswith("counters.")
+        },
+        errors=errors,
+    )
+
+
+def require_hits(manifest: Manifest) -> None:
+    """Refuse what needs hit triangles of a design whose pixel stream carries none."""
+    if not manifest.config["frame"]["hits"]:
+        raise UserError("this configuration's pixel stream carries no hits: set frame.hits=true for --hits")

@@ -1,0 +1,126 @@
+// colonnade._core.Model: the bit-exact model of the device (cpp/model) for Python.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+
+#include <cmath>
+#include <tuple>
+
+#include "model/frame.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace colonnade;
+
+namespace {
+
+using Values = std::map<std::string, std::int64_t>;
+using FieldTuples = std::map<std::string, std::map<std::string, std::tuple<int, int, bool>>>;
+using Records = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Vectors = nb::ndarray<const std::int64_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+template <class T> using Pixels = nb::ndarray<nb::numpy, T>;
+
+/// A new numpy array that owns its memory.
+template <class T> Pixels<T> makeArray(std::initializer_list<std::size_t> shape, T*& data) {
+    std::size_t size = 1;
+    for (const auto extent : shape) size *= extent;
+    data = new T[size]();
+    nb::capsule owner(data, [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
+    return Pixels<T>(data, shape, owner);
+}
+
+std::map<std::string, Layout> layoutsOf(const FieldTuples& tuples) {
+    std::map<std::string, Layout> layouts;
+    for (const auto& [record, fields] : tuples)
+        for (const auto& [name, field] : fields) layouts[record][name] = {std::get<0>(field), std::get<1>(field), std::get<2>(field)};
+    return layouts;
+}
+
+class Model {
+public:
+    Model(const Values& numbers, const FieldTuples& layouts) : numbers_(numbers), device_(numbers_, layoutsOf(layouts)) {}
+
+    void load(const Records& records, std::size_t triangleBase, std::size_t attributeBase) {
+        device_.load(records.data(), records.shape(0), records.shape(1), triangleBase, attributeBase);
+    }
+
+    /// Rows [first, last) of the frame; `start` also takes the registers over.
+    void start(const Values& registers) { device_.start(registers); }
+
+    nb::dict rows(std::int64_t first, std::int64_t last) {
+        const std::int64_t width = device_.frame().width;
+        const auto size = static_cast<std::size_t>(width), count = static_cast<std::size_t>(last - first);
+        std::uint16_t* colour;
+        bool* isObject;
+        std::int64_t* triangle;
+        double* distance;
+        nb::dict result;
+        result["colour"] = makeArray<std::uint16_t>({count, size, 3}, colour);
+        result["is_object"] = makeArray<bool>({count, size}, isObject);
+        result["triangle"] = makeArray<std::int64_t>({count, size}, triangle);
+        result["distance"] = makeArray<double>({count, size}, distance);
+        const double step = std::ldexp(1.0, -numbers_.gridFraction);
+        nb::gil_scoped_release release;
+        std::size_t i = 0;
+        for (std::int64_t y = first; y < last; ++y)
+            for (std::int64_t x = 0; x < width; ++x, ++i) {
+                const Pixel pixel = device_.render(x, y);
+                for (int channel = 0; channel < 3; ++channel) colour[3 * i + channel] = static_cast<std::uint16_t>(pixel.colour[channel]);
+                isObject[i] = pixel.isObject;
+                triangle[i] = pixel.isObject ? static_cast<std::int64_t>(pixel.triangle) : -1;
+                distance[i] = static_cast<double>(pixel.distance) * step;
+            }
+        return result;
+    }
+
+    /// Closest hits of rays given as scene positions (grid steps) and directions of any scale: packed ids, -1 for a miss.
+    nb::object trace(const Vectors& origins, const Vectors& directions) {
+        std::int64_t* ids;
+        auto result = makeArray<std::int64_t>({origins.shape(0)}, ids);
+        for (std::size_t i = 0; i < origins.shape(0); ++i) {
+            RayRequest request{{}, {}, numbers_.farthest(), ~std::uint64_t(0)};
+            for (std::size_t a = 0; a < 3; ++a) {
+                request.origin[a] = origins(i, a);
+                request.direction[a] = directions(i, a);
+            }
+            const Hit hit = device_.trace(setUp(request, device_.frame().bounds, numbers_), false);
+            ids[i] = hit.found ? static_cast<std::int64_t>(hit.id) : -1;
+        }
+        return nb::cast(result);
+    }
+
+    Values counters() const {
+        const Counters& c = device_.counters;
+        const auto value = [](std::uint64_t count) { return static_cast<std::int64_t>(count); };
+        return {{"raysPrimary", value(c.raysPrimary)}, {"raysShadow", value(c.raysShadow)}, {"raysInBox", value(c.raysInBox)},
+                {"nodeReads", value(c.nodeReads)},     {"boxTests", value(c.boxTests)},     {"triangleTests", value(c.triangleTests)},
+                {"hits", value(c.hits)},               {"deepestStack", value(c.deepestStack)}};
+    }
+
+    std::map<std::string, bool> errors() const {
+        const Errors& e = device_.errors;
+        return {{"stackOverflow", e.stackOverflow}, {"illegalRecord", e.illegalRecord}, {"watchdog", e.watchdog}};
+    }
+
+private:
+    Numbers numbers_;
+    Device device_;
+};
+
+} // namespace
+
+void bind_model(nb::module_& module) {
+    nb::class_<Model>(module, "Model", "The device without time: memories and registers are loaded, pixels come out.")
+        .def(nb::init<const Values&, const FieldTuples&>(), "numbers"_a, "layouts"_a,
+             "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh) and its record layouts: record -> field -> (offset, width, signed).")
+        .def("load", &Model::load, "records"_a, "triangle_base"_a, "attribute_base"_a, "Loads the column memory: uint8 [records, bytes].")
+        .def("start", &Model::start, "registers"_a, "Takes registers over (name -> value); clears counters and errors.")
+        .def("rows", &Model::rows, "first"_a, "last"_a,
+             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
+        .def("trace", &Model::trace, "origins"_a, "directions"_a, "Packed ids int64 [n] of the closest hits, -1 for a miss; int64 [n, 3] grid steps.")
+        .def("counters", &Model::counters, "Timing-independent counters since start.")
+        .def("errors", &Model::errors, "Sticky errors since start.");
+}

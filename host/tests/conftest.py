@@ -1,0 +1,142 @@
+"""A manifest in memory: the contract's layouts and registers for a small configuration, without the generator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from colonnade.manifest import Manifest
+
+MakeManifest = Callable[..., Manifest]
+
+
+def manifest_data(
+    *,
+    vertex_bits: int = 16,
+    box_bits: int = 8,
+    mac: int = 32,
+    arity: int = 4,
+    per_record: int = 2,
+    bvh: bool = True,
+    depth: int = 131072,
+    stack_depth: int = 48,
+    max_width: int = 1920,
+    max_height: int = 1080,
+) -> dict[str, Any]:
+    """The JSON object of a manifest; the numbers follow docs/numbers.md."""
+    address = (depth - 1).bit_length()
+    coordinate = max(max_width, max_height).bit_length()
+    numbers = {
+        "vertexBits": vertex_bits,
+        "boxBits": box_bits,
+        "macBits": mac,
+        "gridBits": mac,
+        "gridFraction": mac - vertex_bits - 3,
+        "sceneBits": mac + 8,
+        "coordinateBits": coordinate,
+        "boxPadLog": 2,
+        "normalBits": 12,
+        "normalFraction": 11,
+        "colourBits": 12,
+        "lightBits": 16,
+        "lightFraction": 12,
+    }
+    layouts = _layouts(vertex_bits, box_bits, arity, per_record, address)
+    widest = max(sum(width for _, width, _ in fields) for fields in layouts.values())
+    return {
+        "version": 1,
+        "config": {
+            "geometry": {
+                "vertexBits": vertex_bits,
+                "boxBits": box_bits,
+                "arity": arity,
+                "trianglesPerRecord": per_record,
+                "bvh": bvh,
+            },
+            "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth},
+            "frame": {"maxWidth": max_width, "maxHeight": max_height, "materials": 2},
+        },
+        "numbers": numbers,
+        "records": {"bits": -(-widest // 32) * 32, "layouts": {k: _placed(v) for k, v in layouts.items()}},
+        "registers": {"dataBits": 32, "fields": _registers(vertex_bits, mac, address, coordinate)},
+        "streams": {"pixel": [], "load": []},
+        "memories": {"columnBvh": {"depth": depth, "bits": -(-widest // 32) * 32, "banks": 2}},
+        "formatHash": f"{vertex_bits:02x}{box_bits:02x}{mac:02x}{arity}{per_record}{bvh:d}",
+        "configHash": "0" * 64,
+    }
+
+
+FieldList = list[tuple[str, int, bool]]
+
+
+def _vector(name: str, width: int, signed: bool = False) -> FieldList:
+    return [(f"{name}.{axis}", width, signed) for axis in "xyz"]
+
+
+def _layouts(vertex: int, box: int, arity: int, per_record: int, address: int) -> dict[str, FieldList]:
+    node = _vector("origin", vertex) + _vector("exponent", (vertex - box + 1).bit_length())
+    node += [("firstChild", address, False), ("firstTriangles", address, False)]
+    for child in range(arity):
+        node += [(f"kinds[{child}]", 2, False), *_vector(f"low[{child}]", box), *_vector(f"high[{child}]", box)]
+    triangles: FieldList = [("firstTriangle", address + 1, False), ("count", per_record.bit_length(), False)]
+    for corner in range(3 * per_record):
+        triangles += _vector(f"vertices[{corner}]", vertex)
+    attributes: FieldList = []
+    for face in range(2):
+        for corner in range(3):
+            attributes += _vector(f"faces[{face}].normals[{corner}]", 12, True)
+        attributes += [*_vector(f"faces[{face}].geometricNormal", 12, True), (f"faces[{face}].material", 8, False)]
+    return {"node": node, "triangles": triangles, "attributes": attributes}
+
+
+def _placed(fields: FieldList) -> list[dict[str, Any]]:
+    """Offsets in the generator's manner: the first field is the most significant."""
+    placed, offset = [], 0
+    for name, width, signed in reversed(fields):
+        placed.append({"name": name, "offset": offset, "width": width, "signed": signed, "fraction": 0})
+        offset += width
+    return placed
+
+
+def _registers(vertex: int, mac: int, address: int, coordinate: int) -> list[dict[str, Any]]:
+    fields: FieldList = [(f"frame.{n}", coordinate, False) for n in ("width", "height")]
+    fields += [(f"frame.objectRect.{n}", coordinate, False) for n in ("x0", "y0", "x1", "y1")]
+    fields += [("frame.unitShift", 6, False), ("frame.watchdogCycles", 32, False)]
+    for name in ("position", "direction", "stepX", "stepY"):
+        fields += _vector(f"camera.{name}", mac, True)
+    fields += [("camera.stepShift", 4, False), *_vector("light.position", mac, True)]
+    fields += [("light.shadowOffset", mac - 2, False), ("shading.flat", 1, False), ("shading.shadows", 1, False)]
+    for name, width in (("light.colour", 16), ("ambient", 16), ("background", 12)):
+        fields += [(f"{name}.{c}", width, False) for c in "rgb"]
+    fields += [(f"materials[{i}].albedo.{c}", 12, False) for i in range(2) for c in "rgb"]
+    fields += _vector("bounds.low", vertex) + _vector("bounds.high", vertex)
+    fields += [(f"scene.{n}", address + 1, False) for n in _SCENE]
+    placed, word = [], 0
+    for name, width, signed in fields:
+        words = -(-width // 32)
+        placed.append({"name": name, "address": word, "words": words, "width": width, "signed": signed, "access": "rw"})
+        word += words
+    return placed
+
+
+_SCENE = ("recordCount", "triangleBase", "triangleRecords", "attributeBase")
+
+
+@pytest.fixture(scope="session")
+def make_manifest() -> MakeManifest:
+    """Builds a manifest; keywords as of `manifest_data`."""
+    return lambda **changes: Manifest.from_dict(manifest_data(**changes))
+
+
+@pytest.fixture(scope="session")
+def manifest(make_manifest: MakeManifest) -> Manifest:
+    """The manifest of a small configuration with the default widths."""
+    return make_manifest()
+
+
+@pytest.fixture
+def manifest_json() -> dict[str, Any]:
+    """The JSON object of the fixture `manifest`."""
+    return manifest_data()

@@ -1,0 +1,50 @@
+package colonnade
+
+import chisel3.RawModule
+import circt.stage.ChiselStage
+import colonnade.formats.Json
+
+import java.nio.file.{Files, Path}
+import scala.jdk.CollectionConverters._
+
+/** SystemVerilog of a design, a file for each module, with their list in `filelist.f`. */
+object Emit {
+
+  /** Styles that Verilator, Yosys and older readers agree on. */
+  private val lowering =
+    Seq("disallowLocalVariables", "disallowPackedArrays", "locationInfoStyle=none", "emittedLineLength=120")
+
+  private val memoryList = "mems.conf"
+
+  /** @param blackBoxMemories leaves the bodies of memories out and lists their shapes in `memories.json` */
+  def apply(top: => RawModule, directory: Path, blackBoxMemories: Boolean): Unit = {
+    val options =
+      Seq("-disable-all-randomization", "-strip-debug-info", s"--lowering-options=${lowering.mkString(",")}") ++
+        (if (blackBoxMemories) Seq("--repl-seq-mem", s"--repl-seq-mem-file=$memoryList") else Nil)
+    ChiselStage.emitSystemVerilogFile(
+      top,
+      Array("--target-dir", directory.toString, "--split-verilog"),
+      options.toArray
+    )
+    if (blackBoxMemories) describeMemories(directory)
+  }
+
+  /** Rewrites firtool's list of memories, alternating names and values on a line each, as JSON. */
+  private def describeMemories(directory: Path): Unit = {
+    val list     = directory.resolve(memoryList)
+    val lines    = if (Files.exists(list)) Files.readAllLines(list).asScala.toSeq.filter(_.trim.nonEmpty) else Nil
+    val memories = lines.map { line =>
+      val facts = line.trim.split("\\s+").toSeq.grouped(2).collect { case Seq(key, value) => key -> value }.toMap
+      ujson.Obj(
+        "name"     -> facts("name"),
+        "depth"    -> facts("depth").toInt,
+        "width"    -> facts("width").toInt,
+        "ports"    -> ujson.Arr.from(facts("ports").split(",").map(ujson.Str(_))),
+        "maskBits" -> facts.get("mask_gran").fold[ujson.Value](ujson.Null)(bits => ujson.Num(bits.toInt))
+      )
+    }
+    OutputFiles.writeFile(directory.resolve("memories.json"), Json.pretty(ujson.Arr.from(memories)))
+    Files.deleteIfExists(list)
+    ()
+  }
+}

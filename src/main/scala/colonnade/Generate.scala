@@ -1,0 +1,113 @@
+package colonnade
+
+import chisel3.RawModule
+import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO}
+import colonnade.formats.{FormatsPage, Manifest}
+
+import java.io.IOException
+import java.nio.file.{AccessDeniedException, FileAlreadyExistsException, InvalidPathException, Path, Paths}
+
+/** The generator's command line. Wrong input ends in one line on standard error and exit status 2. */
+object Generate {
+  private val usage: String =
+    """Writes the Verilog of a Colonnade, and manifest.json, which tells the host all of its formats.
+      |
+      |usage: colonnade.Generate --config CONFIG --output DIR [OPTION...]
+      |
+      |  --config CONFIG       tiny, small, edge, a JSON file, or a precision like 32b32s64d
+      |  --set KEY=VALUE       overrides one field, as in array.rows=4; may be repeated
+      |  --output DIR          takes the place of an earlier output; nothing is left half-written
+      |  --manifest-only       writes no Verilog
+      |  --black-box-memories  leaves memories to be filled in; memories.json lists their shapes
+      |  --formats-page FILE   writes the formats as a Markdown page
+      |  --help                prints this
+      |""".stripMargin
+
+  private final case class Options(
+      config:           Option[String] = None,
+      overrides:        Vector[String] = Vector.empty,
+      output:           Option[String] = None,
+      formatsPage:      Option[String] = None,
+      manifestOnly:     Boolean = false,
+      blackBoxMemories: Boolean = false,
+      help:             Boolean = false
+  )
+
+  def main(arguments: Array[String]): Unit = {
+    val status = run(arguments.toSeq)
+    if (status != 0) sys.exit(status)
+  }
+
+  /** Does what the arguments say; the result is the exit status. */
+  def run(arguments: Seq[String]): Int =
+    try {
+      val options = parse(arguments.toList, Options())
+      if (options.help) print(usage) else generate(options)
+      0
+    } catch {
+      case error: ConfigError => refuse(error.getMessage)
+      case error: IOException => refuse(s"cannot write ${reason(error)}")
+    }
+
+  private def top(config: ColonnadeConfig): RawModule =
+    throw new ConfigError(s"the design for $config is not there; use --manifest-only")
+
+  private def generate(options: Options): Unit = {
+    val name   = options.config.getOrElse(throw new ConfigError("--config is missing; see --help"))
+    val config = ConfigIO.load(name, options.overrides)
+    if (options.output.isEmpty && options.formatsPage.isEmpty)
+      throw new ConfigError("--output is missing; see --help")
+
+    options.formatsPage.foreach(file => OutputFiles.writeFile(path(file), FormatsPage(config)))
+    options.output.foreach { directory =>
+      OutputFiles.replaceDirectory(path(directory)) { fresh =>
+        if (!options.manifestOnly) Emit(top(config), fresh, options.blackBoxMemories)
+        OutputFiles.writeFile(fresh.resolve("manifest.json"), formats.Json.pretty(Manifest(config)))
+      }
+    }
+  }
+
+  private def parse(arguments: List[String], options: Options): Options = arguments match {
+    case Nil                                   => options
+    case "--help" :: rest                      => parse(rest, options.copy(help = true))
+    case "--manifest-only" :: rest             => parse(rest, options.copy(manifestOnly = true))
+    case "--black-box-memories" :: rest        => parse(rest, options.copy(blackBoxMemories = true))
+    case Valued(name, "", _)                   => throw new ConfigError(s"$name needs a value; see --help")
+    case Valued("--config", value, rest)       => parse(rest, options.copy(config = Some(value)))
+    case Valued("--set", value, rest)          => parse(rest, options.copy(overrides = options.overrides :+ value))
+    case Valued("--output", value, rest)       => parse(rest, options.copy(output = Some(value)))
+    case Valued("--formats-page", value, rest) => parse(rest, options.copy(formatsPage = Some(value)))
+    case unknown :: _                          => throw new ConfigError(s"unknown option $unknown; see --help")
+  }
+
+  /** An option with a value, as `--name value` or `--name=value`; an empty value when there is none. */
+  private object Valued {
+    private val names = Set("--config", "--set", "--output", "--formats-page")
+
+    def unapply(arguments: List[String]): Option[(String, String, List[String])] = arguments match {
+      case name :: rest if names(name) =>
+        Some((name, rest.headOption.getOrElse(""), rest.drop(1)))
+      case joined :: rest if names(joined.takeWhile(_ != '=')) =>
+        Some((joined.takeWhile(_ != '='), joined.dropWhile(_ != '=').drop(1), rest))
+      case _ => None
+    }
+  }
+
+  private def path(name: String): Path =
+    try Paths.get(name).toAbsolutePath.normalize
+    catch {
+      case error: InvalidPathException => throw new ConfigError(s"'$name' is no path: ${error.getReason}")
+    }
+
+  /** The JDK's file errors often say no more than the file's name. */
+  private def reason(error: IOException): String = error match {
+    case taken: FileAlreadyExistsException => s"${taken.getFile}: there is a file where a directory is needed"
+    case denied: AccessDeniedException     => s"${denied.getFile}: permission denied"
+    case other                             => s"the output: ${other.getMessage}"
+  }
+
+  private def refuse(reason: String): Int = {
+    Console.err.println(s"colonnade.Generate: error: ${reason.linesIterator.mkString(" ")}")
+    2
+  }
+}

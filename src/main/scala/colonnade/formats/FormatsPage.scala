@@ -1,0 +1,70 @@
+package colonnade.formats
+
+import colonnade.config.ColonnadeConfig
+
+/** The memory formats of a configuration as a Markdown page, from the same definitions as the manifest. */
+object FormatsPage {
+
+  def apply(config: ColonnadeConfig): String = {
+    val formats = new RecordFormats(config)
+    val page    = Seq(
+      "# Memory formats",
+      s"""*Written by the generator (`colonnade.Generate --config small --formats-page docs/formats.md`) from the Chisel
+         |bundles in `src/main/scala/colonnade/formats`; a spec holds it against them. Widths follow the configuration:
+         |these are of precision ${config.precision}. Bit 0 is the least significant.*""".stripMargin,
+      "## Column BVH memory",
+      s"""One memory holds three kinds of record, in sections one after the other: nodes from record 0, the triangles from
+         |`scene.triangleBase`, the attributes from `scene.attributeBase`. All records are ${formats.recordBits} bits wide, the
+         |widest kind rounded up to whole 32-bit words; a kind takes the low bits it needs and the others are zero. There are
+         |${config.columnBvhMemory.depth} records, so that an address has ${formats.addressBits} bits, and a packed triangle id ${formats.idBits}.""".stripMargin,
+      "### Node",
+      """Up to four children with boxes relative to the node's corner: their planes are `origin + (low << exponent)` and
+        |`origin + (high << exponent)`, in vertex units. A kind is 0 (empty), 1 (node) or 2 (leaf). Children that are nodes lie
+        |at consecutive records from `firstChild`, in slot order; each that is a leaf is one triangles record, consecutive from
+        |`firstTriangles`, in slot order. The root is record 0.""".stripMargin,
+      table(formats.node),
+      "### Triangles",
+      """The triangles of a leaf. Number k has the packed id `firstTriangle + k`, and the vertices 3k, 3k + 1 and 3k + 2.
+        |Packed ids follow the leaves of one binary tree, depth first, whatever the arity.""".stripMargin,
+      table(formats.triangles),
+      "### Attributes",
+      s"""What shading needs of a face: unit normals at the vertices and of the plane, and the index of its material. The face
+         |with packed id t is in record `scene.attributeBase + t / ${RecordFormats.facesPerRecord}`, slot `t % ${RecordFormats.facesPerRecord}`.""".stripMargin,
+      table(formats.attributes),
+      "## Streams",
+      "### Pixel",
+      "Finished pixels leave in any order.",
+      table(new Pixel(config)),
+      "### Load",
+      "A record and its place; every column takes it.",
+      table(new Load(config)),
+      "## Registers",
+      s"""Words of ${RegisterMap.dataBits} bits. A number starts at a word of its own, low word first; `rw` registers hold still while a frame
+         |runs. A write of 1 to `control.start` starts a frame, and clears the errors and counters of the last one.""".stripMargin,
+      registers(RegisterMap(config))
+    )
+    page.mkString("\n\n") + "\n"
+  }
+
+  private def table(kind: chisel3.Data): String = {
+    val rows = Layout.of(kind).map { field =>
+      s"| `${field.name}` | ${bits(field)} | ${field.width} | ${number(field.signed, field.fraction)} |"
+    }
+    ("| field | bits | width | number |" +: "|---|---|---|---|" +: rows).mkString("\n")
+  }
+
+  private def registers(all: Seq[Register]): String = {
+    val rows = all.map { r =>
+      s"| ${r.address} | `${r.name}` | ${r.width} | ${number(r.signed, fraction = 0)} | ${r.access.label} |"
+    }
+    ("| address | register | width | number | access |" +: "|---|---|---|---|---|" +: rows).mkString("\n")
+  }
+
+  private def bits(field: Field): String =
+    if (field.width == 1) s"${field.offset}" else s"${field.end - 1}:${field.offset}"
+
+  private def number(signed: Boolean, fraction: Int): String = {
+    val kind = if (signed) "signed" else "unsigned"
+    if (fraction == 0) kind else s"$kind, $fraction fraction bits"
+  }
+}

@@ -1,0 +1,83 @@
+package colonnade.formats
+
+import chisel3._
+import chisel3.util.{log2Ceil, Cat, MuxLookup}
+import colonnade.config.ColonnadeConfig
+
+/** The host's way to the registers: one word a cycle. */
+final class RegisterPort(addressBits: Int) extends Bundle {
+  val write = Input(Bool())
+  val read  = Input(Bool())
+
+  /** In words. */
+  val address   = Input(UInt(addressBits.W))
+  val writeData = Input(UInt(RegisterMap.dataBits.W))
+
+  /** Of the read one cycle before; holds until the next. Bits beyond a number's width, and unknown addresses, are 0. */
+  val readData = Output(UInt(RegisterMap.dataBits.W))
+}
+
+final class RegisterFileIO(config: ColonnadeConfig) extends Bundle {
+  val register = new RegisterPort(RegisterFile.addressBits(config))
+  val frame    = Output(new FrameRegisters(config))
+  val device   = Input(new DeviceStatus)
+
+  /** One cycle: a frame begins. */
+  val start = Output(Bool())
+}
+
+/** Holds what the host writes and shows what it reads, at the addresses of [[RegisterMap]].
+  *
+  * While the device is busy every write is ignored, so that the frame's settings hold still. A read takes one cycle; the
+  * words of a wide number are read one by one, so wide ones are consistent only when the device is not busy.
+  */
+final class RegisterFile(config: ColonnadeConfig) extends Module {
+  val io = IO(new RegisterFileIO(config))
+
+  private val registers = RegisterMap(config)
+  private val writes    = io.register.write && !io.device.status.busy
+
+  // Settings: a hardware register for each number, put together to the bundle by its layout.
+  private val settings = registers.filter(_.access == Access.ReadWrite).map(r => r -> storage(r))
+  private val stored   = settings.map { case (r, value) => r.name -> value }.toMap
+  io.frame := Cat(Layout.of(io.frame).sortBy(-_.offset).map(field => stored(field.name))).asTypeOf(io.frame)
+
+  // Control: a pulse in the cycle of the write.
+  private val start = registers.filter(_.access == Access.WriteOnly).head
+  io.start := writes && io.register.address === start.address.U && io.register.writeData(0)
+
+  // Reads: settings and status alike.
+  private val status   = Layout.of(io.device).map(field => field.name -> field).toMap
+  private val observed = registers.filter(_.access == Access.ReadOnly).map { r =>
+    val field = status(r.name)
+    r -> io.device.asUInt(field.end - 1, field.offset)
+  }
+  private val words = for {
+    (r, value) <- settings ++ observed
+    word       <- 0 until r.words
+  } yield (r.address + word).U -> wordOf(value, word)
+
+  private val readData = Reg(UInt(RegisterMap.dataBits.W))
+  when(io.register.read) {
+    readData := MuxLookup(io.register.address, 0.U)(words)
+  }
+  io.register.readData := readData
+
+  private def wordOf(value: UInt, word: Int): UInt = {
+    val low = word * RegisterMap.dataBits
+    value((low + RegisterMap.dataBits).min(value.getWidth) - 1, low)
+  }
+
+  private def storage(register: Register): UInt = Cat((0 until register.words).reverse.map { word =>
+    val bits  = (register.width - word * RegisterMap.dataBits).min(RegisterMap.dataBits)
+    val value = RegInit(0.U(bits.W)).suggestName(s"${register.name.replaceAll("[.\\[]", "_").replace("]", "")}_$word")
+    when(writes && io.register.address === (register.address + word).U) {
+      value := io.register.writeData(bits - 1, 0)
+    }
+    value
+  })
+}
+
+object RegisterFile {
+  def addressBits(config: ColonnadeConfig): Int = log2Ceil(RegisterMap.size(RegisterMap(config)))
+}

@@ -1,0 +1,82 @@
+package colonnade.numbers
+
+import chisel3._
+import chisel3.util.{log2Ceil, Cat, Decoupled}
+
+/** Two mantissas to divide.
+  *
+  * @param numerator   its top bit is set, or it is zero
+  * @param denominator its top bit is set
+  */
+final class Division(mantissaBits: Int) extends Bundle {
+  val numerator   = UInt(mantissaBits.W)
+  val denominator = UInt(mantissaBits.W)
+}
+
+final class DividerIO(mantissaBits: Int, digits: Int) extends Bundle {
+  val division = Flipped(Decoupled(new Division(mantissaBits)))
+
+  /** ⌊numerator · 2^digits / denominator⌋ */
+  val quotient = Decoupled(UInt((digits + 1).W))
+}
+
+/** Divides mantissas by restoring digit recurrence in radix 4: three subtractors side by side try one, two and three
+  * times the denominator, and the largest multiple that fits gives two bits.
+  *
+  * Latency ⌈(digits + 1) / 2⌉ + 1 cycles, one division at a time; the next one enters in the cycle in which a quotient
+  * leaves. A denominator without its top bit gives a quotient that means nothing.
+  */
+final class Divider(mantissaBits: Int, digits: Int) extends Module {
+  require(mantissaBits >= 1, s"a divider of $mantissaBits-bit mantissas; they must have at least 1 bit")
+  require(digits >= 0, s"a divider for $digits digits; it must be for at least 0")
+
+  val io = IO(new DividerIO(mantissaBits, digits))
+
+  /** Steps of two bits; with an even number of digits the last bit is computed in vain. */
+  private val steps     = Divider.steps(digits)
+  private val spareBits = 2 * steps - (digits + 1)
+
+  private val busy      = RegInit(false.B)
+  private val stepsLeft = Reg(UInt(log2Ceil(steps + 1).W))
+  private val quotient  = Reg(UInt((2 * steps).W))
+
+  /** Less than four times the denominator. */
+  private val remainder = Reg(UInt((mantissaBits + 2).W))
+  private val once      = Reg(UInt(mantissaBits.W))
+  private val thrice    = Reg(UInt((mantissaBits + 2).W))
+
+  private val finished = busy && stepsLeft === 0.U
+
+  // Try the three multiples: a borrow means that one does not fit.
+  private val tried   = Seq(once.pad(mantissaBits + 2), Cat(0.U(1.W), once, 0.U(1.W)), thrice).map(remainder -& _)
+  private val fits    = tried.map(difference => !difference(mantissaBits + 2))
+  private val digit   = Cat(fits(1), Mux(fits(1), fits(2), fits(0)))
+  private val reduced =
+    Mux(fits(1), Mux(fits(2), tried(2), tried(1)), Mux(fits(0), tried(0), remainder))(mantissaBits - 1, 0)
+
+  when(busy && !finished) {
+    remainder := Cat(reduced, 0.U(2.W))
+    quotient  := Cat(quotient, digit)(2 * steps - 1, 0)
+    stepsLeft := stepsLeft - 1.U
+  }
+  when(io.quotient.fire) {
+    busy := false.B
+  }
+  when(io.division.fire) {
+    busy      := true.B
+    stepsLeft := steps.U
+    remainder := Cat(0.U(1.W), io.division.bits.numerator, 0.U(1.W))
+    once      := io.division.bits.denominator
+    thrice    := io.division.bits.denominator +& Cat(io.division.bits.denominator, 0.U(1.W))
+  }
+
+  io.division.ready := !busy || io.quotient.fire
+  io.quotient.valid := finished
+  io.quotient.bits  := quotient(2 * steps - 1, spareBits)
+}
+
+object Divider {
+
+  /** Cycles of a division in which quotient bits come out. */
+  def steps(digits: Int): Int = (digits + 2) / 2
+}

@@ -1,0 +1,76 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.Valid
+import colonnade.config.ColonnadeConfig
+import colonnade.numbers.Fixed
+import colonnade.ray.{Context, RayFormats}
+import colonnade.traversal.{LimitUnits, TriangleHit, TriangleResult}
+
+/** A ray that begins to look for hits nearer than `limit`. */
+final class Search(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val limit   = new Fixed(new RayFormats(config.numbers).grid)
+}
+
+/** The best hit of every context's ray: the least (t, packed triangle id), so that the order of tests does not matter.
+  *
+  * A result is taken every cycle; what it changes shows in the next one.
+  */
+final class HitTable(config: ColonnadeConfig) extends Module {
+  private val contexts = config.array.contexts
+  private val formats  = new RayFormats(config.numbers)
+
+  val io = IO(new Bundle {
+    val search = Flipped(Valid(new Search(config)))
+    val result = Flipped(Valid(new TriangleResult(config)))
+
+    /** Of the result's ray: it is a shadow ray, and hits at the very limit (the light) do not count. */
+    val isShadow = Input(Bool())
+
+    /** The result's ray has hit something, this result included. */
+    val hasHitNow = Output(Bool())
+
+    /** By context: largest entry distance that may still hold a nearer hit, and whether there is a hit. */
+    val limits = Output(Vec(contexts, new Fixed(formats.units)))
+    val hasHit = Output(Vec(contexts, Bool()))
+
+    /** Two readers: the hit of the context named, in the same cycle. */
+    val readers = Vec(2, Flipped(new HitReader(config)))
+  })
+
+  private val hits   = Mem(contexts, new TriangleHit(config))
+  private val bests  = Reg(Vec(contexts, new Fixed(formats.grid)))
+  private val limits = Reg(Vec(contexts, new Fixed(formats.units)))
+  private val hasHit = Reg(Vec(contexts, Bool()))
+
+  // Hold a result against the best so far
+  private val context  = io.result.bits.context
+  private val hit      = io.result.bits.hit
+  private val best     = bests(context)
+  private val isTied   = hit.t.integer === best.integer && hasHit(context) && hit.id < hits.read(context).id
+  private val isNearer = io.result.bits.isHit && (hit.t < best || (isTied && !io.isShadow))
+  io.hasHitNow := hasHit(context) || isNearer
+  when(io.result.valid && isNearer) {
+    hits.write(context, hit)
+    bests(context)  := hit.t
+    limits(context) := LimitUnits(config.numbers)(hit.t)
+    hasHit(context) := true.B
+  }
+
+  when(io.search.valid) {
+    bests(io.search.bits.context)  := io.search.bits.limit
+    limits(io.search.bits.context) := LimitUnits(config.numbers)(io.search.bits.limit)
+    hasHit(io.search.bits.context) := false.B
+  }
+
+  io.limits := limits
+  io.hasHit := hasHit
+  io.readers.foreach(reader => reader.hit := hits.read(reader.context))
+}
+
+/** A read port of the [[HitTable]], seen from its user. */
+final class HitReader(config: ColonnadeConfig) extends Bundle {
+  val context = Output(Context(config))
+  val hit     = Input(new TriangleHit(config))
+}

@@ -1,0 +1,210 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled, Mux1H, PopCount, PriorityEncoder, PriorityEncoderOH, Valid}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.RecordFormats
+import colonnade.ray.Context
+
+/** What a context wants a record for: the unit that takes it. */
+object RecordUse extends ChiselEnum {
+  val node, triangles, attributes = Value
+}
+
+/** A context that needs a record. */
+final class RecordWish(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val use     = RecordUse()
+  val address = UInt(RecordFormats.idBits(config).W)
+}
+
+/** A record for the context that wished for it. */
+final class ServedRecord(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val record  = new RecordFormats(config).record
+}
+
+/** An address beyond the scene's records; the context gets nothing. */
+final class RefusedWish(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val use     = RecordUse()
+}
+
+/** Gets contexts the records they wait for.
+  *
+  * Two record buffers. A read is asked for only once a buffer is reserved for it, so a broadcast never has to wait.
+  * With snooping, every waiting context takes a matching record from a buffer, and a buffer takes any broadcast that a
+  * context waits for, whoever had asked for it; a buffer keeps its record until another needs the place. Without, a
+  * context takes only the answer to its own read.
+  *
+  * A record is offered from two cycles after its broadcast until the context is served; a wish that a buffer can grant
+  * at once is offered two cycles after it.
+  */
+final class RecordFetch(config: ColonnadeConfig) extends Module {
+  private val contexts = config.array.contexts
+  private val snooping = config.columnBvhMemory.snooping.B
+
+  val io = IO(new Bundle {
+
+    /** Forget what the buffers hold: the memory may have changed. */
+    val start       = Input(Bool())
+    val row         = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
+    val recordCount = Input(UInt(RecordFormats.idBits(config).W))
+    val wishes      = Flipped(Vec(3, Valid(new RecordWish(config))))
+    val requests    = Decoupled(new RecordRequest(config))
+    val broadcasts  = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+
+    /** One port for each [[RecordUse]]. */
+    val served  = Vec(RecordUse.all.size, Decoupled(new ServedRecord(config)))
+    val refused = Output(Valid(new RefusedWish(config)))
+
+    /** Contexts without, and with, the record they wished for; records taken without having been asked for. */
+    val waiting   = Output(UInt(log2Ceil(contexts + 1).W))
+    val holding   = Output(UInt(log2Ceil(contexts + 1).W))
+    val snoopHits = Output(UInt(log2Ceil(contexts + 1).W))
+  })
+
+  private object BufferState extends ChiselEnum {
+    val empty, reserved, full = Value
+  }
+  private final class RecordBuffer {
+    val state   = RegInit(BufferState.empty)
+    val address = Reg(UInt(RecordFormats.addressBits(config).W))
+    val record  = Reg(new RecordFormats(config).record)
+  }
+  private final class ContextWish {
+    val isWaiting = RegInit(false.B)
+    val hasRecord = RegInit(false.B)
+    val isAsked   = Reg(Bool())
+    val use       = Reg(RecordUse())
+    val address   = Reg(UInt(RecordFormats.idBits(config).W))
+    val buffer    = Reg(UInt(log2Ceil(RecordFetch.buffers).W))
+
+    def isIn(place: RecordBuffer): Bool = address === place.address
+  }
+  private val buffers = Seq.fill(RecordFetch.buffers)(new RecordBuffer)
+  private val wishes  = Seq.fill(contexts)(new ContextWish)
+
+  // Contexts take what they wait for from full buffers
+  private val takes = wishes.map(wish =>
+    buffers.zipWithIndex.map { case (buffer, index) =>
+      val isMeant = Mux(snooping, wish.isIn(buffer), wish.isAsked && wish.buffer === index.U)
+      wish.isWaiting && buffer.state === BufferState.full && isMeant
+    }
+  )
+  wishes.zip(takes).foreach { case (wish, taken) =>
+    when(taken.reduce(_ || _)) {
+      wish.isWaiting := false.B
+      wish.hasRecord := true.B
+      wish.buffer    := PriorityEncoder(taken)
+    }
+  }
+  io.snoopHits := PopCount(wishes.zip(takes).map { case (wish, taken) => taken.reduce(_ || _) && !wish.isAsked })
+
+  // Buffers that nobody needs any more may be filled anew
+  private val isAvailable = buffers.zipWithIndex.map { case (buffer, index) =>
+    val isHeld = wishes.zip(takes).map { case (wish, taken) =>
+      taken(index) || (wish.hasRecord && wish.buffer === index.U)
+    }
+    buffer.state === BufferState.empty || (buffer.state === BufferState.full && !isHeld.reduce(_ || _))
+  }
+
+  // Broadcasts: into the buffer reserved for them, else (snooping) into an available one when a context waits for them
+  private val afterBroadcasts = io.broadcasts.foldLeft(isAvailable) { (available, broadcast) =>
+    val isReserved = buffers.map(buffer =>
+      buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address &&
+        (snooping || broadcast.bits.row === io.row)
+    )
+    val isWanted = wishes.zip(takes).map { case (wish, taken) =>
+      wish.isWaiting && !taken.reduce(_ || _) && wish.address === broadcast.bits.address
+    }
+    val isSnooped = snooping && !isReserved.reduce(_ || _) && isWanted.reduce(_ || _)
+    val places    = PriorityEncoderOH(available).map(_ && isSnooped)
+    val meant     = PriorityEncoderOH(isReserved)
+    buffers.zip(places).zip(meant).foreach { case ((buffer, place), mine) =>
+      when(broadcast.valid && (place || mine)) {
+        buffer.state   := BufferState.full
+        buffer.address := broadcast.bits.address
+        buffer.record  := broadcast.bits.record
+      }
+    }
+    available.zip(places).map { case (free, place) => free && !(place && broadcast.valid) }
+  }
+
+  // Ask for the record of one context that no buffer has or expects
+  private val isCovered = wishes.map(wish =>
+    Mux(
+      snooping,
+      buffers.map(buffer => buffer.state =/= BufferState.empty && wish.isIn(buffer)).reduce(_ || _),
+      wish.isAsked
+    )
+  )
+  private val seekers = PriorityEncoderOH(wishes.zip(isCovered).map { case (wish, covered) =>
+    wish.isWaiting && !covered
+  })
+  private val isSeeking = seekers.reduce(_ || _)
+  private val address   = Mux1H(seekers, wishes.map(_.address))
+  private val isLegal   = address < io.recordCount
+  private val places    = PriorityEncoderOH(afterBroadcasts)
+
+  // What is just arriving need not be asked for
+  private val isArriving = io.broadcasts.map(broadcast => broadcast.valid && broadcast.bits.address === address)
+  io.requests.valid := isSeeking && isLegal && places.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
+  io.requests.bits.address := address
+  when(io.requests.fire) {
+    buffers.zip(places).foreach { case (buffer, place) =>
+      when(place) {
+        buffer.state   := BufferState.reserved
+        buffer.address := address
+      }
+    }
+    wishes.zip(seekers).foreach { case (wish, seeks) =>
+      when(seeks) {
+        wish.isAsked := true.B
+        wish.buffer  := PriorityEncoder(places)
+      }
+    }
+  }
+
+  // Refuse what lies beyond the scene
+  io.refused.valid        := isSeeking && !isLegal
+  io.refused.bits.context := PriorityEncoder(seekers)
+  io.refused.bits.use     := VecInit(wishes.map(_.use))(PriorityEncoder(seekers))
+  when(io.refused.valid) {
+    wishes.zip(seekers).foreach { case (wish, seeks) => when(seeks) { wish.isWaiting := false.B } }
+  }
+
+  // Serve each unit one context at a time
+  RecordUse.all.zip(io.served).foreach { case (use, port) =>
+    val ready = PriorityEncoderOH(wishes.map(wish => wish.hasRecord && wish.use === use))
+    port.valid        := ready.reduce(_ || _)
+    port.bits.context := PriorityEncoder(ready)
+    port.bits.record  := Mux1H(
+      buffers.indices.map(index => Mux1H(ready, wishes.map(_.buffer)) === index.U),
+      buffers.map(_.record)
+    )
+    when(port.fire) {
+      wishes.zip(ready).foreach { case (wish, isServed) => when(isServed) { wish.hasRecord := false.B } }
+    }
+  }
+
+  // New wishes
+  for (port <- io.wishes; (wish, context) <- wishes.zipWithIndex) {
+    when(port.valid && port.bits.context === context.U) {
+      wish.isWaiting := true.B
+      wish.isAsked   := false.B
+      wish.use       := port.bits.use
+      wish.address   := port.bits.address
+    }
+  }
+  when(io.start) { buffers.foreach(_.state := BufferState.empty) }
+
+  io.waiting := PopCount(wishes.map(_.isWaiting))
+  io.holding := PopCount(wishes.map(_.hasRecord))
+}
+
+object RecordFetch {
+
+  /** Record buffers: two give 94 to 99 % of the throughput of unlimited ones. */
+  val buffers: Int = 2
+}

@@ -1,0 +1,254 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Arbiter, PopCount, Queue, RRArbiter, Valid}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
+import colonnade.numbers.Rounding
+import colonnade.ray.{BoxRay, Context, RayGenerator, RayRequest, RaySetup, TriangleRay}
+import colonnade.shading.Shader
+import colonnade.traversal.{TriangleUnit, Visit}
+
+/** Both colours that a context's pixel may have. */
+private final class PixelColours extends Bundle {
+  val lit     = Rgb(FrameRegisters.colour)
+  val ambient = Rgb(FrameRegisters.colour)
+}
+
+/** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
+  *
+  * Pixels come out in any order, which depends on timing; their values do not. A position outside the object's
+  * rectangle passes through with the background's colour and takes no context.
+  */
+final class RenderUnit(config: ColonnadeConfig) extends Module {
+  private val contexts = config.array.contexts
+  private val numbers  = config.numbers
+  private val formats  = new RecordFormats(config)
+
+  val io = IO(new RenderUnitIO(config))
+
+  private val controller   = Module(new RtController(config))
+  private val rayGenerator = Module(new RayGenerator(config))
+  private val raySetup     = Module(new RaySetup(config))
+  private val recordFetch  = Module(new RecordFetch(config))
+  private val traversal    = Module(new Traversal(config))
+  private val triangleUnit = Module(new TriangleUnit(config))
+  private val hitTable     = Module(new HitTable(config))
+  private val shader       = Module(new Shader(config))
+
+  // What each context remembers
+  private val positions    = Mem(contexts, new PixelPosition(config))
+  private val boxRays      = Mem(contexts, new BoxRay(numbers))
+  private val triangleRays = Mem(contexts, new TriangleRay(numbers))
+  private val entries      = Mem(contexts, UInt(numbers.entryBits.W))
+  private val colours      = Mem(contexts, new PixelColours)
+  private val isObject     = Reg(Vec(contexts, Bool()))
+
+  // Positions: past the object, or into a free context
+  private val rectangle = io.registers.frame.objectRect
+  private val position  = io.positions.bits
+  private val isInside  = position.x >= rectangle.x0 && position.x < rectangle.x1 && position.y >= rectangle.y0 && position.y < rectangle.y1
+  private val passing   = Wire(chisel3.util.Decoupled(new Pixel(config)))
+  passing.valid := io.positions.valid && !isInside
+  passing.bits  := backgroundPixel(position)
+  rayGenerator.io.in.valid        := io.positions.valid && isInside && controller.io.free.valid
+  rayGenerator.io.in.bits.context := controller.io.free.bits
+  rayGenerator.io.in.bits.x       := position.x
+  rayGenerator.io.in.bits.y       := position.y
+  io.positions.ready              := Mux(isInside, rayGenerator.io.in.ready && controller.io.free.valid, passing.ready)
+  controller.io.allocate          := rayGenerator.io.in.fire
+  when(rayGenerator.io.in.fire) {
+    positions.write(controller.io.free.bits, position)
+    isObject(controller.io.free.bits) := false.B
+  }
+  rayGenerator.io.camera    := io.registers.camera
+  rayGenerator.io.unitShift := io.registers.frame.unitShift
+
+  // Rays: shadow rays first, since their pixels are nearer to their end
+  private val requests   = Module(new Arbiter(new RayRequest(config), 2))
+  private val shadowRays = Wire(chisel3.util.Decoupled(new RayRequest(config)))
+  requests.io.in(0) :<>= shadowRays
+  requests.io.in(1) :<>= rayGenerator.io.out
+  raySetup.io.in :<>= requests.io.out
+  raySetup.io.bounds := io.registers.bounds
+
+  private val setUpRay = raySetup.io.out
+  private val enters   = setUpRay.fire && setUpRay.bits.enters
+  setUpRay.ready := true.B
+  when(enters) {
+    boxRays.write(setUpRay.bits.context, setUpRay.bits.boxRay)
+    triangleRays.write(setUpRay.bits.context, setUpRay.bits.triangleRay)
+    entries.write(setUpRay.bits.context, setUpRay.bits.entry.natural)
+  }
+  hitTable.io.search.valid        := setUpRay.fire
+  hitTable.io.search.bits.context := setUpRay.bits.context
+  hitTable.io.search.bits.limit   := setUpRay.bits.limit
+  connect(controller.io.entered, enters, setUpRay.bits.context)
+  connect(controller.io.ended(0), setUpRay.fire && !setUpRay.bits.enters, setUpRay.bits.context)
+
+  // Traversal: every visit is a wish for a record
+  traversal.io.clear := io.start
+  traversal.io.scene := io.registers.scene
+  connect(traversal.io.start, enters, setUpRay.bits.context)
+  traversal.io.nodes :<>= recordFetch.io.served(0)
+  traversal.io.ray        := boxRays.read(recordFetch.io.served(0).bits.context)
+  traversal.io.limits     := hitTable.io.limits
+  traversal.io.visits.ready := true.B
+  private val next = traversal.io.visits
+  connect(controller.io.ended(1), next.fire && next.bits.isDone, next.bits.context)
+  wish(0, enters, setUpRay.bits.context, Traversal.firstVisit(config, io.registers.scene))
+  wish(1, next.fire && !next.bits.isDone, next.bits.context, next.bits.visit)
+
+  // Triangles
+  private val triangles = recordFetch.io.served(1)
+  triangleUnit.io.in.valid        := triangles.valid
+  triangleUnit.io.in.bits.context := triangles.bits.context
+  triangleUnit.io.in.bits.record  := formats.asTriangles(triangles.bits.record)
+  triangleUnit.io.in.bits.ray     := triangleRays.read(triangles.bits.context)
+  triangles.ready                 := triangleUnit.io.in.ready
+
+  // A result either ends its ray (a shadow ray that is occluded) or lets it go on
+  private val tested      = triangleUnit.io.out
+  private val isShadow    = controller.io.isShadow(tested.bits.context)
+  private val isOccluded  = isShadow && hitTable.io.hasHitNow
+  private val resumes     = Module(new Arbiter(Context(config), 2))
+  private val isThrough   = tested.valid && tested.bits.isLast
+  tested.ready             := isOccluded || !tested.bits.isLast || resumes.io.in(1).ready
+  hitTable.io.result.valid := tested.fire
+  hitTable.io.result.bits  := tested.bits
+  hitTable.io.isShadow     := isShadow
+  connect(controller.io.ended(2), tested.fire && tested.bits.isLast && isOccluded, tested.bits.context)
+  resumes.io.in(1).valid := isThrough && !isOccluded
+  resumes.io.in(1).bits  := tested.bits.context
+  traversal.io.resume :<>= resumes.io.out
+
+  // A record that does not exist is passed over; a pixel without attributes stays as it is
+  private val refused = recordFetch.io.refused
+  private val isAttributes = refused.bits.use === RecordUse.attributes
+  resumes.io.in(0).valid := refused.valid && !isAttributes
+  resumes.io.in(0).bits  := refused.bits.context
+  connect(controller.io.dropped, refused.valid && isAttributes, refused.bits.context)
+
+  // An ended ray: a primary hit wishes for its attributes
+  private val judged = controller.io.judged
+  controller.io.hasHit           := hitTable.io.hasHit
+  hitTable.io.readers(0).context := judged.bits
+  private val judgedHit = hitTable.io.readers(0).hit
+  private val isSeen    = judged.valid && hitTable.io.hasHit(judged.bits) && !controller.io.isShadow(judged.bits)
+  recordFetch.io.wishes(2).valid        := isSeen
+  recordFetch.io.wishes(2).bits.context := judged.bits
+  recordFetch.io.wishes(2).bits.use     := RecordUse.attributes
+  recordFetch.io.wishes(2).bits.address := io.registers.scene.attributeBase + judgedHit.id / RecordFormats.facesPerRecord.U
+  when(isSeen) { isObject(judged.bits) := true.B }
+
+  // Shading
+  private val attributes = recordFetch.io.served(2)
+  hitTable.io.readers(1).context := attributes.bits.context
+  private val shadedHit = hitTable.io.readers(1).hit
+  shader.io.in.valid        := attributes.valid
+  shader.io.in.bits.context := attributes.bits.context
+  shader.io.in.bits.ray     := triangleRays.read(attributes.bits.context)
+  shader.io.in.bits.hit     := shadedHit
+  shader.io.in.bits.face    := formats.asAttributes(attributes.bits.record).faces(shadedHit.id % RecordFormats.facesPerRecord.U)
+  attributes.ready          := shader.io.in.ready
+  shader.io.light           := io.registers.light
+  shader.io.unitShift       := io.registers.frame.unitShift
+  shader.io.ambient         := io.registers.ambient
+  shader.io.shading         := io.registers.shading
+  shader.io.materials       := io.registers.materials
+
+  private val shaded = shader.io.out
+  shaded.ready                       := !shaded.bits.needsShadowRay || shadowRays.ready
+  shadowRays.valid                   := shaded.valid && shaded.bits.needsShadowRay
+  shadowRays.bits.context            := shaded.bits.context
+  shadowRays.bits.isShadow           := true.B
+  shadowRays.bits.origin             := shaded.bits.origin
+  shadowRays.bits.towards            := shaded.bits.toLight
+  controller.io.shaded.valid               := shaded.fire
+  controller.io.shaded.bits.context        := shaded.bits.context
+  controller.io.shaded.bits.needsShadowRay := shaded.bits.needsShadowRay
+  when(shaded.fire) {
+    val pixelColours = Wire(new PixelColours)
+    pixelColours.lit     := shaded.bits.lit
+    pixelColours.ambient := shaded.bits.ambient
+    colours.write(shaded.bits.context, pixelColours)
+  }
+
+  // Pixels
+  private val complete = controller.io.complete
+  private val finished = Wire(chisel3.util.Decoupled(new Pixel(config)))
+  private val isDark   = controller.io.isShadow(complete.bits) && hitTable.io.hasHit(complete.bits)
+  finished.valid := complete.valid
+  finished.bits  := backgroundPixel(positions.read(complete.bits))
+  when(isObject(complete.bits)) {
+    val pixelColours = colours.read(complete.bits)
+    finished.bits.colour   := Mux(isDark, pixelColours.ambient, pixelColours.lit)
+    finished.bits.isObject := true.B
+  }
+  controller.io.leave := finished.fire
+  if (config.frame.hits) {
+    val pixelHits = Mem(contexts, new PixelHit(config))
+    when(isSeen) {
+      val pixelHit = Wire(new PixelHit(config))
+      pixelHit.triangle     := judgedHit.id
+      pixelHit.distance.raw := (Rounding.floor(entries.read(judged.bits), -numbers.gridFraction) +& judgedHit.t.integer.asUInt)
+      pixelHits.write(judged.bits, pixelHit)
+    }
+    when(isObject(complete.bits)) { finished.bits.hit.get := pixelHits.read(complete.bits) }
+  }
+  private val leaving = Module(new RRArbiter(new Pixel(config), 2))
+  leaving.io.in(0) :<>= finished
+  leaving.io.in(1) :<>= passing
+  io.pixels :<>= Queue(leaving.io.out, 2)
+
+  // The record port
+  recordFetch.io.start       := io.start
+  recordFetch.io.row         := io.row
+  recordFetch.io.recordCount := io.registers.scene.recordCount
+  recordFetch.io.broadcasts  := io.broadcasts
+  io.requests :<>= recordFetch.io.requests
+
+  // Counters
+  private val events = io.events
+  events.raysPrimary      := io.positions.fire
+  events.raysShadow       := shadowRays.fire
+  events.raysInBox        := enters
+  events.nodeReads        := traversal.io.nodes.fire
+  events.boxTests         := traversal.io.boxTests
+  events.triangleTests    := tested.fire
+  events.hits             := isSeen
+  events.snoopHits        := recordFetch.io.snoopHits
+  events.busyRaySetup     := raySetup.io.busy
+  events.busyBoxUnit      := traversal.io.busy
+  events.busyTriangleUnit := triangleUnit.io.busy
+  events.busyShader       := shader.io.busy
+  events.waitRecord       := recordFetch.io.waiting
+  events.waitUnit         := recordFetch.io.holding
+  events.idleContexts     := controller.io.freeCount
+  events.deepestStack     := traversal.io.deepest
+  events.stackOverflow    := traversal.io.overflow
+  events.illegalRecord    := refused.valid
+  io.isIdle               := controller.io.freeCount === contexts.U && !io.pixels.valid
+
+  private def backgroundPixel(at: PixelPosition): Pixel = {
+    val pixel = Wire(new Pixel(config))
+    pixel.x        := at.x
+    pixel.y        := at.y
+    pixel.colour   := io.registers.background
+    pixel.isObject := false.B
+    pixel.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
+    pixel
+  }
+
+  private def connect(port: Valid[UInt], valid: Bool, context: UInt): Unit = {
+    port.valid := valid
+    port.bits  := context
+  }
+
+  private def wish(port: Int, valid: Bool, context: UInt, visit: Visit): Unit = {
+    recordFetch.io.wishes(port).valid        := valid
+    recordFetch.io.wishes(port).bits.context := context
+    recordFetch.io.wishes(port).bits.use     := Mux(visit.isLeaf, RecordUse.triangles, RecordUse.node)
+    recordFetch.io.wishes(port).bits.address := visit.address
+  }
+}

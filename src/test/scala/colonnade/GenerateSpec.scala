@@ -1,0 +1,139 @@
+package colonnade
+
+import chisel3._
+import colonnade.config.ConfigIO
+import colonnade.formats.{Manifest, RegisterFile}
+import colonnade.numbers.Divider
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import java.io.ByteArrayOutputStream
+import java.nio.file.{Files, Path}
+import java.util.Comparator
+import scala.jdk.CollectionConverters._
+import scala.sys.process.{Process, ProcessLogger}
+import scala.util.{Try, Using}
+
+class GenerateSpec extends AnyFlatSpec with Matchers {
+  behavior of "Generate"
+
+  private def inScratch(body: Path => Unit): Unit = {
+    val scratch = Files.createTempDirectory("colonnade")
+    try body(scratch)
+    finally Using.resource(Files.walk(scratch))(_.sorted(Comparator.reverseOrder[Path]()).forEach(Files.delete(_)))
+  }
+
+  private def names(directory: Path): Seq[String] =
+    Using.resource(Files.list(directory))(_.iterator.asScala.map(_.getFileName.toString).toSeq.sorted)
+
+  private def run(arguments: String*): (Int, String) = {
+    val errors = new ByteArrayOutputStream
+    val status = Console.withErr(errors)(Generate.run(arguments))
+    (status, errors.toString)
+  }
+
+  private def refused(arguments: String*)(reason: String): Unit = {
+    val (status, errors) = run(arguments: _*)
+    status shouldBe 2
+    errors should startWith("colonnade.Generate: error: ")
+    errors should include(reason)
+    errors.linesIterator.size shouldBe 1
+    ()
+  }
+
+  it should "write the manifest alone, and nothing beside it" in inScratch { scratch =>
+    val output = scratch.resolve("a/b")
+    run("--config", "tiny", "--set", "array.rows=3", s"--output=$output", "--manifest-only") shouldBe ((0, ""))
+    ujson.read(Files.readString(output.resolve("manifest.json"))) shouldBe
+      Manifest(ConfigIO.load("tiny", Seq("array.rows=3")))
+    names(output) shouldBe Seq("manifest.json")
+    names(output.getParent) shouldBe Seq("b")
+  }
+
+  it should "replace an earlier output, but no other directory" in inScratch { scratch =>
+    val output = scratch.resolve("out")
+    for (_ <- 0 until 2) run("--config", "tiny", "--output", output.toString, "--manifest-only")._1 shouldBe 0
+    Files.delete(output.resolve("manifest.json"))
+    Files.writeString(output.resolve("thesis.txt"), "irreplaceable")
+    refused("--config", "tiny", "--output", output.toString, "--manifest-only")("holds other files")
+    names(output) shouldBe Seq("thesis.txt")
+    refused("--config", "tiny", "--output", output.resolve("thesis.txt").toString, "--manifest-only")("is a file")
+    refused(
+      "--config",
+      "tiny",
+      "--output",
+      output.resolve("thesis.txt/x").toString,
+      "--manifest-only"
+    )("thesis.txt: there is a file")
+  }
+
+  it should "leave an earlier output as it was when the new one fails" in inScratch { scratch =>
+    val output = scratch.resolve("out")
+    run("--config", "tiny", "--output", output.toString, "--manifest-only")
+    an[ArithmeticException] should be thrownBy OutputFiles.replaceDirectory(output) { fresh =>
+      OutputFiles.writeFile(fresh.resolve("half"), "")
+      throw new ArithmeticException
+    }
+    names(output) shouldBe Seq("manifest.json")
+    names(scratch) shouldBe Seq("out")
+  }
+
+  it should "refuse wrong input in one line" in inScratch { scratch =>
+    val output = scratch.resolve("out").toString
+    refused("--config", "tiny", "--output", output, "--manifest-onyl")("unknown option --manifest-onyl")
+    refused("--config", "tiny")("--output is missing")
+    refused("--output", output)("--config is missing")
+    refused("--output", output, "--config")("--config needs a value")
+    refused("--config", "nope", "--output", output)("there is no configuration 'nope'")
+    refused("--config", "tiny", "--set", "array.rows=0", "--output", output)("array.rows is 0")
+    refused("--config", "tiny", "--set", "array.raws=1", "--output", output)("unknown key array.raws")
+    refused("--config", "tiny", "--set", "precision.mac=65", "--output", output)("precision.mac is 65")
+    names(scratch) shouldBe empty
+  }
+
+  it should "explain itself" in {
+    val printed = new ByteArrayOutputStream
+    Console.withOut(printed)(Generate.run(Seq("--help"))) shouldBe 0
+    printed.toString should include("usage:")
+  }
+
+  behavior of "Emit"
+
+  it should "write a file for each module and their list" in inScratch { scratch =>
+    Emit(new RegisterFile(ConfigIO.load("tiny")), scratch, blackBoxMemories = false)
+    names(scratch) shouldBe Seq("RegisterFile.sv", "filelist.f")
+    Files.readString(scratch.resolve("filelist.f")).trim shouldBe "RegisterFile.sv"
+    Files.readString(scratch.resolve("RegisterFile.sv")) should not include "RANDOM"
+  }
+
+  it should "write what Verilator's linter accepts, but for bits that nobody reads" in inScratch { scratch =>
+    assume(Try(Process("verilator --version").!!).isSuccess, "verilator is not installed")
+    Emit(new Divider(32, 18), scratch, blackBoxMemories = false)
+    val lint =
+      Seq("verilator", "--lint-only", "-Wall", "-Wno-UNUSEDSIGNAL", "--top-module", "Divider", "-f", "filelist.f")
+    val said = new StringBuilder
+    withClue(said) {
+      Process(lint, scratch.toFile).!(ProcessLogger(line => said ++= line + "\n")) shouldBe 0
+    }
+  }
+
+  it should "leave memories out and describe their shapes on demand" in inScratch { scratch =>
+    Emit(new EmitSpecMemory, scratch, blackBoxMemories = true)
+    names(scratch) should not contain "mems.conf"
+    val memories = ujson.read(Files.readString(scratch.resolve("memories.json"))).arr
+    memories.map(m => (m("depth").num, m("width").num)) shouldBe Seq((64, 20))
+    memories.head("ports").arr.map(_.str).sorted shouldBe Seq("read", "write")
+  }
+}
+
+private class EmitSpecMemory extends Module {
+  val writeAddress = IO(Input(UInt(6.W)))
+  val readAddress  = IO(Input(UInt(6.W)))
+  val write        = IO(Input(Bool()))
+  val data         = IO(Input(UInt(20.W)))
+  val read         = IO(Output(UInt(20.W)))
+
+  private val memory = SyncReadMem(64, UInt(20.W))
+  when(write)(memory.write(writeAddress, data))
+  read := memory.read(readAddress)
+}

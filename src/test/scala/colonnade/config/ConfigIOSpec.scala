@@ -1,0 +1,104 @@
+package colonnade.config
+
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import java.nio.file.Files
+
+class ConfigIOSpec extends AnyFlatSpec with Matchers {
+  behavior of "ConfigIO"
+
+  private def refusal(name: String, overrides: String*): String =
+    the[ConfigError] thrownBy ConfigIO.load(name, overrides) match { case error => error.getMessage }
+
+  it should "load every preset" in {
+    ConfigIO.presets.map(ConfigIO.load(_).array) shouldBe
+      Seq(ArrayConfig(1, 1, 8), ArrayConfig(2, 2, 8), ArrayConfig(10, 8, 8))
+  }
+
+  it should "read back what it writes" in {
+    for (settings <- Seq(Nil, Seq("geometry.triangleBits=24", "geometry.bvh=false", "precision=17b33s61d"))) {
+      val config = ConfigIO.load("edge", settings)
+      ConfigIO.read(ConfigIO.write(config)) shouldBe config
+    }
+  }
+
+  it should "load a file" in {
+    val file = Files.createTempFile("colonnade", ".json")
+    try {
+      Files.writeString(file, ConfigIO.write(ConfigIO.load("tiny", Seq("array.rows=3"))).render())
+      ConfigIO.load(file.toString).array.rows shouldBe 3
+    } finally Files.delete(file)
+  }
+
+  it should "take the paper's notation as a name, as a value, and override a part of it" in {
+    val expected = PrecisionConfig(mac = 16, sqrt = 24, div = 48)
+    ConfigIO.load("16b24s48d").precision shouldBe expected
+    ConfigIO.load("16b24s48d").array shouldBe ConfigIO.load("small").array
+    ConfigIO.load("tiny", Seq("precision=16b24s48d")).precision shouldBe expected
+    ConfigIO.load("tiny", Seq("precision={\"mac\": 16, \"sqrt\": 24, \"div\": 48}")).precision shouldBe expected
+    ConfigIO.load("tiny", Seq("precision.mac=20")).precision shouldBe PrecisionConfig(20, 32, 64)
+  }
+
+  it should "apply overrides in order" in {
+    ConfigIO.load("tiny", Seq("array.rows=4", "array.rows=5", "frame.hits=false")).array.rows shouldBe 5
+    ConfigIO.load(
+      "tiny",
+      Seq("geometry.triangleBits=40", "geometry.triangleBits=null")
+    ).geometry.triangleBits shouldBe None
+  }
+
+  it should "refuse unknown keys by their path" in {
+    refusal("tiny", "array.row=4") should startWith("unknown key array.row; known here: rows, columns, contexts")
+    refusal("tiny", "ray.rows=4") should startWith("unknown key ray.rows")
+    refusal("tiny", "array.rows.count=4") should startWith("unknown key array.rows.count")
+    refusal("tiny", "colour=4") should startWith("unknown key colour; known here: array")
+    refusal("tiny", "precision.add=4") should startWith("unknown key precision.add; known here: mac, sqrt, div")
+  }
+
+  it should "refuse missing keys by their path" in {
+    val json = ConfigIO.write(ConfigIO.load("tiny"))
+    json("frame").obj.remove("hits")
+    the[ConfigError] thrownBy ConfigIO.read(json) should have message "frame.hits is missing; give it a value"
+    json.value.remove("frame")
+    the[ConfigError] thrownBy ConfigIO.read(json) should have message "frame is missing; give it a value"
+  }
+
+  it should "refuse illegal values with the field, the value and the rule" in {
+    refusal("tiny", "precision.mac=8") shouldBe "precision.mac is 8; it must be from 16 to 64"
+    refusal("tiny", "precision=32b65s64d") shouldBe "precision.sqrt is 65; it must be from 16 to 64"
+    refusal("32b32s8d") shouldBe "precision.div is 8; it must be from 16 to 64"
+    refusal("tiny", "array.rows=0") shouldBe "array.rows is 0; it must be at least 1"
+    refusal("tiny", "geometry.arity=3") shouldBe "geometry.arity is 3; it must be one of 2, 4"
+    refusal("tiny", "frame.tileSize=5") shouldBe "frame.tileSize is 5; it must be one of 4, 8, 16, 32"
+  }
+
+  it should "refuse values of the wrong type" in {
+    refusal("tiny", "array.rows=four") shouldBe "array.rows is \"four\"; it must be a whole number"
+    refusal("tiny", "array.rows=1.5") shouldBe "array.rows is 1.5; it must be a whole number"
+    refusal("tiny", "array.rows=99999999999") should endWith("it must be a whole number")
+    refusal("tiny", "array=1") shouldBe "array is 1; it must be an object with the keys rows, columns, contexts"
+    refusal("tiny", "geometry.bvh=1") shouldBe "geometry.bvh is 1; it must be true or false"
+    refusal("tiny", "precision=32") should startWith("precision is 32; it must be")
+    refusal("tiny", "precision=wide") should startWith("precision is \"wide\"; it must be like 32b32s64d")
+  }
+
+  it should "refuse settings without a key or a value" in {
+    refusal("tiny", "array.rows") should include("not of the form path.to.key=value")
+    refusal("tiny", "=4") should include("not of the form path.to.key=value")
+  }
+
+  it should "refuse what is no configuration" in {
+    refusal("nowhere.json") should startWith("there is no configuration 'nowhere.json'")
+    val file = Files.createTempFile("colonnade", ".json")
+    try {
+      Files.writeString(file, "{\"array\": ")
+      refusal(file.toString) should startWith(s"$file is not JSON: ")
+      Files.writeString(file, "[1]")
+      refusal(file.toString) should startWith("the configuration is [1]; it must be an object")
+      Files.write(file, Array[Byte](-1, -2, 0))
+      refusal(file.toString) should startWith(s"cannot read $file as text")
+    } finally Files.delete(file)
+    refusal(file.getParent.toString) should startWith("there is no configuration")
+  }
+}

@@ -1,0 +1,96 @@
+package colonnade.formats
+
+import chisel3._
+import colonnade.config.{ColonnadeConfig, ConfigIO}
+import chiseltest._
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.util.Random
+
+/** Takes records apart by Chisel's own cast, to be held against the layouts. */
+private class CastHarness(config: ColonnadeConfig) extends Module {
+  private val formats = new RecordFormats(config)
+
+  val record     = IO(Input(formats.record))
+  val node       = IO(Output(formats.node))
+  val triangles  = IO(Output(formats.triangles))
+  val attributes = IO(Output(formats.attributes))
+  node       := formats.asNode(record)
+  triangles  := formats.asTriangles(record)
+  attributes := formats.asAttributes(record)
+}
+
+class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  behavior of "Layout"
+
+  private val variants: Seq[ColonnadeConfig] = Seq(
+    Nil,
+    Seq("geometry.arity=2", "geometry.trianglesPerRecord=1"),
+    Seq("geometry.vertexBits=24", "geometry.boxBits=4", "columnBvhMemory.depth=16"),
+    Seq("geometry.vertexBits=10", "geometry.boxBits=12", "precision=16b16s16d"),
+    Seq("precision=64b64s64d", "frame.materials=1", "frame.hits=false", "columnBvhMemory.depth=4194304")
+  ).map(ConfigIO.load("tiny", _))
+
+  private def kinds(config: ColonnadeConfig): Seq[Data] = {
+    val formats = new RecordFormats(config)
+    Seq(formats.node, formats.triangles, formats.attributes, new Pixel(config), new Load(config)) ++
+      Seq(new FrameRegisters(config), new DeviceStatus)
+  }
+
+  it should "cover each bit of a type once, under unique names" in {
+    for (config <- variants; kind <- kinds(config)) {
+      val fields = Layout.of(kind).sortBy(_.offset)
+      fields.map(_.offset) shouldBe fields.scanLeft(0)(_ + _.width).init
+      fields.last.end shouldBe kind.getWidth
+      fields.map(_.name).distinct.size shouldBe fields.size
+    }
+  }
+
+  it should "fit every kind of record into whole words" in {
+    for (config <- variants) {
+      val formats = new RecordFormats(config)
+      formats.recordBits % 32 shouldBe 0
+      Seq(formats.node, formats.triangles, formats.attributes).foreach(_.getWidth should be <= formats.recordBits)
+    }
+    new RecordFormats(variants.head).recordBits shouldBe 320
+  }
+
+  it should "let the largest exponent reach across the cube" in {
+    for (config <- variants) {
+      val largest = (1 << RecordFormats.exponentBits(config)) - 1
+      val reach   = ((BigInt(1) << config.geometry.boxBits) - 1) << largest
+      reach should be >= (BigInt(1) << config.geometry.vertexBits) - 1
+    }
+  }
+
+  it should "say where Chisel finds the numbers of a record" in {
+    val random = new Random(7)
+    for (config <- variants) test(new CastHarness(config)) { unit =>
+      for (_ <- 0 until 5) {
+        val bits = BigInt(unit.record.getWidth, random)
+        unit.record.poke(bits)
+        for (kind <- Seq(unit.node, unit.triangles, unit.attributes); field <- Layout.of(kind)) {
+          val raw   = (bits >> field.offset) & ((BigInt(1) << field.width) - 1)
+          val value = if (field.signed && raw.testBit(field.width - 1)) raw - (BigInt(1) << field.width) else raw
+          withClue(s"${field.name}: ")(LayoutSpec.number(kind, field.name).peek().litValue shouldBe value)
+        }
+      }
+    }
+  }
+}
+
+private object LayoutSpec {
+
+  /** The element of a flattened name, found by walking the names alone. */
+  def number(data: Data, name: String): Bits =
+    name.split("[.\\[\\]]+").filter(_.nonEmpty).foldLeft(data) {
+      case (vector: Vec[_], index) => vector(index.toInt)
+      case (record: Record, field) => record.elements(field)
+      case (other, part)           => throw new NoSuchElementException(s"$part in $other")
+    } match {
+      case bits: Bits                     => bits
+      case fixed: colonnade.numbers.Fixed => fixed.raw
+      case other                          => throw new NoSuchElementException(s"$name is $other")
+    }
+}

@@ -1,0 +1,109 @@
+package colonnade.formats
+
+import chiseltest._
+import colonnade.config.{ColonnadeConfig, ConfigIO}
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.util.Random
+
+class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  behavior of "RegisterFile"
+
+  private val config: ColonnadeConfig = ConfigIO.load("tiny", Seq("precision=40b32s64d", "frame.materials=2"))
+  private val registers = RegisterMap(config)
+  private val settings  = registers.filter(_.access == Access.ReadWrite)
+
+  private def write(unit: RegisterFile, address: Int, data: BigInt): Unit = {
+    unit.io.register.write.poke(true)
+    unit.io.register.address.poke(address)
+    unit.io.register.writeData.poke(data)
+    unit.clock.step()
+    unit.io.register.write.poke(false)
+  }
+
+  private def read(unit: RegisterFile, address: Int): BigInt = {
+    unit.io.register.read.poke(true)
+    unit.io.register.address.poke(address)
+    unit.clock.step()
+    unit.io.register.read.poke(false)
+    unit.io.register.readData.peek().litValue
+  }
+
+  private def writeWhole(unit: RegisterFile, register: Register, bits: BigInt): Unit =
+    for (word <- 0 until register.words) write(unit, register.address + word, (bits >> 32 * word) & 0xffffffffL)
+
+  private def readWhole(unit: RegisterFile, register: Register): BigInt =
+    (0 until register.words).map(word => read(unit, register.address + word) << 32 * word).sum
+
+  private def ones(register: Register): BigInt = (BigInt(1) << register.width) - 1
+
+  it should "hold every setting, show it to the hardware, and read it back" in {
+    test(new RegisterFile(config)) { unit =>
+      val random = new Random(8)
+      val values = settings.map(r => r -> BigInt(r.width, random))
+      values.foreach { case (register, bits) => writeWhole(unit, register, bits) }
+      for ((register, bits) <- values) withClue(s"${register.name}: ") {
+        readWhole(unit, register) shouldBe bits
+        (LayoutSpec.number(unit.io.frame, register.name).peek().litValue & ones(register)) shouldBe bits
+      }
+    }
+  }
+
+  it should "show status, errors and counters" in {
+    test(new RegisterFile(config)) { unit =>
+      val random = new Random(9)
+      for (register <- registers if register.access == Access.ReadOnly) withClue(s"${register.name}: ") {
+        val bits = BigInt(register.width, random)
+        LayoutSpec.number(unit.io.device, register.name) match {
+          case flag: chisel3.Bool  => flag.poke(bits == 1)
+          case count: chisel3.UInt => count.poke(bits)
+          case other               => fail(s"a status of type $other")
+        }
+        readWhole(unit, register) shouldBe bits
+      }
+    }
+  }
+
+  it should "start a frame by a write of 1, for one cycle" in {
+    test(new RegisterFile(config)) { unit =>
+      val start = registers.find(_.name == "control.start").get.address
+      unit.io.start.expect(false)
+      unit.io.register.write.poke(true)
+      unit.io.register.address.poke(start)
+      unit.io.register.writeData.poke(0)
+      unit.io.start.expect(false)
+      unit.io.register.writeData.poke(1)
+      unit.io.start.expect(true)
+      unit.clock.step()
+      unit.io.register.write.poke(false)
+      unit.io.start.expect(false)
+      unit.io.register.write.poke(true)
+      unit.io.register.address.poke(start + 1)
+      unit.io.start.expect(false)
+    }
+  }
+
+  it should "ignore every write while a frame runs" in {
+    test(new RegisterFile(config)) { unit =>
+      val width = settings.find(_.name == "frame.width").get
+      writeWhole(unit, width, 640)
+      unit.io.device.status.busy.poke(true)
+      writeWhole(unit, width, 320)
+      readWhole(unit, width) shouldBe 640
+      unit.io.register.write.poke(true)
+      unit.io.register.address.poke(0)
+      unit.io.register.writeData.poke(1)
+      unit.io.start.expect(false)
+    }
+  }
+
+  it should "read 0 where there is no register, and from registers that are only written" in {
+    test(new RegisterFile(config)) { unit =>
+      val size = RegisterMap.size(registers)
+      read(unit, (1 << RegisterFile.addressBits(config)) - 1) shouldBe 0
+      if (size < (1 << RegisterFile.addressBits(config))) read(unit, size) shouldBe 0
+      read(unit, 0) shouldBe 0
+    }
+  }
+}

@@ -1,0 +1,91 @@
+package colonnade.numbers
+
+import chisel3._
+import chiseltest._
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+/** All roundings of one operand, signed and unsigned, side by side. */
+private class RoundingHarness(width: Int, amounts: Seq[Int]) extends Module {
+  val signed   = IO(Input(SInt(width.W)))
+  val unsigned = IO(Input(UInt(width.W)))
+
+  private def shown[T <: Data](value: T): T = {
+    val port = IO(Output(chiselTypeOf(value)))
+    port := value
+    port
+  }
+
+  val floors           = amounts.map(n => shown(Rounding.floor(signed, n)))
+  val unsignedFloors   = amounts.map(n => shown(Rounding.floor(unsigned, n)))
+  val nearests         = amounts.map(n => shown(Rounding.nearestEven(signed, n)))
+  val unsignedNearests = amounts.map(n => shown(Rounding.nearestEven(unsigned, n)))
+  val saturated        = (1 to width + 1).map(bits => shown(Rounding.saturate(signed, bits)))
+  val unsignedSaturate = (1 to width + 1).map(bits => shown(Rounding.saturate(unsigned, bits)))
+  val between          = RoundingSpec.ranges.map { case (low, high) => shown(Rounding.saturate(signed, low, high)) }
+}
+
+class RoundingSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  import RoundingSpec._
+
+  behavior of "Rounding"
+
+  for (width <- Seq(1, 2, 5, 6))
+    it should s"agree with exact arithmetic for every $width-bit number and amount" in {
+      val amounts = -2 to width + 2
+      test(new RoundingHarness(width, amounts)) { unit =>
+        for (bits <- 0 until 1 << width) {
+          val x = BigInt(if (bits >= (1 << (width - 1))) bits - (1 << width) else bits)
+          unit.signed.poke(x)
+          unit.unsigned.poke(bits)
+          for ((n, i) <- amounts.zipWithIndex) withClue(s"x $x (unsigned $bits), $n bits: ") {
+            unit.floors(i).peek().litValue shouldBe floor(x, n)
+            unit.unsignedFloors(i).peek().litValue shouldBe floor(bits, n)
+            unit.nearests(i).peek().litValue shouldBe nearestEven(x, n)
+            unit.unsignedNearests(i).peek().litValue shouldBe nearestEven(bits, n)
+          }
+          for (to <- 1 to width + 1) withClue(s"x $x (unsigned $bits) to $to bits: ") {
+            val half = BigInt(1) << (to - 1)
+            unit.saturated(to - 1).peek().litValue shouldBe x.max(-half).min(half - 1)
+            unit.unsignedSaturate(to - 1).peek().litValue shouldBe BigInt(bits).min(2 * half - 1)
+          }
+          for (((low, high), port) <- ranges.zip(unit.between)) withClue(s"x $x to $low..$high: ") {
+            port.peek().litValue shouldBe x.max(low).min(high)
+          }
+        }
+      }
+    }
+
+  it should "keep no more bits than the result needs" in {
+    test(new RoundingHarness(6, Seq(2))) { unit =>
+      unit.floors.head.getWidth shouldBe 4
+      unit.nearests.head.getWidth shouldBe 5
+      unit.saturated(2).getWidth shouldBe 3
+      unit.between.head.getWidth shouldBe 4
+    }
+  }
+}
+
+private object RoundingSpec {
+  val ranges: Seq[(BigInt, BigInt)] =
+    Seq[(Int, Int)]((-4, 7), (0, 5), (-7, -3), (3, 3), (9, 20), (-100, 100)).map { case (a, b) =>
+      (BigInt(a), BigInt(b))
+    }
+
+  /** By integer division, which truncates, made to floor. */
+  def floor(x: BigInt, bits: Int): BigInt =
+    if (bits <= 0) x << -bits
+    else {
+      val step = BigInt(1) << bits
+      (x - x.mod(step)) / step
+    }
+
+  def nearestEven(x: BigInt, bits: Int): BigInt =
+    if (bits <= 0) x << -bits
+    else {
+      val step  = BigInt(1) << bits
+      val below = floor(x, bits)
+      val twice = 2 * (x - below * step)
+      if (twice > step || (twice == step && below.testBit(0))) below + 1 else below
+    }
+}

@@ -1,0 +1,55 @@
+package colonnade.numbers
+
+import chisel3._
+import chisel3.util.DecoupledIO
+import chiseltest._
+
+import scala.collection.mutable
+import scala.util.Random
+
+/** Drives a unit with one stream in and one out, with random stalls on both sides, and holds it to the protocol: a
+  * result that was offered stays as it is until it is taken.
+  */
+object StreamTester {
+
+  /** @param stalls probability that a side is not willing in a cycle
+    * @param limit  cycles without any transfer after which the unit counts as hung
+    * @return the results in order
+    */
+  def exchange[I <: Data, O <: Data, X](clock: Clock, in: DecoupledIO[I], out: DecoupledIO[O], inputs: Seq[X])(
+      poke: (I, X) => Unit,
+      peek: O => BigInt
+  )(random: Random, stalls: Double, limit: Int = 200): Seq[BigInt] = {
+    val results  = mutable.ArrayBuffer.empty[BigInt]
+    var next     = 0
+    var offering = false
+    var pending  = Option.empty[BigInt]
+    var idle     = 0
+    while (results.size < inputs.size) {
+      offering = next < inputs.size && (offering || random.nextDouble() >= stalls)
+      in.valid.poke(offering)
+      if (offering) poke(in.bits, inputs(next))
+      out.ready.poke(random.nextDouble() >= stalls)
+
+      idle += 1
+      val valid = out.valid.peekBoolean()
+      val value = Option.when(valid)(peek(out.bits))
+      require(pending.isEmpty || pending == value, s"the result ${pending.get} changed to $value before it was taken")
+      pending = value
+      if (valid && out.ready.peekBoolean()) {
+        results += value.get
+        pending = None
+        idle = 0
+      }
+      if (offering && in.ready.peekBoolean()) {
+        next += 1
+        offering = false
+        idle = 0
+      }
+      require(idle < limit, s"no transfer for $limit cycles after ${results.size} results")
+      clock.step()
+    }
+    in.valid.poke(false)
+    results.toSeq
+  }
+}

@@ -1,0 +1,125 @@
+package colonnade.unit
+
+import chisel3._
+import chiseltest._
+import colonnade.TestConfigs
+import colonnade.config.ColonnadeConfig
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.collection.mutable
+import scala.util.Random
+
+/** Every wish is served once, with its record, whoever reads it and however the ports stall. */
+class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  behavior of "RecordFetch"
+
+  private def variant(contexts: Int, banks: Int, snooping: Boolean): ColonnadeConfig = TestConfigs.tiny.copy(
+    array = TestConfigs.tiny.array.copy(rows = 3, contexts = contexts),
+    columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(banks = banks, snooping = snooping)
+  )
+
+  private val row         = 1
+  private val recordCount = 24
+
+  private def contentOf(address: Int): BigInt = BigInt(address) * 1000003 + 7
+
+  for (contexts <- Seq(1, 4); banks <- Seq(1, 2); snooping <- Seq(true, false)) {
+    it should s"serve $contexts contexts from $banks banks, snooping $snooping" in {
+      val config = variant(contexts, banks, snooping)
+      test(new RecordFetch(config)) { dut => new Column(dut, config, new Random(contexts * 10 + banks)).run(wishes = 200) }
+    }
+  }
+
+  it should "refuse an address beyond the scene and serve the others" in {
+    val config = variant(contexts = 2, banks = 1, snooping = true)
+    test(new RecordFetch(config)) { dut =>
+      val column = new Column(dut, config, new Random(1))
+      column.wish(0, recordCount, RecordUse.triangles)
+      var refused = false
+      for (_ <- 0 until 10) {
+        refused ||= dut.io.refused.valid.peekBoolean() && dut.io.refused.bits.context.peekInt() == 0
+        dut.io.requests.valid.expect(false.B)
+        dut.clock.step()
+        dut.io.wishes(0).valid.poke(false.B)
+      }
+      refused shouldBe true
+    }
+  }
+
+  /** The column around one fetch: banks that answer after a while, rows that read what they like, units that stall. */
+  private class Column(dut: RecordFetch, config: ColonnadeConfig, random: Random) {
+    private val banks    = config.columnBvhMemory.banks
+    private val contexts = config.array.contexts
+    private val inFlight = Seq.fill(banks)(mutable.Queue.empty[(Int, Int, Int)]) // (due, address, row)
+    private val wanted   = mutable.Map.empty[Int, (Int, RecordUse.Type)]
+    private var now      = 0
+    private var made     = 0
+    private var served   = 0
+
+    dut.io.row.poke(row.U)
+    dut.io.recordCount.poke(recordCount.U)
+    dut.io.wishes.foreach(_.valid.poke(false.B))
+    dut.io.broadcasts.foreach(_.valid.poke(false.B))
+
+    def wish(context: Int, address: Int, use: RecordUse.Type): Unit = {
+      val port = dut.io.wishes(0)
+      port.valid.poke(true.B)
+      port.bits.context.poke(context.U)
+      port.bits.use.poke(use)
+      port.bits.address.poke(address.U)
+      wanted(context) = (address, use)
+    }
+
+    def run(wishes: Int): Unit = {
+      while (served < wishes && now < 40 * wishes) {
+        broadcast()
+        takeRequest()
+        takeServed()
+        val idle = (0 until contexts).filterNot(wanted.contains)
+        dut.io.wishes(0).valid.poke(false.B)
+        if (made < wishes && idle.nonEmpty && random.nextInt(3) > 0) {
+          wish(idle(random.nextInt(idle.size)), random.nextInt(recordCount), RecordUse.all(random.nextInt(3)))
+          made += 1
+        }
+        dut.clock.step()
+        now += 1
+      }
+      served shouldBe wishes
+    }
+
+    private def broadcast(): Unit = for (bank <- 0 until banks) {
+      val port = dut.io.broadcasts(bank)
+      if (random.nextInt(4) == 0) inFlight(bank).enqueue((now + 1 + random.nextInt(5), random.nextInt(recordCount / banks) * banks + bank, 2))
+      val isDue = inFlight(bank).headOption.exists(_._1 <= now)
+      port.valid.poke(isDue.B)
+      if (isDue) {
+        val (_, address, reader) = inFlight(bank).dequeue()
+        port.bits.address.poke(address.U)
+        port.bits.record.poke(contentOf(address).U)
+        port.bits.row.poke(reader.U)
+      }
+    }
+
+    private def takeRequest(): Unit = {
+      val takes = random.nextInt(3) > 0
+      dut.io.requests.ready.poke(takes.B)
+      if (takes && dut.io.requests.valid.peekBoolean()) {
+        val address = dut.io.requests.bits.address.peekInt().toInt
+        inFlight(address % banks).enqueue((now + 1 + random.nextInt(5), address, row))
+      }
+    }
+
+    private def takeServed(): Unit = RecordUse.all.zip(dut.io.served).foreach { case (use, port) =>
+      val takes = random.nextInt(3) > 0
+      port.ready.poke(takes.B)
+      if (takes && port.valid.peekBoolean()) {
+        val context = port.bits.context.peekInt().toInt
+        withClue(s"context $context: ") { wanted.get(context).map(_._2) shouldBe Some(use) }
+        port.bits.record.peekInt() shouldBe contentOf(wanted(context)._1)
+        wanted -= context
+        served += 1
+      }
+    }
+  }
+}
