@@ -22,8 +22,8 @@ Floats = npt.NDArray[np.float64]
 AXES = "xyz"
 CHANNELS = "rgb"
 
-#: Cycles a ray may take before a frame counts as hung; real ones take tens.
-WATCHDOG_CYCLES_PER_RAY = 4096
+#: More cycles than a ray spends on a record, whatever the memory's latency.
+WATCHDOG_CYCLES_PER_RECORD = 32
 
 
 def placement(scene: Scene, header: ImageHeader, manifest: Manifest, width: int, height: int) -> dict[str, int]:
@@ -52,8 +52,8 @@ def registers_of(view: FloatPlacement, header: ImageHeader, manifest: Manifest) 
     registers |= _bounds(header)
     registers |= _object_rectangle(view, registers, manifest)
     registers |= _shading(view, header, manifest)
-    tests = 0 if manifest.bvh else 8 * header.triangle_records
-    cycles = 1_000_000 + 2 * view.width * view.height * (WATCHDOG_CYCLES_PER_RAY + tests)
+    # No frame that makes progress takes longer: every ray, and its shadow ray, reads every record.
+    cycles = 1_000_000 + 2 * view.width * view.height * WATCHDOG_CYCLES_PER_RECORD * header.record_count
     registers["frame.watchdogCycles"] = min(cycles, (1 << 32) - 1)
     return registers
 

@@ -81,15 +81,45 @@ public:
         std::int64_t* ids;
         auto result = makeArray<std::int64_t>({origins.shape(0)}, ids);
         for (std::size_t i = 0; i < origins.shape(0); ++i) {
-            RayRequest request{{}, {}, numbers_.farthest(), ~std::uint64_t(0)};
-            for (std::size_t a = 0; a < 3; ++a) {
-                request.origin[a] = origins(i, a);
-                request.direction[a] = directions(i, a);
-            }
-            const Hit hit = device_.trace(setUp(request, device_.frame().bounds, numbers_), false);
+            const Hit hit = device_.trace(setUp(requestOf(origins, directions, i), device_.frame().bounds, numbers_), false);
             ids[i] = hit.found ? static_cast<std::int64_t>(hit.id) : -1;
         }
         return nb::cast(result);
+    }
+
+    /// Sets rays up and tests each against a box of its own; for checks against exact arithmetic.
+    nb::dict testBoxes(const Vectors& origins, const Vectors& directions, const Vectors& corners, const Vectors& exponents, const Vectors& low,
+                       const Vectors& high) {
+        const std::size_t count = origins.shape(0);
+        bool *enters, *isHit;
+        std::int64_t *heading, *origin, *shear;
+        nb::dict result;
+        result["enters"] = makeArray<bool>({count}, enters);
+        result["is_hit"] = makeArray<bool>({count}, isHit);
+        result["heading"] = makeArray<std::int64_t>({count, 4}, heading);
+        result["origin"] = makeArray<std::int64_t>({count, 3}, origin);
+        result["shear"] = makeArray<std::int64_t>({count, 2}, shear);
+        for (std::size_t i = 0; i < count; ++i) {
+            const Ray ray = setUp(requestOf(origins, directions, i), device_.frame().bounds, numbers_);
+            Node node{};
+            node.kinds[0] = Child::leaf;
+            for (std::size_t a = 0; a < 3; ++a) {
+                node.origin[a] = corners(i, a);
+                node.exponent[a] = static_cast<int>(exponents(i, a));
+                node.low[0][a] = static_cast<std::int32_t>(low(i, a));
+                node.high[0][a] = static_cast<std::int32_t>(high(i, a));
+                heading[4 * i + 1 + a] = ray.negative[a];
+                origin[3 * i + a] = ray.origin[a];
+            }
+            heading[4 * i] = ray.axis;
+            shear[2 * i] = ray.shear[0];
+            shear[2 * i + 1] = ray.shear[1];
+            std::array<Entered, 4> entered;
+            std::uint64_t tests = 0;
+            enters[i] = ray.enters;
+            isHit[i] = ray.enters && colonnade::testBoxes(ray, node, ray.limit, numbers_, entered, tests) > 0;
+        }
+        return result;
     }
 
     Values counters() const {
@@ -106,6 +136,15 @@ public:
     }
 
 private:
+    RayRequest requestOf(const Vectors& origins, const Vectors& directions, std::size_t i) const {
+        RayRequest request{{}, {}, numbers_.farthest(), ~std::uint64_t(0)};
+        for (std::size_t a = 0; a < 3; ++a) {
+            request.origin[a] = origins(i, a);
+            request.direction[a] = directions(i, a);
+        }
+        return request;
+    }
+
     Numbers numbers_;
     Device device_;
 };
@@ -121,6 +160,9 @@ void bind_model(nb::module_& module) {
         .def("rows", &Model::rows, "first"_a, "last"_a,
              "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
         .def("trace", &Model::trace, "origins"_a, "directions"_a, "Packed ids int64 [n] of the closest hits, -1 for a miss; int64 [n, 3] grid steps.")
+        .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a, "high"_a,
+             "Each ray against one box (planes corner + (low << exponent), corner + (high << exponent), units): enters (the object's box), is_hit, "
+             "and the set-up ray: heading int64 [n, 4] (axis, three signs), origin [n, 3] and shear [n, 2] raw, in its permuted frame.")
         .def("counters", &Model::counters, "Timing-independent counters since start.")
         .def("errors", &Model::errors, "Sticky errors since start.");
 }
