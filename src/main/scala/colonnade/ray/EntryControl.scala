@@ -1,0 +1,122 @@
+package colonnade.ray
+
+import chisel3._
+import chisel3.util.log2Ceil
+
+/** What the [[EntryDatapath]] does in a cycle; `side` is 0 for x', 1 for y'. */
+final class EntryCommand(slices: Int) extends Bundle {
+
+  /** Take a new ray over. */
+  val loads = Bool()
+
+  /** Round the head of the origin's queue to units. */
+  val roundsOrigin = Bool()
+
+  /** Turn the origin's queue as it is. */
+  val turnsOrigin = Bool()
+
+  /** Distance of the first (`crossesFar`: the second) plane of the axis whose origin was rounded. */
+  val crosses      = Bool()
+  val crossesFar   = Bool()
+  val crossesSide  = Bool()
+  val crossingSide = UInt(1.W)
+
+  /** The last distance is the dominant axis's first, or second. */
+  val takesAlongNear = Bool()
+  val takesAlongFar  = Bool()
+
+  /** The quotients are there: both reciprocals and the first shear factor, then the second one. */
+  val takesReciprocals = Bool()
+  val takesShear       = Bool()
+  val shearSide        = UInt(1.W)
+
+  /** Multiply the last distance by a reciprocal, or the entry by a slice of a shear factor. */
+  val multipliesShear = Bool()
+  val multiplySide    = UInt(1.W)
+  val slice           = UInt(log2Ceil(slices.max(2)).W)
+
+  /** Scale the last product to a distance along the ray; one cycle later hold it against the entry or the exit. */
+  val scales    = Bool()
+  val scalesFar = Bool()
+  val scaleSide = UInt(1.W)
+  val limits    = Bool()
+  val limitsFar = Bool()
+
+  /** Move the head of the origin's queue to the entry, and turn the queue. */
+  val advancesAlong = Bool()
+  val advancesSide  = Bool()
+}
+
+final class EntryControlIO(slices: Int) extends Bundle {
+  val rayValid       = Input(Bool())
+  val rayReady       = Output(Bool())
+  val quotientsValid = Input(Bool())
+  val quotientsReady = Output(Bool())
+  val outputValid    = Output(Bool())
+  val outputReady    = Input(Bool())
+
+  /** Whether the ray meets the box; known once all axes are. */
+  val enters  = Input(Bool())
+  val command = Output(new EntryCommand(slices))
+  val busy    = Output(Bool())
+}
+
+/** The steps of [[RayEntry]]: three for the dominant axis; the quotients, for which they wait; both sides, a plane each
+  * cycle on its way through distance, product, scale and limit; then the advance, `slices` cycles a side, which a ray
+  * that misses the box skips. The planes come as near x', near y', far y', far x', so that the entry is known, and the
+  * advance begins, while the exits are still on their way.
+  */
+final class EntryControl(slices: Int) extends Module {
+  val io = IO(new EntryControlIO(slices))
+
+  private val quotients = 3
+  private val decided   = 10
+  private val advance   = 8
+  private val last      = advance + 2 * slices
+  private val finished  = last + 1
+
+  private val busy = RegInit(false.B)
+  private val step = Reg(UInt(log2Ceil(finished + 1).W))
+
+  private def at(steps: Int*): Bool = busy && steps.map(step === _.U).reduce(_ || _)
+
+  private val waits = at(quotients) && !io.quotientsValid
+
+  io.busy           := busy
+  io.outputValid    := at(finished)
+  io.rayReady       := !busy || (io.outputValid && io.outputReady)
+  io.quotientsReady := at(quotients + 1)
+
+  when(busy && !waits && !io.outputValid) {
+    step := Mux(at(decided) && !io.enters, finished.U, step + 1.U)
+  }
+  when(io.outputValid && io.outputReady) { busy := false.B }
+  when(io.command.loads) {
+    busy := true.B
+    step := 0.U
+  }
+
+  private val command = io.command
+  command.loads            := io.rayValid && io.rayReady
+  command.roundsOrigin     := at(0, 2, 5) || command.takesReciprocals
+  command.turnsOrigin      := command.roundsOrigin || at(4, 6)
+  command.crosses          := at(1, 2, 4, 5, 6) || command.takesReciprocals
+  command.crossesFar       := at(2, 5, 6)
+  command.crossesSide      := !at(1, 2)
+  command.crossingSide     := at(4, 5).asUInt
+  command.takesAlongNear   := at(2)
+  command.takesAlongFar    := command.takesReciprocals
+  command.takesReciprocals := at(quotients) && io.quotientsValid
+  command.takesShear       := command.takesReciprocals || at(quotients + 1)
+  command.shearSide        := at(quotients + 1).asUInt
+  command.multipliesShear  := step >= advance.U
+  command.multiplySide     := Mux(command.multipliesShear, step >= (advance + slices).U, at(5, 6)).asUInt
+  command.slice            := step - Mux(command.multiplySide.asBool, (advance + slices).U, advance.U)
+  command.scales           := at(5, 6, 7, 8)
+  command.scalesFar        := at(7, 8)
+  command.scaleSide        := at(6, 7).asUInt
+  command.limits           := at(6, 7, 8, 9)
+  command.limitsFar        := at(8, 9)
+  command.advancesAlong    := at(advance)
+  command.advancesSide     := at(advance + slices, last)
+}

@@ -1,0 +1,110 @@
+package colonnade.ray
+
+import chisel3._
+import chisel3.util.{Counter, Decoupled, RegEnable}
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.formats.{Camera, Vec3}
+import colonnade.numbers.{Fixed, Rounding}
+
+/** A pixel whose primary ray a context wants. */
+final class RayPosition(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val x       = UInt(config.numbers.coordinateBits.W)
+  val y       = UInt(config.numbers.coordinateBits.W)
+}
+
+/** The frame registers that define a primary ray. */
+final class CameraRegisters(config: ColonnadeConfig) extends Bundle {
+  val camera = new Camera(config.numbers)
+
+  /** A camera position shifted left by this is in grid steps. */
+  val unitShift = UInt(NumberFormats.bitLength(config.numbers.sceneBits).W)
+}
+
+final class RayGeneratorIO(config: ColonnadeConfig) extends Bundle {
+  val registers = Input(new CameraRegisters(config))
+  val position  = Flipped(Decoupled(new RayPosition(config)))
+  val ray       = Decoupled(new RayRequest(config))
+
+  /** A pixel is inside. */
+  val busy = Output(Bool())
+}
+
+/** Primary rays: `towards = (camera.towards << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
+  *
+  * One multiplier takes the six products in turn: a ray is offered 8 cycles after its pixel was accepted, and the next
+  * pixel is accepted in the cycle that takes the ray. The registers are constant while a pixel is inside. A position
+  * that leaves the scene wraps around; the host refuses it. Source: docs/numbers.md, section 1.
+  */
+final class RayGenerator(config: ColonnadeConfig) extends Module {
+  private val numbers = config.numbers
+  private val scene   = new RayFormats(numbers).scene
+
+  val io = IO(new RayGeneratorIO(config))
+
+  // Control: six products, one cycle behind them their sums
+  private val products   = 2 * 3
+  private val occupied   = RegInit(false.B)
+  private val multiplies = RegInit(false.B)
+  private val product    = Counter(products)
+  private val adds       = RegNext(multiplies, false.B)
+  private val ofY        = product.value(0)
+  private val addsOfY    = RegNext(ofY)
+
+  io.busy           := occupied
+  io.ray.valid      := occupied && !multiplies && !adds
+  io.position.ready := !occupied || io.ray.fire
+  when(multiplies) {
+    when(product.inc()) { multiplies := false.B }
+  }
+  when(io.ray.fire) { occupied := false.B }
+  when(io.position.fire) {
+    occupied   := true.B
+    multiplies := true.B
+  }
+
+  // Datapath: the components in their order, each first of the x product, then of the y product
+  private val position = RegEnable(io.position.bits, io.position.fire)
+  private val camera   = io.registers.camera
+
+  private def component[T <: Data](vector: Vec3[T]): T = {
+    val axis = product.value >> 1
+    Mux(axis === 0.U, vector.x, Mux(axis === 1.U, vector.y, vector.z))
+  }
+
+  private val step       = Mux(ofY, component(camera.stepY), component(camera.stepX))
+  private val coordinate = Mux(ofY, position.y, position.x)
+  private val base       = Mux(ofY, component(camera.position), component(camera.towards))
+  private val amount     = Mux(ofY, io.registers.unitShift, camera.stepShift)
+  private val term       = Reg(SInt((numbers.macBits + numbers.coordinateBits + 1).W))
+  private val shifted    = Reg(SInt(numbers.directionBits.W))
+
+  term    := step * coordinate.zext
+  shifted := shiftLeft(base, amount)
+
+  private val origin  = Reg(Vec(3, SInt(scene.width.W)))
+  private val towards = Reg(Vec(3, SInt(numbers.directionBits.W)))
+
+  // Neither sum overflows: directionBits holds all three terms.
+  private val sum = Rounding.narrow(Mux(addsOfY, towards.last, shifted) +& term, numbers.directionBits)
+  when(adds && !addsOfY) {
+    towards.zip(towards.tail).foreach { case (to, from) => to := from }
+  }
+  when(adds) { towards.last := sum }
+  when(adds && addsOfY) {
+    origin.zip(origin.tail).foreach { case (to, from) => to := from }
+    origin.last := Rounding.narrow(shifted, scene.width)
+  }
+
+  io.ray.bits.context  := position.context
+  io.ray.bits.isShadow := false.B
+  io.ray.bits.origin.axes.zip(origin).foreach { case (to, from) => to := Fixed(scene, from) }
+  io.ray.bits.towards.axes.zip(towards).foreach { case (to, from) => to := from }
+
+  private def shiftLeft(value: SInt, by: UInt): SInt = {
+    val wide = value.pad(numbers.directionBits)
+    (0 until by.getWidth).foldLeft(wide) { (shifted, bit) =>
+      Mux(by(bit), Rounding.narrow((shifted << (1 << bit)).asSInt, numbers.directionBits), shifted)
+    }
+  }
+}

@@ -1,0 +1,67 @@
+package colonnade.ray
+
+import chisel3._
+import chisel3.util.{Cat, Decoupled}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.Bounds
+import colonnade.numbers.Divider
+
+final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
+  val request = Flipped(Decoupled(new RayRequest(config)))
+
+  /** Constant while a ray is inside. */
+  val bounds = Input(new Bounds(config.numbers))
+  val ray    = Decoupled(new SetUpRay(config))
+
+  /** A ray is inside. */
+  val busy = Output(Bool())
+}
+
+/** Prepares a ray for traversal: {{{
+  * request ─▶ DirectionNormaliser ─ mantissas ─▶ 4 × Divider ─ quotients ─▶ RayEntry ─▶ ray
+  *                    └────────────────── the ray in its own frame ───────────▲
+  * }}}
+  * In order; up to three rays are inside. With quotients of 31 and 19 bits a ray takes some 40 cycles and a new one is
+  * taken every 20 at most. A component that is 0 is divided all the same and its quotients are replaced; a direction of
+  * 0 comes out as a ray that does not enter. Source: docs/numbers.md, section 2.
+  */
+final class RaySetup(config: ColonnadeConfig) extends Module {
+  private val numbers = config.numbers
+
+  val io = IO(new RaySetupIO(config))
+
+  private val normaliser  = Module(new DirectionNormaliser(config))
+  private val shears      = Seq.fill(2)(Module(new Divider(numbers.mantissaBits, numbers.shearDigits)))
+  private val reciprocals = Seq.fill(2)(Module(new Divider(numbers.mantissaBits, numbers.reciprocalDigits)))
+  private val entry       = Module(new RayEntry(config))
+  private val dividers    = shears ++ reciprocals
+
+  normaliser.io.request :<>= io.request
+  entry.io.ray :<>= normaliser.io.ray
+  entry.io.bounds := io.bounds
+  io.ray :<>= entry.io.output
+  io.busy := normaliser.io.busy || entry.io.busy
+
+  // All dividers start together, and their quotients leave together
+  private val mantissas = normaliser.io.mantissas
+  private val areFree   = dividers.map(_.io.division.ready).reduce(_ && _)
+  mantissas.ready := areFree
+  dividers.foreach(_.io.division.valid := mantissas.valid && areFree)
+  shears.zip(mantissas.bits.minor).foreach { case (divider, minor) =>
+    divider.io.division.bits.numerator   := minor
+    divider.io.division.bits.denominator := normalised(mantissas.bits.dominant)
+  }
+  reciprocals.zip(mantissas.bits.minor).foreach { case (divider, minor) =>
+    divider.io.division.bits.numerator   := mantissas.bits.dominant
+    divider.io.division.bits.denominator := normalised(minor)
+  }
+
+  private val areDone = dividers.map(_.io.quotient.valid).reduce(_ && _)
+  entry.io.quotients.valid := areDone
+  dividers.foreach(_.io.quotient.ready := areDone && entry.io.quotients.ready)
+  entry.io.quotients.bits.shear.zip(shears).foreach { case (to, divider) => to := divider.io.quotient.bits }
+  entry.io.quotients.bits.reciprocal.zip(reciprocals).foreach { case (to, divider) => to := divider.io.quotient.bits }
+
+  /** Of a component that is 0 too: any denominator will do there, as long as its top bit is set. */
+  private def normalised(mantissa: UInt): UInt = Cat(true.B, mantissa(numbers.mantissaBits - 2, 0))
+}

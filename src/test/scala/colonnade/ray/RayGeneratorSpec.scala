@@ -1,0 +1,131 @@
+package colonnade.ray
+
+import chisel3._
+import chiseltest._
+import colonnade.TestConfigs
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.Vec3
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.util.Random
+
+/** Expected values straight from docs/numbers.md, section 1. */
+class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  import RayGeneratorSpec._
+  behavior of "RayGenerator"
+
+  TestConfigs.formats.foreach { config =>
+    val name = s"${config.precision} with ${config.geometry.vertexBits}-bit vertices"
+
+    it should s"send every pixel's exact ray under random stalls, $name" in {
+      test(new RayGenerator(config)) { generator =>
+        val random = new Random(1)
+        for (frame <- frames(config, random)) {
+          setRegisters(generator, frame)
+          run(generator, pixels(config, random, 12), random)(frame)
+        }
+      }
+    }
+  }
+
+  it should "take a pixel every 8 cycles" in {
+    val config = TestConfigs.tiny
+    test(new RayGenerator(config)) { generator =>
+      generator.io.position.valid.poke(true)
+      generator.io.ray.ready.poke(true)
+      var taken = Seq.empty[Int]
+      for (cycle <- 0 until 100) {
+        if (generator.io.position.ready.peekBoolean()) taken :+= cycle
+        generator.clock.step()
+      }
+      taken.zip(taken.tail).foreach { case (one, next) => next - one should be <= 8 }
+      taken.size should be > 10
+    }
+  }
+
+  private def run(generator: RayGenerator, pixels: Seq[Pixel], random: Random)(frame: Frame): Unit = {
+    var (sent, received, cycle) = (0, 0, 0)
+    while (received < pixels.size) {
+      cycle should be < 100 * pixels.size
+      val offers  = sent < pixels.size && random.nextInt(3) > 0
+      val accepts = random.nextInt(3) > 0
+      generator.io.position.valid.poke(offers)
+      generator.io.ray.ready.poke(accepts)
+      // What is not offered must not matter
+      val offered = if (offers) pixels(sent) else pixels(random.nextInt(pixels.size))
+      generator.io.position.bits.context.poke(offered.context)
+      generator.io.position.bits.x.poke(offered.x)
+      generator.io.position.bits.y.poke(offered.y)
+      generator.io.busy.expect(sent > received)
+      if (accepts && generator.io.ray.valid.peekBoolean()) {
+        expect(generator.io.ray.bits, pixels(received), frame)
+        received += 1
+      }
+      if (offers && generator.io.position.ready.peekBoolean()) sent += 1
+      generator.clock.step()
+      cycle += 1
+    }
+    generator.io.busy.expect(false)
+  }
+
+  private def expect(ray: RayRequest, pixel: Pixel, frame: Frame): Unit = {
+    ray.context.expect(pixel.context)
+    ray.isShadow.expect(false)
+    for (axis <- 0 until 3) {
+      val towards = (frame.towards(axis) << frame.stepShift) + frame.stepX(axis) * pixel.x + frame.stepY(axis) * pixel.y
+      ray.towards.axes(axis).peekInt() shouldBe towards
+      ray.origin.axes(axis).raw.asInstanceOf[SInt].peekInt() shouldBe (frame.position(axis) << frame.unitShift)
+    }
+  }
+}
+
+object RayGeneratorSpec {
+  private type Vector = Seq[BigInt]
+  private case class Pixel(context: Int, x: BigInt, y: BigInt)
+  private case class Frame(
+      position:  Vector,
+      towards:   Vector,
+      stepX:     Vector,
+      stepY:     Vector,
+      stepShift: Int,
+      unitShift: Int
+  )
+
+  /** The extremes of all registers, then random ones. */
+  private def frames(config: ColonnadeConfig, random: Random): Seq[Frame] = {
+    val numbers                          = config.numbers
+    val least                            = -(BigInt(1) << (numbers.macBits - 1))
+    val most                             = -least - 1
+    def vector(value: => BigInt): Vector = Seq.fill(3)(value)
+    def any(bits:     Int): BigInt       = BigInt(bits, random) - (BigInt(1) << (bits - 1))
+    val maxShift                         = numbers.coordinateBits
+    Seq(least, most).map(v =>
+      Frame(vector(v), vector(v), vector(v), vector(v), maxShift, numbers.sceneBits - numbers.macBits)
+    ) ++
+      Seq.fill(4) {
+        val unitShift = random.nextInt(numbers.sceneBits - 1)
+        val position  = vector(any(numbers.macBits.min(numbers.sceneBits - unitShift)))
+        def steps     = vector(any(numbers.macBits))
+        Frame(position, steps, steps, steps, random.nextInt(maxShift + 1), unitShift)
+      }
+  }
+
+  private def pixels(config: ColonnadeConfig, random: Random, count: Int): Seq[Pixel] = {
+    val bits = config.numbers.coordinateBits
+    val corners: Seq[BigInt] = Seq(0, (BigInt(1) << bits) - 1)
+    val extreme = for (x <- corners; y <- corners) yield Pixel(1, x, y)
+    extreme ++ Seq.fill(count)(Pixel(random.nextInt(config.array.contexts), BigInt(bits, random), BigInt(bits, random)))
+  }
+
+  private def setRegisters(generator: RayGenerator, frame: Frame): Unit = {
+    val camera                                  = generator.io.registers.camera
+    def set(port: Vec3[SInt], to: Vector): Unit = port.axes.zip(to).foreach { case (p, v) => p.poke(v) }
+    set(camera.position, frame.position)
+    set(camera.towards, frame.towards)
+    set(camera.stepX, frame.stepX)
+    set(camera.stepY, frame.stepY)
+    camera.stepShift.poke(frame.stepShift)
+    generator.io.registers.unitShift.poke(frame.unitShift)
+  }
+}

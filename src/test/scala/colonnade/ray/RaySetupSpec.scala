@@ -1,0 +1,111 @@
+package colonnade.ray
+
+import chisel3._
+import chiseltest._
+import colonnade.TestConfigs
+import colonnade.numbers.Fixed
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.util.Random
+
+/** Set-up rays equal the model's, bit for bit. */
+class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  import RaySetupSpec._
+  behavior of "RaySetup"
+
+  TestConfigs.formats.foreach { config =>
+    it should s"equal the model under random stalls, ${config.precision} with ${config.geometry.vertexBits}-bit vertices" in {
+      test(new RaySetup(config)) { setup =>
+        val random = new Random(2)
+        val cases  = new SetUpCases(config, random).all(raysPerBox = 14)
+        val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
+        cases.zip(rates).foreach { case (box, rate) => run(setup, box, box.answers(config), random, rate) }
+      }
+    }
+  }
+
+  it should "take a ray every 20 cycles at 32b32s64d, and lose none" in {
+    val config = TestConfigs.tiny
+    test(new RaySetup(config)) { setup =>
+      val random   = new Random(3)
+      val box      = new SetUpCases(config, random).all(raysPerBox = 40).head
+      val answers  = box.answers(config)
+      val inBox    = answers.map(_.head == 1)
+      val left     = run(setup, box, answers, random, Rates(1, 1))
+      val starting = 4
+      inBox.count(identity) should be > 20
+      left.zip(left.tail).drop(starting).map { case (one, next) => next - one }.max should be <= 20
+    }
+  }
+
+  /** Sends all requests and checks all answers; the cycles in which these left. */
+  private def run(
+      setup:   RaySetup,
+      box:     SetUpCase,
+      answers: Seq[Seq[BigInt]],
+      random:  Random,
+      rates:   Rates
+  ): Seq[Int] = {
+    setup.io.bounds.low.axes.zip(box.low).foreach { case (port, value) => port.poke(value) }
+    setup.io.bounds.high.axes.zip(box.high).foreach { case (port, value) => port.poke(value) }
+    val requests               = box.requests
+    var left                   = Seq.empty[Int]
+    var (sent, offered, cycle) = (0, -1, 0)
+    while (left.size < requests.size) {
+      cycle should be < 200 * requests.size
+      val offers  = sent < requests.size && random.nextInt(rates.offer) == 0
+      val accepts = random.nextInt(rates.accept) == 0
+      setup.io.request.valid.poke(offers)
+      setup.io.ray.ready.poke(accepts)
+      // What is offered may be withdrawn; what is not offered must not matter
+      val shown = if (offers) sent else requests.size - 1
+      if (shown != offered) offer(setup.io.request.bits, requests(shown))
+      offered = shown
+      setup.io.busy.expect(sent > left.size)
+      if (accepts && setup.io.ray.valid.peekBoolean()) {
+        expect(setup.io.ray.bits, requests(left.size), answers(left.size))
+        left :+= cycle
+      }
+      if (offers && setup.io.request.ready.peekBoolean()) sent += 1
+      setup.clock.step()
+      cycle += 1
+    }
+    setup.io.busy.expect(false)
+    left
+  }
+
+  private def expect(ray: SetUpRay, request: SetUpRequest, answer: Seq[BigInt]): Unit = withClue(s"$request: ") {
+    ray.context.peekInt() shouldBe request.context
+    ray.isShadow.peekBoolean() shouldBe request.isShadow
+    ray.enters.peekInt() shouldBe answer.head
+    if (answer.head == 1) {
+      val box      = ray.boxRay
+      val triangle = ray.triangleRay
+      box.heading.negative.map(_.peekInt()) shouldBe triangle.heading.negative.map(_.peekInt())
+      box.heading.axis.peekInt() shouldBe triangle.heading.axis.peekInt()
+      val numbers = Seq(triangle.heading.axis.peekInt()) ++ triangle.heading.negative.map(_.peekInt()) ++
+        triangle.origin.map(raw) ++ box.origin.map(raw) ++ triangle.shear.map(raw) ++ box.reciprocal.map(raw) ++
+        box.exponent.map(_.peekInt()) ++ Seq(raw(ray.entry), raw(ray.limit))
+      numbers shouldBe answer.tail
+    }
+  }
+}
+
+object RaySetupSpec {
+
+  /** One cycle in `offer` has a request on offer, one in `accept` takes a ray. */
+  private case class Rates(offer: Int, accept: Int)
+
+  private def raw(number: Fixed): BigInt = number.raw match {
+    case signed: SInt => signed.peekInt()
+    case other        => other.asInstanceOf[UInt].peekInt()
+  }
+
+  private def offer(port: RayRequest, request: SetUpRequest): Unit = {
+    port.context.poke(request.context)
+    port.isShadow.poke(request.isShadow)
+    port.origin.axes.zip(request.origin).foreach { case (to, from) => to.raw.asInstanceOf[SInt].poke(from) }
+    port.towards.axes.zip(request.towards).foreach { case (to, from) => to.poke(from) }
+  }
+}
