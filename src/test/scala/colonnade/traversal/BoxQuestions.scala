@@ -1,0 +1,150 @@
+package colonnade.traversal
+
+import colonnade.config.ColonnadeConfig
+import colonnade.Model
+
+import scala.util.Random
+
+/** A ray and a node as integers; the ray's numbers are in its own frame. */
+final case class BoxQuestion(
+    axis:           Int,
+    negative:       Seq[Boolean],
+    boxOrigin:      Seq[BigInt],
+    reciprocal:     Seq[BigInt],
+    exponent:       Seq[Int],
+    limit:          BigInt,
+    origin:         Seq[BigInt],
+    shift:          Seq[Int],
+    kinds:          Seq[Int],
+    low:            Seq[Seq[BigInt]],
+    high:           Seq[Seq[BigInt]],
+    firstChild:     BigInt,
+    firstTriangles: BigInt,
+    context:        Int
+) {
+
+  /** In the form that vectors.cpp reads. */
+  def words: Seq[BigInt] =
+    (BigInt(axis) +: negative.map(sign => BigInt(if (sign) 1 else 0))) ++ boxOrigin ++ reciprocal ++ exponent.map(BigInt(_)) ++
+      Seq(limit) ++ origin ++ shift.map(BigInt(_)) ++ Seq(firstChild, firstTriangles) ++
+      kinds.indices.flatMap(slot => BigInt(kinds(slot)) +: (low(slot) ++ high(slot)))
+
+  /** Named as in [[BoxCandidate]]. */
+  def fields(limitUnits: BigInt): Map[String, BigInt] = {
+    def vector(name: String, values: Seq[BigInt]) = Seq("x", "y", "z").zip(values).map { case (axis, value) => s"$name.$axis" -> value }
+    def indexed(name: String, values: Seq[BigInt]) = values.zipWithIndex.map { case (value, i) => s"$name[$i]" -> value }
+    Map("context" -> BigInt(context), "limit" -> limitUnits, "ray.heading.axis" -> BigInt(axis)) ++
+      indexed("ray.heading.negative", negative.map(sign => BigInt(if (sign) 1 else 0))) ++ indexed("ray.origin", boxOrigin) ++
+      indexed("ray.reciprocal", reciprocal) ++ indexed("ray.exponent", exponent.map(BigInt(_))) ++
+      vector("node.origin", origin) ++ vector("node.exponent", shift.map(BigInt(_))) ++
+      Map("node.firstChild" -> firstChild, "node.firstTriangles" -> firstTriangles) ++ indexed("node.kinds", kinds.map(BigInt(_))) ++
+      kinds.indices.flatMap(slot => vector(s"node.low[$slot]", low(slot)) ++ vector(s"node.high[$slot]", high(slot)))
+  }
+}
+
+/** Random and directed questions within what the packer and ray set-up guarantee. */
+final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
+  private val numbers  = config.numbers
+  private val random   = new Random(seed)
+  private val cube     = BigInt(1) << numbers.vertexBits
+  private val farthest = (BigInt(1) << (numbers.gridBits - 1)) - 1
+  private val address  = BigInt(config.columnBvhMemory.depth)
+
+  def apply(count: Int): Seq[BoxQuestion] = Seq.fill(count)(one())
+
+  private def below(bound: BigInt): BigInt = BigInt(bound.bitLength + 8, random) % bound
+
+  private def one(): BoxQuestion = {
+    val shift  = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits + 2))
+    val origin = shift.map(s => below(cube).min(cube - 1) >> (if (random.nextInt(3) == 0) 0 else s.min(3)))
+    val kinds  = Seq.fill(config.geometry.arity)(if (random.nextInt(8) == 0) random.nextInt(4) else 1 + random.nextInt(2))
+    val boxes  = kinds.map(_ => Seq.tabulate(3)(a => interval(shift(a))))
+    BoxQuestion(
+      axis = random.nextInt(3),
+      negative = Seq.fill(3)(random.nextBoolean()),
+      boxOrigin = Seq.tabulate(3)(_ => boxOrigin(origin, shift, boxes.flatten)),
+      reciprocal = Seq.fill(2)(reciprocal()),
+      exponent = Seq.fill(2)(exponent()),
+      limit = if (random.nextInt(4) == 0) farthest else below(farthest) >> random.nextInt(6),
+      origin = origin,
+      shift = shift,
+      kinds = kinds,
+      low = boxes.map(_.map(_._1)),
+      high = boxes.map(_.map(_._2)),
+      firstChild = below(address - 4),
+      firstTriangles = below(address - 4),
+      context = random.nextInt(config.array.contexts)
+    )
+  }
+
+  /** Low and high plane: any, flat, or across the node. No plane lies two cubes from the corner. */
+  private def interval(shift: Int): (BigInt, BigInt) = {
+    val most   = ((BigInt(1) << numbers.boxBits) - 1).min((2 * cube - 1) >> shift)
+    val planes = Seq(below(most + 1), below(most + 1)).sorted
+    random.nextInt(6) match {
+      case 0 => (planes(0), planes(0))
+      case 1 => (BigInt(0), most)
+      case _ => (planes(0), planes(1))
+    }
+  }
+
+  /** Anywhere in reach, at its ends, inside the object's cube, or on a plane. */
+  private def boxOrigin(origin: Seq[BigInt], shift: Seq[Int], planes: Seq[(BigInt, BigInt)]): BigInt = {
+    val axis           = random.nextInt(3)
+    val (low, high)    = planes(random.nextInt(planes.size))
+    val lowest         = -cube / 2
+    val highest        = cube * 3 / 2
+    val onPlane        = origin(axis) + ((if (random.nextBoolean()) low else high) << shift(axis))
+    (random.nextInt(6) match {
+      case 0 => onPlane
+      case 1 => if (random.nextBoolean()) lowest else highest
+      case 2 => lowest + below(2 * cube)
+      case _ => below(cube)
+    }).max(lowest).min(highest)
+  }
+
+  /** Between a half and two, with the digits that set-up computes; a zero component's is one. */
+  private def reciprocal(): BigInt = {
+    val digits = numbers.reciprocalDigits
+    val raw    = random.nextInt(6) match {
+      case 0 => BigInt(1) << digits
+      case 1 => (BigInt(1) << (digits + 1)) - 1
+      case _ => (BigInt(1) << (digits - 1)) + below(BigInt(3) << (digits - 1))
+    }
+    raw << (numbers.reciprocalFraction - digits)
+  }
+
+  private def exponent(): Int = random.nextInt(5) match {
+    case 0 => numbers.reciprocalFraction
+    case 1 => random.nextInt(numbers.reciprocalFraction + 1)
+    case _ => random.nextInt(4)
+  }
+}
+
+object BoxQuestions {
+
+  /** The unit's inputs and the results they should give, as fields of [[BoxCandidate]] and [[BoxResult]]. */
+  def solved(config: ColonnadeConfig, questions: Seq[BoxQuestion]): Seq[(Map[String, BigInt], Map[String, BigInt])] = {
+    val limits  = Model.answers(config, questions.map(question => Seq(question.limit)), "limit").map(_.head)
+    val answers = Model.answers(config, questions.map(_.words), "box")
+    for (((question, limit), answer) <- questions.zip(limits).zip(answers)) yield {
+      val count    = answer(1).toInt
+      val children = for (i <- 0 until count; (field, value) <- child(question, answer(2 + 2 * i).toInt, answer(3 + 2 * i)))
+        yield s"children[$i].$field" -> value
+      question.fields(limit) ->
+        (children.toMap ++ Map("context" -> BigInt(question.context), "tests" -> answer.head, "count" -> answer(1)))
+    }
+  }
+
+  /** Children of a kind are consecutive, in slot order. */
+  private def child(question: BoxQuestion, slot: Int, near: BigInt): Seq[(String, BigInt)] = {
+    val kind    = question.kinds(slot)
+    val isLeaf  = kind == 2
+    val earlier = question.kinds.take(slot).count(_ == kind)
+    Seq(
+      "visit.isLeaf"  -> BigInt(if (isLeaf) 1 else 0),
+      "visit.address" -> ((if (isLeaf) question.firstTriangles else question.firstChild) + earlier),
+      "near"          -> near
+    )
+  }
+}

@@ -1,0 +1,64 @@
+package colonnade.traversal
+
+import chiseltest._
+import colonnade.TestConfigs
+import colonnade.config.ColonnadeConfig
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
+  private val binary = TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(arity = 2))
+
+  behavior of "BoxUnit"
+
+  for ((config, i) <- (TestConfigs.formats :+ binary).zipWithIndex)
+    it should s"follow the model under random stalls, format $i (${config.precision}, arity ${config.geometry.arity})" in
+      test(new PackedBoxUnit(config)) { dut =>
+        val questions = new BoxQuestions(config, seed = 100 + i)
+        for ((offered, accepted) <- Seq((1.0, 1.0), (0.4, 1.0), (0.8, 0.3))) compare(dut, config, questions(80), offered, accepted)
+      }
+
+  it should "order equally near children by slot, and skip empty and illegal ones" in
+    test(new PackedBoxUnit(TestConfigs.tiny)) { dut =>
+      val config = TestConfigs.tiny
+      val around = new BoxQuestions(config, seed = 5)(1).head.copy(
+        boxOrigin = Seq.fill(3)(BigInt(1000)),
+        limit = (BigInt(1) << (config.numbers.gridBits - 1)) - 1,
+        origin = Seq.fill(3)(BigInt(900)),
+        shift = Seq.fill(3)(0),
+        low = Seq.fill(4)(Seq.fill(3)(BigInt(0))),
+        high = Seq.fill(4)(Seq.fill(3)(BigInt(255)))
+      )
+      val kinds  = for (a <- 0 to 3; b <- 0 to 3; c <- 0 to 3; d <- 0 to 3) yield Seq(a, b, c, d)
+      compare(dut, config, kinds.grouped(3).map(_.last).toSeq.map(these => around.copy(kinds = these)), offered = 1, accepted = 0.7)
+    }
+
+  for (config <- Seq(TestConfigs.tiny, binary))
+    it should s"take two children a cycle without gaps, arity ${config.geometry.arity}" in
+      test(new PackedBoxUnit(config)) { dut =>
+        val nodes   = 40
+        val beats   = config.geometry.arity / 2
+        val cycles  = compare(dut, config, new BoxQuestions(config, seed = 3)(nodes), offered = 1, accepted = 1)
+        val latency = 5 + beats
+        assert(cycles == beats * (nodes - 1) + latency)
+      }
+
+  /** @return cycles from the first accepted input to the last result */
+  private def compare(dut: PackedBoxUnit, config: ColonnadeConfig, questions: Seq[BoxQuestion], offered: Double, accepted: Double): Int = {
+    val input             = new Packed(new BoxCandidate(config))
+    val output            = new Packed(new BoxResult(config))
+    val solved            = BoxQuestions.solved(config, questions)
+    val (results, cycles) = PackedStreams.run(dut, solved.map(pair => input.pack(pair._1)), offered, accepted, new Random(11))
+    for (((result, (_, expected)), question) <- results.zip(solved).zip(questions)) {
+      val fields = output.unpack(result)
+      for ((name, value) <- expected) assert(fields(name) == value, s"for $name, expected $expected of $question")
+    }
+    cycles
+  }
+}
+
+private class PackedBoxUnit(config: ColonnadeConfig) extends PackedUnit(new BoxCandidate(config), new BoxResult(config)) {
+  private val unit = chisel3.Module(new BoxUnit(config))
+  connect(unit.io.in, unit.io.out, unit.io.busy)
+}

@@ -1,0 +1,196 @@
+package colonnade.traversal
+
+import chisel3._
+import chiseltest._
+import colonnade.TestConfigs
+import colonnade.config.ColonnadeConfig
+import colonnade.traversal.StackReference.Child
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.collection.mutable
+import scala.util.Random
+
+class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester {
+  private def config(arity: Int, stackDepth: Int, contexts: Int): ColonnadeConfig = TestConfigs.tiny.copy(
+    array = TestConfigs.tiny.array.copy(contexts = contexts),
+    geometry = TestConfigs.tiny.geometry.copy(arity = arity),
+    columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(stackDepth = stackDepth)
+  )
+
+  behavior of "TraversalStack"
+
+  for ((arity, stackDepth, contexts) <- Seq((4, 16, 4), (2, 5, 3), (4, 6, 8), (4, 4, 1)))
+    it should s"walk like the reference under random stalls, arity $arity, $stackDepth entries, $contexts contexts" in {
+      val shape = config(arity, stackDepth, contexts)
+      test(new TraversalStack(shape)) { dut =>
+        for ((accepted, seed) <- Seq((1.0, 1), (0.4, 2))) {
+          new StackDriver(dut, shape, seed).run(operations = 400, accepted)
+        }
+      }
+    }
+
+  it should "pop an entry a cycle while it drops those beyond the limit" in {
+    val shape = config(arity = 4, stackDepth = 16, contexts = 2)
+    test(new TraversalStack(shape)) { dut =>
+      val driver = new StackDriver(dut, shape, seed = 1)
+      for (round <- 0 until 3) driver.send(0, Seq.tabulate(4)(i => Child(isLeaf = false, 10 * round + i, if (round == 0) 5 else 100)))
+      dut.io.deepest.expect(9.U)
+      driver.setLimit(0, 50)
+      val waited = driver.resume(0)
+      assert(waited == 2 + 6, "six entries lie above the first that counts")
+    }
+  }
+
+  it should "push in one cycle a sibling, and send the nearest child on after two" in {
+    val shape = config(arity = 4, stackDepth = 16, contexts = 2)
+    test(new TraversalStack(shape)) { dut =>
+      val driver = new StackDriver(dut, shape, seed = 1)
+      for (count <- 1 to 4)
+        assert(driver.send(1, Seq.fill(count)(Child(isLeaf = true, count, 3))) == 2 + (count - 2).max(0))
+      dut.io.deepest.expect(6.U)
+      dut.io.clear.poke(true.B)
+      dut.clock.step()
+      dut.io.clear.poke(false.B)
+      dut.io.deepest.expect(0.U)
+    }
+  }
+}
+
+private sealed trait StackOperation { def context: Int }
+
+private final case class Found(context: Int, children: Seq[Child]) extends StackOperation
+
+private final case class Resumed(context: Int) extends StackOperation
+
+/** Plays the render unit: each context has one operation under way or none. */
+private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: Int) {
+  private val contexts  = config.array.contexts
+  private val arity     = config.geometry.arity
+  private val random    = new Random(seed)
+  private val reference = new StackReference(contexts, config.columnBvhMemory.stackDepth)
+  private val limits    = Array.fill(contexts)(BigInt(1000))
+  private val expected  = Array.fill(contexts)(Option.empty[Option[Child]])
+
+  private val foundQueue   = mutable.Queue.empty[Found]
+  private val resumedQueue = mutable.Queue.empty[Resumed]
+  private var overflows    = 0
+  private var waited       = 0
+
+  // Defined inputs from the first cycle; empty stacks
+  dut.io.clear.poke(true.B)
+  for (context <- 0 until contexts) {
+    start(context)
+    setLimit(context, 1000)
+  }
+  dut.io.clear.poke(false.B)
+
+  def start(context: Int): Unit = {
+    reference.start(context)
+    dut.io.start.valid.poke(true.B)
+    dut.io.start.bits.poke(context.U)
+    step(accepted = 0.5)
+    dut.io.start.valid.poke(false.B)
+  }
+
+  def setLimit(context: Int, limit: BigInt): Unit = {
+    limits(context) = limit
+    dut.io.limits(context).raw.asInstanceOf[SInt].poke(limit.S)
+  }
+
+  /** @return cycles until the visit came */
+  def send(context: Int, children: Seq[Child]): Int = {
+    offer(Found(context, children))
+    await()
+  }
+
+  def resume(context: Int): Int = {
+    offer(Resumed(context))
+    await()
+  }
+
+  private def await(): Int = {
+    var cycles = 0
+    while (expected.exists(_.nonEmpty)) {
+      assert(cycles < 100, "no visit came")
+      step(accepted = 1)
+      cycles += 1
+    }
+    cycles - 1
+  }
+
+  /** Random operations on random contexts, then checks the measurements. */
+  def run(operations: Int, accepted: Double): Unit = {
+    var done = 0
+    while (done < operations) {
+      val context = random.nextInt(contexts)
+      if (expected(context).isEmpty) {
+        if (random.nextInt(25) == 0) start(context)
+        setLimit(context, if (random.nextInt(4) == 0) BigInt(random.nextInt(300)) else 1000)
+        val children = Seq.fill((random.nextInt(arity + 3) - 1).max(0).min(arity))(child())
+        offer(if (random.nextInt(3) == 0) Resumed(context) else Found(context, children.sortBy(_.near)))
+        done += 1
+      }
+      step(accepted)
+    }
+    while (expected.exists(_.nonEmpty)) step(accepted)
+    for (_ <- 0 until 5) {
+      dut.io.visits.valid.expect(false.B)
+      dut.io.busy.expect(false.B)
+      step(accepted = 1)
+    }
+    dut.io.deepest.expect(reference.deepest.U)
+    assert(overflows == reference.overflows)
+  }
+
+  private def child(): Child = Child(random.nextBoolean(), random.nextInt(config.columnBvhMemory.depth), random.nextInt(400))
+
+  private def offer(operation: StackOperation): Unit = operation match {
+    case found: Found     =>
+      expected(found.context) = Some(reference.result(found.context, found.children, limits(found.context)))
+      foundQueue += found
+    case resumed: Resumed =>
+      expected(resumed.context) = Some(reference.resume(resumed.context, limits(resumed.context)))
+      resumedQueue += resumed
+  }
+
+  private def step(accepted: Double): Unit = {
+    dut.io.results.valid.poke(foundQueue.nonEmpty.B)
+    for (found <- foundQueue.headOption) {
+      val bits = dut.io.results.bits
+      bits.context.poke(found.context.U)
+      bits.count.poke(found.children.size.U)
+      for ((child, i) <- found.children.zipWithIndex) {
+        bits.children(i).visit.isLeaf.poke(child.isLeaf.B)
+        bits.children(i).visit.address.poke(child.address.U)
+        bits.children(i).near.raw.asInstanceOf[SInt].poke(child.near.S)
+      }
+    }
+    dut.io.resume.valid.poke(resumedQueue.nonEmpty.B)
+    for (resumed <- resumedQueue.headOption) dut.io.resume.bits.poke(resumed.context.U)
+    val accepts = random.nextDouble() < accepted
+    dut.io.visits.ready.poke(accepts.B)
+
+    waited += 1
+    assert(waited < 100, "nothing happens")
+    if (accepts && dut.io.visits.valid.peekBoolean()) check()
+    if (dut.io.overflow.peekBoolean()) overflows += 1
+    if (foundQueue.nonEmpty && dut.io.results.ready.peekBoolean()) foundQueue.dequeue()
+    if (resumedQueue.nonEmpty && dut.io.resume.ready.peekBoolean()) resumedQueue.dequeue()
+    dut.clock.step()
+  }
+
+  private def check(): Unit = {
+    val visit   = dut.io.visits.bits
+    val context = visit.context.peekInt().toInt
+    val answer  = expected(context).getOrElse(fail(s"context $context has nothing under way"))
+    visit.isDone.expect(answer.isEmpty.B)
+    for (child <- answer) {
+      visit.visit.isLeaf.expect(child.isLeaf.B)
+      visit.visit.address.expect(child.address.U)
+    }
+    expected(context) = None
+    waited = 0
+  }
+
+  private def fail(message: String): Nothing = throw new AssertionError(message)
+}
