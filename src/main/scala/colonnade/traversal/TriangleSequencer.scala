@@ -1,0 +1,67 @@
+package colonnade.traversal
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.Vec3
+import colonnade.ray.TriangleRay
+
+final class TriangleSequencerIO(config: ColonnadeConfig) extends Bundle {
+  val schedule  = Input(new TriangleSchedule)
+  val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
+
+  /** The vertex of this phase (phases 0 to 2). */
+  val vertex = Output(Vec3(UInt(config.geometry.vertexBits.W)))
+
+  /** Stays from phase 0 to 3. */
+  val ray = Output(new TriangleRay(config.numbers))
+
+  /** The triangle under way from phase 0 to 3. */
+  val tag = Output(Valid(new TriangleTag(config)))
+}
+
+/** Holds a record and hands out its triangles, one each round of the schedule, a vertex a phase.
+  *
+  * A candidate is taken in phase 3 and starts in the next cycle: no round is lost between records. A record whose
+  * `count` is 0 gives one absent triangle; a `count` beyond the record's room counts as full.
+  */
+final class TriangleSequencer(config: ColonnadeConfig) extends Module {
+  val io = IO(new TriangleSequencerIO(config))
+
+  private val perRecord = config.geometry.trianglesPerRecord
+  private val indexBits = log2Ceil(perRecord).max(1)
+
+  private val isOccupied = RegInit(false.B)
+  private val candidate  = Reg(new TriangleCandidate(config))
+  private val index      = Reg(UInt(indexBits.W))
+
+  private val record = candidate.record
+  private val isLast = index === (perRecord - 1).U || index +& 1.U >= record.count
+  private val isEnd  = io.schedule.is(3)
+
+  io.candidate.ready := isEnd && (!isOccupied || isLast)
+  when(isEnd) {
+    index := index + 1.U
+    when(io.candidate.ready) {
+      isOccupied := io.candidate.valid
+      index      := 0.U
+    }
+  }
+  when(io.candidate.fire) { candidate := io.candidate.bits }
+
+  private val triangles = record.vertices.grouped(3).toSeq
+  private val vertices  = (0 until 3).map { vertex =>
+    triangles.zipWithIndex.tail.foldLeft(triangles.head(vertex)) { case (other, (triangle, k)) =>
+      Mux(index === k.U, triangle(vertex), other)
+    }
+  }
+  io.vertex := Mux(io.schedule.is(0), vertices(0), Mux(io.schedule.is(1), vertices(1), vertices(2)))
+  io.ray    := candidate.ray
+
+  io.tag.valid           := isOccupied
+  io.tag.bits.context    := candidate.context
+  io.tag.bits.id         := record.firstTriangle + index
+  io.tag.bits.isLast     := isLast
+  io.tag.bits.isAbsent   := record.count === 0.U
+  io.tag.bits.isNegative := candidate.ray.heading.negative(2)
+}

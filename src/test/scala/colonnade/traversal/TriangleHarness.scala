@@ -1,0 +1,123 @@
+package colonnade.traversal
+
+import chisel3._
+import chiseltest._
+import colonnade.config.ColonnadeConfig
+import colonnade.numbers.Fixed
+import org.scalatest.matchers.should.Matchers
+
+/** A record's triangles with their ray; none stands for a record whose count is 0. */
+final case class TestCandidate(context: Int, firstTriangle: Int, ray: TestRay, triangles: Seq[TestTriangle])
+
+/** One result: of which candidate, whether it is its last, and the hit. */
+final case class ExpectedResult(candidate: TestCandidate, index: Int, isLast: Boolean, hit: ExpectedHit)
+
+/** Drives a [[TriangleUnit]] and holds it against the model. */
+final class TriangleHarness(config: ColonnadeConfig, questions: TriangleQuestions) extends Matchers {
+  private val perRecord = config.geometry.trianglesPerRecord
+
+  private val miss = ExpectedHit(isHit = false, 0, Seq.fill(3)(BigInt(0)), backSide = false)
+
+  private def expected(candidates: Seq[TestCandidate]): Seq[ExpectedResult] = {
+    val hits = questions.expected(candidates.flatMap(c => c.triangles.map((c.ray, _)))).iterator
+    candidates.flatMap { c =>
+      if (c.triangles.isEmpty) Seq(ExpectedResult(c, 0, isLast = true, miss))
+      else c.triangles.indices.map(k => ExpectedResult(c, k, k == c.triangles.size - 1, hits.next()))
+    }
+  }
+
+  /** Random candidates, a few of them empty. */
+  def random(count: Int): Seq[TestCandidate] = Seq.fill(count) {
+    val (ray, triangles) = questions.meeting(if (questions.chance(20)) 0 else 1 + questions.nextInt(perRecord))
+    candidate(ray, triangles)
+  }
+
+  def candidate(ray: TestRay, triangles: Seq[TestTriangle]): TestCandidate =
+    TestCandidate(
+      questions.nextInt(config.array.contexts),
+      questions.nextInt(config.columnBvhMemory.depth),
+      ray,
+      triangles
+    )
+
+  /** Sends all candidates and checks all results.
+    *
+    * @param bubbles one in so many cycles offers nothing, 0: never
+    * @param stalls  one in so many cycles accepts results only, 0: always
+    * @return cycles from the first candidate to the last result, and how many triangles were hit
+    */
+  def run(unit: TriangleUnit, candidates: Seq[TestCandidate], bubbles: Int, stalls: Int): (Int, Int) = {
+    val awaited                  = expected(candidates)
+    val limit                    = 200 + awaited.size * 40 * stalls.max(1)
+    var (sent, received, cycles) = (0, 0, 0)
+    var isOffered                = false
+    unit.clock.setTimeout(0)
+    while (received < awaited.size) {
+      withClue(s"after $received of ${awaited.size} results: ")(cycles should be < limit)
+      if (!isOffered && sent < candidates.size && (bubbles == 0 || !questions.chance(bubbles))) {
+        poke(unit, candidates(sent))
+        isOffered = true
+      }
+      unit.io.candidate.valid.poke(isOffered.B)
+      val accepts = stalls == 0 || questions.chance(stalls)
+      unit.io.result.ready.poke(accepts.B)
+      if (accepts && unit.io.result.valid.peekBoolean()) {
+        unit.io.busy.expect(true.B)
+        check(unit.io.result.bits, awaited(received))
+        received += 1
+      }
+      if (isOffered && unit.io.candidate.ready.peekBoolean()) {
+        sent += 1
+        isOffered = false
+      }
+      unit.clock.step()
+      cycles += 1
+    }
+    unit.io.candidate.valid.poke(false.B)
+    unit.io.result.ready.poke(true.B)
+    sent shouldBe candidates.size
+    for (_ <- 0 until 80) {
+      unit.io.result.valid.expect(false.B)
+      unit.clock.step()
+    }
+    unit.io.busy.expect(false.B)
+    (cycles, awaited.count(_.hit.isHit))
+  }
+
+  private def check(result: TriangleResult, expected: ExpectedResult): Unit = withClue(s"$expected: ") {
+    result.context.peekInt() shouldBe expected.candidate.context
+    result.isLast.peekBoolean() shouldBe expected.isLast
+    result.isHit.peekBoolean() shouldBe expected.hit.isHit
+    if (expected.hit.isHit) {
+      val hit = result.hit
+      (peek(hit.t), hit.weights.map(peek), hit.backSide.peekBoolean()) shouldBe
+        ((expected.hit.t, expected.hit.weights, expected.hit.backSide))
+      hit.id.peekInt() shouldBe expected.candidate.firstTriangle + expected.index
+    }
+  }
+
+  private def poke(unit: TriangleUnit, candidate: TestCandidate): Unit = {
+    val (bits, ray) = (unit.io.candidate.bits, unit.io.candidate.bits.ray)
+    bits.context.poke(candidate.context.U)
+    bits.record.firstTriangle.poke(candidate.firstTriangle.U)
+    bits.record.count.poke(candidate.triangles.size.U)
+    for ((triangle, k) <- candidate.triangles.zipWithIndex; (vertex, j) <- triangle.vertices.zipWithIndex)
+      bits.record.vertices(3 * k + j).axes.zip(vertex).foreach { case (port, value) => port.poke(value.U) }
+    ray.heading.axis.poke(candidate.ray.axis.U)
+    ray.heading.negative.zip(candidate.ray.negative).foreach { case (port, value) => port.poke(value.B) }
+    ray.origin.zip(candidate.ray.origin).foreach { case (port, value) => poke(port, value) }
+    ray.shear.zip(candidate.ray.shear).foreach { case (port, value) => poke(port, value) }
+  }
+
+  private def poke(port: Fixed, value: BigInt): Unit = port.raw match {
+    case signed: SInt   => signed.poke(value.S)
+    case unsigned: UInt => unsigned.poke(value.U)
+    case other          => fail(s"a raw number of type $other")
+  }
+
+  private def peek(port: Fixed): BigInt = port.raw match {
+    case signed: SInt   => signed.peekInt()
+    case unsigned: UInt => unsigned.peekInt()
+    case other          => fail(s"a raw number of type $other")
+  }
+}
