@@ -6,15 +6,6 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordFormats, SceneMap}
 import colonnade.ray.Context
 
-/** What a ray does next. */
-final class NextVisit(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config)
-
-  /** Nothing is left to visit; `visit` means nothing then. */
-  val isDone = Bool()
-  val visit  = new Visit(config)
-}
-
 /** The baseline without acceleration structure: every ray visits every triangles record, in the order of the memory.
   *
   * A context's first record is visited by whoever starts it; each `resume` gives the next, one cycle later.
