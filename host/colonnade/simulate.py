@@ -92,8 +92,9 @@ def _build(
     header = f"#pragma once\n#define EACH_COLUMN(DO) {each}\n" + _hit_distance(sources)
     (place / "columns.hpp").write_text(header)
     shutil.copy(harness, place / "harness.cpp")
+    (place / "sources.f").write_text("\n".join(map(str, sources)) + "\n")
     command = [str(verilator), *VERILATOR_OPTIONS, "-j", "0", "--Mdir", str(place / "obj"), "-o", "simulator"]
-    command += ["-CFLAGS", f"-O2 -I{place}", *map(str, sources), str(place / "harness.cpp")]
+    command += ["-CFLAGS", f"-O2 -I{place}", "-f", str(place / "sources.f"), str(place / "harness.cpp")]
     log = logs / "build.log"
     with log.open("w") as stream:
         status = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=stream, stderr=subprocess.STDOUT, check=False)

@@ -57,7 +57,7 @@ public:
             if (bytes != sizeof top_.io_load_bits_record) throw std::runtime_error("records of another width than the load port's");
             top_.io_load_valid = 1;
             top_.io_load_bits_target = 0;
-            top_.io_load_bits_address = static_cast<decltype(top_.io_load_bits_address)>(address);
+            top_.io_load_bits_address = static_cast<std::uint32_t>(address);
             std::memcpy(&top_.io_load_bits_record, record.data(), bytes);
             for (int wait = 0; !ready(top_.io_load_ready); ++wait) {
                 if (wait > 1000) throw std::runtime_error("the load port takes no records");
@@ -70,7 +70,7 @@ public:
 
     void write(std::uint64_t address, std::uint32_t value) {
         top_.io_register_write = 1;
-        top_.io_register_address = static_cast<decltype(top_.io_register_address)>(address);
+        top_.io_register_address = static_cast<std::uint32_t>(address);
         top_.io_register_writeData = value;
         cycle();
         top_.io_register_write = 0;
@@ -80,7 +80,7 @@ public:
         unsigned __int128 value = 0;
         for (unsigned word = 0; word < words; ++word) {
             top_.io_register_read = 1;
-            top_.io_register_address = static_cast<decltype(top_.io_register_address)>(address + word);
+            top_.io_register_address = static_cast<std::uint32_t>(address + word);
             cycle();
             top_.io_register_read = 0;
             top_.eval();

@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Arbiter, PopCount, Queue, RRArbiter, Valid}
+import chisel3.util.{Arbiter, Decoupled, Queue, RRArbiter, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
 import colonnade.numbers.Rounding
@@ -48,31 +48,31 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val rectangle = io.registers.frame.objectRect
   private val position  = io.positions.bits
   private val isInside  = position.x >= rectangle.x0 && position.x < rectangle.x1 && position.y >= rectangle.y0 && position.y < rectangle.y1
-  private val passing   = Wire(chisel3.util.Decoupled(new Pixel(config)))
+  private val passing   = Wire(Decoupled(new Pixel(config)))
   passing.valid := io.positions.valid && !isInside
   passing.bits  := backgroundPixel(position)
-  rayGenerator.io.in.valid        := io.positions.valid && isInside && controller.io.free.valid
-  rayGenerator.io.in.bits.context := controller.io.free.bits
-  rayGenerator.io.in.bits.x       := position.x
-  rayGenerator.io.in.bits.y       := position.y
-  io.positions.ready              := Mux(isInside, rayGenerator.io.in.ready && controller.io.free.valid, passing.ready)
-  controller.io.allocate          := rayGenerator.io.in.fire
-  when(rayGenerator.io.in.fire) {
+  rayGenerator.io.position.valid        := io.positions.valid && isInside && controller.io.free.valid
+  rayGenerator.io.position.bits.context := controller.io.free.bits
+  rayGenerator.io.position.bits.x       := position.x
+  rayGenerator.io.position.bits.y       := position.y
+  io.positions.ready              := Mux(isInside, rayGenerator.io.position.ready && controller.io.free.valid, passing.ready)
+  controller.io.allocate          := rayGenerator.io.position.fire
+  when(rayGenerator.io.position.fire) {
     positions.write(controller.io.free.bits, position)
     isObject(controller.io.free.bits) := false.B
   }
-  rayGenerator.io.camera    := io.registers.camera
-  rayGenerator.io.unitShift := io.registers.frame.unitShift
+  rayGenerator.io.registers.camera    := io.registers.camera
+  rayGenerator.io.registers.unitShift := io.registers.frame.unitShift
 
   // Rays: shadow rays first, since their pixels are nearer to their end
   private val requests   = Module(new Arbiter(new RayRequest(config), 2))
-  private val shadowRays = Wire(chisel3.util.Decoupled(new RayRequest(config)))
+  private val shadowRays = Wire(Decoupled(new RayRequest(config)))
   requests.io.in(0) :<>= shadowRays
-  requests.io.in(1) :<>= rayGenerator.io.out
-  raySetup.io.in :<>= requests.io.out
+  requests.io.in(1) :<>= rayGenerator.io.ray
+  raySetup.io.request :<>= requests.io.out
   raySetup.io.bounds := io.registers.bounds
 
-  private val setUpRay = raySetup.io.out
+  private val setUpRay = raySetup.io.ray
   private val enters   = setUpRay.fire && setUpRay.bits.enters
   setUpRay.ready := true.B
   when(enters) {
@@ -101,14 +101,14 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   // Triangles
   private val triangles = recordFetch.io.served(1)
-  triangleUnit.io.in.valid        := triangles.valid
-  triangleUnit.io.in.bits.context := triangles.bits.context
-  triangleUnit.io.in.bits.record  := formats.asTriangles(triangles.bits.record)
-  triangleUnit.io.in.bits.ray     := triangleRays.read(triangles.bits.context)
-  triangles.ready                 := triangleUnit.io.in.ready
+  triangleUnit.io.candidate.valid        := triangles.valid
+  triangleUnit.io.candidate.bits.context := triangles.bits.context
+  triangleUnit.io.candidate.bits.record  := formats.asTriangles(triangles.bits.record)
+  triangleUnit.io.candidate.bits.ray     := triangleRays.read(triangles.bits.context)
+  triangles.ready                 := triangleUnit.io.candidate.ready
 
   // A result either ends its ray (a shadow ray that is occluded) or lets it go on
-  private val tested      = triangleUnit.io.out
+  private val tested      = triangleUnit.io.result
   private val isShadow    = controller.io.isShadow(tested.bits.context)
   private val isOccluded  = isShadow && hitTable.io.hasHitNow
   private val resumes     = Module(new Arbiter(Context(config), 2))
@@ -145,19 +145,19 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val attributes = recordFetch.io.served(2)
   hitTable.io.readers(1).context := attributes.bits.context
   private val shadedHit = hitTable.io.readers(1).hit
-  shader.io.in.valid        := attributes.valid
-  shader.io.in.bits.context := attributes.bits.context
-  shader.io.in.bits.ray     := triangleRays.read(attributes.bits.context)
-  shader.io.in.bits.hit     := shadedHit
-  shader.io.in.bits.face    := formats.asAttributes(attributes.bits.record).faces(shadedHit.id % RecordFormats.facesPerRecord.U)
-  attributes.ready          := shader.io.in.ready
+  shader.io.request.valid        := attributes.valid
+  shader.io.request.bits.context := attributes.bits.context
+  shader.io.request.bits.ray     := triangleRays.read(attributes.bits.context)
+  shader.io.request.bits.hit     := shadedHit
+  shader.io.request.bits.face    := formats.asAttributes(attributes.bits.record).faces(shadedHit.id % RecordFormats.facesPerRecord.U)
+  attributes.ready          := shader.io.request.ready
   shader.io.light           := io.registers.light
   shader.io.unitShift       := io.registers.frame.unitShift
   shader.io.ambient         := io.registers.ambient
   shader.io.shading         := io.registers.shading
   shader.io.materials       := io.registers.materials
 
-  private val shaded = shader.io.out
+  private val shaded = shader.io.result
   shaded.ready                       := !shaded.bits.needsShadowRay || shadowRays.ready
   shadowRays.valid                   := shaded.valid && shaded.bits.needsShadowRay
   shadowRays.bits.context            := shaded.bits.context
@@ -176,7 +176,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   // Pixels
   private val complete = controller.io.complete
-  private val finished = Wire(chisel3.util.Decoupled(new Pixel(config)))
+  private val finished = Wire(Decoupled(new Pixel(config)))
   private val isDark   = controller.io.isShadow(complete.bits) && hitTable.io.hasHit(complete.bits)
   finished.valid := complete.valid
   finished.bits  := backgroundPixel(positions.read(complete.bits))
