@@ -29,7 +29,7 @@ final class DistanceStage(config: ColonnadeConfig, lanes: Int) extends Module {
   private val formats = new TriangleFormats(numbers)
 
   private def turn(moves: Bool): UInt = {
-    val lane = RegInit(0.U(log2Ceil(lanes).max(1).W))
+    val lane = RegInit(0.U(log2Ceil(lanes).W))
     when(moves) { lane := Mux(lane === (lanes - 1).U, 0.U, lane + 1.U) }
     lane
   }

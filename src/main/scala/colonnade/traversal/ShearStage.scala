@@ -49,8 +49,8 @@ final class ShearStage(config: ColonnadeConfig) extends Module {
   private val advances = schedule.advances
 
   // Translate: differences are within 1.5 · 2^(gridBits - 3) steps
-  private val heading    = io.ray.heading
-  private val vertex     = PermutedFrame(io.vertex, heading.axis).map { coordinate =>
+  private val heading = io.ray.heading
+  private val vertex  = PermutedFrame(io.vertex, heading.axis).map { coordinate =>
     Rounding.nearestEven(coordinate, -numbers.gridFraction).zext
   }
   private val origin     = io.ray.origin.map(_.integer)
