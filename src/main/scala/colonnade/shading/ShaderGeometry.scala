@@ -1,0 +1,68 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{Decoupled, Valid}
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.formats.Light
+
+final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
+  private val numbers = config.numbers
+  private val formats = new ShaderFormats(numbers)
+
+  val request   = Flipped(Decoupled(new ShadeRequest(config)))
+  val isFlat    = Input(Bool())
+  val light     = Input(new Light(numbers))
+  val unitShift = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
+
+  /** To the multiplier, which answers in the next cycle. */
+  val factors = Valid(new Factors(formats))
+  val product = Input(SInt(formats.productBits.W))
+  val result  = Decoupled(new ShadingPoint(config))
+}
+
+/** Where a hit lies, which way its light is, and the angle between that and its shading normal: docs/numbers.md, 5.1 to
+  * 5.6 and the product of 5.7. This is the control; the numbers are in [[GeometryDatapath]].
+  *
+  * One hit at a time. Latency 37 cycles and two for each digit of a slope (two at 32 bits): see [[GeometryProgram]].
+  * A hit whose smooth normal is zero takes 12 cycles more, for a second start with the geometric one.
+  */
+final class ShaderGeometry(config: ColonnadeConfig) extends Module {
+  private val formats = new ShaderFormats(config.numbers)
+  private val program = new GeometryProgram(formats)
+
+  val io = IO(new ShaderGeometryIO(config))
+
+  private val datapath = Module(new GeometryDatapath(config))
+  private val isBusy   = RegInit(false.B)
+  private val step     = RegInit(program.last.U(program.stepBits.W))
+  private val isDone   = step === program.last.U
+
+  /** Shade with the geometric normal: it is asked for, or the smooth one is zero. */
+  private val isFlat    = Reg(Bool())
+  private val control   = program.control(step, io.request.fire)
+  private val startOver = control.countNormal && datapath.io.normalIsZero && !isFlat
+
+  when(io.request.fire) {
+    isBusy := true.B
+    step   := 0.U
+    isFlat := io.isFlat
+  }.elsewhen(startOver) {
+    step   := 0.U
+    isFlat := true.B
+  }.elsewhen(!isDone) {
+    step := step + 1.U
+  }
+  when(io.result.fire)(isBusy := false.B)
+
+  io.request.ready := !isBusy
+  io.result.valid  := isBusy && isDone
+
+  datapath.io.control   := control
+  datapath.io.request   := io.request.bits
+  datapath.io.isFlat    := isFlat
+  datapath.io.light     := io.light
+  datapath.io.unitShift := io.unitShift
+  datapath.io.product   := io.product
+  io.factors            := datapath.io.factors
+  io.result.bits        := datapath.io.result
+}

@@ -1,0 +1,145 @@
+package colonnade.shading
+
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+
+import scala.util.Random
+
+/** A hit in raw integers, as the model's "shade" asks for it. */
+final case class HitQuestion(
+    context:         Int,
+    axis:            Int,
+    negative:        Seq[Boolean],
+    origin:          Seq[BigInt],
+    shear:           Seq[BigInt],
+    t:               BigInt,
+    weights:         Seq[BigInt],
+    backSide:        Boolean,
+    normals:         Seq[Seq[BigInt]],
+    geometricNormal: Seq[BigInt],
+    material:        Int
+)
+
+/** What the registers say, in raw integers. */
+final case class LightQuestion(
+    position:  Seq[BigInt],
+    unitShift: Int,
+    colour:    Seq[BigInt],
+    ambient:   Seq[BigInt],
+    albedos:   Seq[Seq[BigInt]],
+    offset:    BigInt,
+    isFlat:    Boolean,
+    shadows:   Boolean
+)
+
+object ShaderQuestions {
+
+  /** The words of the model's question. */
+  def words(hit: HitQuestion, light: LightQuestion): Seq[BigInt] =
+    (BigInt(hit.axis) +: hit.negative.map(bit)) ++ hit.origin ++ hit.shear ++ (hit.t +: hit.weights) ++
+      (bit(hit.backSide) +: hit.normals.flatten) ++ hit.geometricNormal ++ light.position.map(_ << light.unitShift) ++
+      light.colour ++ light.ambient ++ light.albedos(hit.material) ++
+      Seq(light.offset, bit(light.isFlat), bit(light.shadows))
+
+  def bit(claim: Boolean): BigInt = if (claim) 1 else 0
+}
+
+/** Random hits and lights: of all sizes, with the corners of every range. */
+final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
+  private val numbers = config.numbers
+
+  private def chance(oneIn: Int): Boolean = random.nextInt(oneIn) == 0
+
+  private def natural(bits: Int): BigInt =
+    if (chance(8)) BigInt(0) else if (chance(8)) (BigInt(1) << bits) - 1 else BigInt(random.nextInt(bits) + 1, random)
+
+  private def signed(bits: Int): BigInt = {
+    val magnitude = natural(bits - 1)
+    if (chance(16)) -(BigInt(1) << (bits - 1)) else if (random.nextBoolean()) magnitude else -magnitude
+  }
+
+  private def three[T](value: => T): Seq[T] = Seq.fill(3)(value)
+
+  private def unit(vector: Seq[Double]): Seq[BigInt] = {
+    val length = math.sqrt(vector.map(x => x * x).sum)
+    vector.map(x => BigInt(math.round(x / length * 2047)))
+  }
+
+  private def anyUnit: Seq[BigInt] = unit(three(random.nextGaussian()))
+
+  private def nearly(vector: Seq[BigInt]): Seq[BigInt] = unit(vector.map(_.toDouble + random.nextGaussian() * 300))
+
+  def light(): LightQuestion = {
+    val shift = random.nextInt((numbers.sceneBits - 4).min(if (random.nextBoolean()) 6 else 64))
+    val bits  = numbers.macBits.min(numbers.sceneBits - shift)
+    LightQuestion(
+      position = three(signed(bits)),
+      unitShift = shift,
+      colour = three(natural(NumberFormats.lightBits)),
+      ambient = three(natural(if (chance(4)) NumberFormats.lightBits else 11)),
+      albedos = Seq.fill(config.frame.materials)(three(natural(NumberFormats.colourBits))),
+      offset = natural(numbers.gridBits - 2),
+      isFlat = chance(4),
+      shadows = !chance(4)
+    )
+  }
+
+  /** Components of any size. */
+  def anyHit(): HitQuestion = hit(
+    origin = three(signed(numbers.gridBits)),
+    t = natural(numbers.gridBits - 1),
+    normals = three(three(signed(NumberFormats.normalBits))),
+    geometricNormal = three(signed(NumberFormats.normalBits))
+  )
+
+  /** A surface of unit normals, turned to the light or away from it, more or less. */
+  def surfaceHit(light: LightQuestion): HitQuestion = {
+    val way     = light.position.map(x => (x << light.unitShift).toDouble)
+    val facing  = if (way.forall(_ == 0)) anyUnit else unit(way.map(x => if (chance(10)) -x else x))
+    val average = if (chance(3)) anyUnit else if (chance(3)) facing else nearly(facing)
+    val normals = three(if (chance(5)) average else nearly(average))
+    hit(
+      origin = three(signed(numbers.gridBits - random.nextInt(8))),
+      t = natural(numbers.gridBits - 4),
+      normals = normals,
+      geometricNormal = if (chance(3)) average else nearly(average)
+    )
+  }
+
+  /** Smooth normals that cancel out, or weigh nothing. */
+  def withoutSmoothNormal(): HitQuestion = {
+    val plain = anyHit()
+    if (random.nextBoolean()) plain.copy(weights = three(BigInt(0)))
+    else {
+      val normal = anyUnit
+      plain.copy(
+        normals = Seq(normal, normal.map(-_), anyUnit),
+        weights = Seq.fill(2)(natural(numbers.barycentricBits)).map(_ => BigInt(5)) :+ BigInt(0)
+      )
+    }
+  }
+
+  /** No normal at all. */
+  def withoutNormal(): HitQuestion = withoutSmoothNormal().copy(geometricNormal = three(BigInt(0)))
+
+  private def hit(
+      origin:          Seq[BigInt],
+      t:               BigInt,
+      normals:         Seq[Seq[BigInt]],
+      geometricNormal: Seq[BigInt]
+  ): HitQuestion = {
+    val steepest = BigInt(1) << numbers.shearFraction
+    HitQuestion(
+      context = random.nextInt(config.array.contexts),
+      axis = random.nextInt(3),
+      negative = three(random.nextBoolean()),
+      origin = origin,
+      shear = Seq.fill(2)(if (chance(8)) steepest else natural(numbers.shearFraction)).map(s => if (random.nextBoolean()) s else -s),
+      t = t,
+      weights = three(natural(numbers.barycentricBits)),
+      backSide = random.nextBoolean(),
+      normals = normals,
+      geometricNormal = geometricNormal,
+      material = random.nextInt(config.frame.materials)
+    )
+  }
+}
