@@ -6,7 +6,7 @@ import colonnade.column.Column
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, FrameController}
-import colonnade.unit.RenderUnitIO
+import colonnade.unit.{RenderUnit, RenderUnitIO}
 
 /** Ports of [[Colonnade]]. */
 final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
@@ -27,10 +27,12 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   * Load the records, write the frame registers, start; take the pixels until `done`, then read errors and counters. A
   * frame with an error bit is not to be shown. An aborted frame withdraws pixels that the sink has not taken.
   *
-  * @param renderUnit makes a render unit
+  * @param renderUnit makes a render unit; another one with the same ports for specs
   */
-final class Colonnade(config: ColonnadeConfig, renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO })
-    extends Module {
+final class Colonnade(
+    config: ColonnadeConfig,
+    renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO } = new RenderUnit(_)
+) extends Module {
   val io = IO(new ColonnadeIO(config))
 
   private val registers  = Module(new RegisterFile(config))

@@ -5,7 +5,7 @@ import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{ColumnProgress, EventSums, PixelCollector, Tile, TileWalker}
-import colonnade.unit.RenderUnitIO
+import colonnade.unit.{RenderUnit, RenderUnitIO}
 
 /** Ports of [[Column]]. */
 final class ColumnIO(config: ColonnadeConfig) extends Bundle {
@@ -30,10 +30,12 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
 
 /** Render units that share one memory of records. A reset clears all but the memory.
   *
-  * @param renderUnit makes a render unit
+  * @param renderUnit makes a render unit; another one with the same ports for specs
   */
-final class Column(config: ColonnadeConfig, renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO })
-    extends Module {
+final class Column(
+    config: ColonnadeConfig,
+    renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO } = new RenderUnit(_)
+) extends Module {
   val io = IO(new ColumnIO(config))
 
   private val walker     = Module(new TileWalker(config))

@@ -36,12 +36,12 @@ class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
     val accepted = requests.zip(wanted).map { case (request, wants) => wants && request.ready }
     val accepts  = accepted.reduce(_ || _)
     val address  = Mux1H(accepted, requests.map(_.bits.address))
-    val row      = Mux1H(accepted, (0 until rows).map(_.U(8.W)))
+    val row      = Mux1H(accepted, (0 until rows).map(_.U(2.W)))
 
     // The scoreboard: the oldest first
-    val held   = RegInit(0.U(4.W))
+    val held   = RegInit(0.U(2.W))
     val places = Reg(Vec(capacity + 1, chiselTypeOf(address)))
-    val owners = Reg(Vec(capacity + 1, UInt(8.W)))
+    val owners = Reg(Vec(capacity + 1, UInt(2.W)))
     val answer = answers(bank) && held =/= 0.U
     when(answer) {
       for (i <- 0 until capacity) {
@@ -75,7 +75,7 @@ class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
 
     // Nobody starves
     for (row <- 0 until rows) {
-      val waited = RegInit(0.U(8.W))
+      val waited = RegInit(0.U(2.W))
       when(!wanted(row) || accepted(row)) { waited := 0.U }.elsewhen(accepts) { waited := waited + 1.U }
       assert(waited < rows.U, "nobody waits for more than the others")
     }
