@@ -27,10 +27,19 @@ final class Pixel(config: ColonnadeConfig) extends Bundle {
   val hit      = if (config.frame.hits) Some(new PixelHit(config)) else None
 }
 
-/** A record on its way into the column BVH memories. */
+/** Which memories a [[Load]] is for. */
+object LoadTarget {
+  val bits: Int = 2
+
+  def columnBvh: UInt = 0.U(bits.W)
+}
+
+/** A record on its way into the device's memories: into that of every column. */
 final class Load(config: ColonnadeConfig) extends Bundle {
   private val formats = new RecordFormats(config)
 
+  /** See [[LoadTarget]]; a load for no memory is dropped. */
+  val target  = UInt(LoadTarget.bits.W)
   val address = UInt(formats.addressBits.W)
   val record  = formats.record
 }

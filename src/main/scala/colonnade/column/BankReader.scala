@@ -1,0 +1,67 @@
+package colonnade.column
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, PopCount, Queue, RegEnable, Valid}
+import colonnade.config.ColonnadeConfig
+import colonnade.frame.{ColumnBvhEvents, RoundRobin}
+import colonnade.unit.{RecordBroadcast, RecordRequest}
+
+/** Ports of [[BankReader]]. */
+final class BankReaderIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Of rows that want a record of this bank; ready only where valid is set. */
+  val requests  = Vec(config.array.rows, Flipped(Decoupled(new RecordRequest(config))))
+  val broadcast = Output(Valid(new RecordBroadcast(config)))
+  val memory    = new BankPort(config)
+  val events    = Output(new ColumnBvhEvents(config))
+  val isIdle    = Output(Bool())
+}
+
+/** One bank's part of the [[ColumnBvhController]]: an arbiter, the list of reads in flight, and the register from which
+  * a record goes to all rows. The list has room for as many reads as a memory of `readLatency` holds.
+  */
+final class BankReader(config: ColonnadeConfig) extends Module {
+  val io = IO(new BankReaderIO(config))
+
+  private val rows     = config.array.rows
+  private val turn     = Module(new RoundRobin(rows))
+  private val inFlight = Module(new Queue(new Read(config), config.columnBvhMemory.readLatency + 1))
+  private val asking   = turn.io.requests
+  private val accepts  = io.memory.request.fire
+
+  // Choose a row
+  turn.io.requests := VecInit(io.requests.map(_.valid)).asUInt
+  turn.io.isTaken  := accepts
+  io.requests.zip(turn.io.grant.asBools).foreach { case (request, isGranted) =>
+    request.ready := isGranted && io.memory.request.ready && inFlight.io.enq.ready
+  }
+
+  // Read, and note for whom
+  private val address = Mux1H(turn.io.grant, io.requests.map(_.bits.address))
+  io.memory.request.valid      := asking.orR && inFlight.io.enq.ready
+  io.memory.request.bits       := Banks.addressIn(config, address)
+  inFlight.io.enq.valid        := accepts
+  inFlight.io.enq.bits.address := address
+  inFlight.io.enq.bits.row     := OHToUInt(turn.io.grant)
+
+  // Show the record to everybody
+  private val answers   = io.memory.response.valid
+  private val broadcast = Wire(new RecordBroadcast(config))
+  broadcast.address     := inFlight.io.deq.bits.address
+  broadcast.row         := inFlight.io.deq.bits.row
+  broadcast.record      := io.memory.response.bits
+  inFlight.io.deq.ready := answers
+  io.broadcast.valid    := RegNext(answers, false.B)
+  io.broadcast.bits     := RegEnable(broadcast, answers)
+  assert(!answers || inFlight.io.deq.valid, "a bank answers without a question")
+
+  io.events.recordReads   := accepts
+  io.events.bankConflicts := Mux(accepts, PopCount(asking) - 1.U, 0.U)
+  io.isIdle               := !inFlight.io.deq.valid && !io.broadcast.valid
+}
+
+/** A read in flight. */
+private final class Read(config: ColonnadeConfig) extends Bundle {
+  val address = new RecordRequest(config).address.cloneType
+  val row     = UInt(log2Ceil(config.array.rows.max(2)).W)
+}

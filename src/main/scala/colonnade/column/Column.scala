@@ -1,0 +1,78 @@
+package colonnade.column
+
+import chisel3._
+import chisel3.util.{Decoupled, PopCount, Valid}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{FrameRegisters, Load, Pixel}
+import colonnade.frame.{ColumnProgress, EventSums, PixelCollector, Tile, TileWalker}
+import colonnade.unit.{RenderUnit, RenderUnitIO}
+
+/** Ports of [[Column]]. */
+final class ColumnIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Constant while a frame runs. */
+  val registers = Input(new FrameRegisters(config))
+
+  /** A frame begins; precedes its first tile. */
+  val start = Input(Bool())
+
+  /** Only while idle. */
+  val load  = Flipped(Valid(new Load(config)))
+  val tiles = Flipped(Decoupled(new Tile(config)))
+
+  /** In no particular order. */
+  val pixels   = Decoupled(new Pixel(config))
+  val progress = Output(new ColumnProgress)
+
+  /** One cycle after they happened. */
+  val events = Output(new EventSums(config, 1))
+}
+
+/** Render units that share one memory of records. A reset clears all but the memory.
+  *
+  * @param renderUnit makes a render unit; another one with the same ports for specs
+  */
+final class Column(
+    config: ColonnadeConfig,
+    renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO } = new RenderUnit(_)
+) extends Module {
+  val io = IO(new ColumnIO(config))
+
+  private val walker     = Module(new TileWalker(config))
+  private val units      = Seq.fill(config.array.rows)(Module(renderUnit(config)).io)
+  private val controller = Module(new ColumnBvhController(config))
+  private val memory     = Module(new ColumnBvhMemory(config))
+  private val collector  = Module(new PixelCollector(config))
+
+  // Tiles become pixels to render
+  walker.io.frame := io.registers.frame
+  walker.io.tiles <> io.tiles
+  units.zip(walker.io.positions).foreach { case (unit, positions) => unit.positions <> positions }
+
+  // Units ask for records and see all that are read
+  controller.io.requests.zip(units).foreach { case (requests, unit) => requests <> unit.requests }
+  memory.io.banks <> controller.io.memory
+  units.foreach(_.broadcasts := controller.io.broadcasts)
+  memory.io.load := io.load
+
+  // Colours leave
+  collector.io.sources.zip(units).foreach { case (sources, unit) => sources <> unit.pixels }
+  io.pixels <> collector.io.pixels
+
+  // What all units know
+  for ((unit, row) <- units.zipWithIndex) {
+    unit.row       := row.U
+    unit.registers := io.registers
+    unit.start     := io.start
+  }
+
+  // Pixels handed out and not yet gone
+  private val inFlight = RegInit(0.U((2 * config.numbers.coordinateBits).W))
+  private val enters   = PopCount(walker.io.positions.map(_.fire))
+  private val leaves   = io.pixels.fire
+  inFlight := inFlight + enters - leaves
+
+  io.progress.isDrained := walker.io.isIdle && inFlight === leaves.asUInt
+  io.progress.isIdle    := RegNext(units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle, true.B)
+  io.events             := RegNext(EventSums.ofColumn(config, units.map(_.events), controller.io.events))
+}

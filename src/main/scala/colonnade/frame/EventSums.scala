@@ -1,0 +1,84 @@
+package colonnade.frame
+
+import chisel3._
+import chisel3.util.log2Ceil
+import colonnade.config.ColonnadeConfig
+import colonnade.unit.UnitEvents
+
+/** What happened in a column BVH controller in one cycle; names as in `Counters`. */
+final class ColumnBvhEvents(config: ColonnadeConfig) extends Bundle {
+  val recordReads = UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)
+
+  /** Requests that wait because the bank serves another row. */
+  val bankConflicts = UInt(log2Ceil(config.array.rows + 1).W)
+}
+
+/** What happened in some columns in one cycle: sums over their units and controllers; names as in `Counters`. */
+final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
+  private val units = columns * config.array.rows
+
+  private def sum(most: Int): UInt = UInt(log2Ceil(most + 1).W)
+  private def perUnit              = sum(units)
+  private def perContext           = sum(units * config.array.contexts)
+
+  val raysPrimary      = perUnit
+  val raysShadow       = perUnit
+  val raysInBox        = perUnit
+  val nodeReads        = perUnit
+  val boxTests         = sum(units * config.geometry.arity)
+  val triangleTests    = perUnit
+  val hits             = perUnit
+  val recordReads      = sum(columns * config.columnBvhMemory.banks)
+  val snoopHits        = perContext
+  val bankConflicts    = perUnit
+  val busyRaySetup     = perUnit
+  val busyBoxUnit      = perUnit
+  val busyTriangleUnit = perUnit
+  val busyShader       = perUnit
+  val waitRecord       = perContext
+  val waitUnit         = perContext
+  val idleContexts     = perContext
+
+  /** A level, not an event: the most of all units. */
+  val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
+
+  /** Errors in any unit. */
+  val stackOverflow = Bool()
+  val illegalRecord = Bool()
+}
+
+object EventSums {
+
+  /** A column's, from those of its units and its controller. */
+  def ofColumn(config: ColonnadeConfig, units: Seq[UnitEvents], controller: ColumnBvhEvents): EventSums = {
+    val sums = joined(new EventSums(config, 1), units.map(_.elements.toMap))
+    sums.recordReads   := controller.recordReads
+    sums.bankConflicts := controller.bankConflicts
+    sums
+  }
+
+  /** The array's, from those of its columns. */
+  def ofArray(config: ColonnadeConfig, columns: Seq[EventSums]): EventSums =
+    joined(new EventSums(config, columns.size), columns.map(_.elements.toMap))
+
+  /** Joins what the parts have by the same name. */
+  private def joined(result: EventSums, parts: Seq[Map[String, Data]]): EventSums = {
+    val sums = Wire(result)
+    for ((name, sum) <- sums.elements if parts.head.contains(name)) {
+      val values = parts.map(_(name).asUInt)
+      sum := (name match {
+        case "deepestStack"                    => tree(values)((a, b) => Mux(a > b, a, b))
+        case "stackOverflow" | "illegalRecord" => tree(values)(_ | _)
+        case _                                 => tree(values)(_ +& _)
+      })
+    }
+    sums
+  }
+
+  private def tree(values: Seq[UInt])(join: (UInt, UInt) => UInt): UInt =
+    if (values.size == 1) values.head
+    else {
+      val (left, right) = values.splitAt(values.size / 2)
+      join(tree(left)(join), tree(right)(join))
+    }
+}

@@ -1,0 +1,32 @@
+package colonnade.frame
+
+import chisel3._
+
+/** Ports of [[Watchdog]]. */
+final class WatchdogIO(bits: Int) extends Bundle {
+
+  /** Cycles without progress that are too many; 0 is never. */
+  val limit = Input(UInt(bits.W))
+
+  /** Starts counting anew. */
+  val restart = Input(Bool())
+
+  /** This cycle does not count. */
+  val hold = Input(Bool())
+
+  val isExpired = Output(Bool())
+}
+
+/** Counts the cycles since the last progress; expires with the one after `limit` of them. */
+final class Watchdog(bits: Int) extends Module {
+  val io = IO(new WatchdogIO(bits))
+
+  private val count = RegInit(0.U(bits.W))
+  io.isExpired := io.limit =/= 0.U && count === io.limit
+
+  when(io.restart) {
+    count := 0.U
+  }.elsewhen(!io.hold && !io.isExpired) {
+    count := count + 1.U
+  }
+}

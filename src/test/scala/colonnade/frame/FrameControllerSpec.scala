@@ -1,0 +1,172 @@
+package colonnade.frame
+
+import chiseltest._
+import colonnade.TestConfigs
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "FrameController"
+
+  private val columns  = 3
+  private val tileSize = 8
+  private val config   = TestConfigs.tiny.copy(array = TestConfigs.tiny.array.copy(columns = columns))
+
+  /** A column that takes some time for a tile; one that is stuck takes for ever. */
+  private final class FakeColumn(dut: FrameController, index: Int, random: Random) {
+    var isStuck      = false
+    var tiles        = Vector.empty[(Int, Int)]
+    private var left = 0
+
+    /** Before the clock's edge: whether a pixel leaves. */
+    def drive(): Boolean = {
+      val port   = dut.io.tiles(index)
+      val leaves = left > 0 && !isStuck
+      port.ready.poke(left == 0)
+      dut.io.progress(index).isDrained.poke(left == 0 || (left == 1 && leaves))
+      dut.io.progress(index).isIdle.poke(left == 0)
+      leaves
+    }
+
+    def step(): Unit = {
+      val port = dut.io.tiles(index)
+      if (dut.io.aborts.peekBoolean()) left = 0
+      else if (left > 0 && !isStuck) left -= 1
+      else if (port.ready.peekBoolean() && port.valid.peekBoolean()) {
+        tiles :+= (port.bits.x.peekInt().toInt, port.bits.y.peekInt().toInt)
+        left = 1 + random.nextInt(20)
+      }
+    }
+  }
+
+  private final class Bench(dut: FrameController) {
+    val random  = new Random(3)
+    var stalls  = false
+    var aborts  = 0
+    var running = 0
+    var columns = Seq.empty[FakeColumn]
+
+    /** One frame; returns its cycles, or nothing when it does not end within `limit`. */
+    def frame(wide: Int, high: Int, watchdog: Int, stuck: Option[Int] = None, limit: Int = 5000): Option[Int] = {
+      dut.io.frame.pixelsWide.poke(wide)
+      dut.io.frame.pixelsHigh.poke(high)
+      dut.io.frame.watchdogCycles.poke(watchdog)
+      columns = dut.io.tiles.indices.map(new FakeColumn(dut, _, random))
+      stuck.foreach(columns(_).isStuck = true)
+      aborts = 0
+      running = 0
+      dut.io.start.poke(true)
+      step()
+      dut.io.start.poke(false)
+      dut.io.status.done.expect(false)
+      (1 to limit).find { _ =>
+        step()
+        dut.io.status.done.peekBoolean()
+      }
+    }
+
+    private def step(): Unit = {
+      val leaves = columns.map(_.drive()).reduce(_ || _)
+      dut.io.traffic.leaves.poke(leaves)
+      dut.io.traffic.stalls.poke(stalls)
+      if (dut.io.aborts.peekBoolean()) aborts += 1
+      if (dut.io.isRunning.peekBoolean()) running += 1
+      columns.foreach(_.step())
+      dut.clock.step()
+    }
+
+    def expectTiles(wide: Int, high: Int): Unit = {
+      val expected =
+        Morton.cells((wide + tileSize - 1) / tileSize, (high + tileSize - 1) / tileSize).map { case (x, y) =>
+          (x * tileSize, y * tileSize)
+        }
+      assert(columns.flatMap(_.tiles).sorted == expected.sorted)
+      columns.foreach(column => assert(column.tiles == expected.filter(column.tiles.contains(_)), "Morton order"))
+    }
+  }
+
+  it should "hand out every tile of several frames once, in Morton order" in {
+    test(new FrameController(config)) { dut =>
+      dut.clock.setTimeout(0)
+      val bench = new Bench(dut)
+      for ((wide, high) <- Seq((64, 48), (1, 1), (60, 9), (8, 100), (8, 8))) {
+        assert(bench.frame(wide, high, watchdog = 0).nonEmpty)
+        bench.expectTiles(wide, high)
+        dut.io.watchdogError.expect(false)
+        dut.io.status.busy.expect(false)
+        assert(bench.aborts == 0)
+      }
+    }
+  }
+
+  it should "end a frame without pixels at once" in {
+    test(new FrameController(config)) { dut =>
+      val bench = new Bench(dut)
+      for ((wide, high) <- Seq((0, 0), (0, 8), (8, 0))) {
+        assert(bench.frame(wide, high, watchdog = 0).exists(_ < 10))
+        bench.expectTiles(0, 0)
+      }
+    }
+  }
+
+  it should "give free columns their tiles without a pause" in {
+    test(new FrameController(config)) { dut =>
+      dut.io.frame.pixelsWide.poke(64)
+      dut.io.frame.pixelsHigh.poke(64)
+      dut.io.tiles.foreach(_.ready.poke(true))
+      dut.io.start.poke(true)
+      dut.clock.step()
+      dut.io.start.poke(false)
+      dut.clock.step()
+      for (_ <- 0 until 64) {
+        assert(dut.io.tiles.count(_.valid.peekBoolean()) == 1)
+        dut.clock.step()
+      }
+      assert(dut.io.tiles.count(_.valid.peekBoolean()) == 0)
+    }
+  }
+
+  it should "abort a frame that hangs, with an error that the next start clears" in {
+    test(new FrameController(config)) { dut =>
+      dut.clock.setTimeout(0)
+      val bench = new Bench(dut)
+      for (stuck <- 0 until columns) {
+        assert(bench.frame(32, 32, watchdog = 100, stuck = Some(stuck)).exists(_ < 800))
+        assert(bench.aborts == 1)
+        dut.io.watchdogError.expect(true)
+        assert(bench.frame(32, 32, watchdog = 100).nonEmpty)
+        dut.io.watchdogError.expect(false)
+        bench.expectTiles(32, 32)
+      }
+    }
+  }
+
+  it should "wait for ever without a watchdog, and while the sink stalls" in {
+    test(new FrameController(config)) { dut =>
+      dut.clock.setTimeout(0)
+      val bench = new Bench(dut)
+      assert(bench.frame(16, 16, watchdog = 0, stuck = Some(1), limit = 600).isEmpty)
+    }
+    test(new FrameController(config)) { dut =>
+      dut.clock.setTimeout(0)
+      val bench = new Bench(dut)
+      bench.stalls = true
+      assert(bench.frame(16, 16, watchdog = 50, stuck = Some(1), limit = 600).isEmpty)
+    }
+  }
+
+  it should "ignore a start while a frame runs" in {
+    test(new FrameController(config)) { dut =>
+      dut.io.frame.pixelsWide.poke(8)
+      dut.io.frame.pixelsHigh.poke(8)
+      dut.io.start.poke(true)
+      dut.io.begins.expect(true)
+      for (_ <- 0 until 10) {
+        dut.clock.step()
+        dut.io.begins.expect(false)
+        dut.io.status.busy.expect(true)
+      }
+    }
+  }
+}

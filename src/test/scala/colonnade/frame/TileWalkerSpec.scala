@@ -1,0 +1,84 @@
+package colonnade.frame
+
+import chiseltest._
+import colonnade.TestConfigs
+import colonnade.config.ColonnadeConfig
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "TileWalker"
+
+  private def config(rows: Int, tileSize: Int): ColonnadeConfig =
+    TestConfigs.tiny.copy(
+      array = TestConfigs.tiny.array.copy(rows = rows),
+      frame = TestConfigs.tiny.frame.copy(tileSize = tileSize)
+    )
+
+  /** The positions that leave, by row and in the order of time, and the cycles that took. */
+  private def walk(
+      dut: TileWalker,
+      size: (Int, Int),
+      tiles: Seq[(Int, Int)],
+      isReady: Int => Boolean
+  ): (Seq[(Int, (Int, Int))], Int) = {
+    dut.io.frame.pixelsWide.poke(size._1)
+    dut.io.frame.pixelsHigh.poke(size._2)
+    var waiting   = tiles
+    var positions = Vector.empty[(Int, (Int, Int))]
+    var cycles    = 0
+    while (waiting.nonEmpty || !dut.io.isIdle.peekBoolean()) {
+      dut.io.tiles.valid.poke(waiting.nonEmpty)
+      waiting.headOption.foreach { case (x, y) =>
+        dut.io.tiles.bits.x.poke(x)
+        dut.io.tiles.bits.y.poke(y)
+      }
+      for ((port, row) <- dut.io.positions.zipWithIndex) {
+        val ready = isReady(row)
+        port.ready.poke(ready)
+        if (ready && port.valid.peekBoolean())
+          positions :+= row -> (port.bits.x.peekInt().toInt, port.bits.y.peekInt().toInt)
+      }
+      if (waiting.nonEmpty && dut.io.tiles.ready.peekBoolean()) waiting = waiting.tail
+      dut.clock.step()
+      cycles += 1
+    }
+    (positions, cycles)
+  }
+
+  private def pixels(size: (Int, Int), tile: (Int, Int), tileSize: Int): Seq[(Int, Int)] =
+    Morton
+      .cells((size._1 - tile._1).min(tileSize), (size._2 - tile._2).min(tileSize))
+      .map { case (x, y) => (tile._1 + x, tile._2 + y) }
+
+  for (tileSize <- Seq(4, 32)) {
+    it should s"walk tiles of $tileSize in Morton order without a gap" in {
+      val tiles = Seq((0, 0), (tileSize, 0), (2 * tileSize, 3 * tileSize))
+      test(new TileWalker(config(rows = 1, tileSize))) { dut =>
+        dut.clock.setTimeout(0)
+        val (positions, cycles) = walk(dut, (640, 480), tiles, _ => true)
+        assert(positions.map(_._2) == tiles.flatMap(pixels((640, 480), _, tileSize)))
+        assert(cycles == 3 * tileSize * tileSize + 3)
+      }
+    }
+  }
+
+  it should "spread neighbours over the rows" in {
+    test(new TileWalker(config(rows = 4, tileSize = 8))) { dut =>
+      val (positions, _) = walk(dut, (640, 480), Seq((8, 16)), _ => true)
+      assert(positions.map(_._1) == Seq.tabulate(64)(_ % 4))
+    }
+  }
+
+  it should "give every pixel of clipped tiles once, whoever is ready" in {
+    val random = new Random(2)
+    val size   = (21, 10)
+    val tiles  = Seq((0, 0), (8, 0), (16, 0), (0, 8), (8, 8), (16, 8))
+    for (rows <- Seq(1, 3, 10)) test(new TileWalker(config(rows, tileSize = 8))) { dut =>
+      val (positions, _) = walk(dut, size, tiles, row => random.nextInt(5 + 20 * row) == 0)
+      val expected       = tiles.flatMap(pixels(size, _, 8))
+      assert(positions.map(_._2).sorted == expected.sorted)
+    }
+  }
+}
