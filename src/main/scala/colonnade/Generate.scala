@@ -49,8 +49,7 @@ object Generate {
       case error: IOException => refuse(s"cannot write ${reason(error)}")
     }
 
-  private def top(config: ColonnadeConfig): RawModule =
-    throw new ConfigError(s"the design for $config is not there; use --manifest-only")
+  private def top(config: ColonnadeConfig): RawModule = new Colonnade(config)
 
   private def generate(options: Options): Unit = {
     val name   = options.config.getOrElse(throw new ConfigError("--config is missing; see --help"))

@@ -156,7 +156,7 @@ final class Counters extends Bundle {
   val boxTests      = counter
   val triangleTests = counter
 
-  /** Triangle tests that were accepted. */
+  /** Primary rays that hit the object. */
   val hits = counter
 
   /** Most entries that any stack held. */

@@ -105,8 +105,9 @@ object RecordFormats {
   /** Bits of a material's index. */
   val materialBits: Int = 8
 
-  /** Faces of one attributes record. */
+  /** Faces of one attributes record: a power of two, so that a packed id splits into record and slot. */
   val facesPerRecord: Int = 2
+  val faceSlotBits:   Int = log2Ceil(facesPerRecord)
 
   def addressBits(config: ColonnadeConfig): Int = log2Ceil(config.columnBvhMemory.depth)
 

@@ -138,7 +138,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   recordFetch.io.wishes(2).valid        := isSeen
   recordFetch.io.wishes(2).bits.context := judged.bits
   recordFetch.io.wishes(2).bits.use     := RecordUse.attributes
-  recordFetch.io.wishes(2).bits.address := io.registers.scene.attributeBase + judgedHit.id / RecordFormats.facesPerRecord.U
+  recordFetch.io.wishes(2).bits.address := io.registers.scene.attributeBase + (judgedHit.id >> RecordFormats.faceSlotBits)
   when(isSeen) { isObject(judged.bits) := true.B }
 
   // Shading
@@ -149,7 +149,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   shader.io.request.bits.context := attributes.bits.context
   shader.io.request.bits.ray     := triangleRays.read(attributes.bits.context)
   shader.io.request.bits.hit     := shadedHit
-  shader.io.request.bits.face    := formats.asAttributes(attributes.bits.record).faces(shadedHit.id % RecordFormats.facesPerRecord.U)
+  shader.io.request.bits.face    := formats.asAttributes(attributes.bits.record).faces(shadedHit.id(RecordFormats.faceSlotBits - 1, 0))
   attributes.ready          := shader.io.request.ready
   shader.io.light           := io.registers.light
   shader.io.unitShift       := io.registers.frame.unitShift
