@@ -58,7 +58,6 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
 
   val io = IO(new TraversalStackIO(config))
 
-  private val entries = SyncReadMem(StackAddress.size(config), new StackEntry(config))
   private val levels  = RegInit(VecInit.fill(contexts)(0.U.asTypeOf(StackLevel(config))))
   private val answers = Module(new Queue(new NextVisit(config), TraversalStack.answers))
 
@@ -107,8 +106,8 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   private val free    = StackAddress(config, context, level)
   private val address = Mux(popsAgain, answer.below, Mux(wantsPop, free - 1.U, free))
   private val child   = io.results.bits.children(Rounding.narrow(count - 1.U - pushesDone, log2Ceil(arity)))
-  entry := entries.read(address, pops || popsAgain)
-  when(pushes)(entries.write(address, StackEntry(config, child)))
+  private val reads   = pops || popsAgain
+  entry := memory(address, StackEntry(config, child).asUInt, reads || pushes, pushes).asTypeOf(entry)
 
   // On to the second cycle
   isAnswering := ends || popsAgain
@@ -131,6 +130,10 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   io.deepest  := deepest
   io.overflow := begins && wantsPush && isFull
   io.busy     := isAnswering || answers.io.deq.valid || pushesDone =/= 0.U
+
+  /** All stacks in one memory with one port. What is read comes in the next cycle, and for that cycle. */
+  protected def memory(address: UInt, written: UInt, isEnabled: Bool, isWrite: Bool): UInt =
+    SyncReadMem(StackAddress.size(config), chiselTypeOf(written)).readWrite(address, written, isEnabled, isWrite)
 
   private def element[T <: Data](all: Vec[T], context: UInt): T =
     if (contexts == 1) all.head else all(context)

@@ -47,10 +47,35 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
   private val numbers  = config.numbers
   private val random   = new Random(seed)
   private val cube     = BigInt(1) << numbers.vertexBits
+  private val lowest   = -cube / 2
+  private val highest  = cube * 3 / 2
   private val farthest = (BigInt(1) << (numbers.gridBits - 1)) - 1
   private val address  = BigInt(config.columnBvhMemory.depth)
 
   def apply(count: Int): Seq[BoxQuestion] = Seq.fill(count)(one())
+
+  /** Pairs of questions that differ by one unit of one origin, and in the number of children entered: a result that is
+    * one off anywhere shows.
+    */
+  def atBrinks(count: Int): Seq[BoxQuestion] = {
+    def entered(questions: Seq[BoxQuestion]): Seq[BigInt] = Model.answers(config, questions.map(_.words), "box").map(_(1))
+    def moved(question: BoxQuestion, axis: Int, to: BigInt) = question.copy(boxOrigin = question.boxOrigin.updated(axis, to))
+
+    val any    = apply(400 * count).map(question => (question, random.nextInt(3)))
+    val ends   = Seq(lowest, highest).map(end => any.map { case (question, axis) => moved(question, axis, end) })
+    val counts = ends.map(entered)
+    val start  = any.indices.filter(i => counts.head(i) != counts.last(i)).take(count)
+    require(start.size == count, s"only ${start.size} of $count brinks")
+    // Halve the way between two ends that differ, all questions at a time
+    val axes  = start.map(any(_)._2)
+    val first = start.map(i => (ends.head(i), ends.last(i)))
+    val pairs = (0 to numbers.vertexBits + 1).foldLeft(first) { (pairs, _) =>
+      val middles = pairs.zip(axes).map { case ((from, to), axis) => moved(from, axis, (from.boxOrigin(axis) + to.boxOrigin(axis)) >> 1) }
+      val counted = entered(pairs.map(_._1)).zip(entered(middles))
+      pairs.zip(middles).zip(counted).map { case (((from, to), middle), (a, b)) => if (a == b) (middle, to) else (from, middle) }
+    }
+    pairs.flatMap { case (from, to) => Seq(from, to) }
+  }
 
   private def below(bound: BigInt): BigInt = BigInt(bound.bitLength + 8, random) % bound
 
@@ -90,11 +115,9 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
 
   /** Anywhere in reach, at its ends, inside the object's cube, or on a plane. */
   private def boxOrigin(origin: Seq[BigInt], shift: Seq[Int], planes: Seq[(BigInt, BigInt)]): BigInt = {
-    val axis           = random.nextInt(3)
-    val (low, high)    = planes(random.nextInt(planes.size))
-    val lowest         = -cube / 2
-    val highest        = cube * 3 / 2
-    val onPlane        = origin(axis) + ((if (random.nextBoolean()) low else high) << shift(axis))
+    val axis        = random.nextInt(3)
+    val (low, high) = planes(random.nextInt(planes.size))
+    val onPlane     = origin(axis) + ((if (random.nextBoolean()) low else high) << shift(axis))
     (random.nextInt(6) match {
       case 0 => onPlane
       case 1 => if (random.nextBoolean()) lowest else highest
