@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled}
+import chisel3.util.{is, log2Ceil, switch, Decoupled, MuxLookup}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Light, Material, RecordFormats, Rgb}
 import colonnade.numbers.Rounding
@@ -16,10 +16,13 @@ final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
+  /** The hit's material. */
+  val material = Flipped(Decoupled(UInt(RecordFormats.materialBits.W)))
+
+  /** The same hit's cosine. */
   val cosine = Flipped(Decoupled(UInt(formats.cosineBits.W)))
 
-  /** Constant from before the cosine until the colours are taken. */
-  val material  = Input(UInt(RecordFormats.materialBits.W))
+  /** Constant while a hit is in work. */
   val materials = Input(Vec(config.frame.materials, new Material))
   val light     = Input(new Light(numbers))
   val ambient   = Input(Rgb(FrameRegisters.intensity))
@@ -32,82 +35,92 @@ final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
 
 private object ColourStep extends ChiselEnum {
 
-  /** Of each channel, in this order: light · cosine, albedo · ambient, albedo · (ambient + direct). */
-  val idle, direct, ambient, lit, done = Value
+  /** Albedo · ambient; then wait for the cosine; light · cosine; albedo · (ambient + direct). */
+  val idle, ambient, cosine, direct, lit, done = Value
 }
 
 /** The colours of a hit: docs/numbers.md, 5.8.
   *
-  * One hit at a time: nine products, one a cycle while the multiplier is free, and two cycles. A material's index beyond
-  * the table takes any of its entries; the packer writes none. Where the table's size is a power of two, it counts
-  * modulo the size, as in the model.
+  * One hit at a time: three products, of which nothing waits for the cosine, then six more; one a cycle while the
+  * multiplier is free, and two cycles. A material's index beyond the table takes any of its entries; the packer writes
+  * none. Where the table's size is a power of two, it counts modulo the size, as in the model.
   */
 final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val formats = new ShaderFormats(config.numbers)
+  private val indices = log2Ceil(config.frame.materials)
 
   val io = IO(new ColourUnitIO(config))
 
-  private val step    = RegInit(ColourStep.idle)
-  private val channel = Reg(UInt(2.W))
-  private val cosine  = Reg(UInt(formats.cosineBits.W))
+  private val step     = RegInit(ColourStep.idle)
+  private val channel  = Reg(UInt(2.W))
+  private val material = Reg(UInt(indices.W))
+  private val cosine   = Reg(UInt(formats.cosineBits.W))
 
   /** Light that falls onto the surface. */
-  private val incoming = Reg(UInt((NumberFormats.lightBits + 1).W))
+  private val incoming = Reg(Vec(3, UInt((NumberFormats.lightBits + 1).W)))
   private val lit      = Reg(Vec(3, FrameRegisters.colour))
   private val ambient  = Reg(Vec(3, FrameRegisters.colour))
 
-  private def ofChannel(colour: Seq[UInt]): UInt = VecInit(colour :+ colour.last)(channel)
+  private def select(colour: Seq[UInt], channel: UInt): UInt =
+    MuxLookup(channel, colour(2))(Seq(0.U -> colour(0), 1.U -> colour(1)))
 
-  private val index =
-    if (config.frame.materials == 1) 0.U else Rounding.narrow(io.material, log2Ceil(config.frame.materials))
-  private val lightNow   = ofChannel(io.light.colour.channels.map(_.natural))
-  private val ambientNow = ofChannel(io.ambient.channels.map(_.natural))
+  // Factors
+  private val isDirect     = step === ColourStep.direct
+  private val isAmbient    = step === ColourStep.ambient
+  private val isLit        = step === ColourStep.lit
+  private val ambientLight = io.ambient.channels.map(_.natural)
+  private val directLight  = select(io.light.colour.channels.map(_.natural), channel)
+  private val albedo       = select(io.materials(material).albedo.channels, channel)
+  private val illumination = Mux(isAmbient, select(ambientLight, channel), select(incoming, channel))
+  io.factors.valid       := isAmbient || isDirect || isLit
+  io.factors.bits.wide   := Mux(isDirect, cosine, illumination).zext.pad(formats.wideBits)
+  io.factors.bits.narrow := Mux(isDirect, directLight, albedo).zext.pad(formats.narrowBits)
 
-  /** A cycle late: no step in which the channel changes looks at it. */
-  private val albedo = RegNext(ofChannel(io.materials(index).albedo.channels))
-
-  // The product of this step comes in the next cycle, whatever that does
-  private val taken   = io.factors.fire
-  private val product = io.product.asUInt
-  private val direct  = Rounding.narrow(Rounding.floor(product, config.numbers.cosineFraction), NumberFormats.lightBits)
-  private val colour  = Rounding.saturate(Rounding.floor(product, NumberFormats.lightFraction), NumberFormats.colourBits)
-
-  private def arrives(of: ColourStep.Type): Bool = RegNext(taken && step === of, false.B)
-
-  private def push(channels: Vec[UInt]): Unit = {
-    channels(0) := channels(1)
-    channels(1) := channels(2)
-    channels(2) := colour
-  }
-
-  when(arrives(ColourStep.direct))(incoming := ambientNow +& direct)
-  when(arrives(ColourStep.ambient))(push(ambient))
-  private val litArrives = arrives(ColourStep.lit)
-  when(litArrives)(push(lit))
-
-  private val isIntensity = step === ColourStep.direct
-  io.factors.valid       := isIntensity || step === ColourStep.ambient || step === ColourStep.lit
-  io.factors.bits.wide   :=
-    Mux(isIntensity, cosine, Mux(step === ColourStep.ambient, ambientNow, incoming)).zext.pad(formats.wideBits)
-  io.factors.bits.narrow := Mux(isIntensity, lightNow, albedo).zext.pad(formats.narrowBits)
-
-  // Control
-  when(io.cosine.fire) {
-    cosine  := io.cosine.bits
-    channel := 0.U
-    step    := ColourStep.direct
-  }
-  when(taken) {
-    step := Mux(isIntensity, ColourStep.ambient, Mux(step === ColourStep.ambient, ColourStep.lit, ColourStep.direct))
-    when(step === ColourStep.lit) {
-      channel := channel + 1.U
-      when(channel === 2.U)(step := ColourStep.done)
+  // The product of this cycle comes in the next one, whatever that does
+  private val arrivingStep    = RegNext(Mux(io.factors.fire, step, ColourStep.idle), ColourStep.idle)
+  private val arrivingChannel = RegNext(channel)
+  private val product         = io.product.asUInt
+  private val direct          =
+    Rounding.narrow(Rounding.floor(product, config.numbers.cosineFraction), NumberFormats.lightBits)
+  private val colour = Rounding.saturate(Rounding.floor(product, NumberFormats.lightFraction), NumberFormats.colourBits)
+  for (i <- 0 until 3) {
+    when(arrivingChannel === i.U) {
+      when(arrivingStep === ColourStep.ambient)(ambient(i) := colour)
+      when(arrivingStep === ColourStep.direct)(incoming(i) := ambientLight(i) +& direct)
+      when(arrivingStep === ColourStep.lit)(lit(i)         := colour)
     }
   }
-  when(io.colours.fire)(step := ColourStep.idle)
 
-  io.cosine.ready         := step === ColourStep.idle
-  io.colours.valid        := step === ColourStep.done && !litArrives
+  // Control
+  private val isLast = channel === 2.U
+  when(io.factors.fire)(channel := Mux(isLast, 0.U, channel + 1.U))
+  switch(step) {
+    is(ColourStep.idle) {
+      channel  := 0.U
+      material := io.material.bits
+      when(io.material.fire)(step := ColourStep.ambient)
+    }
+    is(ColourStep.ambient) {
+      when(io.factors.fire && isLast)(step := ColourStep.cosine)
+    }
+    is(ColourStep.cosine) {
+      cosine := io.cosine.bits
+      when(io.cosine.fire)(step := ColourStep.direct)
+    }
+    is(ColourStep.direct) {
+      when(io.factors.fire && isLast)(step := ColourStep.lit)
+    }
+    is(ColourStep.lit) {
+      when(io.factors.fire && isLast)(step := ColourStep.done)
+    }
+    is(ColourStep.done) {
+      when(io.colours.fire)(step := ColourStep.idle)
+    }
+  }
+
+  io.material.ready       := step === ColourStep.idle
+  io.cosine.ready         := step === ColourStep.cosine
+  io.colours.valid        := step === ColourStep.done && arrivingStep === ColourStep.idle
   io.colours.bits.lit     := toRgb(lit)
   io.colours.bits.ambient := toRgb(ambient)
 

@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{log2Ceil, switch, is, Cat, Decoupled}
+import chisel3.util.{is, log2Ceil, switch, Cat, Decoupled}
 import colonnade.config.NumberFormats
 import colonnade.numbers.{Divider, Rounding, SquareRoot}
 

@@ -107,8 +107,8 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
     } ++ control.slope.zip(slopeDigits).map { case (isDigit, digit) => isDigit -> (distance -> digit) } ++ Seq(
       control.raise   -> (io.light.shadowOffset.zext -> geometricNormal(0)),
       control.square  -> (scaled                     -> scaled),
-      control.project -> (scaled -> Rounding.narrow(normal(0), formats.narrowBits)),
-      control.lengths -> (normalLength.zext -> lengthMantissa.zext)
+      control.project -> (scaled                     -> Rounding.narrow(normal(0), formats.narrowBits)),
+      control.lengths -> (normalLength.zext          -> lengthMantissa.zext)
     )
   io.factors.valid       := choices.map(_._1).reduce(_ || _)
   io.factors.bits.wide   := Mux1H(choices.map { case (when, (wide, _)) => when -> wide.pad(formats.wideBits) })
@@ -135,8 +135,8 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   private val addToPoint = control.addSlope || control.addDistance || control.addOffset
   private val subtract   = Mux1H(
     Seq(
-      control.addDistance                                                  -> isNegative,
-      control.addOffset                                                    -> backSide,
+      control.addDistance                                               -> isNegative,
+      control.addOffset                                                 -> backSide,
       (control.pushNormal || control.pushLight || control.measureLight) -> true.B
     )
   )
@@ -160,7 +160,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
     measured := Mux(control.startMeasure, 0.U, measured) | magnitude
   }
   when(control.countNormal)(normalZeros := zeros)
-  when(control.countLight)(lightZeros := zeros)
+  when(control.countLight)(lightZeros   := zeros)
   io.normalIsZero := zero
 
   // Shifter
@@ -174,7 +174,11 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   )
   private val shiftBits = io.unitShift.getWidth.max(normalZeros.getWidth)
   private val shift     =
-    Mux(control.scaleNormal, normalZeros.pad(shiftBits), Mux(control.scaleLight, lightZeros.pad(shiftBits), io.unitShift))
+    Mux(
+      control.scaleNormal,
+      normalZeros.pad(shiftBits),
+      Mux(control.scaleLight, lightZeros.pad(shiftBits), io.unitShift)
+    )
   private val shiftedNow = (0 until shiftBits).foldLeft(toShift) { (number, bit) =>
     Mux(shift(bit), Rounding.narrow((number << (1 << bit)).asSInt, formats.vectorBits), number)
   }
@@ -188,7 +192,14 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
     turn(normalsOrToLight, Mux(control.pushLight, total, normalsOrToLight(0)))
   }
   when(control.pushNormal || control.scaleNormal || control.project) {
-    turn(normal, Mux(control.pushNormal, Mux(backSide, total, right), Rounding.floor(shiftedNow, formats.vectorBits - formats.narrowBits)))
+    turn(
+      normal,
+      Mux(
+        control.pushNormal,
+        Mux(backSide, total, right),
+        Rounding.floor(shiftedNow, formats.vectorBits - formats.narrowBits)
+      )
+    )
   }
   when(control.weighted.asUInt.orR) {
     weights(0) := weights(1)

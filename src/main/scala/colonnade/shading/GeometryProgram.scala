@@ -104,9 +104,9 @@ final class GeometryProgram(formats: ShaderFormats) {
   /** Decodes a step. */
   def control(step: UInt, load: Bool): GeometryControl = {
     def in(steps: Seq[Int]): Bool = steps.map(step === _.U).reduce(_ || _)
-    def at(steps: Int*):     Bool = in(steps)
+    def at(steps: Int*): Bool     = in(steps)
 
-    val sums    = Seq(three(0), three(3), three(6)) ++ slopes ++ raise.map(Seq(_)) :+ squareNormal :+ project :+
+    val sums = Seq(three(0), three(3), three(6)) ++ slopes ++ raise.map(Seq(_)) :+ squareNormal :+ project :+
       squareLight :+ Seq(lengths)
     val control = Wire(new GeometryControl(formats))
     control.load := load

@@ -3,7 +3,7 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.Decoupled
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.formats.{FrameRegisters, Light, Material, RecordFormats, Rgb, Shading, Vec3}
+import colonnade.formats.{FrameRegisters, Light, Material, Rgb, Shading, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.{Context, RayFormats}
 
@@ -50,15 +50,17 @@ final class Shader(config: ColonnadeConfig) extends Module {
   geometry.io.light     := io.light
   geometry.io.unitShift := io.unitShift
 
-  // From the geometry to the cosine: the rest of the hit is held
-  private val point = geometry.io.result
-  point.ready           := !isHeld && cosine.io.angle.ready
-  cosine.io.angle.valid := point.valid && !isHeld
-  cosine.io.angle.bits  := point.bits.angle
+  // From the geometry to the cosine and the colours, both at once; the rest of the hit is held
+  private val point  = geometry.io.result
+  private val isFree = !isHeld && cosine.io.angle.ready && colour.io.material.ready
+  point.ready              := isFree
+  cosine.io.angle.valid    := point.valid && isFree
+  cosine.io.angle.bits     := point.bits.angle
+  colour.io.material.valid := point.valid && isFree
+  colour.io.material.bits  := point.bits.material
   when(point.fire) {
     isHeld              := true.B
     held.context        := point.bits.context
-    held.material       := point.bits.material
     held.needsShadowRay := io.shading.shadows && point.bits.angle.isAcute
     held.origin         := point.bits.origin
     held.toLight        := point.bits.toLight
@@ -67,7 +69,6 @@ final class Shader(config: ColonnadeConfig) extends Module {
 
   // Colours
   colour.io.cosine <> cosine.io.cosine
-  colour.io.material  := held.material
   colour.io.materials := io.materials
   colour.io.light     := io.light
   colour.io.ambient   := io.ambient
@@ -98,7 +99,6 @@ private final class HeldHit(config: ColonnadeConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   val context        = Context(config)
-  val material       = UInt(RecordFormats.materialBits.W)
   val needsShadowRay = Bool()
   val origin         = Vec3(SInt(formats.pointBits.W))
   val toLight        = Vec3(SInt(formats.toLightBits.W))

@@ -133,7 +133,9 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
       axis = random.nextInt(3),
       negative = three(random.nextBoolean()),
       origin = origin,
-      shear = Seq.fill(2)(if (chance(8)) steepest else natural(numbers.shearFraction)).map(s => if (random.nextBoolean()) s else -s),
+      shear = Seq.fill(2)(if (chance(8)) steepest else natural(numbers.shearFraction)).map(s =>
+        if (random.nextBoolean()) s else -s
+      ),
       t = t,
       weights = three(natural(numbers.barycentricBits)),
       backSide = random.nextBoolean(),

@@ -20,7 +20,9 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     numbers.reverse.foldLeft(BigInt(0))((all, number) => (all << fieldBits) + number + (BigInt(1) << (fieldBits - 1)))
 
   private def unpack(all: BigInt, count: Int): Seq[BigInt] =
-    Seq.tabulate(count)(i => ((all >> (i * fieldBits)) & ((BigInt(1) << fieldBits) - 1)) - (BigInt(1) << (fieldBits - 1)))
+    Seq.tabulate(count)(i =>
+      ((all >> (i * fieldBits)) & ((BigInt(1) << fieldBits) - 1)) - (BigInt(1) << (fieldBits - 1))
+    )
 
   private val answerNumbers = 14
 
@@ -77,14 +79,17 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     val questions = rounds.flatMap { case (light, hits) => hits.map(ShaderQuestions.words(_, light)) }
     val answers   = Model.answers(config, questions, "shade").iterator
     for (((light, hits), round) <- rounds.zipWithIndex) {
-      var poked = Option.empty[HitQuestion]
+      var poked                                            = Option.empty[HitQuestion]
       def poke(port: ShadeRequest, hit: HitQuestion): Unit = if (!poked.exists(_ eq hit)) {
         pokeHit(port, hit)
         poked = Some(hit)
       }
       pokeLight(shader.io, light)
       val results =
-        StreamTester.exchange(shader.clock, shader.io.request, shader.io.result, hits)(poke, peek)(random, stalls(round), 400)
+        StreamTester.exchange(shader.clock, shader.io.request, shader.io.result, hits)(
+          poke,
+          peek
+        )(random, stalls(round), 400)
       results.zip(hits).foreach { case (result, hit) =>
         val answer = answers.next() :+ BigInt(hit.context)
         assert(unpack(result, answerNumbers) == answer, s"of $hit under $light in ${config.precision}")
@@ -153,12 +158,12 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   it should "take a hit at least every 50 cycles at 32b32s64d" in test(new Shader(TestConfigs.tiny)) { shader =>
     val random    = new Random(23)
     val questions = new ShaderQuestions(TestConfigs.tiny, random)
-    val light     = questions.light().copy(position = Seq(3000, 5000, 9000), unitShift = 12, isFlat = false, shadows = true)
+    val light = questions.light().copy(position = Seq(3000, 5000, 9000), unitShift = 12, isFlat = false, shadows = true)
     pokeLight(shader.io, light)
     shader.io.request.valid.poke(true)
     shader.io.result.ready.poke(true)
     val taken = for (_ <- 0 until 20) yield {
-      pokeHit(shader.io.request.bits, questions.surfaceHit(light))
+      pokeHit(shader.io.request.bits, questions.surfaceHit(light).copy(weights = Seq(BigInt(1), BigInt(1), BigInt(2))))
       var cycles = 1
       while (!shader.io.request.ready.peekBoolean()) {
         shader.clock.step()
