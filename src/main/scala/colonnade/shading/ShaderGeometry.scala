@@ -23,7 +23,7 @@ final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
 /** Where a hit lies, which way its light is, and the angle between that and its shading normal: docs/numbers.md, 5.1 to
   * 5.6 and the product of 5.7. This is the control; the numbers are in [[GeometryDatapath]].
   *
-  * One hit at a time. Latency 37 cycles and two for each digit of a slope (two at 32 bits): see [[GeometryProgram]].
+  * One hit at a time. Latency 36 cycles and two for each digit of a slope (two at 32 bits): see [[GeometryProgram]].
   * A hit whose smooth normal is zero takes 12 cycles more, for a second start with the geometric one.
   */
 final class ShaderGeometry(config: ColonnadeConfig) extends Module {

@@ -118,6 +118,16 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
     }
   }
 
+  /** Products halfway between two grid steps, or just beside; the offset's too when it is odd. */
+  def halfway(): HitQuestion = {
+    val half = BigInt(1) << (numbers.shearFraction - 1)
+    anyHit().copy(
+      shear = Seq.fill(2)((half + random.nextInt(3) - 1) * (if (random.nextBoolean()) 1 else -1)),
+      t = random.nextInt(64),
+      geometricNormal = Seq(1024, -1024, 1025)
+    )
+  }
+
   /** No normal at all. */
   def withoutNormal(): HitQuestion = withoutSmoothNormal().copy(geometricNormal = three(BigInt(0)))
 

@@ -109,7 +109,8 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
         val hits  = Seq.fill(3)(questions.surfaceHit(light)) :+ questions.anyHit() :+ questions.withoutSmoothNormal()
         light -> random.shuffle(hits)
       }
-      check(shader, config, rounds ++ extremes(config, questions) ++ atTheLight(questions), random, _ % 2 * 0.7)
+      val ties = Seq.fill(2)(questions.light().copy(offset = random.nextInt(64)) -> Seq.fill(5)(questions.halfway()))
+      check(shader, config, rounds ++ ties ++ extremes(config, questions) ++ atTheLight(questions), random, _ % 2 * 0.7)
     }
   }
 
