@@ -149,14 +149,29 @@ class SceneImage:
             raise UserError(f"{file} is truncated ({len(data):,} of {expected:,} bytes): {_ADVICE}")
         if len(data) > faces_end + _DIGEST_BYTES or hashlib.sha256(data[:faces_end]).digest() != data[faces_end:]:
             raise UserError(f"{file} is corrupt (its checksum does not match): {_ADVICE}")
-        if manifest is not None and header.format_hash != manifest.format_hash:
-            raise UserError(
-                f"{file} was packed for another format ({header.format_hash[:12]}, the hardware has"
-                f" {manifest.format_hash[:12]}): pack the scene again for this configuration"
-            )
+        if manifest is not None:
+            _check_fits(header, manifest, file)
         raw = np.frombuffer(data, dtype=np.uint8)
         records = raw[start:records_end].reshape(header.record_count, header.record_bits // 8)
         return SceneImage(header, records, np.frombuffer(data[records_end:faces_end], dtype="<i4").astype(np.int32))
+
+
+def _check_fits(header: ImageHeader, manifest: Manifest, file: Path) -> None:
+    """Refuse an image that the manifest's hardware cannot render."""
+    if header.format_hash != manifest.format_hash:
+        raise UserError(
+            f"{file} was packed for another format ({header.format_hash[:12]}, the hardware has"
+            f" {manifest.format_hash[:12]}): pack the scene again for this configuration"
+        )
+    depth = int(manifest.memories["columnBvh"]["depth"])
+    if header.record_count > depth:
+        raise UserError(f"{file} holds {header.record_count:,} records, columnBvhMemory.depth is {depth:,}: raise it")
+    stack_depth = int(manifest.config["columnBvhMemory"]["stackDepth"])
+    if header.tree is not None and header.tree.stack_bound > stack_depth:
+        raise UserError(
+            f"{file} needs a stack of {header.tree.stack_bound} entries, columnBvhMemory.stackDepth is {stack_depth}:"
+            " raise it"
+        )
 
 
 def _header(data: bytes, file: Path) -> tuple[ImageHeader, int]:

@@ -95,7 +95,7 @@ def _build(
     (place / "sources.f").write_text("\n".join(map(str, sources)) + "\n")
     command = [str(verilator), *VERILATOR_OPTIONS, "-j", "0", "--Mdir", str(place / "obj"), "-o", "simulator"]
     command += ["-CFLAGS", f"-O2 -I{place}", "-f", str(place / "sources.f"), str(place / "harness.cpp")]
-    log = logs / "build.log"
+    log = logs / f"{place.name.split('.')[1]}.log"
     with log.open("w") as stream:
         status = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=stream, stderr=subprocess.STDOUT, check=False)
     program = place / "obj" / "simulator"

@@ -83,7 +83,7 @@ void answerSetUp(Question& ask, const Numbers& n) {
     const bool isShadow = ask.number() != 0;
     RayRequest request{ask.wideVector(), {}, 0, 0};
     request.direction = ask.wideVector();
-    request.limit = isShadow ? static_cast<Wide>(magnitude(request.direction[dominantAxis(request.direction)])) : Wide(n.farthest());
+    request.limit = isShadow ? static_cast<Wide>(magnitude(request.direction[dominantAxis(request.direction)])) : n.unlimited();
     Bounds bounds{ask.vector(), {}};
     bounds.high = ask.vector();
     const Ray ray = setUp(request, bounds, n);

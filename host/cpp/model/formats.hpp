@@ -60,8 +60,10 @@ struct Numbers {
 
     /// Units by which a box is widened.
     std::int64_t boxPad() const { return std::int64_t(1) << boxPadLog; }
-    /// The limit on t of a ray that has none.
+    /// The largest t of a set-up ray.
     std::int64_t farthest() const { return static_cast<std::int64_t>(largest(gridBits)); }
+    /// The limit on t of a ray that is asked for without one: still beyond `farthest` after any entry is taken off.
+    Wide unlimited() const { return (Wide(1) << (sceneBits + 1)) - 1; }
 };
 
 /// Where a field lies in its record.

@@ -101,7 +101,7 @@ public:
     const Frame& frame() const { return frame_; }
 
     RayRequest primaryRay(std::int64_t x, std::int64_t y) const {
-        RayRequest request{frame_.cameraPosition, {}, numbers_.farthest(), ~std::uint64_t(0)};
+        RayRequest request{frame_.cameraPosition, {}, numbers_.unlimited(), ~std::uint64_t(0)};
         for (int a = 0; a < 3; ++a)
             request.direction[a] = floorShift<Wide>(frame_.cameraDirection[a], -frame_.stepShift) + Wide(x) * frame_.stepX[a] + Wide(y) * frame_.stepY[a];
         return request;

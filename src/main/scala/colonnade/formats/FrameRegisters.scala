@@ -27,7 +27,9 @@ final class FrameSettings(numbers: NumberFormats) extends Record {
   /** A position of the camera or the light, shifted left by this, is in grid steps. */
   val unitShift = UInt(NumberFormats.bitLength(numbers.sceneBits).W)
 
-  /** A frame that takes longer ends with an error. Cycles in which the pixel sink stalls do not count. */
+  /** A frame in which no pixel leaves for so many cycles ends with an error; 0 waits for ever. Cycles in which the
+    * pixel sink stalls do not count.
+    */
   val watchdogCycles = UInt(32.W)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(

@@ -34,7 +34,14 @@ object Manifest {
       "bits"  -> formats.recordBits,
       "banks" -> config.columnBvhMemory.banks
     )
-    val formatHash = Json.hash(ujson.Obj("records" -> records, "registers" -> registers, "numbers" -> numbers))
+    val formatHash = Json.hash(
+      ujson.Obj(
+        "records"   -> records,
+        "registers" -> registers,
+        "numbers"   -> numbers,
+        "bvh"       -> config.geometry.bvh // an image without nodes says nothing to hardware that walks them
+      )
+    )
 
     val manifest = ujson.Obj(
       "version"    -> version,

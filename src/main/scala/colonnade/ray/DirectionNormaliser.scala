@@ -132,8 +132,8 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
   course.isZero.zip(directions).foreach { case (to, from) => to := from.exponent === 0.U }
 
   io.ray.bits.origin := origin
-  private val farthest = ((BigInt(1) << (numbers.gridBits - 1)) - 1).U
-  io.ray.bits.limit := Mux(isShadow, Rounding.saturate(largest, numbers.sceneBits + 1), farthest)
+  private val unlimited = ((BigInt(1) << (numbers.sceneBits + 1)) - 1).U
+  io.ray.bits.limit := Mux(isShadow, Rounding.saturate(largest, numbers.sceneBits + 1), unlimited)
 
   private def magnitudeOf(component: SInt): UInt = Mux(component < 0.S, 0.S -% component, component).asUInt
 

@@ -1,0 +1,116 @@
+"""Whole frames: the emitted Verilog under Verilator against the model, bit for bit."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from colonnade.frame import Frame
+from colonnade.generator import design_for, manifest_for
+from colonnade.meshes import load_mesh
+from colonnade.model import load_scene, new_model, render_model
+from colonnade.pack import pack
+from colonnade.placement import placement
+from colonnade.scene import Camera, Light, Material, MeshSource, Scene
+from colonnade.simulate import Stalls, render_rtl
+
+pytestmark = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+
+TEAPOT = Scene(MeshSource(name="teapot:4"))
+
+#: Name, configuration, overrides, mesh, stalls of the pixel sink.
+CASES = [
+    ("tiny", "tiny", (), "teapot:4", Stalls()),
+    ("small, stalled sink", "small", (), "teapot:4", Stalls(40, 7)),
+    ("binary tree, one bank", "tiny", ("geometry.arity=2", "columnBvhMemory.banks=1"), "torus", Stalls(10, 3)),
+    ("no tree, slow memory", "tiny", ("geometry.bvh=false", "columnBvhMemory.readLatency=5"), "cube", Stalls()),
+    ("narrow", "16b16s32d", ("array.rows=1", "array.columns=1"), "sphere:2", Stalls()),
+]
+
+
+def assert_equal(rtl: Frame, model: Frame) -> None:
+    assert rtl.errors == model.errors == []
+    np.testing.assert_array_equal(rtl.colour, model.colour)
+    np.testing.assert_array_equal(rtl.triangle, model.triangle)
+    np.testing.assert_array_equal(rtl.distance, model.distance)
+    assert {name: rtl.counters[name] for name in model.counters} == model.counters
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
+def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str, ...], str, Stalls]) -> None:
+    """Three frames in a row, the scene loaded once: smooth, flat from another side, and from inside the object."""
+    _, config, overrides, mesh, stalls = case
+    design = design_for(config, overrides)
+    image = pack(load_mesh(mesh), design.manifest)
+    scene = replace(TEAPOT, mesh=MeshSource(name=mesh))
+    views = [
+        (scene, 48, 37),
+        (replace(scene, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True)), 33, 20),
+        (replace(scene, camera=Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0)), light=Light(shadows=False)), 17, 9),
+    ]
+    registers: list[Mapping[str, int]] = [placement(*view[:1], image.header, design.manifest, *view[1:]) for view in views]
+    simulated = render_rtl(design, image, registers, stalls)
+    for frame, settings in zip(simulated.frames, registers, strict=True):
+        assert_equal(frame, render_model(design.manifest, image, settings))
+    assert simulated.frames[0].is_object.any()
+
+
+def test_single_rays_through_the_hardware_slip_through_no_edge() -> None:
+    """Frames of one pixel whose ray goes from inside a closed mesh exactly to a vertex."""
+    design = design_for("tiny")
+    numbers = design.manifest.numbers
+    image = pack(load_mesh("sphere:2"), design.manifest)
+    base = placement(replace(TEAPOT, mesh=MeshSource(name="sphere:2")), image.header, design.manifest, 1, 1)
+    fields = design.manifest.layouts["triangles"].unpack(
+        image.records[image.header.triangle_base : image.header.attribute_base]
+    )
+    vertices = np.stack([fields[f"vertices[0].{axis}"] for axis in "xyz"], axis=1)[:200] << numbers["gridFraction"]
+    random = np.random.default_rng(5)
+    middle = 1 << (numbers["vertexBits"] - 1 + numbers["gridFraction"])
+    registers: list[Mapping[str, int]] = []
+    for vertex in vertices:
+        origin = middle + random.integers(-middle // 3, middle // 3, size=3)
+        view = {"camera.position": origin, "camera.direction": vertex - origin}
+        settings = {f"{name}.{axis}": int(value[a]) for name, value in view.items() for a, axis in enumerate("xyz")}
+        rectangle = {f"frame.objectRect.{edge}": int(edge[1] == "1") for edge in ("x0", "y0", "x1", "y1")}
+        registers.append({**base, **settings, **rectangle, "frame.unitShift": 0, "camera.stepShift": 0})
+    frames = render_rtl(design, image, registers).frames
+    assert all(frame.is_object[0, 0] for frame in frames)
+
+
+def test_a_distant_camera_sees_the_object() -> None:
+    """A ray's limit is not used up by the way to the object."""
+    manifest = manifest_for("tiny").manifest
+    image = pack(load_mesh("sphere:3"), manifest)
+    for distance in (5.0, 60.0):
+        scene = Scene(
+            MeshSource(name="sphere:3"), camera=Camera(position=(0.1, 0.2, distance), target=(0.0, 0.0, 0.0), fov=60.0 / distance)
+        )
+        frame = render_model(manifest, image, placement(scene, image.header, manifest, 16, 16))
+        assert frame.is_object[8, 8]
+
+
+def test_a_tree_that_bites_its_tail_ends_with_an_error() -> None:
+    """A root whose children are itself: the watchdog ends the frame, in the hardware and in the model."""
+    design = design_for("tiny")
+    image = pack(load_mesh("cube"), design.manifest)
+    layout = design.manifest.layouts["node"]
+    records = image.records.copy()
+    root = layout.unpack(records[:1])
+    for slot in range(layout.count_of("kinds[{}]")):
+        root[f"kinds[{slot}]"][:] = int(slot == 0)
+    root["firstChild"][:] = 0
+    records[:1] = layout.pack(root)
+    looped = replace(image, records=records)
+    registers = placement(replace(TEAPOT, mesh=MeshSource(name="cube")), image.header, design.manifest, 16, 16)
+    registers["frame.watchdogCycles"] = 5000
+    assert render_rtl(design, looped, [registers]).frames[0].errors == ["watchdog"]
+    model = new_model(design.manifest)
+    load_scene(model, looped)
+    model.start(registers)
+    model.rows(0, 16)
+    assert model.errors()["watchdog"]
