@@ -132,7 +132,7 @@ def render_rtl(
         job, outputs = _write_job(Path(place), design.manifest, image, registers)
         command = [str(program), "--stall", str(stalls.percent), "--seed", str(stalls.seed), str(job)]
         with progress.step("rendering in the simulator") as report:
-            lines = _run(command, report)
+            lines = _run(command, Path(place) / "results", report)
         return _collect(design.manifest, registers, outputs, lines)
 
 
@@ -156,23 +156,24 @@ def _write_job(
     return job, outputs
 
 
-def _run(command: list[str], report: Report) -> list[str]:
-    """Output lines of the harness; its progress goes to ``report``."""
-    with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
+def _run(command: list[str], results: Path, report: Report) -> list[str]:
+    """Lines that the harness writes to the file ``results``; its progress goes to ``report``."""
+    said: deque[str] = deque(maxlen=5)
+    with (
+        results.open("w") as output,
+        subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.PIPE, text=True
+        ) as process,
+    ):
         assert process.stderr is not None
-        said: deque[str] = deque(maxlen=5)
         for line in process.stderr:
             if line.startswith("progress "):
                 report(float(line.split()[1]))
             else:
                 said.append(line.strip())
-        output = process.stdout.read()
     if process.returncode != 0:
         raise RuntimeError(f"the simulated hardware failed (status {process.returncode}): {'; '.join(said)}")
-    return output.splitlines()
+    return results.read_text().splitlines()
 
 
 def _collect(
