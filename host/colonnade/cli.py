@@ -15,6 +15,7 @@ from colonnade.commands.generate import generate
 from colonnade.commands.inspect import inspect
 from colonnade.commands.pack import pack
 from colonnade.commands.render import render
+from colonnade.commands.verify import verify
 from colonnade.errors import UserError
 
 #: Exit status for wrong input.
@@ -60,7 +61,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, render, compare, bench):
+for command in (generate, pack, inspect, render, compare, verify, bench):
     cli.add_command(command)
 
 

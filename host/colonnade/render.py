@@ -143,9 +143,7 @@ def _result(
     )
 
 
-def _report(
-    backend: str, manifest: Manifest, image: SceneImage, frame: Frame, size: tuple[int, int]
-) -> dict[str, Any]:
+def _report(backend: str, manifest: Manifest, image: SceneImage, frame: Frame, size: tuple[int, int]) -> dict[str, Any]:
     counters = frame.counters
     rays = {
         "primary": counters["raysPrimary"],

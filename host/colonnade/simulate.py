@@ -84,9 +84,7 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path
     return program
 
 
-def _build(
-    verilator: Path, manifest: Manifest, harness: Path, sources: list[Path], place: Path, logs: Path
-) -> Path:
+def _build(verilator: Path, manifest: Manifest, harness: Path, sources: list[Path], place: Path, logs: Path) -> Path:
     columns = int(manifest.config["array"]["columns"])
     each = " ".join(f"DO({column})" for column in range(columns))
     header = f"#pragma once\n#define EACH_COLUMN(DO) {each}\n" + _hit_distance(sources)

@@ -33,10 +33,11 @@ def grid_vertices(image: Any, manifest: Manifest) -> Integers:
     """Corners of all packed triangles, int64 [n, 3, 3], as the hardware rounds them to the grid."""
     header, per_record = image.header, manifest.config["geometry"]["trianglesPerRecord"]
     fields = manifest.layouts["triangles"].unpack(image.records[header.triangle_base : header.attribute_base])
-    corners = [
-        np.stack([np.stack([fields[f"vertices[{3 * k + j}].{axis}"] for axis in "xyz"], axis=1) for j in range(3)], axis=1)
-        for k in range(per_record)
-    ]
+
+    def vertex(number: int) -> Integers:
+        return np.stack([fields[f"vertices[{number}].{axis}"] for axis in "xyz"], axis=1)
+
+    corners = [np.stack([vertex(3 * k + j) for j in range(3)], axis=1) for k in range(per_record)]
     shift = manifest.numbers["gridFraction"]
     units = np.concatenate([c[fields["count"] > k] for k, c in enumerate(corners)])
     return units << shift if shift >= 0 else np.rint(units / 2.0**-shift).astype(np.int64)
@@ -81,7 +82,9 @@ def wrongly_culled(count: int, precision: str, seed: int) -> tuple[int, int]:
     numbers = manifest.numbers
     random = np.random.default_rng(seed)
     cube, fraction = 1 << numbers["vertexBits"], numbers["gridFraction"]
-    extent = (random.integers(0, cube, size=(count, 3)) >> random.integers(0, 17, size=(count, 1))) * (random.random((count, 3)) > 0.1)
+    extent = (random.integers(0, cube, size=(count, 3)) >> random.integers(0, 17, size=(count, 1))) * (
+        random.random((count, 3)) > 0.1
+    )
     low = (random.random((count, 3)) * (cube - 1 - extent)).astype(np.int64)
     box_bits = manifest.config["geometry"]["boxBits"]
     exponents = np.zeros_like(extent)
@@ -89,7 +92,11 @@ def wrongly_culled(count: int, precision: str, seed: int) -> tuple[int, int]:
         exponents += too_wide
     high = -(-extent >> exponents)
     # Rays aimed at points in or near their box, from near and far; some parallel to an axis, some starting on a plane
-    target = low + random.integers(-1, 2, size=(count, 3)) * (extent // 8) + (random.random((count, 3)) * (extent + 1)).astype(np.int64)
+    target = (
+        low
+        + random.integers(-1, 2, size=(count, 3)) * (extent // 8)
+        + (random.random((count, 3)) * (extent + 1)).astype(np.int64)
+    )
     start = random.integers(-cube // 2, cube + cube // 2, size=(count, 3))
     start = np.where(random.random((count, 3)) < 0.15, target, start)
     start = np.where(random.random((count, 3)) < 0.05, low, start)
@@ -114,7 +121,7 @@ def meets(result: dict[str, Any], i: int, planes: tuple[Integers, Integers], num
     first, last = (0, 1), None
     for a in range(3):
         # In steps of the grid, or of a unit where that is finer
-        scale, origin = (1 << fraction, int(result["origin"][i][a])) if fraction >= 0 else (1, int(result["origin"][i][a]) << -fraction)
+        scale, origin = 1 << max(0, fraction), int(result["origin"][i][a]) << max(0, -fraction)
         low, high = int(planes[0][i][order[a]]) * scale - origin, int(planes[1][i][order[a]]) * scale - origin
         slope = slopes[a]
         if slope == 0:

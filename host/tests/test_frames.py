@@ -47,12 +47,12 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     design = design_for(config, overrides)
     image = pack(load_mesh(mesh), design.manifest)
     scene = replace(TEAPOT, mesh=MeshSource(name=mesh))
-    views = [
-        (scene, 48, 37),
-        (replace(scene, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True)), 33, 20),
-        (replace(scene, camera=Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0)), light=Light(shadows=False)), 17, 9),
+    flat = replace(scene, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True))
+    inside = replace(scene, camera=Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0)), light=Light(shadows=False))
+    views = [(scene, 48, 37), (flat, 33, 20), (inside, 17, 9)]
+    registers: list[Mapping[str, int]] = [
+        placement(view, image.header, design.manifest, width, height) for view, width, height in views
     ]
-    registers: list[Mapping[str, int]] = [placement(*view[:1], image.header, design.manifest, *view[1:]) for view in views]
     simulated = render_rtl(design, image, registers, stalls)
     for frame, settings in zip(simulated.frames, registers, strict=True):
         assert_equal(frame, render_model(design.manifest, image, settings))
@@ -88,7 +88,8 @@ def test_a_distant_camera_sees_the_object() -> None:
     image = pack(load_mesh("sphere:3"), manifest)
     for distance in (5.0, 60.0):
         scene = Scene(
-            MeshSource(name="sphere:3"), camera=Camera(position=(0.1, 0.2, distance), target=(0.0, 0.0, 0.0), fov=60.0 / distance)
+            MeshSource(name="sphere:3"),
+            camera=Camera(position=(0.1, 0.2, distance), target=(0.0, 0.0, 0.0), fov=60.0 / distance),
         )
         frame = render_model(manifest, image, placement(scene, image.header, manifest, 16, 16))
         assert frame.is_object[8, 8]
