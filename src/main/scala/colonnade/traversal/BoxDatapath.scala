@@ -81,8 +81,8 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
     interval.isOccupied := registered(registered(registered(io.children(lane).isOccupied)))
     interval.near       := near.asUInt(distanceBits - 2, 0)
     // One is added to a side's far, which floor has made too small; below `far` that can't overflow
-    interval.far        := Mux(sideFar < far, Rounding.narrow(sideFar +& 1.S, distanceBits), far)
-    io.intervals(lane)  := registered(interval)
+    interval.far       := Mux(sideFar < far, Rounding.narrow(sideFar +& 1.S, distanceBits), far)
+    io.intervals(lane) := registered(interval)
   }
 
   /** One cycle later; unlike `RegNext`, as wide as it is known to be. */

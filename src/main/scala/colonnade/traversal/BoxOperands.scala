@@ -63,8 +63,10 @@ object BoxOperands {
       operands.corner(axis) := difference.asUInt(numbers.vertexBits + 1, 0).asSInt
     }
     for (axis <- 0 until 2) {
-      operands.reciprocal(axis) := ray.reciprocal(axis).natural >> (numbers.reciprocalFraction - numbers.reciprocalDigits)
-      operands.drop(axis)       := numbers.reciprocalFraction.U - ray.exponent(axis)
+      operands.reciprocal(
+        axis
+      )                   := ray.reciprocal(axis).natural >> (numbers.reciprocalFraction - numbers.reciprocalDigits)
+      operands.drop(axis) := numbers.reciprocalFraction.U - ray.exponent(axis)
     }
     operands
   }

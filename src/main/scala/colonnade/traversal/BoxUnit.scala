@@ -39,11 +39,11 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
 
   // Let a node in; its first children start at once, the others follow without a gap
   private val follows = if (beats > 1) RegNext(io.in.fire, false.B) else false.B
-  io.in.ready          := notes.io.enq.ready && !follows
-  notes.io.enq.valid   := io.in.fire
-  notes.io.enq.bits    := BoxNote(config, io.in.bits)
-  private val starts    = io.in.fire || follows
-  private val endsNode  = if (beats > 1) follows else io.in.fire
+  io.in.ready        := notes.io.enq.ready && !follows
+  notes.io.enq.valid := io.in.fire
+  notes.io.enq.bits  := BoxNote(config, io.in.bits)
+  private val starts   = io.in.fire || follows
+  private val endsNode = if (beats > 1) follows else io.in.fire
 
   // Operands
   private val stored   = Seq.tabulate(arity)(BoxOperands.child(config, io.in.bits.node, _))

@@ -20,11 +20,11 @@ object ChildOrder {
 
   /** Combinational: all pairs are compared at once, and each child goes where its number of predecessors says. */
   def apply(config: ColonnadeConfig, isEntered: Seq[Bool], near: Seq[UInt]): ChildOrder = {
-    val slots = near.indices
+    val slots      = near.indices
     val isNotAfter = Map.from(for (i <- slots; j <- slots if i < j) yield (i, j) -> (near(i) <= near(j)))
 
     def precedes(i: Int, j: Int): Bool = isEntered(i) && (if (i < j) isNotAfter((i, j)) else !isNotAfter((j, i)))
-    val places = slots.map(slot => PopCount(slots.filter(_ != slot).map(precedes(_, slot))))
+    val places                         = slots.map(slot => PopCount(slots.filter(_ != slot).map(precedes(_, slot))))
 
     val order = Wire(new ChildOrder(config))
     order.count := PopCount(isEntered)

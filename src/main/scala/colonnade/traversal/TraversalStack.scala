@@ -58,6 +58,7 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
 
   val io = IO(new TraversalStackIO(config))
 
+  private val entries = SyncReadMem(StackAddress.size(config), UInt(new StackEntry(config).getWidth.W))
   private val levels  = RegInit(VecInit.fill(contexts)(0.U.asTypeOf(StackLevel(config))))
   private val answers = Module(new Queue(new NextVisit(config), TraversalStack.answers))
 
@@ -75,19 +76,19 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   assert(!answers.io.enq.valid || answers.io.enq.ready, "an operation was begun without a place for its answer")
 
   // Choose an operation: pop again, go on with a result's pushes, or take turns
-  private val pushesDone   = RegInit(0.U(log2Ceil(arity).W))
-  private val resumedLast  = RegInit(false.B)
-  private val hasRoom      = answers.io.count +& isAnswering < TraversalStack.answers.U
-  private val begins       = hasRoom && !popsAgain && (io.results.valid || io.resume.valid)
-  private val takesResult  = io.results.valid && (!io.resume.valid || resumedLast || pushesDone =/= 0.U)
-  private val count        = io.results.bits.count
-  private val wantsPush    = takesResult && count > 1.U
-  private val wantsPop     = !takesResult || count === 0.U
-  private val isLastPush   = pushesDone +& 2.U >= count
-  private val ends         = begins && (!wantsPush || isLastPush)
-  io.results.ready := ends && takesResult
-  io.resume.ready  := ends && !takesResult
-  when(ends)(resumedLast := !takesResult)
+  private val pushesDone  = RegInit(0.U(log2Ceil(arity).W))
+  private val resumedLast = RegInit(false.B)
+  private val hasRoom     = answers.io.count +& isAnswering < TraversalStack.answers.U
+  private val begins      = hasRoom && !popsAgain && (io.results.valid || io.resume.valid)
+  private val takesResult = io.results.valid && (!io.resume.valid || resumedLast || pushesDone =/= 0.U)
+  private val count       = io.results.bits.count
+  private val wantsPush   = takesResult && count > 1.U
+  private val wantsPop    = !takesResult || count === 0.U
+  private val isLastPush  = pushesDone +& 2.U >= count
+  private val ends        = begins && (!wantsPush || isLastPush)
+  io.results.ready               := ends && takesResult
+  io.resume.ready                := ends && !takesResult
+  when(ends)(resumedLast               := !takesResult)
   when(begins && wantsPush)(pushesDone := Mux(isLastPush, 0.U, pushesDone + 1.U))
 
   // What it does to its stack
@@ -107,7 +108,7 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   private val address = Mux(popsAgain, answer.below, Mux(wantsPop, free - 1.U, free))
   private val child   = io.results.bits.children(Rounding.narrow(count - 1.U - pushesDone, log2Ceil(arity)))
   private val reads   = pops || popsAgain
-  entry := memory(address, StackEntry(config, child).asUInt, reads || pushes, pushes).asTypeOf(entry)
+  entry := entries.readWrite(address, StackEntry(config, child).asUInt, reads || pushes, pushes).asTypeOf(entry)
 
   // On to the second cycle
   isAnswering := ends || popsAgain
@@ -127,13 +128,9 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   // Measurements
   private val deepest = RegInit(0.U.asTypeOf(StackLevel(config)))
   when(io.clear)(deepest := 0.U).elsewhen(pushes && level >= deepest)(deepest := level + 1.U)
-  io.deepest  := deepest
+  io.deepest := deepest
   io.overflow := begins && wantsPush && isFull
-  io.busy     := isAnswering || answers.io.deq.valid || pushesDone =/= 0.U
-
-  /** All stacks in one memory with one port. What is read comes in the next cycle, and for that cycle. */
-  protected def memory(address: UInt, written: UInt, isEnabled: Bool, isWrite: Bool): UInt =
-    SyncReadMem(StackAddress.size(config), chiselTypeOf(written)).readWrite(address, written, isEnabled, isWrite)
+  io.busy := isAnswering || answers.io.deq.valid || pushesDone =/= 0.U
 
   private def element[T <: Data](all: Vec[T], context: UInt): T =
     if (contexts == 1) all.head else all(context)

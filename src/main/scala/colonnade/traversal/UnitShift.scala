@@ -21,7 +21,10 @@ final class UnitShift(drop: UInt, numbers: NumberFormats) {
   def apply(product: SInt): SInt = {
     val clear = numbers.reciprocalFraction - numbers.reciprocalDigits
     val whole = if (clear == 0) product else (product << clear).asSInt
-    require(whole.getWidth == resultBits + most + 1, s"a product of ${whole.getWidth} bits; expected ${resultBits + most + 1}")
+    require(
+      whole.getWidth == resultBits + most + 1,
+      s"a product of ${whole.getWidth} bits; expected ${resultBits + most + 1}"
+    )
 
     val isNegative = whole.head(1).asBool
     val overflows  = ((whole.asUInt(resultBits + most - 1, resultBits - 1) ^ Fill(most + 1, isNegative)) & above).orR

@@ -25,19 +25,31 @@ final case class BoxQuestion(
 
   /** In the form that vectors.cpp reads. */
   def words: Seq[BigInt] =
-    (BigInt(axis) +: negative.map(sign => BigInt(if (sign) 1 else 0))) ++ boxOrigin ++ reciprocal ++ exponent.map(BigInt(_)) ++
+    (BigInt(axis) +: negative.map(sign => BigInt(if (sign) 1 else 0))) ++ boxOrigin ++ reciprocal ++ exponent.map(
+      BigInt(_)
+    ) ++
       Seq(limit) ++ origin ++ shift.map(BigInt(_)) ++ Seq(firstChild, firstTriangles) ++
       kinds.indices.flatMap(slot => BigInt(kinds(slot)) +: (low(slot) ++ high(slot)))
 
   /** Named as in [[BoxCandidate]]. */
   def fields(limitUnits: BigInt): Map[String, BigInt] = {
-    def vector(name: String, values: Seq[BigInt]) = Seq("x", "y", "z").zip(values).map { case (axis, value) => s"$name.$axis" -> value }
-    def indexed(name: String, values: Seq[BigInt]) = values.zipWithIndex.map { case (value, i) => s"$name[$i]" -> value }
+    def vector(name: String, values: Seq[BigInt]) = Seq("x", "y", "z").zip(values).map { case (axis, value) =>
+      s"$name.$axis" -> value
+    }
+    def indexed(name: String, values: Seq[BigInt]) = values.zipWithIndex.map { case (value, i) =>
+      s"$name[$i]" -> value
+    }
     Map("context" -> BigInt(context), "limit" -> limitUnits, "ray.heading.axis" -> BigInt(axis)) ++
-      indexed("ray.heading.negative", negative.map(sign => BigInt(if (sign) 1 else 0))) ++ indexed("ray.origin", boxOrigin) ++
+      indexed("ray.heading.negative", negative.map(sign => BigInt(if (sign) 1 else 0))) ++ indexed(
+        "ray.origin",
+        boxOrigin
+      ) ++
       indexed("ray.reciprocal", reciprocal) ++ indexed("ray.exponent", exponent.map(BigInt(_))) ++
       vector("node.origin", origin) ++ vector("node.exponent", shift.map(BigInt(_))) ++
-      Map("node.firstChild" -> firstChild, "node.firstTriangles" -> firstTriangles) ++ indexed("node.kinds", kinds.map(BigInt(_))) ++
+      Map("node.firstChild" -> firstChild, "node.firstTriangles" -> firstTriangles) ++ indexed(
+        "node.kinds",
+        kinds.map(BigInt(_))
+      ) ++
       kinds.indices.flatMap(slot => vector(s"node.low[$slot]", low(slot)) ++ vector(s"node.high[$slot]", high(slot)))
   }
 }
@@ -58,8 +70,10 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
     * one off anywhere shows.
     */
   def atBrinks(count: Int): Seq[BoxQuestion] = {
-    def entered(questions: Seq[BoxQuestion]): Seq[BigInt] = Model.answers(config, questions.map(_.words), "box").map(_(1))
-    def moved(question: BoxQuestion, axis: Int, to: BigInt) = question.copy(boxOrigin = question.boxOrigin.updated(axis, to))
+    def entered(questions: Seq[BoxQuestion]): Seq[BigInt] =
+      Model.answers(config, questions.map(_.words), "box").map(_(1))
+    def moved(question: BoxQuestion, axis: Int, to: BigInt) =
+      question.copy(boxOrigin = question.boxOrigin.updated(axis, to))
 
     val any    = apply(400 * count).map(question => (question, random.nextInt(3)))
     val ends   = Seq(lowest, highest).map(end => any.map { case (question, axis) => moved(question, axis, end) })
@@ -70,9 +84,13 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
     val axes  = start.map(any(_)._2)
     val first = start.map(i => (ends.head(i), ends.last(i)))
     val pairs = (0 to numbers.vertexBits + 1).foldLeft(first) { (pairs, _) =>
-      val middles = pairs.zip(axes).map { case ((from, to), axis) => moved(from, axis, (from.boxOrigin(axis) + to.boxOrigin(axis)) >> 1) }
+      val middles = pairs.zip(axes).map { case ((from, to), axis) =>
+        moved(from, axis, (from.boxOrigin(axis) + to.boxOrigin(axis)) >> 1)
+      }
       val counted = entered(pairs.map(_._1)).zip(entered(middles))
-      pairs.zip(middles).zip(counted).map { case (((from, to), middle), (a, b)) => if (a == b) (middle, to) else (from, middle) }
+      pairs.zip(middles).zip(counted).map { case (((from, to), middle), (a, b)) =>
+        if (a == b) (middle, to) else (from, middle)
+      }
     }
     pairs.flatMap { case (from, to) => Seq(from, to) }
   }
@@ -82,8 +100,9 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
   private def one(): BoxQuestion = {
     val shift  = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits + 2))
     val origin = shift.map(s => below(cube).min(cube - 1) >> (if (random.nextInt(3) == 0) 0 else s.min(3)))
-    val kinds  = Seq.fill(config.geometry.arity)(if (random.nextInt(8) == 0) random.nextInt(4) else 1 + random.nextInt(2))
-    val boxes  = kinds.map(_ => Seq.tabulate(3)(a => interval(shift(a))))
+    val kinds  =
+      Seq.fill(config.geometry.arity)(if (random.nextInt(8) == 0) random.nextInt(4) else 1 + random.nextInt(2))
+    val boxes = kinds.map(_ => Seq.tabulate(3)(a => interval(shift(a))))
     BoxQuestion(
       axis = random.nextInt(3),
       negative = Seq.fill(3)(random.nextBoolean()),
@@ -152,8 +171,9 @@ object BoxQuestions {
     val answers = Model.answers(config, questions.map(_.words), "box")
     for (((question, limit), answer) <- questions.zip(limits).zip(answers)) yield {
       val count    = answer(1).toInt
-      val children = for (i <- 0 until count; (field, value) <- child(question, answer(2 + 2 * i).toInt, answer(3 + 2 * i)))
-        yield s"children[$i].$field" -> value
+      val children =
+        for (i <- 0 until count; (field, value) <- child(question, answer(2 + 2 * i).toInt, answer(3 + 2 * i)))
+          yield s"children[$i].$field" -> value
       question.fields(limit) ->
         (children.toMap ++ Map("context" -> BigInt(question.context), "tests" -> answer.head, "count" -> answer(1)))
     }

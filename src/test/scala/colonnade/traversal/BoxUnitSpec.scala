@@ -31,8 +31,14 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
         low = Seq.fill(4)(Seq.fill(3)(BigInt(0))),
         high = Seq.fill(4)(Seq.fill(3)(BigInt(255)))
       )
-      val kinds  = for (a <- 0 to 3; b <- 0 to 3; c <- 0 to 3; d <- 0 to 3) yield Seq(a, b, c, d)
-      compare(dut, config, kinds.grouped(3).map(_.last).toSeq.map(these => around.copy(kinds = these)), offered = 1, accepted = 0.7)
+      val kinds = for (a <- 0 to 3; b <- 0 to 3; c <- 0 to 3; d <- 0 to 3) yield Seq(a, b, c, d)
+      compare(
+        dut,
+        config,
+        kinds.grouped(3).map(_.last).toSeq.map(these => around.copy(kinds = these)),
+        offered = 1,
+        accepted = 0.7
+      )
     }
 
   for (config <- Seq(TestConfigs.tiny, binary))
@@ -46,11 +52,18 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
 
   /** @return cycles from the first accepted input to the last result */
-  private def compare(dut: PackedBoxUnit, config: ColonnadeConfig, questions: Seq[BoxQuestion], offered: Double, accepted: Double): Int = {
+  private def compare(
+      dut:       PackedBoxUnit,
+      config:    ColonnadeConfig,
+      questions: Seq[BoxQuestion],
+      offered:   Double,
+      accepted:  Double
+  ): Int = {
     val input             = new Packed(new BoxCandidate(config))
     val output            = new Packed(new BoxResult(config))
     val solved            = BoxQuestions.solved(config, questions)
-    val (results, cycles) = PackedStreams.run(dut, solved.map(pair => input.pack(pair._1)), offered, accepted, new Random(11))
+    val (results, cycles) =
+      PackedStreams.run(dut, solved.map(pair => input.pack(pair._1)), offered, accepted, new Random(11))
     for (((result, (_, expected)), question) <- results.zip(solved).zip(questions)) {
       val fields = output.unpack(result)
       for ((name, value) <- expected) assert(fields(name) == value, s"for $name, expected $expected of $question")
@@ -59,7 +72,8 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 }
 
-private class PackedBoxUnit(config: ColonnadeConfig) extends PackedUnit(new BoxCandidate(config), new BoxResult(config)) {
+private class PackedBoxUnit(config: ColonnadeConfig)
+    extends PackedUnit(new BoxCandidate(config), new BoxResult(config)) {
   private val unit = chisel3.Module(new BoxUnit(config))
   connect(unit.io.in, unit.io.out, unit.io.busy)
 }

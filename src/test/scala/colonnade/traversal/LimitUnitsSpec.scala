@@ -19,9 +19,10 @@ class LimitUnitsSpec extends AnyFlatSpec with ChiselScalatestTester {
       val random   = new Random(1)
       val farthest = (BigInt(1) << (numbers.gridBits - 1)) - 1
       // Where saturation begins
-      val brink    = ((BigInt(1) << (numbers.vertexBits + 2)) - 2 - (BigInt(1) << numbers.boxPadLog)) << numbers.gridFraction.max(0)
-      val around   = (-3 to 3).map(brink + _).filter(limit => limit >= 0 && limit <= farthest)
-      val limits   = Seq(BigInt(0), BigInt(1), farthest, farthest - 1) ++ around ++
+      val brink =
+        ((BigInt(1) << (numbers.vertexBits + 2)) - 2 - (BigInt(1) << numbers.boxPadLog)) << numbers.gridFraction.max(0)
+      val around = (-3 to 3).map(brink + _).filter(limit => limit >= 0 && limit <= farthest)
+      val limits = Seq(BigInt(0), BigInt(1), farthest, farthest - 1) ++ around ++
         Seq.fill(300)(BigInt(numbers.gridBits - 1, random) >> random.nextInt(numbers.gridBits - 1))
       val expected = Model.answers(config, limits.map(Seq(_)), "limit").map(_.head)
       test(new LimitUnitsHarness(config)) { dut =>

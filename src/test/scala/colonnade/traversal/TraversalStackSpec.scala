@@ -33,7 +33,8 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester {
     val shape = config(arity = 4, stackDepth = 16, contexts = 2)
     test(new TraversalStack(shape)) { dut =>
       val driver = new StackDriver(dut, shape, seed = 1)
-      for (round <- 0 until 3) driver.send(0, Seq.tabulate(4)(i => Child(isLeaf = false, 10 * round + i, if (round == 0) 5 else 100)))
+      for (round <- 0 until 3)
+        driver.send(0, Seq.tabulate(4)(i => Child(isLeaf = false, 10 * round + i, if (round == 0) 5 else 100)))
       dut.io.deepest.expect(9.U)
       driver.setLimit(0, 50)
       val waited = driver.resume(0)
@@ -125,7 +126,7 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
       val context = random.nextInt(contexts)
       if (expected(context).isEmpty) {
         if (random.nextInt(25) == 0) start(context)
-        setLimit(context, if (random.nextInt(4) == 0) BigInt(random.nextInt(300)) else 1000)
+        setLimit(context, if (random.nextInt(4) == 0) BigInt(random.nextInt(12)) else 1000)
         val children = Seq.fill((random.nextInt(arity + 3) - 1).max(0).min(arity))(child())
         offer(if (random.nextInt(3) == 0) Resumed(context) else Found(context, children.sortBy(_.near)))
         done += 1
@@ -142,10 +143,11 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
     assert(overflows == reference.overflows)
   }
 
-  private def child(): Child = Child(random.nextBoolean(), random.nextInt(config.columnBvhMemory.depth), random.nextInt(400))
+  private def child(): Child =
+    Child(random.nextBoolean(), random.nextInt(config.columnBvhMemory.depth), random.nextInt(12))
 
   private def offer(operation: StackOperation): Unit = operation match {
-    case found: Found     =>
+    case found: Found =>
       expected(found.context) = Some(reference.result(found.context, found.children, limits(found.context)))
       foundQueue += found
     case resumed: Resumed =>
