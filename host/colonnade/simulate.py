@@ -34,6 +34,10 @@ VERILATOR_OPTIONS = (
     "--output-split 20000 --output-split-cfuncs 2000 -Wno-fatal --top-module Colonnade"
 ).split()
 
+#: In a larger array the render unit is compiled once, not once a copy: the code of 80 copies takes an hour to compile
+#: and does not fit any cache.
+MOST_FLAT_UNITS = 4
+
 
 @dataclass(frozen=True)
 class Stalls:
@@ -92,6 +96,9 @@ def _build(verilator: Path, manifest: Manifest, harness: Path, sources: list[Pat
     shutil.copy(harness, place / "harness.cpp")
     (place / "sources.f").write_text("\n".join(map(str, sources)) + "\n")
     command = [str(verilator), *VERILATOR_OPTIONS, "-j", "0", "--Mdir", str(place / "obj"), "-o", "simulator"]
+    if columns * int(manifest.config["array"]["rows"]) > MOST_FLAT_UNITS:
+        (place / "blocks.vlt").write_text('`verilator_config\nhier_block -module "RenderUnit"\n')
+        command += ["--hierarchical", str(place / "blocks.vlt")]
     command += ["-CFLAGS", f"-O2 -I{place}", "-f", str(place / "sources.f"), str(place / "harness.cpp")]
     log = logs / f"{place.name.split('.')[1]}.log"
     with log.open("w") as stream:
