@@ -43,6 +43,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       if (waiting.nonEmpty && dut.io.tiles.ready.peekBoolean()) waiting = waiting.tail
       dut.clock.step()
       cycles += 1
+      assert(cycles < 50000, "the walk ends")
     }
     (positions, cycles)
   }
