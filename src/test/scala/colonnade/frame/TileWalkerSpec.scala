@@ -18,9 +18,9 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   /** The positions that leave, by row and in the order of time, and the cycles that took. */
   private def walk(
-      dut: TileWalker,
-      size: (Int, Int),
-      tiles: Seq[(Int, Int)],
+      dut:     TileWalker,
+      size:    (Int, Int),
+      tiles:   Seq[(Int, Int)],
       isReady: Int => Boolean
   ): (Seq[(Int, (Int, Int))], Int) = {
     dut.io.frame.pixelsWide.poke(size._1)
