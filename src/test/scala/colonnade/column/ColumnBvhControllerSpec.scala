@@ -40,7 +40,7 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
   )
 
   it should "lose and double no read of a bank" in {
-    prove(cycles = 4)(new BankReaderProof(config(rows = 2, banks = 1, latency = 1, depth = 16)))
+    prove(cycles = 5)(new BankReaderProof(config(rows = 2, banks = 1, latency = 1, depth = 16)))
   }
 
   private def load(dut: ControllerAndMemory, records: Seq[BigInt]): Unit = {
