@@ -30,7 +30,7 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   * @param renderUnit makes a render unit; another one with the same ports for specs
   */
 final class Colonnade(
-    config: ColonnadeConfig,
+    config:     ColonnadeConfig,
     renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO } = new RenderUnit(_)
 ) extends Module {
   val io = IO(new ColonnadeIO(config))

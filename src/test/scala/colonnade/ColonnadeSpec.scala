@@ -33,29 +33,30 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
     it should s"render several frames with $rows rows, $columns columns, $banks banks of latency $latency" in {
       val configuration = config(rows, columns, banks, latency)
       val random        = new Random(rows)
-      test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
-        val device = new Device(dut, configuration)
-        for (((wide, high), seed) <- Seq((13, 6), (4, 4), (0, 5), (1, 7)).zipWithIndex) {
-          val scene = records(configuration, seed)
-          device.load(scene)
-          device.write("frame.width", wide)
-          device.write("frame.height", high)
-          device.write("shading.flat", seed % 2)
-          val stalls           = seed % 2 == 0
-          val (pixels, cycles) = device.frame(() => !stalls || random.nextInt(4) == 0)(read)
-          val units            = BigInt(rows * columns)
+      test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Seq(VerilatorBackendAnnotation)) {
+        dut =>
+          val device = new Device(dut, configuration)
+          for (((wide, high), seed) <- Seq((13, 6), (4, 4), (0, 5), (1, 7)).zipWithIndex) {
+            val scene = records(configuration, seed)
+            device.load(scene)
+            device.write("frame.width", wide)
+            device.write("frame.height", high)
+            device.write("shading.flat", seed % 2)
+            val stalls           = seed % 2 == 0
+            val (pixels, cycles) = device.frame(() => !stalls || random.nextInt(4) == 0)(read)
+            val units            = BigInt(rows * columns)
 
-          assert(pixels.size == wide * high && pixels.toMap == picture(configuration, scene, wide, high))
-          assert(device.read("status.done") == 1 && device.read("status.busy") == 0)
-          if (pixels.nonEmpty) assert(device.read("counters.cycles") == cycles)
-          assert(device.read("counters.raysPrimary") == pixels.size)
-          assert(device.read("counters.nodeReads") == FakeRenderUnit.reads * pixels.size)
-          assert(device.read("counters.deepestStack") == (wide - 1).max(0).min(7) * high.min(1))
-          val contexts = Seq("waitRecord", "waitUnit", "idleContexts").map(name => device.read(s"counters.$name"))
-          assert(contexts.sum == units * device.read("counters.cycles"))
-          assert(device.read("errors.illegalRecord") == (if (seed % 2 == 1 && wide > 5 && high > 0) 1 else 0))
-          assert(device.read("errors.watchdog") == 0 && device.read("errors.stackOverflow") == 0)
-        }
+            assert(pixels.size == wide * high && pixels.toMap == picture(configuration, scene, wide, high))
+            assert(device.read("status.done") == 1 && device.read("status.busy") == 0)
+            if (pixels.nonEmpty) assert(device.read("counters.cycles") == cycles)
+            assert(device.read("counters.raysPrimary") == pixels.size)
+            assert(device.read("counters.nodeReads") == FakeRenderUnit.reads * pixels.size)
+            assert(device.read("counters.deepestStack") == (wide - 1).max(0).min(7) * high.min(1))
+            val contexts = Seq("waitRecord", "waitUnit", "idleContexts").map(name => device.read(s"counters.$name"))
+            assert(contexts.sum == units * device.read("counters.cycles"))
+            assert(device.read("errors.illegalRecord") == (if (seed % 2 == 1 && wide > 5 && high > 0) 1 else 0))
+            assert(device.read("errors.watchdog") == 0 && device.read("errors.stackOverflow") == 0)
+          }
       }
     }
   }

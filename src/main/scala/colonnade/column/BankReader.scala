@@ -1,7 +1,7 @@
 package colonnade.column
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, PopCount, Queue, RegEnable, Valid}
+import chisel3.util.{Decoupled, Mux1H, OHToUInt, PopCount, RegEnable, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.frame.{ColumnBvhEvents, RoundRobin}
 import colonnade.unit.{RecordBroadcast, RecordRequest}
@@ -25,7 +25,7 @@ final class BankReader(config: ColonnadeConfig) extends Module {
 
   private val rows     = config.array.rows
   private val turn     = Module(new RoundRobin(rows))
-  private val inFlight = Module(new Queue(new Read(config), config.columnBvhMemory.readLatency + 1))
+  private val inFlight = Module(new ReadList(config))
   private val asking   = turn.io.requests
   private val accepts  = io.memory.request.fire
 
@@ -33,35 +33,29 @@ final class BankReader(config: ColonnadeConfig) extends Module {
   turn.io.requests := VecInit(io.requests.map(_.valid)).asUInt
   turn.io.isTaken  := accepts
   io.requests.zip(turn.io.grant.asBools).foreach { case (request, isGranted) =>
-    request.ready := isGranted && io.memory.request.ready && inFlight.io.enq.ready
+    request.ready := isGranted && io.memory.request.ready && inFlight.io.begins.ready
   }
 
   // Read, and note for whom
   private val address = Mux1H(turn.io.grant, io.requests.map(_.bits.address))
-  io.memory.request.valid      := asking.orR && inFlight.io.enq.ready
-  io.memory.request.bits       := Banks.addressIn(config, address)
-  inFlight.io.enq.valid        := accepts
-  inFlight.io.enq.bits.address := address
-  inFlight.io.enq.bits.row     := OHToUInt(turn.io.grant)
+  io.memory.request.valid         := asking.orR && inFlight.io.begins.ready
+  io.memory.request.bits          := Banks.addressIn(config, address)
+  inFlight.io.begins.valid        := accepts
+  inFlight.io.begins.bits.address := address
+  inFlight.io.begins.bits.row     := OHToUInt(turn.io.grant)
 
   // Show the record to everybody
   private val answers   = io.memory.response.valid
   private val broadcast = Wire(new RecordBroadcast(config))
-  broadcast.address     := inFlight.io.deq.bits.address
-  broadcast.row         := inFlight.io.deq.bits.row
-  broadcast.record      := io.memory.response.bits
-  inFlight.io.deq.ready := answers
-  io.broadcast.valid    := RegNext(answers, false.B)
-  io.broadcast.bits     := RegEnable(broadcast, answers)
-  assert(!answers || inFlight.io.deq.valid, "a bank answers without a question")
+  broadcast.address        := inFlight.io.oldest.bits.address
+  broadcast.row            := inFlight.io.oldest.bits.row
+  broadcast.record         := io.memory.response.bits
+  inFlight.io.oldest.ready := answers
+  io.broadcast.valid       := RegNext(answers, false.B)
+  io.broadcast.bits        := RegEnable(broadcast, answers)
+  assert(!answers || inFlight.io.oldest.valid, "a bank answers without a question")
 
   io.events.recordReads   := accepts
   io.events.bankConflicts := Mux(accepts, PopCount(asking) - 1.U, 0.U)
-  io.isIdle               := !inFlight.io.deq.valid && !io.broadcast.valid
-}
-
-/** A read in flight. */
-private final class Read(config: ColonnadeConfig) extends Bundle {
-  val address = new RecordRequest(config).address.cloneType
-  val row     = UInt(log2Ceil(config.array.rows.max(2)).W)
+  io.isIdle               := !inFlight.io.oldest.valid && !io.broadcast.valid
 }

@@ -33,7 +33,7 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   * @param renderUnit makes a render unit; another one with the same ports for specs
   */
 final class Column(
-    config: ColonnadeConfig,
+    config:     ColonnadeConfig,
     renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO } = new RenderUnit(_)
 ) extends Module {
   val io = IO(new ColumnIO(config))

@@ -30,7 +30,7 @@ class BankReaderProof(config: ColonnadeConfig) extends Module {
 
   private val held   = RegInit(0.U(2.W))
   private val answer = answers && held =/= 0.U
-  held := held + accepts - answer
+  held                         := held + accepts - answer
   dut.io.memory.request.ready  := ready
   dut.io.memory.response.valid := answer
   dut.io.memory.response.bits  := 0.U

@@ -28,12 +28,12 @@ class FakeRenderUnit(config: ColonnadeConfig) extends Module {
   private val deepest  = RegInit(0.U(3.W))
   private val luck     = LFSR(16, seed = Some(7))
 
-  private val isStuck   = io.registers.shading.shadows && position.x === hangsAt._1.U && position.y === hangsAt._2.U
-  private val meant     = io.broadcasts.map(b => b.valid && b.bits.address === address)
-  private val isShown   = meant.reduce(_ || _)
-  private val record    = chisel3.util.Mux1H(meant, io.broadcasts.map(_.bits.record))
-  private val isWanted  = state === asking || state === waiting
-  private val takes     = isWanted && isShown && !isStuck
+  private val isStuck  = io.registers.shading.shadows && position.x === hangsAt._1.U && position.y === hangsAt._2.U
+  private val meant    = io.broadcasts.map(b => b.valid && b.bits.address === address)
+  private val isShown  = meant.reduce(_ || _)
+  private val record   = chisel3.util.Mux1H(meant, io.broadcasts.map(_.bits.record))
+  private val isWanted = state === asking || state === waiting
+  private val takes    = isWanted && isShown && !isStuck
 
   io.positions.ready       := state === free && luck(0)
   io.requests.valid        := state === asking && !isShown

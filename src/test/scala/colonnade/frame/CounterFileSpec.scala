@@ -50,7 +50,7 @@ class CounterFileSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "keep the deepest stack and errors of a frame, and not those of the last one" in {
     test(new CounterFile(config)) { dut =>
-      def level(column: Int, deepest: Int): Unit = dut.io.events(column).deepestStack.poke(deepest)
+      def level(column: Int, deepest: Int): Unit    = dut.io.events(column).deepestStack.poke(deepest)
       def frame(deepest: Int, error: Boolean): Unit = {
         dut.io.clear.poke(true)
         dut.clock.step()

@@ -51,7 +51,10 @@ class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
   behavior of "PixelCollector"
 
   private def withRows(rows: Int) =
-    TestConfigs.tiny.copy(array = TestConfigs.tiny.array.copy(rows = rows), frame = TestConfigs.tiny.frame.copy(hits = false))
+    TestConfigs.tiny.copy(
+      array = TestConfigs.tiny.array.copy(rows = rows),
+      frame = TestConfigs.tiny.frame.copy(hits = false)
+    )
 
   it should "lose and double no pixel" in {
     prove(cycles = 6)(new PixelCollectorProof(withRows(2)))
@@ -86,21 +89,22 @@ class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
             source.bits.x.poke(x)
             source.bits.y.poke(y)
             source.bits.colour.channels.foreach(_.poke(colour))
-            source.bits.isObject.poke(colour % 2 == 1)
+            source.bits.isObject.poke(colour         % 2 == 1)
             source.bits.hit.get.triangle.poke(colour % 512)
           }
         }
         val takes = random.nextInt(3) > 0
         dut.io.pixels.ready.poke(takes)
         if (takes && dut.io.pixels.valid.peekBoolean()) {
-          val bits  = dut.io.pixels.bits
-          val pixel = (bits.x.peekInt().toInt, bits.y.peekInt().toInt, bits.colour.g.peekInt().toInt)
-          bits.isObject.expect(pixel._3 % 2 == 1)
+          val bits          = dut.io.pixels.bits
+          val pixel         = (bits.x.peekInt().toInt, bits.y.peekInt().toInt, bits.colour.g.peekInt().toInt)
+          bits.isObject.expect(pixel._3         % 2 == 1)
           bits.hit.get.triangle.expect(pixel._3 % 512)
           assert(left.contains(pixel))
           left = if (left(pixel) == 1) left - pixel else left.updated(pixel, left(pixel) - 1)
         }
-        for (row <- offers.indices if offers(row) && dut.io.sources(row).ready.peekBoolean()) waiting(row) = waiting(row).tail
+        for (row <- offers.indices if offers(row) && dut.io.sources(row).ready.peekBoolean())
+          waiting(row) = waiting(row).tail
         dut.clock.step()
       }
     }

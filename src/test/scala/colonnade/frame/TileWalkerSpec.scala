@@ -18,9 +18,9 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   /** The positions that leave, by row and in the order of time, and the cycles that took. */
   private def walk(
-      dut: TileWalker,
-      size: (Int, Int),
-      tiles: Seq[(Int, Int)],
+      dut:     TileWalker,
+      size:    (Int, Int),
+      tiles:   Seq[(Int, Int)],
       isReady: Int => Boolean
   ): (Seq[(Int, (Int, Int))], Int) = {
     dut.io.frame.pixelsWide.poke(size._1)
@@ -43,6 +43,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       if (waiting.nonEmpty && dut.io.tiles.ready.peekBoolean()) waiting = waiting.tail
       dut.clock.step()
       cycles += 1
+      assert(cycles < 50000, "the walk ends")
     }
     (positions, cycles)
   }
