@@ -12,7 +12,7 @@ from colonnade.toolchain import project_root
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
-@pytest.mark.parametrize("overrides", [(), ("geometry.bvh=false", "precision=17b19s23d")], ids=["tree", "no tree, odd widths"])
+@pytest.mark.parametrize("overrides", [(), ("geometry.bvh=false", "precision=17b19s23d")], ids=["tree", "odd"])
 def test_verilog_is_clean(overrides: tuple[str, ...]) -> None:
     design = design_for("tiny", overrides)
     command = ["verilator", "--lint-only", "-Wall", str(project_root() / "tools" / "lint.vlt")]

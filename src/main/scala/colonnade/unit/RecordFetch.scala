@@ -149,7 +149,7 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
   // What is just arriving need not be asked for
   private val isArriving = io.broadcasts.map(broadcast => broadcast.valid && broadcast.bits.address === address)
-  io.requests.valid := isSeeking && isLegal && places.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
+  io.requests.valid        := isSeeking && isLegal && places.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
   io.requests.bits.address := address
   when(io.requests.fire) {
     buffers.zip(places).foreach { case (buffer, place) =>

@@ -47,16 +47,17 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   // Positions: past the object, or into a free context
   private val rectangle = io.registers.frame.objectRect
   private val position  = io.positions.bits
-  private val isInside  = position.x >= rectangle.x0 && position.x < rectangle.x1 && position.y >= rectangle.y0 && position.y < rectangle.y1
-  private val passing   = Wire(Decoupled(new Pixel(config)))
-  passing.valid := io.positions.valid && !isInside
-  passing.bits  := backgroundPixel(position)
+  private val isInside  =
+    position.x >= rectangle.x0 && position.x < rectangle.x1 && position.y >= rectangle.y0 && position.y < rectangle.y1
+  private val passing = Wire(Decoupled(new Pixel(config)))
+  passing.valid                         := io.positions.valid && !isInside
+  passing.bits                          := backgroundPixel(position)
   rayGenerator.io.position.valid        := io.positions.valid && isInside && controller.io.free.valid
   rayGenerator.io.position.bits.context := controller.io.free.bits
   rayGenerator.io.position.bits.x       := position.x
   rayGenerator.io.position.bits.y       := position.y
-  io.positions.ready              := Mux(isInside, rayGenerator.io.position.ready && controller.io.free.valid, passing.ready)
-  controller.io.allocate          := rayGenerator.io.position.fire
+  io.positions.ready     := Mux(isInside, rayGenerator.io.position.ready && controller.io.free.valid, passing.ready)
+  controller.io.allocate := rayGenerator.io.position.fire
   when(rayGenerator.io.position.fire) {
     positions.write(controller.io.free.bits, position)
     isObject(controller.io.free.bits) := false.B
@@ -91,8 +92,8 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   traversal.io.scene := io.registers.scene
   connect(traversal.io.start, enters, setUpRay.bits.context)
   traversal.io.nodes :<>= recordFetch.io.served(0)
-  traversal.io.ray        := boxRays.read(recordFetch.io.served(0).bits.context)
-  traversal.io.limits     := hitTable.io.limits
+  traversal.io.ray          := boxRays.read(recordFetch.io.served(0).bits.context)
+  traversal.io.limits       := hitTable.io.limits
   traversal.io.visits.ready := true.B
   private val next = traversal.io.visits
   connect(controller.io.ended(1), next.fire && next.bits.isDone, next.bits.context)
@@ -105,14 +106,14 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   triangleUnit.io.candidate.bits.context := triangles.bits.context
   triangleUnit.io.candidate.bits.record  := formats.asTriangles(triangles.bits.record)
   triangleUnit.io.candidate.bits.ray     := triangleRays.read(triangles.bits.context)
-  triangles.ready                 := triangleUnit.io.candidate.ready
+  triangles.ready                        := triangleUnit.io.candidate.ready
 
   // A result either ends its ray (a shadow ray that is occluded) or lets it go on
-  private val tested      = triangleUnit.io.result
-  private val isShadow    = controller.io.isShadow(tested.bits.context)
-  private val isOccluded  = isShadow && hitTable.io.hasHitNow
-  private val resumes     = Module(new Arbiter(Context(config), 2))
-  private val isThrough   = tested.valid && tested.bits.isLast
+  private val tested     = triangleUnit.io.result
+  private val isShadow   = controller.io.isShadow(tested.bits.context)
+  private val isOccluded = isShadow && hitTable.io.hasHitNow
+  private val resumes    = Module(new Arbiter(Context(config), 2))
+  private val isThrough  = tested.valid && tested.bits.isLast
   tested.ready             := isOccluded || !tested.bits.isLast || resumes.io.in(1).ready
   hitTable.io.result.valid := tested.fire
   hitTable.io.result.bits  := tested.bits
@@ -123,7 +124,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   traversal.io.resume :<>= resumes.io.out
 
   // A record that does not exist is passed over; a pixel without attributes stays as it is
-  private val refused = recordFetch.io.refused
+  private val refused      = recordFetch.io.refused
   private val isAttributes = refused.bits.use === RecordUse.attributes
   resumes.io.in(0).valid := refused.valid && !isAttributes
   resumes.io.in(0).bits  := refused.bits.context
@@ -138,7 +139,9 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   recordFetch.io.wishes(2).valid        := isSeen
   recordFetch.io.wishes(2).bits.context := judged.bits
   recordFetch.io.wishes(2).bits.use     := RecordUse.attributes
-  recordFetch.io.wishes(2).bits.address := io.registers.scene.attributeBase + (judgedHit.id >> RecordFormats.faceSlotBits)
+  recordFetch.io.wishes(
+    2
+  ).bits.address := io.registers.scene.attributeBase + (judgedHit.id >> RecordFormats.faceSlotBits)
   when(isSeen) { isObject(judged.bits) := true.B }
 
   // Shading
@@ -149,21 +152,24 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   shader.io.request.bits.context := attributes.bits.context
   shader.io.request.bits.ray     := triangleRays.read(attributes.bits.context)
   shader.io.request.bits.hit     := shadedHit
-  shader.io.request.bits.face    := formats.asAttributes(attributes.bits.record).faces(shadedHit.id(RecordFormats.faceSlotBits - 1, 0))
-  attributes.ready          := shader.io.request.ready
-  shader.io.light           := io.registers.light
-  shader.io.unitShift       := io.registers.frame.unitShift
-  shader.io.ambient         := io.registers.ambient
-  shader.io.shading         := io.registers.shading
-  shader.io.materials       := io.registers.materials
+  shader.io.request.bits.face    := formats.asAttributes(attributes.bits.record).faces(shadedHit.id(
+    RecordFormats.faceSlotBits - 1,
+    0
+  ))
+  attributes.ready    := shader.io.request.ready
+  shader.io.light     := io.registers.light
+  shader.io.unitShift := io.registers.frame.unitShift
+  shader.io.ambient   := io.registers.ambient
+  shader.io.shading   := io.registers.shading
+  shader.io.materials := io.registers.materials
 
   private val shaded = shader.io.result
-  shaded.ready                       := !shaded.bits.needsShadowRay || shadowRays.ready
-  shadowRays.valid                   := shaded.valid && shaded.bits.needsShadowRay
-  shadowRays.bits.context            := shaded.bits.context
-  shadowRays.bits.isShadow           := true.B
-  shadowRays.bits.origin             := shaded.bits.origin
-  shadowRays.bits.towards            := shaded.bits.toLight
+  shaded.ready                             := !shaded.bits.needsShadowRay || shadowRays.ready
+  shadowRays.valid                         := shaded.valid && shaded.bits.needsShadowRay
+  shadowRays.bits.context                  := shaded.bits.context
+  shadowRays.bits.isShadow                 := true.B
+  shadowRays.bits.origin                   := shaded.bits.origin
+  shadowRays.bits.towards                  := shaded.bits.toLight
   controller.io.shaded.valid               := shaded.fire
   controller.io.shaded.bits.context        := shaded.bits.context
   controller.io.shaded.bits.needsShadowRay := shaded.bits.needsShadowRay
@@ -191,7 +197,10 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     when(isSeen) {
       val pixelHit = Wire(new PixelHit(config))
       pixelHit.triangle     := judgedHit.id
-      pixelHit.distance.raw := (Rounding.floor(entries.read(judged.bits), -numbers.gridFraction) +& judgedHit.t.integer.asUInt)
+      pixelHit.distance.raw := (Rounding.floor(
+        entries.read(judged.bits),
+        -numbers.gridFraction
+      ) +& judgedHit.t.integer.asUInt)
       pixelHits.write(judged.bits, pixelHit)
     }
     when(isObject(complete.bits)) { finished.bits.hit.get := pixelHits.read(complete.bits) }

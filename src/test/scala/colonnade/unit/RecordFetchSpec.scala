@@ -27,7 +27,9 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   for (contexts <- Seq(1, 4); banks <- Seq(1, 2); snooping <- Seq(true, false)) {
     it should s"serve $contexts contexts from $banks banks, snooping $snooping" in {
       val config = variant(contexts, banks, snooping)
-      test(new RecordFetch(config)) { dut => new Column(dut, config, new Random(contexts * 10 + banks)).run(wishes = 200) }
+      test(new RecordFetch(config)) { dut =>
+        new Column(dut, config, new Random(contexts * 10 + banks)).run(wishes = 200)
+      }
     }
   }
 
@@ -90,7 +92,8 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
 
     private def broadcast(): Unit = for (bank <- 0 until banks) {
       val port = dut.io.broadcasts(bank)
-      if (random.nextInt(4) == 0) inFlight(bank).enqueue((now + 1 + random.nextInt(5), random.nextInt(recordCount / banks) * banks + bank, 2))
+      if (random.nextInt(4) == 0)
+        inFlight(bank).enqueue((now + 1 + random.nextInt(5), random.nextInt(recordCount / banks) * banks + bank, 2))
       val isDue = inFlight(bank).headOption.exists(_._1 <= now)
       port.valid.poke(isDue.B)
       if (isDue) {
