@@ -55,6 +55,7 @@ final class Colonnade(
     column.io.registers := registers.io.frame
     column.io.start     := controller.io.begins
     column.io.tiles <> controller.io.tiles(index)
+    column.io.backgroundTiles <> controller.io.backgroundTiles(index)
     io.pixels(index) <> column.io.pixels
     controller.io.progress(index) := column.io.progress
     counters.io.events(index)     := column.io.events

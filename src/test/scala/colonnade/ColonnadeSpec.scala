@@ -40,7 +40,9 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
             val scene = records(configuration, seed)
             device.load(scene)
             device.write("frame.width", wide)
+            device.write("frame.objectRect.x1", wide)
             device.write("frame.height", high)
+            device.write("frame.objectRect.y1", high)
             device.write("shading.flat", seed % 2)
             val stalls           = seed % 2 == 0
             val (pixels, cycles) = device.frame(() => !stalls || random.nextInt(4) == 0)(read)
@@ -68,7 +70,9 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
       val scene  = records(configuration, 1)
       device.load(scene)
       device.write("frame.width", 10)
+      device.write("frame.objectRect.x1", 10)
       device.write("frame.height", 6)
+      device.write("frame.objectRect.y1", 6)
       device.write("frame.watchdogCycles", 300)
       for (hangs <- Seq(1, 1, 0)) {
         device.write("shading.shadows", hangs)
@@ -89,7 +93,9 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
       var cycle  = 0
       device.load(records(configuration, 1))
       device.write("frame.width", 4)
+      device.write("frame.objectRect.x1", 4)
       device.write("frame.height", 4)
+      device.write("frame.objectRect.y1", 4)
       device.write("frame.watchdogCycles", 100)
       val (pixels, cycles) = device.frame { () =>
         cycle += 1

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Load, Pixel}
-import colonnade.frame.{ColumnProgress, EventSums, PixelCollector, Tile, TileWalker}
+import colonnade.frame.{BackgroundWalker, ColumnProgress, EventSums, PixelCollector, Tile, TileWalker}
 import colonnade.unit.{RenderUnit, RenderUnitIO}
 
 /** Ports of [[Column]]. */
@@ -19,6 +19,9 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   /** Only while idle. */
   val load  = Flipped(Valid(new Load(config)))
   val tiles = Flipped(Decoupled(new Tile(config)))
+
+  /** Tiles that no ray to the object goes through. */
+  val backgroundTiles = Flipped(Decoupled(new Tile(config)))
 
   /** In no particular order. */
   val pixels   = Decoupled(new Pixel(config))
@@ -39,15 +42,21 @@ final class Column(
   val io = IO(new ColumnIO(config))
 
   private val walker     = Module(new TileWalker(config))
+  private val background = Module(new BackgroundWalker(config))
   private val units      = Seq.fill(config.array.rows)(Module(renderUnit(config)).io)
   private val controller = Module(new ColumnBvhController(config))
   private val memory     = Module(new ColumnBvhMemory(config))
-  private val collector  = Module(new PixelCollector(config))
+  private val collector  = Module(new PixelCollector(config, config.array.rows + 1))
 
   // Tiles become pixels to render
   walker.io.frame := io.registers.frame
   walker.io.tiles <> io.tiles
   units.zip(walker.io.positions).foreach { case (unit, positions) => unit.positions <> positions }
+
+  // Tiles of the background become pixels at once
+  background.io.frame  := io.registers.frame
+  background.io.colour := io.registers.background
+  background.io.tiles <> io.backgroundTiles
 
   // Units ask for records and see all that are read
   controller.io.requests.zip(units).foreach { case (requests, unit) => requests <> unit.requests }
@@ -56,7 +65,9 @@ final class Column(
   memory.io.load := io.load
 
   // Colours leave
-  collector.io.sources.zip(units).foreach { case (sources, unit) => sources <> unit.pixels }
+  collector.io.sources.zip(units.map(_.pixels) :+ background.io.pixels).foreach { case (source, pixels) =>
+    source <> pixels
+  }
   io.pixels <> collector.io.pixels
 
   // What all units know
@@ -68,11 +79,11 @@ final class Column(
 
   // Pixels handed out and not yet gone
   private val inFlight = RegInit(0.U((2 * config.numbers.coordinateBits).W))
-  private val enters   = PopCount(walker.io.positions.map(_.fire))
+  private val enters   = PopCount(walker.io.positions.map(_.fire) :+ background.io.pixels.fire)
   private val leaves   = io.pixels.fire
   inFlight := inFlight + enters - leaves
 
-  io.progress.isDrained := walker.io.isIdle && inFlight === leaves.asUInt
+  io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === leaves.asUInt
   io.progress.isIdle    := RegNext(units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle, true.B)
-  io.events             := RegNext(EventSums.ofColumn(config, units.map(_.events), controller.io.events))
+  io.events := RegNext(EventSums.ofColumn(config, units.map(_.events), background.io.pixels.fire, controller.io.events))
 }

@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.log2Ceil
+import chisel3.util.{log2Ceil, PopCount}
 import colonnade.config.ColonnadeConfig
 import colonnade.unit.UnitEvents
 
@@ -21,7 +21,8 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   private def perUnit              = sum(units)
   private def perContext           = sum(units * config.array.contexts)
 
-  val raysPrimary      = perUnit
+  /** With the background's, which go past the units. */
+  val raysPrimary      = sum(units + columns)
   val raysShadow       = perUnit
   val raysInBox        = perUnit
   val nodeReads        = perUnit
@@ -49,9 +50,15 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
 
 object EventSums {
 
-  /** A column's, from those of its units and its controller. */
-  def ofColumn(config: ColonnadeConfig, units: Seq[UnitEvents], controller: ColumnBvhEvents): EventSums = {
+  /** A column's, from those of its units, of its background pixels and of its controller. */
+  def ofColumn(
+      config:     ColonnadeConfig,
+      units:      Seq[UnitEvents],
+      background: Bool,
+      controller: ColumnBvhEvents
+  ): EventSums = {
     val sums = joined(new EventSums(config, 1), units.map(_.elements.toMap))
+    sums.raysPrimary   := PopCount(units.map(_.raysPrimary) :+ background)
     sums.recordReads   := controller.recordReads
     sums.bankConflicts := controller.bankConflicts
     sums

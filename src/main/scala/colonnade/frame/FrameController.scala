@@ -34,9 +34,12 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 
   /** Valid only where ready is set, see [[Dispatcher]]. */
-  val tiles    = Vec(columns, Decoupled(new Tile(config)))
-  val progress = Input(Vec(columns, new ColumnProgress))
-  val traffic  = Input(new PixelTraffic)
+  val tiles = Vec(columns, Decoupled(new Tile(config)))
+
+  /** Tiles that do not meet the object's rectangle. */
+  val backgroundTiles = Vec(columns, Decoupled(new Tile(config)))
+  val progress        = Input(Vec(columns, new ColumnProgress))
+  val traffic         = Input(new PixelTraffic)
 
   /** A frame begins: clears what is left of the last one. */
   val begins = Output(Bool())
@@ -53,7 +56,7 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   val watchdogError = Output(Bool())
 }
 
-/** Runs frames: hands out the tiles, sees the last pixel leave, and ends the frame when the device has come to rest.
+/** Runs frames: hands out the tiles, those of the object and those of the background side by side, sees the last pixel leave, and ends the frame when the device has come to rest.
   *
   * The first tile is out two cycles after the start; `done` follows the last pixel by [[FrameController.settleCycles]]
   * or more, so that counters and errors are complete. A frame without pixels ends at once. A frame from which no pixel
@@ -69,10 +72,12 @@ final class FrameController(config: ColonnadeConfig) extends Module {
   private val done     = RegInit(false.B)
   private val error    = RegInit(false.B)
 
-  private val dealer   = withReset(reset.asBool || io.aborts)(Module(new TileDealer(config)))
+  private val dealers = withReset(reset.asBool || io.aborts) {
+    Seq(true, false).map(ofObject => Module(new TileDealer(config, ofObject)))
+  }
   private val watchdog = Module(new Watchdog(io.frame.watchdogCycles.getWidth))
 
-  private val isFinished = dealer.io.isIdle && io.progress.map(_.isDrained).reduce(_ && _)
+  private val isFinished = dealers.map(_.io.isIdle).reduce(_ && _) && io.progress.map(_.isDrained).reduce(_ && _)
   private val isAtRest   = settling === 0.U && io.progress.map(_.isIdle).reduce(_ && _)
 
   switch(state) {
@@ -114,9 +119,11 @@ final class FrameController(config: ColonnadeConfig) extends Module {
   watchdog.io.restart := io.begins || io.aborts || io.traffic.leaves
   watchdog.io.hold    := io.traffic.stalls || state === State.waiting
 
-  dealer.io.frame := io.frame
-  dealer.io.start := io.begins
-  io.tiles <> dealer.io.tiles
+  dealers.zip(Seq(io.tiles, io.backgroundTiles)).foreach { case (dealer, tiles) =>
+    dealer.io.frame := io.frame
+    dealer.io.start := io.begins
+    tiles <> dealer.io.tiles
+  }
 
   io.status.busy   := state =/= State.waiting
   io.status.done   := done

@@ -6,18 +6,18 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.Pixel
 
 /** Ports of [[PixelCollector]]. */
-final class PixelCollectorIO(config: ColonnadeConfig) extends Bundle {
-  val sources = Vec(config.array.rows, Flipped(Decoupled(new Pixel(config))))
+final class PixelCollectorIO(config: ColonnadeConfig, count: Int) extends Bundle {
+  val sources = Vec(count, Flipped(Decoupled(new Pixel(config))))
   val pixels  = Decoupled(new Pixel(config))
 }
 
-/** Joins the pixels of a column's render units in one stream: one a cycle, a cycle later, from the sources in turn.
+/** Joins the pixels of `count` sources, a column's render units and its background, in one stream: one a cycle, a cycle later, from the sources in turn.
   * Pixels of one source stay in order.
   */
-final class PixelCollector(config: ColonnadeConfig) extends Module {
-  val io = IO(new PixelCollectorIO(config))
+final class PixelCollector(config: ColonnadeConfig, count: Int) extends Module {
+  val io = IO(new PixelCollectorIO(config, count))
 
-  private val turn   = Module(new RoundRobin(config.array.rows))
+  private val turn   = Module(new RoundRobin(count))
   private val chosen = Wire(Decoupled(new Pixel(config)))
   turn.io.requests := VecInit(io.sources.map(_.valid)).asUInt
   turn.io.isTaken  := chosen.fire

@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{Decoupled, Queue, RegEnable}
+import chisel3.util.{Decoupled, Queue}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.FrameSettings
 import colonnade.unit.PixelPosition
@@ -17,7 +17,7 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Hands the pixels of a tile, clipped at the frame's edge, in Morton order to whichever render unit is ready, in turn.
+/** Hands the pixels of a tile, in the order of [[TileScan]], to whichever render unit is ready, in turn.
   *
   * One pixel a cycle, the first one three cycles after its tile is taken. A slot in front of each render unit holds its
   * next pixel. The next tile is taken when no more than these and two pixels of this one are left, so that tiles follow
@@ -26,29 +26,12 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
 final class TileWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new TileWalkerIO(config))
 
-  private val scan      = Module(new MortonScan(Tile.pixelLevels(config)))
-  private val dispatch  = Module(new Dispatcher(new PixelPosition(config), config.array.rows))
-  private val tile      = RegEnable(io.tiles.bits, io.tiles.fire)
-  private val positions = Wire(Decoupled(new PixelPosition(config)))
+  private val scan     = Module(new TileScan(config))
+  private val dispatch = Module(new Dispatcher(new PixelPosition(config), config.array.rows))
 
-  scan.io.size.valid     := io.tiles.valid
-  scan.io.size.bits.wide := clipped(io.frame.pixelsWide, io.tiles.bits.x)
-  scan.io.size.bits.high := clipped(io.frame.pixelsHigh, io.tiles.bits.y)
-  io.tiles.ready         := scan.io.size.ready
-
-  positions.valid     := scan.io.cells.valid
-  positions.bits.x    := tile.x | scan.io.cells.bits.x
-  positions.bits.y    := tile.y | scan.io.cells.bits.y
-  scan.io.cells.ready := positions.ready
-
-  dispatch.io.items <> Queue(positions, 2)
+  scan.io.frame := io.frame
+  scan.io.tiles <> io.tiles
+  dispatch.io.items <> Queue(scan.io.positions, 2)
   io.positions.zip(dispatch.io.takers).foreach { case (position, taker) => position <> Queue(taker, 1, pipe = true) }
   io.isIdle := scan.io.isIdle && !dispatch.io.items.valid && !io.positions.map(_.valid).reduce(_ || _)
-
-  /** Pixels of a tile in one direction. */
-  private def clipped(frame: UInt, first: UInt): UInt = {
-    val size = config.frame.tileSize.U
-    val left = frame - first
-    Mux(left < size, left, size)
-  }
 }

@@ -17,6 +17,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   private final class FakeColumn(dut: FrameController, index: Int, random: Random) {
     var isStuck      = false
     var tiles        = Vector.empty[(Int, Int)]
+    var backgrounds  = Vector.empty[(Int, Int)]
     private var left = 0
 
     /** Before the clock's edge: whether a pixel leaves. */
@@ -24,13 +25,17 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       val port   = dut.io.tiles(index)
       val leaves = left > 0 && !isStuck
       port.ready.poke(left == 0)
+      dut.io.backgroundTiles(index).ready.poke(random.nextBoolean())
       dut.io.progress(index).isDrained.poke(left == 0 || (left == 1 && leaves))
       dut.io.progress(index).isIdle.poke(left == 0)
       leaves
     }
 
     def step(): Unit = {
-      val port = dut.io.tiles(index)
+      val port       = dut.io.tiles(index)
+      val background = dut.io.backgroundTiles(index)
+      if (background.ready.peekBoolean() && background.valid.peekBoolean())
+        backgrounds :+= (background.bits.x.peekInt().toInt, background.bits.y.peekInt().toInt)
       if (dut.io.aborts.peekBoolean()) left = 0
       else if (left > 0 && !isStuck) left -= 1
       else if (port.ready.peekBoolean() && port.valid.peekBoolean()) {
@@ -47,10 +52,25 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     var running = 0
     var columns = Seq.empty[FakeColumn]
 
-    /** One frame; returns its cycles, or nothing when it does not end within `limit`. */
-    def frame(wide: Int, high: Int, watchdog: Int, stuck: Option[Int] = None, limit: Int = 5000): Option[Int] = {
+    /** One frame; returns its cycles, or nothing when it does not end within `limit`.
+      *
+      * @param rect the object's: x0, y0, x1, y1; the frame unless given
+      */
+    def frame(
+        wide:     Int,
+        high:     Int,
+        watchdog: Int,
+        stuck:    Option[Int] = None,
+        limit:    Int = 5000,
+        rect:     Option[(Int, Int, Int, Int)] = None
+    ): Option[Int] = {
       dut.io.frame.pixelsWide.poke(wide)
       dut.io.frame.pixelsHigh.poke(high)
+      val (x0, y0, x1, y1) = rect.getOrElse((0, 0, wide, high))
+      dut.io.frame.objectRect.x0.poke(x0)
+      dut.io.frame.objectRect.y0.poke(y0)
+      dut.io.frame.objectRect.x1.poke(x1)
+      dut.io.frame.objectRect.y1.poke(y1)
       dut.io.frame.watchdogCycles.poke(watchdog)
       columns = dut.io.tiles.indices.map(new FakeColumn(dut, _, random))
       stuck.foreach(columns(_).isStuck = true)
@@ -76,13 +96,19 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.clock.step()
     }
 
-    def expectTiles(wide: Int, high: Int): Unit = {
-      val expected =
-        Morton.cells((wide + tileSize - 1) / tileSize, (high + tileSize - 1) / tileSize).map { case (x, y) =>
-          (x * tileSize, y * tileSize)
-        }
-      assert(columns.flatMap(_.tiles).sorted == expected.sorted)
-      columns.foreach(column => assert(column.tiles == expected.filter(column.tiles.contains(_)), "Morton order"))
+    def expectTiles(wide: Int, high: Int, isObjects: ((Int, Int)) => Boolean = _ => true): Unit = {
+      val (objects, backgrounds) =
+        Morton
+          .cells((wide + tileSize - 1) / tileSize, (high + tileSize - 1) / tileSize)
+          .map { case (x, y) => (x * tileSize, y * tileSize) }
+          .partition(isObjects)
+      expectDealt(objects, columns.map(_.tiles))
+      expectDealt(backgrounds, columns.map(_.backgrounds))
+    }
+
+    private def expectDealt(expected: Seq[(Int, Int)], dealt: Seq[Seq[(Int, Int)]]): Unit = {
+      assert(dealt.flatten.sorted == expected.sorted)
+      dealt.foreach(tiles => assert(tiles == expected.filter(tiles.contains(_)), "Morton order"))
     }
   }
 
@@ -96,6 +122,21 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.watchdogError.expect(false)
         dut.io.status.busy.expect(false)
         assert(bench.aborts == 0)
+      }
+    }
+  }
+
+  it should "deal tiles that the object's rectangle does not meet to the background" in {
+    test(new FrameController(config)) { dut =>
+      dut.clock.setTimeout(0)
+      val bench = new Bench(dut)
+      for (
+        (x0, y0, x1, y1) <-
+          Seq((8, 8, 16, 16), (9, 7, 10, 8), (0, 0, 0, 0), (15, 40, 17, 48), (63, 0, 64, 48), (5, 5, 5, 9))
+      ) {
+        assert(bench.frame(64, 48, watchdog = 0, rect = Some((x0, y0, x1, y1))).nonEmpty)
+        val pixels = for (x <- x0 until x1; y <- y0 until y1) yield (x / tileSize * tileSize, y / tileSize * tileSize)
+        bench.expectTiles(64, 48, pixels.toSet)
       }
     }
   }
@@ -114,6 +155,8 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     test(new FrameController(config)) { dut =>
       dut.io.frame.pixelsWide.poke(64)
       dut.io.frame.pixelsHigh.poke(64)
+      dut.io.frame.objectRect.x1.poke(64)
+      dut.io.frame.objectRect.y1.poke(64)
       dut.io.tiles.foreach(_.ready.poke(true))
       dut.io.start.poke(true)
       dut.clock.step()

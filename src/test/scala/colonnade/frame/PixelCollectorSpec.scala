@@ -17,7 +17,7 @@ class PixelCollectorProof(config: ColonnadeConfig) extends Module {
   val ready  = IO(Input(Bool()))
   val marks  = IO(Input(Bool()))
 
-  private val collector = Module(new PixelCollector(config))
+  private val collector = Module(new PixelCollector(config, 2))
   private val sources   = collector.io.sources
   private val pixels    = collector.io.pixels
   pixels.ready := ready
@@ -50,19 +50,15 @@ class PixelCollectorProof(config: ColonnadeConfig) extends Module {
 class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
   behavior of "PixelCollector"
 
-  private def withRows(rows: Int) =
-    TestConfigs.tiny.copy(
-      array = TestConfigs.tiny.array.copy(rows = rows),
-      frame = TestConfigs.tiny.frame.copy(hits = false)
-    )
+  private val withoutHits = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(hits = false))
 
   it should "lose and double no pixel" in {
-    prove(cycles = 6)(new PixelCollectorProof(withRows(2)))
+    prove(cycles = 6)(new PixelCollectorProof(withoutHits))
   }
 
-  for (rows <- Seq(1, 10)) {
+  for (rows <- Seq(1, 11)) {
     it should s"join $rows streams at one pixel a cycle" in {
-      test(new PixelCollector(withRows(rows))) { dut =>
+      test(new PixelCollector(withoutHits, rows)) { dut =>
         dut.io.sources.foreach(_.valid.poke(true))
         dut.io.pixels.ready.poke(true)
         dut.io.sources.zipWithIndex.foreach { case (source, row) => source.bits.x.poke(row) }
@@ -78,7 +74,7 @@ class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
 
   it should "carry every bit under random stalls" in {
     val random = new Random(1)
-    test(new PixelCollector(TestConfigs.tiny.copy(array = TestConfigs.tiny.array.copy(rows = 4)))) { dut =>
+    test(new PixelCollector(TestConfigs.tiny, 4)) { dut =>
       val waiting = Array.fill(4)(Seq.fill(50)((random.nextInt(640), random.nextInt(480), random.nextInt(4096))))
       var left    = waiting.flatten.groupBy(identity).view.mapValues(_.length).toMap
       while (left.nonEmpty) {

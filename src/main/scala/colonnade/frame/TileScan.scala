@@ -1,0 +1,47 @@
+package colonnade.frame
+
+import chisel3._
+import chisel3.util.{Decoupled, RegEnable}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.FrameSettings
+import colonnade.unit.PixelPosition
+
+/** Ports of [[TileScan]]. */
+final class TileScanIO(config: ColonnadeConfig) extends Bundle {
+  val frame     = Input(new FrameSettings(config.numbers))
+  val tiles     = Flipped(Decoupled(new Tile(config)))
+  val positions = Decoupled(new PixelPosition(config))
+
+  /** No pixel is left. */
+  val isIdle = Output(Bool())
+}
+
+/** The pixels of a tile, clipped at the frame's edge, in Morton order.
+  *
+  * One pixel a cycle; the next tile is taken when few pixels of this one are left, so that tiles follow each other
+  * without a gap.
+  */
+final class TileScan(config: ColonnadeConfig) extends Module {
+  val io = IO(new TileScanIO(config))
+
+  private val scan = Module(new MortonScan(Tile.pixelLevels(config)))
+  private val tile = RegEnable(io.tiles.bits, io.tiles.fire)
+
+  scan.io.size.valid     := io.tiles.valid
+  scan.io.size.bits.wide := clipped(io.frame.pixelsWide, io.tiles.bits.x)
+  scan.io.size.bits.high := clipped(io.frame.pixelsHigh, io.tiles.bits.y)
+  io.tiles.ready         := scan.io.size.ready
+
+  io.positions.valid  := scan.io.cells.valid
+  io.positions.bits.x := tile.x | scan.io.cells.bits.x
+  io.positions.bits.y := tile.y | scan.io.cells.bits.y
+  scan.io.cells.ready := io.positions.ready
+  io.isIdle           := scan.io.isIdle
+
+  /** Pixels of a tile in one direction. */
+  private def clipped(frame: UInt, first: UInt): UInt = {
+    val size = config.frame.tileSize.U
+    val left = frame - first
+    Mux(left < size, left, size)
+  }
+}
