@@ -147,5 +147,5 @@ def test_no_box_that_a_ray_meets_is_culled(precision: str) -> None:
 @pytest.mark.matrix
 def test_a_million_boxes_and_none_culled_wrongly() -> None:
     culled, met = wrongly_culled(1_000_000, "32b32s64d", seed=2)
-    print(f"{met:,} of 1,000,000 boxes met, {culled} culled wrongly")
     assert culled == 0
+    assert met > 100_000

@@ -205,6 +205,6 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
 object RecordFetch {
 
-  /** Record buffers: two give 94 to 99 % of the throughput of unlimited ones. */
+  /** Records that a render unit can hold or expect at a time. */
   val buffers: Int = 2
 }
