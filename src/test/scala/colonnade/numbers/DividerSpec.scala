@@ -25,7 +25,7 @@ class DividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
     it should s"divide all $mantissaBits-bit mantissas to $digits digits" in {
       val mantissas = BigInt(1) << (mantissaBits - 1) until BigInt(1) << mantissaBits
       val operands  = for (n <- BigInt(0) +: mantissas; d <- mantissas) yield (n, d)
-      test(new Divider(mantissaBits, digits)) { unit =>
+      for (digitsPerCycle <- 1 to 3) test(new Divider(mantissaBits, digits, digitsPerCycle)) { unit =>
         quotients(unit, operands, new Random(1), stalls = 0.2) shouldBe expected(operands, digits)
       }
     }
@@ -38,7 +38,7 @@ class DividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
       val operands =
         (for (n <- BigInt(0) +: extremes; d <- extremes) yield (n, d)) ++
           Seq.fill(150)((top | BigInt(mantissaBits - 1, random), top | BigInt(mantissaBits - 1, random)))
-      test(new Divider(mantissaBits, digits)) { unit =>
+      for (digitsPerCycle <- 1 to 2) test(new Divider(mantissaBits, digits, digitsPerCycle)) { unit =>
         for (stalls <- Seq(0.0, 0.7))
           quotients(unit, operands, random, stalls) shouldBe expected(operands, digits)
       }
