@@ -71,7 +71,8 @@ class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
       assert(times < rows.U, "nobody waits for more than the others")
       times
     }
-    val waitedLongest = passedOver.zip(fires).map { case (times, fire) => fire && times === (rows - 1).U }.reduce(_ || _)
+    val waitedLongest =
+      passedOver.zip(fires).map { case (times, fire) => fire && times === (rows - 1).U }.reduce(_ || _)
 
     // The read that is followed, and how many are before it
     private val follows = RegInit(false.B)

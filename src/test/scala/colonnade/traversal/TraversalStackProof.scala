@@ -45,7 +45,7 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   dut.io.start.valid  := starts
   dut.io.start.bits   := started
   for ((limit, bits) <- dut.io.limits.zip(limits))
-    limit := Fixed(limit.format, (bits(1) ## Fill(limit.format.width - 1, bits(0))).asSInt)
+    limit      := Fixed(limit.format, (bits(1) ## Fill(limit.format.width - 1, bits(0))).asSInt)
   dut.io.clear := false.B
   visit.ready  := ready
 

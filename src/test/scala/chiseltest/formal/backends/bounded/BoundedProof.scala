@@ -33,13 +33,13 @@ private final class BoundedProof(proof: ProofSystem) {
     cycles.search(any(proof.assertions.map(cycles.bit(_, cycle)))) { z3 =>
       val violated = proof.assertions.filter(name => z3.getValue(cycles.bit(name, cycle)).contains(BigInt(1)))
       val file     = writeTrace(violated, cycle, z3, cycles)
-      s"violated in cycle $cycle after the reset: ${violated.map(proof.describe).mkString(", ")}; see $file"
+      s"violated in cycle $cycle after the reset: ${violated.map(proof.describe).mkString(", ")}; see ${file.relativeTo(os.pwd)}"
     }
   }
 
   /** Why the proof says nothing, if it does not. */
   def emptiness(count: Int): Option[String] = {
-    val cycles = new Unrolling(proof.system, count)
+    val cycles                                 = new Unrolling(proof.system, count)
     def isPossible(condition: BVExpr): Boolean = cycles.search(condition)(_ => ()).nonEmpty
 
     if (!isPossible(BVLiteral(1, 1))) Some(s"the assumptions can't be kept for $count cycles")

@@ -32,7 +32,9 @@ private[bounded] object Memories {
 
   private def withoutReads(expression: SMTExpr): SMTExpr = expression match {
     case ArrayRead(memory, index) =>
-      (1 until words(memory)).foldLeft(wordOf(memory, 0))((rest, i) => BVIte(isIndex(index, i), wordOf(memory, i), rest))
+      (1 until words(memory)).foldLeft(wordOf(memory, 0))((rest, i) =>
+        BVIte(isIndex(index, i), wordOf(memory, i), rest)
+      )
     case other => SMTExprMap.mapExpr(other, withoutReads(_: SMTExpr))
   }
 

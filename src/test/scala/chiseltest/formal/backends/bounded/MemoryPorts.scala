@@ -30,7 +30,8 @@ private final class MemoryPorts {
     case memory: DefMemory if memory.readwriters.nonEmpty =>
       memories += memory.name -> memory
       splitMemory(memory)
-    case Connect(_, SubField(SubField(Reference(name, _, _, _), port, _, _), field, _, _), driver) if isSplit(name, port) =>
+    case Connect(_, SubField(SubField(Reference(name, _, _, _), port, _, _), field, _, _), driver)
+        if isSplit(name, port) =>
       drivers += (name, port, field) -> onExpression(driver)
       EmptyStmt
     case other => other.mapStmt(onStatement).mapExpr(onExpression)
@@ -59,8 +60,8 @@ private final class MemoryPorts {
     } yield Connect(NoInfo, field, value)
 
   private def fields(memory: DefMemory, port: String): Seq[(Expression, Expression)] = {
-    def was(field:   String): Expression = drivers((memory.name, port, field))
-    def reads(field: String): Expression = memPortField(splitMemory(memory), reader(port), field)
+    def was(field:    String): Expression = drivers((memory.name, port, field))
+    def reads(field:  String): Expression = memPortField(splitMemory(memory), reader(port), field)
     def writes(field: String): Expression = memPortField(splitMemory(memory), writer(port), field)
     def bit(operation: PrimOp, operands: Expression*): Expression =
       DoPrim(operation, operands, Seq(), UIntType(IntWidth(1)))

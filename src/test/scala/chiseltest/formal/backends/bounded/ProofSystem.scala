@@ -42,8 +42,8 @@ private[bounded] object ProofSystem {
     val asserting       = low.circuit.mapModule { module =>
       MemoryPorts.split(module).mapStmt(withoutCovers(_, covers, texts))
     }
-    val system          = Memories.toRegisters(flatten(CircuitState(asserting, low.annotations)))
-    val bad             = system.signals.filter(_.lbl == IsBad).map(_.name)
+    val system = Memories.toRegisters(flatten(CircuitState(asserting, low.annotations)))
+    val bad    = system.signals.filter(_.lbl == IsBad).map(_.name)
     ProofSystem(
       system,
       Compiler.requireTargetDir(low.annotations),

@@ -28,7 +28,8 @@ private[bounded] final class Unrolling(system: TransitionSystem, cycles: Int) {
   }
 
   private def tell(z3: SolverContext, cycle: Int): Unit = {
-    def equate(symbol: BVSymbol, value: SMTExpr): Unit = z3.assert(BVEqual(at(symbol, cycle), value.asInstanceOf[BVExpr]))
+    def equate(symbol: BVSymbol, value: SMTExpr): Unit =
+      z3.assert(BVEqual(at(symbol, cycle), value.asInstanceOf[BVExpr]))
 
     (system.inputs ++ registers ++ signals.keys).foreach(s => z3.runCommand(DeclareFunction(at(s, cycle), Seq())))
     for ((register, state) <- registers.zip(system.states)) {
