@@ -1,19 +1,21 @@
 package colonnade
 
 import chisel3.Module
-import chiseltest.formal._
-import chiseltest.{ChiselScalatestTester, HasTestName}
+import chiseltest.HasTestName
+import chiseltest.formal.backends.bounded.BoundedProof
 import org.scalatest.TestSuite
 
 import scala.util.Try
 
 /** Bounded model checks; a spec is cancelled where z3 is missing. */
-trait Proofs extends Formal { this: TestSuite with ChiselScalatestTester with HasTestName =>
+trait Proofs { this: TestSuite with HasTestName =>
 
-  /** Holds the module's assertions for all inputs of the first `cycles` cycles after a reset. */
+  /** Holds the module's assertions for all inputs of the first `cycles` cycles after a reset that keep its assumptions.
+    * Fails also where the proof says nothing: where assumptions contradict one another, or a `cover` can't happen.
+    */
   def prove(cycles: Int)(module: => Module): Unit = {
     assume(Proofs.hasZ3, "z3 is not installed")
-    verify(module, Seq(BoundedCheck(cycles), Z3EngineAnnotation))
+    BoundedProof.objection(() => module, cycles, s"test_run_dir/$getTestName").foreach(fail(_))
   }
 }
 

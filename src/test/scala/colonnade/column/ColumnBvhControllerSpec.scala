@@ -39,8 +39,8 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
     columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(depth = depth, banks = banks, readLatency = latency)
   )
 
-  it should "lose and double no read of a bank" in {
-    prove(cycles = 5)(new BankReaderProof(config(rows = 2, banks = 1, latency = 1, depth = 16)))
+  it should "lose and double no read, and starve no row, whenever two banks answer" in {
+    prove(cycles = 8)(new ColumnBvhControllerProof(config(rows = 3, banks = 2, latency = 1, depth = 16)))
   }
 
   private def load(dut: ControllerAndMemory, records: Seq[BigInt]): Unit = {

@@ -45,6 +45,10 @@ class PixelCollectorProof(config: ColonnadeConfig) extends Module {
     follows := ahead =/= 0.U
   }
   assert(!follows || ahead =/= 0.U || pixels.bits.x === x, "the pixel that was accepted")
+
+  private val waited = RegNext(follows && pixels.fire, false.B) && follows
+  cover(waited && pixels.fire && ahead === 0.U && x === 15.U, "a pixel leaves after another")
+  cover(held === 2.U && offers.reduce(_ && _), "both sources wait")
 }
 
 class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
@@ -53,7 +57,7 @@ class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
   private val withoutHits = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(hits = false))
 
   it should "lose and double no pixel" in {
-    prove(cycles = 6)(new PixelCollectorProof(withoutHits))
+    prove(cycles = 10)(new PixelCollectorProof(withoutHits))
   }
 
   for (rows <- Seq(1, 11)) {

@@ -2,15 +2,15 @@ package colonnade.traversal
 
 import chisel3._
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
 import colonnade.traversal.StackReference.Child
+import colonnade.{Proofs, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.collection.mutable
 import scala.util.Random
 
-class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester {
+class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
   private def config(arity: Int, stackDepth: Int, contexts: Int): ColonnadeConfig = TestConfigs.tiny.copy(
     array = TestConfigs.tiny.array.copy(contexts = contexts),
     geometry = TestConfigs.tiny.geometry.copy(arity = arity),
@@ -26,6 +26,19 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester {
         for ((accepted, seed) <- Seq((1.0, 1), (0.4, 2))) {
           new StackDriver(dut, shape, seed).run(operations = 400, accepted)
         }
+      }
+    }
+
+  for ((arity, cycles) <- Seq((2, 14), (4, 12)))
+    it should s"lose, double and mix up no entry, and cull only those beyond the limit, arity $arity" in {
+      val shape = config(arity, stackDepth = 4, contexts = 2)
+      prove(cycles) {
+        new TraversalStackProof(
+          shape.copy(
+            geometry = shape.geometry.copy(vertexBits = 10),
+            columnBvhMemory = shape.columnBvhMemory.copy(depth = 16)
+          )
+        )
       }
     }
 

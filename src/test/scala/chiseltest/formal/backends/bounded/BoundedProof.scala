@@ -1,0 +1,69 @@
+package chiseltest.formal.backends.bounded
+
+import chisel3.Module
+import chiseltest.formal.backends.smt.SolverContext
+import chiseltest.formal.backends.{TransitionSystemSimulator, Witness}
+import firrtl2.backends.experimental.smt._
+
+/** Checks a module by z3 in the cycles that follow one cycle of reset. Lies in chiseltest's package, whose parts are
+  * private to it. Its own `verify` does not get through larger modules, passes where assumptions contradict one
+  * another, and knows no covers.
+  */
+object BoundedProof {
+
+  /** Nothing where the module's assertions hold in `cycles` cycles, its assumptions can be kept in all of them and each
+    * of its covers happens; otherwise what is wrong.
+    */
+  def objection(module: () => Module, cycles: Int, directory: String): Option[String] = {
+    val proof = new BoundedProof(ProofSystem(module, directory))
+    proof.violation(cycles).orElse(proof.emptiness(cycles)).map(objection => s"${proof.name}: $objection")
+  }
+}
+
+private final class BoundedProof(proof: ProofSystem) {
+  val name: String = proof.system.name
+
+  /** The earliest violation. */
+  def violation(cycles: Int): Option[String] =
+    if (proof.assertions.isEmpty) Some("nothing is asserted")
+    else LazyList.range(1, cycles + 1).flatMap(violationIn).headOption
+
+  private def violationIn(cycle: Int): Option[String] = {
+    val cycles = new Unrolling(proof.system, cycle)
+    cycles.search(any(proof.assertions.map(cycles.bit(_, cycle)))) { z3 =>
+      val violated = proof.assertions.filter(name => z3.getValue(cycles.bit(name, cycle)).contains(BigInt(1)))
+      val file     = writeTrace(violated, cycle, z3, cycles)
+      s"violated in cycle $cycle after the reset: ${violated.map(proof.describe).mkString(", ")}; see ${file.relativeTo(os.pwd)}"
+    }
+  }
+
+  /** Why the proof says nothing, if it does not. */
+  def emptiness(count: Int): Option[String] = {
+    val cycles                                 = new Unrolling(proof.system, count)
+    def isPossible(condition: BVExpr): Boolean = cycles.search(condition)(_ => ()).nonEmpty
+
+    if (!isPossible(BVLiteral(1, 1))) Some(s"the assumptions can't be kept for $count cycles")
+    else
+      proof.covers
+        .find(cover => !isPossible(any((1 to count).map(cycles.bit(cover, _)))))
+        .map(cover => s"can't happen within $count cycles: ${proof.describe(cover)}")
+  }
+
+  private def any(bits: Seq[BVExpr]): BVExpr = bits.reduce(BVOr(_, _))
+
+  /** All signals up to the violation, as a waveform. */
+  private def writeTrace(violated: Seq[String], cycle: Int, z3: SolverContext, cycles: Unrolling): os.Path = {
+    def values(symbols: Seq[SMTSymbol], cycle: Int): Map[Int, BigInt] =
+      symbols.zipWithIndex.flatMap { case (symbol, i) =>
+        z3.getValue(cycles.at(symbol.asInstanceOf[BVSymbol], cycle)).map(i -> _)
+      }.toMap
+
+    val file   = proof.directory / s"$name.vcd"
+    val inputs = (0 to cycle).map(values(proof.system.inputs, _))
+    new TransitionSystemSimulator(proof.system).run(
+      Witness(violated, values(proof.system.states.map(_.sym), 0), Map.empty, inputs),
+      vcdFileName = Some(file.toString)
+    )
+    file
+  }
+}

@@ -1,0 +1,174 @@
+package colonnade.traversal
+
+import chisel3._
+import chisel3.util.{log2Ceil, Fill, PriorityEncoder, RegEnable}
+import colonnade.config.ColonnadeConfig
+import colonnade.numbers.Fixed
+
+/** Offers results and resumptions of all contexts, starts, limits and stalls as freely as the stack's contract lets
+  * them come, and compares the answers of one context, whichever it is, with a plain stack. An address is all zeros or
+  * all ones, chosen for each child, and so are nears, and limits but for their sign: which entry an answer is can be
+  * told by these bits, for any two entries may differ in them.
+  */
+private[traversal] final class TraversalStackProof(config: ColonnadeConfig) extends Module {
+  private val arity      = config.geometry.arity
+  private val contexts   = config.array.contexts
+  private val stackDepth = config.columnBvhMemory.stackDepth
+  require(contexts == 2)
+
+  val finds    = IO(Input(Bool()))
+  val found    = IO(Input(new FoundChildren(arity)))
+  val resumes  = IO(Input(Bool()))
+  val resumed  = IO(Input(UInt(1.W)))
+  val starts   = IO(Input(Bool()))
+  val started  = IO(Input(UInt(1.W)))
+  val limits   = IO(Input(Vec(contexts, UInt(2.W))))
+  val ready    = IO(Input(Bool()))
+  val followed = IO(Input(UInt(1.W)))
+
+  private val dut     = Module(new TraversalStack(config))
+  private val visit   = dut.io.visits
+  private val accepts = dut.io.results.fire || dut.io.resume.fire
+
+  // Drive the stack
+  dut.io.results.valid        := finds
+  dut.io.results.bits         := 0.U.asTypeOf(dut.io.results.bits)
+  dut.io.results.bits.context := found.context
+  dut.io.results.bits.count   := found.count
+  for ((child, i) <- dut.io.results.bits.children.zipWithIndex) {
+    child.visit.isLeaf  := (i == 0).B // only the nearest, which is not pushed
+    child.visit.address := Fill(child.visit.address.getWidth, found.marks(i))
+    child.near          := Fixed(child.near.format, Fill(child.near.format.width - 1, found.isFar(i)).zext)
+  }
+  dut.io.resume.valid := resumes
+  dut.io.resume.bits  := resumed
+  dut.io.start.valid  := starts
+  dut.io.start.bits   := started
+  for ((limit, bits) <- dut.io.limits.zip(limits))
+    limit      := Fixed(limit.format, (bits(1) ## Fill(limit.format.width - 1, bits(0))).asSInt)
+  dut.io.clear := false.B
+  visit.ready  := ready
+
+  // The contract: one operation of a context at a time, a result that waits stays, a start when nothing is under way
+  private val underWay = RegInit(VecInit.fill(contexts)(false.B))
+  private val stays    = RegNext(finds && !dut.io.results.ready, false.B)
+  assume(found.count <= arity.U)
+  assume(!finds || !underWay(found.context))
+  assume(!resumes || !(underWay(resumed) || (finds && found.context === resumed)))
+  assume(!starts || !(underWay(started) || (finds && found.context === started) || (resumes && resumed === started)))
+  assume(!stays || (finds && found.asUInt === RegNext(found.asUInt)))
+  when(visit.fire) { underWay(visit.bits.context) := false.B }
+  when(dut.io.results.fire) { underWay(found.context) := true.B }
+  when(dut.io.resume.fire) { underWay(resumed) := true.B }
+
+  assert(!(dut.io.results.fire && dut.io.resume.fire), "one operation at a time")
+  assert(!visit.valid || underWay(visit.bits.context), "no visit that nobody asked for")
+  assert(!underWay.reduce(_ || _) || dut.io.busy, "busy while something is under way")
+
+  // The stack of the context that is followed, as it should be: newest first
+  private val isFirst  = RegNext(false.B, true.B)
+  private val context  = Mux(isFirst, followed, RegEnable(followed, isFirst))
+  private val entries  = RegInit(VecInit.fill(stackDepth)(0.U.asTypeOf(new ProofEntry)))
+  private val level    = RegInit(0.U(log2Ceil(stackDepth + 1).W))
+  private val isFound  = dut.io.results.fire && found.context === context
+  private val pops     = (isFound && found.count === 0.U) || (dut.io.resume.fire && resumed === context)
+  private val limit    = limits(context)
+  private val isCulled = entries.map(_.isBeyond(limit))
+  private val counts   = VecInit(isCulled.zipWithIndex.map { case (culled, i) => i.U < level && !culled })
+  private val isEmpty  = !counts.asUInt.orR
+  private val drops    = PriorityEncoder(counts)
+
+  // Push the children but the nearest, far first
+  private val pushed = (1 until arity).reverse.foldLeft(Pushed(entries, level, 0.U)) { case (before, i) =>
+    val isPushed = found.count > i.U
+    val isFull   = before.level === stackDepth.U
+    val goesOn   = isPushed && !isFull
+    val after    = ProofEntry(found.marks(i), found.isFar(i)) +: before.entries.init
+    Pushed(
+      VecInit(before.entries.zip(after).map { case (old, young) => Mux(goesOn, young, old) }),
+      before.level + goesOn,
+      before.lost +& (isPushed && isFull)
+    )
+  }
+  when(pops) {
+    level := Mux(isEmpty, 0.U, level - drops - 1.U)
+    for ((entry, i) <- entries.zipWithIndex)
+      entry := VecInit((1 to stackDepth).map(n => entries((i + n).min(stackDepth - 1))))(drops)
+  }.elsewhen(isFound) {
+    level   := pushed.level
+    entries := pushed.entries
+  }.elsewhen(starts && started === context) {
+    level := 0.U
+  }
+
+  // Overflows of a result
+  private val overflows = RegInit(0.U(log2Ceil(arity).W))
+  overflows := Mux(dut.io.results.fire, 0.U, overflows + dut.io.overflow)
+  assert(!dut.io.overflow || finds, "an overflow of nothing")
+  assert(
+    !isFound || overflows +& dut.io.overflow === Mux(pops, 0.U, pushed.lost),
+    "an overflow for each entry that does not fit, and for no other"
+  )
+
+  // The answer
+  private val isDone   = RegEnable(pops && isEmpty, isFound || pops)
+  private val isPopped = RegEnable(pops, isFound || pops)
+  private val mark     = RegEnable(Mux(pops, entries(drops).mark, found.marks(0)), isFound || pops)
+  private val answers  = visit.fire && visit.bits.context === context
+  when(answers) {
+    assert(visit.bits.isDone === isDone, "done when nothing within the limit is left")
+    assert(isDone || visit.bits.visit.isLeaf === !isPopped, "the nearest child, or else an entry")
+    assert(isDone || visit.bits.visit.address === Fill(visit.bits.visit.address.getWidth, mark), "the right entry")
+  }
+
+  // While visits are taken, neither an operation nor its answer waits for long, and offers take turns
+  private val unanswered = RegInit(0.U(4.W))
+  private val refused    = RegInit(0.U(4.W))
+  unanswered := Mux(underWay(context) && !answers, unanswered + ready, 0.U)
+  refused    := Mux(accepts || !(finds || resumes), 0.U, refused + ready)
+  assert(unanswered <= (stackDepth + 2).U, "a visit soon after each operation")
+  assert(refused <= (stackDepth + 2).U, "operations are accepted")
+  for ((one, other) <- Seq(dut.io.results -> dut.io.resume, dut.io.resume -> dut.io.results)) {
+    val isPassedOver = RegInit(false.B)
+    isPassedOver := one.valid && !one.ready && (isPassedOver || other.fire)
+    assert(!(isPassedOver && one.valid && other.fire), "operations take turns")
+  }
+
+  // What has to happen for this to say something; with two children an overflow takes too many cycles
+  private val wasFull = RegInit(false.B)
+  private val ended   = RegEnable(level =/= 0.U, isFound || pops)
+  private val culled  = RegEnable(drops, isFound || pops)
+  when(isFound && !pops && pushed.lost =/= 0.U) { wasFull := true.B }
+  cover(answers && isPopped && !isDone && culled > 1.U, "an entry below two that are culled")
+  cover(answers && isPopped && isDone && ended, "all entries are culled")
+  cover(underWay.reduce(_ && _) && visit.valid && RegNext(visit.valid && !ready, false.B), "both contexts wait")
+  if (arity > 2) cover(answers && isPopped && !isDone && wasFull, "an entry after an overflow")
+}
+
+/** A result in the proof: bit i belongs to child i. */
+private[traversal] final class FoundChildren(arity: Int) extends Bundle {
+  val context = UInt(1.W)
+  val count   = UInt(log2Ceil(arity + 1).W)
+  val marks   = UInt(arity.W)
+  val isFar   = UInt(arity.W)
+}
+
+private final class ProofEntry extends Bundle {
+  val mark  = Bool()
+  val isFar = Bool()
+
+  /** Near is 0 or the largest; bit 1 of the limit is its sign, bit 0 all its others. */
+  def isBeyond(limit: UInt): Bool = limit(1) || (isFar && !limit(0))
+}
+
+private object ProofEntry {
+  def apply(mark: Bool, isFar: Bool): ProofEntry = {
+    val entry = Wire(new ProofEntry)
+    entry.mark  := mark
+    entry.isFar := isFar
+    entry
+  }
+}
+
+/** After some pushes. */
+private final case class Pushed(entries: Vec[ProofEntry], level: UInt, lost: UInt)
