@@ -32,8 +32,8 @@ private final class BoundedProof(proof: ProofSystem) {
     val cycles = new Unrolling(proof.system, cycle)
     cycles.search(any(proof.assertions.map(cycles.bit(_, cycle)))) { z3 =>
       val violated = proof.assertions.filter(name => z3.getValue(cycles.bit(name, cycle)).contains(BigInt(1)))
-      val file     = writeTrace(cycle, z3, cycles)
-      s"violated in cycle $cycle after the reset: ${violated.map(proof.describe).mkString(", ")}; see ${file.relativeTo(os.pwd)}"
+      val trace    = writeTrace(cycle, z3, cycles).relativeTo(os.pwd)
+      s"violated in cycle $cycle after the reset: ${violated.map(proof.describe).mkString(", ")}; see $trace"
     }
   }
 
