@@ -9,9 +9,10 @@ lazy val colonnade = (project in file("."))
   .settings(
     name := "colonnade",
     libraryDependencies ++= Seq(
-      "org.chipsalliance" %% "chisel"     % chiselVersion,
-      "com.lihaoyi"       %% "upickle"    % "3.1.0",
-      "edu.berkeley.cs"   %% "chiseltest" % "6.0.0" % Test
+      "org.chipsalliance" %% "chisel"          % chiselVersion,
+      "com.lihaoyi"       %% "upickle"         % "3.1.0",
+      "edu.berkeley.cs"   %% "chiseltest"      % "6.0.0"    % Test,
+      "org.scalatestplus" %% "scalacheck-1-17" % "3.2.17.0" % Test // for chiseltest's scalatest
     ),
     addCompilerPlugin("org.chipsalliance" % "chisel-plugin" % chiselVersion cross CrossVersion.full),
     scalacOptions ++= Seq(

@@ -9,6 +9,7 @@ import itertools
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import ConvexHull, QhullError
 
 from colonnade.errors import UserError
 from colonnade.image import ImageHeader
@@ -50,7 +51,7 @@ def registers_of(view: FloatPlacement, header: ImageHeader, manifest: Manifest) 
     registers |= _positions(view, header, manifest)
     registers |= _directions(view, manifest)
     registers |= _bounds(header)
-    registers |= _object_rectangle(view, registers, manifest)
+    registers |= _where_the_object_is(view, registers, manifest)
     registers |= _shading(view, header, manifest)
     # No frame that makes progress takes longer: every ray, and its shadow ray, reads every record.
     cycles = 1_000_000 + 2 * view.width * view.height * WATCHDOG_CYCLES_PER_RECORD * header.record_count
@@ -112,10 +113,33 @@ def _bounds(header: ImageHeader) -> dict[str, int]:
     }
 
 
-def _object_rectangle(view: FloatPlacement, registers: dict[str, int], manifest: Manifest) -> dict[str, int]:
+def _where_the_object_is(view: FloatPlacement, registers: dict[str, int], manifest: Manifest) -> dict[str, int]:
     """The pixels whose rays may meet the object: its box, padded as the hardware pads it, projected by the registers.
 
     A box that reaches behind the camera takes the whole frame, one that is wholly behind it nothing.
+    """
+    pixels, depth = _projected_corners(registers, manifest)
+    if (depth > 1e-6).all():
+        rectangle, outline = _rectangle(pixels, view.width, view.height), _outline(pixels, manifest)
+    else:
+        rectangle, outline = [0, 0, view.width, view.height], []
+        if (depth < -1e-6).all():
+            rectangle = [0, 0, 0, 0]
+    names = ("x0", "y0", "x1", "y1")
+    result = {f"frame.objectRect.{name}": value for name, value in zip(names, rectangle, strict=True)}
+    edges = sum(name.startswith("frame.objectOutline[") and name.endswith("].x") for name in manifest.registers)
+    for index in range(edges):
+        x, y, offset = outline[index] if index < len(outline) else (0, 0, 0)
+        result |= {f"frame.objectOutline[{index}].{name}": v for name, v in (("x", x), ("y", y), ("offset", offset))}
+    return result
+
+
+def _projected_corners(registers: dict[str, int], manifest: Manifest) -> tuple[Floats, Floats]:
+    """Where the object's padded box lies in the picture.
+
+    Returns:
+        Pixel coordinates float64 [8, 2] of its corners, and their relative depths float64 [8], negative behind the
+        camera; pixels mean nothing where a depth is not positive.
     """
 
     def vector(name: str) -> Floats:
@@ -131,18 +155,38 @@ def _object_rectangle(view: FloatPlacement, registers: dict[str, int], manifest:
     # A corner is met at origin + depth · (first + x · stepX + y · stepY).
     basis = np.stack([vector("camera.stepX"), vector("camera.stepY"), first], axis=1)
     solved = np.linalg.solve(basis / np.abs(first).max(), (corners - origin).T)
-    depth = solved[2] / np.abs(corners - origin).max()
-    rectangle = [0, 0, view.width, view.height]
-    if (depth < -1e-6).all():
-        rectangle = [0, 0, 0, 0]
-    elif (depth > 1e-6).all():
-        x, y = solved[0] / solved[2], solved[1] / solved[2]
-        limits = (view.width, view.height)
-        least = [int(np.clip(np.floor(v.min()) - 1, 0, most)) for v, most in zip((x, y), limits, strict=True)]
-        greatest = [int(np.clip(np.ceil(v.max()) + 2, 0, most)) for v, most in zip((x, y), limits, strict=True)]
-        empty = least[0] >= greatest[0] or least[1] >= greatest[1]
-        rectangle = [0, 0, 0, 0] if empty else least + greatest
-    return {f"frame.objectRect.{name}": value for name, value in zip(("x0", "y0", "x1", "y1"), rectangle, strict=True)}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (solved[:2] / solved[2]).T, solved[2] / np.abs(corners - origin).max()
+
+
+def _rectangle(pixels: Floats, width: int, height: int) -> list[int]:
+    """Rectangle x0, y0, x1, y1 (exclusive) in the frame around points, a pixel wider; zeros when it is empty."""
+    limits = (width, height)
+    least = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, limits)
+    greatest = np.clip(np.ceil(pixels.max(axis=0)) + 2, 0, limits)
+    if (least >= greatest).any():
+        return [0, 0, 0, 0]
+    return [int(value) for value in (*least, *greatest)]
+
+
+def _outline(pixels: Floats, manifest: Manifest) -> list[tuple[int, int, int]]:
+    """Half-planes x, y, offset around points, a pixel wider: the edges of their convex hull.
+
+    Only the edges' directions are rounded: each offset is the least that holds all points, so the outline is never too
+    narrow. Points that lie on a line have none.
+    """
+    try:
+        hull = ConvexHull(pixels)
+    except QhullError:
+        return []
+    most_normal = (1 << (manifest.registers["frame.objectOutline[0].x"].width - 1)) - 1
+    most_offset = (1 << (manifest.registers["frame.objectOutline[0].offset"].width - 1)) - 1
+    longest = np.argsort(-np.linalg.norm(np.diff(pixels[hull.simplices], axis=1)[:, 0], axis=1), kind="stable")
+    edges = []
+    for normal in np.rint(-hull.equations[longest, :2] * most_normal):
+        offset = np.ceil(most_normal - (pixels @ normal).min())
+        edges.append((int(normal[0]), int(normal[1]), int(np.clip(offset, -most_offset, most_offset))))
+    return edges
 
 
 def _shading(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:

@@ -8,8 +8,15 @@
 //   limit  t                                              -> limitUnits
 //   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] light[3] colour[3] ambient[3] albedo[3] offset flat shadows
 //                                                         -> lit[3] ambient[3] needsShadowRay origin[3] toLight[3]
+//
+// Whole pixels; the first three lines have no answer, and set the scene in this order:
+//   layout record name=offset,width,signed ...              (once for each kind of record)
+//   records triangleBase attributeBase hexadecimal ...
+//   registers name=value ...
+//   pixel  x y                                            -> colour[3] isObject triangle distance
 #include <algorithm>
 #include <iostream>
+#include <optional>
 #include <sstream>
 
 #include "model/frame.hpp"
@@ -164,6 +171,53 @@ std::map<std::string, std::int64_t> readNumbers(std::istream& words) {
     return values;
 }
 
+/// A device with a scene in it.
+class Scene {
+public:
+    explicit Scene(const Numbers& numbers) : numbers_(numbers) {}
+
+    void readLayout(std::istream& words) {
+        std::string record;
+        words >> record;
+        for (std::string field; words >> field;) {
+            const auto equals = field.find('=');
+            std::istringstream place(field.substr(equals + 1));
+            char comma;
+            Field& read = layouts_[record][field.substr(0, equals)];
+            place >> read.offset >> comma >> read.width >> comma >> read.isSigned;
+        }
+    }
+
+    void readRecords(std::istream& words) {
+        std::size_t triangleBase, attributeBase, count = 0;
+        words >> triangleBase >> attributeBase;
+        std::vector<std::uint8_t> bytes;
+        for (std::string digits; words >> digits; ++count)
+            for (std::size_t end = digits.size(); end > 0; end -= 2) bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
+        if (count == 0) throw std::invalid_argument("a scene without records");
+        device_.emplace(numbers_, layouts_);
+        device_->load(bytes.data(), count, bytes.size() / count, triangleBase, attributeBase);
+    }
+
+    Device& device() {
+        if (!device_) throw std::invalid_argument("there is no scene yet");
+        return *device_;
+    }
+
+private:
+    Numbers numbers_;
+    std::map<std::string, Layout> layouts_;
+    std::optional<Device> device_;
+};
+
+void answerPixel(Question& ask, Device& device) {
+    const std::int64_t x = ask.number(), y = ask.number();
+    const Pixel pixel = device.render(x, y);
+    Answer answer;
+    answer.all(pixel.colour) << pixel.isObject << pixel.triangle << pixel.distance;
+    answer.print();
+}
+
 } // namespace
 
 int main() try {
@@ -172,6 +226,7 @@ int main() try {
     std::istringstream first(line);
     first >> kind;
     const Numbers numbers(readNumbers(first));
+    Scene scene(numbers);
     while (std::getline(std::cin, line)) {
         std::istringstream words(line);
         words >> kind;
@@ -180,6 +235,10 @@ int main() try {
         else if (kind == "box") answerBox(ask, numbers);
         else if (kind == "triangle") answerTriangle(ask, numbers);
         else if (kind == "shade") answerShade(ask, numbers);
+        else if (kind == "layout") scene.readLayout(words);
+        else if (kind == "records") scene.readRecords(words);
+        else if (kind == "registers") scene.device().start(readNumbers(words));
+        else if (kind == "pixel") answerPixel(ask, scene.device());
         else if (kind == "limit") (Answer() << limitUnits(ask.number(), numbers)).print();
         else throw std::invalid_argument("unknown question '" + kind + "'");
     }

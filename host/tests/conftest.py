@@ -103,6 +103,9 @@ def _placed(fields: FieldList) -> list[dict[str, Any]]:
 def _registers(vertex: int, mac: int, address: int, coordinate: int) -> list[dict[str, Any]]:
     fields: FieldList = [(f"frame.{n}", coordinate, False) for n in ("width", "height")]
     fields += [(f"frame.objectRect.{n}", coordinate, False) for n in ("x0", "y0", "x1", "y1")]
+    for edge in range(6):
+        fields += [(f"frame.objectOutline[{edge}].{n}", 12, True) for n in ("x", "y")]
+        fields += [(f"frame.objectOutline[{edge}].offset", coordinate + 13, True)]
     fields += [("frame.unitShift", 6, False), ("frame.watchdogCycles", 32, False)]
     for name in ("position", "direction", "stepX", "stepY"):
         fields += _vector(f"camera.{name}", mac, True)

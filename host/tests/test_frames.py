@@ -77,7 +77,8 @@ def test_single_rays_through_the_hardware_slip_through_no_edge() -> None:
         view = {"camera.position": origin, "camera.direction": vertex - origin}
         settings = {f"{name}.{axis}": int(value[a]) for name, value in view.items() for a, axis in enumerate("xyz")}
         rectangle = {f"frame.objectRect.{edge}": int(edge[1] == "1") for edge in ("x0", "y0", "x1", "y1")}
-        registers.append({**base, **settings, **rectangle, "frame.unitShift": 0, "camera.stepShift": 0})
+        outline = {name: 0 for name in base if name.startswith("frame.objectOutline")}
+        registers.append({**base, **settings, **rectangle, **outline, "frame.unitShift": 0, "camera.stepShift": 0})
     frames = render_rtl(design, image, registers).frames
     assert all(frame.is_object[0, 0] for frame in frames)
 

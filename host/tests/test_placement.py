@@ -111,7 +111,7 @@ def test_the_light_is_relative_to_cube_and_camera() -> None:
     fov=st.floats(5, 140),
     mac=st.sampled_from([16, 32]),
 )
-def test_no_vertex_is_seen_outside_the_rectangle(
+def test_no_vertex_is_seen_outside_rectangle_and_outline(
     make_manifest: MakeManifest,
     position: tuple[float, float, float],
     target: tuple[float, float, float],
@@ -139,6 +139,9 @@ def test_no_vertex_is_seen_outside_the_rectangle(
     assert (x[seen] >= x0 - 0.5).all() and (x[seen] <= x1 - 0.5).all()
     assert (y[seen] >= y0 - 0.5).all() and (y[seen] <= y1 - 0.5).all()
     assert 0 <= x0 <= x1 <= 160 and 0 <= y0 <= y1 <= 120
+    for edge in range(6):
+        a, b, offset = (registers[f"frame.objectOutline[{edge}].{name}"] for name in ("x", "y", "offset"))
+        assert (a * np.clip(x[seen], 0, 159) + b * np.clip(y[seen], 0, 119) + offset >= 0).all()
 
 
 def rectangle(registers: dict[str, int]) -> tuple[int, ...]:

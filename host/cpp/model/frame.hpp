@@ -24,10 +24,16 @@ struct Pixel {
 /// Register values by their flattened names.
 using Registers = std::map<std::string, std::int64_t>;
 
+/// The pixels with x · px + y · py + offset ≥ 0.
+struct HalfPlane {
+    std::int64_t x, y, offset;
+};
+
 /// The frame registers, decoded.
 struct Frame {
     std::int64_t width, height;
     std::array<std::int64_t, 4> objectRectangle;
+    std::vector<HalfPlane> objectOutline;
     WideVector cameraPosition;
     Vector cameraDirection, stepX, stepY;
     int stepShift;
@@ -51,6 +57,10 @@ struct Frame {
         width = take("frame.width");
         height = take("frame.height");
         objectRectangle = {take("frame.objectRect.x0"), take("frame.objectRect.y0"), take("frame.objectRect.x1"), take("frame.objectRect.y1")};
+        for (int i = 0; registers.count("frame.objectOutline[" + std::to_string(i) + "].x"); ++i) {
+            const std::string edge = "frame.objectOutline[" + std::to_string(i) + "].";
+            objectOutline.push_back({take(edge + "x"), take(edge + "y"), take(edge + "offset")});
+        }
         cameraPosition = position("camera.position");
         cameraDirection = vector("camera.direction");
         stepX = vector("camera.stepX");
@@ -70,6 +80,12 @@ struct Frame {
         triangleBase = static_cast<std::size_t>(take("scene.triangleBase"));
         triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));
         attributeBase = static_cast<std::size_t>(take("scene.attributeBase"));
+    }
+
+    bool maySeeObject(std::int64_t px, std::int64_t py) const {
+        const auto& rectangle = objectRectangle;
+        if (px < rectangle[0] || px >= rectangle[2] || py < rectangle[1] || py >= rectangle[3]) return false;
+        return std::all_of(objectOutline.begin(), objectOutline.end(), [&](const HalfPlane& edge) { return edge.x * px + edge.y * py + edge.offset >= 0; });
     }
 };
 
@@ -110,8 +126,7 @@ public:
     Pixel render(std::int64_t x, std::int64_t y) {
         Pixel pixel{frame_.lighting.background, false, 0, 0};
         ++counters.raysPrimary;
-        const auto& rectangle = frame_.objectRectangle;
-        if (x < rectangle[0] || x >= rectangle[2] || y < rectangle[1] || y >= rectangle[3]) return pixel;
+        if (!frame_.maySeeObject(x, y)) return pixel;
         const Ray ray = setUp(primaryRay(x, y), frame_.bounds, numbers_);
         const Hit hit = trace(ray, false);
         if (!hit.found) return pixel;

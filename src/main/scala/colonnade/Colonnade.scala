@@ -18,6 +18,11 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   /** One stream for each column, in no particular order; all pixels of a frame come once. */
   val pixels = Vec(config.array.columns, Decoupled(new Pixel(config)))
 
+  /** Only of a holdable memory: which banks wait, one bit for each, column by column. For verification. */
+  val memoryHolds =
+    if (config.columnBvhMemory.holdable) Some(Input(UInt((config.array.columns * config.columnBvhMemory.banks).W)))
+    else None
+
   /** The frame is complete; falls with the next start. */
   val done = Output(Bool())
 }
@@ -57,6 +62,9 @@ final class Colonnade(
     column.io.tiles <> controller.io.tiles(index)
     column.io.backgroundTiles <> controller.io.backgroundTiles(index)
     io.pixels(index) <> column.io.pixels
+    for (columnHolds <- column.io.holds; holds <- io.memoryHolds) {
+      columnHolds := holds >> (index * config.columnBvhMemory.banks)
+    }
     controller.io.progress(index) := column.io.progress
     counters.io.events(index)     := column.io.events
   }

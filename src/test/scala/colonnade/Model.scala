@@ -5,6 +5,7 @@ import java.nio.file.{Files, Path, Paths, StandardCopyOption}
 import java.security.MessageDigest
 
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.{Layout, RecordFormats}
 
 import scala.jdk.CollectionConverters._
 import scala.sys.process._
@@ -13,12 +14,47 @@ import scala.sys.process._
 object Model {
 
   /** Answers to questions in the form that vectors.cpp documents. */
-  def answers(config: ColonnadeConfig, questions: Seq[Seq[BigInt]], kind: String): Seq[Seq[BigInt]] = {
+  def answers(config: ColonnadeConfig, questions: Seq[Seq[BigInt]], kind: String): Seq[Seq[BigInt]] =
+    answers(config, Nil, questions, kind)
+
+  /** Pixels of a scene: red, green, blue, isObject, triangle, distance.
+    *
+    * @param registers all that the host writes, by name
+    */
+  def pixels(
+      config:    ColonnadeConfig,
+      registers: Map[String, BigInt],
+      records:   Seq[BigInt],
+      positions: Seq[(Int, Int)]
+  ): Seq[Seq[BigInt]] = {
+    val formats = new RecordFormats(config)
+    val kinds   = Seq("node" -> formats.node, "triangles" -> formats.triangles, "attributes" -> formats.attributes)
+    val layouts = kinds.map { case (name, kind) =>
+      val fields = Layout.of(kind).map(field =>
+        s"${field.name}=${field.offset},${field.width},${if (field.signed) 1 else 0}"
+      )
+      s"layout $name ${fields.mkString(" ")}"
+    }
+    val digits = formats.recordBits / 4
+    val hex    = records.map(record => "0" * (digits - record.toString(16).length) + record.toString(16))
+    val scene  =
+      s"records ${registers("scene.triangleBase")} ${registers("scene.attributeBase")} ${hex.mkString(" ")}"
+    val written = registers.map { case (name, value) => s"$name=$value" }.mkString("registers ", " ", "")
+    answers(config, layouts ++ Seq(scene, written), positions.map { case (x, y) => Seq(BigInt(x), BigInt(y)) }, "pixel")
+  }
+
+  private def answers(
+      config:    ColonnadeConfig,
+      setting:   Seq[String],
+      questions: Seq[Seq[BigInt]],
+      kind:      String
+  ): Seq[Seq[BigInt]] = {
     val header = "numbers " + (config.numbers.entries ++ traversal(config)).map { case (key, value) =>
       s"$key=$value"
     }.mkString(" ")
     val text =
-      (header +: questions.map(question => (kind +: question.map(_.toString)).mkString(" "))).mkString("", "\n", "\n")
+      ((header +: setting) ++ questions.map(question => (kind +: question.map(_.toString)).mkString(" ")))
+        .mkString("", "\n", "\n")
     val output = (Process(program.toString) #< new java.io.ByteArrayInputStream(text.getBytes(UTF_8))).!!
     val result = output.linesIterator.map(_.split(' ').toSeq.map(BigInt(_))).toSeq
     require(result.size == questions.size, s"${result.size} answers to ${questions.size} questions")

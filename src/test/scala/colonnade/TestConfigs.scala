@@ -10,7 +10,15 @@ object TestConfigs {
     ArrayConfig(rows = 1, columns = 1, contexts = 4),
     PrecisionConfig(mac = 32, sqrt = 32, div = 64),
     GeometryConfig(vertexBits = 16, boxBits = 8, triangleBits = None, arity = 4, trianglesPerRecord = 2, bvh = true),
-    ColumnBvhMemoryConfig(depth = 1024, banks = 2, stackDepth = 16, snooping = true, readLatency = 1),
+    ColumnBvhMemoryConfig(
+      depth = 1024,
+      banks = 2,
+      stackDepth = 16,
+      snooping = true,
+      recordBuffers = 2,
+      readLatency = 1,
+      holdable = false
+    ),
     FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, hits = true)
   )
 

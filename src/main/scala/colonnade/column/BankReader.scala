@@ -19,6 +19,9 @@ final class BankReaderIO(config: ColonnadeConfig) extends Bundle {
 
 /** One bank's part of the [[ColumnBvhController]]: an arbiter, the list of reads in flight, and the register from which
   * a record goes to all rows. The list has room for as many reads as a memory of `readLatency` holds.
+  *
+  * With snooping a request for a record that is in flight waits, for its row will find the record in the other one's
+  * broadcast.
   */
 final class BankReader(config: ColonnadeConfig) extends Module {
   val io = IO(new BankReaderIO(config))
@@ -30,7 +33,11 @@ final class BankReader(config: ColonnadeConfig) extends Module {
   private val accepts  = io.memory.request.fire
 
   // Choose a row
-  turn.io.requests := VecInit(io.requests.map(_.valid)).asUInt
+  private val isComing = io.requests.map { request =>
+    val isRead = inFlight.io.reads.map(read => read.valid && read.bits.address === request.bits.address)
+    config.columnBvhMemory.snooping.B && isRead.reduce(_ || _)
+  }
+  turn.io.requests := VecInit(io.requests.zip(isComing).map { case (request, comes) => request.valid && !comes }).asUInt
   turn.io.isTaken  := accepts
   io.requests.zip(turn.io.grant.asBools).foreach { case (request, isGranted) =>
     request.ready := isGranted && io.memory.request.ready && inFlight.io.begins.ready

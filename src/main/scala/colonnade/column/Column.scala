@@ -17,10 +17,13 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   val start = Input(Bool())
 
   /** Only while idle. */
-  val load  = Flipped(Valid(new Load(config)))
+  val load = Flipped(Valid(new Load(config)))
+
+  /** See [[ColumnBvhMemoryIO]]. */
+  val holds = if (config.columnBvhMemory.holdable) Some(Input(UInt(config.columnBvhMemory.banks.W))) else None
   val tiles = Flipped(Decoupled(new Tile(config)))
 
-  /** Tiles that no ray to the object goes through. */
+  /** Tiles without a pixel that may see the object. */
   val backgroundTiles = Flipped(Decoupled(new Tile(config)))
 
   /** In no particular order. */
@@ -53,16 +56,18 @@ final class Column(
   walker.io.tiles <> io.tiles
   units.zip(walker.io.positions).foreach { case (unit, positions) => unit.positions <> positions }
 
-  // Tiles of the background become pixels at once
+  // Tiles of the background, and the others' pixels outside the object's outline, become pixels at once
   background.io.frame  := io.registers.frame
   background.io.colour := io.registers.background
   background.io.tiles <> io.backgroundTiles
+  background.io.others <> walker.io.others
 
   // Units ask for records and see all that are read
   controller.io.requests.zip(units).foreach { case (requests, unit) => requests <> unit.requests }
   memory.io.banks <> controller.io.memory
   units.foreach(_.broadcasts := controller.io.broadcasts)
   memory.io.load := io.load
+  memory.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
 
   // Colours leave
   collector.io.sources.zip(units.map(_.pixels) :+ background.io.pixels).foreach { case (source, pixels) =>
@@ -85,5 +90,5 @@ final class Column(
 
   io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === leaves.asUInt
   io.progress.isIdle    := RegNext(units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle, true.B)
-  io.events := RegNext(EventSums.ofColumn(config, units.map(_.events), background.io.pixels.fire, controller.io.events))
+  io.events             := RegNext(EventSums.ofColumn(config, enters, units.map(_.events), controller.io.events))
 }

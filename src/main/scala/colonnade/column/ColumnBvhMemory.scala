@@ -1,7 +1,7 @@
 package colonnade.column
 
 import chisel3._
-import chisel3.util.{Pipe, Valid}
+import chisel3.util.{Decoupled, Pipe, Queue, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, LoadTarget, RecordFormats}
 
@@ -9,14 +9,17 @@ import colonnade.formats.{Load, LoadTarget, RecordFormats}
 final class ColumnBvhMemoryIO(config: ColonnadeConfig) extends Bundle {
 
   /** Only while no read is in flight. */
-  val load  = Flipped(Valid(new Load(config)))
+  val load = Flipped(Valid(new Load(config)))
+
+  /** One bit for each bank: it neither accepts nor answers. */
+  val holds = if (config.columnBvhMemory.holdable) Some(Input(UInt(config.columnBvhMemory.banks.W))) else None
   val banks = Vec(config.columnBvhMemory.banks, Flipped(new BankPort(config)))
 }
 
 /** The records that the render units of a column share. Each bank answers one read a cycle, `readLatency` cycles later.
   *
   * A bank has a single port, for reads and loads exclude each other; cycles of latency beyond the first are spent before
-  * it, where a register holds an address and not a record.
+  * it, where a register holds an address and not a record. A bank that can be held has a queue for its answers.
   */
 final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnBvhMemoryIO(config))
@@ -30,8 +33,14 @@ final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
     assert(!(writes && read.valid), "a load during a read")
 
     val address = Mux(writes, Banks.addressIn(config, io.load.bits.address), read.bits)
-    port.request.ready  := true.B
-    port.response.valid := RegNext(read.valid, false.B)
-    port.response.bits  := records.readWrite(address, io.load.bits.record, writes || read.valid, writes)
+    val answer  = Wire(Decoupled(new RecordFormats(config).record))
+    val answers = if (config.columnBvhMemory.holdable) Queue(answer, ReadList.room(config), flow = true) else answer
+    val isHeld  = io.holds.map(_(bank)).getOrElse(false.B)
+    answer.valid        := RegNext(read.valid, false.B)
+    answer.bits         := records.readWrite(address, io.load.bits.record, writes || read.valid, writes)
+    answers.ready       := !isHeld
+    port.request.ready  := !isHeld
+    port.response.valid := answers.fire
+    port.response.bits  := answers.bits
   }
 }

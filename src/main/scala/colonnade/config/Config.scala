@@ -52,16 +52,27 @@ final case class GeometryConfig(
 
 /** The memory that the render units of a column share.
   *
-  * @param depth       records
-  * @param banks       independent banks, interleaved by record address
-  * @param stackDepth  traversal stack entries of each context
-  * @param snooping    every context that waits for a record takes it when anybody reads it
-  * @param readLatency cycles from an accepted read to its record
+  * @param depth         records
+  * @param banks         independent banks, interleaved by record address
+  * @param stackDepth    traversal stack entries of each context
+  * @param snooping      every context that waits for a record takes it when anybody reads it
+  * @param recordBuffers records that a render unit can hold or expect at a time
+  * @param readLatency   cycles from an accepted read to its record
+  * @param holdable      an input for each bank that makes it wait: for verification, to vary the latency at run time
   */
-final case class ColumnBvhMemoryConfig(depth: Int, banks: Int, stackDepth: Int, snooping: Boolean, readLatency: Int) {
+final case class ColumnBvhMemoryConfig(
+    depth:         Int,
+    banks:         Int,
+    stackDepth:    Int,
+    snooping:      Boolean,
+    recordBuffers: Int,
+    readLatency:   Int,
+    holdable:      Boolean
+) {
   Require.within("columnBvhMemory.depth", depth, 16, 1 << 22)
   Require.oneOf("columnBvhMemory.banks", banks, Seq(1, 2, 4))
   Require.within("columnBvhMemory.stackDepth", stackDepth, 4, 256)
+  Require.within("columnBvhMemory.recordBuffers", recordBuffers, 1, 8)
   Require.within("columnBvhMemory.readLatency", readLatency, 1, 16)
 }
 

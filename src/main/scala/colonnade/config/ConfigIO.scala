@@ -40,8 +40,17 @@ object ConfigIO {
       "trianglesPerRecord",
       "bvh"
     )
-    val memory = root.section("columnBvhMemory", "depth", "banks", "stackDepth", "snooping", "readLatency")
-    val frame  = root.section("frame", "maxWidth", "maxHeight", "tileSize", "materials", "hits")
+    val memory = root.section(
+      "columnBvhMemory",
+      "depth",
+      "banks",
+      "stackDepth",
+      "snooping",
+      "recordBuffers",
+      "readLatency",
+      "holdable"
+    )
+    val frame = root.section("frame", "maxWidth", "maxHeight", "tileSize", "materials", "hits")
 
     ColonnadeConfig(
       array = ArrayConfig(
@@ -63,7 +72,9 @@ object ConfigIO {
         banks = memory.int("banks"),
         stackDepth = memory.int("stackDepth"),
         snooping = memory.boolean("snooping"),
-        readLatency = memory.int("readLatency")
+        recordBuffers = memory.int("recordBuffers"),
+        readLatency = memory.int("readLatency"),
+        holdable = memory.boolean("holdable")
       ),
       frame = FrameConfig(
         maxWidth = frame.int("maxWidth"),
@@ -94,11 +105,13 @@ object ConfigIO {
         "bvh"                -> geometry.bvh
       ),
       "columnBvhMemory" -> ujson.Obj(
-        "depth"       -> columnBvhMemory.depth,
-        "banks"       -> columnBvhMemory.banks,
-        "stackDepth"  -> columnBvhMemory.stackDepth,
-        "snooping"    -> columnBvhMemory.snooping,
-        "readLatency" -> columnBvhMemory.readLatency
+        "depth"         -> columnBvhMemory.depth,
+        "banks"         -> columnBvhMemory.banks,
+        "stackDepth"    -> columnBvhMemory.stackDepth,
+        "snooping"      -> columnBvhMemory.snooping,
+        "recordBuffers" -> columnBvhMemory.recordBuffers,
+        "readLatency"   -> columnBvhMemory.readLatency,
+        "holdable"      -> columnBvhMemory.holdable
       ),
       "frame" -> ujson.Obj(
         "maxWidth"  -> frame.maxWidth,

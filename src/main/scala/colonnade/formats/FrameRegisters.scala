@@ -14,6 +14,19 @@ final class PixelRect(coordinateBits: Int) extends Bundle {
   val y1 = UInt(coordinateBits.W)
 }
 
+/** The pixels (px, py) with `x · px + y · py + offset ≥ 0`; all of them where every field is 0. */
+final class HalfPlane(coordinateBits: Int) extends Bundle {
+  val x = SInt(HalfPlane.normalBits.W)
+  val y = SInt(HalfPlane.normalBits.W)
+
+  /** As large as what it has to make up for in the largest frame. */
+  val offset = SInt((HalfPlane.normalBits + coordinateBits + 1).W)
+}
+
+object HalfPlane {
+  val normalBits: Int = 12
+}
+
 /** A record, not a bundle: Chisel keeps the name `width` for itself. */
 final class FrameSettings(numbers: NumberFormats) extends Record {
 
@@ -21,8 +34,9 @@ final class FrameSettings(numbers: NumberFormats) extends Record {
   val pixelsWide = UInt(numbers.coordinateBits.W)
   val pixelsHigh = UInt(numbers.coordinateBits.W)
 
-  /** The only pixels whose rays may meet the object. */
-  val objectRect = new PixelRect(numbers.coordinateBits)
+  /** Only pixels in the rectangle and in all half-planes have rays that may meet the object. */
+  val objectRect    = new PixelRect(numbers.coordinateBits)
+  val objectOutline = Vec(FrameRegisters.outlineEdges, new HalfPlane(numbers.coordinateBits))
 
   /** A position of the camera or the light, shifted left by this, is in grid steps. */
   val unitShift = UInt(NumberFormats.bitLength(numbers.sceneBits).W)
@@ -36,6 +50,7 @@ final class FrameSettings(numbers: NumberFormats) extends Record {
     "width"          -> pixelsWide,
     "height"         -> pixelsHigh,
     "objectRect"     -> objectRect,
+    "objectOutline"  -> objectOutline,
     "unitShift"      -> unitShift,
     "watchdogCycles" -> watchdogCycles
   )
@@ -119,6 +134,9 @@ final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
 
 object FrameRegisters {
 
+  /** A box seen from anywhere outside has no more edges. */
+  val outlineEdges: Int = 6
+
   /** A light's intensity in one channel. */
   def intensity: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightBits, NumberFormats.lightFraction))
 
@@ -169,16 +187,20 @@ final class Counters extends Bundle {
   val snoopHits     = counter
   val bankConflicts = counter
 
-  /** Unit cycles with work. */
+  /** Unit cycles in which a unit's narrowest stage held work. */
   val busyRaySetup     = counter
   val busyBoxUnit      = counter
   val busyTriangleUnit = counter
   val busyShader       = counter
 
-  /** Context cycles by what a context waited for. */
-  val waitRecord   = counter
-  val waitUnit     = counter
-  val idleContexts = counter
+  /** Context cycles by where the context was; what is left of all context cycles, it was on its way out. */
+  val idleContexts      = counter
+  val contextsSetUp     = counter
+  val waitRecord        = counter
+  val waitUnit          = counter
+  val contextsBox       = counter
+  val contextsTriangles = counter
+  val contextsShading   = counter
 }
 
 object Counters {

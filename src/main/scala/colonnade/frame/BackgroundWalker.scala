@@ -1,37 +1,45 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.Decoupled
+import chisel3.util.{Arbiter, Decoupled}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, FrameSettings, Pixel, PixelHit, Rgb}
+import colonnade.unit.PixelPosition
 
 /** Ports of [[BackgroundWalker]]. */
 final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame  = Input(new FrameSettings(config.numbers))
   val colour = Input(Rgb(FrameRegisters.colour))
   val tiles  = Flipped(Decoupled(new Tile(config)))
+
+  /** Pixels of other tiles; they come first. */
+  val others = Flipped(Decoupled(new PixelPosition(config)))
   val pixels = Decoupled(new Pixel(config))
 
-  /** No pixel is left. */
+  /** No pixel of a tile is left. */
   val isIdle = Output(Bool())
 }
 
-/** The pixels of tiles that no ray to the object goes through: the background's colour, one a cycle, beside the render
-  * units, which work on other tiles meanwhile.
+/** Gives pixels that cannot see the object the background's colour, one a cycle, beside the render units, which work on
+  * other pixels meanwhile: all of the tiles that it takes, and what the column's [[TileWalker]] sorts out.
   */
 final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new BackgroundWalkerIO(config))
 
-  private val scan = Module(new TileScan(config))
+  private val scan      = Module(new TileScan(config))
+  private val positions = Module(new Arbiter(new PixelPosition(config), 2))
   scan.io.frame := io.frame
   scan.io.tiles <> io.tiles
 
-  io.pixels.valid         := scan.io.positions.valid
-  io.pixels.bits.x        := scan.io.positions.bits.x
-  io.pixels.bits.y        := scan.io.positions.bits.y
+  positions.io.in(0) <> io.others
+  positions.io.in(1) <> scan.io.positions
+
+  io.pixels.valid         := positions.io.out.valid
+  io.pixels.bits.x        := positions.io.out.bits.x
+  io.pixels.bits.y        := positions.io.out.bits.y
   io.pixels.bits.colour   := io.colour
   io.pixels.bits.isObject := false.B
   io.pixels.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
-  scan.io.positions.ready := io.pixels.ready
-  io.isIdle               := scan.io.isIdle
+  positions.io.out.ready := io.pixels.ready
+  io.isIdle              := scan.io.isIdle
 }

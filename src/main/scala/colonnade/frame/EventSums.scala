@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{log2Ceil, PopCount}
+import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
 import colonnade.unit.UnitEvents
 
@@ -21,7 +21,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   private def perUnit              = sum(units)
   private def perContext           = sum(units * config.array.contexts)
 
-  /** With the background's, which go past the units. */
+  /** With those of the background, which go past the units. */
   val raysPrimary      = sum(units + columns)
   val raysShadow       = perUnit
   val raysInBox        = perUnit
@@ -36,9 +36,14 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val busyBoxUnit      = perUnit
   val busyTriangleUnit = perUnit
   val busyShader       = perUnit
-  val waitRecord       = perContext
-  val waitUnit         = perContext
-  val idleContexts     = perContext
+
+  val idleContexts      = perContext
+  val contextsSetUp     = perContext
+  val waitRecord        = perContext
+  val waitUnit          = perContext
+  val contextsBox       = perContext
+  val contextsTriangles = perContext
+  val contextsShading   = perContext
 
   /** A level, not an event: the most of all units. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
@@ -50,15 +55,15 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
 
 object EventSums {
 
-  /** A column's, from those of its units, of its background pixels and of its controller. */
+  /** A column's, from the pixels it has begun and from those of its units and of its controller. */
   def ofColumn(
-      config:     ColonnadeConfig,
-      units:      Seq[UnitEvents],
-      background: Bool,
-      controller: ColumnBvhEvents
+      config:      ColonnadeConfig,
+      raysPrimary: UInt,
+      units:       Seq[UnitEvents],
+      controller:  ColumnBvhEvents
   ): EventSums = {
     val sums = joined(new EventSums(config, 1), units.map(_.elements.toMap))
-    sums.raysPrimary   := PopCount(units.map(_.raysPrimary) :+ background)
+    sums.raysPrimary   := raysPrimary
     sums.recordReads   := controller.recordReads
     sums.bankConflicts := controller.bankConflicts
     sums

@@ -36,7 +36,7 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   /** Valid only where ready is set, see [[Dispatcher]]. */
   val tiles = Vec(columns, Decoupled(new Tile(config)))
 
-  /** Tiles that do not meet the object's rectangle. */
+  /** Tiles without a pixel that may see the object. */
   val backgroundTiles = Vec(columns, Decoupled(new Tile(config)))
   val progress        = Input(Vec(columns, new ColumnProgress))
   val traffic         = Input(new PixelTraffic)
@@ -58,7 +58,7 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
 
 /** Runs frames: hands out the tiles, those of the object and those of the background side by side, sees the last pixel leave, and ends the frame when the device has come to rest.
   *
-  * The first tile is out two cycles after the start; `done` follows the last pixel by [[FrameController.settleCycles]]
+  * The first tile is out four cycles after the start; `done` follows the last pixel by [[FrameController.settleCycles]]
   * or more, so that counters and errors are complete. A frame without pixels ends at once. A frame from which no pixel
   * leaves for `watchdogCycles` (stalls of the sink not counted, 0 is for ever) is aborted: it ends with an error.
   */

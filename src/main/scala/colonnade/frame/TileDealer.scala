@@ -19,10 +19,10 @@ final class TileDealerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Hands the tiles of a frame in Morton order to whichever column is ready, in turn: those that meet the object's
-  * rectangle, or the others.
+/** Hands the tiles of a frame in Morton order to whichever column is ready, in turn: those that meet the object, or the
+  * others.
   *
-  * One tile a cycle while the queue lasts, the first one two cycles after the start. Codes outside the frame are skipped
+  * One tile a cycle while the queue lasts, the first one four cycles after the start. Codes outside the frame are skipped
   * ahead of need: skipping between two tiles takes fewer cycles than a column has pixels in one. A tile of the other kind
   * takes one cycle.
   */
@@ -34,6 +34,7 @@ final class TileDealer(config: ColonnadeConfig, ofObject: Boolean) extends Modul
   private val coordinateBits = config.numbers.coordinateBits
   private val pixelLevels    = Tile.pixelLevels(config)
   private val scan           = Module(new MortonScan(Tile.tileLevels(config)))
+  private val outline        = Module(new OutlineTest(config, config.frame.tileSize))
   private val dispatch       = Module(new Dispatcher(new Tile(config), config.array.columns))
   private val tiles          = Wire(Decoupled(new Tile(config)))
 
@@ -41,22 +42,22 @@ final class TileDealer(config: ColonnadeConfig, ofObject: Boolean) extends Modul
   scan.io.size.bits.wide := tilesIn(io.frame.pixelsWide)
   scan.io.size.bits.high := tilesIn(io.frame.pixelsHigh)
 
-  private val isMeant = meetsObject(tiles.bits) === ofObject.B
-  tiles.valid         := scan.io.cells.valid && isMeant
-  tiles.bits.x        := firstPixel(scan.io.cells.bits.x)
-  tiles.bits.y        := firstPixel(scan.io.cells.bits.y)
-  scan.io.cells.ready := tiles.ready || !isMeant
+  outline.io.frame          := io.frame
+  outline.io.squares.valid  := scan.io.cells.valid
+  outline.io.squares.bits.x := firstPixel(scan.io.cells.bits.x)
+  outline.io.squares.bits.y := firstPixel(scan.io.cells.bits.y)
+  scan.io.cells.ready       := outline.io.squares.ready
+
+  private val tested  = outline.io.tested
+  private val isMeant = tested.bits.meetsObject === ofObject.B
+  tiles.valid  := tested.valid && isMeant
+  tiles.bits.x := tested.bits.first.x
+  tiles.bits.y := tested.bits.first.y
+  tested.ready := tiles.ready || !isMeant
 
   dispatch.io.items <> Queue(tiles, queueEntries)
   io.tiles <> dispatch.io.takers
-  io.isIdle := scan.io.isIdle && !dispatch.io.items.valid
-
-  private def meetsObject(tile: Tile): Bool = {
-    val rect = io.frame.objectRect
-    val size = config.frame.tileSize.U
-    rect.x0 < rect.x1 && rect.y0 < rect.y1 && tile.x < rect.x1 && tile.y < rect.y1 &&
-    tile.x +& size > rect.x0 && tile.y +& size > rect.y0
-  }
+  io.isIdle := scan.io.isIdle && outline.io.isIdle && !dispatch.io.items.valid
 
   private def tilesIn(pixels: UInt): UInt = (pixels +& (config.frame.tileSize - 1).U) >> pixelLevels
 

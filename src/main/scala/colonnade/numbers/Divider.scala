@@ -23,22 +23,26 @@ final class DividerIO(mantissaBits: Int, digits: Int) extends Bundle {
 /** Divides mantissas by restoring digit recurrence in radix 4: three subtractors side by side try one, two and three
   * times the denominator, and the largest multiple that fits gives two bits.
   *
-  * Latency ⌈(digits + 1) / 2⌉ + 1 cycles, one division at a time; the next one enters in the cycle in which a quotient
-  * leaves. A denominator without its top bit gives a quotient that means nothing.
+  * Latency ⌈(digits + 1) / (2 · digitsPerCycle)⌉ + 1 cycles, one division at a time; the next one enters in the cycle in
+  * which a quotient leaves. A denominator without its top bit gives a quotient that means nothing.
+  *
+  * @param digitsPerCycle radix-4 digits computed in a cycle, one after the other
   */
-final class Divider(mantissaBits: Int, digits: Int) extends Module {
+final class Divider(mantissaBits: Int, digits: Int, digitsPerCycle: Int = 1) extends Module {
   require(mantissaBits >= 1, s"a divider of $mantissaBits-bit mantissas; they must have at least 1 bit")
   require(digits >= 0, s"a divider for $digits digits; it must be for at least 0")
 
   val io = IO(new DividerIO(mantissaBits, digits))
 
-  /** Steps of two bits; with an even number of digits the last bit is computed in vain. */
-  private val steps     = Divider.steps(digits)
-  private val spareBits = 2 * steps - (digits + 1)
+  private val steps        = Divider.steps(digits, digitsPerCycle)
+  private val quotientBits = 2 * steps * digitsPerCycle
+
+  /** The last bits may be computed in vain. */
+  private val spareBits = quotientBits - (digits + 1)
 
   private val busy      = RegInit(false.B)
   private val stepsLeft = Reg(UInt(log2Ceil(steps + 1).W))
-  private val quotient  = Reg(UInt((2 * steps).W))
+  private val quotient  = Reg(UInt(quotientBits.W))
 
   /** Less than four times the denominator. */
   private val remainder = Reg(UInt((mantissaBits + 2).W))
@@ -48,15 +52,22 @@ final class Divider(mantissaBits: Int, digits: Int) extends Module {
   private val finished = busy && stepsLeft === 0.U
 
   // Try the three multiples: a borrow means that one does not fit.
-  private val tried   = Seq(once.pad(mantissaBits + 2), Cat(0.U(1.W), once, 0.U(1.W)), thrice).map(remainder -& _)
-  private val fits    = tried.map(difference => !difference(mantissaBits + 2))
-  private val digit   = Cat(fits(1), Mux(fits(1), fits(2), fits(0)))
-  private val reduced =
-    Mux(fits(1), Mux(fits(2), tried(2), tried(1)), Mux(fits(0), tried(0), remainder))(mantissaBits - 1, 0)
+  private def step(remainder: UInt): (UInt, UInt) = {
+    val tried   = Seq(once.pad(mantissaBits + 2), Cat(0.U(1.W), once, 0.U(1.W)), thrice).map(remainder -& _)
+    val fits    = tried.map(difference => !difference(mantissaBits + 2))
+    val digit   = Cat(fits(1), Mux(fits(1), fits(2), fits(0)))
+    val reduced =
+      Mux(fits(1), Mux(fits(2), tried(2), tried(1)), Mux(fits(0), tried(0), remainder))(mantissaBits - 1, 0)
+    (Cat(reduced, 0.U(2.W)), digit)
+  }
+  private val (reduced, found) = (1 to digitsPerCycle).foldLeft((remainder, quotient)) { case ((left, found), _) =>
+    val (reduced, digit) = step(left)
+    (reduced, Cat(found, digit))
+  }
 
   when(busy && !finished) {
-    remainder := Cat(reduced, 0.U(2.W))
-    quotient  := Cat(quotient, digit)(2 * steps - 1, 0)
+    remainder := reduced
+    quotient  := found(quotientBits - 1, 0)
     stepsLeft := stepsLeft - 1.U
   }
   when(io.quotient.fire) {
@@ -72,11 +83,11 @@ final class Divider(mantissaBits: Int, digits: Int) extends Module {
 
   io.division.ready := !busy || io.quotient.fire
   io.quotient.valid := finished
-  io.quotient.bits  := quotient(2 * steps - 1, spareBits)
+  io.quotient.bits  := quotient(quotientBits - 1, spareBits)
 }
 
 object Divider {
 
   /** Cycles of a division in which quotient bits come out. */
-  def steps(digits: Int): Int = (digits + 2) / 2
+  def steps(digits: Int, digitsPerCycle: Int = 1): Int = digits / (2 * digitsPerCycle) + 1
 }

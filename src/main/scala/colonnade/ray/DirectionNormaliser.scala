@@ -43,7 +43,6 @@ final class DirectionNormaliserIO(config: ColonnadeConfig) extends Bundle {
   val request   = Flipped(Decoupled(new RayRequest(config)))
   val mantissas = Decoupled(new DirectionMantissas(config.numbers))
   val ray       = Decoupled(new PermutedRay(config))
-  val busy      = Output(Bool())
 }
 
 /** Finds a ray's dominant axis, turns the ray into its own frame and normalises its direction.
@@ -70,7 +69,6 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
   private val isSettled  = step === settled && turns === 0.U
   private val rotates    = step === settled && turns =/= 0.U
 
-  io.busy            := step =/= idle
   io.mantissas.valid := isSettled && hasMantissas
   io.ray.valid       := isSettled && hasRay
   io.request.ready   := step === idle || (isSettled && isLeft)

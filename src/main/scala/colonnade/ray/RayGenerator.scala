@@ -25,9 +25,6 @@ final class RayGeneratorIO(config: ColonnadeConfig) extends Bundle {
   val registers = Input(new CameraRegisters(config))
   val position  = Flipped(Decoupled(new RayPosition(config)))
   val ray       = Decoupled(new RayRequest(config))
-
-  /** A pixel is inside. */
-  val busy = Output(Bool())
 }
 
 /** Primary rays: `towards = (camera.towards << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
@@ -51,7 +48,6 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
   private val ofY        = product.value(0)
   private val addsOfY    = RegNext(ofY)
 
-  io.busy           := occupied
   io.ray.valid      := occupied && !multiplies && !adds
   io.position.ready := !occupied || io.ray.fire
   when(multiplies) {

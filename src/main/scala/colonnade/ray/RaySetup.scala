@@ -13,7 +13,7 @@ final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
   val bounds = Input(new Bounds(config.numbers))
   val ray    = Decoupled(new SetUpRay(config))
 
-  /** A ray is inside. */
+  /** The stage that lasts longest, the entry, holds a ray. */
   val busy = Output(Bool())
 }
 
@@ -21,8 +21,8 @@ final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
   * request ─▶ DirectionNormaliser ─ mantissas ─▶ 4 × Divider ─ quotients ─▶ RayEntry ─▶ ray
   *                    └────────────────── the ray in its own frame ───────────▲
   * }}}
-  * In order; up to three rays are inside. With quotients of 31 and 19 bits a ray takes some 40 cycles and a new one is
-  * taken every 20 at most. A component that is 0 is divided all the same and its quotients are replaced; a direction of
+  * In order; up to three rays are inside. With quotients of 31 and 19 bits a ray takes some 30 cycles and a new one is
+  * taken every 16 at most. A component that is 0 is divided all the same and its quotients are replaced; a direction of
   * 0 comes out as a ray that does not enter. Source: docs/numbers.md, section 2.
   */
 final class RaySetup(config: ColonnadeConfig) extends Module {
@@ -30,8 +30,8 @@ final class RaySetup(config: ColonnadeConfig) extends Module {
 
   val io = IO(new RaySetupIO(config))
 
-  private val normaliser  = Module(new DirectionNormaliser(config))
-  private val shears      = Seq.fill(2)(Module(new Divider(numbers.mantissaBits, numbers.shearDigits)))
+  private val normaliser = Module(new DirectionNormaliser(config))
+  private val shears = Seq.fill(2)(Module(new Divider(numbers.mantissaBits, numbers.shearDigits, digitsPerCycle = 2)))
   private val reciprocals = Seq.fill(2)(Module(new Divider(numbers.mantissaBits, numbers.reciprocalDigits)))
   private val entry       = Module(new RayEntry(config))
   private val dividers    = shears ++ reciprocals
@@ -40,7 +40,7 @@ final class RaySetup(config: ColonnadeConfig) extends Module {
   entry.io.ray :<>= normaliser.io.ray
   entry.io.bounds := io.bounds
   io.ray :<>= entry.io.output
-  io.busy := normaliser.io.busy || entry.io.busy
+  io.busy := entry.io.busy
 
   // All dividers start together, and their quotients leave together
   private val mantissas = normaliser.io.mantissas

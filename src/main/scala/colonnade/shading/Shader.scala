@@ -92,7 +92,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
   io.result.bits.origin         := Vec3.of(originX, originY, originZ)
   io.result.bits.toLight        := Vec3.of(toLightX, toLightY, toLightZ)
 
-  io.busy := isHeld || !geometry.io.request.ready
+  io.busy := !geometry.io.request.ready
 }
 
 /** What the shader keeps of a hit while its colours are in work. */

@@ -12,7 +12,7 @@ final class BoxUnitIO(config: ColonnadeConfig) extends Bundle {
   val in  = Flipped(Decoupled(new BoxCandidate(config)))
   val out = Decoupled(new BoxResult(config))
 
-  /** The unit holds a node. */
+  /** The datapath takes children in. */
   val busy = Output(Bool())
 }
 
@@ -72,7 +72,7 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   orders.io.deq.ready := io.out.ready
   notes.io.deq.ready  := io.out.fire
   io.out.bits         := notes.io.deq.bits.result(orders.io.deq.bits)
-  io.busy             := notes.io.deq.valid
+  io.busy             := starts
 }
 
 object BoxUnit {

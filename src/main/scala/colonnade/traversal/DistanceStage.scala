@@ -35,8 +35,8 @@ final class DistanceStage(config: ColonnadeConfig, lanes: Int) extends Module {
   }
 
   // Lanes, each with the terms of its triangle
-  private val dividers   = Seq.fill(lanes)(Module(new Divider(formats.mantissaBits, formats.digits)))
-  private val terms      = Reg(Vec(lanes, new DistanceTerms(config)))
+  private val dividers = Seq.fill(lanes)(Module(new Divider(formats.mantissaBits, formats.digits, digitsPerCycle = 2)))
+  private val terms    = Reg(Vec(lanes, new DistanceTerms(config)))
   private val isOccupied = RegInit(VecInit(Seq.fill(lanes)(false.B)))
   private val asking     = turn(io.question.fire)
   private val collects   = Wire(Bool())

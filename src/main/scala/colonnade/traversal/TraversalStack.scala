@@ -48,8 +48,8 @@ final class TraversalStackIO(config: ColonnadeConfig) extends Bundle {
   * resumption, pop. Popped entries that begin beyond the ray's limit are dropped. Each result or resumption is answered
   * by one visit. A context has at most one of them under way, so that answers of a context can't overtake.
   *
-  * Throughput: one operation a cycle; each push beyond the first and each dropped entry takes one more. Latency: 2
-  * cycles after the last of them. Results and resumptions take turns.
+  * Throughput: one operation a cycle; each push beyond the first and each dropped entry takes one more. Latency: one
+  * cycle after the last of them. Results and resumptions take turns.
   */
 class TraversalStack(config: ColonnadeConfig) extends Module {
   private val arity      = config.geometry.arity
@@ -60,7 +60,7 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
 
   private val entries = SyncReadMem(StackAddress.size(config), UInt(new StackEntry(config).getWidth.W))
   private val levels  = RegInit(VecInit.fill(contexts)(0.U.asTypeOf(StackLevel(config))))
-  private val answers = Module(new Queue(new NextVisit(config), TraversalStack.answers))
+  private val answers = Module(new Queue(new NextVisit(config), TraversalStack.answers, flow = true))
 
   // The second cycle of an operation: its answer, or the entry that was read
   private val isAnswering = RegInit(false.B)

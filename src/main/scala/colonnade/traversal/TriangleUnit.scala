@@ -9,7 +9,7 @@ final class TriangleUnitIO(config: ColonnadeConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
   val result    = Decoupled(new TriangleResult(config))
 
-  /** Holds work in this cycle. */
+  /** A triangle's vertices go in. */
   val busy = Output(Bool())
 }
 
@@ -24,8 +24,8 @@ final private class TriangleTurn(config: ColonnadeConfig) extends Bundle {
   * docs/numbers.md, section 4, without the comparison with the best hit so far.
   *
   * One triangle every 4 cycles, one result each, in order. A miss takes 11 cycles. A triangle that the ray's line
-  * crosses goes on to weights, numerator and division: about 30 cycles and half the quotient's digits, one every
-  * 8 cycles or every round of the division lanes, whichever is longer.
+  * crosses goes on to weights, numerator and division: about 30 cycles and a quarter of the quotient's digits, one
+  * every 8 cycles or every round of the division lanes, whichever is longer.
   *
   * {{{
   * candidate ▸ sequencer ▸ shear ▸ edges ▸ (crossed: weights ▸ numerator ▸ distance) ▸ result
@@ -40,7 +40,7 @@ final private class TriangleTurn(config: ColonnadeConfig) extends Bundle {
   * @param distanceLanes divisions under way at the same time
   * @param turns         results that may wait for one that divides
   */
-final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 2, turns: Int = 8) extends Module {
+final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, turns: Int = 8) extends Module {
   val io = IO(new TriangleUnitIO(config))
 
   private val sequencer = Module(new TriangleSequencer(config))
@@ -105,5 +105,5 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 2, turns:
   order.io.deq.ready     := io.result.ready && isReady
   distance.io.hit.ready  := io.result.fire && turn.isCrossed
 
-  io.busy := sequencer.io.tag.valid || sheared.valid || tested.valid || order.io.deq.valid
+  io.busy := sequencer.io.tag.valid
 }

@@ -29,7 +29,6 @@ final class RecordBroadcast(config: ColonnadeConfig) extends Bundle {
 final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   private def contexts = UInt(log2Ceil(config.array.contexts + 1).W)
 
-  val raysPrimary      = Bool()
   val raysShadow       = Bool()
   val raysInBox        = Bool()
   val nodeReads        = Bool()
@@ -42,10 +41,16 @@ final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   val busyTriangleUnit = Bool()
   val busyShader       = Bool()
 
-  /** Contexts that wait for a record, for a unit, and that have no ray. */
-  val waitRecord   = contexts
-  val waitUnit     = contexts
-  val idleContexts = contexts
+  /** Contexts without a pixel; whose ray is generated or set up; that wait for a record, or with it for a unit; in box
+    * unit and stack; in the triangle unit; in the shader. The others are on their way out.
+    */
+  val idleContexts      = contexts
+  val contextsSetUp     = contexts
+  val waitRecord        = contexts
+  val waitUnit          = contexts
+  val contextsBox       = contexts
+  val contextsTriangles = contexts
+  val contextsShading   = contexts
 
   /** Most entries that any of the unit's stacks has held since the frame's start: a level, not an event. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)

@@ -32,12 +32,12 @@ final class RefusedWish(config: ColonnadeConfig) extends Bundle {
 
 /** Gets contexts the records they wait for.
   *
-  * Two record buffers. A read is asked for only once a buffer is reserved for it, so a broadcast never has to wait.
-  * With snooping, every waiting context takes a matching record from a buffer, and a buffer takes any broadcast that a
+  * A read is asked for only once a record buffer is reserved for it, so a broadcast never has to wait. With snooping,
+  * every waiting context takes a matching record, as it arrives or from a buffer, and a buffer takes any broadcast that a
   * context waits for, whoever had asked for it; a buffer keeps its record until another needs the place. Without, a
   * context takes only the answer to its own read.
   *
-  * A record is offered from two cycles after its broadcast until the context is served; a wish that a buffer can grant
+  * A record is offered from one cycle after its broadcast until the context is served; a wish that a buffer can grant
   * at once is offered two cycles after it.
   */
 final class RecordFetch(config: ColonnadeConfig) extends Module {
@@ -78,28 +78,22 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val isAsked   = Reg(Bool())
     val use       = Reg(RecordUse())
     val address   = Reg(UInt(RecordFormats.idBits(config).W))
-    val buffer    = Reg(UInt(log2Ceil(RecordFetch.buffers).W))
+    val buffer    = Reg(UInt(log2Ceil(config.columnBvhMemory.recordBuffers.max(2)).W))
 
-    def isIn(place: RecordBuffer): Bool = address === place.address
   }
-  private val buffers = Seq.fill(RecordFetch.buffers)(new RecordBuffer)
+  private val buffers = Seq.fill(config.columnBvhMemory.recordBuffers)(new RecordBuffer)
   private val wishes  = Seq.fill(contexts)(new ContextWish)
+
+  /** The record in, or on its way into, buffer `index` is the one that a context waits for. */
+  private def isMeant(wish: ContextWish, index: Int, address: UInt): Bool =
+    wish.isWaiting && Mux(snooping, wish.address === address, wish.isAsked && wish.buffer === index.U)
 
   // Contexts take what they wait for from full buffers
   private val takes = wishes.map(wish =>
     buffers.zipWithIndex.map { case (buffer, index) =>
-      val isMeant = Mux(snooping, wish.isIn(buffer), wish.isAsked && wish.buffer === index.U)
-      wish.isWaiting && buffer.state === BufferState.full && isMeant
+      buffer.state === BufferState.full && isMeant(wish, index, buffer.address)
     }
   )
-  wishes.zip(takes).foreach { case (wish, taken) =>
-    when(taken.reduce(_ || _)) {
-      wish.isWaiting := false.B
-      wish.hasRecord := true.B
-      wish.buffer    := PriorityEncoder(taken)
-    }
-  }
-  io.snoopHits := PopCount(wishes.zip(takes).map { case (wish, taken) => taken.reduce(_ || _) && !wish.isAsked })
 
   // Buffers that nobody needs any more may be filled anew
   private val isAvailable = buffers.zipWithIndex.map { case (buffer, index) =>
@@ -109,7 +103,13 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     buffer.state === BufferState.empty || (buffer.state === BufferState.full && !isHeld.reduce(_ || _))
   }
 
-  // Broadcasts: into the buffer reserved for them, else (snooping) into an available one when a context waits for them
+  // Broadcasts: into the buffer reserved for them, else (snooping) into an available one when a context waits for them.
+  // Whoever waits for one takes it as it arrives.
+  private val arrivals = Seq.fill(buffers.size)(Wire(Valid(UInt(RecordFormats.addressBits(config).W))))
+  arrivals.foreach { arrival =>
+    arrival.valid := false.B
+    arrival.bits  := DontCare
+  }
   private val afterBroadcasts = io.broadcasts.foldLeft(isAvailable) { (available, broadcast) =>
     val isReserved = buffers.map(buffer =>
       buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address &&
@@ -121,8 +121,10 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val isSnooped = snooping && !isReserved.reduce(_ || _) && isWanted.reduce(_ || _)
     val places    = PriorityEncoderOH(available).map(_ && isSnooped)
     val meant     = PriorityEncoderOH(isReserved)
-    buffers.zip(places).zip(meant).foreach { case ((buffer, place), mine) =>
+    for ((((buffer, arrival), place), mine) <- buffers.zip(arrivals).zip(places).zip(meant)) {
       when(broadcast.valid && (place || mine)) {
+        arrival.valid  := true.B
+        arrival.bits   := broadcast.bits.address
         buffer.state   := BufferState.full
         buffer.address := broadcast.bits.address
         buffer.record  := broadcast.bits.record
@@ -131,11 +133,26 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     available.zip(places).map { case (free, place) => free && !(place && broadcast.valid) }
   }
 
+  // A context has what a buffer had or has just got
+  private val finds = wishes.zip(takes).map { case (wish, taken) =>
+    taken.zip(arrivals).zipWithIndex.map { case ((isTaken, arrival), index) =>
+      isTaken || (arrival.valid && isMeant(wish, index, arrival.bits))
+    }
+  }
+  wishes.zip(finds).foreach { case (wish, found) =>
+    when(found.reduce(_ || _)) {
+      wish.isWaiting := false.B
+      wish.hasRecord := true.B
+      wish.buffer    := PriorityEncoder(found)
+    }
+  }
+  io.snoopHits := PopCount(wishes.zip(finds).map { case (wish, found) => found.reduce(_ || _) && !wish.isAsked })
+
   // Ask for the record of one context that no buffer has or expects
   private val isCovered = wishes.map(wish =>
     Mux(
       snooping,
-      buffers.map(buffer => buffer.state =/= BufferState.empty && wish.isIn(buffer)).reduce(_ || _),
+      buffers.map(buffer => buffer.state =/= BufferState.empty && wish.address === buffer.address).reduce(_ || _),
       wish.isAsked
     )
   )
@@ -201,10 +218,4 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
   io.waiting := PopCount(wishes.map(_.isWaiting))
   io.holding := PopCount(wishes.map(_.hasRecord))
-}
-
-object RecordFetch {
-
-  /** Records that a render unit can hold or expect at a time. */
-  val buffers: Int = 2
 }

@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Arbiter, Decoupled, Queue, RRArbiter, Valid}
+import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
 import colonnade.numbers.Rounding
@@ -17,8 +17,7 @@ private final class PixelColours extends Bundle {
 
 /** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
   *
-  * Pixels come out in any order, which depends on timing; their values do not. A position outside the object's
-  * rectangle passes through with the background's colour and takes no context.
+  * Pixels come out in any order, which depends on timing; their values do not.
   */
 final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
@@ -44,20 +43,14 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val colours      = Mem(contexts, new PixelColours)
   private val isObject     = Reg(Vec(contexts, Bool()))
 
-  // Positions: past the object, or into a free context
-  private val rectangle = io.registers.frame.objectRect
-  private val position  = io.positions.bits
-  private val isInside  =
-    position.x >= rectangle.x0 && position.x < rectangle.x1 && position.y >= rectangle.y0 && position.y < rectangle.y1
-  private val passing = Wire(Decoupled(new Pixel(config)))
-  passing.valid                         := io.positions.valid && !isInside
-  passing.bits                          := backgroundPixel(position)
-  rayGenerator.io.position.valid        := io.positions.valid && isInside && controller.io.free.valid
+  // A position takes a free context
+  private val position = io.positions.bits
+  rayGenerator.io.position.valid        := io.positions.valid && controller.io.free.valid
   rayGenerator.io.position.bits.context := controller.io.free.bits
   rayGenerator.io.position.bits.x       := position.x
   rayGenerator.io.position.bits.y       := position.y
-  io.positions.ready     := Mux(isInside, rayGenerator.io.position.ready && controller.io.free.valid, passing.ready)
-  controller.io.allocate := rayGenerator.io.position.fire
+  io.positions.ready                    := rayGenerator.io.position.ready && controller.io.free.valid
+  controller.io.allocate                := rayGenerator.io.position.fire
   when(rayGenerator.io.position.fire) {
     positions.write(controller.io.free.bits, position)
     isObject(controller.io.free.bits) := false.B
@@ -184,8 +177,12 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val complete = controller.io.complete
   private val finished = Wire(Decoupled(new Pixel(config)))
   private val isDark   = controller.io.isShadow(complete.bits) && hitTable.io.hasHit(complete.bits)
-  finished.valid := complete.valid
-  finished.bits  := backgroundPixel(positions.read(complete.bits))
+  finished.valid         := complete.valid
+  finished.bits.x        := positions.read(complete.bits).x
+  finished.bits.y        := positions.read(complete.bits).y
+  finished.bits.colour   := io.registers.background
+  finished.bits.isObject := false.B
+  finished.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
   when(isObject(complete.bits)) {
     val pixelColours = colours.read(complete.bits)
     finished.bits.colour   := Mux(isDark, pixelColours.ambient, pixelColours.lit)
@@ -205,10 +202,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     }
     when(isObject(complete.bits)) { finished.bits.hit.get := pixelHits.read(complete.bits) }
   }
-  private val leaving = Module(new RRArbiter(new Pixel(config), 2))
-  leaving.io.in(0) :<>= finished
-  leaving.io.in(1) :<>= passing
-  io.pixels :<>= Queue(leaving.io.out, 2)
+  io.pixels :<>= Queue(finished, 2)
 
   // The record port
   recordFetch.io.start       := io.start
@@ -219,7 +213,6 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   // Counters
   private val events = io.events
-  events.raysPrimary      := io.positions.fire
   events.raysShadow       := shadowRays.fire
   events.raysInBox        := enters
   events.nodeReads        := traversal.io.nodes.fire
@@ -231,22 +224,25 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   events.busyBoxUnit      := traversal.io.busy
   events.busyTriangleUnit := triangleUnit.io.busy
   events.busyShader       := shader.io.busy
-  events.waitRecord       := recordFetch.io.waiting
-  events.waitUnit         := recordFetch.io.holding
-  events.idleContexts     := controller.io.freeCount
-  events.deepestStack     := traversal.io.deepest
-  events.stackOverflow    := traversal.io.overflow
-  events.illegalRecord    := refused.valid
-  io.isIdle               := controller.io.freeCount === contexts.U && !io.pixels.valid
 
-  private def backgroundPixel(at: PixelPosition): Pixel = {
-    val pixel = Wire(new Pixel(config))
-    pixel.x        := at.x
-    pixel.y        := at.y
-    pixel.colour   := io.registers.background
-    pixel.isObject := false.B
-    pixel.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
-    pixel
+  events.idleContexts      := controller.io.freeCount
+  events.contextsSetUp     := controller.io.setUpCount
+  events.waitRecord        := recordFetch.io.waiting
+  events.waitUnit          := recordFetch.io.holding
+  events.contextsBox       := population(Seq(traversal.io.nodes.fire, traversal.io.resume.fire), next.fire)
+  events.contextsTriangles := population(Seq(triangles.fire), tested.fire && tested.bits.isLast)
+  events.contextsShading   := population(Seq(attributes.fire), shaded.fire)
+
+  events.deepestStack  := traversal.io.deepest
+  events.stackOverflow := traversal.io.overflow
+  events.illegalRecord := refused.valid
+  io.isIdle            := controller.io.freeCount === contexts.U && !io.pixels.valid
+
+  /** Contexts that have entered and not left. */
+  private def population(enter: Seq[Bool], leaves: Bool): UInt = {
+    val count = RegInit(0.U(log2Ceil(contexts + 1).W))
+    count := count + PopCount(enter) - leaves
+    count
   }
 
   private def connect(port: Valid[UInt], valid: Bool, context: UInt): Unit = {

@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{PopCount, PriorityEncoder, Valid}
+import chisel3.util.{log2Ceil, PopCount, PriorityEncoder, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.ray.Context
 
@@ -68,8 +68,11 @@ final class RtController(config: ColonnadeConfig) extends Module {
     val leave    = Input(Bool())
 
     /** By context: its ray is a shadow ray. */
-    val isShadow  = Output(Vec(contexts, Bool()))
-    val freeCount = Output(UInt(chisel3.util.log2Ceil(contexts + 1).W))
+    val isShadow = Output(Vec(contexts, Bool()))
+
+    /** Contexts that hold no pixel, and whose ray is generated or set up. */
+    val freeCount  = Output(UInt(log2Ceil(contexts + 1).W))
+    val setUpCount = Output(UInt(log2Ceil(contexts + 1).W))
   })
 
   private val stage    = RegInit(VecInit(Seq.fill(contexts)(Stage.free)))
@@ -85,10 +88,11 @@ final class RtController(config: ColonnadeConfig) extends Module {
     found
   }
 
-  io.free      := anyAt(Stage.free)
-  io.judged    := anyAt(Stage.ended)
-  io.complete  := anyAt(Stage.complete)
-  io.freeCount := PopCount(isAt(Stage.free))
+  io.free       := anyAt(Stage.free)
+  io.judged     := anyAt(Stage.ended)
+  io.complete   := anyAt(Stage.complete)
+  io.freeCount  := PopCount(isAt(Stage.free))
+  io.setUpCount := PopCount(isAt(Stage.setUp))
 
   when(io.allocate) {
     stage(io.free.bits)    := Stage.setUp

@@ -66,7 +66,6 @@ class FakeRenderUnit(config: ColonnadeConfig) extends Module {
   }
 
   io.events               := 0.U.asTypeOf(io.events)
-  io.events.raysPrimary   := io.positions.fire
   io.events.nodeReads     := takes
   io.events.snoopHits     := takes && state === asking
   io.events.waitRecord    := isWanted

@@ -1,11 +1,13 @@
 package colonnade.config
 
+import colonnade.{ArbitraryConfig, Properties}
+import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
 import java.nio.file.Files
 
-class ConfigIOSpec extends AnyFlatSpec with Matchers {
+class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
   behavior of "ConfigIO"
 
   private def refusal(name: String, overrides: String*): String =
@@ -13,7 +15,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers {
 
   it should "load every preset" in {
     ConfigIO.presets.map(ConfigIO.load(_).array) shouldBe
-      Seq(ArrayConfig(1, 1, 8), ArrayConfig(2, 2, 8), ArrayConfig(10, 8, 8))
+      Seq(ArrayConfig(1, 1, 8), ArrayConfig(2, 2, 8), ArrayConfig(10, 8, 12))
   }
 
   it should "read back what it writes" in {
@@ -21,6 +23,36 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers {
       val config = ConfigIO.load("edge", settings)
       ConfigIO.read(ConfigIO.write(config)) shouldBe config
     }
+  }
+
+  it should "read back any configuration it writes, as a value and as text" in holds(cases = 300) {
+    Prop.forAll(ArbitraryConfig.legal) { config =>
+      val json = ConfigIO.write(config)
+      ConfigIO.read(json) == config && ConfigIO.read(ujson.read(json.render())) == config
+    }
+  }
+
+  it should "refuse any number outside its range, by name" in holds(cases = 100) {
+    val ranges = Seq(
+      "array.contexts"              -> (1, 16),
+      "precision.mac"               -> (16, 64),
+      "precision.sqrt"              -> (16, 64),
+      "precision.div"               -> (16, 64),
+      "geometry.vertexBits"         -> (10, 24),
+      "geometry.boxBits"            -> (4, 12),
+      "geometry.triangleBits"       -> (16, 64),
+      "columnBvhMemory.depth"       -> (16, 1 << 22),
+      "columnBvhMemory.stackDepth"  -> (4, 256),
+      "columnBvhMemory.readLatency" -> (1, 16),
+      "frame.maxWidth"              -> (8, 4096),
+      "frame.maxHeight"             -> (8, 4096),
+      "frame.materials"             -> (1, 256)
+    )
+    val wrong = for {
+      (field, (low, high)) <- Gen.oneOf(ranges)
+      value                <- Gen.oneOf(Gen.chooseNum(Int.MinValue, low - 1), Gen.chooseNum(high + 1, Int.MaxValue))
+    } yield (field, value, s"$field is $value; it must be from $low to $high")
+    Prop.forAllNoShrink(wrong) { case (field, value, message) => refusal("tiny", s"$field=$value") == message }
   }
 
   it should "load a file" in {

@@ -3,6 +3,9 @@ package colonnade.formats
 import chisel3._
 import colonnade.config.{ColonnadeConfig, ConfigIO}
 import chiseltest._
+import colonnade.traversal.Packed
+import colonnade.{ArbitraryConfig, Properties}
+import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -21,7 +24,7 @@ private class CastHarness(config: ColonnadeConfig) extends Module {
   attributes := formats.asAttributes(record)
 }
 
-class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Properties {
   behavior of "Layout"
 
   private val variants: Seq[ColonnadeConfig] = Seq(
@@ -39,28 +42,56 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   }
 
   it should "cover each bit of a type once, under unique names" in {
-    for (config <- variants; kind <- kinds(config)) {
-      val fields = Layout.of(kind).sortBy(_.offset)
-      fields.map(_.offset) shouldBe fields.scanLeft(0)(_ + _.width).init
-      fields.last.end shouldBe kind.getWidth
-      fields.map(_.name).distinct.size shouldBe fields.size
+    for (config <- variants) coverEachBit(config)
+  }
+
+  it should "cover each bit of a type once, of any configuration" in holds(cases = 60) {
+    Prop.forAll(ArbitraryConfig.legal) { config =>
+      coverEachBit(config)
+      true
+    }
+  }
+
+  private def coverEachBit(config: ColonnadeConfig): Unit = for (kind <- kinds(config)) {
+    val fields = Layout.of(kind).sortBy(_.offset)
+    fields.map(_.offset) shouldBe fields.scanLeft(0)(_ + _.width).init
+    fields.last.end shouldBe kind.getWidth
+    fields.map(_.name).distinct.size shouldBe fields.size
+  }
+
+  it should "give back the numbers of any record that were put where it says" in holds(cases = 60) {
+    def number(field: Field): Gen[BigInt] = {
+      val lowest = if (field.signed) -(BigInt(1) << (field.width - 1)) else BigInt(0)
+      Gen.oneOf(Gen.const(lowest), Gen.choose(lowest, lowest + (BigInt(1) << field.width) - 1))
+    }
+    val records = for {
+      config <- ArbitraryConfig.legal
+      formats = new RecordFormats(config)
+      kind   <- Gen.oneOf(Seq[Data](formats.node, formats.triangles, formats.attributes))
+      values <- Gen.sequence[Seq[BigInt], BigInt](Layout.of(kind).map(number))
+    } yield (kind, Layout.of(kind).map(_.name).zip(values).toMap)
+    Prop.forAllNoShrink(records) { case (kind, values) =>
+      val packed = new Packed(kind)
+      packed.unpack(packed.pack(values)) == values
     }
   }
 
   it should "fit every kind of record into whole words" in {
-    for (config <- variants) {
-      val formats = new RecordFormats(config)
-      formats.recordBits % 32 shouldBe 0
-      Seq(formats.node, formats.triangles, formats.attributes).foreach(_.getWidth should be <= formats.recordBits)
-    }
     new RecordFormats(variants.head).recordBits shouldBe 320
+    holds(cases = 60) {
+      Prop.forAll(ArbitraryConfig.legal) { config =>
+        val formats = new RecordFormats(config)
+        formats.recordBits % 32 == 0 &&
+        Seq(formats.node, formats.triangles, formats.attributes).forall(_.getWidth <= formats.recordBits)
+      }
+    }
   }
 
-  it should "let the largest exponent reach across the cube" in {
-    for (config <- variants) {
+  it should "let the largest exponent reach across the cube" in holds(cases = 200) {
+    Prop.forAll(ArbitraryConfig.legal) { config =>
       val largest = (1 << RecordFormats.exponentBits(config)) - 1
       val reach   = ((BigInt(1) << config.geometry.boxBits) - 1) << largest
-      reach should be >= (BigInt(1) << config.geometry.vertexBits) - 1
+      reach >= (BigInt(1) << config.geometry.vertexBits) - 1
     }
   }
 

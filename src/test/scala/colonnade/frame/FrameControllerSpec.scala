@@ -161,7 +161,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.start.poke(true)
       dut.clock.step()
       dut.io.start.poke(false)
-      dut.clock.step()
+      dut.clock.step(3)
       for (_ <- 0 until 64) {
         assert(dut.io.tiles.count(_.valid.peekBoolean()) == 1)
         dut.clock.step()

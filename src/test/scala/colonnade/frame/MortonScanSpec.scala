@@ -1,11 +1,13 @@
 package colonnade.frame
 
 import chiseltest._
+import colonnade.Properties
+import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-class MortonScanSpec extends AnyFlatSpec with ChiselScalatestTester {
+class MortonScanSpec extends AnyFlatSpec with ChiselScalatestTester with Properties {
   behavior of "MortonScan"
 
   /** Gives one grid after the other; returns the cells of each, and the longest time between two cells of one. */
@@ -46,6 +48,24 @@ class MortonScanSpec extends AnyFlatSpec with ChiselScalatestTester {
         val (cells, _) = scan(dut, sizes, () => random.nextInt(4) > 0)
         assert(cells == sizes.flatMap { case (wide, high) => Morton.cells(wide, high) })
       }
+    }
+  }
+
+  it should "visit arbitrary grids one after the other in Morton order, under stalls" in holds(cases = 12) {
+    val scans = for {
+      levels <- Gen.choose(1, 5)
+      side = Gen.chooseNum(0, 1 << levels)
+      sizes   <- Gen.resize(4, Gen.nonEmptyListOf(Gen.zip(side, side)))
+      willing <- Gen.choose(0.2, 1.0)
+    } yield (levels, sizes, willing)
+    Prop.forAllNoShrink(scans) { case (levels, sizes, willing) =>
+      val random = new Random(1)
+      test(new MortonScan(levels)) { dut =>
+        dut.clock.setTimeout(0)
+        val (cells, _) = scan(dut, sizes, () => random.nextDouble() < willing)
+        assert(cells == sizes.flatMap { case (wide, high) => Morton.cells(wide, high) })
+      }
+      true
     }
   }
 

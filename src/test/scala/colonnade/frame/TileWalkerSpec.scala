@@ -16,7 +16,9 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       frame = TestConfigs.tiny.frame.copy(tileSize = tileSize)
     )
 
-  /** The positions that leave, by row and in the order of time, and the cycles that took. */
+  /** The positions that leave, by row and in the order of time, and the cycles that took. Those that cannot see the
+    * object have the row -1.
+    */
   private def walk(
       dut:     TileWalker,
       size:    (Int, Int),
@@ -25,6 +27,8 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
   ): (Seq[(Int, (Int, Int))], Int) = {
     dut.io.frame.pixelsWide.poke(size._1)
     dut.io.frame.pixelsHigh.poke(size._2)
+    dut.io.frame.objectRect.x1.poke(size._1)
+    dut.io.frame.objectRect.y1.poke(size._2)
     var waiting   = tiles
     var positions = Vector.empty[(Int, (Int, Int))]
     var cycles    = 0
@@ -34,7 +38,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.tiles.bits.x.poke(x)
         dut.io.tiles.bits.y.poke(y)
       }
-      for ((port, row) <- dut.io.positions.zipWithIndex) {
+      for ((port, row) <- (dut.io.others +: dut.io.positions).zip(-1 until dut.io.positions.size)) {
         val ready = isReady(row)
         port.ready.poke(ready)
         if (ready && port.valid.peekBoolean())
@@ -60,7 +64,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.clock.setTimeout(0)
         val (positions, cycles) = walk(dut, (640, 480), tiles, _ => true)
         assert(positions.map(_._2) == tiles.flatMap(pixels((640, 480), _, tileSize)))
-        assert(cycles == 3 * tileSize * tileSize + 3)
+        assert(cycles == 3 * tileSize * tileSize + 4)
       }
     }
   }
@@ -72,12 +76,28 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
+  it should "sort out the pixels outside the outline, whoever is ready" in {
+    val random = new Random(3)
+    test(new TileWalker(config(rows = 3, tileSize = 8))) { dut =>
+      val edge = dut.io.frame.objectOutline(2)
+      edge.x.poke(3)
+      edge.y.poke(-2)
+      edge.offset.poke(-9)
+      val (positions, _)   = walk(dut, (640, 480), Seq((0, 0), (8, 8)), row => random.nextInt(3 + 2 * row + 2) == 0)
+      val (others, inside) = positions.partition(_._1 < 0)
+      val expected         = Seq((0, 0), (8, 8)).flatMap(pixels((640, 480), _, 8))
+      val sees             = (pixel: (Int, Int)) => 3 * pixel._1 - 2 * pixel._2 - 9 >= 0
+      assert(inside.map(_._2).sorted == expected.filter(sees).sorted)
+      assert(others.map(_._2) == expected.filterNot(sees))
+    }
+  }
+
   it should "give every pixel of clipped tiles once, whoever is ready" in {
     val random = new Random(2)
     val size   = (21, 10)
     val tiles  = Seq((0, 0), (8, 0), (16, 0), (0, 8), (8, 8), (16, 8))
     for (rows <- Seq(1, 3, 10)) test(new TileWalker(config(rows, tileSize = 8))) { dut =>
-      val (positions, _) = walk(dut, size, tiles, row => random.nextInt(5 + 20 * row) == 0)
+      val (positions, _) = walk(dut, size, tiles, row => random.nextInt(5 + 20 * row.max(0)) == 0)
       val expected       = tiles.flatMap(pixels(size, _, 8))
       assert(positions.map(_._2).sorted == expected.sorted)
     }

@@ -1,12 +1,14 @@
 package colonnade.numbers
 
 import chiseltest._
+import colonnade.Properties
+import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
 import scala.util.Random
 
-class DividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+class DividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Properties {
   behavior of "Divider"
 
   private def quotients(unit: Divider, operands: Seq[(BigInt, BigInt)], random: Random, stalls: Double): Seq[BigInt] =
@@ -25,7 +27,7 @@ class DividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
     it should s"divide all $mantissaBits-bit mantissas to $digits digits" in {
       val mantissas = BigInt(1) << (mantissaBits - 1) until BigInt(1) << mantissaBits
       val operands  = for (n <- BigInt(0) +: mantissas; d <- mantissas) yield (n, d)
-      test(new Divider(mantissaBits, digits)) { unit =>
+      for (digitsPerCycle <- 1 to 3) test(new Divider(mantissaBits, digits, digitsPerCycle)) { unit =>
         quotients(unit, operands, new Random(1), stalls = 0.2) shouldBe expected(operands, digits)
       }
     }
@@ -38,11 +40,32 @@ class DividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
       val operands =
         (for (n <- BigInt(0) +: extremes; d <- extremes) yield (n, d)) ++
           Seq.fill(150)((top | BigInt(mantissaBits - 1, random), top | BigInt(mantissaBits - 1, random)))
-      test(new Divider(mantissaBits, digits)) { unit =>
+      for (digitsPerCycle <- 1 to 2) test(new Divider(mantissaBits, digits, digitsPerCycle)) { unit =>
         for (stalls <- Seq(0.0, 0.7))
           quotients(unit, operands, random, stalls) shouldBe expected(operands, digits)
       }
     }
+
+  it should "give the floor of the exact quotient, at any width and number of digits" in holds(cases = 10) {
+    def mantissa(bits: Int): Gen[BigInt] = Gen.choose(BigInt(1) << (bits - 1), (BigInt(1) << bits) - 1)
+    val divisions                        = for {
+      mantissaBits <- Gen.choose(1, 40)
+      digits       <- Gen.choose(0, 40)
+      operands     <- Gen.listOfN(12, Gen.zip(mantissa(mantissaBits), mantissa(mantissaBits)))
+      stalls       <- Gen.oneOf(0.0, 0.5)
+    } yield (mantissaBits, digits, operands, stalls)
+    Prop.forAllNoShrink(divisions) { case (mantissaBits, digits, operands, stalls) =>
+      test(new Divider(mantissaBits, digits)) { unit =>
+        val found = quotients(unit, operands, new Random(1), stalls)
+        for ((quotient, (numerator, denominator)) <- found.zip(operands))
+          withClue(s"$numerator / $denominator, $mantissaBits bits, $digits digits: ") {
+            assert(quotient * denominator <= (numerator << digits))
+            assert((numerator << digits) < (quotient + 1) * denominator)
+          }
+      }
+      true
+    }
+  }
 
   it should "take one division every steps + 1 cycles when nobody stalls" in {
     test(new Divider(32, 18)) { unit =>

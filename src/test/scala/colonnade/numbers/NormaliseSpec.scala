@@ -2,6 +2,8 @@ package colonnade.numbers
 
 import chisel3._
 import chiseltest._
+import colonnade.Properties
+import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -16,7 +18,7 @@ private class NormaliseHarness(width: Int, mantissaBits: Int) extends Module {
   bitLength := Normalise.bitLength(x)
 }
 
-class NormaliseSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+class NormaliseSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Properties {
   behavior of "Normalise"
 
   private def check(unit: NormaliseHarness, x: BigInt, mantissaBits: Int): Unit = {
@@ -46,4 +48,28 @@ class NormaliseSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers
           check(unit, (BigInt(1) << (length - 1)) | BigInt(length - 1, random), mantissaBits)
       }
     }
+
+  it should "give a mantissa with its top bit set, and lose less than its last bit, at any width" in holds(cases = 12) {
+    val operands = for {
+      width        <- Gen.choose(1, 100)
+      mantissaBits <- Gen.choose(1, 40)
+      values       <- Gen.listOfN(20, RoundingSpec.signed(width + 1).map(_.abs.min((BigInt(1) << width) - 1)))
+    } yield (width, mantissaBits, values)
+    Prop.forAllNoShrink(operands) { case (width, mantissaBits, values) =>
+      test(new NormaliseHarness(width, mantissaBits)) { unit =>
+        for (x <- values) withClue(s"$width bits, mantissa of $mantissaBits bits, x $x: ") {
+          unit.x.poke(x)
+          val mantissa = unit.result.mantissa.peek().litValue
+          val exponent = unit.result.exponent.peek().litValue.toInt
+          if (x == 0) (mantissa, exponent) shouldBe ((BigInt(0), 0))
+          else {
+            mantissa.bitLength shouldBe mantissaBits
+            // mantissa ≤ x / 2^(exponent - mantissaBits) < mantissa + 1
+            assert(RoundingSpec.isFloor(mantissa, x, exponent - mantissaBits))
+          }
+        }
+      }
+      true
+    }
+  }
 }

@@ -2,6 +2,8 @@ package colonnade.numbers
 
 import chisel3._
 import chiseltest._
+import colonnade.Properties
+import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -25,7 +27,7 @@ private class RoundingHarness(width: Int, amounts: Seq[Int]) extends Module {
   val between          = RoundingSpec.ranges.map { case (low, high) => shown(Rounding.saturate(signed, low, high)) }
 }
 
-class RoundingSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+class RoundingSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Properties {
   import RoundingSpec._
 
   behavior of "Rounding"
@@ -56,6 +58,30 @@ class RoundingSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       }
     }
 
+  it should "give the integer next to x / 2^n, at any width and amount" in holds(cases = 12) {
+    val operands = for {
+      width   <- Gen.choose(1, 80)
+      amounts <- Gen.listOfN(3, Gen.choose(-8, width + 8))
+      values  <- Gen.listOfN(20, signed(width))
+    } yield (width, amounts, values)
+    Prop.forAllNoShrink(operands) { case (width, amounts, values) =>
+      test(new RoundingHarness(width, amounts)) { unit =>
+        for (x <- values) {
+          val natural = x + (BigInt(1) << (width - 1))
+          unit.signed.poke(x)
+          unit.unsigned.poke(natural)
+          for ((n, i) <- amounts.zipWithIndex) withClue(s"$width bits, x $x (unsigned $natural), $n bits: ") {
+            assert(isFloor(unit.floors(i).peek().litValue, x, n))
+            assert(isFloor(unit.unsignedFloors(i).peek().litValue, natural, n))
+            assert(isNearestEven(unit.nearests(i).peek().litValue, x, n))
+            assert(isNearestEven(unit.unsignedNearests(i).peek().litValue, natural, n))
+          }
+        }
+      }
+      true
+    }
+  }
+
   it should "keep no more bits than the result needs" in {
     test(new RoundingHarness(6, Seq(2))) { unit =>
       unit.floors.head.getWidth shouldBe 4
@@ -71,6 +97,26 @@ private object RoundingSpec {
     Seq[(Int, Int)]((-4, 7), (0, 5), (-7, -3), (3, 3), (9, 20), (-100, 100)).map { case (a, b) =>
       (BigInt(a), BigInt(b))
     }
+
+  /** Every length, so that small numbers occur as often as large ones. */
+  def signed(width: Int): Gen[BigInt] = for {
+    length <- Gen.choose(0, width - 1)
+    bits   <- Gen.choose(BigInt(0), (BigInt(1) << length) - 1)
+    sign   <- Gen.oneOf(true, false)
+  } yield if (sign) -bits - 1 else bits
+
+  /** result ≤ x / 2^n < result + 1, both sides times what makes them whole. */
+  def isFloor(result: BigInt, x: BigInt, n: Int): Boolean = {
+    val (whole, step) = (x << (-n).max(0), BigInt(1) << n.max(0))
+    result * step <= whole && whole < (result + 1) * step
+  }
+
+  /** |result - x / 2^n| ≤ ½, and an even result where that is ½. */
+  def isNearestEven(result: BigInt, x: BigInt, n: Int): Boolean = {
+    val (whole, step) = (x << (-n).max(0), BigInt(1) << n.max(0))
+    val twice         = 2 * (result * step - whole).abs
+    twice < step || (twice == step && !result.testBit(0))
+  }
 
   /** By integer division, which truncates, made to floor. */
   def floor(x: BigInt, bits: Int): BigInt =

@@ -1,12 +1,14 @@
 package colonnade.numbers
 
 import chiseltest._
+import colonnade.Properties
+import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
 import scala.util.Random
 
-class SquareRootSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+class SquareRootSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Properties {
   behavior of "SquareRoot"
 
   private def roots(unit: SquareRoot, radicands: Seq[BigInt], random: Random, stalls: Double): Seq[BigInt] =
@@ -43,4 +45,19 @@ class SquareRootSpec extends AnyFlatSpec with ChiselScalatestTester with Matcher
         }
       }
     }
+
+  it should "find the floor of the exact root, at any width" in holds(cases = 10) {
+    val numbers = for {
+      bits      <- Gen.choose(1, 70)
+      radicands <- Gen.listOfN(12, RoundingSpec.signed(bits + 1).map(_.abs.min((BigInt(1) << bits) - 1)))
+      stalls    <- Gen.oneOf(0.0, 0.5)
+    } yield (bits, radicands, stalls)
+    Prop.forAllNoShrink(numbers) { case (bits, radicands, stalls) =>
+      test(new SquareRoot(bits)) { unit =>
+        val found = roots(unit, radicands, new Random(1), stalls)
+        for ((root, radicand) <- found.zip(radicands)) assert(isFloorOfRoot(root, radicand), s"$bits bits: $radicand")
+      }
+      true
+    }
+  }
 }

@@ -62,7 +62,6 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       val shown = if (offers) sent else requests.size - 1
       if (shown != offered) offer(setup.io.request.bits, requests(shown))
       offered = shown
-      setup.io.busy.expect(sent > left.size)
       if (accepts && setup.io.ray.valid.peekBoolean()) {
         expect(setup.io.ray.bits, requests(left.size), answers(left.size))
         left :+= cycle
@@ -71,7 +70,6 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       setup.clock.step()
       cycle += 1
     }
-    setup.io.busy.expect(false)
     left
   }
 

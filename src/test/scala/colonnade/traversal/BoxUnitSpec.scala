@@ -75,5 +75,5 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
 private class PackedBoxUnit(config: ColonnadeConfig)
     extends PackedUnit(new BoxCandidate(config), new BoxResult(config)) {
   private val unit = chisel3.Module(new BoxUnit(config))
-  connect(unit.io.in, unit.io.out, unit.io.busy)
+  connect(unit.io.in, unit.io.out)
 }

@@ -14,19 +14,25 @@ import scala.util.Random
 class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "RecordFetch"
 
-  private def variant(contexts: Int, banks: Int, snooping: Boolean): ColonnadeConfig = TestConfigs.tiny.copy(
-    array = TestConfigs.tiny.array.copy(rows = 3, contexts = contexts),
-    columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(banks = banks, snooping = snooping)
-  )
+  private def variant(contexts: Int, banks: Int, snooping: Boolean, recordBuffers: Int = 2): ColonnadeConfig =
+    TestConfigs.tiny.copy(
+      array = TestConfigs.tiny.array.copy(rows = 3, contexts = contexts),
+      columnBvhMemory =
+        TestConfigs.tiny.columnBvhMemory.copy(banks = banks, snooping = snooping, recordBuffers = recordBuffers)
+    )
 
   private val row         = 1
   private val recordCount = 24
 
   private def contentOf(address: Int): BigInt = BigInt(address) * 1000003 + 7
 
-  for (contexts <- Seq(1, 4); banks <- Seq(1, 2); snooping <- Seq(true, false)) {
-    it should s"serve $contexts contexts from $banks banks, snooping $snooping" in {
-      val config = variant(contexts, banks, snooping)
+  for {
+    (contexts, recordBuffers) <- Seq((1, 2), (4, 1), (4, 2), (6, 5))
+    banks                     <- Seq(1, 2)
+    snooping                  <- Seq(true, false)
+  } {
+    it should s"serve $contexts contexts from $banks banks and $recordBuffers buffers, snooping $snooping" in {
+      val config = variant(contexts, banks, snooping, recordBuffers)
       test(new RecordFetch(config)) { dut =>
         new Column(dut, config, new Random(contexts * 10 + banks)).run(wishes = 200)
       }

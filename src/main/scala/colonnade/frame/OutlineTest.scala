@@ -1,0 +1,70 @@
+package colonnade.frame
+
+import chisel3._
+import chisel3.util.{Decoupled, RegEnable}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.FrameSettings
+import colonnade.unit.PixelPosition
+
+/** A square of pixels, by its first one. */
+final class TestedSquare(config: ColonnadeConfig) extends Bundle {
+  val first = new PixelPosition(config)
+
+  /** One of its pixels may see the object. */
+  val meetsObject = Bool()
+}
+
+/** Ports of [[OutlineTest]]. */
+final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
+  val frame   = Input(new FrameSettings(config.numbers))
+  val squares = Flipped(Decoupled(new PixelPosition(config)))
+  val tested  = Decoupled(new TestedSquare(config))
+
+  /** No square is inside. */
+  val isIdle = Output(Bool())
+}
+
+/** Holds squares of `size` pixels against the object's rectangle and outline: a square meets the object unless it lies
+  * outside the rectangle or wholly outside one edge's half-plane.
+  *
+  * One square a cycle, in order, two cycles after it came: products, then their sums.
+  */
+final class OutlineTest(config: ColonnadeConfig, size: Int) extends Module {
+  val io = IO(new OutlineTestIO(config))
+
+  private val rectangle = io.frame.objectRect
+  private val outline   = io.frame.objectOutline
+
+  // Handshake
+  private val isMultiplied = RegInit(false.B)
+  private val isTested     = RegInit(false.B)
+  private val adds         = !isTested || io.tested.ready
+  private val multiplies   = !isMultiplied || adds
+  when(multiplies) { isMultiplied := io.squares.valid }
+  when(adds) { isTested := isMultiplied }
+  io.squares.ready := multiplies
+  io.tested.valid  := isTested
+  io.isIdle        := !isMultiplied && !isTested
+
+  // Products, of the corner that is furthest inside
+  private val square   = io.squares.bits
+  private val inRect   = spans(square.x, rectangle.x0, rectangle.x1) && spans(square.y, rectangle.y0, rectangle.y1)
+  private val products = outline.map { edge =>
+    Seq(edge.x -> square.x, edge.y -> square.y).map { case (normal, first) =>
+      val furthest = Mux(normal > 0.S, first +& (size - 1).U, first)
+      RegEnable(normal * furthest.zext, multiplies)
+    }
+  }
+  private val multiplied = RegEnable(square, multiplies)
+  private val isInRect   = RegEnable(inRect, multiplies)
+
+  // Sums
+  private val isInside =
+    outline.zip(products).map { case (edge, Seq(ofX, ofY)) => (ofX +& ofY) +& edge.offset >= 0.S }.reduce(_ && _)
+  io.tested.bits.first       := RegEnable(multiplied, adds)
+  io.tested.bits.meetsObject := RegEnable(isInRect && isInside, adds)
+
+  /** The square, and an interval that may be empty, have pixels in common in one direction. */
+  private def spans(first: UInt, low: UInt, high: UInt): Bool =
+    low < high && first < high && first +& size.U > low
+}

@@ -1,0 +1,53 @@
+package colonnade
+
+import colonnade.config._
+import org.scalacheck.Gen
+
+/** Any configuration that the generator accepts. */
+object ArbitraryConfig {
+  private val flag = Gen.oneOf(true, false)
+
+  private val precision =
+    Gen.zip(width, width, width).map { case (mac, sqrt, div) => PrecisionConfig(mac, sqrt, div) }
+
+  private def width: Gen[Int] = Gen.chooseNum(16, 64, 17, 32, 63)
+
+  private val array = for {
+    rows     <- Gen.chooseNum(1, 100)
+    columns  <- Gen.chooseNum(1, 100)
+    contexts <- Gen.chooseNum(1, 16)
+  } yield ArrayConfig(rows, columns, contexts)
+
+  private val geometry = for {
+    vertexBits         <- Gen.chooseNum(10, 24)
+    boxBits            <- Gen.chooseNum(4, 12)
+    triangleBits       <- Gen.option(width)
+    arity              <- Gen.oneOf(2, 4)
+    trianglesPerRecord <- Gen.oneOf(1, 2)
+    bvh                <- flag
+  } yield GeometryConfig(vertexBits, boxBits, triangleBits, arity, trianglesPerRecord, bvh)
+
+  private val memory = for {
+    depth       <- Gen.chooseNum(16, 1 << 22, 17, 1024, 1 << 17)
+    banks       <- Gen.oneOf(1, 2, 4)
+    stackDepth  <- Gen.chooseNum(4, 256)
+    snooping    <- flag
+    readLatency <- Gen.chooseNum(1, 16)
+  } yield ColumnBvhMemoryConfig(depth, banks, stackDepth, snooping, readLatency)
+
+  private val frame = for {
+    maxWidth  <- Gen.chooseNum(8, 4096)
+    maxHeight <- Gen.chooseNum(8, 4096)
+    tileSize  <- Gen.oneOf(4, 8, 16, 32)
+    materials <- Gen.chooseNum(1, 256)
+    hits      <- flag
+  } yield FrameConfig(maxWidth, maxHeight, tileSize, materials, hits)
+
+  val legal: Gen[ColonnadeConfig] = for {
+    array     <- array
+    precision <- precision
+    geometry  <- geometry
+    memory    <- memory
+    frame     <- frame
+  } yield ColonnadeConfig(array, precision, geometry, memory, frame)
+}

@@ -1,0 +1,60 @@
+package colonnade.frame
+
+import chiseltest._
+import colonnade.TestConfigs
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+class BackgroundWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "BackgroundWalker"
+
+  for (hits <- Seq(true, false))
+    it should s"colour every pixel of clipped tiles once, in Morton order, under stalls, with hits $hits" in {
+      val config = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(tileSize = 4, hits = hits))
+      val size   = (13, 6)
+      val tiles  = TileScanSpec.tiles(size, 4)
+      val colour = Seq(4095, 17, 2048)
+      test(new BackgroundWalker(config)) { dut =>
+        dut.io.frame.pixelsWide.poke(size._1)
+        dut.io.frame.pixelsHigh.poke(size._2)
+        dut.io.colour.channels.zip(colour).foreach { case (port, value) => port.poke(value) }
+        for ((willing, seed) <- Seq((1.0, 1), (0.3, 2))) {
+          val random  = new Random(seed)
+          val visited = TileScanSpec.walk(dut.clock, dut.io.tiles, dut.io.pixels, () => dut.io.isIdle.peekBoolean())(
+            tiles,
+            () => random.nextDouble() < willing
+          ) { pixel =>
+            pixel.isObject.expect(false)
+            for (hit <- pixel.hit) {
+              hit.triangle.expect(0)
+              assert(hit.distance.raw.peek().litValue == 0)
+            }
+            assert(pixel.colour.channels.map(_.peekInt().toInt) == colour)
+            (pixel.x.peekInt().toInt, pixel.y.peekInt().toInt)
+          }
+          assert(visited == tiles.flatMap(TileScanSpec.pixels(size, _, 4)))
+        }
+      }
+    }
+
+  it should "give a pixel a cycle, and be idle before the first and after the last" in {
+    val config = TileScanSpec.config(tileSize = 8)
+    test(new BackgroundWalker(config)) { dut =>
+      dut.io.frame.pixelsWide.poke(640)
+      dut.io.frame.pixelsHigh.poke(480)
+      dut.io.pixels.ready.poke(true)
+      dut.io.isIdle.expect(true)
+      dut.io.tiles.valid.poke(true)
+      dut.clock.step()
+      dut.io.tiles.valid.poke(false)
+      for (_ <- 0 until 64) {
+        dut.io.pixels.valid.expect(true)
+        dut.io.isIdle.expect(false)
+        dut.clock.step()
+      }
+      dut.io.pixels.valid.expect(false)
+      dut.io.isIdle.expect(true)
+    }
+  }
+}

@@ -1,0 +1,190 @@
+package colonnade.unit
+
+import chisel3._
+import chiseltest._
+import colonnade.TestConfigs
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{NodeRecord, RecordFormats}
+import colonnade.numbers.FixedPorts._
+import colonnade.ray.BoxRay
+import colonnade.traversal.{Packed, SmallTree, StackReference}
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.collection.mutable
+import scala.util.Random
+
+/** Whole trees, walked as the render unit does: each visit is served after a while, leaves may shrink the limit. */
+class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "Traversal"
+
+  private def config(contexts: Int, arity: Int, bvh: Boolean = true): ColonnadeConfig = TestConfigs.tiny.copy(
+    array = TestConfigs.tiny.array.copy(contexts = contexts),
+    geometry = TestConfigs.tiny.geometry.copy(arity = arity, bvh = bvh)
+  )
+
+  for ((contexts, arity) <- Seq((5, 4), (2, 2)))
+    it should s"walk trees of arity $arity with $contexts contexts like the reference" in {
+      val shape = config(contexts, arity)
+      test(new TraversalHarness(shape)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+        for ((accepted, shrinks, seed) <- Seq((1.0, false, 1), (0.4, true, 2), (0.8, true, 3)))
+          new TreeWalkers(dut, shape, seed).run(rays = 40, accepted, shrinks)
+      }
+    }
+
+  it should "visit every triangles record without a tree" in
+    test(new TraversalHarness(config(contexts = 2, arity = 4, bvh = false))) { dut =>
+      dut.io.scene.triangleBase.poke(5)
+      dut.io.scene.triangleRecords.poke(4)
+      dut.io.visits.ready.poke(true)
+      for (context <- 0 until 2) {
+        dut.io.start.valid.poke(true)
+        dut.io.start.bits.poke(context)
+        dut.clock.step()
+      }
+      dut.io.start.valid.poke(false)
+      for (visit <- 1 to 4; context <- 0 until 2) {
+        dut.io.resume.valid.poke(true)
+        dut.io.resume.bits.poke(context)
+        dut.clock.step()
+        dut.io.resume.valid.poke(false)
+        for (_ <- 0 until 10 if !dut.io.visits.valid.peekBoolean()) dut.clock.step()
+        dut.io.visits.valid.expect(true)
+        dut.io.visits.bits.context.expect(context)
+        dut.io.visits.bits.isDone.expect(visit == 4)
+        if (visit < 4) dut.io.visits.bits.visit.address.expect(5 + visit)
+        dut.clock.step()
+      }
+    }
+}
+
+/** With the ray in one port. */
+private class TraversalHarness(config: ColonnadeConfig) extends Module {
+  private val unit = Module(new Traversal(config))
+
+  val ray = IO(Input(UInt(new BoxRay(config.numbers).getWidth.W)))
+  val io  = IO(chiselTypeOf(unit.io))
+  io :<>= unit.io
+  unit.io.ray := ray.asTypeOf(new BoxRay(config.numbers))
+}
+
+/** Rays in a random tree; each context has one or none. */
+private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: Int) {
+  private final class Walk(val ray: Int) {
+    var limit  = farthest
+    var leaves = Vector.empty[Int]
+  }
+
+  private val contexts  = config.array.contexts
+  private val farthest  = (BigInt(1) << (config.numbers.boxDistanceBits - 1)) - 1
+  private val random    = new Random(seed)
+  private val tree      = new SmallTree(config, rayCount = 40, seed)
+  private val reference = new StackReference(contexts, config.columnBvhMemory.stackDepth)
+  private val walks     = mutable.Map.empty[Int, Walk]
+
+  private val rayBits    = tree.rays.map(ray => new Packed(new BoxRay(config.numbers)).pack(tree.fields(ray, "ray.")))
+  private val recordBits = tree.nodes.map(node => new Packed(new NodeRecord(config)).pack(tree.fields(node, "node.")))
+
+  /** Where contexts are: a record is read, and is then offered; or the next visit is expected. */
+  private val reading  = mutable.Map.empty[Int, StackReference.Child]
+  private val nodes    = mutable.Queue.empty[(Int, Int)]
+  private val resuming = mutable.Queue.empty[Int]
+  private val expected = mutable.Map.empty[Int, Option[StackReference.Child]]
+  private var begun    = 0
+  private var ended    = 0
+  private var visits   = 0
+
+  dut.io.clear.poke(true)
+  dut.clock.step()
+  dut.io.clear.poke(false)
+
+  def run(rays: Int, accepted: Double, shrinks: Boolean): Unit = {
+    var idle = 0
+    while (ended < rays) {
+      val starts =
+        (0 until contexts).find(!walks.contains(_)).filter(_ => begun < rays && random.nextBoolean())
+      dut.io.start.valid.poke(starts.nonEmpty)
+      starts.foreach(begin)
+      offer()
+      val accepts = random.nextDouble() < accepted
+      dut.io.visits.ready.poke(accepts)
+
+      idle += 1
+      assert(idle < 100, "nothing happens")
+      if (accepts && dut.io.visits.valid.peekBoolean()) {
+        take()
+        idle = 0
+      }
+      if (nodes.nonEmpty && dut.io.nodes.ready.peekBoolean()) nodes.dequeue()
+      if (resuming.nonEmpty && dut.io.resume.ready.peekBoolean()) resuming.dequeue()
+      dut.clock.step()
+      for (context <- reading.keys.toSeq.sorted if random.nextInt(3) == 0) finish(context, shrinks)
+    }
+    dut.io.deepest.expect(reference.deepest)
+    assert(reference.overflows == 0 && visits > 2 * rays, s"only $visits visits of $rays rays")
+  }
+
+  private def begin(context: Int): Unit = {
+    dut.io.start.bits.poke(context)
+    reference.start(context)
+    walks(context) = new Walk(begun)
+    dut.io.limits(context).pokeRaw(farthest)
+    reading(context) = StackReference.Child(isLeaf = false, address = 0, near = 0)
+    begun += 1
+  }
+
+  private def offer(): Unit = {
+    dut.io.nodes.valid.poke(nodes.nonEmpty)
+    for ((context, address) <- nodes.headOption) {
+      dut.io.nodes.bits.context.poke(context)
+      dut.io.nodes.bits.record.poke(recordBits(address).U(new RecordFormats(config).recordBits.W))
+      dut.ray.poke(rayBits(walks(context).ray))
+    }
+    dut.io.resume.valid.poke(resuming.nonEmpty)
+    resuming.headOption.foreach(dut.io.resume.bits.poke(_))
+  }
+
+  /** A context has its record: it goes to the box unit, or a leaf is tested and the ray goes on. */
+  private def finish(context: Int, shrinks: Boolean): Unit = {
+    val walk  = walks(context)
+    val visit = reading.remove(context).get
+    if (visit.isLeaf) {
+      walk.leaves :+= visit.address.toInt
+      if (shrinks && random.nextInt(3) == 0) {
+        walk.limit = walk.limit.min(visit.near + random.nextInt(1 << config.numbers.vertexBits))
+        dut.io.limits(context).pokeRaw(walk.limit)
+      }
+      expected(context) = reference.resume(context, walk.limit)
+      resuming += context
+    } else {
+      val address = visit.address.toInt
+      expected(context) = reference.result(context, tree.children(walk.ray, address, walk.limit), walk.limit)
+      nodes += ((context, address))
+    }
+  }
+
+  private def take(): Unit = {
+    val next    = dut.io.visits.bits
+    val context = next.context.peekInt().toInt
+    assert(expected.contains(context), s"context $context has asked for nothing")
+    val answer = expected.remove(context).get
+    next.isDone.expect(answer.isEmpty)
+    for (child <- answer) {
+      next.visit.isLeaf.expect(child.isLeaf)
+      next.visit.address.expect(child.address)
+      reading(context) = child
+      visits += 1
+    }
+    if (answer.isEmpty) {
+      end(walks.remove(context).get)
+      ended += 1
+    }
+  }
+
+  /** Each leaf was visited once at most; none that lies within the last limit was left out. */
+  private def end(walk: Walk): Unit = {
+    val visited = walk.leaves.toSet
+    assert(visited.size == walk.leaves.size, walk.leaves.toString)
+    assert(tree.leaves(walk.ray, walk.limit).subsetOf(visited))
+    assert(visited.subsetOf(tree.leaves(walk.ray, farthest)))
+  }
+}
