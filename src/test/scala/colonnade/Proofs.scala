@@ -14,7 +14,7 @@ trait Proofs { this: TestSuite with HasTestName =>
     * Fails also where the proof says nothing: where assumptions contradict one another, or a `cover` can't happen.
     */
   def prove(cycles: Int)(module: => Module): Unit = {
-    assume(Proofs.hasZ3, "z3 is not installed")
+    if (!Proofs.hasZ3) cancel("z3 is not installed")
     BoundedProof.objection(() => module, cycles, s"test_run_dir/$getTestName").foreach(fail(_))
   }
 }

@@ -2,8 +2,8 @@ package chiseltest.formal.backends.bounded
 
 import chisel3.Module
 import chiseltest.formal.backends.smt.SolverContext
-import chiseltest.formal.backends.{TransitionSystemSimulator, Witness}
 import firrtl2.backends.experimental.smt._
+import treadle2.vcd.VCD
 
 /** Checks a module by z3 in the cycles that follow one cycle of reset. Lies in chiseltest's package, whose parts are
   * private to it. Its own `verify` does not get through larger modules, passes where assumptions contradict one
@@ -32,8 +32,8 @@ private final class BoundedProof(proof: ProofSystem) {
     val cycles = new Unrolling(proof.system, cycle)
     cycles.search(any(proof.assertions.map(cycles.bit(_, cycle)))) { z3 =>
       val violated = proof.assertions.filter(name => z3.getValue(cycles.bit(name, cycle)).contains(BigInt(1)))
-      val file     = writeTrace(violated, cycle, z3, cycles)
-      s"violated in cycle $cycle after the reset: ${violated.map(proof.describe).mkString(", ")}; see ${file.relativeTo(os.pwd)}"
+      val trace    = writeTrace(cycle, z3, cycles).relativeTo(os.pwd)
+      s"violated in cycle $cycle after the reset: ${violated.map(proof.describe).mkString(", ")}; see $trace"
     }
   }
 
@@ -51,19 +51,17 @@ private final class BoundedProof(proof: ProofSystem) {
 
   private def any(bits: Seq[BVExpr]): BVExpr = bits.reduce(BVOr(_, _))
 
-  /** All signals up to the violation, as a waveform. */
-  private def writeTrace(violated: Seq[String], cycle: Int, z3: SolverContext, cycles: Unrolling): os.Path = {
-    def values(symbols: Seq[SMTSymbol], cycle: Int): Map[Int, BigInt] =
-      symbols.zipWithIndex.flatMap { case (symbol, i) =>
-        z3.getValue(cycles.at(symbol.asInstanceOf[BVSymbol], cycle)).map(i -> _)
-      }.toMap
-
-    val file   = proof.directory / s"$name.vcd"
-    val inputs = (0 to cycle).map(values(proof.system.inputs, _))
-    new TransitionSystemSimulator(proof.system).run(
-      Witness(violated, values(proof.system.states.map(_.sym), 0), Map.empty, inputs),
-      vcdFileName = Some(file.toString)
-    )
+  /** All values up to the violation, as a waveform: a time step a cycle, from the reset on. */
+  private def writeTrace(cycle: Int, z3: SolverContext, cycles: Unrolling): os.Path = {
+    val trace = VCD(name)
+    for (symbol <- cycles.symbols) trace.addWire(symbol.name, symbol.width)
+    for (time <- 0 to cycle) {
+      for (symbol <- cycles.symbols; value <- z3.getValue(cycles.at(symbol, time)))
+        trace.wireChanged(symbol.name, value)
+      trace.incrementTime()
+    }
+    val file = proof.directory / s"$name.vcd"
+    trace.write(file.toString)
     file
   }
 }

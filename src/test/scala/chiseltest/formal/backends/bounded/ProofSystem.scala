@@ -53,8 +53,8 @@ private[bounded] object ProofSystem {
     )
   }
 
-  /** The flat system does not know covers: asserts the contrary, and notes its name. Also notes the texts of assertions by place,
-    * which are in a print of their own.
+  /** The flat system does not know covers: asserts the contrary, and notes its name. Also notes the texts of assertions
+    * by place, which are in a print of their own.
     */
   private def withoutCovers(
       statement: ir.Statement,

@@ -8,10 +8,16 @@ import firrtl2.backends.experimental.smt._
   * first is the one for which it simplifies everything, later ones take several times as long.
   */
 private[bounded] final class Unrolling(system: TransitionSystem, cycles: Int) {
-  private val names       = (system.inputs ++ system.states.map(_.sym) ++ system.signals.map(_.sym)).map(_.name).toSet
   private val assumptions = system.signals.filter(_.lbl == IsConstraint).map(_.name)
 
-  /** A signal, register or input of one bit. */
+  private val registers = system.states.map(_.sym.asInstanceOf[BVSymbol])
+  private val signals   = system.signals.map(signal => signal.sym.asInstanceOf[BVSymbol] -> signal.e)
+
+  /** Inputs, registers and signals: what has a value in each cycle. */
+  val symbols: Seq[BVSymbol] = system.inputs ++ registers ++ signals.map(_._1)
+  private val names = symbols.map(_.name).toSet
+
+  /** A symbol of one bit in a cycle. */
   def bit(name: String, cycle: Int): BVSymbol = at(BVSymbol(name, 1), cycle)
 
   def at(symbol: BVSymbol, cycle: Int): BVSymbol = BVSymbol(nameAt(symbol.name, cycle), symbol.width)
@@ -31,7 +37,7 @@ private[bounded] final class Unrolling(system: TransitionSystem, cycles: Int) {
     def equate(symbol: BVSymbol, value: SMTExpr): Unit =
       z3.assert(BVEqual(at(symbol, cycle), value.asInstanceOf[BVExpr]))
 
-    (system.inputs ++ registers ++ signals.keys).foreach(s => z3.runCommand(DeclareFunction(at(s, cycle), Seq())))
+    symbols.foreach(symbol => z3.runCommand(DeclareFunction(at(symbol, cycle), Seq())))
     for ((register, state) <- registers.zip(system.states)) {
       val value = if (cycle == 0) state.init.map(at(_, 0)) else state.next.map(at(_, cycle - 1))
       value.foreach(equate(register, _))
@@ -40,11 +46,6 @@ private[bounded] final class Unrolling(system: TransitionSystem, cycles: Int) {
     z3.assert(BVEqual(bit("reset", cycle), BVLiteral(if (cycle == 0) 1 else 0, 1)))
     assumptions.foreach(assumption => z3.assert(bit(assumption, cycle)))
   }
-
-  private def registers: Seq[BVSymbol] = system.states.map(_.sym.asInstanceOf[BVSymbol])
-
-  private lazy val signals: Map[BVSymbol, SMTExpr] =
-    system.signals.map(signal => signal.sym.asInstanceOf[BVSymbol] -> signal.e).toMap
 
   private def at(expression: SMTExpr, cycle: Int): SMTExpr = expression match {
     case symbol: BVSymbol if names(symbol.name) => at(symbol, cycle)
