@@ -57,14 +57,19 @@ def design_result(reports: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         reports: by mesh, from `measure`; at least one.
     """
     first = next(iter(reports.values()))
+    meshes = {name: mesh_result(report) for name, report in reports.items()}
     in_box = geometric_mean(report["rays_per_cycle_in_box"] for report in reports.values())
     return {
         "config": first["config"],
         "config_hash": first["config_hash"],
         "size": first["size"],
-        "meshes": {name: mesh_result(report) for name, report in reports.items()},
+        "meshes": meshes,
         "geomean_rays_per_cycle_in_box": in_box,
         "geomean_rays_per_cycle": geometric_mean(report["rays_per_cycle"] for report in reports.values()),
+        "geomean_bounds": {
+            bound: geometric_mean(mesh["bounds"][bound] or 0.0 for mesh in meshes.values())
+            for bound in ("perfect_memory", "perfect_units")
+        },
         "ratio_to_paper": in_box / PAPER_RAYS_PER_CYCLE,
     }
 

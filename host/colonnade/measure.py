@@ -15,7 +15,7 @@ from colonnade.errors import UserError
 from colonnade.files import write_json
 from colonnade.generator import GeneratedDesign, design_for
 from colonnade.image import SceneImage
-from colonnade.meshes import load_mesh
+from colonnade.meshes import Mesh, load_mesh
 from colonnade.pack import pack
 from colonnade.parallel import in_order
 from colonnade.placement import placement
@@ -46,7 +46,7 @@ class Run:
 
     @property
     def title(self) -> str:
-        """For progress and errors."""
+        """For progress."""
         return " ".join((self.mesh, *self.overrides))
 
 
@@ -68,16 +68,23 @@ class Conditions:
 
 
 def measure(runs: Sequence[Run], conditions: Conditions, progress: Progress = QUIET) -> Iterator[dict[str, Any]]:
-    """Reports of the runs, in their order: those of `frame_report`, with ``cycles_per_second`` and ``seconds``."""
+    """Reports of the runs, in their order: those of `frame_report`, with ``cycles_per_second`` and ``seconds``.
+
+    All meshes are loaded before the first frame is rendered.
+    """
     scene = load_scene(conditions.scene)
+    meshes: dict[str, Mesh] = {}
+    with progress.step("loading the meshes"):
+        for name in dict.fromkeys(run.mesh for run in runs):
+            meshes[name] = load_mesh(scene.with_mesh(name).mesh_source)
 
     def one(run: Run) -> dict[str, Any]:
-        return _measured(run, scene, conditions, progress.of(run.title))
+        return _measured(run, scene, meshes[run.mesh], conditions, progress.of(run.title))
 
     return in_order(one, runs, conditions.jobs)
 
 
-def _measured(run: Run, scene: Scene, conditions: Conditions, progress: Progress) -> dict[str, Any]:
+def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progress: Progress) -> dict[str, Any]:
     scene = scene.with_mesh(run.mesh)
     with _BUILDING:
         design = design_for(run.config, run.overrides, progress)
@@ -86,10 +93,10 @@ def _measured(run: Run, scene: Scene, conditions: Conditions, progress: Progress
     begun = time.perf_counter()
     try:
         with progress.step("packing the scene"):
-            image = pack(load_mesh(scene.mesh_source), design.manifest)
+            image = pack(mesh, design.manifest)
             registers = placement(scene, image.header, design.manifest, width, height)
     except UserError as error:
-        raise UserError(f"{run.title}: {error}") from error
+        raise UserError(": ".join((*run.overrides, str(error)))) from error
     seconds = {"pack": time.perf_counter() - begun}
     kept = cache_directory(project_root()) / "measurements" / f"{_digest(design, image, registers)}.json"
     if conditions.reuse and kept.is_file():

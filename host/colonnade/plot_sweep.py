@@ -106,10 +106,18 @@ def _panels_of_meshes(report: Mapping[str, Any]) -> list[_Panel]:
     for mesh in report["base"]["meshes"]:
         lines: dict[str, list[tuple[Any, float]]] = {}
         for point in report["points"]:
-            name = ", ".join(f"{key.rpartition('.')[2]} {_text(point['values'][key])}" for key in others) or mesh
+            name = ", ".join(_phrase(key, point["values"][key]) for key in others) or mesh
             lines.setdefault(name, []).append((point["values"][first], point["meshes"][mesh]["rays_per_cycle_in_box"]))
         panels.append(_Panel(mesh, LABELS.get(first, first), lines, None))
     return panels
+
+
+def _phrase(key: str, value: Any) -> str:
+    """A field and its value in words: ``no snooping``, ``banks 2``."""
+    field = key.rpartition(".")[2]
+    if isinstance(value, bool):
+        return field if value else f"no {field}"
+    return f"{field} {_text(value)}"
 
 
 def _text(value: Any) -> str:

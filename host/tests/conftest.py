@@ -146,7 +146,10 @@ def manifest_json() -> dict[str, Any]:
     return manifest_data()
 
 
-SMALL_ARRAY = {"array": {"rows": 2, "columns": 3, "contexts": 4}, "columnBvhMemory": {"banks": 2}}
+SMALL_ARRAY = {
+    "array": {"rows": 2, "columns": 3, "contexts": 4},
+    "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1},
+}
 
 #: Of a frame of 100 cycles on `SMALL_ARRAY`: 600 unit cycles, 2,400 context cycles, 600 bank cycles, 300 stream cycles.
 COUNTERS = {

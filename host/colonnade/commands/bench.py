@@ -90,8 +90,11 @@ def bench(
     report = benchmark.bench(
         config, overrides, meshes or benchmark.MESHES, conditions, progress.for_terminal(), finished=show
     )
+    in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
+    means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])
+    table.print("geometric mean", None, None, *means, None, None, None, "")
     click.echo(
-        f"geometric mean {report['geomean_rays_per_cycle_in_box']:.3f} rays per cycle in box, "
+        f"{in_box:.3f} in-box rays per cycle: "
         f"{report['ratio_to_paper']:.1f} times the paper's {benchmark.PAPER_RAYS_PER_CYCLE}"
     )
     if plot is not None:
