@@ -20,7 +20,7 @@ from colonnade.pack import pack
 from colonnade.parallel import in_order
 from colonnade.placement import placement
 from colonnade.progress import QUIET, Progress
-from colonnade.render import frame_report, require_no_errors
+from colonnade.render import frame_report, mesh_report, require_no_errors
 from colonnade.scene import Scene, load_scene
 from colonnade.simulate import build_simulator, render_rtl
 from colonnade.sizes import check_size
@@ -100,8 +100,12 @@ def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
     seconds = {"pack": time.perf_counter() - begun}
     kept = cache_directory(project_root()) / "measurements" / f"{_digest(design, image, registers)}.json"
     if conditions.reuse and kept.is_file():
-        report: dict[str, Any] = json.loads(kept.read_text())
-        return report
+        known: dict[str, Any] = json.loads(kept.read_text())
+        return known | {
+            "config": design.manifest.config,
+            "config_hash": design.manifest.config_hash,
+            "mesh": mesh_report(image.header),
+        }
     with _BUILDING:
         build_simulator(design, progress)
     begun = time.perf_counter()

@@ -159,7 +159,7 @@ def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: F
     return {
         "backend": backend,
         "config": manifest.config,
-        "mesh": _mesh_report(header),
+        "mesh": mesh_report(header),
         "size": [width, height],
         "cycles": cycles,
         "rays": rays,
@@ -170,7 +170,8 @@ def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: F
     }
 
 
-def _mesh_report(header: ImageHeader) -> dict[str, Any]:
+def mesh_report(header: ImageHeader) -> dict[str, Any]:
+    """What a report says about the mesh."""
     return {"name": header.mesh, "triangles": header.triangles, "source_triangles": header.source_triangles}
 
 
