@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from colonnade.bench import PAPER_RAYS_PER_CYCLE
+from colonnade.bench import PAPER_RAYS_PER_CYCLE, geometric_mean
 from colonnade.files import replacing
 from colonnade.plot_sweep import LABELS
 
@@ -68,6 +68,16 @@ def rates(bench: Data, _: Path) -> str:
     titles += ["bound: perfect memory", "bound: perfect units", "bottleneck"]
     ratio = f"**{bench['ratio_to_paper']:.1f} times** the chip's {PAPER_RAYS_PER_CYCLE}."
     return f"{conditions} The geometric mean is {ratio}\n\n{markdown(titles, rows)}"
+
+
+def limits(bench: Data, _: Path) -> str:
+    """In-box rays per cycle that each unit or port alone would allow."""
+    meshes = bench["meshes"]
+    resources = list(next(iter(meshes.values()))["limits"])
+    rows = [(name, *(_number(mesh["limits"][resource]) for resource in resources)) for name, mesh in meshes.items()]
+    means = (geometric_mean(mesh["limits"][resource] or 0.0 for mesh in meshes.values()) for resource in resources)
+    rows.append(("geometric mean", *(f"**{mean:.2f}**" for mean in means)))
+    return markdown(["mesh", *resources], rows)
 
 
 def work(bench: Data, _: Path) -> str:
@@ -163,6 +173,7 @@ def _percent(share: float) -> str:
 #: Tables by the name in the page: the part of `tools/performance` whose data they show, and what writes them.
 TABLES: dict[str, tuple[str, Callable[[Data, Path], str]]] = {
     "rates": ("bench", rates),
+    "limits": ("bench", limits),
     "work": ("bench", work),
     "stages": ("bench", stages),
     "utilisation": ("bench", utilisation),

@@ -71,21 +71,24 @@ def figures(report: Mapping[str, Any]) -> dict[str, Any]:
     Returns:
         ``utilisation``, by unit and port, 0 to 1; ``bottleneck``, the busiest of them; ``stalls``, shares of all
         context cycles that add up to 1; ``per_ray``, for each in-box ray; ``snoop_share``, of the records that contexts
-        took; ``bounds``, in-box rays per cycle.
+        took; ``limits``, in-box rays per cycle that each unit or port alone would allow; ``bounds``, the least of those
+        of the units and of the ports.
     """
     counters, cycles = report["counters"], report["cycles"]
     shape = Shape.of(report["config"])
     use = utilisation(counters, cycles, shape)
     resources = {name: share for name, share in use.items() if name != RENDER_UNIT}
+    rate = report["rays_per_cycle_in_box"]
     return {
         "utilisation": use,
         "bottleneck": max(resources, key=lambda name: resources[name]),
         "stalls": stalls(counters, cycles, shape),
         "per_ray": per_ray(counters),
         "snoop_share": _ratio(counters["snoopHits"], records_taken(counters)),
+        "limits": {name: _bound(rate, [share]) for name, share in resources.items()},
         "bounds": {
-            "perfect_memory": _bound(report["rays_per_cycle_in_box"], (use[name] for name in UNITS)),
-            "perfect_units": _bound(report["rays_per_cycle_in_box"], (use[name] for name in PORTS)),
+            "perfect_memory": _bound(rate, (use[name] for name in UNITS)),
+            "perfect_units": _bound(rate, (use[name] for name in PORTS)),
         },
     }
 

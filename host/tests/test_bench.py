@@ -59,6 +59,12 @@ def test_bounds_let_the_busiest_be_busy_all_the_time(rtl_report: MakeReport) -> 
     )
 
 
+def test_limits_are_of_each_alone(rtl_report: MakeReport) -> None:
+    limits = throughput.figures(rtl_report(0.5))["limits"]
+    assert limits["shader"] == pytest.approx(50.0)
+    assert min(limits.values()) == limits["box unit"] == pytest.approx(0.625)
+
+
 def test_a_frame_without_rays_to_the_object_has_no_bounds_of_units(rtl_report: MakeReport) -> None:
     empty = rtl_report(0.0) | {
         "counters": dict.fromkeys(rtl_report(0.0)["counters"], 0) | {"raysPrimary": 300, "idleContexts": 2400}
