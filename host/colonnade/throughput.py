@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-#: Counters of busy cycles by the unit's name: cycles in which its input takes something or cannot take anything, summed
-#: over all render units.
+#: Counters of busy cycles by the unit's name: cycles in which its narrowest stage holds work, summed over all of them.
 UNITS = {
     "ray set-up": "busyRaySetup",
     "box unit": "busyBoxUnit",
@@ -43,12 +42,14 @@ class Shape:
 
     Attributes:
         units: render units.
+        triangle_units: triangle tests beside each other, of all render units.
         contexts: of all render units.
         columns: columns, each with a pixel stream.
         banks: of all columns.
     """
 
     units: int
+    triangle_units: int
     contexts: int
     columns: int
     banks: int
@@ -59,7 +60,8 @@ class Shape:
         columns = int(config["array"]["columns"])
         units = columns * int(config["array"]["rows"])
         banks = columns * int(config["columnBvhMemory"]["banks"])
-        return Shape(units, units * int(config["array"]["contexts"]), columns, banks)
+        lanes, contexts = int(config["units"]["triangleLanes"]), int(config["array"]["contexts"])
+        return Shape(units, units * lanes, units * contexts, columns, banks)
 
 
 def figures(report: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,9 +97,10 @@ def figures(report: Mapping[str, Any]) -> dict[str, Any]:
 
 def utilisation(counters: Mapping[str, int], cycles: int, shape: Shape) -> dict[str, float]:
     """Share of the frame's cycles in which each kind of unit or port was busy, averaged over all of its kind."""
+    instances = {unit: shape.triangle_units if unit == "triangle unit" else shape.units for unit in UNITS}
     return {
         RENDER_UNIT: 1.0 - _ratio(counters["idleContexts"], cycles * shape.contexts),
-        **{unit: _ratio(counters[counter], cycles * shape.units) for unit, counter in UNITS.items()},
+        **{unit: _ratio(counters[counter], cycles * instances[unit]) for unit, counter in UNITS.items()},
         "memory banks": _ratio(counters["recordReads"], cycles * shape.banks),
         "pixel streams": _ratio(counters["raysPrimary"], cycles * shape.columns),
     }

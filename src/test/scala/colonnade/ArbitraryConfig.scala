@@ -27,6 +27,11 @@ object ArbitraryConfig {
     bvh                <- flag
   } yield GeometryConfig(vertexBits, boxBits, triangleBits, arity, trianglesPerRecord, bvh)
 
+  private def units(arity: Int) = for {
+    boxLanes      <- Gen.oneOf(Seq(1, 2, 4).filter(_ <= arity))
+    triangleLanes <- Gen.chooseNum(1, 4)
+  } yield UnitsConfig(boxLanes, triangleLanes)
+
   private val memory = for {
     depth         <- Gen.chooseNum(16, 1 << 22, 17, 1024, 1 << 17)
     banks         <- Gen.oneOf(1, 2, 4)
@@ -49,7 +54,8 @@ object ArbitraryConfig {
     array     <- array
     precision <- precision
     geometry  <- geometry
+    units     <- units(geometry.arity)
     memory    <- memory
     frame     <- frame
-  } yield ColonnadeConfig(array, precision, geometry, memory, frame)
+  } yield ColonnadeConfig(array, precision, geometry, units, memory, frame)
 }

@@ -10,6 +10,7 @@ object TestConfigs {
     ArrayConfig(rows = 1, columns = 1, contexts = 4),
     PrecisionConfig(mac = 32, sqrt = 32, div = 64),
     GeometryConfig(vertexBits = 16, boxBits = 8, triangleBits = None, arity = 4, trianglesPerRecord = 2, bvh = true),
+    UnitsConfig(boxLanes = 2, triangleLanes = 1),
     ColumnBvhMemoryConfig(
       depth = 1024,
       banks = 2,

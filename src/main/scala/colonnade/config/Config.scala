@@ -50,6 +50,16 @@ final case class GeometryConfig(
   Require.oneOf("geometry.trianglesPerRecord", trianglesPerRecord, Seq(1, 2))
 }
 
+/** How much of a render unit's work is done side by side.
+  *
+  * @param boxLanes      children that the box unit tests in a cycle
+  * @param triangleLanes triangle tests of four cycles each that run beside each other
+  */
+final case class UnitsConfig(boxLanes: Int, triangleLanes: Int) {
+  Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
+  Require.within("units.triangleLanes", triangleLanes, 1, 4)
+}
+
 /** The memory that the render units of a column share.
   *
   * @param depth         records
@@ -96,8 +106,11 @@ final case class ColonnadeConfig(
     array:           ArrayConfig,
     precision:       PrecisionConfig,
     geometry:        GeometryConfig,
+    units:           UnitsConfig,
     columnBvhMemory: ColumnBvhMemoryConfig,
     frame:           FrameConfig
 ) {
+  Require.oneOf("units.boxLanes", units.boxLanes, Seq(1, 2, 4).filter(_ <= geometry.arity))
+
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 }

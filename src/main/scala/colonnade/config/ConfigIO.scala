@@ -29,7 +29,7 @@ object ConfigIO {
   }
 
   def read(json: ujson.Value): ColonnadeConfig = {
-    val root  = new ConfigReader("", json, Seq("array", "precision", "geometry", "columnBvhMemory", "frame"))
+    val root  = new ConfigReader("", json, Seq("array", "precision", "geometry", "units", "columnBvhMemory", "frame"))
     val array = root.section("array", "rows", "columns", "contexts")
     val shape = root.section(
       "geometry",
@@ -40,6 +40,7 @@ object ConfigIO {
       "trianglesPerRecord",
       "bvh"
     )
+    val units  = root.section("units", "boxLanes", "triangleLanes")
     val memory = root.section(
       "columnBvhMemory",
       "depth",
@@ -67,6 +68,7 @@ object ConfigIO {
         trianglesPerRecord = shape.int("trianglesPerRecord"),
         bvh = shape.boolean("bvh")
       ),
+      units = UnitsConfig(boxLanes = units.int("boxLanes"), triangleLanes = units.int("triangleLanes")),
       columnBvhMemory = ColumnBvhMemoryConfig(
         depth = memory.int("depth"),
         banks = memory.int("banks"),
@@ -88,7 +90,7 @@ object ConfigIO {
 
   /** The JSON that [[read]] takes, with `precision` spelled out. */
   def write(config: ColonnadeConfig): ujson.Obj = {
-    import config.{array, columnBvhMemory, frame, geometry, precision => widths}
+    import config.{array, units, columnBvhMemory, frame, geometry, precision => widths}
     ujson.Obj(
       "array" -> ujson.Obj(
         "rows"     -> array.rows,
@@ -104,6 +106,7 @@ object ConfigIO {
         "trianglesPerRecord" -> geometry.trianglesPerRecord,
         "bvh"                -> geometry.bvh
       ),
+      "units"           -> ujson.Obj("boxLanes" -> units.boxLanes, "triangleLanes" -> units.triangleLanes),
       "columnBvhMemory" -> ujson.Obj(
         "depth"         -> columnBvhMemory.depth,
         "banks"         -> columnBvhMemory.banks,

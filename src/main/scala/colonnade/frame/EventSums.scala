@@ -34,7 +34,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val bankConflicts    = perUnit
   val busyRaySetup     = perUnit
   val busyBoxUnit      = perUnit
-  val busyTriangleUnit = perUnit
+  val busyTriangleUnit = sum(units * config.units.triangleLanes)
   val busyShader       = perUnit
 
   val idleContexts      = perContext

@@ -1,7 +1,7 @@
 package colonnade.traversal
 
 import chisel3._
-import chisel3.util.{Decoupled, PopCount, Queue, RegEnable, ShiftRegister}
+import chisel3.util.{log2Ceil, Decoupled, Mux1H, PopCount, Queue, RegEnable, ShiftRegister}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{ChildKind, RecordFormats}
 import colonnade.numbers.Fixed
@@ -19,14 +19,15 @@ final class BoxUnitIO(config: ColonnadeConfig) extends Bundle {
 /** One ray against the children of one node (docs/numbers.md, section 3): which it enters, near to far, and where they
   * lie. Children of an illegal kind count as empty.
   *
-  * Two children a cycle: a node every cycle for arity 2, every second cycle for arity 4, in order. Latency 6 and 7
-  * cycles. The pipeline never stalls: as many nodes are let in as the queue behind it can take, and that is enough for
-  * full speed. Relies on what the packer and ray set-up guarantee: a child's planes are within two cubes of its node's
-  * corner, a ray's origin within half a cube of the object's cube, and a reciprocal has no more digits than set-up computes.
+  * `units.boxLanes` children a cycle: with two a node every cycle for arity 2, every second cycle for arity 4, in order.
+  * Latency 5 cycles and one for each cycle of a node. The pipeline never stalls: as many nodes are let in as the queue
+  * behind it can take, and that is enough for full speed. Relies on what the packer and ray set-up guarantee: a child's
+  * planes are within two cubes of its node's corner, a ray's origin within half a cube of the object's cube, and a
+  * reciprocal has no more digits than set-up computes.
   */
 class BoxUnit(config: ColonnadeConfig) extends Module {
-  import BoxUnit.lanes
   private val arity = config.geometry.arity
+  private val lanes = config.units.boxLanes
   private val beats = arity / lanes
 
   /** Nodes on their way from when one is let in to when its place is free again. */
@@ -38,23 +39,26 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   private val orders = Module(new Queue(new ChildOrder(config), places))
 
   // Let a node in; its first children start at once, the others follow without a gap
-  private val follows = if (beats > 1) RegNext(io.in.fire, false.B) else false.B
+  private val beat    = RegInit(0.U(log2Ceil(beats.max(2)).W))
+  private val follows = beat =/= 0.U
+  when(io.in.fire || follows) { beat := Mux(beat === (beats - 1).U, 0.U, beat + 1.U) }
   io.in.ready        := notes.io.enq.ready && !follows
   notes.io.enq.valid := io.in.fire
   notes.io.enq.bits  := BoxNote(config, io.in.bits)
   private val starts   = io.in.fire || follows
-  private val endsNode = if (beats > 1) follows else io.in.fire
+  private val endsNode = starts && beat === (beats - 1).U
 
   // Operands
   private val stored   = Seq.tabulate(arity)(BoxOperands.child(config, io.in.bits.node, _))
   private val heading  = io.in.bits.ray.heading
-  private val waiting  = stored.drop(lanes).map(RegEnable(_, io.in.fire))
+  private val waiting  = stored.map(RegEnable(_, io.in.fire))
   private val axis     = Mux(follows, RegEnable(heading.axis, io.in.fire), heading.axis)
   private val node     = RegEnable(BoxOperands.node(config, io.in.bits), io.in.fire)
   private val datapath = Module(new BoxDatapath(config, lanes))
   datapath.io.node := node
   for (lane <- 0 until lanes) {
-    val child    = if (beats > 1) Mux(follows, waiting(lane), stored(lane)) else stored(lane)
+    val turns    = (stored.take(lanes) ++ waiting.drop(lanes)).grouped(lanes).map(_(lane)).toSeq
+    val child    = Mux1H(turns.zipWithIndex.map { case (child, turn) => (beat === turn.U) -> child })
     val negative = Seq.tabulate(3)(a => Mux(follows, node.negative(a), heading.negative(a)))
     datapath.io.children(lane) := RegEnable(BoxOperands.planes(config, child, axis, negative), starts)
   }
@@ -63,9 +67,10 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   private val ends      = ShiftRegister(endsNode, BoxDatapath.latency + 1, false.B, true.B)
   private val isEntered = datapath.io.intervals.map(_.isEntered)
   private val near      = datapath.io.intervals.map(_.near)
-  private def earlier[T <: Data](values: Seq[T]): Seq[T] = if (beats > 1) values.map(RegNext(_)) else Seq.empty
+  private def ofAllTurns[T <: Data](values: Seq[T]): Seq[T] =
+    (0 until beats).reverse.flatMap(before => values.map(ShiftRegister(_, before)))
   orders.io.enq.valid := ends
-  orders.io.enq.bits  := ChildOrder(config, earlier(isEntered) ++ isEntered, earlier(near) ++ near)
+  orders.io.enq.bits  := ChildOrder(config, ofAllTurns(isEntered), ofAllTurns(near))
   assert(!ends || orders.io.enq.ready, "a node was let in without a place for its result")
 
   io.out.valid        := orders.io.deq.valid
@@ -73,12 +78,6 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   notes.io.deq.ready  := io.out.fire
   io.out.bits         := notes.io.deq.bits.result(orders.io.deq.bits)
   io.busy             := starts
-}
-
-object BoxUnit {
-
-  /** Children tested in a cycle. */
-  val lanes: Int = 2
 }
 
 /** What the result needs of a node beside the order of its children. */

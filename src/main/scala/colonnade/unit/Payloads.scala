@@ -38,7 +38,7 @@ final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   val snoopHits        = contexts
   val busyRaySetup     = Bool()
   val busyBoxUnit      = Bool()
-  val busyTriangleUnit = Bool()
+  val busyTriangleUnit = UInt(log2Ceil(config.units.triangleLanes + 1).W)
   val busyShader       = Bool()
 
   /** Contexts without a pixel; whose ray is generated or set up; that wait for a record, or with it for a unit; in box

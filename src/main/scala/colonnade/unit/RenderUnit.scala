@@ -7,7 +7,7 @@ import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
 import colonnade.numbers.Rounding
 import colonnade.ray.{BoxRay, Context, RayGenerator, RayRequest, RaySetup, TriangleRay}
 import colonnade.shading.Shader
-import colonnade.traversal.{TriangleUnit, Visit}
+import colonnade.traversal.{TriangleLanes, Visit}
 
 /** Both colours that a context's pixel may have. */
 private final class PixelColours extends Bundle {
@@ -31,7 +31,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val raySetup     = Module(new RaySetup(config))
   private val recordFetch  = Module(new RecordFetch(config))
   private val traversal    = Module(new Traversal(config))
-  private val triangleUnit = Module(new TriangleUnit(config))
+  private val triangleUnit = Module(new TriangleLanes(config))
   private val hitTable     = Module(new HitTable(config))
   private val shader       = Module(new Shader(config))
 

@@ -12,8 +12,15 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   behavior of "BoxUnit"
 
-  for ((config, i) <- (TestConfigs.formats :+ binary).zipWithIndex)
-    it should s"follow the model under random stalls, format $i (${config.precision}, arity ${config.geometry.arity})" in
+  private def lanes(config: ColonnadeConfig, count: Int) = config.copy(units = config.units.copy(boxLanes = count))
+
+  private val laneVariants = Seq(lanes(TestConfigs.tiny, 1), lanes(TestConfigs.tiny, 4), lanes(binary, 1))
+
+  private def shape(config: ColonnadeConfig) =
+    s"${config.precision}, arity ${config.geometry.arity}, ${config.units.boxLanes} lanes"
+
+  for ((config, i) <- (TestConfigs.formats ++ (binary +: laneVariants)).zipWithIndex)
+    it should s"follow the model under random stalls, format $i (${shape(config)})" in
       test(new PackedBoxUnit(config)) { dut =>
         val questions = new BoxQuestions(config, seed = 100 + i)
         compare(dut, config, questions.atBrinks(20), offered = 1, accepted = 1)
@@ -41,11 +48,11 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       )
     }
 
-  for (config <- Seq(TestConfigs.tiny, binary))
-    it should s"take two children a cycle without gaps, arity ${config.geometry.arity}" in
+  for (config <- Seq(TestConfigs.tiny, binary) ++ laneVariants)
+    it should s"keep its lanes busy without gaps (${shape(config)})" in
       test(new PackedBoxUnit(config)) { dut =>
         val nodes   = 40
-        val beats   = config.geometry.arity / 2
+        val beats   = config.geometry.arity / config.units.boxLanes
         val cycles  = compare(dut, config, new BoxQuestions(config, seed = 3)(nodes), offered = 1, accepted = 1)
         val latency = 5 + beats
         assert(cycles == beats * (nodes - 1) + latency)

@@ -26,9 +26,9 @@ class TriangleUnitSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       }
     }
 
-  it should "test records of one triangle with one division lane" in {
+  it should "test records of one triangle with two division lanes" in {
     val config = TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(trianglesPerRecord = 1))
-    test(new TriangleUnit(config, distanceLanes = 1)).withAnnotations(simulation) { unit =>
+    test(new TriangleUnit(config, distanceLanes = 2)).withAnnotations(simulation) { unit =>
       val harness = new TriangleHarness(config, new TriangleQuestions(config, seed = 10))
       harness.run(unit, harness.random(300), bubbles = 0, stalls = 0)._2 should be > 60
     }

@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chiseltest._
 import colonnade.{Model, TestConfigs}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, UnitsConfig}
 import colonnade.formats.{FrameRegisters, Pixel}
 import colonnade.traversal.Packed
 import org.scalatest.flatspec.AnyFlatSpec
@@ -41,6 +41,13 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
 
   render(TestConfigs.tiny, "a tree, contexts that snoop")
+  render(
+    TestConfigs.tiny.copy(
+      units = UnitsConfig(boxLanes = 4, triangleLanes = 2),
+      columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(recordBuffers = 3)
+    ),
+    "wide units"
+  )
   render(
     TestConfigs.withPrecision(16, 16, 32).copy(
       array = TestConfigs.tiny.array.copy(contexts = 1),

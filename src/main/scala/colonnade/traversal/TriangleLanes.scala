@@ -1,0 +1,36 @@
+package colonnade.traversal
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled, PopCount, RRArbiter}
+import colonnade.config.ColonnadeConfig
+import colonnade.frame.Dispatcher
+
+/** Ports of [[TriangleLanes]]. */
+final class TriangleLanesIO(config: ColonnadeConfig) extends Bundle {
+  val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
+
+  /** Those of one record in their order. */
+  val result = Decoupled(new TriangleResult(config))
+
+  /** Lanes into which a triangle's vertices go. */
+  val busy = Output(UInt(log2Ceil(config.units.triangleLanes + 1).W))
+}
+
+/** `units.triangleLanes` [[TriangleUnit]]s: a record goes to one that is free, in turn, and results leave in turn.
+  * Latency and each lane's throughput are those of the unit.
+  */
+final class TriangleLanes(config: ColonnadeConfig) extends Module {
+  val io = IO(new TriangleLanesIO(config))
+
+  private val lanes    = Seq.fill(config.units.triangleLanes)(Module(new TriangleUnit(config)).io)
+  private val dispatch = Module(new Dispatcher(new TriangleCandidate(config), lanes.size))
+  private val results  = Module(new RRArbiter(new TriangleResult(config), lanes.size))
+
+  dispatch.io.items :<>= io.candidate
+  for (((lane, taker), result) <- lanes.zip(dispatch.io.takers).zip(results.io.in)) {
+    lane.candidate :<>= taker
+    result :<>= lane.result
+  }
+  io.result :<>= results.io.out
+  io.busy := PopCount(lanes.map(_.busy))
+}
