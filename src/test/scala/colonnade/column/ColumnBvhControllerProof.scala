@@ -40,15 +40,28 @@ class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
   private class Side(bank: Int) {
     private val memory    = dut.io.memory(bank)
     private val broadcast = dut.io.broadcasts(bank)
-    private val asked     = requests.map(request => request.valid && Banks.isIn(config, request.bits.address, bank))
-    private val fires     = requests.zip(asked).map { case (request, isAsked) => request.ready && isAsked }
-    private val accepts   = fires.reduce(_ || _)
-    private val address   = Mux1H(fires, addresses)
 
-    // The memory
-    val held           = RegInit(0.U(log2Ceil(capacity + 1).W))
+    // The memory, and what it is asked for, oldest first
+    val held            = RegInit(0.U(log2Ceil(capacity + 1).W))
+    private val reading = Reg(Vec(capacity, chiselTypeOf(requests.head.bits.address)))
+
+    // With snooping, a record that is in flight is not read again: its broadcast serves whoever asks for it
+    private def comes(address: UInt): Bool =
+      config.columnBvhMemory.snooping.B &&
+        reading.zipWithIndex.map { case (read, i) => held > i.U && read === address }.reduce(_ || _)
+
+    private val asked = requests.map { request =>
+      request.valid && Banks.isIn(config, request.bits.address, bank) && !comes(request.bits.address)
+    }
+    private val fires   = requests.zip(asked).map { case (request, isAsked) => request.ready && isAsked }
+    private val accepts = fires.reduce(_ || _)
+    private val address = Mux1H(fires, addresses)
+
     private val answer = answers(bank) && held =/= 0.U
-    held                  := held + accepts - answer
+    held := held + accepts - answer
+    for ((read, i) <- reading.zipWithIndex)
+      when(accepts && held - answer === i.U)(read := address)
+        .elsewhen(answer)(read := reading((i + 1).min(capacity - 1)))
     memory.request.ready  := ready(bank)
     memory.response.valid := answer
     memory.response.bits  := data(bank)

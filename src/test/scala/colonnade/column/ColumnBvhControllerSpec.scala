@@ -39,8 +39,13 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
     columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(depth = depth, banks = banks, readLatency = latency)
   )
 
-  it should "lose and double no read, and starve no row, whenever two banks answer" in {
-    prove(cycles = 8)(new ColumnBvhControllerProof(config(rows = 3, banks = 2, latency = 1, depth = 16)))
+  for (snooping <- Seq(true, false)) {
+    it should s"lose and double no read, and starve no row, whenever two banks answer, snooping $snooping" in {
+      val shape = config(rows = 3, banks = 2, latency = 1, depth = 16)
+      prove(cycles = 7) {
+        new ColumnBvhControllerProof(shape.copy(columnBvhMemory = shape.columnBvhMemory.copy(snooping = snooping)))
+      }
+    }
   }
 
   private def load(dut: ControllerAndMemory, records: Seq[BigInt]): Unit = {
