@@ -32,8 +32,9 @@ test-host: setup ## only pytest
 verify: setup ## the full matrix: array shapes, precisions, meshes; long
 	@tools/verify
 
-bench: setup ## rays per cycle of the benchmark meshes
-	@$(venv)/colonnade bench --config $(BENCH_CONFIG)
+bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where the cycles go
+	@mkdir -p out
+	@$(venv)/colonnade bench --config $(BENCH_CONFIG) --json out/bench.json --plot out/bench.png
 
 check: setup ## formatters, linters, types, golden manifests
 	@tools/check

@@ -15,6 +15,7 @@ from colonnade.commands.generate import generate
 from colonnade.commands.inspect import inspect
 from colonnade.commands.pack import pack
 from colonnade.commands.render import render
+from colonnade.commands.sweep import sweep
 from colonnade.commands.verify import verify
 from colonnade.errors import UserError
 
@@ -61,7 +62,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, render, compare, verify, bench):
+for command in (generate, pack, inspect, render, compare, verify, bench, sweep):
     cli.add_command(command)
 
 

@@ -42,6 +42,19 @@ class GeneratedDesign:
     dir: Path
     manifest: Manifest
 
+    @property
+    def sources(self) -> list[Path]:
+        """The SystemVerilog files."""
+        return sorted(path for path in self.dir.iterdir() if path.suffix in (".sv", ".v"))
+
+    def digest(self) -> str:
+        """A SHA-256 of the SystemVerilog: two designs with the same one behave alike."""
+        digest = hashlib.sha256()
+        for path in self.sources:
+            content = path.read_bytes()
+            digest.update(f"{path.name} {len(content)}\n".encode() + content)
+        return digest.hexdigest()
+
 
 def manifest_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
     """The manifest of a configuration, without Verilog: all that packing, the model and placement need."""

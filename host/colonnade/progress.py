@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import threading
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -17,10 +19,17 @@ Report = Callable[[float], None]
 class Progress:
     """Steps of a piece of work. This base class shows nothing."""
 
-    @contextlib.contextmanager
-    def step(self, title: str) -> Iterator[Report]:
-        """Run one step. What is yielded may be called with the share that is done, or never."""
-        yield lambda share: None
+    def step(self, title: str) -> AbstractContextManager[Report]:
+        """Run one step, in any thread. What is yielded may be called with the share that is done, or never."""
+        return contextlib.nullcontext(lambda share: None)
+
+    def paused(self) -> AbstractContextManager[None]:
+        """Nothing is shown meanwhile: other text may be printed."""
+        return contextlib.nullcontext()
+
+    def of(self, name: str) -> Progress:
+        """The same, with `name` before each title: one of several pieces of work at a time."""
+        return self
 
 
 #: Shows nothing.
@@ -28,15 +37,59 @@ QUIET = Progress()
 
 
 class TerminalProgress(Progress):
-    """Bars on standard error, gone when their step is done."""
+    """Bars on standard error, one for each step that runs, gone when their steps are done."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._running = 0
+        self._display: RichProgress | None = None
 
     @contextlib.contextmanager
     def step(self, title: str) -> Iterator[Report]:
         """Show a bar for one step; it pulses until the first share is reported."""
-        display = _display()
-        with display:
+        with self._lock:
+            display = self._display = self._display or _display()
+            self._running += 1
+            display.start()
             task = display.add_task(title, total=None)
+        try:
             yield lambda share: display.update(task, total=1.0, completed=share)
+        finally:
+            with self._lock:
+                self._running -= 1
+                display.remove_task(task)
+                if self._running == 0:
+                    display.stop()
+                    self._display = None
+
+    @contextlib.contextmanager
+    def paused(self) -> Iterator[None]:
+        """The bars make way; steps that begin or end meanwhile wait."""
+        with self._lock:
+            display = self._display
+            if display is not None:
+                display.stop()
+            try:
+                yield
+            finally:
+                if display is not None:
+                    display.start()
+
+    def of(self, name: str) -> Progress:
+        """The same bars, with `name` before each title."""
+        return _Named(self, name)
+
+
+class _Named(Progress):
+    def __init__(self, whole: Progress, name: str) -> None:
+        self._whole = whole
+        self._name = name
+
+    def step(self, title: str) -> AbstractContextManager[Report]:
+        return self._whole.step(f"{self._name}: {title}")
+
+    def paused(self) -> AbstractContextManager[None]:
+        return self._whole.paused()
 
 
 def _display() -> RichProgress:
@@ -50,7 +103,8 @@ def _display() -> RichProgress:
         TaskProgressColumn(),
         TimeElapsedColumn(),
     )
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False)
 
 
 def for_terminal() -> Progress:

@@ -110,7 +110,7 @@ def render(
             frame = render_model(manifest, image, registers, lambda done, total: share(done / total))
         seconds["run"] = time.perf_counter() - packed
     require_no_errors(frame)
-    report = _report(backend, manifest, image, frame, (width, height)) | {"seconds": seconds} | report
+    report = frame_report(backend, manifest, image.header, frame) | {"seconds": seconds} | report
     view = float_placement(scene, image.header.extent, width, height)
     return _result(frame, image, view, manifest, report)
 
@@ -143,7 +143,9 @@ def _result(
     )
 
 
-def _report(backend: str, manifest: Manifest, image: SceneImage, frame: Frame, size: tuple[int, int]) -> dict[str, Any]:
+def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: Frame) -> dict[str, Any]:
+    """What there is to say about a frame of the model or the RTL, but for the seconds it took."""
+    height, width = frame.is_object.shape
     counters = frame.counters
     rays = {
         "primary": counters["raysPrimary"],
@@ -157,8 +159,8 @@ def _report(backend: str, manifest: Manifest, image: SceneImage, frame: Frame, s
     return {
         "backend": backend,
         "config": manifest.config,
-        "mesh": _mesh_report(image.header),
-        "size": list(size),
+        "mesh": mesh_report(header),
+        "size": [width, height],
         "cycles": cycles,
         "rays": rays,
         "rays_per_cycle": everything / cycles if cycles else None,
@@ -168,7 +170,8 @@ def _report(backend: str, manifest: Manifest, image: SceneImage, frame: Frame, s
     }
 
 
-def _mesh_report(header: ImageHeader) -> dict[str, Any]:
+def mesh_report(header: ImageHeader) -> dict[str, Any]:
+    """What a report says about the mesh."""
     return {"name": header.mesh, "triangles": header.triangles, "source_triangles": header.source_triangles}
 
 

@@ -43,12 +43,26 @@ class Stalls:
     """Disturbances of the harness that must not change a frame.
 
     Attributes:
-        percent: Share of the cycles in which the pixel sink takes nothing.
+        percent: Share of the cycles in which the pixel sink takes nothing, 0 to 99.
         seed: Of the choice of those cycles.
+        memory_percent: Share of the cycles in which each bank is held, 0 to 99; for designs that are holdable.
+        memory_burst: Longest hold of a bank, cycles; lengths from 1 on are equally frequent.
     """
 
     percent: int = 0
     seed: int = 1
+    memory_percent: int = 0
+    memory_burst: int = 32
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.percent < 100 and 0 <= self.memory_percent < 100 and self.memory_burst >= 1):
+            raise ValueError(f"stalls of 0 to 99 percent, in bursts of at least a cycle: not {self}")
+
+    @property
+    def options(self) -> list[str]:
+        """What the harness is told."""
+        memory = ["--memory", str(self.memory_percent), "--burst", str(self.memory_burst)]
+        return ["--stall", str(self.percent), "--seed", str(self.seed), *(memory if self.memory_percent else [])]
 
 
 @dataclass(frozen=True)
@@ -68,10 +82,8 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path
     """The simulator of a design: compiled once, kept by the content of the Verilog and of the harness."""
     verilator = require_simulator()
     harness = Path(__file__).parent / "harness" / "harness.cpp"
-    sources = sorted(path for path in design.dir.iterdir() if path.suffix in (".sv", ".v"))
-    digest = hashlib.sha256(" ".join(VERILATOR_OPTIONS).encode())
-    for path in (harness, *sources):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    parts = (" ".join(VERILATOR_OPTIONS).encode(), harness.read_bytes(), design.digest().encode())
+    digest = hashlib.sha256(b"".join(f"{len(part)}:".encode() + part for part in parts))
     folder = cache_directory(project_root()) / "simulator" / digest.hexdigest()[:20]
     program = folder / "simulator"
     with locked(folder.parent / f"{folder.name}.lock"):
@@ -80,22 +92,25 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path
                 progress.step("building the simulator"),
                 tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as place,
             ):
-                built = _build(verilator, design.manifest, harness, sources, Path(place), folder.parent)
+                built = _build(verilator, design, harness, Path(place), folder.parent)
                 folder.mkdir(exist_ok=True)
                 built.replace(program)
     os.utime(program)
     return program
 
 
-def _build(verilator: Path, manifest: Manifest, harness: Path, sources: list[Path], place: Path, logs: Path) -> Path:
-    columns = int(manifest.config["array"]["columns"])
+def _build(verilator: Path, design: GeneratedDesign, harness: Path, place: Path, logs: Path) -> Path:
+    config, sources = design.manifest.config, design.sources
+    columns = int(config["array"]["columns"])
     each = " ".join(f"DO({column})" for column in range(columns))
     header = f"#pragma once\n#define EACH_COLUMN(DO) {each}\n" + _hit_distance(sources)
+    if is_holdable(design.manifest):
+        header += f"#define MEMORY_BANKS {columns * int(config['columnBvhMemory']['banks'])}\n"
     (place / "columns.hpp").write_text(header)
     shutil.copy(harness, place / "harness.cpp")
     (place / "sources.f").write_text("\n".join(map(str, sources)) + "\n")
     command = [str(verilator), *VERILATOR_OPTIONS, "-j", "0", "--Mdir", str(place / "obj"), "-o", "simulator"]
-    if columns * int(manifest.config["array"]["rows"]) > MOST_FLAT_UNITS:
+    if columns * int(config["array"]["rows"]) > MOST_FLAT_UNITS:
         (place / "blocks.vlt").write_text('`verilator_config\nhier_block -module "RenderUnit"\n')
         command += ["--hierarchical", str(place / "blocks.vlt")]
     command += ["-CFLAGS", f"-O2 -I{place}", "-f", str(place / "sources.f"), str(place / "harness.cpp")]
@@ -128,13 +143,16 @@ def render_rtl(
     """Renders frames, one for each set of registers; the image is loaded once.
 
     Raises:
+        UserError: the stalls hold banks, and the design has no input for that.
         RuntimeError: the hardware misbehaves (a pixel missing, twice, or outside the frame).
     """
-    program = build_simulator(design, progress)
     stalls = stalls or Stalls()
+    if stalls.memory_percent and not is_holdable(design.manifest):
+        raise UserError("this configuration's memory cannot be held: set columnBvhMemory.holdable=true for such stalls")
+    program = build_simulator(design, progress)
     with tempfile.TemporaryDirectory(prefix="colonnade-") as place:
         job, outputs = _write_job(Path(place), design.manifest, image, registers)
-        command = [str(program), "--stall", str(stalls.percent), "--seed", str(stalls.seed), str(job)]
+        command = [str(program), *stalls.options, str(job)]
         with progress.step("rendering in the simulator") as report:
             lines = _run(command, Path(place) / "results", report)
         return _collect(design.manifest, registers, outputs, lines)
@@ -219,6 +237,11 @@ def _frame(manifest: Manifest, registers: Mapping[str, int], output: Path, value
         },
         errors=errors,
     )
+
+
+def is_holdable(manifest: Manifest) -> bool:
+    """The design has an input that holds banks of its memory."""
+    return bool(manifest.config["columnBvhMemory"].get("holdable", False))
 
 
 def require_hits(manifest: Manifest) -> None:

@@ -1,4 +1,5 @@
-"""A manifest in memory: the contract's layouts and registers for a small configuration, without the generator."""
+"""A manifest in memory: the contract's layouts and registers for a small configuration, without the generator; and the
+report of a frame."""
 
 from __future__ import annotations
 
@@ -143,3 +144,55 @@ def manifest(make_manifest: MakeManifest) -> Manifest:
 def manifest_json() -> dict[str, Any]:
     """The JSON object of the fixture `manifest`."""
     return manifest_data()
+
+
+SMALL_ARRAY = {
+    "array": {"rows": 2, "columns": 3, "contexts": 4},
+    "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1},
+}
+
+#: Of a frame of 100 cycles on `SMALL_ARRAY`: 600 unit cycles, 2,400 context cycles, 600 bank cycles, 300 stream cycles.
+COUNTERS = {
+    "raysPrimary": 150,
+    "raysInBox": 50,
+    "nodeReads": 150,
+    "boxTests": 500,
+    "triangleTests": 80,
+    "hits": 20,
+    "recordReads": 60,
+    "snoopHits": 180,
+    "busyRaySetup": 60,
+    "busyBoxUnit": 480,
+    "busyTriangleUnit": 120,
+    "busyShader": 6,
+    "idleContexts": 240,
+    "contextsSetUp": 480,
+    "waitRecord": 120,
+    "waitUnit": 60,
+    "contextsBox": 1200,
+    "contextsTriangles": 120,
+    "contextsShading": 60,
+}
+
+
+def frame_report(in_box: float) -> dict[str, Any]:
+    """Of a frame of the RTL at so many in-box rays per cycle."""
+    return {
+        "config": SMALL_ARRAY,
+        "config_hash": "c0",
+        "size": [15, 10],
+        "mesh": {"triangles": 12},
+        "cycles": 100,
+        "rays": {"in_box": 50},
+        "counters": COUNTERS,
+        "rays_per_cycle": 2 * in_box,
+        "rays_per_cycle_in_box": in_box,
+        "cycles_per_second": 1000.0,
+        "seconds": {"pack": 0.1, "run": 0.2},
+    }
+
+
+@pytest.fixture(scope="session")
+def rtl_report() -> Callable[[float], dict[str, Any]]:
+    """Makes the report of a frame from its in-box rays per cycle."""
+    return frame_report

@@ -9,14 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from colonnade.errors import UserError
 from colonnade.frame import Frame
-from colonnade.generator import design_for, manifest_for
+from colonnade.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.meshes import load_mesh
 from colonnade.model import load_scene, new_model, render_model
 from colonnade.pack import pack
 from colonnade.placement import placement
+from colonnade.render import frame_report
 from colonnade.scene import Camera, Light, Material, MeshSource, Scene
 from colonnade.simulate import Stalls, render_rtl
+from colonnade.throughput import figures, records_taken
 
 pytestmark = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 
@@ -57,6 +60,66 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     for frame, settings in zip(simulated.frames, registers, strict=True):
         assert_equal(frame, render_model(design.manifest, image, settings))
     assert simulated.frames[0].is_object.any()
+
+
+@pytest.fixture(scope="module")
+def holdable() -> GeneratedDesign:
+    """Three units share two banks that can be held."""
+    return design_for("tiny", ("array.rows=3", "columnBvhMemory.holdable=true"))
+
+
+@pytest.mark.parametrize(
+    "stalls",
+    [
+        Stalls(memory_percent=30, seed=1),
+        Stalls(percent=40, memory_percent=60, seed=2),
+        Stalls(percent=10, memory_percent=50, memory_burst=1, seed=3),
+        Stalls(percent=70, memory_percent=80, memory_burst=4, seed=4),
+    ],
+    ids=str,
+)
+def test_random_memory_latency_changes_nothing_but_time(holdable: GeneratedDesign, stalls: Stalls) -> None:
+    """Banks that wait when they like, beside a sink that does: the frames are the model's, and take longer."""
+    image = pack(load_mesh("teapot:3"), holdable.manifest)
+    flat = replace(TEAPOT, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True))
+    registers: list[Mapping[str, int]] = [
+        placement(view, image.header, holdable.manifest, 40, 30) for view in (TEAPOT, flat)
+    ]
+    held = render_rtl(holdable, image, registers, stalls).frames
+    free = render_rtl(holdable, image, registers, replace(stalls, memory_percent=0)).frames
+    for frame, quicker, settings in zip(held, free, registers, strict=True):
+        assert_equal(frame, render_model(holdable.manifest, image, settings))
+        assert frame.counters["cycles"] > 1.05 * quicker.counters["cycles"]
+
+
+@pytest.mark.parametrize("stalls", [Stalls(), Stalls(percent=40, memory_percent=60, seed=2)], ids=str)
+def test_counters_account_for_every_cycle_and_record(holdable: GeneratedDesign, stalls: Stalls) -> None:
+    """Contexts are in one place at a time, units are busy no longer than a frame, and records are taken for a cause."""
+    image = pack(load_mesh("teapot:3"), holdable.manifest)
+    settings = placement(TEAPOT, image.header, holdable.manifest, 40, 30)
+    report = frame_report(
+        "rtl", holdable.manifest, image.header, render_rtl(holdable, image, [settings], stalls).frames[0]
+    )
+    found, counters = figures(report), report["counters"]
+    assert all(0 < share < 1 for share in found["stalls"].values()), found["stalls"]
+    assert all(0 < share < 1 for share in found["utilisation"].values()), found["utilisation"]
+    triangle_records = records_taken(counters) - counters["nodeReads"] - counters["hits"]
+    assert triangle_records <= counters["triangleTests"] <= 2 * triangle_records
+
+
+def test_memory_that_cannot_be_held_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refused before anything is built."""
+    monkeypatch.setattr("colonnade.simulate.build_simulator", lambda *_: pytest.fail("a simulator is built"))
+    design = manifest_for("tiny")
+    image = pack(load_mesh("cube"), design.manifest)
+    with pytest.raises(UserError, match=r"columnBvhMemory\.holdable=true"):
+        render_rtl(design, image, [], Stalls(memory_percent=10))
+
+
+@pytest.mark.parametrize("stalls", [{"percent": 100}, {"memory_percent": 100}, {"percent": -1}, {"memory_burst": 0}])
+def test_stalls_that_never_end_are_refused(stalls: dict[str, int]) -> None:
+    with pytest.raises(ValueError, match="0 to 99"):
+        Stalls(**stalls)
 
 
 def test_single_rays_through_the_hardware_slip_through_no_edge() -> None:

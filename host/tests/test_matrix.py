@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from colonnade import toolchain
+from colonnade.generator import design_for
+from colonnade.meshes import load_mesh
+from colonnade.model import render_model
+from colonnade.pack import pack
+from colonnade.placement import placement
 from colonnade.render import RenderResult, render
+from colonnade.scene import load_scene
+from colonnade.simulate import Stalls, render_rtl
 
 pytestmark = pytest.mark.matrix
 
@@ -50,6 +57,27 @@ def assert_equal(first: RenderResult, second: RenderResult) -> None:
 @pytest.mark.parametrize("shape", SHAPES)
 def test_every_shape_renders_the_same_frame(shape: str, mesh: str) -> None:
     assert_equal(frame("rtl", mesh, SHAPES[shape]), frame("model", mesh))
+
+
+@pytest.mark.parametrize("banks", (1, 2, 4))
+@pytest.mark.parametrize("snooping", ("false", "true"))
+@pytest.mark.parametrize("contexts", (1, 4, 8, 12))
+def test_random_memory_latency_changes_no_frame(contexts: int, snooping: str, banks: int) -> None:
+    """Five seeds of banks and a sink that wait at random, on every kind of column memory controller."""
+    memory = (f"columnBvhMemory.{field}" for field in (f"snooping={snooping}", f"banks={banks}", "holdable=true"))
+    design = design_for("tiny", ("array.rows=3", f"array.contexts={contexts}", *memory))
+    image = pack(load_mesh("torus"), design.manifest)
+    scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")
+    registers = placement(scene, image.header, design.manifest, 48, 36)
+    expected = render_model(design.manifest, image, registers)
+    for seed in range(1, 6):
+        stalls = Stalls(percent=17 * seed, seed=seed, memory_percent=100 - 15 * seed, memory_burst=2**seed)
+        frame = render_rtl(design, image, [registers], stalls).frames[0]
+        assert frame.errors == []
+        np.testing.assert_array_equal(frame.colour, expected.colour)
+        np.testing.assert_array_equal(frame.triangle, expected.triangle)
+        np.testing.assert_array_equal(frame.distance, expected.distance)
+        assert {name: frame.counters[name] for name in expected.counters} == expected.counters
 
 
 @pytest.mark.parametrize("mesh", MESHES)

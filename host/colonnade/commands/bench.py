@@ -8,50 +8,97 @@ from typing import Any
 
 import click
 
-from colonnade.commands.options import configuration_options, finish, json_option, require_outputs
+from colonnade.commands.options import (
+    FILE,
+    configuration_options,
+    finish,
+    json_option,
+    measurement_options,
+    require_outputs,
+)
 
 
 @click.command(short_help="Measure rays per cycle of the benchmark's meshes.")
 @configuration_options
 @click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Only this mesh. May be repeated.")
-@click.option("--size", metavar="WxH", help="Size of the frames in pixels. Default: the benchmark scene's.")
+@measurement_options
+@click.option("--plot", type=FILE, metavar="FILE", help="Draw where the cycles go, a PNG.")
 @json_option
 def bench(
-    config: str, overrides: tuple[str, ...], meshes: tuple[str, ...], size: str | None, json_file: Path | None
+    config: str,
+    overrides: tuple[str, ...],
+    meshes: tuple[str, ...],
+    size: str | None,
+    jobs: int | None,
+    reuse: bool,
+    plot: Path | None,
+    json_file: Path | None,
 ) -> None:
-    """Render each benchmark mesh through the RTL; print rays per cycle and the busiest unit.
+    """Render each benchmark mesh through the RTL; print rays per cycle and what holds it back.
 
-    In box counts the rays that enter the object's box, over all cycles of the frame. Meshes that are not built in
-    are looked for in the folders of COLONNADE_MESHES.
+    In box counts the rays that enter the object's box, over all cycles of the frame. Busiest names the unit or port
+    with the highest utilisation. The bounds are in-box rays per cycle with the same reads and tests: with a perfect
+    memory the busiest unit is the limit, with perfect units the busiest port. Meshes that are not built in are looked
+    for in the folders of COLONNADE_MESHES.
     """
     from colonnade.sizes import parse_size
 
     pixels = parse_size(size) if size is not None else None
-    require_outputs(json_file)
+    require_outputs(plot, json_file)
 
     from colonnade import bench as benchmark
     from colonnade import progress
+    from colonnade.measure import Conditions
+    from colonnade.parallel import processors
+    from colonnade.tables import Column, Table
     from colonnade.toolchain import project_root
 
+    table = Table(
+        (
+            Column("mesh", 14, is_text=True),
+            Column("triangles", 9, ","),
+            Column("cycles", 11, ","),
+            Column("in box", 6, ".3f", group="rays per cycle"),
+            Column("all", 6, ".3f", group="rays per cycle"),
+            Column("memory", 6, ".3f", group="bound, perfect"),
+            Column("units", 6, ".3f", group="bound, perfect"),
+            Column("reads/ray", 9, ".2f"),
+            Column("snooped", 7, ".0%"),
+            Column("busy", 4, ".0%"),
+            Column("busiest", 14, is_text=True),
+        ),
+        click.echo,
+    )
+
     def show(name: str, result: Mapping[str, Any]) -> None:
-        busiest = result["bottleneck"]
-        click.echo(
-            f"{name:<14} {result['triangles']:>9,} {result['cycles']:>11,} {result['rays_per_cycle_in_box']:>8.3f} "
-            f"{result['rays_per_cycle']:>9.3f}   {busiest} {result['utilisation'][busiest]:.0%}"
+        busiest, bounds = result["bottleneck"], result["bounds"]
+        table.print(
+            name,
+            result["triangles"],
+            result["cycles"],
+            result["rays_per_cycle_in_box"],
+            result["rays_per_cycle"],
+            bounds["perfect_memory"],
+            bounds["perfect_units"],
+            result["per_ray"]["record_reads"],
+            result["snoop_share"],
+            result["utilisation"][busiest],
+            busiest,
         )
 
-    click.echo(f"{'mesh':<14} {'triangles':>9} {'cycles':>11} {'in box':>8} {'all rays':>9}   busiest")
+    conditions = Conditions(project_root() / "scenes" / "object.toml", pixels, jobs or processors(), reuse)
     report = benchmark.bench(
-        project_root() / "scenes" / "object.toml",
-        config,
-        overrides,
-        meshes or benchmark.MESHES,
-        pixels,
-        progress.for_terminal(),
-        show,
+        config, overrides, meshes or benchmark.MESHES, conditions, progress.for_terminal(), finished=show
     )
+    in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
+    means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])
+    table.print("geometric mean", None, None, *means, None, None, None, "")
     click.echo(
-        f"geometric mean {report['geomean_rays_per_cycle_in_box']:.3f} rays per cycle in box, "
+        f"{in_box:.3f} in-box rays per cycle: "
         f"{report['ratio_to_paper']:.1f} times the paper's {benchmark.PAPER_RAYS_PER_CYCLE}"
     )
+    if plot is not None:
+        from colonnade.plot_stages import plot_stages
+
+        plot_stages(report, plot)
     finish(report, json_file)

@@ -32,6 +32,25 @@ def configuration_options(command: Command) -> Command:
     )(command)
 
 
+def measurement_options(command: Command) -> Command:
+    """Add ``--size``, ``--jobs`` and ``--reuse``: how frames are measured."""
+    command = click.option(
+        "--reuse/--fresh",
+        default=False,
+        show_default=True,
+        help="Take the counters of a kept run of the same hardware and the same scene image.",
+    )(command)
+    command = click.option(
+        "--jobs",
+        type=click.IntRange(min=1),
+        metavar="N",
+        help="Frames to render at a time, each on one processor. Default: the number of processors.",
+    )(command)
+    return click.option("--size", metavar="WxH", help="Size of the frames in pixels. Default: the benchmark scene's.")(
+        command
+    )
+
+
 def json_option(command: Command) -> Command:
     """Add ``--json``: the report for machines."""
     return click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the report as JSON.")(command)

@@ -38,12 +38,31 @@ def verify(
     require_outputs(json_file)
 
     from colonnade import bench, progress, verification
+    from colonnade.tables import Column, Table
     from colonnade.toolchain import project_root
 
-    def show(name: str, result: dict[str, Any]) -> None:
-        click.echo(row(name, result))
+    table = Table(
+        (
+            Column("mesh", 14, is_text=True),
+            Column("triangles", 9, ","),
+            Column("pixels", 8, group="RTL against model: differing"),
+            Column("hits", 8, group="RTL against model: differing"),
+            Column("counters", 8, group="RTL against model: differing"),
+            Column("hit/miss", 8, ".4%", group="model against float scene"),
+            Column("triangle", 8, ".4%", group="model against float scene"),
+            Column("PSNR dB", 7, ".2f", group="model against float scene"),
+        ),
+        click.echo,
+    )
+    keys = {
+        "rtl": ("pixels", "triangles", "counters"),
+        "reference": ("hit_disagreement", "triangle_disagreement", "psnr"),
+    }
 
-    click.echo(HEADING)
+    def show(name: str, result: dict[str, Any]) -> None:
+        compared = [(result[part] or {}).get(key) for part, of_part in keys.items() for key in of_part]
+        table.print(name, result["triangles"], *compared)
+
     report = verification.verify(
         project_root() / "scenes" / "object.toml",
         config,
@@ -58,21 +77,3 @@ def verify(
     finish(report, json_file)
     if not report["equal"]:
         context.exit(1)
-
-
-HEADING = (
-    f"{'':<14} {'':>9}  RTL against model: differing   model against float scene\n"
-    f"{'mesh':<14} {'triangles':>9} {'pixels':>8} {'hits':>8} {'counters':>9} "
-    f"{'hit/miss %':>12} {'triangle %':>11} {'PSNR dB':>8}"
-)
-
-
-def row(name: str, result: dict[str, Any]) -> str:
-    """One line of the table; a dash for what was not compared."""
-    rtl, reference = result["rtl"], result["reference"]
-    left = f"{rtl['pixels']:>8} {rtl['triangles']:>8} {rtl['counters']:>9}" if rtl else f"{'-':>8} {'-':>8} {'-':>9}"
-    right = f"{'-':>12} {'-':>11} {'-':>8}"
-    if reference:
-        shares = f"{100 * reference['hit_disagreement']:>12.4f} {100 * reference['triangle_disagreement']:>11.4f}"
-        right = f"{shares} {reference['psnr']:>8.2f}"
-    return f"{name:<14} {result['triangles']:>9,} {left} {right}"

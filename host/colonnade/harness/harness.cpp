@@ -6,20 +6,26 @@
 //                            (struct PixelBytes, row by row)
 //   read NAME ADDRESS WORDS  prints "value NAME VALUE"
 //
-// Options: --stall PERCENT (of the cycles in which the pixel sink does not take pixels), --seed N.
+// Options: --stall PERCENT (of the cycles in which the pixel sink does not take pixels), --seed N; where the memory can
+// be held: --memory PERCENT (of a frame's cycles in which each bank is held), --burst N (longest hold, cycles).
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 when the hardware misbehaves.
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <random>
 #include <sstream>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "VColonnade.h"
-#include "columns.hpp" // EACH_COLUMN(DO): DO(column) for each column; HIT_DISTANCE(column) where the stream carries hits
+#include "columns.hpp" // EACH_COLUMN(DO): DO(column) for each column; HIT_DISTANCE(column) where the stream carries hits;
+                       // MEMORY_BANKS, of all columns, where they can be held
 #include "verilated.h"
 
 namespace {
@@ -40,9 +46,53 @@ template <class Port> double numberOf(const Port& port) {
     return static_cast<double>(value);
 }
 
+struct Options {
+    unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32;
+};
+
+#ifdef MEMORY_BANKS
+/// Holds each bank on its own: for a random number of cycles, at random, so that it is held in `percent` of all cycles.
+class BankHolds {
+public:
+    explicit BankHolds(const Options& options) : random_(options.seed), percent_(options.memoryPercent), burst_(1, options.memoryBurst) {
+        const double held = percent_ / 100.0, length = (1.0 + options.memoryBurst) / 2.0;
+        begins_ = std::bernoulli_distribution(percent_ == 0 ? 0.0 : 1.0 / (1.0 + length * (1.0 - held) / held));
+    }
+
+    /// The bits of the next cycle.
+    template <class Port> void next(Port& port) {
+        if (percent_ == 0) return;
+        unsigned char bits[sizeof(Port)] = {};
+        for (unsigned bank = 0; bank < MEMORY_BANKS; ++bank) {
+            unsigned& left = left_[bank];
+            if (left == 0 && begins_(random_)) left = burst_(random_);
+            if (left == 0) continue;
+            --left;
+            bits[bank / 8] |= static_cast<unsigned char>(1u << (bank % 8));
+        }
+        std::memcpy(&port, bits, sizeof bits);
+    }
+
+private:
+    std::mt19937 random_;
+    unsigned percent_;
+    std::uniform_int_distribution<unsigned> burst_;
+    std::bernoulli_distribution begins_;
+    unsigned left_[MEMORY_BANKS] = {};
+};
+#endif
+
 class Harness {
 public:
-    Harness(unsigned stallPercent, unsigned seed) : random_(seed), stallPercent_(stallPercent) {
+    explicit Harness(const Options& options)
+        : random_(options.seed), stallPercent_(options.stallPercent)
+#ifdef MEMORY_BANKS
+        , holds_(options)
+#endif
+    {
+#ifndef MEMORY_BANKS
+        if (options.memoryPercent != 0) throw std::runtime_error("this hardware's memory cannot be held");
+#endif
         top_.reset = 1;
         for (int i = 0; i < 8; ++i) cycle();
         top_.reset = 0;
@@ -99,6 +149,9 @@ public:
         auto shown = begun;
         std::uint64_t quiet = 0;
         for (std::size_t before = 0; !ready(top_.io_done); before = received_) {
+#ifdef MEMORY_BANKS
+            holds_.next(top_.io_memoryHolds);
+#endif
             cycle();
             quiet = received_ == before ? quiet + 1 : 0;
             if (quiet > 2'000'000'000) throw std::runtime_error("no pixel in two thousand million cycles");
@@ -107,6 +160,9 @@ public:
                 std::cerr << "progress " << static_cast<double>(received_) / static_cast<double>(pixels_.size()) << std::endl;
             }
         }
+#ifdef MEMORY_BANKS
+        std::memset(&top_.io_memoryHolds, 0, sizeof top_.io_memoryHolds);
+#endif
         const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
         std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(pixels_.data()), static_cast<std::streamsize>(pixels_.size() * sizeof(PixelBytes)));
         std::cout << "simulated " << cycles_ - first << ' ' << seconds.count() << '\n';
@@ -161,6 +217,9 @@ private:
     VColonnade top_;
     std::mt19937 random_;
     unsigned stallPercent_;
+#ifdef MEMORY_BANKS
+    BankHolds holds_;
+#endif
     std::uint64_t cycles_ = 0;
     std::vector<PixelBytes> pixels_;
     std::size_t width_ = 0, received_ = 0;
@@ -173,8 +232,8 @@ std::string decimal(unsigned __int128 value) {
     return digits;
 }
 
-void run(const std::string& job, unsigned stallPercent, unsigned seed) {
-    Harness harness(stallPercent, seed);
+void run(const std::string& job, const Options& options) {
+    Harness harness(options);
     std::ifstream commands(job);
     for (std::string line; std::getline(commands, line);) {
         std::istringstream words(line);
@@ -193,14 +252,17 @@ void run(const std::string& job, unsigned stallPercent, unsigned seed) {
 
 int main(int argc, char** argv) try {
     std::string job;
-    unsigned stallPercent = 0, seed = 1;
+    Options options;
+    const std::pair<const char*, unsigned*> named[] = {
+        {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}};
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
-        if (argument == "--stall" && i + 1 < argc) stallPercent = static_cast<unsigned>(std::stoul(argv[++i]));
-        else if (argument == "--seed" && i + 1 < argc) seed = static_cast<unsigned>(std::stoul(argv[++i]));
-        else job = argument;
+        const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });
+        if (option == std::end(named)) job = argument;
+        else if (++i < argc) *option->second = static_cast<unsigned>(std::stoul(argv[i]));
+        else throw std::runtime_error(argument + " without a number");
     }
-    run(job, stallPercent, seed);
+    run(job, options);
     return 0;
 } catch (const std::exception& problem) {
     std::cerr << "harness: " << problem.what() << '\n';

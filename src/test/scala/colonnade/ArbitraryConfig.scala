@@ -28,12 +28,14 @@ object ArbitraryConfig {
   } yield GeometryConfig(vertexBits, boxBits, triangleBits, arity, trianglesPerRecord, bvh)
 
   private val memory = for {
-    depth       <- Gen.chooseNum(16, 1 << 22, 17, 1024, 1 << 17)
-    banks       <- Gen.oneOf(1, 2, 4)
-    stackDepth  <- Gen.chooseNum(4, 256)
-    snooping    <- flag
-    readLatency <- Gen.chooseNum(1, 16)
-  } yield ColumnBvhMemoryConfig(depth, banks, stackDepth, snooping, readLatency)
+    depth         <- Gen.chooseNum(16, 1 << 22, 17, 1024, 1 << 17)
+    banks         <- Gen.oneOf(1, 2, 4)
+    stackDepth    <- Gen.chooseNum(4, 256)
+    snooping      <- flag
+    recordBuffers <- Gen.chooseNum(1, 8)
+    readLatency   <- Gen.chooseNum(1, 16)
+    holdable      <- flag
+  } yield ColumnBvhMemoryConfig(depth, banks, stackDepth, snooping, recordBuffers, readLatency, holdable)
 
   private val frame = for {
     maxWidth  <- Gen.chooseNum(8, 4096)

@@ -6,6 +6,7 @@ import colonnade.config.ColonnadeConfig
 
 /** Rows that ask, withdraw and change their minds at any time; banks that stall, and answer at any time, though in
   * order. Follows one read of each bank, any that is accepted while the bank's bit of `marks` is set, to its broadcast.
+  * With snooping a row has to wait for a record that is being read, and for nothing else.
   */
 class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
   private val rows     = config.array.rows
@@ -40,28 +41,21 @@ class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
   private class Side(bank: Int) {
     private val memory    = dut.io.memory(bank)
     private val broadcast = dut.io.broadcasts(bank)
-
-    // The memory, and what it is asked for, oldest first
-    val held            = RegInit(0.U(log2Ceil(capacity + 1).W))
-    private val reading = Reg(Vec(capacity, chiselTypeOf(requests.head.bits.address)))
-
-    // With snooping, a record that is in flight is not read again: its broadcast serves whoever asks for it
-    private def comes(address: UInt): Bool =
-      config.columnBvhMemory.snooping.B &&
-        reading.zipWithIndex.map { case (read, i) => held > i.U && read === address }.reduce(_ || _)
-
-    private val asked = requests.map { request =>
-      request.valid && Banks.isIn(config, request.bits.address, bank) && !comes(request.bits.address)
+    val held              = RegInit(0.U(log2Ceil(capacity + 1).W))
+    private val underWay  = Reg(Vec(capacity, chiselTypeOf(addresses.head))) // the latest one first
+    private val asked     = requests.map { request =>
+      val isRead = underWay.zipWithIndex.map { case (read, place) => held > place.U && read === request.bits.address }
+      val waits  = config.columnBvhMemory.snooping.B && isRead.reduce(_ || _)
+      request.valid && Banks.isIn(config, request.bits.address, bank) && !waits
     }
-    private val fires   = requests.zip(asked).map { case (request, isAsked) => request.ready && isAsked }
-    private val accepts = fires.reduce(_ || _)
-    private val address = Mux1H(fires, addresses)
+    private val fires     = requests.zip(asked).map { case (request, isAsked) => request.ready && isAsked }
+    private val accepts   = fires.reduce(_ || _)
+    private val address   = Mux1H(fires, addresses)
 
+    // The memory
     private val answer = answers(bank) && held =/= 0.U
     held := held + accepts - answer
-    for ((read, i) <- reading.zipWithIndex)
-      when(accepts && held - answer === i.U)(read := address)
-        .elsewhen(answer)(read := reading((i + 1).min(capacity - 1)))
+    when(accepts) { underWay := VecInit(address +: underWay.init) }
     memory.request.ready  := ready(bank)
     memory.response.valid := answer
     memory.response.bits  := data(bank)

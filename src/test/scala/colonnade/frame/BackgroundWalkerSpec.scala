@@ -38,6 +38,28 @@ class BackgroundWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
 
+  it should "put pixels that others sort out before those of its tile" in {
+    test(new BackgroundWalker(TileScanSpec.config(tileSize = 8))) { dut =>
+      dut.io.frame.pixelsWide.poke(640)
+      dut.io.frame.pixelsHigh.poke(480)
+      dut.io.pixels.ready.poke(true)
+      dut.io.tiles.valid.poke(true)
+      dut.clock.step()
+      dut.io.tiles.valid.poke(false)
+      dut.io.others.bits.x.poke(100)
+      dut.io.others.bits.y.poke(7)
+      val xs = for (cycle <- 0 until 65) yield {
+        dut.io.others.valid.poke(cycle == 5)
+        dut.io.pixels.valid.expect(true)
+        val x = dut.io.pixels.bits.x.peekInt()
+        dut.clock.step()
+        x
+      }
+      assert(xs(5) == 100 && xs.count(_ == 100) == 1)
+      dut.io.isIdle.expect(true)
+    }
+  }
+
   it should "give a pixel a cycle, and be idle before the first and after the last" in {
     val config = TileScanSpec.config(tileSize = 8)
     test(new BackgroundWalker(config)) { dut =>

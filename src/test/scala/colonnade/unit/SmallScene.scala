@@ -9,7 +9,14 @@ import scala.util.Random
 /** A few large triangles in the object's cube, seen from before it: records as the packer lays them out, and registers.
   * Nodes hold `arity` groups of leaves, cut along x.
   */
-final class SmallScene(config: ColonnadeConfig, seed: Int, wide: Int, high: Int, triangleCount: Int) {
+final class SmallScene(
+    config:        ColonnadeConfig,
+    seed:          Int,
+    wide:          Int,
+    high:          Int,
+    triangleCount: Int,
+    shadows:       Boolean
+) {
   private type Point = Seq[Int]
   private type Leaf  = Seq[Seq[Point]]
 
@@ -65,13 +72,13 @@ final class SmallScene(config: ColonnadeConfig, seed: Int, wide: Int, high: Int,
       "frame.width"          -> wide,
       "frame.height"         -> high,
       "frame.unitShift"      -> unitShift,
-      "frame.objectRect.x0"  -> 1,
+      "frame.objectRect.x0"  -> 0,
       "frame.objectRect.x1"  -> wide,
-      "frame.objectRect.y1"  -> (high - 1),
+      "frame.objectRect.y1"  -> high,
       "camera.stepShift"     -> 2,
       "light.shadowOffset"   -> (cube >> 8).max(1),
       "shading.flat"         -> seed % 2,
-      "shading.shadows"      -> 1,
+      "shading.shadows"      -> (if (shadows) 1 else 0),
       "frame.objectRect.y0"  -> 0,
       "frame.watchdogCycles" -> 0
     ) ++ scene.map { case (name, value) => s"scene.$name" -> BigInt(value) } ++ materials.flatten ++

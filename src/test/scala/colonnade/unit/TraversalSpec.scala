@@ -149,8 +149,8 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
     val visit = reading.remove(context).get
     if (visit.isLeaf) {
       walk.leaves :+= visit.address.toInt
-      if (shrinks && random.nextInt(3) == 0) {
-        walk.limit = walk.limit.min(visit.near + random.nextInt(1 << config.numbers.vertexBits))
+      if (shrinks && random.nextBoolean()) {
+        walk.limit = walk.limit.min(visit.near + random.nextInt(1 << (config.numbers.vertexBits - 3)))
         dut.io.limits(context).pokeRaw(walk.limit)
       }
       expected(context) = reference.resume(context, walk.limit)

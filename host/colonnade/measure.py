@@ -1,0 +1,132 @@
+"""Frames through the RTL for the sake of their counters: some at a time, and none twice where that is wanted."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from colonnade.errors import UserError
+from colonnade.files import write_json
+from colonnade.generator import GeneratedDesign, design_for
+from colonnade.image import SceneImage
+from colonnade.meshes import Mesh, load_mesh
+from colonnade.pack import pack
+from colonnade.parallel import in_order
+from colonnade.placement import placement
+from colonnade.progress import QUIET, Progress
+from colonnade.render import frame_report, mesh_report, require_no_errors
+from colonnade.scene import Scene, load_scene
+from colonnade.simulate import build_simulator, render_rtl
+from colonnade.sizes import check_size
+from colonnade.toolchain import cache_directory, project_root
+
+#: A build takes all processors by itself.
+_BUILDING = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Run:
+    """One frame to render.
+
+    Attributes:
+        config: name of the configuration, with `overrides` applied.
+        overrides: ``key.path=value`` changes.
+        mesh: name or file.
+    """
+
+    config: str
+    overrides: tuple[str, ...]
+    mesh: str
+
+    @property
+    def title(self) -> str:
+        """For progress."""
+        return " ".join((self.mesh, *self.overrides))
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What the runs of one measurement have in common.
+
+    Attributes:
+        scene: the benchmark's scene; its mesh is replaced.
+        size: width and height in pixels; the scene's unless given.
+        jobs: frames at a time.
+        reuse: take the report of a run of the same hardware and the same scene image, where one was kept.
+    """
+
+    scene: Path
+    size: tuple[int, int] | None = None
+    jobs: int = 1
+    reuse: bool = False
+
+
+def measure(runs: Sequence[Run], conditions: Conditions, progress: Progress = QUIET) -> Iterator[dict[str, Any]]:
+    """Reports of the runs, in their order: those of `frame_report`, with ``cycles_per_second`` and ``seconds``.
+
+    All meshes are loaded before the first frame is rendered.
+    """
+    scene = load_scene(conditions.scene)
+    meshes: dict[str, Mesh] = {}
+    with progress.step("loading the meshes"):
+        for name in dict.fromkeys(run.mesh for run in runs):
+            meshes[name] = load_mesh(scene.with_mesh(name).mesh_source)
+
+    def one(run: Run) -> dict[str, Any]:
+        return _measured(run, scene, meshes[run.mesh], conditions, progress.of(run.title))
+
+    return in_order(one, runs, conditions.jobs)
+
+
+def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progress: Progress) -> dict[str, Any]:
+    scene = scene.with_mesh(run.mesh)
+    with _BUILDING:
+        design = design_for(run.config, run.overrides, progress)
+    width, height = conditions.size or (scene.frame.width, scene.frame.height)
+    check_size((width, height), design.manifest)
+    begun = time.perf_counter()
+    try:
+        with progress.step("packing the scene"):
+            image = pack(mesh, design.manifest)
+            registers = placement(scene, image.header, design.manifest, width, height)
+    except UserError as error:
+        raise UserError(": ".join((*run.overrides, str(error)))) from error
+    seconds = {"pack": time.perf_counter() - begun}
+    kept = cache_directory(project_root()) / "measurements" / f"{_digest(design, image, registers)}.json"
+    if conditions.reuse and kept.is_file():
+        known: dict[str, Any] = json.loads(kept.read_text())
+        return known | {
+            "config": design.manifest.config,
+            "config_hash": design.manifest.config_hash,
+            "mesh": mesh_report(image.header),
+        }
+    with _BUILDING:
+        build_simulator(design, progress)
+    begun = time.perf_counter()
+    simulated = render_rtl(design, image, [registers], progress=progress)
+    seconds["run"] = time.perf_counter() - begun
+    frame = simulated.frames[0]
+    require_no_errors(frame)
+    report = {
+        **frame_report("rtl", design.manifest, image.header, frame),
+        "config_hash": design.manifest.config_hash,
+        "cycles_per_second": simulated.cycles_per_second,
+        "seconds": seconds,
+    }
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    write_json(kept, report)
+    return report
+
+
+def _digest(design: GeneratedDesign, image: SceneImage, registers: Mapping[str, int]) -> str:
+    """Of all that a frame's counters follow from."""
+    digest = hashlib.sha256(design.digest().encode())
+    digest.update(image.records.tobytes())
+    digest.update(json.dumps(dict(registers), sort_keys=True, default=int).encode())
+    return digest.hexdigest()[:24]
