@@ -48,9 +48,9 @@ class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
       val waits  = config.columnBvhMemory.snooping.B && isRead.reduce(_ || _)
       request.valid && Banks.isIn(config, request.bits.address, bank) && !waits
     }
-    private val fires     = requests.zip(asked).map { case (request, isAsked) => request.ready && isAsked }
-    private val accepts   = fires.reduce(_ || _)
-    private val address   = Mux1H(fires, addresses)
+    private val fires   = requests.zip(asked).map { case (request, isAsked) => request.ready && isAsked }
+    private val accepts = fires.reduce(_ || _)
+    private val address = Mux1H(fires, addresses)
 
     // The memory
     private val answer = answers(bank) && held =/= 0.U
