@@ -29,7 +29,7 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
       }
     }
 
-  for ((arity, cycles) <- Seq((2, 14), (4, 12)))
+  for ((arity, cycles) <- Seq((2, 11), (4, 10)))
     it should s"lose, double and mix up no entry, and cull only those beyond the limit, arity $arity" in {
       val shape = config(arity, stackDepth = 4, contexts = 2)
       prove(cycles) {
