@@ -79,19 +79,18 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val use       = Reg(RecordUse())
     val address   = Reg(UInt(RecordFormats.idBits(config).W))
     val buffer    = Reg(UInt(log2Ceil(config.columnBvhMemory.recordBuffers.max(2)).W))
-
   }
   private val buffers = Seq.fill(config.columnBvhMemory.recordBuffers)(new RecordBuffer)
   private val wishes  = Seq.fill(contexts)(new ContextWish)
 
-  /** The record in, or on its way into, buffer `index` is the one that a context waits for. */
-  private def isMeant(wish: ContextWish, index: Int, address: UInt): Bool =
-    wish.isWaiting && Mux(snooping, wish.address === address, wish.isAsked && wish.buffer === index.U)
+  /** The answer to a context's own read is, or comes, into buffer `index`. */
+  private def isOwn(wish: ContextWish, index: Int): Bool = wish.isAsked && wish.buffer === index.U
 
   // Contexts take what they wait for from full buffers
   private val takes = wishes.map(wish =>
     buffers.zipWithIndex.map { case (buffer, index) =>
-      buffer.state === BufferState.full && isMeant(wish, index, buffer.address)
+      val isMeant = Mux(snooping, wish.address === buffer.address, isOwn(wish, index))
+      wish.isWaiting && buffer.state === BufferState.full && isMeant
     }
   )
 
@@ -103,40 +102,38 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     buffer.state === BufferState.empty || (buffer.state === BufferState.full && !isHeld.reduce(_ || _))
   }
 
-  // Broadcasts: into the buffer reserved for them, else (snooping) into an available one when a context waits for them.
-  // Whoever waits for one takes it as it arrives.
-  private val arrivals = Seq.fill(buffers.size)(Wire(Valid(UInt(RecordFormats.addressBits(config).W))))
-  arrivals.foreach { arrival =>
-    arrival.valid := false.B
-    arrival.bits  := DontCare
-  }
-  private val afterBroadcasts = io.broadcasts.foldLeft(isAvailable) { (available, broadcast) =>
-    val isReserved = buffers.map(buffer =>
-      buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address &&
-        (snooping || broadcast.bits.row === io.row)
-    )
-    val isWanted = wishes.zip(takes).map { case (wish, taken) =>
-      wish.isWaiting && !taken.reduce(_ || _) && wish.address === broadcast.bits.address
+  // Broadcasts: into the buffer reserved for them, else (snooping) into an available one when a context waits for them
+  private val awaited =
+    io.broadcasts.map(broadcast => wishes.map(wish => wish.isWaiting && wish.address === broadcast.bits.address))
+  private val (afterBroadcasts, fills) =
+    io.broadcasts.zip(awaited).foldLeft((isAvailable, Seq.empty[Seq[Bool]])) {
+      case ((available, fills), (broadcast, isAwaited)) =>
+        val isReserved = buffers.map(buffer =>
+          buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address &&
+            (snooping || broadcast.bits.row === io.row)
+        )
+        val isWanted  = isAwaited.zip(takes).map { case (waits, taken) => waits && !taken.reduce(_ || _) }
+        val isSnooped = snooping && !isReserved.reduce(_ || _) && isWanted.reduce(_ || _)
+        val places    = PriorityEncoderOH(available).map(_ && isSnooped && broadcast.valid)
+        val meant     = PriorityEncoderOH(isReserved).map(_ && broadcast.valid)
+        val filled    = places.zip(meant).map { case (place, mine) => place || mine }
+        for ((buffer, fill) <- buffers.zip(filled)) {
+          when(fill) {
+            buffer.state   := BufferState.full
+            buffer.address := broadcast.bits.address
+            buffer.record  := broadcast.bits.record
+          }
+        }
+        (available.zip(places).map { case (free, place) => free && !place }, fills :+ filled)
     }
-    val isSnooped = snooping && !isReserved.reduce(_ || _) && isWanted.reduce(_ || _)
-    val places    = PriorityEncoderOH(available).map(_ && isSnooped)
-    val meant     = PriorityEncoderOH(isReserved)
-    for ((((buffer, arrival), place), mine) <- buffers.zip(arrivals).zip(places).zip(meant)) {
-      when(broadcast.valid && (place || mine)) {
-        arrival.valid  := true.B
-        arrival.bits   := broadcast.bits.address
-        buffer.state   := BufferState.full
-        buffer.address := broadcast.bits.address
-        buffer.record  := broadcast.bits.record
-      }
-    }
-    available.zip(places).map { case (free, place) => free && !(place && broadcast.valid) }
-  }
 
   // A context has what a buffer had or has just got
-  private val finds = wishes.zip(takes).map { case (wish, taken) =>
-    taken.zip(arrivals).zipWithIndex.map { case ((isTaken, arrival), index) =>
-      isTaken || (arrival.valid && isMeant(wish, index, arrival.bits))
+  private val finds = wishes.zipWithIndex.map { case (wish, context) =>
+    buffers.indices.map { index =>
+      val arrives = fills.zip(awaited).map { case (filled, isAwaited) =>
+        filled(index) && Mux(snooping, isAwaited(context), wish.isWaiting && isOwn(wish, index))
+      }
+      takes(context)(index) || arrives.reduce(_ || _)
     }
   }
   wishes.zip(finds).foreach { case (wish, found) =>
