@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Mux1H, PopCount, PriorityEncoder, PriorityEncoderOH, Valid}
+import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, PopCount, PriorityEncoder, PriorityEncoderOH, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 import colonnade.ray.Context
@@ -21,6 +21,7 @@ final class RecordWish(config: ColonnadeConfig) extends Bundle {
 /** A record for the context that wished for it. */
 final class ServedRecord(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
+  val use     = RecordUse()
   val record  = new RecordFormats(config).record
 }
 
@@ -54,8 +55,9 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val requests    = Decoupled(new RecordRequest(config))
     val broadcasts  = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
 
-    /** One port for each [[RecordUse]]. */
-    val served  = Vec(RecordUse.all.size, Decoupled(new ServedRecord(config)))
+    /** Units that take a record in this cycle, one for each [[RecordUse]]; and the record that one of them takes. */
+    val isReady = Input(Vec(RecordUse.all.size, Bool()))
+    val served  = Output(Valid(new ServedRecord(config)))
     val refused = Output(Valid(new RefusedWish(config)))
 
     /** Contexts without, and with, the record they wished for; records taken without having been asked for. */
@@ -117,15 +119,17 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
         val places    = PriorityEncoderOH(available).map(_ && isSnooped && broadcast.valid)
         val meant     = PriorityEncoderOH(isReserved).map(_ && broadcast.valid)
         val filled    = places.zip(meant).map { case (place, mine) => place || mine }
-        for ((buffer, fill) <- buffers.zip(filled)) {
-          when(fill) {
-            buffer.state   := BufferState.full
-            buffer.address := broadcast.bits.address
-            buffer.record  := broadcast.bits.record
-          }
-        }
         (available.zip(places).map { case (free, place) => free && !place }, fills :+ filled)
     }
+
+  for ((buffer, fill) <- buffers.zip(fills.transpose)) {
+    val broadcast = Mux1H(fill, io.broadcasts.map(_.bits))
+    when(fill.reduce(_ || _)) {
+      buffer.state   := BufferState.full
+      buffer.address := broadcast.address
+      buffer.record  := broadcast.record
+    }
+  }
 
   // A context has what a buffer had or has just got
   private val finds = wishes.zipWithIndex.map { case (wish, context) =>
@@ -180,27 +184,30 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     }
   }
 
+  private def useOf(chosen: Seq[Bool]): RecordUse.Type = RecordUse.safe(Mux1H(chosen, wishes.map(_.use.asUInt)))._1
+
   // Refuse what lies beyond the scene
   io.refused.valid        := isSeeking && !isLegal
-  io.refused.bits.context := PriorityEncoder(seekers)
-  io.refused.bits.use     := VecInit(wishes.map(_.use))(PriorityEncoder(seekers))
+  io.refused.bits.context := OHToUInt(seekers)
+  io.refused.bits.use     := useOf(seekers)
   when(io.refused.valid) {
     wishes.zip(seekers).foreach { case (wish, seeks) => when(seeks) { wish.isWaiting := false.B } }
   }
 
-  // Serve each unit one context at a time
-  RecordUse.all.zip(io.served).foreach { case (use, port) =>
-    val ready = PriorityEncoderOH(wishes.map(wish => wish.hasRecord && wish.use === use))
-    port.valid        := ready.reduce(_ || _)
-    port.bits.context := PriorityEncoder(ready)
-    port.bits.record  := Mux1H(
-      buffers.indices.map(index => Mux1H(ready, wishes.map(_.buffer)) === index.U),
-      buffers.map(_.record)
-    )
-    when(port.fire) {
-      wishes.zip(ready).foreach { case (wish, isServed) => when(isServed) { wish.hasRecord := false.B } }
-    }
-  }
+  // Serve one context whose unit is ready
+  private val servedOnes = PriorityEncoderOH(wishes.map { wish =>
+    wish.hasRecord && RecordUse.all.zip(
+      io.isReady
+    ).map { case (use, isReady) => wish.use === use && isReady }.reduce(_ || _)
+  })
+  private val place = Mux1H(servedOnes, wishes.map(_.buffer))
+  io.served.valid        := servedOnes.reduce(_ || _)
+  io.served.bits.context := OHToUInt(servedOnes)
+  io.served.bits.use     := useOf(servedOnes)
+  io.served.bits.record  := Mux1H(buffers.zipWithIndex.map { case (buffer, index) =>
+    (place === index.U) -> buffer.record
+  })
+  wishes.zip(servedOnes).foreach { case (wish, isServed) => when(isServed) { wish.hasRecord := false.B } }
 
   // New wishes
   for (port <- io.wishes; (wish, context) <- wishes.zipWithIndex) {

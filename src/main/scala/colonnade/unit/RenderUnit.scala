@@ -84,8 +84,12 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   traversal.io.clear := io.start
   traversal.io.scene := io.registers.scene
   connect(traversal.io.start, enters, setUpRay.bits.context)
-  traversal.io.nodes :<>= recordFetch.io.served(0)
-  traversal.io.ray          := boxRays.read(recordFetch.io.served(0).bits.context)
+  private val served      = recordFetch.io.served
+  private val triangleRay = triangleRays.read(served.bits.context)
+  recordFetch.io.isReady := VecInit(traversal.io.nodes.ready, triangleUnit.io.candidate.ready, shader.io.request.ready)
+  traversal.io.nodes.valid  := isFor(RecordUse.node)
+  traversal.io.nodes.bits   := served.bits
+  traversal.io.ray          := boxRays.read(served.bits.context)
   traversal.io.limits       := hitTable.io.limits
   traversal.io.visits.ready := true.B
   private val next = traversal.io.visits
@@ -94,12 +98,10 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   wish(1, next.fire && !next.bits.isDone, next.bits.context, next.bits.visit)
 
   // Triangles
-  private val triangles = recordFetch.io.served(1)
-  triangleUnit.io.candidate.valid        := triangles.valid
-  triangleUnit.io.candidate.bits.context := triangles.bits.context
-  triangleUnit.io.candidate.bits.record  := formats.asTriangles(triangles.bits.record)
-  triangleUnit.io.candidate.bits.ray     := triangleRays.read(triangles.bits.context)
-  triangles.ready                        := triangleUnit.io.candidate.ready
+  triangleUnit.io.candidate.valid        := isFor(RecordUse.triangles)
+  triangleUnit.io.candidate.bits.context := served.bits.context
+  triangleUnit.io.candidate.bits.record  := formats.asTriangles(served.bits.record)
+  triangleUnit.io.candidate.bits.ray     := triangleRay
 
   // A result either ends its ray (a shadow ray that is occluded) or lets it go on
   private val tested     = triangleUnit.io.result
@@ -138,18 +140,16 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   when(isSeen) { isObject(judged.bits) := true.B }
 
   // Shading
-  private val attributes = recordFetch.io.served(2)
-  hitTable.io.readers(1).context := attributes.bits.context
+  hitTable.io.readers(1).context := served.bits.context
   private val shadedHit = hitTable.io.readers(1).hit
-  shader.io.request.valid        := attributes.valid
-  shader.io.request.bits.context := attributes.bits.context
-  shader.io.request.bits.ray     := triangleRays.read(attributes.bits.context)
+  shader.io.request.valid        := isFor(RecordUse.attributes)
+  shader.io.request.bits.context := served.bits.context
+  shader.io.request.bits.ray     := triangleRay
   shader.io.request.bits.hit     := shadedHit
-  shader.io.request.bits.face    := formats.asAttributes(attributes.bits.record).faces(shadedHit.id(
+  shader.io.request.bits.face    := formats.asAttributes(served.bits.record).faces(shadedHit.id(
     RecordFormats.faceSlotBits - 1,
     0
   ))
-  attributes.ready    := shader.io.request.ready
   shader.io.light     := io.registers.light
   shader.io.unitShift := io.registers.frame.unitShift
   shader.io.ambient   := io.registers.ambient
@@ -230,13 +230,16 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   events.waitRecord        := recordFetch.io.waiting
   events.waitUnit          := recordFetch.io.holding
   events.contextsBox       := population(Seq(traversal.io.nodes.fire, traversal.io.resume.fire), next.fire)
-  events.contextsTriangles := population(Seq(triangles.fire), tested.fire && tested.bits.isLast)
-  events.contextsShading   := population(Seq(attributes.fire), shaded.fire)
+  events.contextsTriangles := population(Seq(triangleUnit.io.candidate.fire), tested.fire && tested.bits.isLast)
+  events.contextsShading   := population(Seq(shader.io.request.fire), shaded.fire)
 
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
   events.illegalRecord := refused.valid
   io.isIdle            := controller.io.freeCount === contexts.U && !io.pixels.valid
+
+  /** The record served is for this use. */
+  private def isFor(use: RecordUse.Type): Bool = served.valid && served.bits.use === use
 
   /** Contexts that have entered and not left. */
   private def population(enter: Seq[Bool], leaves: Bool): UInt = {

@@ -119,12 +119,18 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       }
     }
 
-    private def takeServed(): Unit = RecordUse.all.zip(dut.io.served).foreach { case (use, port) =>
-      val takes = random.nextInt(3) > 0
-      port.ready.poke(takes.B)
-      if (takes && port.valid.peekBoolean()) {
+    private def takeServed(): Unit = {
+      val takers = RecordUse.all.zip(dut.io.isReady).filter { case (_, port) =>
+        val takes = random.nextInt(3) > 0
+        port.poke(takes.B)
+        takes
+      }
+      val port = dut.io.served
+      if (port.valid.peekBoolean()) {
         val context = port.bits.context.peekInt().toInt
-        withClue(s"context $context: ") { wanted.get(context).map(_._2) shouldBe Some(use) }
+        val use     = port.bits.use.peek()
+        takers.map(_._1.litValue) should contain(use.litValue)
+        withClue(s"context $context: ") { wanted.get(context).map(_._2.litValue) shouldBe Some(use.litValue) }
         port.bits.record.peekInt() shouldBe contentOf(wanted(context)._1)
         wanted -= context
         served += 1
