@@ -128,11 +128,15 @@ def scaling(sweep: Data, _: Path) -> str:
 
 
 def ablation(sweep: Data, docs: Path) -> str:
-    """Measured beside the model's figures: a row for each number of contexts and mesh."""
+    """Measured beside the model's figures, in box and column: a row for each number of contexts and mesh."""
     keys = ("array.contexts", "columnBvhMemory.snooping", "columnBvhMemory.banks")
     points = {tuple(point["values"][key] for key in keys): point for point in sweep["points"]}
-    modelled = json.loads((docs / "data" / "cycle-model.json").read_text())["points"]
-    model = {(p["mesh"], p["lanes"], p["contexts"], p["snooping"], p["banks"]): p["in_box"] for p in modelled}
+    modelled = json.loads((docs / "data" / "cycle-model.json").read_text())
+    model = {
+        (p["mesh"], p["lanes"], p["contexts"], p["snooping"], p["banks"]): p["in_box"] / modelled["columns"]
+        for p in modelled["points"]
+    }
+    columns = sweep["base"]["config"]["array"]["columns"]
     variants = list(dict.fromkeys((snooping, banks) for _, snooping, banks in points))
     names = [
         f"{'snooping' if snooping else 'round-robin'}, {banks} bank{'s' * (banks > 1)}" for snooping, banks in variants
@@ -141,12 +145,12 @@ def ablation(sweep: Data, docs: Path) -> str:
     for mesh in sweep["base"]["meshes"]:
         for contexts in dict.fromkeys(contexts for contexts, _, _ in points):
             at = [(contexts, *variant) for variant in variants]
-            measured = (f"**{points[place]['meshes'][mesh]['rays_per_cycle_in_box']:.2f}**" for place in at)
+            measured = (f"**{points[place]['meshes'][mesh]['rays_per_cycle_in_box'] / columns:.3f}**" for place in at)
             rows.append((mesh, str(contexts), "RTL", *measured))
             for lanes in ("6/2", "12/4"):
                 figures = [model.get((mesh, lanes, *place)) for place in at]
                 if any(figure is not None for figure in figures):
-                    rows.append(("", "", f"model, {lanes} lanes", *map(_number, figures)))
+                    rows.append(("", "", f"model, {lanes} lanes", *(_number(figure, 3) for figure in figures)))
     return markdown(["mesh", "contexts", "", *names], rows)
 
 
@@ -162,8 +166,8 @@ def _shares(bench: Data, key: str) -> str:
     return markdown(["mesh", *first[key]], rows)
 
 
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2f}"
+def _number(value: float | None, digits: int = 2) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
 
 
 def _percent(share: float) -> str:

@@ -75,8 +75,8 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
 def test_ablation_stands_beside_the_model(docs: Path) -> None:
     rows = table(docs, "ablation")
     assert "| mesh | contexts |  | round-robin, 1 bank | snooping, 1 bank |" in rows
-    assert "| bunny | 4 | RTL | **1.00** | **1.25** |\n|  |  | model, 6/2 lanes | 0.72 | 1.32 |" in rows
-    assert "|  |  | model, 12/4 lanes | – | 1.52 |" in rows
+    assert "| bunny | 4 | RTL | **0.333** | **0.417** |\n|  |  | model, 6/2 lanes | 0.090 | 0.165 |" in rows
+    assert "|  |  | model, 12/4 lanes | – | 0.190 |" in rows
     assert rows.count("| cube |") == 2
 
 
