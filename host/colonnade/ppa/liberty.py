@@ -74,7 +74,9 @@ def pruned(path: Path) -> str:
     kept.append(text[begin:])
     if depth != 0:
         raise UserError(f"{path} is cut off or no liberty: its braces do not match")
-    return re.sub(r"\n\s*\n+", "\n", "".join(kept))
+    # Wire load models are among the groups that went
+    text = re.sub(r"default_wire_load\w*\s*:[^;]*;", "", "".join(kept))
+    return re.sub(r"\n\s*\n+", "\n", text)
 
 
 def _is_dropped(group: str, argument: str) -> bool:
