@@ -12,10 +12,12 @@ from click.testing import CliRunner
 
 from colonnade.cli import cli
 from colonnade.errors import UserError
-from colonnade.ppa import liberty, memories
+from colonnade.ppa import liberty, memories, opensta
 from colonnade.ppa.cells import Library, Table
+from colonnade.ppa.guard import differences, gates_of_tiny
 from colonnade.ppa.hierarchy import BORDERS, Hierarchy
 from colonnade.ppa.netlist import Netlist
+from colonnade.ppa.page import page
 from colonnade.ppa.timing import Analysis
 
 GUARD = Path(__file__).parent / "ppa_tiny.json"
@@ -28,8 +30,9 @@ ARC = """timing () { related_pin : "%s"; timing_sense : %s;
   fall_transition (t) { values ("5, 5", "5, 5"); index_1 ("0, 100"); index_2 ("0, 10"); } }"""
 
 LIBERTY = f"""/* small */ library (small) {{
-  time_unit : "1ps"; capacitive_load_unit (1, ff);
-  lu_table_template (t) {{ variable_1 : input_net_transition; variable_2 : total_output_net_capacitance; }}
+  delay_model : table_lookup; time_unit : "1ps"; capacitive_load_unit (1, ff);
+  lu_table_template (t) {{ variable_1 : input_net_transition; variable_2 : total_output_net_capacitance;
+    index_1 ("0, 100"); index_2 ("0, 10"); }}
   lu_table_template (s) {{ variable_1 : related_pin_transition; variable_2 : constrained_pin_transition;
     index_1 ("0, 100"); index_2 ("0, 100"); }}
   cell (NAND) {{ area : 2; leakage_power () {{ value : 1; }}
@@ -43,7 +46,7 @@ LIBERTY = f"""/* small */ library (small) {{
   cell (OLD) {{ area : 1; dont_use : true; }}
   cell (SDFQ) {{ area : 1; }}
   cell (DFF) {{ area : 9; ff (I, N) {{ clocked_on : "C"; next_state : "D"; }}
-    pin (C) {{ direction : input; }}
+    pin (C) {{ direction : input; clock : true; }}
     pin (D) {{ direction : input; capacitance : 1; timing () {{ related_pin : "C"; timing_type : setup_rising;
       rise_constraint (s) {{ values ("3, 4", "3, 4"); }} fall_constraint (s) {{ values ("3, 4", "3, 4"); }} }} }}
     pin (Q) {{ direction : output; function : "I";
@@ -173,6 +176,31 @@ def test_wrong_input_is_one_line(arguments: tuple[str, ...], message: str) -> No
     assert len(result.stderr.splitlines()) == 1
 
 
+def test_the_page_keeps_its_text_and_names_what_is_missing(tmp_path: Path) -> None:
+    text = "# Cost\n<!-- units_32b32s64d -->\nold\n<!-- end -->\nprose\n<!-- ecp5 -->\n<!-- end -->\n"
+    missing = "Not measured: run `tools/ppa`."
+    written = (
+        f"# Cost\n<!-- units_32b32s64d -->\n{missing}\n<!-- end -->\nprose\n<!-- ecp5 -->\n{missing}\n<!-- end -->\n"
+    )
+    assert page(text, tmp_path) == written
+
+
+def test_a_changed_area_is_told() -> None:
+    recorded = {"BoxUnit": 10.0, "Shader": 20.0, "gone": 1.0}
+    told = differences(recorded, {"BoxUnit": 10.15, "Shader": 21.0, "new": 1.0})
+    assert told == ["new is new", "gone is gone", "Shader has 21.00 kGE, on record are 20.00 (+5.0%)"]
+
+
+@pytest.mark.skipif(not opensta.is_there(), reason="OpenSTA is not installed")
+def test_opensta_finds_the_same_path(small: Library) -> None:
+    cells = {"first": cell("DFF", C=2, D=3, Q=4), "gate": cell("INV", A=4, Y=5), "second": cell("DFF", C=2, D=5, Q=9)}
+    top = module(cells, {"begins": 4, "between": 5, "z": 9})
+    analysis = Analysis(Netlist({"top": top}, "top", small), small)
+    path = analysis.timing().register_to_register
+    assert path is not None
+    assert opensta.register_to_register(top, small, analysis.slew, analysis.output_load) == pytest.approx(path.ns, 1e-3)
+
+
 @pytest.mark.parametrize("text", ["", "library (a) {", "no cells"])
 def test_what_is_no_liberty_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "bad.lib").write_text(text)
@@ -184,7 +212,6 @@ def test_what_is_no_liberty_is_refused(tmp_path: Path, text: str) -> None:
 @pytest.mark.skipif(importlib.util.find_spec("pyosys") is None, reason="no Yosys: run tools/ppa-environment")
 def test_gates_of_tiny_are_those_on_record() -> None:
     """A change of area is meant, or it shows here."""
-    from colonnade.ppa.guard import differences, gates_of_tiny
 
     changed = differences(json.loads(GUARD.read_text()), gates_of_tiny())
     assert not changed, (

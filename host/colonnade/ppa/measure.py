@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from colonnade.generator import black_boxed_design_for
-from colonnade.ppa import memories
+from colonnade.ppa import memories, opensta
 from colonnade.ppa.hierarchy import LEVELS, Hierarchy, Level, Memory
 from colonnade.ppa.netlist import Netlist
 from colonnade.ppa.synthesis import Gates, Technology, count_gates, synthesise, technology
@@ -71,7 +71,8 @@ def measure(
         "levels": levels,
         "render_unit_kge": levels["render_unit"]["kge"],
         "slowest_path": slowest,
-        "render_unit_paths": None if whole is None else _paths(whole, into),
+        "render_unit_paths": whole,
+        "opensta": _second_opinion(units),
         "chip": {
             "mm2": memories.CHIP_MM2,
             "units": memories.CHIP_UNITS,
@@ -84,9 +85,13 @@ def measure(
 
 
 def _unit(level: Level, module: str, netlists: Mapping[str, Any], into: Technology) -> dict[str, Any]:
-    gates: Gates = count_gates(netlists[module], into)
-    timing = _timing({module: netlists[module]}, module, into)
+    netlist = netlists[module]
+    gates: Gates = count_gates(netlist, into)
     area = into.gate_area
+    paths = _timing({module: netlist}, module, into)
+    if paths and paths["register_to_register"] and into.library and opensta.is_there():
+        edges = Analysis.edges(into.library)
+        paths["register_to_register"]["opensta_ns"] = opensta.register_to_register(netlist, into.library, *edges)
     return {
         "level": level.name,
         "module": module,
@@ -95,14 +100,14 @@ def _unit(level: Level, module: str, netlists: Mapping[str, Any], into: Technolo
         "flops_kge": gates.registers / 1e3,
         "combinational_kge": gates.combinational / 1e3,
         "um2": None if area is None else gates.total * area,
-        "paths": None if timing is None else _paths(timing, into),
+        "paths": paths,
     }
 
 
-def _timing(modules: Mapping[str, Any], top: str, into: Technology) -> Timing | None:
+def _timing(modules: Mapping[str, Any], top: str, into: Technology) -> dict[str, Any] | None:
     if into.library is None:
         return None
-    return Analysis(Netlist(modules, top, into.library), into.library).timing()
+    return _paths(Analysis(Netlist(modules, top, into.library), into.library).timing(), into)
 
 
 def _paths(timing: Timing, into: Technology) -> dict[str, Any]:
@@ -120,6 +125,13 @@ def _paths(timing: Timing, into: Technology) -> dict[str, Any]:
         "register_to_output": path(timing.register_to_output),
         "input_to_output": path(timing.input_to_output),
     }
+
+
+def _second_opinion(units: Mapping[str, Mapping[str, Any]]) -> dict[str, Any] | None:
+    """How far OpenSTA's slowest paths are from ours, where it is there."""
+    found = [unit["paths"]["register_to_register"] for unit in units.values() if _is_timed(unit)]
+    shares = [path["ns"] / path["opensta_ns"] - 1 for path in found if path.get("opensta_ns")]
+    return {"units": len(shares), "least": min(shares), "most": max(shares)} if shares else None
 
 
 def _is_timed(unit: Mapping[str, Any]) -> bool:

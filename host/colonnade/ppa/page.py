@@ -13,10 +13,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from colonnade.bench import geometric_mean
 from colonnade.files import replacing
 from colonnade.performance_page import markdown
 from colonnade.ppa.hierarchy import LEVELS
-from colonnade.ppa.text import MOST_FO4, TITLES
+from colonnade.ppa.text import MOST_FO4, TITLES, second_opinion
 
 #: The files of a precision, and what their columns are called.
 LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
@@ -35,7 +36,7 @@ def page(text: str, data: Path) -> str:
             reports = _reports(data, precision)
             body = {"units": units, "totals": totals, "paths": paths}[kind](reports) if reports else ""
         else:
-            body = {"bvh": bvh, "ecp5": ecp5, "libraries": libraries}[kind](data)
+            body = {"bvh": bvh, "nodes": nodes, "ecp5": ecp5, "libraries": libraries}[kind](data)
         return f"{match[1]}{body or 'Not measured: run `tools/ppa`.'}\n{match[3]}"
 
     return _TABLE.sub(replaced, text)
@@ -104,7 +105,13 @@ def paths(reports: Mapping[str, Data]) -> str:
                 above.append(f"{name} ({path['fo4']:.0f} with {LIBRARIES[library]})")
     if not rows:
         return ""
-    verdict = f"Units above {MOST_FO4} FO4: {', '.join(above) or 'none'}."
+    opinions = [
+        f"with {LIBRARIES[library]} {second_opinion(report['opensta'])}"
+        for library, report in reports.items()
+        if report["opensta"]
+    ]
+    verdict = f"Against OpenSTA, {'; '.join(opinions)}. " if opinions else ""
+    verdict += f"Units above {MOST_FO4} FO4: {', '.join(above) or 'none'}."
     titles = ["slowest path", "library", "ns", "FO4", "from", "to", "gates"]
     return f"{verdict}\n\n{markdown(titles, rows)}"
 
@@ -124,6 +131,25 @@ def bvh(data: Path) -> str:
     on, off = (report["levels"]["array"]["logic_kge"] for report in (tree, none))
     rows.append(["array: logic, kGE", f"{on:,.1f}", f"{off:,.1f}", f"{on / off - 1:+.1%}"])
     return markdown(["", "with a BVH", "without", "for the BVH"], rows)
+
+
+def nodes(data: Path) -> str:
+    """What the acceleration structure costs in memory."""
+    file = data / "ppa-nodes.json"
+    if not file.is_file():
+        return ""
+    report = json.loads(file.read_text())
+    rows, overheads = [], []
+    for name, mesh in report["meshes"].items():
+        tree, none = mesh["tree"], mesh["none"]
+        overheads.append(tree["records"] / none["records"])
+        row = [name, f"{mesh['triangles']:,}", *(f"{tree[kind]:,}" for kind in ("nodes", "triangles", "attributes"))]
+        rows.append(
+            [*row, f"{none['records']:,}", f"{tree['nodes'] / none['records']:+.1%}", f"{overheads[-1] - 1:+.1%}"]
+        )
+    row = ["geometric mean", *[""] * 6, f"{geometric_mean(overheads) - 1:+.1%}"]
+    titles = ["mesh", "triangles", "nodes", "triangle records", "attribute records", "without a tree, all"]
+    return markdown([*titles, "nodes alone", "overhead"], [*rows, row])
 
 
 def ecp5(data: Path) -> str:

@@ -85,12 +85,19 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"slowest path within a unit: {_path(slowest)}, in {slowest['unit']}"
     if whole and whole["register_to_register"]:
         yield f"slowest path of a render unit, across its units: {_path(whole['register_to_register'])}"
+    if report["opensta"]:
+        yield f"OpenSTA, on PATH, as a second opinion on these paths: {second_opinion(report['opensta'])}"
     yield ""
     yield f"kGE: {used['gates']}. Memories: {_rates()}; in kGE as area of {CHIP_NODE}."
     if used["liberty"]:
         yield f"Library: {', '.join(used['liberty'])}; FO4 is {used['fo4_ns'] * 1e3:.1f} ps: {used['fo4']}."
         yield f"Delays: {used['timing']}; target {used['delay_target_ns']:g} ns."
     yield f"At {CHIP_NODE}: gates × {chip['um2_per_gate']} µm², no gaps; a scaling by gate count, not a synthesis."
+
+
+def second_opinion(opinion: Mapping[str, Any]) -> str:
+    """How far our paths are from OpenSTA's."""
+    return f"ours are {opinion['least']:+.1%} to {opinion['most']:+.1%} longer than its, over {opinion['units']} units"
 
 
 def _path(path: Mapping[str, Any]) -> str:

@@ -48,18 +48,23 @@ class Timing:
 
 
 class Analysis:
-    """Propagates arrivals through a netlist. Slews of inputs and of the clock, and the load of outputs, are FO4's."""
+    """Propagates arrivals through a netlist."""
 
     def __init__(self, netlist: Netlist, library: Library) -> None:
         self._netlist = netlist
-        inverter = library.inverter
-        source = next(pin for pin in inverter.pins.values() if pin.direction == "input")
-        output = next(pin for pin in inverter.pins.values() if pin.direction == "output")
-        self._slew = output.arcs[0].tables["rise_transition"].at(library.fo4, 4 * source.capacitance)
-        self._loads = self._sum_loads(4 * source.capacitance)
+        self.slew, self.output_load = self.edges(library)
+        self._loads = self._sum_loads()
         self._registers = [instance for instance in netlist.instances if instance.cell.is_register]
         self._order = self._sorted()
         self._arcs: dict[str, list[tuple[Pin, list[Arc]]]] = {}
+
+    @staticmethod
+    def edges(library: Library) -> tuple[float, float]:
+        """Slew of inputs and of the clock in ns, load of outputs in pF: those of an inverter in a FO4 chain."""
+        inverter = library.inverter
+        load = 4 * next(pin.capacitance for pin in inverter.pins.values() if pin.direction == "input")
+        output = next(pin for pin in inverter.pins.values() if pin.direction == "output")
+        return output.arcs[0].tables["rise_transition"].at(library.fo4, load), load
 
     def timing(self) -> Timing:
         """The slowest paths."""
@@ -69,7 +74,7 @@ class Analysis:
                 net = register.nets.get(pin.name)
                 if net is not None and arcs:
                     clocked[net] = self._clocked(arcs, self._loads[net])
-        begins = {net: [0.0, 0.0, self._slew, self._slew] for net in self._netlist.driven_outside}
+        begins = {net: [0.0, 0.0, self.slew, self.slew] for net in self._netlist.driven_outside}
         register_to_register, register_to_output = self._slowest(clocked)
         input_to_register, input_to_output = self._slowest(begins)
         return Timing(register_to_register, input_to_register, register_to_output, input_to_output)
@@ -78,7 +83,7 @@ class Analysis:
         tables = [arc.tables for arc in arcs]
 
         def worst(name: str) -> float:
-            return max((table[name].at(self._slew, load) for table in tables if name in table), default=_NEVER)
+            return max((table[name].at(self.slew, load) for table in tables if name in table), default=_NEVER)
 
         return [worst("cell_rise"), worst("cell_fall"), worst("rise_transition"), worst("fall_transition")]
 
@@ -151,7 +156,7 @@ class Analysis:
             if arc.kind.startswith("setup"):
                 for edge, name in enumerate(("rise_constraint", "fall_constraint")):
                     if at[edge] >= 0 and name in arc.tables:
-                        latest = max(latest, at[edge] + arc.tables[name].at(at[edge + 2], self._slew))
+                        latest = max(latest, at[edge] + arc.tables[name].at(at[edge + 2], self.slew))
         return latest
 
     def _path(self, ns: float, net: int, end: str, before: Mapping[int, tuple[Instance, int]]) -> Path:
@@ -181,7 +186,7 @@ class Analysis:
             self._arcs[cell.name] = found
         return found
 
-    def _sum_loads(self, output_load: float) -> list[float]:
+    def _sum_loads(self) -> list[float]:
         loads = [0.0] * self._netlist.size
         for instance in self._netlist.instances:
             for name, net in instance.nets.items():
@@ -189,7 +194,7 @@ class Analysis:
                 if pin is not None and pin.direction == "input":
                     loads[net] += pin.capacitance
         for net in self._netlist.read_outside:
-            loads[net] += output_load
+            loads[net] += self.output_load
         return loads
 
     def _sorted(self) -> list[Instance]:
