@@ -18,6 +18,7 @@ COLUMN = ("ColumnBvhController", "TileWalker", "BackgroundWalker", "PixelCollect
 DEVICE = ("FrameController", "RegisterFile", "CounterFile")
 
 _INSTANCE = re.compile(r"^  (\w+)\s+(\w+) \(", re.MULTILINE)
+_TABLE = re.compile(r"^  reg\s+(?:\[(\d+):0\]\s+)?Memory\[0:(\d+)\];", re.MULTILINE)
 _MODULE = re.compile(r"^module (\w+)", re.MULTILINE)
 
 
@@ -66,18 +67,39 @@ class Memory:
         return self.depth * self.width
 
 
+@dataclass(frozen=True)
+class FlopTable:
+    """A memory with combinational reads: it is synthesised, as flip-flops and multiplexers."""
+
+    name: str
+    level: str
+    unit: str
+    count: int
+    depth: int
+    width: int
+
+    @property
+    def bits(self) -> int:
+        """Of all of them in the unit."""
+        return self.count * self.depth * self.width
+
+
 class Hierarchy:
     """The modules of a generated design, memories left out, and who instantiates whom."""
 
     def __init__(self, folder: Path) -> None:
         self.files: dict[str, Path] = {}
         self._instances: dict[str, Counter[str]] = {}
+        self._tables: dict[str, tuple[int, int]] = {}
         self._shapes = {shape["name"]: shape for shape in json.loads((folder / "memories.json").read_text())}
         for file in sorted(folder.glob("*.sv")):
             text = file.read_text()
             for module in _MODULE.findall(text):
                 self.files[module] = file
                 self._instances[module] = Counter(kind for kind, _ in _INSTANCE.findall(text))
+            table = _TABLE.search(text)
+            if table:
+                self._tables[file.stem] = (int(table[2]) + 1, int(table[1] or 0) + 1)
         known = {*self.files, *self._shapes}
         for counts in self._instances.values():
             for kind in set(counts) - known:
@@ -131,6 +153,18 @@ class Hierarchy:
                         ports = ",".join(shape["ports"])
                         found.append(Memory(*where, int(shape["depth"]), int(shape["width"]), ports))
         return found
+
+    def tables(self) -> list[FlopTable]:
+        """The tables of each unit that become flip-flops, counted within one of its level; largest first."""
+        found = []
+        for level in LEVELS:
+            for unit in (*self.units(level), level.top):
+                for name, (depth, width) in self._tables.items():
+                    number = self.count(name, unit, BORDERS - {unit})
+                    if number:
+                        title = level.rest if unit == level.top else unit
+                        found.append(FlopTable(name, level.name, title, number, depth, width))
+        return sorted(found, key=lambda table: (-table.bits, table.name))
 
     def _is_memory(self, module: str) -> bool:
         return bool(set(self._instances[module]) & set(self._shapes))

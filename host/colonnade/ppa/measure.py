@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from colonnade.generator import black_boxed_design_for
@@ -68,6 +69,7 @@ def measure(
         "technology": _described(into),
         "units": units,
         "memories": {memory.name: memories.described(memory) for memory in boxes},
+        "flop_tables": [{**asdict(table), "bits": table.bits} for table in hierarchy.tables()],
         "levels": levels,
         "render_unit_kge": levels["render_unit"]["kge"],
         "slowest_path": slowest,

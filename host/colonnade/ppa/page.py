@@ -24,6 +24,9 @@ LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
 
 Data = Mapping[str, Any]
 
+#: Smaller tables are left out of the page.
+LEAST_BITS = 100
+
 _TABLE = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -32,9 +35,10 @@ def page(text: str, data: Path) -> str:
 
     def replaced(match: re.Match[str]) -> str:
         kind, _, precision = match[2].partition("_")
-        if kind in ("units", "totals", "paths"):
+        if precision:
             reports = _reports(data, precision)
-            body = {"units": units, "totals": totals, "paths": paths}[kind](reports) if reports else ""
+            of_precision = {"units": units, "totals": totals, "tables": tables, "paths": paths}
+            body = of_precision[kind](reports) if reports else ""
         else:
             body = {"bvh": bvh, "nodes": nodes, "ecp5": ecp5, "libraries": libraries}[kind](data)
         return f"{match[1]}{body or 'Not measured: run `tools/ppa`.'}\n{match[3]}"
@@ -85,6 +89,17 @@ def totals(reports: Mapping[str, Data]) -> str:
     rows += [row, ["the chip", "–", "–", "–", "–", f"{chip['kge_per_unit'] * 80:,.0f}", "–", f"{chip['mm2']:.2f}"]]
     titles = ["", "library", "logic, kGE", "logic, mm²", "memory, kbit", "with memory, kGE"]
     return markdown([*titles, "logic scaled to 28 nm, mm²", "with memory at 28 nm, mm²"], rows)
+
+
+def tables(reports: Mapping[str, Data]) -> str:
+    """The memories of a render unit that are flip-flops."""
+    report = next(iter(reports.values()))
+    rows = [
+        [f"`{table['name']}`", table["unit"], str(table["count"]), f"{table['bits']:,}"]
+        for table in report["flop_tables"]
+        if table["level"] == "render_unit" and table["bits"] >= LEAST_BITS
+    ]
+    return markdown(["table (depth × width)", "unit", "of them", "bits"], rows)
 
 
 def paths(reports: Mapping[str, Data]) -> str:

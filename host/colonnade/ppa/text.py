@@ -80,6 +80,12 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
             f"memory {name}, in {memory['unit']}: {memory['count']} × {memory['depth']:,} × {memory['width']} bits, "
             f"{_per_node(memory, 'um2', ',.0f')} µm², {_per_node(memory, 'read_pj', '.1f')} pJ a read"
         )
+    tables = [table for table in report["flop_tables"] if table["level"] == "render_unit"]
+    largest = (f"{table['name']} in {table['unit']}" for table in tables[:3])
+    yield (
+        f"tables of a render unit that are flip-flops, and counted as such: "
+        f"{sum(table['bits'] for table in tables):,} bits; the largest are {', '.join(largest)}"
+    )
     slowest, whole = report["slowest_path"], report["render_unit_paths"]
     if slowest["unit"]:
         yield f"slowest path within a unit: {_path(slowest)}, in {slowest['unit']}"
