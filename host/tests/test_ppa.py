@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from colonnade.cli import cli
 from colonnade.errors import UserError
-from colonnade.ppa import liberty, memories, opensta
+from colonnade.ppa import liberty, measure, memories, opensta
 from colonnade.ppa.cells import Library, Table
 from colonnade.ppa.guard import differences, gates_of_tiny
 from colonnade.ppa.hierarchy import BORDERS, Hierarchy
@@ -169,7 +169,8 @@ def test_the_chip_has_141_thousand_gates_a_unit() -> None:
         (("--delay", "0"), "--delay"),
     ],
 )
-def test_wrong_input_is_one_line(arguments: tuple[str, ...], message: str) -> None:
+def test_wrong_input_is_one_line(monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], message: str) -> None:
+    monkeypatch.setattr(measure, "require_yosys", lambda: None)
     result = CliRunner().invoke(cli, ["ppa", "--config", "tiny", *arguments])
     assert result.exit_code == 2
     assert message in result.stderr
@@ -199,6 +200,13 @@ def test_opensta_finds_the_same_path(small: Library) -> None:
     path = analysis.timing().register_to_register
     assert path is not None
     assert opensta.register_to_register(top, small, analysis.slew, analysis.output_load) == pytest.approx(path.ns, 1e-3)
+
+
+def test_missing_yosys_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    result = CliRunner().invoke(cli, ["ppa", "--config", "tiny"])
+    assert result.exit_code == 2
+    assert "tools/ppa-environment" in result.stderr
 
 
 @pytest.mark.parametrize("text", ["", "library (a) {", "no cells"])

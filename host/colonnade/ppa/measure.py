@@ -10,7 +10,7 @@ from colonnade.generator import black_boxed_design_for
 from colonnade.ppa import memories, opensta
 from colonnade.ppa.hierarchy import LEVELS, Hierarchy, Level, Memory
 from colonnade.ppa.netlist import Netlist
-from colonnade.ppa.synthesis import Gates, Technology, count_gates, synthesise, technology
+from colonnade.ppa.synthesis import Gates, Technology, count_gates, require_yosys, synthesise, technology
 from colonnade.ppa.timing import Analysis, Path, Timing, gates_by_name
 from colonnade.progress import QUIET, Progress
 
@@ -39,6 +39,7 @@ def measure(
     Returns:
         The report as ``--json`` writes it.
     """
+    require_yosys()
     into = technology(tuple(liberties), delay)
     design = black_boxed_design_for(config, overrides, progress)
     hierarchy = Hierarchy(design.dir)

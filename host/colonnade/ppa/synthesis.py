@@ -92,6 +92,12 @@ class Gates:
         return self.registers + self.combinational
 
 
+def require_yosys() -> None:
+    """Refuse to begin without Yosys."""
+    if importlib.util.find_spec("pyosys") is None:
+        raise UserError("no Yosys found, which colonnade ppa needs: run tools/ppa-environment, which installs pyosys")
+
+
 def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
     """Prune and read the liberties; `delay` in ns, by default `TARGET_FO4` of them."""
     if not liberties:
@@ -102,8 +108,6 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
     folder.mkdir(parents=True, exist_ok=True)
     kept = []
     for path in liberty.find_liberties(liberties):
-        if not path.is_file():
-            raise UserError(f"no liberty {path}: name a .lib or .lib.gz file, or a folder of them")
         text = liberty.pruned(path).encode("latin-1")
         copy = folder / f"{path.name.split('.')[0]}-{hashlib.sha256(text).hexdigest()[:20]}.lib"
         if not copy.is_file():
@@ -180,8 +184,6 @@ def _constraints(into: Technology) -> str:
 
 def run_yosys(script: list[str], place: Path, links: Mapping[str, Path], log: Path) -> None:
     """Run passes in the folder `place`, where `links` name the files they read; what Yosys says goes to `log`."""
-    if importlib.util.find_spec("pyosys") is None:
-        raise UserError("no Yosys found, which synthesis needs: run tools/ppa-environment, which installs pyosys")
     for name, file in links.items():
         (place / name).symlink_to(file.resolve())
     (place / "script.ys").write_text("\n".join(script) + "\n")
@@ -211,7 +213,9 @@ def count_gates(netlist: dict[str, Any], into: Technology) -> Gates:
         elif into.library is None and kind in TRANSISTORS:
             gates, is_register = TRANSISTORS[kind] / 4, kind.startswith("$_DFF")
         elif kind.startswith("$") and kind != "$scopeinfo":
-            raise RuntimeError(f"{number} cells {kind} were not mapped")
+            if into.library is None:
+                raise RuntimeError(f"{number} cells {kind} were not mapped")
+            raise UserError(f"the liberty has nothing for {number} cells {kind}: name all files of the library")
         else:
             continue
         registers += gates * number if is_register else 0.0
