@@ -19,7 +19,7 @@ from colonnade.sweep import Variation, parse_variations, sweep
 def manifest_of(_: str, overrides: Sequence[str], *__: object) -> SimpleNamespace:
     values = {"rows": "2", "contexts": "4"} | dict(text.removeprefix("array.").split("=") for text in overrides)
     array = {"columns": 1, "rows": int(values["rows"]), "contexts": int(values["contexts"])}
-    config = {"array": array, "columnBvhMemory": {"banks": 1}}
+    config = {"array": array, "units": {"triangleLanes": 1}, "columnBvhMemory": {"banks": 1}}
     return SimpleNamespace(manifest=SimpleNamespace(config=config, config_hash=str(sorted(array.items()))))
 
 
