@@ -14,6 +14,7 @@ from colonnade.commands.compare import compare
 from colonnade.commands.generate import generate
 from colonnade.commands.inspect import inspect
 from colonnade.commands.pack import pack
+from colonnade.commands.ppa import ppa
 from colonnade.commands.render import render
 from colonnade.commands.sweep import sweep
 from colonnade.commands.verify import verify
@@ -62,7 +63,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, render, compare, verify, bench, sweep):
+for command in (generate, pack, inspect, render, compare, verify, bench, sweep, ppa):
     cli.add_command(command)
 
 

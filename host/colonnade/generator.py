@@ -66,6 +66,11 @@ def design_for(config: str, overrides: Sequence[str] = (), progress: Progress = 
     return _cached(config, overrides, (), progress)
 
 
+def black_boxed_design_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
+    """The same with memories as black boxes, and ``memories.json`` with their shapes: what synthesis reads."""
+    return _cached(config, overrides, ("--black-box-memories",), progress)
+
+
 def generate(
     config: str,
     overrides: Sequence[str],

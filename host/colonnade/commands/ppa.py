@@ -1,0 +1,73 @@
+"""``colonnade ppa``: what a configuration costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from colonnade.commands.options import configuration_options, finish, json_option, require_outputs
+
+
+@click.command(short_help="Measure gates, memories and the slowest paths of a configuration.")
+@configuration_options
+@click.option(
+    "--liberty",
+    "liberties",
+    multiple=True,
+    metavar="F",
+    help="Standard cells: a .lib or .lib.gz, or a folder of them. May be repeated: all are one library.",
+)
+@click.option("--delay", type=click.FloatRange(min=0, min_open=True), metavar="NS", help="Delay to aim at.  [60 FO4]")
+@click.option(
+    "--target",
+    type=click.Choice(("asic", "ecp5")),
+    default="asic",
+    show_default=True,
+    help="Standard cells, or an FPGA of the ECP5 family.",
+)
+@json_option
+def ppa(
+    config: str,
+    overrides: tuple[str, ...],
+    liberties: tuple[str, ...],
+    delay: float | None,
+    target: str,
+    json_file: Path | None,
+) -> None:
+    """Synthesise every unit of a configuration on its own, with Yosys, and add them up.
+
+    A render unit, a column and the array are composed: the hierarchy is kept at the units. Memories are black boxes,
+    added by an area per bit; contexts are flip-flops and count as such. Without --liberty gates are Yosys's own and
+    nothing has a delay. Units are kept by content: a second run takes seconds.
+    """
+    require_outputs(json_file)
+    if target == "ecp5":
+        if liberties or delay is not None:
+            raise click.UsageError("--target ecp5 takes neither --liberty nor --delay", click.get_current_context())
+        finish(_fpga(config, overrides), json_file)
+        return
+
+    from colonnade import progress
+    from colonnade.ppa.measure import measure
+    from colonnade.ppa.text import UnitTable, summary
+
+    table = UnitTable(click.echo)
+    report: Mapping[str, Any] = measure(
+        config, overrides, liberties, delay, progress.for_terminal(), finished=table.print
+    )
+    for line in summary(report):
+        click.echo(line)
+    finish(report, json_file)
+
+
+def _fpga(config: str, overrides: tuple[str, ...]) -> Mapping[str, Any]:
+    from colonnade import progress
+    from colonnade.ppa.fpga import place, summary
+
+    report = place(config, overrides, progress.for_terminal())
+    for line in summary(report):
+        click.echo(line)
+    return report

@@ -1,0 +1,170 @@
+"""Which modules the generator wrote, and which of them are the units that are synthesised on their own."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+#: Units of a level, in the order of the data; what is left of the level's module is a unit too, named last.
+RENDER_UNIT = (
+    *("RayGenerator", "RaySetup", "BoxUnit", "TraversalStack", "TriangleUnit", "Shader"),
+    *("RtController", "RecordFetch", "HitTable"),
+)
+COLUMN = ("ColumnBvhController", "TileWalker", "BackgroundWalker", "PixelCollector")
+DEVICE = ("FrameController", "RegisterFile", "CounterFile")
+
+_INSTANCE = re.compile(r"^  (\w+)\s+(\w+) \(", re.MULTILINE)
+_TABLE = re.compile(r"^  reg\s+(?:\[(\d+):0\]\s+)?Memory\[0:(\d+)\];", re.MULTILINE)
+_MODULE = re.compile(r"^module (\w+)", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Level:
+    """Render unit, column or array.
+
+    Attributes:
+        name: of the level in reports.
+        top: its module.
+        units: modules that are synthesised on their own.
+        rest: the name of all else in `top`.
+    """
+
+    name: str
+    top: str
+    units: tuple[str, ...]
+    rest: str
+
+
+LEVELS = (
+    Level("render_unit", "RenderUnit", RENDER_UNIT, "contexts"),
+    Level("column", "Column", COLUMN, "rest of Column"),
+    Level("array", "Colonnade", DEVICE, "rest of Colonnade"),
+)
+
+#: Modules at which the synthesis of another one stops.
+BORDERS = frozenset({*RENDER_UNIT, *COLUMN, *DEVICE, "RenderUnit", "Column"})
+
+
+@dataclass(frozen=True)
+class Memory:
+    """A memory that is a black box: how many, where, and its shape."""
+
+    name: str
+    level: str
+    unit: str
+    count: int
+    depth: int
+    width: int
+    ports: str
+
+    @property
+    def bits(self) -> int:
+        """Of one of them."""
+        return self.depth * self.width
+
+
+@dataclass(frozen=True)
+class FlopTable:
+    """A memory with combinational reads: it is synthesised, as flip-flops and multiplexers."""
+
+    name: str
+    level: str
+    unit: str
+    count: int
+    depth: int
+    width: int
+
+    @property
+    def bits(self) -> int:
+        """Of all of them in the unit."""
+        return self.count * self.depth * self.width
+
+
+class Hierarchy:
+    """The modules of a generated design, memories left out, and who instantiates whom."""
+
+    def __init__(self, folder: Path) -> None:
+        self.files: dict[str, Path] = {}
+        self._instances: dict[str, Counter[str]] = {}
+        self._tables: dict[str, tuple[int, int]] = {}
+        self._shapes = {shape["name"]: shape for shape in json.loads((folder / "memories.json").read_text())}
+        for file in sorted(folder.glob("*.sv")):
+            text = file.read_text()
+            for module in _MODULE.findall(text):
+                self.files[module] = file
+                self._instances[module] = Counter(kind for kind, _ in _INSTANCE.findall(text))
+            table = _TABLE.search(text)
+            if table:
+                self._tables[file.stem] = (int(table[2]) + 1, int(table[1] or 0) + 1)
+        known = {*self.files, *self._shapes}
+        for counts in self._instances.values():
+            for kind in set(counts) - known:
+                del counts[kind]
+
+    def units(self, level: Level) -> list[str]:
+        """The units of a level that this design has."""
+        return [unit for unit in level.units if unit in self.files]
+
+    def closure(self, top: str) -> tuple[list[str], list[str]]:
+        """Modules to read for `top`: those that belong to it, and those where it ends: other units and memories."""
+        own, ends, waiting = [top], [], [top]
+        while waiting:
+            for module in self._instances[waiting.pop()]:
+                if module in self._shapes or module in own or module in ends:
+                    continue
+                if module in BORDERS or self._is_memory(module):
+                    ends.append(module)
+                else:
+                    own.append(module)
+                    waiting.append(module)
+        return sorted(own), sorted(ends)
+
+    def header(self, module: str) -> str:
+        """A module with its ports and nothing in it."""
+        text = self.files[module].read_text()
+        match = re.search(rf"^module {module}\(.*?^\);\n", text, re.MULTILINE | re.DOTALL)
+        if match is None:
+            raise RuntimeError(f"{self.files[module]}: no head of module {module}")
+        return f"{match.group()}endmodule\n"
+
+    def count(self, module: str, inside: str, stop: Iterable[str] = ()) -> int:
+        """Instances of `module` in one `inside`, at any depth; modules of `stop` are not entered."""
+        if inside in stop:
+            return 0
+        return sum(
+            number * (1 if kind == module else self.count(module, kind, stop) if kind in self.files else 0)
+            for kind, number in self._instances[inside].items()
+        )
+
+    def memories(self) -> list[Memory]:
+        """The memories of each unit, counted within one of its level."""
+        found = []
+        for level in LEVELS:
+            for unit in (*self.units(level), level.top):
+                for name, shape in self._shapes.items():
+                    number = self.count(name, unit, BORDERS - {unit})
+                    if number:
+                        title = level.rest if unit == level.top else unit
+                        where = (name.removesuffix("_ext"), level.name, title, number)
+                        ports = ",".join(shape["ports"])
+                        found.append(Memory(*where, int(shape["depth"]), int(shape["width"]), ports))
+        return found
+
+    def tables(self) -> list[FlopTable]:
+        """The tables of each unit that become flip-flops, counted within one of its level; largest first."""
+        found = []
+        for level in LEVELS:
+            for unit in (*self.units(level), level.top):
+                for name, (depth, width) in self._tables.items():
+                    number = self.count(name, unit, BORDERS - {unit})
+                    if number:
+                        title = level.rest if unit == level.top else unit
+                        found.append(FlopTable(name, level.name, title, number, depth, width))
+        return sorted(found, key=lambda table: (-table.bits, table.name))
+
+    def _is_memory(self, module: str) -> bool:
+        return bool(set(self._instances[module]) & set(self._shapes))

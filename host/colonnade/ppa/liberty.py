@@ -1,0 +1,211 @@
+"""Reads standard cells from liberty files.
+
+Files are first pruned to what is used here, which also saves Yosys most of its reading: current-source models, power
+and noise go, and so do cells that ordinary logic should not be mapped to.
+"""
+
+from __future__ import annotations
+
+import gzip
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+from pathlib import Path
+
+from colonnade.errors import UserError
+from colonnade.ppa.cells import Arc, Cell, Library, Pin, Table
+
+#: Cells for scan, clock gating, power domains and probing; delay cells.
+AVOIDED = (
+    *("*lpflow*", "*probe*", "*dlclk*", "*sparecell*", "*dlygate*", "*dlymetal*", "*clkdly*"),
+    *("*__sdf*", "*__sedf*", "*__edf*", "*__dfbb*", "ICG*", "SDF*"),
+)
+
+_DROPPED = re.compile(
+    r"(?P<comment>/\*.*?\*/)|(?P<string>\"[^\"]*\")|"
+    r"(?P<group>\b(?P<name>\w+)\s*\((?P<argument>[^(){}]*)\)\s*\{)|(?P<open>\{)|(?P<close>\})",
+    re.DOTALL,
+)
+_DROPPED_GROUPS = re.compile(
+    r"output_current_\w+|receiver_capacitance\w*|ccs\w*|internal_power|leakage_power|test_cell|"
+    r"normalized_driver_waveform|wire_load\w*|hyperbolic_noise\w*|dc_current|min_pulse_width|pg_pin"
+)
+_TOKEN = re.compile(r"/\*.*?\*/|//[^\n]*|\\\n|\s+|(\"[^\"]*\"|[{}();:,]|[^\s{}();:,\"]+)", re.DOTALL)
+
+
+def find_liberties(names: Sequence[str]) -> tuple[Path, ...]:
+    """The files that ``--liberty`` names: files, or folders of them."""
+    found: list[Path] = []
+    for name in names:
+        path = Path(name)
+        inside = sorted(p for p in path.iterdir() if re.search(r"\.lib(\.gz)?$", p.name)) if path.is_dir() else [path]
+        if not path.exists():
+            raise UserError(f"no liberty {name}: name a .lib or .lib.gz file, or a folder of them")
+        if not inside:
+            raise UserError(f"{name} holds no .lib and no .lib.gz file: name another folder for --liberty")
+        found += inside
+    return tuple(found)
+
+
+def pruned(path: Path) -> str:
+    """The text of a liberty without the groups and the cells that are of no use here."""
+    try:
+        text = (gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()).decode("latin-1")
+    except (OSError, EOFError) as error:
+        raise UserError(f"{path} cannot be read: {error}") from error
+    if not re.search(r"\blibrary\s*\(", text):
+        raise UserError(f"{path} is no liberty: it holds no library group")
+    kept: list[str] = []
+    begin = depth = dropped_from = 0
+    for token in _DROPPED.finditer(text):
+        if token["group"] or token["open"]:
+            depth += 1
+            if token["group"] and not dropped_from and _is_dropped(token["name"], token["argument"]):
+                kept.append(text[begin : token.start()])
+                dropped_from = depth
+        elif token["close"]:
+            if dropped_from == depth:
+                begin, dropped_from = token.end(), 0
+            depth -= 1
+        elif token["comment"] and not dropped_from:
+            kept.append(text[begin : token.start()])
+            begin = token.end()
+    kept.append(text[begin:])
+    if depth != 0:
+        raise UserError(f"{path} is cut off or no liberty: its braces do not match")
+    # Wire load models are among the groups that went
+    text = re.sub(r"default_wire_load\w*\s*:[^;]*;", "", "".join(kept))
+    return re.sub(r"\n\s*\n+", "\n", text)
+
+
+def _is_dropped(group: str, argument: str) -> bool:
+    name = argument.strip().strip('"')
+    return (group == "cell" and any(fnmatch(name, pattern) for pattern in AVOIDED)) or bool(
+        _DROPPED_GROUPS.fullmatch(group)
+    )
+
+
+def load(paths: Sequence[Path]) -> Library:
+    """Read pruned files."""
+    cells: dict[str, Cell] = {}
+    for path in paths:
+        top = next(_groups(_tokens(path.read_text("latin-1"))))
+        cells.update(_Reader(top).cells())
+    return Library(tuple(paths), cells)
+
+
+@dataclass
+class _Group:
+    name: str
+    arguments: list[str]
+    values: dict[str, list[str]] = field(default_factory=dict)
+    groups: list[_Group] = field(default_factory=list)
+
+    def of(self, *names: str) -> Iterator[_Group]:
+        return (group for group in self.groups if group.name in names)
+
+    def text(self, name: str, default: str = "") -> str:
+        return self.values.get(name, [default])[0].strip('"').strip()
+
+
+def _tokens(text: str) -> Iterator[str]:
+    return (token[1] for token in _TOKEN.finditer(text) if token[1] is not None)
+
+
+def _groups(tokens: Iterator[str]) -> Iterator[_Group]:
+    """Groups at the top; attributes, simple and complex, become values of their group."""
+    stack = [_Group("", [])]
+    words: list[str] = []
+    for token in tokens:
+        if token == "{":
+            stack.append(_Group(words[0], [word for word in words[1:] if word not in "(),"]))
+            stack[-2].groups.append(stack[-1])
+            words = []
+        elif token in ";}":
+            if len(words) > 1:
+                stack[-1].values[words[0]] = [word for word in words[1:] if word not in "(),:"]
+            words = []
+            if token == "}":
+                closed = stack.pop()
+                if len(stack) == 1:
+                    yield closed
+        elif token == ":" or token == "(" or not words or words[-1] in ("(", ",", ":") or token in "),":
+            words.append(token)
+        elif len(words) > 2 and words[-1] == ")":
+            # A complex attribute without its semicolon
+            stack[-1].values[words[0]] = [word for word in words[1:] if word not in "(),"]
+            words = [token]
+        elif len(words) > 2 and words[1] == ":":
+            # A simple one
+            if _is_operator(words[-1]) or _is_operator(token):
+                words.append(token)
+            else:
+                stack[-1].values[words[0]] = words[2:]
+                words = [token]
+        else:
+            words.append(token)
+
+
+def _is_operator(word: str) -> bool:
+    return word in "+-*/"
+
+
+class _Reader:
+    """Turns the groups of one library into cells, in ns and pF."""
+
+    def __init__(self, library: _Group) -> None:
+        self._library = library
+        self._time = _unit(library.text("time_unit", "1ns"), {"ps": 1e-3, "ns": 1.0})
+        amount, unit = (*library.values.get("capacitive_load_unit", []), "1", "pf")[:2]
+        self._load = float(amount) * {"ff": 1e-3, "pf": 1.0}[unit.strip('"').lower()]
+        self._templates = {template.arguments[0]: template for template in library.of("lu_table_template")}
+
+    def cells(self) -> Iterator[tuple[str, Cell]]:
+        for group in self._library.of("cell"):
+            name = group.arguments[0].strip('"')
+            if group.text("dont_use") == "true":
+                continue
+            pins = {pin.name: pin for part in group.of("pin") for pin in [self._pin(part)]}
+            is_register = any(True for _ in group.of("ff", "latch", "statetable"))
+            yield name, Cell(name, float(group.text("area", "0")), is_register, pins)
+
+    def _pin(self, group: _Group) -> Pin:
+        arcs = tuple(self._arc(timing) for timing in group.of("timing"))
+        capacitance = float(group.text("capacitance", "0")) * self._load
+        return Pin(group.arguments[0].strip('"'), group.text("direction"), capacitance, group.text("function"), arcs)
+
+    def _arc(self, group: _Group) -> Arc:
+        tables = {table.name: self._table(table) for table in group.groups if table.values.get("values")}
+        sense = group.text("timing_sense", "non_unate")
+        return Arc(group.text("related_pin"), group.text("timing_type", "combinational"), sense, tables)
+
+    def _table(self, group: _Group) -> Table:
+        """Slew, or a constrained pin's slew, becomes `slews`; load, or the clock's slew, becomes `loads`."""
+        template = self._templates.get(group.arguments[0]) if group.arguments else None
+        axes: dict[str, tuple[float, ...]] = {}
+        for number in ("1", "2"):
+            variable = template.text(f"variable_{number}") if template else ""
+            words = group.values.get(f"index_{number}") or (template and template.values.get(f"index_{number}"))
+            if variable and words:
+                scale = self._load if "capacitance" in variable else self._time
+                name = "loads" if "capacitance" in variable or "related" in variable else "slews"
+                axes[name] = tuple(scale * value for value in _numbers(words))
+        slews, loads = axes.get("slews", (0.0,)), axes.get("loads", (0.0,))
+        flat = [self._time * value for value in _numbers(group.values["values"])]
+        if next(iter(axes), "slews") == "slews":
+            values = tuple(tuple(flat[i * len(loads) : (i + 1) * len(loads)]) for i in range(len(slews)))
+        else:
+            values = tuple(tuple(flat[i :: len(slews)]) for i in range(len(slews)))
+        return Table(slews, loads, values)
+
+
+def _numbers(words: Sequence[str]) -> list[float]:
+    return [float(number) for word in words for number in re.split(r"[\s,\\]+", word.strip('"').strip()) if number]
+
+
+def _unit(text: str, units: dict[str, float]) -> float:
+    match = re.fullmatch(r"([\d.]+)\s*(\w+)", text)
+    if match is None or match[2].lower() not in units:
+        raise UserError(f"a liberty counts time in {text}: only ps and ns are understood")
+    return float(match[1]) * units[match[2].lower()]

@@ -1,0 +1,216 @@
+"""Writes the tables of ``docs/ppa.md`` from the data that `tools/ppa` measured.
+
+A table stands between ``<!-- NAME -->`` and ``<!-- end -->``; everything else of the page is left alone.
+Run as ``python -m colonnade.ppa.page DOCS``.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from colonnade.bench import geometric_mean
+from colonnade.files import replacing
+from colonnade.performance_page import markdown
+from colonnade.ppa.hierarchy import LEVELS
+from colonnade.ppa.text import MOST_FO4, TITLES, second_opinion
+
+#: The files of a precision, and what their columns are called.
+LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
+
+Data = Mapping[str, Any]
+
+#: Smaller tables are left out of the page.
+LEAST_BITS = 100
+
+_TABLE = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def page(text: str, data: Path) -> str:
+    """The page with its tables written anew from the folder `data`."""
+
+    def replaced(match: re.Match[str]) -> str:
+        kind, _, precision = match[2].partition("_")
+        if precision:
+            reports = _reports(data, precision)
+            of_precision = {"units": units, "totals": totals, "tables": tables, "paths": paths}
+            body = of_precision[kind](reports) if reports else ""
+        else:
+            body = {"bvh": bvh, "nodes": nodes, "ecp5": ecp5, "libraries": libraries}[kind](data)
+        return f"{match[1]}{body or 'Not measured: run `tools/ppa`.'}\n{match[3]}"
+
+    return _TABLE.sub(replaced, text)
+
+
+def units(reports: Mapping[str, Data]) -> str:
+    """kGE of each unit by each library, its share, its slowest path."""
+    first = next(iter(reports.values()))
+    timed = [name for name, report in reports.items() if report["technology"]["liberty"]]
+    titles = ["unit", *(f"kGE, {LIBRARIES[name]}" for name in reports), "share", "flip-flops"]
+    titles += [f"µm², {LIBRARIES[name]}" for name in timed] + [f"FO4, {LIBRARIES[name]}" for name in timed]
+    rows: list[list[str]] = []
+    for level in LEVELS:
+        rows.append([f"**{TITLES[level.name]}**", *[""] * (len(titles) - 1)])
+        for name, unit in first["units"].items():
+            if unit["level"] == level.name:
+                same = [report["units"][name] for report in reports.values()]
+                of_timed = [reports[library]["units"][name] for library in timed]
+                row = [name, *(f"{each['kge']:.1f}" for each in same), f"{100 * unit['share']:.1f} %"]
+                row += [f"{unit['flops']:,}", *(f"{each['um2']:,.0f}" for each in of_timed)]
+                rows.append([*row, *(_fo4(each["paths"]["register_to_register"]) for each in of_timed)])
+    return markdown(titles, rows)
+
+
+def totals(reports: Mapping[str, Data]) -> str:
+    """Render unit, column and array."""
+    rows = []
+    for level in LEVELS:
+        for library, report in reports.items():
+            total = report["levels"][level.name]
+            um2 = "–" if total["logic_um2"] is None else f"{total['logic_um2'] / 1e6:.4f}"
+            row = [TITLES[level.name], LIBRARIES[library], f"{total['logic_kge']:,.1f}", um2]
+            row += [f"{total['memory_bits'] / 1000:,.0f}", f"{total['kge']:,.1f}"]
+            rows.append([*row, f"{total['logic_mm2_28nm']:.3f}", f"{total['mm2_28nm']:.3f}"])
+    chip = next(iter(reports.values()))["chip"]
+    row = [
+        "the chip ÷ 80",
+        "–",
+        "–",
+        "–",
+        "–",
+        f"{chip['kge_per_unit']:.0f}",
+        "–",
+        f"{chip['mm2'] / chip['units']:.3f}",
+    ]
+    rows += [row, ["the chip", "–", "–", "–", "–", f"{chip['kge_per_unit'] * 80:,.0f}", "–", f"{chip['mm2']:.2f}"]]
+    titles = ["", "library", "logic, kGE", "logic, mm²", "memory, kbit", "with memory, kGE"]
+    return markdown([*titles, "logic scaled to 28 nm, mm²", "with memory at 28 nm, mm²"], rows)
+
+
+def tables(reports: Mapping[str, Data]) -> str:
+    """The memories of a render unit that are flip-flops."""
+    report = next(iter(reports.values()))
+    rows = [
+        [f"`{table['name']}`", table["unit"], str(table["count"]), f"{table['bits']:,}"]
+        for table in report["flop_tables"]
+        if table["level"] == "render_unit" and table["bits"] >= LEAST_BITS
+    ]
+    return markdown(["table (depth × width)", "unit", "of them", "bits"], rows)
+
+
+def paths(reports: Mapping[str, Data]) -> str:
+    """The slowest paths, and the units above the limit."""
+    rows, above = [], []
+    for library, report in reports.items():
+        if not report["technology"]["liberty"]:
+            continue
+        slowest, whole = report["slowest_path"], (report["render_unit_paths"] or {}).get("register_to_register")
+        found = [(f"within a unit: {slowest['unit']}", slowest), ("a render unit, across its units", whole)]
+        for title, path in found:
+            if path:
+                row = [title, LIBRARIES[library], f"{path['ns']:.3f}", f"{path['fo4']:.1f}"]
+                rows.append([*row, f"`{path['from']}`", f"`{path['to']}`", str(path["gates"])])
+        for name, unit in report["units"].items():
+            path = (unit["paths"] or {}).get("register_to_register")
+            if path and path["fo4"] > MOST_FO4:
+                above.append(f"{name} ({path['fo4']:.0f} with {LIBRARIES[library]})")
+    if not rows:
+        return ""
+    opinions = [
+        f"with {LIBRARIES[library]} {second_opinion(report['opensta'])}"
+        for library, report in reports.items()
+        if report["opensta"]
+    ]
+    verdict = f"Against OpenSTA, {'; '.join(opinions)}. " if opinions else ""
+    verdict += f"Units above {MOST_FO4} FO4: {', '.join(above) or 'none'}."
+    titles = ["slowest path", "library", "ns", "FO4", "from", "to", "gates"]
+    return f"{verdict}\n\n{markdown(titles, rows)}"
+
+
+def bvh(data: Path) -> str:
+    """What the acceleration structure costs in gates."""
+    files = data / "ppa-32b32s64d-yosys.json", data / "ppa-no-bvh-yosys.json"
+    if not all(file.is_file() for file in files):
+        return ""
+    tree, none = (json.loads(file.read_text()) for file in files)
+    rows = []
+    for title, key in (("logic, kGE", "logic_kge"), ("memory, kbit", "memory_bits"), ("with memory, kGE", "kge")):
+        on, off = (report["levels"]["render_unit"][key] for report in (tree, none))
+        scale = 1000 if key == "memory_bits" else 1
+        more = f"{on / off - 1:+.1%}" if off else "–"
+        rows.append([f"render unit: {title}", f"{on / scale:,.1f}", f"{off / scale:,.1f}", more])
+    on, off = (report["levels"]["array"]["logic_kge"] for report in (tree, none))
+    rows.append(["array: logic, kGE", f"{on:,.1f}", f"{off:,.1f}", f"{on / off - 1:+.1%}"])
+    return markdown(["", "with a BVH", "without", "for the BVH"], rows)
+
+
+def nodes(data: Path) -> str:
+    """What the acceleration structure costs in memory."""
+    file = data / "ppa-nodes.json"
+    if not file.is_file():
+        return ""
+    report = json.loads(file.read_text())
+    rows, overheads = [], []
+    for name, mesh in report["meshes"].items():
+        tree, none = mesh["tree"], mesh["none"]
+        overheads.append(tree["records"] / none["records"])
+        row = [name, f"{mesh['triangles']:,}", *(f"{tree[kind]:,}" for kind in ("nodes", "triangles", "attributes"))]
+        rows.append(
+            [*row, f"{none['records']:,}", f"{tree['nodes'] / none['records']:+.1%}", f"{overheads[-1] - 1:+.1%}"]
+        )
+    row = ["geometric mean", *[""] * 6, f"{geometric_mean(overheads) - 1:+.1%}"]
+    titles = ["mesh", "triangles", "nodes", "triangle records", "attribute records", "without a tree, all"]
+    return markdown([*titles, "nodes alone", "overhead"], [*rows, row])
+
+
+def ecp5(data: Path) -> str:
+    """The FPGA's figures."""
+    file = data / "ppa-ecp5.json"
+    if not file.is_file():
+        return ""
+    report = json.loads(file.read_text())
+    rows = [
+        [title.replace("_", " "), f"{report[title]:,}", f"{number:,}"] for title, number in report["available"].items()
+    ]
+    depth = report["config"]["columnBvhMemory"]["depth"]
+    clock = "–" if report["fmax_mhz"] is None else f"{report['fmax_mhz']:.1f} MHz"
+    return f"{depth:,} records; fmax {clock}.\n\n{markdown([report['target'], 'used', 'there are'], rows)}"
+
+
+def libraries(data: Path) -> str:
+    """What the libraries' gate and FO4 are."""
+    rows = []
+    for library, report in _reports(data, "32b32s64d").items():
+        used = report["technology"]
+        if used["liberty"]:
+            row = [LIBRARIES[library], ", ".join(used["liberty"]), f"{used['um2_per_gate']:g}"]
+            rows.append([*row, f"{used['fo4_ns'] * 1e3:.1f}", used["fo4"], f"{used['delay_target_ns']:.3f}"])
+    titles = ["library", "files", "µm² a gate", "FO4, ps", "FO4 is", "abc's target, ns"]
+    return markdown(titles, rows) if rows else ""
+
+
+def _reports(data: Path, precision: str) -> dict[str, Data]:
+    files = {library: data / f"ppa-{precision}-{library}.json" for library in LIBRARIES}
+    return {library: json.loads(file.read_text()) for library, file in files.items() if file.is_file()}
+
+
+def _fo4(path: Data | None) -> str:
+    if path is None:
+        return "–"
+    return f"**{path['fo4']:.0f}**" if path["fo4"] > MOST_FO4 else f"{path['fo4']:.0f}"
+
+
+def main(docs: Path) -> None:
+    """Rewrite the tables of the page in the folder `docs`."""
+    file = docs / "ppa.md"
+    text = page(file.read_text(), docs / "data")
+    with replacing(file) as stream:
+        stream.write(text.encode())
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
