@@ -111,7 +111,7 @@ def speed(bench: Data, _: Path) -> str:
 
 
 def scaling(sweep: Data, _: Path) -> str:
-    """One row a point."""
+    """The picture, and one row a point."""
     base = sweep["base"]
     titles = ["varied", "value", *(f"{name}, in-box rays per cycle" for name in base["meshes"])]
     titles += ["per render unit", "to the base"]
@@ -124,7 +124,8 @@ def scaling(sweep: Data, _: Path) -> str:
     for point in sweep["points"]:
         key = point["varied"]
         rows.append(row(LABELS.get(key, key), str(point["values"][key]), point))
-    return markdown(titles, rows)
+    picture = "![In-box rays per cycle against rows, columns, contexts, banks, buffers and latency](pictures/scaling.png)"
+    return f"{picture}\n\n{markdown(titles, rows)}"
 
 
 def ablation(sweep: Data, docs: Path) -> str:
