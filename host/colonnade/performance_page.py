@@ -124,7 +124,7 @@ def scaling(sweep: Data, _: Path) -> str:
     for point in sweep["points"]:
         key = point["varied"]
         rows.append(row(LABELS.get(key, key), str(point["values"][key]), point))
-    picture = "![In-box rays per cycle against rows, columns, contexts, banks, buffers and latency](pictures/scaling.png)"
+    picture = "![In-box rays per cycle, each field varied alone](pictures/scaling.png)"
     return f"{picture}\n\n{markdown(titles, rows)}"
 
 
