@@ -25,7 +25,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     }
   }
 
-  it should "take a ray every 20 cycles at 32b32s64d, and lose none" in {
+  it should "take a ray every 16 cycles at 32b32s64d, and lose none" in {
     val config = TestConfigs.tiny
     test(new RaySetup(config)) { setup =>
       val random   = new Random(3)
@@ -35,7 +35,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       val left     = run(setup, box, answers, random, Rates(1, 1))
       val starting = 4
       inBox.count(identity) should be > 20
-      left.zip(left.tail).drop(starting).map { case (one, next) => next - one }.max should be <= 20
+      left.zip(left.tail).drop(starting).map { case (one, next) => next - one }.max should be <= 16
     }
   }
 
