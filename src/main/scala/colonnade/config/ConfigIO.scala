@@ -51,7 +51,7 @@ object ConfigIO {
       "readLatency",
       "holdable"
     )
-    val frame = root.section("frame", "maxWidth", "maxHeight", "tileSize", "materials", "hits")
+    val frame = root.section("frame", "maxWidth", "maxHeight", "tileSize", "materials", "lights", "maxBounces", "hits")
 
     ColonnadeConfig(
       array = ArrayConfig(
@@ -83,6 +83,8 @@ object ConfigIO {
         maxHeight = frame.int("maxHeight"),
         tileSize = frame.int("tileSize"),
         materials = frame.int("materials"),
+        lights = frame.int("lights"),
+        maxBounces = frame.int("maxBounces"),
         hits = frame.boolean("hits")
       )
     )
@@ -121,6 +123,8 @@ object ConfigIO {
         "maxHeight" -> frame.maxHeight,
         "tileSize"  -> frame.tileSize,
         "materials" -> frame.materials,
+        "lights"    -> frame.lights,
+        "maxBounces" -> frame.maxBounces,
         "hits"      -> frame.hits
       )
     )
