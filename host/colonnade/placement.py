@@ -65,7 +65,7 @@ def _positions(view: FloatPlacement, header: ImageHeader, manifest: Manifest) ->
     reach = 1 << (numbers["sceneBits"] - 1)
     offset = np.array(header.frame.offset)
     steps: dict[str, Floats] = {}
-    for name, point in (("camera", view.origin), ("light", view.light)):
+    for name, point in (("camera", view.origin), ("lights[0]", view.light)):
         steps[name] = (point - offset) * header.frame.scale * 2.0 ** numbers["gridFraction"]
         if not np.abs(steps[name]).max() < reach - 1:
             edge = header.extent.edge * header.frame.scale * 2.0 ** numbers["gridFraction"]
@@ -195,18 +195,19 @@ def _shading(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> d
     steps = view.shadow_offset * header.frame.scale * 2.0 ** numbers["gridFraction"]
     most = min(2.0 ** (numbers["vertexBits"] - 2 + numbers["gridFraction"]), 2.0 ** (numbers["gridBits"] - 2) - 1)
     result = {
-        "light.shadowOffset": int(np.clip(np.rint(steps), 1, max(1.0, most))),
+        "shading.offset": int(np.clip(np.rint(steps), 1, max(1.0, most))),
         "shading.flat": int(view.flat),
         "shading.shadows": int(view.shadows),
+        "shading.lights": 1,
     }
     light = 1 << numbers["lightFraction"]
     most_light = (1 << numbers["lightBits"]) - 1
-    result |= _colour("light.colour", view.light_colour * light, most_light)
+    result |= _colour("lights[0].colour", view.light_colour * light, most_light)
     result |= _colour("ambient", view.ambient * light, most_light)
     result |= _colour("background", view.background * white, white)
     for index in range(int(manifest.config["frame"]["materials"])):
         result |= _colour(f"materials[{index}].albedo", view.albedo * white * (index == 0), white)
-    return result
+    return dict.fromkeys((name for name, register in manifest.registers.items() if register.access == "rw"), 0) | result
 
 
 def _vector(name: str, values: Floats) -> dict[str, int]:

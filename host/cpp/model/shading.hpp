@@ -126,12 +126,12 @@ inline Illumination illuminate(const WideVector& origin, const WideVector& norma
     const Wide facingLight = dot(shadingNormal, shadingLight), ll = dot(shadingLight, shadingLight);
     std::int64_t cosine = cosineOf(facingLight, dot(shadingNormal, shadingNormal), ll, n);
     if (light.reachMantissa != 0 && cosine != 0) {
-        const Normalised divisor = normalise(ll, n.mantissaBits);
-        const int exponent = n.mantissaBits + light.reachExponent - divisor.exponent - 2 * drop;
-        const std::int64_t most = std::int64_t(4) << n.cosineFraction;
+        const Normalised square = normalise(ll, n.shadeBits), divisor = normalise(square.mantissa, n.mantissaBits);
+        const int exponent = n.mantissaBits + light.reachExponent - square.exponent - 2 * drop;
+        const std::int64_t most = std::int64_t(4) << n.lightFraction;
         const Wide quotient = divide(static_cast<std::uint64_t>(light.reachMantissa), divisor.mantissa, n.cosineFraction);
-        const std::int64_t falloff = exponent > 3 ? most : static_cast<std::int64_t>(std::min<Wide>(most, floorShift<Wide>(quotient, -exponent)));
-        cosine = (cosine * falloff) >> n.cosineFraction;
+        const std::int64_t falloff = exponent > 3 ? most : static_cast<std::int64_t>(std::min<Wide>(most, floorShift<Wide>(quotient, n.cosineFraction - n.lightFraction - exponent)));
+        cosine = (cosine * falloff) >> n.lightFraction;
     }
     Illumination result{};
     const std::int64_t brightest = (std::int64_t(1) << n.lightBits) - 1;
