@@ -17,6 +17,9 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   val shading   = Input(new Shading)
   val materials = Input(Vec(config.frame.materials, new Material))
   val request   = Flipped(Decoupled(new ShadeRequest(config)))
+
+  /** `request` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
   val result    = Decoupled(new ShadeResult(config))
 
   /** Holds a hit. */
@@ -47,6 +50,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
 
   // Geometry
   geometry.io.request <> io.request
+  io.takesNext          := geometry.io.takesNext
   geometry.io.isFlat    := io.shading.flat
   geometry.io.light     := io.light
   geometry.io.unitShift := io.unitShift

@@ -10,6 +10,9 @@ final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
   private val formats = new ShaderFormats(numbers)
 
   val request   = Flipped(Decoupled(new ShadeRequest(config)))
+
+  /** `request` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
   val isFlat    = Input(Bool())
   val light     = Input(new Light(numbers))
   val unitShift = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
@@ -55,6 +58,7 @@ final class ShaderGeometry(config: ColonnadeConfig) extends Module {
   when(io.result.fire)(isBusy := false.B)
 
   io.request.ready := !isBusy
+  io.takesNext     := (!isBusy && !io.request.valid) || io.result.fire
   io.result.valid  := isBusy && isDone
 
   datapath.io.control   := control

@@ -9,6 +9,9 @@ final class TriangleUnitIO(config: ColonnadeConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
   val result    = Decoupled(new TriangleResult(config))
 
+  /** `candidate` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
+
   /** A triangle's vertices go in. */
   val busy = Output(Bool())
 }
@@ -62,6 +65,7 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, turns:
 
   // The way of every triangle
   sequencer.io.candidate <> io.candidate
+  io.takesNext     := sequencer.io.takesNext
   shear.io.vertex  := sequencer.io.vertex
   shear.io.ray     := sequencer.io.ray
   edges.io.sheared := shear.io.sheared

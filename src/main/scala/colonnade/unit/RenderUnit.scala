@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, Valid}
+import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, RegEnable, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
 import colonnade.numbers.Rounding
@@ -35,12 +35,12 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val hitTable     = Module(new HitTable(config))
   private val shader       = Module(new Shader(config))
 
-  // What each context remembers
-  private val positions    = Mem(contexts, new PixelPosition(config))
-  private val boxRays      = Mem(contexts, new BoxRay(numbers))
-  private val triangleRays = Mem(contexts, new TriangleRay(numbers))
-  private val entries      = Mem(contexts, UInt(numbers.entryBits.W))
-  private val colours      = Mem(contexts, new PixelColours)
+  // What each context remembers, in memories that are read a cycle before
+  private val positions    = ContextTable(config, new PixelPosition(config))
+  private val boxRays      = ContextTable(config, new BoxRay(numbers))
+  private val triangleRays = ContextTable(config, new TriangleRay(numbers))
+  private val entries      = ContextTable(config, UInt(numbers.entryBits.W))
+  private val colours      = ContextTable(config, new PixelColours)
   private val isObject     = Reg(Vec(contexts, Bool()))
 
   // A position takes a free context
@@ -84,12 +84,12 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   traversal.io.clear := io.start
   traversal.io.scene := io.registers.scene
   connect(traversal.io.start, enters, setUpRay.bits.context)
-  private val served      = recordFetch.io.served
-  private val triangleRay = triangleRays.read(served.bits.context)
-  recordFetch.io.isReady := VecInit(traversal.io.nodes.ready, triangleUnit.io.candidate.ready, shader.io.request.ready)
+  private val (chosen, served) = (recordFetch.io.chosen, recordFetch.io.served)
+  private val triangleRay      = triangleRays.read(chosen.bits, chosen.valid)
+  recordFetch.io.takesNext  := VecInit(traversal.io.takesNext, triangleUnit.io.takesNext, shader.io.takesNext)
   traversal.io.nodes.valid  := isFor(RecordUse.node)
   traversal.io.nodes.bits   := served.bits
-  traversal.io.ray          := boxRays.read(served.bits.context)
+  traversal.io.ray          := boxRays.read(chosen.bits, chosen.valid)
   traversal.io.limits       := hitTable.io.limits
   traversal.io.visits.ready := true.B
   private val next = traversal.io.visits
@@ -127,21 +127,22 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   // An ended ray: a primary hit wishes for its attributes
   private val judged = controller.io.judged
-  controller.io.hasHit           := hitTable.io.hasHit
-  hitTable.io.readers(0).context := judged.bits
-  private val judgedHit = hitTable.io.readers(0).hit
-  private val isSeen    = judged.valid && hitTable.io.hasHit(judged.bits) && !controller.io.isShadow(judged.bits)
-  recordFetch.io.wishes(2).valid        := isSeen
-  recordFetch.io.wishes(2).bits.context := judged.bits
-  recordFetch.io.wishes(2).bits.use     := RecordUse.attributes
-  recordFetch.io.wishes(
-    2
-  ).bits.address := io.registers.scene.attributeBase + (judgedHit.id >> RecordFormats.faceSlotBits)
+  private val isSeen = judged.valid && hitTable.io.hasHit(judged.bits) && !controller.io.isShadow(judged.bits)
+  controller.io.hasHit := hitTable.io.hasHit
   when(isSeen) { isObject(judged.bits) := true.B }
+  private val seen = RegNext(isSeen, false.B)
+  hitTable.io.nearest.context := RegEnable(judged.bits, isSeen)
+  private val nearest = hitTable.io.nearest
+  recordFetch.io.wishes(2).valid        := seen
+  recordFetch.io.wishes(2).bits.context := nearest.context
+  recordFetch.io.wishes(2).bits.use     := RecordUse.attributes
+  recordFetch.io.wishes(2).bits.address :=
+    io.registers.scene.attributeBase + (nearest.id >> RecordFormats.faceSlotBits)
 
   // Shading
-  hitTable.io.readers(1).context := served.bits.context
-  private val shadedHit = hitTable.io.readers(1).hit
+  hitTable.io.chosen := chosen
+  hitTable.io.served := served.bits.context
+  private val shadedHit = hitTable.io.hit
   shader.io.request.valid        := isFor(RecordUse.attributes)
   shader.io.request.bits.context := served.bits.context
   shader.io.request.bits.ray     := triangleRay
@@ -173,36 +174,38 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     colours.write(shaded.bits.context, pixelColours)
   }
 
-  // Pixels
+  // Pixels: a context is free as soon as its tables are being read, when there is a place for what they hold
   private val complete = controller.io.complete
   private val finished = Wire(Decoupled(new Pixel(config)))
+  private val outgoing = Module(new Queue(new Pixel(config), 1))
   private val isDark   = controller.io.isShadow(complete.bits) && hitTable.io.hasHit(complete.bits)
-  finished.valid         := complete.valid
-  finished.bits.x        := positions.read(complete.bits).x
-  finished.bits.y        := positions.read(complete.bits).y
+  private val leaves   = complete.valid && outgoing.io.enq.ready && !finished.valid
+  controller.io.leave := leaves
+  private val pixelColours = colours.read(complete.bits, leaves)
+  private val place        = positions.read(complete.bits, leaves)
+  finished.valid         := RegNext(leaves, false.B)
+  finished.bits.x        := place.x
+  finished.bits.y        := place.y
   finished.bits.colour   := io.registers.background
-  finished.bits.isObject := false.B
+  finished.bits.isObject := RegEnable(isObject(complete.bits), leaves)
   finished.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
-  when(isObject(complete.bits)) {
-    val pixelColours = colours.read(complete.bits)
-    finished.bits.colour   := Mux(isDark, pixelColours.ambient, pixelColours.lit)
-    finished.bits.isObject := true.B
+  when(finished.bits.isObject) {
+    finished.bits.colour := Mux(RegEnable(isDark, leaves), pixelColours.ambient, pixelColours.lit)
   }
-  controller.io.leave := finished.fire
   if (config.frame.hits) {
-    val pixelHits = Mem(contexts, new PixelHit(config))
-    when(isSeen) {
+    val pixelHits = ContextTable(config, new PixelHit(config))
+    val entry     = entries.read(judged.bits, isSeen)
+    when(seen) {
       val pixelHit = Wire(new PixelHit(config))
-      pixelHit.triangle     := judgedHit.id
-      pixelHit.distance.raw := (Rounding.floor(
-        entries.read(judged.bits),
-        -numbers.gridFraction
-      ) +& judgedHit.t.integer.asUInt)
-      pixelHits.write(judged.bits, pixelHit)
+      pixelHit.triangle     := nearest.id
+      pixelHit.distance.raw := Rounding.floor(entry, -numbers.gridFraction) +& nearest.t.integer.asUInt
+      pixelHits.write(nearest.context, pixelHit)
     }
-    when(isObject(complete.bits)) { finished.bits.hit.get := pixelHits.read(complete.bits) }
+    val pixelHit = pixelHits.read(complete.bits, leaves)
+    when(finished.bits.isObject) { finished.bits.hit.get := pixelHit }
   }
-  io.pixels :<>= Queue(finished, 2)
+  outgoing.io.enq :<>= finished
+  io.pixels :<>= outgoing.io.deq
 
   // The record port
   recordFetch.io.start       := io.start
@@ -218,7 +221,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   events.nodeReads        := traversal.io.nodes.fire
   events.boxTests         := traversal.io.boxTests
   events.triangleTests    := tested.fire
-  events.hits             := isSeen
+  events.hits             := seen
   events.snoopHits        := recordFetch.io.snoopHits
   events.busyRaySetup     := raySetup.io.busy
   events.busyBoxUnit      := traversal.io.busy
@@ -236,7 +239,11 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
   events.illegalRecord := refused.valid
-  io.isIdle            := controller.io.freeCount === contexts.U && !io.pixels.valid
+  io.isIdle            := controller.io.freeCount === contexts.U && !finished.valid && !io.pixels.valid
+
+  // A record comes only to a unit that takes it
+  for ((unit, index) <- Seq(traversal.io.nodes, triangleUnit.io.candidate, shader.io.request).zipWithIndex)
+    assert(!unit.valid || unit.ready, s"unit $index has a record that it does not take")
 
   /** The record served is for this use. */
   private def isFor(use: RecordUse.Type): Bool = served.valid && served.bits.use === use
