@@ -24,6 +24,8 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   /** With those of the background, which go past the units. */
   val raysPrimary      = sum(units + columns)
   val raysShadow       = perUnit
+  val raysReflection   = perUnit
+  val raysRefraction   = perUnit
   val raysInBox        = perUnit
   val nodeReads        = perUnit
   val boxTests         = sum(units * config.geometry.arity)

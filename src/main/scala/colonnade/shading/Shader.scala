@@ -17,6 +17,9 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   val materials = Input(Vec(config.frame.materials, new Material(config)))
   val request   = Flipped(Decoupled(new ShadeRequest(config)))
 
+  /** `request` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
+
   /** Hits on diffuse surfaces. */
   val lit = Decoupled(new LitSurface(config))
 
@@ -56,6 +59,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
   material := io.materials(surface.material(log2Ceil(config.frame.materials.max(2)) - 1, 0))
   private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse).getOrElse(false.B)
   geometry.io.request <> io.request
+  io.takesNext           := geometry.io.takesNext
   geometry.io.shading    := io.shading
   geometry.io.lights     := io.lights
   geometry.io.unitShift  := io.unitShift

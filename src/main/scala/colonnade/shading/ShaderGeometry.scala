@@ -9,7 +9,10 @@ final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
-  val request   = Flipped(Decoupled(new ShadeRequest(config)))
+  val request = Flipped(Decoupled(new ShadeRequest(config)))
+
+  /** `request` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
   val lights    = Input(Vec(config.frame.lights, new Light(numbers)))
   val shading   = Input(new Shading(config))
 
@@ -66,6 +69,7 @@ final class ShaderGeometry(config: ColonnadeConfig) extends Module {
   }
 
   io.request.ready := !isBusy
+  io.takesNext     := (!isBusy && !io.request.valid) || (io.result.fire && isLast)
   io.result.valid  := isBusy && isDone
 
   datapath.io.control   := control

@@ -10,6 +10,9 @@ import colonnade.ray.{Context, RayFormats}
 /** Ports of [[BoxUnit]]. */
 final class BoxUnitIO(config: ColonnadeConfig) extends Bundle {
   val in  = Flipped(Decoupled(new BoxCandidate(config)))
+
+  /** `in` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
   val out = Decoupled(new BoxResult(config))
 
   /** The datapath takes children in. */
@@ -41,8 +44,10 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   // Let a node in; its first children start at once, the others follow without a gap
   private val beat    = RegInit(0.U(log2Ceil(beats.max(2)).W))
   private val follows = beat =/= 0.U
-  when(io.in.fire || follows) { beat := Mux(beat === (beats - 1).U, 0.U, beat + 1.U) }
+  private val nextBeat = Mux(io.in.fire || follows, Mux(beat === (beats - 1).U, 0.U, beat + 1.U), beat)
+  beat               := nextBeat
   io.in.ready        := notes.io.enq.ready && !follows
+  io.takesNext       := nextBeat === 0.U && notes.io.count +& io.in.fire - notes.io.deq.fire < places.U
   notes.io.enq.valid := io.in.fire
   notes.io.enq.bits  := BoxNote(config, io.in.bits)
   private val starts   = io.in.fire || follows

@@ -80,6 +80,7 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
 
   dut.io.search.valid.poke(false)
   dut.io.result.valid.poke(false)
+  dut.io.chosen.valid.poke(true)
 
   def best(context: Int): Option[Result] = searches(context).flatMap(_.best)
 
@@ -114,17 +115,23 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     assert(found == Model.answers(config, asked.map(Seq(_)), "limit").map(_.head))
   }
 
+  /** Looks at every ray; the hit of one of them that is chosen comes a cycle later. */
   def check(): Unit = for ((search, context) <- searches.zipWithIndex; ray <- search) {
     dut.io.hasHit(context).expect(ray.hits.nonEmpty, s"context $context, $ray")
     // A shadow ray needs no more than the answer that it has hit
     if (!ray.isShadow || ray.hits.isEmpty)
       limits += ray.best.fold(ray.limit)(_.t) -> dut.io.limits(context).peekRaw()
-    for (reader <- dut.io.readers; hit <- ray.best if !ray.isShadow) {
-      reader.context.poke(context)
-      assert(reader.hit.t.peekRaw() == hit.t, s"context $context, $ray")
-      assert(reader.hit.id.peekInt() == hit.id, s"context $context, $ray")
-      assert(reader.hit.weights.map(_.peekRaw()) == hit.weights)
-      reader.hit.backSide.expect(hit.backSide)
+    for (hit <- ray.best if !ray.isShadow) {
+      dut.io.nearest.context.poke(context)
+      assert(dut.io.nearest.t.peekRaw() == hit.t, s"context $context, $ray")
+      assert(dut.io.nearest.id.peekInt() == hit.id, s"context $context, $ray")
+      dut.io.chosen.bits.poke(context)
+      dut.clock.step()
+      dut.io.served.poke(context)
+      assert(dut.io.hit.t.peekRaw() == hit.t, s"context $context, $ray")
+      assert(dut.io.hit.id.peekInt() == hit.id, s"context $context, $ray")
+      assert(dut.io.hit.weights.map(_.peekRaw()) == hit.weights)
+      dut.io.hit.backSide.expect(hit.backSide)
     }
   }
 
