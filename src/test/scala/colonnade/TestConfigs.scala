@@ -20,7 +20,7 @@ object TestConfigs {
       readLatency = 1,
       holdable = false
     ),
-    FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, hits = true)
+    FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, lights = 2, maxBounces = 3, hits = true)
   )
 
   def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig =

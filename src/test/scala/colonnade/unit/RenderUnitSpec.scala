@@ -57,6 +57,10 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     ),
     "no tree, one context, nobody snoops"
   )
+  render(
+    TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(lights = 1, maxBounces = 0)),
+    "one light, nothing bounces"
+  )
 }
 
 /** With the registers and each pixel in one port. */
