@@ -9,7 +9,7 @@ final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
-  val request   = Flipped(Decoupled(new ShadeRequest(config)))
+  val request = Flipped(Decoupled(new ShadeRequest(config)))
 
   /** `request` will be ready in the next cycle. */
   val takesNext = Output(Bool())

@@ -61,7 +61,7 @@ final class HitTable(config: ColonnadeConfig) extends Module {
   io.hasHitNow := hasHit(context) || isNearer
   when(io.result.valid && isNearer) {
     val detail = Wire(new HitDetails(config))
-    detail.weights := hit.weights
+    detail.weights  := hit.weights
     detail.backSide := hit.backSide
     details.write(context, detail)
     ids(context)    := hit.id
@@ -76,8 +76,8 @@ final class HitTable(config: ColonnadeConfig) extends Module {
     hasHit(io.search.bits.context) := false.B
   }
 
-  io.limits := limits
-  io.hasHit := hasHit
+  io.limits     := limits
+  io.hasHit     := hasHit
   io.nearest.t  := bests(io.nearest.context)
   io.nearest.id := ids(io.nearest.context)
 
