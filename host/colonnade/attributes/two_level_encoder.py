@@ -99,7 +99,8 @@ def _cell_costs(pixels: _Pixels, cells: int, entries: NDArray[np.float64]) -> ND
     lengths = (entries**2).sum(axis=2)
     costs = squares[..., np.newaxis] + weights[..., np.newaxis] * lengths[:, np.newaxis, :]
     costs -= 2.0 * (sums @ entries.transpose(0, 2, 1))
-    return costs.astype(np.float32)
+    rounded: NDArray[np.float32] = costs.astype(np.float32)
+    return rounded
 
 
 def _candidates(pixels: _Pixels, palette: NDArray[np.float64]) -> NDArray[np.intp]:
