@@ -1,0 +1,1 @@
+"""The physical-attribute memory's contents: a room's maps, clustered to fit on chip."""
