@@ -15,7 +15,7 @@ from colonnade.attributes.plane_fit import Samples, fitted_planes, refitted, sam
 from colonnade.attributes.plane_map import PLANE_MODES, PlaneMap
 from colonnade.attributes.plane_numbers import Picture, packed_planes, unpacked_planes
 from colonnade.attributes.shell import packed_shell, room_shell
-from colonnade.attributes.tiles import cut, pooled, present, spread_cells
+from colonnade.attributes.tiles import cut, joined, pooled, present, spread_cells
 from colonnade.attributes.two_level import mask_words
 from colonnade.room.room import Room
 
@@ -62,7 +62,7 @@ def _cell_costs(pixels: Samples, planes: NDArray[np.float64], layout: AttributeL
 
 def _of_cells(costs: NDArray[np.float32], cells: int) -> NDArray[np.float32]:
     """Costs of coarser cells: float32 [tiles, cells * cells, planes]."""
-    fine: NDArray[np.float32] = costs.reshape(len(costs), _FINEST, _FINEST, -1)
+    fine: NDArray[np.float32] = costs.reshape(len(costs), _FINEST, _FINEST, costs.shape[2])
     coarse: NDArray[np.float32] = pooled(fine, cells)
     return coarse
 
@@ -94,8 +94,6 @@ def _owners(
     modes: NDArray[np.intp], ids: list[NDArray[np.intp]], costs: NDArray[np.float32], layout: AttributeLayout
 ) -> NDArray[np.intp]:
     """The plane of every pixel of the map, row by row: intp [height * width]."""
-    from colonnade.attributes.tiles import joined
-
     size = layout.tile_size
     owner = np.empty((layout.tiles, size, size), np.intp)
     for number in range(len(PLANE_MODES)):

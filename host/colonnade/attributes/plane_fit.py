@@ -24,7 +24,7 @@ REACH = 0.06
 #: A smaller error does not matter, metres: spares planes for what is worse.
 FINE = 0.002
 _CANDIDATE_STEP = 8
-_SAMPLE_STEP = 3
+_SAMPLE_STEP = 4
 _NEIGHBOURS = 5
 _NEAR = 0.01
 _ROUNDS = 8
@@ -39,22 +39,29 @@ class Samples:
         basis: float64 [n, 3], what A, B, C are multiplied by.
         w: float64 [n], depth_unit / z.
         metres: float64 [n], of error along the view ray for each unit of w, to first order.
+        scaled: float32 [n, 4]: ``scaled @ (A, B, C, -1)`` is the signed error in metres.
     """
 
     basis: NDArray[np.float64]
     w: NDArray[np.float64]
     metres: NDArray[np.float64]
+    scaled: NDArray[np.float32]
+
+    @staticmethod
+    def of(basis: NDArray[np.float64], w: NDArray[np.float64], metres: NDArray[np.float64]) -> Samples:
+        """Samples of all but ``scaled``."""
+        scaled = np.concatenate([basis, w[:, np.newaxis]], axis=1) * metres[:, np.newaxis]
+        return Samples(basis, w, metres, scaled.astype(np.float32))
 
     def errors(self, planes: NDArray[np.float64]) -> NDArray[np.float32]:
         """Metres along the view ray between the pixels and planes [k, 3], not saturated: float32 [n, k]."""
-        scaled = (self.basis * self.metres[:, np.newaxis]).astype(np.float32)
-        difference = scaled @ planes.T.astype(np.float32)
-        difference -= (self.w * self.metres).astype(np.float32)[:, np.newaxis]
+        factors = np.concatenate([planes, np.full((len(planes), 1), -1.0)], axis=1).astype(np.float32)
+        difference: NDArray[np.float32] = self.scaled @ factors.T
         return np.abs(difference, out=difference)
 
     def part(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Samples:
         """Some of them."""
-        return Samples(self.basis[which], self.w[which], self.metres[which])
+        return Samples(self.basis[which], self.w[which], self.metres[which], self.scaled[which])
 
 
 def samples_of(room: Room, picture: Picture, step: int = 1) -> Samples:
@@ -63,7 +70,7 @@ def samples_of(room: Room, picture: Picture, step: int = 1) -> Samples:
     length = np.linalg.norm(room.camera.directions(room.width, room.height)[::step, ::step], axis=2)
     basis = picture.basis()[::step, ::step]
     metres = depth * depth * length / picture.depth_unit
-    return Samples(basis.reshape(-1, 3), (picture.depth_unit / depth).ravel(), metres.ravel())
+    return Samples.of(basis.reshape(-1, 3), (picture.depth_unit / depth).ravel(), metres.ravel())
 
 
 def fitted_planes(room: Room, picture: Picture, count: int) -> NDArray[np.float64]:
@@ -130,16 +137,16 @@ def _candidates(room: Room, picture: Picture) -> NDArray[np.float64]:
 
 
 def _cost(errors: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.clip(errors, FINE, REACH)
+    # REACH is where a greedy choice starts: what is beyond it gains nothing
+    return np.maximum(errors, np.float32(FINE))
 
 
 def _greedy(samples: Samples, candidates: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """The candidates that together leave the least error, in the order of their choice."""
     reached = np.full(len(samples.w), REACH, np.float32)
 
-    def gains(planes: NDArray[np.float64]) -> NDArray[np.float64]:
-        left = np.minimum(_cost(samples.errors(planes)), reached[:, np.newaxis])
-        gained: NDArray[np.float64] = float(reached.sum(dtype=np.float64)) - left.sum(axis=0, dtype=np.float64)
+    def gains(planes: NDArray[np.float64]) -> NDArray[np.float32]:
+        gained: NDArray[np.float32] = np.maximum(reached[:, np.newaxis] - _cost(samples.errors(planes)), 0).sum(axis=0)
         return gained
 
     queue: list[tuple[float, int, int]] = []
