@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from colonnade.attributes import AttributeImage, AttributeLayout, encode_room
+from colonnade.attributes.cache import encoded_room
 from colonnade.attributes.measure import ray_errors
 from colonnade.attributes.plane_encoder import encode_planes
 from colonnade.attributes.plane_map import PLANE_MODES, PlaneMap
@@ -181,16 +183,35 @@ def test_surfaces_of_the_rooms(name: str, mean: float, p95: float) -> None:
     assert len(planes) == 6
 
 
+def all_words(image: AttributeImage) -> list[bytes]:
+    return [memory.tobytes() for part in image.memories().values() for memory in part.values()]
+
+
 def test_a_whole_room_is_the_same_every_time() -> None:
     room = boxes()
     images = [encode_room(room, AttributeLayout(160, 120)) for _ in range(2)]
-
-    def words(image: AttributeImage) -> list[bytes]:
-        return [memory.tobytes() for part in image.memories().values() for memory in part.values()]
-
-    assert words(images[0]) == words(images[1])
+    assert all_words(images[0]) == all_words(images[1])
     assert images[0].byte_counts() == {"albedo": 16384, "normals": 16384, "planes": 8192}
     assert np.abs(images[0].decoded_albedo() - room.albedo).mean() < 0.002
+
+
+@pytest.mark.parametrize("encoding", ["twoLevel", "slic"])
+def test_a_room_is_encoded_once(encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    room, layout = boxes(), AttributeLayout(160, 120, encoding)
+    first = encoded_room(room, layout, tmp_path)
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("encoded again")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("colonnade.attributes.cache.encode_room", refuse)
+        assert all_words(encoded_room(room, layout, tmp_path)) == all_words(first)
+        for other in (replace(room, albedo=room.albedo * 0.5), replace(room, depth=room.depth * 1.01)):
+            with pytest.raises(AssertionError):
+                encoded_room(other, layout, tmp_path)
+    (kept,) = tmp_path.glob("*.npz")
+    kept.write_bytes(b"broken")
+    assert all_words(encoded_room(room, layout, tmp_path)) == all_words(first)
 
 
 def test_a_room_of_another_size() -> None:

@@ -51,6 +51,15 @@ class AttributeImage:
             "planes": dict(self.planes.memories()),
         }
 
+    @staticmethod
+    def from_memories(
+        layout: AttributeLayout, memories: dict[str, dict[str, NDArray[Any]]], depth_unit: float
+    ) -> AttributeImage:
+        """The image whose `memories` these are."""
+        kind: type[TwoLevelMap] | type[SlicMap] = SlicMap if layout.encoding == "slic" else TwoLevelMap
+        planes = PlaneMap(**memories["planes"], depth_unit=depth_unit)
+        return AttributeImage(layout, kind(**memories["albedo"]), kind(**memories["normals"]), planes)
+
     def byte_counts(self) -> dict[str, int]:
         """Bytes of memory of each map."""
         of_map = self.layout.map_memory_bytes

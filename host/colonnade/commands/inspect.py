@@ -71,7 +71,7 @@ def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ..
 def _inspect_room(
     background: Path, encoding: str, output: Path | None, with_dists: bool, json_file: Path | None
 ) -> None:
-    from colonnade.attributes import AttributeLayout, encode_room
+    from colonnade.attributes import AttributeLayout, encoded_room
     from colonnade.attributes.measure import measure, report_lines
     from colonnade.attributes.pictures import map_pictures, write_pictures
     from colonnade.room import load_room
@@ -79,7 +79,7 @@ def _inspect_room(
     room = load_room(background)
     for note in room.notes:
         click.echo(f"colonnade: note: {room.name}: {note}", err=True)
-    image = encode_room(room, AttributeLayout(room.width, room.height, encoding))
+    image = encoded_room(room, AttributeLayout(room.width, room.height, encoding))
     report = measure(room, image, with_dists)
     for line in report_lines(report):
         click.echo(line)
