@@ -1,9 +1,9 @@
 """A room's depth map as a mesh of triangles: what the rebuilt room is measured against.
 
 Neighbouring pixels are joined unless the depth jumps between them: then nothing is known of what lies behind, and no
-sheet is drawn from the front to the back. A jump is a ratio of depths beyond `JUMP` that neither pixel's normal
-explains: a wall seen along itself stays whole. Triangles face the camera; whoever meets one from behind sees what no
-map knows.
+sheet is drawn from the front to the back. A jump is a ratio of depths beyond `JUMP` that not both pixels' normals
+explain: a wall seen along itself stays whole, for there both do. Triangles face the camera; whoever meets one from
+behind sees what no map knows.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 #: Neighbours of which one is farther than this many times the other may lie on different things …
 JUMP = 1.05
-#: … and do unless the step between them is within this sine of a pixel's tangent plane.
+#: … and do unless the step between them is within this sine of both pixels' tangent planes.
 OFF_PLANE = 0.25
 
 
@@ -79,5 +79,5 @@ def _joined(p: Floats, q: Floats, normals_p: Floats, normals_q: Floats) -> NDArr
     step = q - p
     length = np.linalg.norm(step, axis=-1)
     near, far = np.minimum(p[..., 2], q[..., 2]), np.maximum(p[..., 2], q[..., 2])
-    off = np.minimum(*(np.abs(np.einsum("...i,...i->...", n, step)) for n in (normals_p, normals_q)))
+    off = np.maximum(*(np.abs(np.einsum("...i,...i->...", n, step)) for n in (normals_p, normals_q)))
     return np.asarray((far <= JUMP * near) | (off <= OFF_PLANE * length), dtype=np.bool_)
