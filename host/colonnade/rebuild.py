@@ -84,18 +84,24 @@ def positions(room: Room, met: Rebuilt) -> Floats:
 
 
 class DepthMarch:
-    """A march through the full depth map, at most a pixel or a fiftieth of w a step, nearest texels."""
+    """A march through the full maps, at most a pixel or a fiftieth of w a step: each texel is a plane of its own."""
 
-    #: A surface is met when the ray passes behind it and it goes on there: texels before and after differ by less than
-    #: this share of w. Otherwise the ray has gone behind something, or into it if it is no farther behind than `DEEP`.
+    #: A surface is met when the ray passes behind it and it goes on there: the planes before and after differ by less
+    #: than this share of w. Otherwise the ray has gone behind something, or into it if it is no deeper than `DEEP`.
     JUMP = 0.04
     DEEP = 0.01
     #: A start so little behind the surface is on it.
     START = 0.005
+    #: No plane is steeper than this share of w a pixel: at outlines normals turn away from the camera.
+    STEEP = 0.05
 
     def __init__(self, room: Room, most_steps: int = 2048) -> None:
         self._room, self._most = room, most_steps
         self._w = 1.0 / room.depth
+        towards = np.einsum("hwi,hwi->hw", room.normals, room.points())
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slopes = np.stack([room.normals[..., 0] / room.fx, room.normals[..., 1] / room.fy]) / towards
+        self._slopes = np.nan_to_num(slopes).clip(-self.STEEP * self._w, self.STEEP * self._w)
 
     def __call__(self, origins: Floats, directions: Floats) -> Rebuilt:
         """Where the rays meet the room."""
@@ -114,8 +120,8 @@ class DepthMarch:
         step = slope / np.where(pace > 0, pace, 1.0)[:, None]
         kind, steps, place = np.full(count, LOST), np.zeros(count, dtype=np.int64), start.copy()
         alive = np.arange(count)
-        height, map_w = self._above(place)
-        before, before_w = np.where(height > -self.START * place[:, 2], height.clip(min=1e-12), height), map_w
+        height = self._above(place, place)
+        before = np.where(height > -self.START * place[:, 2], height.clip(min=1e-12), height)
         for number in range(1, self._most + 1):
             here = start[alive] + number * step[alive]
             inside = (here[:, 0] >= 0) & (here[:, 0] < room.width) & (here[:, 1] >= 0) & (here[:, 1] < room.height)
@@ -123,24 +129,26 @@ class DepthMarch:
             steps[alive] = number
             kind[alive[~inside]] = LEFT
             place[alive[~inside]] = here[~inside]
-            alive, here, before, before_w = alive[inside], here[inside], before[inside], before_w[inside]
+            alive, here, before = alive[inside], here[inside], before[inside]
             if len(alive) == 0:
                 break
-            now, now_w = self._above(here)
+            now = self._above(here, here)
             passed = (before > 0) & (now <= 0)
-            one_surface = np.abs(now_w - before_w) < self.JUMP * now_w
-            met = passed & (one_surface | (now > -self.DEEP * now_w))
+            # Where the plane of the step before would be here: far from this one's, something begins or ends.
+            one_surface = np.abs(self._above(here, here - step[alive]) - now) < self.JUMP * here[:, 2]
+            met = passed & (one_surface | (now > -self.DEEP * here[:, 2]))
             back = np.where(one_surface, now / np.where(met, now - before, 1.0), 0.0)
             place[alive[met]] = here[met] - back[met, None] * step[alive[met]]
             kind[alive[met]] = HIT
-            alive, before, before_w = alive[~met], now[~met], now_w[~met]
+            alive, before = alive[~met], now[~met]
         place[alive] = start[alive] + self._most * step[alive]
         with np.errstate(divide="ignore"):
             return Rebuilt(place[:, 0], place[:, 1], 1 / place[:, 2], kind, steps)
 
-    def _above(self, place: Floats) -> tuple[Floats, Floats]:
-        """How far in front of the surface places (u, v, w) are, in w, and the surface's w; float64 [n] each."""
-        column = np.clip(place[:, 0].astype(np.intp), 0, self._room.width - 1)
-        row = np.clip(place[:, 1].astype(np.intp), 0, self._room.height - 1)
-        surface = self._w[row, column]
-        return place[:, 2] - surface, surface
+    def _above(self, place: Floats, of: Floats) -> Floats:
+        """How far in w places (u, v, w) lie in front of the plane that is seen at places ``of``, float64 [n]."""
+        column = np.clip(of[:, 0].astype(np.intp), 0, self._room.width - 1)
+        row = np.clip(of[:, 1].astype(np.intp), 0, self._room.height - 1)
+        across, along = self._slopes[:, row, column]
+        surface = self._w[row, column] + across * (place[:, 0] - column - 0.5) + along * (place[:, 1] - row - 0.5)
+        return np.asarray(place[:, 2] - surface, dtype=np.float64)
