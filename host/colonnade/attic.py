@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +115,7 @@ def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
     room = attic(width, height).room
     folder.mkdir(parents=True, exist_ok=True)
     pose = room.camera_to_world * np.array([-1.0, -1.0, 1.0, 1.0])
-    meta = {"width": width, "height": height, "fx": room.fx, "fy": room.fy, "cx": room.cx, "cy": room.cy}
+    meta: dict[str, Any] = {"width": width, "height": height, "fx": room.fx, "fy": room.fy, "cx": room.cx, "cy": room.cy}
     meta |= {"cam_to_world": [*pose.tolist(), [0.0, 0.0, 0.0, 1.0]], "albedo_encoding": "srgb"}
     meta |= {"depth_step": DEPTH_STEP, "licence": "CC0: made by colonnade.attic"}
     write_png(folder / "albedo.png", room.albedo)

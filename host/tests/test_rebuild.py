@@ -79,7 +79,7 @@ def test_the_study_knows_a_good_rebuild_from_a_bad_one(made: Attic) -> None:
     assert good.receiver_mean == 0 and good.receiver_p95 == 0
     bad = study(room, shifted, lambda u, v: room.depth.ravel() + 0.1)
     assert bad.mirror.ok < 0.2 and bad.mirror.missed == good.mirror.missed
-    assert bad.mirror_psnr < good.mirror_psnr - 3 and bad.mirror_flip > good.mirror_flip
+    assert bad.mirror_psnr < good.mirror_psnr - 1 and bad.mirror_flip > 2 * good.mirror_flip
     assert bad.receiver_mean is not None and 0.1 <= bad.receiver_mean < 0.15
     none = study(room, blind)
     assert (none.mirror.ok, none.mirror.missed, none.mirror.invented) == (0, 1, 0)
