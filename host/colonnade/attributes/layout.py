@@ -42,7 +42,7 @@ class AttributeLayout:
         encoding: ``twoLevel`` or ``slic``, of albedo and normals.
         tile_size: Edge of a tile, pixels: 8, 16 or 32.
         palette_size: Vectors of a map that all its tiles share, 4 to 256.
-        field_bits: Of each of the three components of a vector, 6 to 16.
+        field_bits: Of each of the three components of a vector, 6 to 13.
         map_bytes: For the albedo map, and as many for the normals.
         planes: Plane table, 2 to 128; its last one is nothing, infinitely far away.
         plane_bytes: For planes, their map and the shell.
@@ -69,7 +69,7 @@ class AttributeLayout:
         within("width", 1, 4096)
         within("height", 1, 4096)
         within("palette_size", 4, 1 << INDEX_BITS)
-        within("field_bits", 6, 16)
+        within("field_bits", 6, 13)
         within("planes", 2, 128)
         within("shell_planes", 1, 16)
         if self.tile_size not in (8, 16, 32):

@@ -40,7 +40,7 @@ def pooled(tiles: NDArray[Any], cells: int) -> NDArray[Any]:
     """Sums over cells: [tiles, size, size, ...] to [tiles, cells * cells, ...], row by row."""
     count, size = tiles.shape[:2]
     edge = size // cells
-    grid = tiles.reshape(count, cells, edge, cells, edge, *tiles.shape[3:]).sum(axis=(2, 4))
+    grid: NDArray[Any] = tiles.reshape(count, cells, edge, cells, edge, *tiles.shape[3:]).sum(axis=(2, 4))
     return grid.reshape(count, cells * cells, *tiles.shape[3:])
 
 

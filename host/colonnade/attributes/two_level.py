@@ -8,8 +8,8 @@ A descriptor, low bit first: mode (3), pointer (13), entry 0 (8), entry 1 (8).
 | 1, 2, 3 | 2 | 4x4, 8x8, 16x16 | 1, 4, 16 | at the pointer |
 | 4, 5, 6, 7 | 4 | 2x2, 4x4, 8x8, 16x16 | 1, 2, 8, 32 | after a word with entries 2 (low byte) and 3 |
 
-Cells of a tile are numbered row by row; cell c takes the mask's bit c (two entries) or bits 2c and 2c + 1 (four), counted
-from the low bit of the first word. A look-up reads a descriptor, at most two words of the heap, and the palette.
+Cells of a tile are numbered row by row; cell c takes the mask's bit c (two entries) or bits 2c and 2c + 1 (four),
+counted from the low bit of the first word. A look-up reads a descriptor, at most two words of the heap, the palette.
 """
 
 from __future__ import annotations

@@ -67,7 +67,8 @@ def read_array(file: Path) -> NDArray[np.float64]:
         array = array[..., 0]
     if array.ndim != 2:
         raise UserError(f"{file} must hold one number for each pixel: its shape is {array.shape}")
-    return array.astype(np.float64)
+    numbers: NDArray[np.float64] = array.astype(np.float64)
+    return numbers
 
 
 def _samples(file: Path) -> NDArray[Any]:
