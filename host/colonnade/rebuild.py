@@ -1,7 +1,7 @@
 """A room rebuilt from what its camera saw: which background point does a ray meet?
 
-A `Rebuild` answers for rays in view space. `DepthMarch` answers from the full depth map, step by step: it is what the
-device's march would be with all the memory in the world.
+A `Rebuild` answers for rays in view space. `PlaneMarch` answers from a plane for each pixel, step by step, in 64 bits;
+`DepthMarch` has the planes of the full maps: what the device's march would be with all the memory in the world.
 
 With w = 1/z a ray stays straight in (u, v, w): from (u0, v0, w0) along (Du, Dv, Dw) with Du = fx·dx − dz·(u0 − cx),
 Dv alike and Dw = −dz·w0.
@@ -83,8 +83,8 @@ def positions(room: Room, met: Rebuilt) -> Floats:
     return np.stack([across, along, np.ones_like(met.z)], axis=1) * met.z[:, None]
 
 
-class DepthMarch:
-    """A march through the full maps, at most a pixel or a fiftieth of w a step: each texel is a plane of its own."""
+class PlaneMarch:
+    """A march of at most a pixel or a fiftieth of w a step through a map of planes."""
 
     #: A surface is met when the ray passes behind it and it goes on there: the planes before and after differ by less
     #: than this share of w. Otherwise the ray has gone behind something, or into it if it is no deeper than `DEEP`.
@@ -92,16 +92,18 @@ class DepthMarch:
     DEEP = 0.01
     #: A start so little behind the surface is on it.
     START = 0.005
-    #: No plane is steeper than this share of w a pixel: at outlines normals turn away from the camera.
-    STEEP = 0.05
 
-    def __init__(self, room: Room, most_steps: int = 2048) -> None:
+    def __init__(self, room: Room, w: Floats, slopes: Floats, most_steps: int = 2048) -> None:
+        """A room by its planes.
+
+        Args:
+            room: Its camera and size.
+            w: 1/metre, of each pixel's plane at the pixel's centre, float64 [height, width].
+            slopes: How w changes a pixel to the right and a pixel down, float64 [2, height, width].
+            most_steps: Then a ray is lost.
+        """
         self._room, self._most = room, most_steps
-        self._w = 1.0 / room.depth
-        towards = np.einsum("hwi,hwi->hw", room.normals, room.points())
-        with np.errstate(divide="ignore", invalid="ignore"):
-            slopes = np.stack([room.normals[..., 0] / room.fx, room.normals[..., 1] / room.fy]) / towards
-        self._slopes = np.nan_to_num(slopes).clip(-self.STEEP * self._w, self.STEEP * self._w)
+        self._w, self._slopes = w, slopes
 
     def __call__(self, origins: Floats, directions: Floats) -> Rebuilt:
         """Where the rays meet the room."""
@@ -152,3 +154,18 @@ class DepthMarch:
         across, along = self._slopes[:, row, column]
         surface = self._w[row, column] + across * (place[:, 0] - column - 0.5) + along * (place[:, 1] - row - 0.5)
         return np.asarray(place[:, 2] - surface, dtype=np.float64)
+
+
+class DepthMarch(PlaneMarch):
+    """A march through the full maps: depth and normal of each pixel are a plane of its own."""
+
+    #: No plane is steeper than this share of w a pixel: at outlines normals turn away from the camera.
+    STEEP = 0.05
+
+    def __init__(self, room: Room, most_steps: int = 2048) -> None:
+        """A room by its depth and normals."""
+        w = 1.0 / room.depth
+        towards = np.einsum("hwi,hwi->hw", room.normals, room.points())
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slopes = np.stack([room.normals[..., 0] / room.fx, room.normals[..., 1] / room.fy]) / towards
+        super().__init__(room, w, np.nan_to_num(slopes).clip(-self.STEEP * w, self.STEEP * w), most_steps)

@@ -74,10 +74,10 @@ def test_the_study_knows_a_good_rebuild_from_a_bad_one(made: Attic) -> None:
         nothing, count = np.zeros(len(origins)), np.full(len(origins), 3)
         return Rebuilt(nothing, nothing, nothing + 1, np.full(len(origins), LEFT), count)
 
-    good = study(room, march, lambda u, v: room.depth.ravel())
+    good = study(room, march, room.depth)
     assert good.mirror.ok > 0.85 and good.cosine.ok > 0.85 and good.mirror.missed < 0.1
     assert good.receiver_mean == 0 and good.receiver_p95 == 0
-    bad = study(room, shifted, lambda u, v: room.depth.ravel() + 0.1)
+    bad = study(room, shifted, room.depth + 0.1)
     assert bad.mirror.ok < 0.2 and bad.mirror.missed == good.mirror.missed
     assert bad.mirror_psnr < good.mirror_psnr - 1 and bad.mirror_flip > 2 * good.mirror_flip
     assert bad.receiver_mean is not None and 0.1 <= bad.receiver_mean < 0.15
