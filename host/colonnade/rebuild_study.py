@@ -138,7 +138,7 @@ def study(room: Room, rebuild: Rebuild, depth: Floats | None = None, seed: int =
 def _asked(room: Room, mesh: DepthMesh, rebuild: Rebuild, rays: Rays) -> _Answers:
     truth = mesh.meet(rays.origins, rays.directions)
     rebuilt = rebuild(rays.origins, rays.directions)
-    near = np.hypot(rebuilt.u - truth.u, rebuilt.v - truth.v) <= NEAR_PIXELS
+    near = np.hypot(rebuilt.seen_u - truth.u, rebuilt.seen_v - truth.v) <= NEAR_PIXELS
     near |= np.linalg.norm(positions(room, rebuilt) - truth.position, axis=1) <= NEAR_METRES
     return _Answers(rays, truth, np.isnan(truth.u), rebuilt, near & _found(rebuilt) & ~truth.outside)
 
@@ -172,7 +172,7 @@ def _pictures(room: Room, answers: _Answers) -> tuple[NDArray[np.uint8], NDArray
     pictures = []
     for u, v, found in (
         (answers.truth.u, answers.truth.v, known),
-        (answers.rebuilt.u, answers.rebuilt.v, answers.found),
+        (answers.rebuilt.seen_u, answers.rebuilt.seen_v, answers.found),
     ):
         picture = np.full((PICTURE * PICTURE, 3), 128, dtype=np.uint8)
         column = np.clip(np.nan_to_num(u), 0, room.width - 1).astype(np.intp)
