@@ -1,6 +1,5 @@
 package colonnade.shading
 
-import chisel3._
 import chiseltest._
 import colonnade.TestConfigs
 import colonnade.numbers.FixedPorts._
