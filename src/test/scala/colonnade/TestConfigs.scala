@@ -20,6 +20,7 @@ object TestConfigs {
       readLatency = 1,
       holdable = false
     ),
+    physicalAttributeMemory = None,
     FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, hits = true)
   )
 

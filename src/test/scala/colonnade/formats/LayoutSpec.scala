@@ -38,7 +38,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
   private def kinds(config: ColonnadeConfig): Seq[Data] = {
     val formats = new RecordFormats(config)
     Seq(formats.node, formats.triangles, formats.attributes, new Pixel(config), new Load(config)) ++
-      Seq(new FrameRegisters(config), new DeviceStatus)
+      Seq(new FrameRegisters(config), new DeviceStatus) ++ AttributeMemories.layouts.map { case (_, kind) => kind() }
   }
 
   it should "cover each bit of a type once, under unique names" in {

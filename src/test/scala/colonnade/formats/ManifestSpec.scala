@@ -16,7 +16,18 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
   it should "name what the host relies on" in {
     val whole = manifest()
     whole.value.keys.toSeq shouldBe
-      Seq("version", "config", "numbers", "records", "registers", "streams", "memories", "formatHash", "configHash")
+      Seq(
+        "version",
+        "config",
+        "numbers",
+        "records",
+        "registers",
+        "streams",
+        "memories",
+        "attributes",
+        "formatHash",
+        "configHash"
+      )
     whole("records")("layouts").obj.keys.toSeq shouldBe Seq("node", "triangles", "attributes")
     whole("memories")("columnBvh") shouldBe ujson.Obj("depth" -> 131072, "bits" -> 320, "banks" -> 2)
     val names = whole("registers")("fields").arr.map(_("name").str)
