@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from colonnade.dists import dists_or_none
 from colonnade.errors import UserError
 from colonnade.hits import Hits, read_hits
 from colonnade.metrics import compare_hits, compare_pictures
@@ -16,7 +17,11 @@ HIT_KEYS = ("hit_disagreement", "triangle_disagreement")
 
 
 def compare(
-    first: Path, second: Path, first_hits: Path | None = None, second_hits: Path | None = None
+    first: Path,
+    second: Path,
+    first_hits: Path | None = None,
+    second_hits: Path | None = None,
+    with_dists: bool = True,
 ) -> dict[str, Any]:
     """Compare two frames.
 
@@ -25,6 +30,7 @@ def compare(
         second: picture to judge, or a hits file.
         first_hits: hits file of the first frame.
         second_hits: hits file of the second frame.
+        with_dists: judge by DISTS too, whose weights are fetched at its first use.
 
     Returns:
         The keys `PICTURE_KEYS` and `HIT_KEYS`, None where nothing to compare was given.
@@ -41,17 +47,18 @@ def compare(
 
     report: dict[str, Any] = dict.fromkeys((*PICTURE_KEYS, *HIT_KEYS))
     if not are_hits[0]:
-        report.update(_compare_pictures(first, second))
+        report.update(_compare_pictures(first, second, with_dists))
     if first_hits and second_hits:
         report.update(_compare_hits(first_hits, second_hits))
     return report
 
 
-def _compare_pictures(first: Path, second: Path) -> dict[str, Any]:
+def _compare_pictures(first: Path, second: Path, with_dists: bool) -> dict[str, Any]:
     pictures = read_picture(first), read_picture(second)
     _require_same_size((first, second), (pictures[0].shape[:2], pictures[1].shape[:2]))
     difference = compare_pictures(*pictures)
-    return {key: getattr(difference, key) for key in PICTURE_KEYS if hasattr(difference, key)}
+    report = {key: getattr(difference, key) for key in PICTURE_KEYS if hasattr(difference, key)}
+    return report | {"dists": dists_or_none(*pictures) if with_dists else None}
 
 
 def _compare_hits(first: Path, second: Path) -> dict[str, Any]:

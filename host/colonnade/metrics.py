@@ -87,12 +87,17 @@ def ssim(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float | None:
 
 def flip(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float:
     """Mean FLIP error (Andersson et al. 2020) of two sRGB pictures, at its default 67 pixels a degree."""
+    return float(flip_map(reference, test).mean(dtype="float64"))
+
+
+def flip_map(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """FLIP error of each pixel, float32 [height, width], 0 to 1."""
     import flip_evaluator
     import numpy as np
 
     pictures = [picture.astype(np.float32) / np.float32(255.0) for picture in (reference, test)]
-    _, mean, _ = flip_evaluator.evaluate(*pictures, "LDR", inputsRGB=True, applyMagma=False)
-    return float(mean)
+    errors, _, _ = flip_evaluator.evaluate(*pictures, "LDR", inputsRGB=True, applyMagma=False)
+    return np.asarray(errors, dtype=np.float32).reshape(reference.shape[:2])
 
 
 def compare_hits(reference: NDArray[np.int64], test: NDArray[np.int64]) -> HitDifference:

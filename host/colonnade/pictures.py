@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from colonnade.errors import UserError
 from colonnade.files import replacing
+from colonnade.srgb import curved, straightened
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,17 +18,14 @@ def encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Linear colours (any shape, 0.0 to 1.0, saturated) as 8-bit sRGB, rounded to nearest."""
     import numpy as np
 
-    value = np.clip(linear, 0.0, 1.0)
-    curved = np.where(value <= 0.0031308, 12.92 * value, 1.055 * np.power(value, 1 / 2.4) - 0.055)
-    return np.rint(curved * 255.0).astype(np.uint8)
+    return np.rint(curved(linear) * 255.0).astype(np.uint8)
 
 
 def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float64]:
     """8-bit sRGB (any shape) as linear colours, 0.0 to 1.0."""
     import numpy as np
 
-    value = encoded.astype(np.float64) / 255.0
-    return np.where(value <= 0.04045, value / 12.92, np.power((value + 0.055) / 1.055, 2.4))
+    return straightened(encoded.astype(np.float64) / 255.0)
 
 
 def write_png(path: Path, linear: NDArray[np.float64]) -> None:

@@ -1,4 +1,4 @@
-"""``colonnade inspect``: what a scene image holds."""
+"""``colonnade inspect``: what a scene image holds, or what clustering does to a room."""
 
 from __future__ import annotations
 
@@ -9,21 +9,54 @@ import click
 from colonnade.commands.options import FILE, finish, json_option, require_outputs
 
 
-@click.command(short_help="Show what a scene image holds.")
-@click.argument("directory", metavar="DIR", type=FILE)
+@click.command(short_help="Show what a scene image holds, or what clustering does to a room.")
+@click.argument("directory", metavar="DIR", type=FILE, required=False)
 @click.option("--config", metavar="C", help="Hardware that the image is for: a preset, a JSON file, or a precision.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change one field of --config.")
+@click.option("--background", type=FILE, metavar="ROOM", help="A room's folder: cluster its maps and show the loss.")
+@click.option(
+    "--encoding",
+    type=click.Choice(["twoLevel", "slic"]),
+    default="twoLevel",
+    show_default=True,
+    help="How the room's maps are clustered.",
+)
+@click.option(
+    "--output", type=FILE, metavar="FOLDER", help="Write the room's maps as pictures: before, after, difference."
+)
+@click.option("--no-dists", is_flag=True, help="Leave out DISTS, whose weights (64 MB) are fetched at its first use.")
 @json_option
-def inspect(directory: Path, config: str | None, overrides: tuple[str, ...], json_file: Path | None) -> None:
+def inspect(
+    directory: Path | None,
+    config: str | None,
+    overrides: tuple[str, ...],
+    background: Path | None,
+    encoding: str,
+    output: Path | None,
+    no_dists: bool,
+    json_file: Path | None,
+) -> None:
     """Show what a scene image holds: its tree's statistics and the map of its memory.
 
     DIR is the folder that colonnade pack wrote. With --config the image must be one for that hardware, and how full
-    its memories are is shown as well.
+    its memories are is shown as well. With --background instead of DIR a room's maps are clustered, and their bytes
+    and losses are shown.
     """
+    context = click.get_current_context()
     if overrides and config is None:
-        raise click.UsageError("--set changes a configuration: give --config as well", click.get_current_context())
+        raise click.UsageError("--set changes a configuration: give --config as well", context)
+    if (directory is None) == (background is None):
+        raise click.UsageError("name the folder of a scene image, or --background ROOM, one of the two", context)
+    if output is not None and background is None:
+        raise click.UsageError("--output is for the maps of --background", context)
     require_outputs(json_file)
+    if background is not None:
+        _inspect_room(background, encoding, output, not no_dists, json_file)
+    elif directory is not None:
+        _inspect_image(directory, config, overrides, json_file)
 
+
+def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ...], json_file: Path | None) -> None:
     from colonnade import progress
     from colonnade.generator import manifest_for
     from colonnade.image import SceneImage
@@ -33,3 +66,23 @@ def inspect(directory: Path, config: str | None, overrides: tuple[str, ...], jso
     image = SceneImage.load(directory, manifest)
     print_report(image.header, manifest, click.echo)
     finish(describe(image), json_file)
+
+
+def _inspect_room(
+    background: Path, encoding: str, output: Path | None, with_dists: bool, json_file: Path | None
+) -> None:
+    from colonnade.attributes import AttributeLayout, encoded_room
+    from colonnade.attributes.measure import measure, report_lines
+    from colonnade.attributes.pictures import map_pictures, write_pictures
+    from colonnade.room import load_room
+
+    room = load_room(background)
+    for note in room.notes:
+        click.echo(f"colonnade: note: {room.name}: {note}", err=True)
+    image = encoded_room(room, AttributeLayout(room.width, room.height, encoding))
+    report = measure(room, image, with_dists)
+    for line in report_lines(report):
+        click.echo(line)
+    if output is not None:
+        write_pictures(output, map_pictures(room, image))
+    finish(report, json_file)
