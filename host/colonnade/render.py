@@ -64,16 +64,16 @@ def render(
         backend: One of `BACKENDS`.
         size: (width, height); the scene's unless given.
         mesh: Replaces the scene's mesh: a name or a file.
-        background: A room; this version renders objects alone and refuses one.
+        background: A room's folder, in place of the scene's background.
         hits: The hit triangles are wanted: the hardware must be configured to deliver them.
         progress: Shows the steps.
 
     Raises:
         UserError: Something about the input is wrong, or the hardware flagged an error.
     """
-    if background is not None:
-        raise UserError("--background: this version renders the object alone, without a room; leave the option out")
     scene = load_scene(scene_path)
+    if background is not None:
+        scene = scene.with_room(background)
     if mesh is not None:
         scene = scene.with_mesh(mesh)
     width, height = size or (scene.frame.width, scene.frame.height)
@@ -81,6 +81,8 @@ def render(
     check_size((width, height), manifest)
     if backend == "reference":
         return _render_reference(scene, manifest, (width, height), progress)
+    if scene.background.room is not None:
+        raise UserError(f"--backend {backend} renders the object alone, without a room: use --backend reference")
     if hits and backend == "rtl":
         from colonnade.simulate import require_hits
 
@@ -180,9 +182,16 @@ def _render_reference(scene: Scene, manifest: Manifest, size: tuple[int, int], p
 
     begun = time.perf_counter()
     mesh = load_mesh(scene.mesh_source)
-    view = float_placement(scene, mesh.extent, *size)
+    room = backdrop = None
+    if scene.background.room is not None:
+        from colonnade.depth_mesh import full_backdrop
+        from colonnade.room import load_room
+
+        room = load_room(scene.background.room)
+        backdrop = full_backdrop(room)
+    view = float_placement(scene, mesh.extent, *size, mesh.materials, room)
     loaded = time.perf_counter()
-    reference = render_reference(mesh, view, progress)
+    reference = render_reference(mesh, view, progress, backdrop)
     report = {
         "backend": "reference",
         "config": manifest.config,
