@@ -1,8 +1,8 @@
 package colonnade.background
 
 import chisel3._
-import chisel3.util.{Decoupled, Valid}
-import colonnade.config.AttributeLayout
+import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{AlbedoEntry, NormalEntry, ShellEntry}
 
 /** A question or an answer, and the word by which its requester knows it. */
@@ -67,4 +67,43 @@ final class AttributePort(layout: AttributeLayout, tagBits: Int) extends Bundle 
   val normals = new AttributeChannel(new MapPixel(layout), new NormalEntry, tagBits)
   val cells   = new AttributeChannel(new CellQuestion(layout), new CellAnswer(layout), tagBits)
   val planes  = new AttributeChannel(new PlaneQuestion(layout), new ShellEntry, tagBits)
+
+  /** For a port without a requester. */
+  def asksNothing(): Unit = {
+    Seq(albedo, normals, cells, planes).foreach { channel =>
+      channel.question.valid := false.B
+      channel.question.bits  := DontCare
+    }
+  }
+}
+
+object AttributePort {
+
+  /** A render unit's tag is the number of a context. */
+  def tagBits(config: ColonnadeConfig): Int = log2Ceil(config.array.contexts.max(2))
+
+  /** The port of a column, for all of its render units. */
+  def ofColumn(config: ColonnadeConfig): AttributePort =
+    new AttributePort(AttributeLayout.of(config), AttributeArbiter.tagBits(config.array.rows, tagBits(config)))
+}
+
+/** Questions accepted in one cycle; names as in `Counters`. */
+final class AttributeEvents extends Bundle {
+  val albedoReads = Bool()
+  val normalReads = Bool()
+  val cellReads   = Bool()
+  val planeReads  = Bool()
+}
+
+object AttributeEvents {
+
+  /** Those of a port. */
+  def apply(port: AttributePort): AttributeEvents = {
+    val events = Wire(new AttributeEvents)
+    events.albedoReads := port.albedo.question.fire
+    events.normalReads := port.normals.question.fire
+    events.cellReads   := port.cells.question.fire
+    events.planeReads  := port.planes.question.fire
+    events
+  }
 }

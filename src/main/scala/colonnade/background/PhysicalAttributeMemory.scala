@@ -5,14 +5,6 @@ import chisel3.util.Valid
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{AlbedoEntry, Load, NormalEntry}
 
-/** What was read in one cycle. */
-final class AttributeEvents extends Bundle {
-  val albedoReads = Bool()
-  val normalReads = Bool()
-  val cellReads   = Bool()
-  val planeReads  = Bool()
-}
-
 /** Ports of [[PhysicalAttributeMemory]]. */
 final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Bundle {
 
@@ -46,8 +38,5 @@ final class PhysicalAttributeMemory(config: ColonnadeConfig, requesters: Int, ta
   normals.io.load := io.load
   planes.io.load  := io.load
 
-  io.events.albedoReads := albedo.io.pixels.question.fire
-  io.events.normalReads := normals.io.pixels.question.fire
-  io.events.cellReads   := planes.io.cells.question.fire
-  io.events.planeReads  := planes.io.planes.question.fire
+  io.events := AttributeEvents(joined.io.served)
 }

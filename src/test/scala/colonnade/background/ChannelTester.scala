@@ -44,12 +44,17 @@ final class ChannelTester(
     random:   Random
 ) {
   private val toAsk   = mutable.Queue.from(dialogue)
-  private val awaited = mutable.Queue.empty[Exchange]
-  private var offer   = Option.empty[Exchange] // with its tag
+  private val awaited = mutable.Queue.empty[(Exchange, Int)] // with the cycle of the question
+  private var offer   = Option.empty[Exchange]               // with its tag
 
   /** Questions accepted, and answers. */
   var asked    = 0
   var answered = 0
+
+  /** Least cycles from a question accepted to its answer. */
+  var latency = Int.MaxValue
+
+  private var cycle = 0
 
   def isDone: Boolean = answered == dialogue.size
 
@@ -63,7 +68,9 @@ final class ChannelTester(
     if (channel.answer.valid.peekBoolean()) {
       assert(awaited.nonEmpty, s"$name answers without a question")
       answered += 1
-      val (found, expected) = (channel.answer.bits.peekInt(), awaited.dequeue())
+      val found               = channel.answer.bits.peekInt()
+      val (expected, askedAt) = awaited.dequeue()
+      latency = latency.min(cycle - askedAt)
       assert(
         (found & expected.mask) == (expected.answer & expected.mask),
         s"$name: answer $answered is ${found.toString(16)}, not ${expected.answer.toString(16)}"
@@ -71,9 +78,10 @@ final class ChannelTester(
     }
     for (exchange <- offer if channel.question.ready.peekBoolean()) {
       asked += 1
-      awaited += exchange
+      awaited += exchange -> cycle
       offer = None
     }
+    cycle += 1
   }
 
   private def tagged(exchange: Exchange): Exchange = {

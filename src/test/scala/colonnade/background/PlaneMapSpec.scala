@@ -41,6 +41,7 @@ class PlaneMapSpec extends AnyFlatSpec with ChiselScalatestTester {
           val cycles = ChannelTester.run(map.clock, Seq(cells, planes))
           // Three words a cell at most.
           if (offered == 1) assert(cycles <= 3 * 500 + 8)
+          assert((cells.latency, planes.latency) == ((5, 1)))
         }
       }
     }
