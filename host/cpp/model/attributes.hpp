@@ -150,7 +150,7 @@ public:
         else if (memory == "normals.heap" || memory == "normals.labels") normals_.heap().load(words, count, stride);
         else if (memory == "planes.descriptors") ids_.loadDescriptors(by("planeDescriptor"));
         else if (memory == "planes.heap") ids_.heap().load(words, count, stride);
-        else if (memory == "planes.table") loadPlanes(by("plane"));
+        else if (memory == "planes.planes") loadPlanes(by("plane"));
         else if (memory == "planes.shell") loadShell(by("shellEntry"));
         else throw std::invalid_argument("there is no attribute memory '" + memory + "'");
     }

@@ -44,8 +44,8 @@ object ArbitraryConfig {
 
   /** Maps whose bytes are between what their fixed parts need and what pointers reach. */
   private val physicalAttributeMemory = for {
-    width       <- Gen.chooseNum(16, 1000, 640)
-    height      <- Gen.chooseNum(16, 1000, 480)
+    width       <- Gen.chooseNum(64, 1000, 640)
+    height      <- Gen.chooseNum(64, 1000, 480)
     encoding    <- Gen.oneOf(MapEncoding.all)
     tileSize    <- Gen.oneOf(16, 32)
     paletteSize <- Gen.oneOf(16, 64, 256)

@@ -41,8 +41,8 @@ final case class PhysicalAttributeMemoryConfig(
 ) {
   import PhysicalAttributeMemoryConfig._
 
-  Require.within(s"$section.width", width, 16, 4096)
-  Require.within(s"$section.height", height, 16, 4096)
+  Require.within(s"$section.width", width, 64, 4096)
+  Require.within(s"$section.height", height, 64, 4096)
   Require.oneOf(s"$section.tileSize", tileSize, Seq(16, 32))
   Require.oneOf(s"$section.paletteSize", paletteSize, powers)
   Require.oneOf(s"$section.planes", planes, powers)

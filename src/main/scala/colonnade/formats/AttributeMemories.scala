@@ -22,7 +22,7 @@ object AttributeMemories {
       val shapes = map("albedo", layout) ++ map("normals", layout) ++ Seq(
         ("planes.descriptors", layout.tiles, (new PlaneDescriptor).getWidth),
         ("planes.heap", layout.planeHeapWords, AttributeLayout.heapWordBits),
-        ("planes.table", memory.planes, (new Plane).getWidth),
+        ("planes.planes", memory.planes, (new Plane).getWidth),
         ("planes.shell", memory.shellPlanes, (new ShellEntry).getWidth)
       )
       shapes.zip(LoadTarget.firstAttributes until LoadTarget.firstAttributes + shapes.size).map {
