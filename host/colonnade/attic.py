@@ -115,7 +115,14 @@ def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
     room = attic(width, height).room
     folder.mkdir(parents=True, exist_ok=True)
     pose = room.camera_to_world * np.array([-1.0, -1.0, 1.0, 1.0])
-    meta: dict[str, Any] = {"width": width, "height": height, "fx": room.fx, "fy": room.fy, "cx": room.cx, "cy": room.cy}
+    meta: dict[str, Any] = {
+        "width": width,
+        "height": height,
+        "fx": room.fx,
+        "fy": room.fy,
+        "cx": room.cx,
+        "cy": room.cy,
+    }
     meta |= {"cam_to_world": [*pose.tolist(), [0.0, 0.0, 0.0, 1.0]], "albedo_encoding": "srgb"}
     meta |= {"depth_step": DEPTH_STEP, "licence": "CC0: made by colonnade.attic"}
     write_png(folder / "albedo.png", room.albedo)

@@ -75,6 +75,8 @@ class Backdrop:
         room: Its camera and size.
         geometry: Where rays meet it.
         albedo, normals: Its maps, float64 [height, width, 3], as those of `Room`.
+        depth: What it takes for the depth of pixels that are seen directly, metres, float64 [height, width]; None: the
+            room's own.
         shell: Stands in where the geometry does not reach; None: such rays meet the scene's background colour, and
             their pixels are marked.
     """
@@ -83,13 +85,15 @@ class Backdrop:
     geometry: Geometry
     albedo: Floats
     normals: Floats
+    depth: Floats | None = None
     shell: Shell | None = None
 
     def seen(self, u: Floats, v: Floats) -> BackdropPoints:
         """What the camera itself sees at pixels of the maps, float64 [n] each."""
         room, (row, column) = self.room, self._texels(u, v)
         across, along = (u - room.cx) / room.fx, (v - room.cy) / room.fy
-        position = np.stack([across, along, np.ones(len(u))], axis=1) * room.depth[row, column, None]
+        depth = room.depth if self.depth is None else self.depth
+        position = np.stack([across, along, np.ones(len(u))], axis=1) * depth[row, column, None]
         return self._of_texels(position, row, column, np.zeros(len(u), dtype=np.bool_))
 
     def meet(self, origins: Floats, directions: Floats) -> BackdropPoints:

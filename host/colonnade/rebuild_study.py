@@ -4,13 +4,14 @@ The truth knows a ray if it meets the mesh from the front. A known ray is *ok* i
 `NEAR_PIXELS` of the map or `NEAR_METRES` of the point, and *missed* if the rebuild says that it leaves the view or
 gives up. Pictures are of the albedo in sRGB, over known rays; what was missed is black.
 
-`python -m colonnade.rebuild_study ROOM …` prints the figures of `DepthMarch`.
+`python -m colonnade.rebuild_study ROOM …` prints the figures of rooms, marched in 64 bits through the planes of the
+full maps, and through those that the attribute memory holds.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -99,15 +100,13 @@ class _Answers:
         return _found(self.rebuilt)
 
 
-def study(
-    room: Room, rebuild: Rebuild, depth: Callable[[Floats, Floats], Floats] | None = None, seed: int = 1
-) -> RebuildReport:
+def study(room: Room, rebuild: Rebuild, depth: Floats | None = None, seed: int = 1) -> RebuildReport:
     """Measure a rebuild.
 
     Args:
         room: With its depth map.
         rebuild: Where it says that rays meet the room.
-        depth: The rebuilt depth, metres, of pixels (u, v) of the map as the camera sees them; float64 [n] each.
+        depth: What the rebuild takes for the depth of each pixel, metres, float64 [height, width].
         seed: Of the cosine-distributed directions.
     """
     mesh, random = DepthMesh(room), np.random.default_rng(seed)
@@ -139,7 +138,7 @@ def study(
 def _asked(room: Room, mesh: DepthMesh, rebuild: Rebuild, rays: Rays) -> _Answers:
     truth = mesh.meet(rays.origins, rays.directions)
     rebuilt = rebuild(rays.origins, rays.directions)
-    near = np.hypot(rebuilt.u - truth.u, rebuilt.v - truth.v) <= NEAR_PIXELS
+    near = np.hypot(rebuilt.seen_u - truth.u, rebuilt.seen_v - truth.v) <= NEAR_PIXELS
     near |= np.linalg.norm(positions(room, rebuilt) - truth.position, axis=1) <= NEAR_METRES
     return _Answers(rays, truth, np.isnan(truth.u), rebuilt, near & _found(rebuilt) & ~truth.outside)
 
@@ -173,7 +172,7 @@ def _pictures(room: Room, answers: _Answers) -> tuple[NDArray[np.uint8], NDArray
     pictures = []
     for u, v, found in (
         (answers.truth.u, answers.truth.v, known),
-        (answers.rebuilt.u, answers.rebuilt.v, answers.found),
+        (answers.rebuilt.seen_u, answers.rebuilt.seen_v, answers.found),
     ):
         picture = np.full((PICTURE * PICTURE, 3), 128, dtype=np.uint8)
         column = np.clip(np.nan_to_num(u), 0, room.width - 1).astype(np.intp)
@@ -186,11 +185,10 @@ def _pictures(room: Room, answers: _Answers) -> tuple[NDArray[np.uint8], NDArray
     return pictures[0], pictures[1], mask.reshape(PICTURE, PICTURE)
 
 
-def _receiver_errors(room: Room, depth: Callable[[Floats, Floats], Floats]) -> Floats:
+def _receiver_errors(room: Room, depth: Floats) -> Floats:
     """Metres along the camera's rays between each pixel's surface and its rebuilt one, float64 [pixels]."""
-    v, u = (np.mgrid[: room.height, : room.width] + 0.5).reshape(2, -1)
-    length = np.linalg.norm(room.camera.directions(room.width, room.height), axis=2).ravel()
-    return np.asarray(np.abs(depth(u, v) - room.depth.ravel()) * length, dtype=np.float64)
+    length = np.linalg.norm(room.camera.directions(room.width, room.height), axis=2)
+    return np.asarray((np.abs(depth - room.depth) * length).ravel(), dtype=np.float64)
 
 
 def table(reports: dict[str, RebuildReport]) -> str:
@@ -221,13 +219,17 @@ def table(reports: dict[str, RebuildReport]) -> str:
 
 
 def main(folders: list[str]) -> None:
-    """Print the figures of `DepthMarch` in rooms."""
+    """Print the figures of rooms."""
+    from colonnade.attributes import AttributeLayout, encoded_room
+    from colonnade.clustered_room import plane_march, rebuilt_depth
     from colonnade.room import load_room
 
     reports = {}
     for folder in folders:
         room = load_room(Path(folder))
-        reports[room.name] = study(room, DepthMarch(room))
+        image = encoded_room(room, AttributeLayout(width=room.width, height=room.height))
+        reports[f"{room.name}, full maps"] = study(room, DepthMarch(room), room.depth)
+        reports[f"{room.name}, planes"] = study(room, plane_march(room, image), rebuilt_depth(room, image))
     print(table(reports))
 
 

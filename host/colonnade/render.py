@@ -22,6 +22,7 @@ from colonnade.placement import FloatPlacement, float_placement, placement
 from colonnade.progress import QUIET, Progress
 from colonnade.scene import Scene, load_scene
 from colonnade.sizes import check_size
+from colonnade.viewpoint import made_of
 
 BACKENDS = ("rtl", "model", "reference")
 
@@ -90,7 +91,7 @@ def render(
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        image = pack(load_mesh(scene.mesh_source), manifest)
+        image = pack_scene(scene, manifest)
         registers = placement(scene, image.header, manifest, width, height)
     packed = time.perf_counter()
     seconds: dict[str, float | None] = {"pack": packed - begun, "build": None}
@@ -113,8 +114,14 @@ def render(
         seconds["run"] = time.perf_counter() - packed
     require_no_errors(frame)
     report = frame_report(backend, manifest, image.header, frame) | {"seconds": seconds} | report
-    view = float_placement(scene, image.header.extent, width, height)
+    view = float_placement(scene, image.header.extent, width, height, image.header.materials)
     return _result(frame, image, view, manifest, report)
+
+
+def pack_scene(scene: Scene, manifest: Manifest) -> SceneImage:
+    """The scene image of a scene's mesh, made of what the scene says."""
+    mesh = load_mesh(scene.mesh_source)
+    return pack(mesh, manifest, made_of(mesh.materials, scene.material))
 
 
 def require_no_errors(frame: Frame) -> None:
@@ -152,12 +159,12 @@ def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: F
     rays = {
         "primary": counters["raysPrimary"],
         "shadow": counters["raysShadow"],
-        "reflection": 0,
-        "refraction": 0,
+        "reflection": counters["raysReflection"],
+        "refraction": counters["raysRefraction"],
         "in_box": counters["raysInBox"],
     }
     cycles = counters.get("cycles")
-    everything = rays["primary"] + rays["shadow"]
+    everything = sum(count for kind, count in rays.items() if kind != "in_box")
     return {
         "backend": backend,
         "config": manifest.config,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -121,7 +122,7 @@ def float_placement(
         step_x=camera.step_x @ pose.rotation,
         step_y=camera.step_y @ pose.rotation,
         lights=tuple(_placed(light, camera, centre, edge, pose) for light in scene.lights),
-        materials=tuple(_made_of(material, scene.material) for material in materials),
+        materials=made_of(materials, scene.material),
         ambient=np.array(scene.ambient.colour),
         background=np.array(scene.background.colour),
         flat=scene.material.flat,
@@ -133,10 +134,10 @@ def float_placement(
     )
 
 
-def _made_of(own: MeshMaterial, wanted: Material) -> MeshMaterial:
-    """A material of the mesh with what the scene says in its place."""
+def made_of(own: Sequence[MeshMaterial], wanted: Material) -> tuple[MeshMaterial, ...]:
+    """Materials of a mesh with what the scene says in their place."""
     given = {key: value for key in ("kind", "albedo", "ior") if (value := getattr(wanted, key)) is not None}
-    return replace(own, **given)
+    return tuple(replace(material, **given) for material in own)
 
 
 def _placed(light: Light, camera: Camera, centre: Floats, edge: float, pose: Pose) -> PlacedLight:

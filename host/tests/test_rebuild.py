@@ -10,7 +10,7 @@ import pytest
 from colonnade.attic import Attic, attic
 from colonnade.backdrop import Backdrop
 from colonnade.embree import RayTracer
-from colonnade.rebuild import HIT, LEFT, LOST, DepthMarch, Rebuilt, RebuiltGeometry, from_march, positions
+from colonnade.rebuild import HIDDEN, HIT, LEFT, LOST, DepthMarch, Rebuilt, RebuiltGeometry, from_march, positions
 from colonnade.rebuild_rays import RADIUS, cosine_rays, glass_rays, mirror_rays, standing_spheres
 from colonnade.rebuild_study import study, table
 
@@ -58,7 +58,7 @@ def test_the_march_meets_what_the_true_room_has_there(made: Attic) -> None:
     truth = tracer.surface_points(tracer.first_hits(origins, directions), origins, directions).position
     hit = met.kind == HIT
     away = np.linalg.norm(positions(room, met) @ turn.T + world[:, 3] - truth, axis=1)[hit]
-    assert 0.2 < hit.mean() < 0.95 and set(np.unique(met.kind)) <= {HIT, LEFT, LOST}
+    assert 0.2 < hit.mean() < 0.95 and set(np.unique(met.kind)) <= {HIT, HIDDEN, LEFT, LOST}
     assert (away < 0.1).mean() > 0.9
 
 
@@ -68,16 +68,16 @@ def test_the_study_knows_a_good_rebuild_from_a_bad_one(made: Attic) -> None:
 
     def shifted(origins: np.ndarray, directions: np.ndarray) -> Rebuilt:
         met = march(origins, directions)
-        return replace(met, u=met.u + 12, z=met.z * 1.2)
+        return replace(met, seen_u=met.seen_u + 12, z=met.z * 1.2)
 
     def blind(origins: np.ndarray, directions: np.ndarray) -> Rebuilt:
         nothing, count = np.zeros(len(origins)), np.full(len(origins), 3)
-        return Rebuilt(nothing, nothing, nothing + 1, np.full(len(origins), LEFT), count)
+        return Rebuilt(*[nothing] * 2, nothing + 1, *[nothing] * 2, np.full(len(origins), LEFT), count)
 
-    good = study(room, march, lambda u, v: room.depth.ravel())
+    good = study(room, march, room.depth)
     assert good.mirror.ok > 0.85 and good.cosine.ok > 0.85 and good.mirror.missed < 0.1
     assert good.receiver_mean == 0 and good.receiver_p95 == 0
-    bad = study(room, shifted, lambda u, v: room.depth.ravel() + 0.1)
+    bad = study(room, shifted, room.depth + 0.1)
     assert bad.mirror.ok < 0.2 and bad.mirror.missed == good.mirror.missed
     assert bad.mirror_psnr < good.mirror_psnr - 1 and bad.mirror_flip > 2 * good.mirror_flip
     assert bad.receiver_mean is not None and 0.1 <= bad.receiver_mean < 0.15
@@ -93,12 +93,12 @@ def test_a_march_that_returns_arrays_is_a_rebuild_and_a_geometry(made: Attic) ->
     rays = mirror_rays(standing_spheres(room)[0])
     rebuild = from_march(lambda origins, directions: vars(march(origins, directions)))
     met, again = rebuild(rays.origins, rays.directions), march(rays.origins, rays.directions)
-    for name in ("u", "v", "z", "kind", "steps"):
+    for name in ("u", "v", "z", "seen_u", "seen_v", "kind", "steps"):
         np.testing.assert_array_equal(getattr(met, name), getattr(again, name))
     points = Backdrop(room, RebuiltGeometry(room, rebuild), room.albedo, room.normals).meet(
         rays.origins, rays.directions
     )
-    np.testing.assert_array_equal(points.outside, met.kind != HIT)
+    np.testing.assert_array_equal(points.outside, (met.kind != HIT) & (met.kind != HIDDEN))
 
 
 def test_a_start_just_behind_the_surface_is_on_it(made: Attic) -> None:

@@ -83,9 +83,11 @@ object ArbitraryConfig {
     maxWidth  <- Gen.chooseNum(8, 4096)
     maxHeight <- Gen.chooseNum(8, 4096)
     tileSize  <- Gen.oneOf(4, 8, 16, 32)
-    materials <- Gen.chooseNum(1, 256)
-    hits      <- flag
-  } yield FrameConfig(maxWidth, maxHeight, tileSize, materials, hits)
+    materials  <- Gen.chooseNum(1, 256)
+    lights     <- Gen.chooseNum(1, 8)
+    maxBounces <- Gen.chooseNum(0, 15)
+    hits       <- flag
+  } yield FrameConfig(maxWidth, maxHeight, tileSize, materials, lights, maxBounces, hits)
 
   val legal: Gen[ColonnadeConfig] = for {
     array     <- array

@@ -21,7 +21,7 @@ object TestConfigs {
       holdable = false
     ),
     physicalAttributeMemory = None,
-    FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, hits = true)
+    FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, lights = 2, maxBounces = 3, hits = true)
   )
 
   /** Maps of a few tiles, the last ones cut, with a heap for some of them. */

@@ -168,7 +168,8 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     Mux(step < reflects.U, passing, Mux(step === reflects.U, albedoNow, of(throughput))),
     Mux(step === 0.U, tint, Mux(step === 1.U, share, background))
   )
-  private val product = RegNext(left.pad(sumBits) * right.pad(shareBits))
+  private val product = Reg(UInt((sumBits + shareBits).W))
+  product := left * right
   private val part    = Rounding.floor(product, fraction)
   private val colour  = Rounding.saturate(part, colourBits)
   private val total   = Rounding.saturate(of(gathered) +& part, colourBits)

@@ -207,7 +207,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
       Mux(
         control.pushNormal,
         Mux(backSide, total, right),
-        Rounding.floor(shiftedNow, formats.vectorBits - formats.narrowBits)
+        Mux(control.project, normal(0), Rounding.floor(shiftedNow, formats.vectorBits - formats.narrowBits))
       )
     )
   }

@@ -36,5 +36,5 @@ final class TriangleLanes(config: ColonnadeConfig) extends Module {
   }
   io.result :<>= results.io.out
   io.takesNext := VecInit(lanes.map(_.takesNext)).asUInt.orR
-  io.busy := PopCount(lanes.map(_.busy))
+  io.busy      := PopCount(lanes.map(_.busy))
 }

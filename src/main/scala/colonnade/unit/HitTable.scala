@@ -72,7 +72,7 @@ final class HitTable(config: ColonnadeConfig) extends Module {
   }
   when(io.result.valid && isNearer && !io.isShadow) {
     val detail = Wire(new HitDetails(config))
-    detail.weights := hit.weights
+    detail.weights  := hit.weights
     detail.backSide := hit.backSide
     details.write(context, detail)
     ids(context)    := hit.id

@@ -1,7 +1,17 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, PopCount, PriorityEncoder, PriorityEncoderOH, RegEnable, Valid}
+import chisel3.util.{
+  log2Ceil,
+  Decoupled,
+  Mux1H,
+  OHToUInt,
+  PopCount,
+  PriorityEncoder,
+  PriorityEncoderOH,
+  RegEnable,
+  Valid
+}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 import colonnade.ray.Context
@@ -214,7 +224,7 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
       .sortBy { case (_, use) => use }
       .map { case (isChosen, _) => isChosen }
   }
-  private val chosenOnes  = foremost.transpose.map(_.zip(chosenUse).map { case (one, use) => one && use }.reduce(_ || _))
+  private val chosenOnes = foremost.transpose.map(_.zip(chosenUse).map { case (one, use) => one && use }.reduce(_ || _))
   private val chosenPlace = buffers.indices.map { index =>
     wishes.zip(takes).zip(chosenOnes).map { case ((wish, taken), isChosen) =>
       isChosen && Mux(wish.hasRecord, wish.buffer === index.U, PriorityEncoderOH(taken)(index))
@@ -249,5 +259,6 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 object RecordFetch {
 
   /** Uses of records, the most urgent first. */
-  private val precedence: Seq[Int] = Seq(RecordUse.triangles, RecordUse.attributes, RecordUse.node).map(_.litValue.toInt)
+  private val precedence: Seq[Int] =
+    Seq(RecordUse.triangles, RecordUse.attributes, RecordUse.node).map(_.litValue.toInt)
 }

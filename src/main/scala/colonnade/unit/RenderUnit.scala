@@ -5,7 +5,7 @@ import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, RegEnable, V
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
 import colonnade.numbers.Rounding
-import colonnade.ray.{BoxRay, Context, RayGenerator, RayRequest, RaySetup, TriangleRay}
+import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
 import colonnade.shading.{ColourUnit, ShadowRays, Shader}
 import colonnade.traversal.{TriangleLanes, Visit}
 
@@ -33,12 +33,11 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val colourUnit   = Module(new ColourUnit(config))
 
   // What each context remembers, in memories that are read a cycle before
-  private val positions    = ContextTable(config, new PixelPosition(config))
-  private val boxRays      = ContextTable(config, new BoxRay(numbers))
-  private val triangleRays = ContextTable(config, new TriangleRay(numbers))
-  private val entries      = ContextTable(config, UInt(numbers.entryBits.W))
-  private val colours      = ContextTable(config, Rgb(FrameRegisters.colour))
-  private val isObject     = Reg(Vec(contexts, Bool()))
+  private val positions = ContextTable(config, new PixelPosition(config))
+  private val rays      = ContextTable(config, new TracedRay(numbers))
+  private val entries   = ContextTable(config, UInt(numbers.entryBits.W))
+  private val colours   = ContextTable(config, Rgb(FrameRegisters.colour))
+  private val isObject  = Reg(Vec(contexts, Bool()))
 
   // A position takes a free context
   private val position = io.positions.bits
@@ -68,8 +67,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val enters   = setUpRay.fire && setUpRay.bits.enters
   setUpRay.ready := true.B
   when(enters) {
-    boxRays.write(setUpRay.bits.context, setUpRay.bits.boxRay)
-    triangleRays.write(setUpRay.bits.context, setUpRay.bits.triangleRay)
+    rays.write(setUpRay.bits.context, setUpRay.bits.ray)
     entries.write(setUpRay.bits.context, setUpRay.bits.entry.natural)
   }
   hitTable.io.search.valid        := setUpRay.fire
@@ -83,11 +81,11 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   traversal.io.scene := io.registers.scene
   connect(traversal.io.start, enters, setUpRay.bits.context)
   private val (chosen, served) = (recordFetch.io.chosen, recordFetch.io.served)
-  private val triangleRay      = triangleRays.read(chosen.bits, chosen.valid)
+  private val ray              = rays.read(chosen.bits, chosen.valid)
   recordFetch.io.takesNext  := VecInit(traversal.io.takesNext, triangleUnit.io.takesNext, shader.io.takesNext)
   traversal.io.nodes.valid  := isFor(RecordUse.node)
   traversal.io.nodes.bits   := served.bits
-  traversal.io.ray          := boxRays.read(chosen.bits, chosen.valid)
+  traversal.io.ray          := ray.forBoxes
   traversal.io.limits       := hitTable.io.limits
   traversal.io.visits.ready := true.B
   private val next = traversal.io.visits
@@ -99,7 +97,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   triangleUnit.io.candidate.valid        := isFor(RecordUse.triangles)
   triangleUnit.io.candidate.bits.context := served.bits.context
   triangleUnit.io.candidate.bits.record  := formats.asTriangles(served.bits.record)
-  triangleUnit.io.candidate.bits.ray     := triangleRay
+  triangleUnit.io.candidate.bits.ray     := ray.forTriangles
 
   // A result either ends its ray (a shadow ray that is occluded) or lets it go on
   private val tested     = triangleUnit.io.result
@@ -145,7 +143,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val shadedHit = hitTable.io.hit
   shader.io.request.valid        := isFor(RecordUse.attributes)
   shader.io.request.bits.context := served.bits.context
-  shader.io.request.bits.ray     := triangleRay
+  shader.io.request.bits.ray     := ray.forTriangles
   shader.io.request.bits.hit     := shadedHit
   shader.io.request.bits.face    := formats.asAttributes(served.bits.record).faces(shadedHit.id(
     RecordFormats.faceSlotBits - 1,
