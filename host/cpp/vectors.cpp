@@ -17,63 +17,17 @@
 //   records triangleBase attributeBase hexadecimal ...
 //   registers name=value ...
 //   pixel  x y                                            -> colour[3] isObject triangle distance
-#include <algorithm>
-#include <iostream>
+//
+// Rooms: see room_questions.hpp.
 #include <optional>
 #include <sstream>
 
 #include "model/frame.hpp"
+#include "room_questions.hpp"
 
 namespace {
 
 using namespace colonnade;
-
-class Question {
-public:
-    explicit Question(std::istream& words) : words_(words) {}
-    Wide wide() {
-        std::string word;
-        if (!(words_ >> word)) throw std::invalid_argument("a question is too short");
-        const bool isNegative = word[0] == '-';
-        UnsignedWide value = 0;
-        for (std::size_t i = isNegative; i < word.size(); ++i) value = value * 10 + static_cast<unsigned>(word[i] - '0');
-        return isNegative ? -static_cast<Wide>(value) : static_cast<Wide>(value);
-    }
-    std::int64_t number() { return static_cast<std::int64_t>(wide()); }
-    Vector vector() {
-        Vector v;
-        for (auto& component : v) component = number();
-        return v;
-    }
-    WideVector wideVector() {
-        WideVector v;
-        for (auto& component : v) component = wide();
-        return v;
-    }
-
-private:
-    std::istream& words_;
-};
-
-class Answer {
-public:
-    Answer& operator<<(Wide value) {
-        std::string digits;
-        for (UnsignedWide rest = magnitude(value); rest != 0 || digits.empty(); rest /= 10) digits += static_cast<char>('0' + static_cast<int>(rest % 10));
-        if (value < 0) digits += '-';
-        std::reverse(digits.begin(), digits.end());
-        text_ += text_.empty() ? digits : " " + digits;
-        return *this;
-    }
-    template <class Values> Answer& all(const Values& values) {
-        for (const auto value : values) *this << static_cast<Wide>(value);
-        return *this;
-    }
-    void print() const { std::cout << text_ << '\n'; }
-
-private:
-    std::string text_;
-};
 
 void askHeading(Question& ask, Ray& ray) {
     ray.enters = true;
@@ -212,6 +166,8 @@ public:
         }
     }
 
+    const std::map<std::string, Layout>& layouts() const { return layouts_; }
+
     void readRecords(std::istream& words) {
         std::size_t triangleBase, attributeBase, count = 0;
         words >> triangleBase >> attributeBase;
@@ -251,6 +207,7 @@ int main() try {
     first >> kind;
     const Numbers numbers(readNumbers(first));
     Scene scene(numbers);
+    Room room;
     while (std::getline(std::cin, line)) {
         std::istringstream words(line);
         words >> kind;
@@ -264,6 +221,9 @@ int main() try {
         else if (kind == "records") scene.readRecords(words);
         else if (kind == "registers") scene.device().start(readNumbers(words));
         else if (kind == "pixel") answerPixel(ask, scene.device());
+        else if (kind == "sizes") room.begin(readNumbers(words), scene.layouts());
+        else if (kind == "words") room.load(words);
+        else if (room.knows(kind)) room.answer(kind, ask).print();
         else if (kind == "limit") (Answer() << limitUnits(ask.number(), numbers)).print();
         else throw std::invalid_argument("unknown question '" + kind + "'");
     }

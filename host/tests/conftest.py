@@ -59,6 +59,7 @@ def manifest_data(
                 "bvh": bvh,
             },
             "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth},
+            "physicalAttributeMemory": None,
             "frame": {"maxWidth": max_width, "maxHeight": max_height, "materials": 2, "lights": 2, "maxBounces": 4},
         },
         "numbers": numbers,
@@ -66,6 +67,7 @@ def manifest_data(
         "registers": {"dataBits": 32, "fields": _registers(vertex_bits, mac, address, coordinate)},
         "streams": {"pixel": [], "load": []},
         "memories": {"columnBvh": {"depth": depth, "bits": -(-widest // 32) * 32, "banks": 2}},
+        "attributes": None,
         "formatHash": f"{vertex_bits:02x}{box_bits:02x}{mac:02x}{arity}{per_record}{bvh:d}",
         "configHash": "0" * 64,
     }

@@ -116,14 +116,18 @@ final case class FrameConfig(
   val hasBounces: Boolean = maxBounces > 0
 }
 
-/** A whole generator configuration: immutable, checked at construction. */
+/** A whole generator configuration: immutable, checked at construction.
+  *
+  * @param physicalAttributeMemory none: the device knows no room
+  */
 final case class ColonnadeConfig(
-    array:           ArrayConfig,
-    precision:       PrecisionConfig,
-    geometry:        GeometryConfig,
-    units:           UnitsConfig,
-    columnBvhMemory: ColumnBvhMemoryConfig,
-    frame:           FrameConfig
+    array:                   ArrayConfig,
+    precision:               PrecisionConfig,
+    geometry:                GeometryConfig,
+    units:                   UnitsConfig,
+    columnBvhMemory:         ColumnBvhMemoryConfig,
+    physicalAttributeMemory: Option[PhysicalAttributeMemoryConfig],
+    frame:                   FrameConfig
 ) {
   Require.oneOf("units.boxLanes", units.boxLanes, Seq(1, 2, 4).filter(_ <= geometry.arity))
 

@@ -220,8 +220,9 @@ final class Errors extends Bundle {
 }
 
 /** What happened in the last frame. Sums over the array, except where a field says otherwise. */
-final class Counters extends Bundle {
-  private def counter = UInt(Counters.bits.W)
+final class Counters(config: ColonnadeConfig) extends Bundle {
+  private def counter     = UInt(Counters.bits.W)
+  private def roomCounter = config.physicalAttributeMemory.map(_ => counter)
 
   /** From start to the last pixel. */
   val cycles      = counter
@@ -263,6 +264,12 @@ final class Counters extends Bundle {
   val contextsBox       = counter
   val contextsTriangles = counter
   val contextsShading   = counter
+
+  /** Questions that the maps of a room have answered. */
+  val albedoReads = roomCounter
+  val normalReads = roomCounter
+  val cellReads   = roomCounter
+  val planeReads  = roomCounter
 }
 
 object Counters {
@@ -270,10 +277,10 @@ object Counters {
 }
 
 /** What the host reads. */
-final class DeviceStatus extends Bundle {
+final class DeviceStatus(config: ColonnadeConfig) extends Bundle {
   val status   = new Status
   val errors   = new Errors
-  val counters = new Counters
+  val counters = new Counters(config)
 }
 
 final class Control extends Bundle {

@@ -20,7 +20,7 @@ final class RegisterPort(addressBits: Int) extends Bundle {
 final class RegisterFileIO(config: ColonnadeConfig) extends Bundle {
   val register = new RegisterPort(RegisterFile.addressBits(config))
   val frame    = Output(new FrameRegisters(config))
-  val device   = Input(new DeviceStatus)
+  val device   = Input(new DeviceStatus(config))
 
   /** One cycle: a frame begins. */
   val start = Output(Bool())
