@@ -153,7 +153,7 @@ def test_depth_from_normals_of_a_furnished_room(tmp_path: Path) -> None:
     shutil.copytree(ROOMS / "living", folder)
     (folder / "depth.png").unlink()
     truth = load_room(ROOMS / "living").depth
-    assert np.median(np.abs(load_room(folder).depth / truth - 1)) < 0.15
+    assert np.median(np.abs(load_room(folder).depth / truth - 1)) < 0.06
 
 
 def break_file(name: str, content: bytes) -> Callable[[Path], None]:

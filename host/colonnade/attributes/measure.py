@@ -59,7 +59,12 @@ def measure(room: Room, image: AttributeImage, with_dists: bool = True) -> dict[
         "albedo": _pictures(room.albedo, albedo, with_dists),
         "normals": {"mean_degrees": float(degrees.mean()), "p95_degrees": float(np.percentile(degrees, 95))},
         "relit": _pictures(relit(room.albedo, room.normals), relit(albedo, normals), with_dists),
-        "planes": {"mean_cm": float(centimetres.mean()), "p95_cm": float(np.percentile(centimetres, 95))},
+        "planes": {
+            "mean_cm": float(centimetres.mean()),
+            "median_cm": float(np.median(centimetres)),
+            "p95_cm": float(np.percentile(centimetres, 95)),
+            "beyond_5_cm": float(np.mean(centimetres > 5.0)),
+        },
         "depth_unit": image.depth_unit,
         "shell": int(np.count_nonzero(image.planes.shell[:, 0])),
     }
@@ -89,7 +94,9 @@ def report_lines(report: dict[str, Any]) -> Iterable[str]:
         )
     degrees, planes = report["normals"], report["planes"]
     yield f"normals     {degrees['mean_degrees']:.2f} degrees off, {degrees['p95_degrees']:.1f} for 5 % of the pixels"
-    yield f"surfaces    {planes['mean_cm']:.2f} cm off along the view ray, {planes['p95_cm']:.2f} for 5 % of the pixels"
+    yield f"surfaces    {planes['mean_cm']:.2f} cm off along the view ray, median {planes['median_cm']:.2f}," + (
+        f" {planes['p95_cm']:.2f} for 5 % of the pixels; {planes['beyond_5_cm']:.1%} off by 5 cm"
+    )
     yield f"shell       {report['shell']} planes around the room"
 
 
