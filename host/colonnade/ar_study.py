@@ -2,13 +2,12 @@
 
 The truth is the float reference with full maps and the depth map's mesh; see `colonnade.clustered_room.backdrops`.
 
-`python -m colonnade.ar_study ROOM …` prints the losses of three objects in rooms, marched in 64 bits.
+`colonnade study --frames ROOM …` prints the losses of three objects in rooms, marched in 64 bits.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -132,8 +131,10 @@ def _shown(difference: RegionDifference) -> str:
     return f"{difference.psnr:.1f}, {difference.flip:.3f}, {dists}"
 
 
-def main(folders: list[str]) -> None:
-    """Print the losses of `OBJECTS` in rooms."""
+def study_frames(
+    folders: Iterable[Path], with_dists: bool = True, progress: Progress = QUIET
+) -> dict[str, Mapping[str, Regions]]:
+    """The losses of `OBJECTS` in rooms, by room and object, marched in 64 bits."""
     from colonnade.attributes import AttributeLayout, encoded_room
     from colonnade.clustered_room import plane_march
     from colonnade.meshes import load_mesh
@@ -141,17 +142,15 @@ def main(folders: list[str]) -> None:
     from colonnade.viewpoint import float_placement
 
     by_frame = {}
+    meshes = {name: load_mesh(name) for name, _ in OBJECTS.values()}
     for folder in folders:
-        room = load_room(Path(folder))
+        room = load_room(folder)
         image = encoded_room(room, AttributeLayout(width=room.width, height=room.height))
         march = plane_march(room, image)
         for name, (mesh_name, material) in OBJECTS.items():
-            mesh = load_mesh(mesh_name)
+            mesh = meshes[mesh_name]
             scene = standing_scene(mesh_name, material, room, STANDING.get(room.name, Placing()))
             view = float_placement(scene, mesh.extent, room.width, room.height, mesh.materials, room)
-            by_frame[f"{room.name}: {name}"] = losses(mesh, view, room, image, march).by_loss
-    print(table(by_frame))
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+            measured = losses(mesh, view, room, image, march, None, with_dists, progress)
+            by_frame[f"{room.name}: {name}"] = measured.by_loss
+    return by_frame

@@ -16,6 +16,7 @@ from colonnade.commands.inspect import inspect
 from colonnade.commands.pack import pack
 from colonnade.commands.ppa import ppa
 from colonnade.commands.render import render
+from colonnade.commands.study import study
 from colonnade.commands.sweep import sweep
 from colonnade.commands.verify import verify
 from colonnade.errors import UserError
@@ -63,7 +64,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, render, compare, verify, bench, sweep, ppa):
+for command in (generate, pack, inspect, render, compare, study, verify, bench, sweep, ppa):
     cli.add_command(command)
 
 

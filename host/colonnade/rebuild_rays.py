@@ -20,6 +20,8 @@ RADIUS = 0.15
 #: Spheres in a room, and the edge of the picture that is taken of each, pixels.
 SPHERES = 6
 PICTURE = 128
+#: The map shows the surface at a place if its depth is within this share of the place's.
+SUPPORT = 0.02
 #: Index of refraction of the glass.
 IOR = 1.5
 
@@ -39,10 +41,10 @@ class Rays:
 
 
 def standing_spheres(room: Room, count: int = SPHERES, radius: float = RADIUS) -> Floats:
-    """Centres of spheres that stand on level surfaces, whole in the view and touching nothing: float64 [k, 3].
+    """Centres of spheres that stand on level surfaces as wide as themselves, whole in the view, touching nothing.
 
     Of all places on a grid of 8 pixels the first is the one nearest to the camera's axis, each further one the farthest
-    from those before.
+    from those before: float64 [k, 3].
     """
     points = room.points()
     up = room.camera_to_world[1, :3]
@@ -52,7 +54,8 @@ def standing_spheres(room: Room, count: int = SPHERES, radius: float = RADIUS) -
     around = points[::2, ::2].reshape(-1, 3)
     free = [bool((np.linalg.norm(around - centre, axis=1) > radius).all()) for centre in centres]
     centres = centres[np.array(free, dtype=bool)]
-    centres = centres[[_is_seen(room, centre, radius) for centre in centres]] if len(centres) else centres
+    seen = [_is_seen(room, centre, radius) and _is_carried(room, centre, radius) for centre in centres]
+    centres = centres[np.array(seen, dtype=bool)]
     if len(centres) == 0:
         return np.empty((0, 3))
     chosen = [int(np.argmin(np.hypot(centres[:, 0], centres[:, 1]) / centres[:, 2]))]
@@ -70,6 +73,20 @@ def _is_seen(room: Room, centre: Floats, radius: float) -> bool:
         return False
     part = room.depth[int(v - reach) : int(v + reach) + 1, int(u - reach) : int(u + reach) + 1]
     return bool((part > centre[2] - radius).all())
+
+
+def _is_carried(room: Room, centre: Floats, radius: float) -> bool:
+    """Whether the map shows the surface that it stands on a radius to the left, right, front and back."""
+    axes = room.camera_to_world[:, :3].T
+    foot = centre - axes[:, 1] * radius
+    for side in (axes[:, 0], -axes[:, 0], axes[:, 2], -axes[:, 2]):
+        place = foot + radius * side
+        u, v = place[0] / place[2] * room.fx + room.cx, place[1] / place[2] * room.fy + room.cy
+        if not (0 <= u < room.width and 0 <= v < room.height):
+            return False
+        if abs(room.depth[int(v), int(u)] - place[2]) > SUPPORT * place[2]:
+            return False
+    return True
 
 
 def mirror_rays(centre: Floats, radius: float = RADIUS) -> Rays:

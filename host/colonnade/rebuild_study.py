@@ -4,13 +4,12 @@ The truth knows a ray if it meets the mesh from the front. A known ray is *ok* i
 `NEAR_PIXELS` of the map or `NEAR_METRES` of the point, and *missed* if the rebuild says that it leaves the view or
 gives up. Pictures are of the albedo in sRGB, over known rays; what was missed is black.
 
-`python -m colonnade.rebuild_study ROOM …` prints the figures of rooms, marched in 64 bits through the planes of the
-full maps, and through those that the attribute memory holds.
+`colonnade study ROOM …` prints the figures of rooms, marched in 64 bits through the planes of the full maps, and
+through those that the attribute memory holds.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.depth_mesh import DepthMesh
+from colonnade.errors import UserError
 from colonnade.metrics import flip_map, psnr
 from colonnade.pictures import encode_srgb
 from colonnade.rebuild import HIDDEN, HIT, DepthMarch, Rebuild, Rebuilt, positions
@@ -112,7 +112,7 @@ def study(room: Room, rebuild: Rebuild, depth: Floats | None = None, seed: int =
     mesh, random = DepthMesh(room), np.random.default_rng(seed)
     centres = standing_spheres(room)
     if len(centres) == 0:
-        raise ValueError(f"room {room.name} has no level surface on which a sphere could stand in full view")
+        raise UserError(f"room {room.name} has no level surface on which a sphere could stand in full view")
     mirror = [_asked(room, mesh, rebuild, mirror_rays(centre)) for centre in centres]
     cosine = [_asked(room, mesh, rebuild, cosine_rays(centre, COSINE_RAYS, random)) for centre in centres]
     glass = [_asked(room, mesh, rebuild, glass_rays(centre)) for centre in centres]
@@ -218,20 +218,16 @@ def table(reports: dict[str, RebuildReport]) -> str:
     return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
 
 
-def main(folders: list[str]) -> None:
-    """Print the figures of rooms."""
+def study_rooms(folders: Iterable[Path]) -> dict[str, RebuildReport]:
+    """The figures of rooms, by name and planes: those of the full maps, and those of the attribute memory."""
     from colonnade.attributes import AttributeLayout, encoded_room
     from colonnade.clustered_room import plane_march, rebuilt_depth
     from colonnade.room import load_room
 
     reports = {}
     for folder in folders:
-        room = load_room(Path(folder))
+        room = load_room(folder)
         image = encoded_room(room, AttributeLayout(width=room.width, height=room.height))
         reports[f"{room.name}, full maps"] = study(room, DepthMarch(room), room.depth)
         reports[f"{room.name}, planes"] = study(room, plane_march(room, image), rebuilt_depth(room, image))
-    print(table(reports))
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+    return reports

@@ -18,7 +18,7 @@ from colonnade.cli import cli
 from colonnade.sizes import parse_size
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-COMMANDS = ("generate", "pack", "inspect", "render", "compare", "verify", "bench", "sweep", "ppa")
+COMMANDS = ("generate", "pack", "inspect", "render", "compare", "study", "verify", "bench", "sweep", "ppa")
 
 
 def run(*arguments: object) -> Result:
