@@ -126,6 +126,19 @@ class Register:
 
 
 @dataclass(frozen=True)
+class AttributeFormats:
+    """What the physical-attribute memory's words hold.
+
+    Attributes:
+        sizes: Of the maps, by name.
+        layouts: Of the words, by kind.
+    """
+
+    sizes: Mapping[str, int]
+    layouts: Mapping[str, RecordLayout]
+
+
+@dataclass(frozen=True)
 class Manifest:
     """One generated design as the host sees it."""
 
@@ -136,6 +149,7 @@ class Manifest:
     registers: Mapping[str, Register]
     streams: Mapping[str, RecordLayout]
     memories: Mapping[str, Mapping[str, Any]]
+    attributes: AttributeFormats | None
     format_hash: str
     config_hash: str
 
@@ -171,6 +185,7 @@ class Manifest:
             registers={r["name"]: _register(r) for r in data["registers"]["fields"]},
             streams={name: _layout(name, fields, None) for name, fields in data["streams"].items()},
             memories=data["memories"],
+            attributes=_attributes(data["attributes"]),
             format_hash=data["formatHash"],
             config_hash=data["configHash"],
         )
@@ -183,6 +198,13 @@ def _layout(name: str, fields: list[Mapping[str, Any]], bits: int | None) -> Rec
     }
     used = max((field.offset + field.width for field in parsed.values()), default=0)
     return RecordLayout(name, bits if bits is not None else -(-used // 32) * 32, parsed)
+
+
+def _attributes(data: Mapping[str, Any] | None) -> AttributeFormats | None:
+    if data is None:
+        return None
+    sizes = {name: int(value) for name, value in data["sizes"].items()}
+    return AttributeFormats(sizes, {name: _layout(name, fields, None) for name, fields in data["layouts"].items()})
 
 
 def _register(data: Mapping[str, Any]) -> Register:

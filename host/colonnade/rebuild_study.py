@@ -10,6 +10,7 @@ through those that the attribute memory holds.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -219,15 +220,21 @@ def table(reports: dict[str, RebuildReport]) -> str:
 
 
 def study_rooms(folders: Iterable[Path]) -> dict[str, RebuildReport]:
-    """The figures of rooms, by name and planes: those of the full maps, and those of the attribute memory."""
+    """The figures of rooms, by name and march: through the full maps, through the attribute memory's planes in 64 bits,
+    and the device's own march through them."""
     from colonnade.attributes import AttributeLayout, encoded_room
     from colonnade.clustered_room import plane_march, rebuilt_depth
+    from colonnade.generator import manifest_for
     from colonnade.room import load_room
+    from colonnade.room_march import DeviceMarch
 
     reports = {}
     for folder in folders:
         room = load_room(folder)
-        image = encoded_room(room, AttributeLayout(width=room.width, height=room.height))
+        layout = AttributeLayout(width=room.width, height=room.height)
+        image = encoded_room(room, layout)
+        manifest = manifest_for("small", (f"physicalAttributeMemory={json.dumps(layout.to_config())}",)).manifest
         reports[f"{room.name}, full maps"] = study(room, DepthMarch(room), room.depth)
         reports[f"{room.name}, planes"] = study(room, plane_march(room, image), rebuilt_depth(room, image))
+        reports[f"{room.name}, device"] = study(room, DeviceMarch(room, image, manifest), rebuilt_depth(room, image))
     return reports

@@ -15,7 +15,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from colonnade.errors import UserError
 
@@ -88,6 +89,13 @@ class AttributeLayout:
                 f"background layout: {name} is {available:,}, but {self.width}x{self.height} pixels in tiles of"
                 f" {self.tile_size} need {-(-needed_bits // 8):,} at least: raise it, or take larger tiles"
             )
+
+    def to_config(self) -> dict[str, Any]:
+        """The section ``physicalAttributeMemory`` of a configuration with these sizes."""
+        names = {"tile_size": "tileSize", "palette_size": "paletteSize", "map_bytes": "mapBytes"}
+        names |= {"plane_bytes": "planeBytes", "shell_planes": "shellPlanes"}
+        sizes = {names.get(name, name): value for name, value in asdict(self).items() if name != "field_bits"}
+        return {**sizes, "shared": False}
 
     @property
     def tile_columns(self) -> int:

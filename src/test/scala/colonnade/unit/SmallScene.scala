@@ -112,11 +112,11 @@ final class SmallScene(
     )
   }
 
-  /** Diffuse, mirror and glass by turns. */
+  /** Every second one is a mirror or glass. */
   private def glossy(material: Int): Map[String, BigInt] = {
     val one = BigInt(1) << NumberFormats.etaFraction
     Map[String, BigInt](
-      "kind"        -> (material + seed) % 3,
+      "kind"        -> (if (material % 2 == 0) 0 else 1 + seed % 2),
       "etaFront"    -> one * 2 / 3,
       "etaBack"     -> one * 3 / 2,
       "reflectance" -> 164
