@@ -15,7 +15,7 @@ from colonnade.errors import UserError
 from colonnade.ppa import liberty, measure, memories, opensta
 from colonnade.ppa.cells import Library, Table
 from colonnade.ppa.guard import differences, gates_of_tiny
-from colonnade.ppa.hierarchy import BORDERS, Hierarchy
+from colonnade.ppa.hierarchy import BORDERS, Hierarchy, Memory
 from colonnade.ppa.netlist import Netlist
 from colonnade.ppa.page import page
 from colonnade.ppa.timing import Analysis
@@ -154,6 +154,14 @@ def test_units_are_where_synthesis_stops(tmp_path: Path) -> None:
     assert hierarchy.header("Queue") == "module Queue(\n  input clock\n);\nendmodule\n"
     (memory,) = hierarchy.memories()
     assert (memory.level, memory.unit, memory.count, memory.bits) == ("column", "rest of Column", 1, 32)
+
+
+def test_a_dozen_words_cost_more_a_bit_than_a_macro() -> None:
+    small, large = (Memory("m", "render_unit", "contexts", 2, depth, 10, "write,read") for depth in (12, 576))
+    assert memories.area_um2(small) == pytest.approx(2 * 120 * 1.0)
+    assert memories.area_um2(large) == pytest.approx(2 * 5760 * 0.19)
+    assert memories.described(small)["kge"] == pytest.approx(240 / 0.49 / 1e3)
+    assert memories.area_mm2(1.0, 510.0) == pytest.approx(1e-3)
 
 
 def test_the_chip_has_141_thousand_gates_a_unit() -> None:

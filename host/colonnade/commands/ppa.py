@@ -40,7 +40,7 @@ def ppa(
     """Synthesise every unit of a configuration on its own, with Yosys, and add them up.
 
     A render unit, a column and the array are composed: the hierarchy is kept at the units. Memories are black boxes,
-    added by an area per bit; contexts are flip-flops and count as such. Without --liberty gates are Yosys's own and
+    added by an area per bit; queues are flip-flops and count as such. Without --liberty gates are Yosys's own and
     nothing has a delay. Units are kept by content: a second run takes seconds.
     """
     require_outputs(json_file)

@@ -144,23 +144,25 @@ def _is_timed(unit: Mapping[str, Any]) -> bool:
 def _levels(units: Mapping[str, Mapping[str, Any]], rows: int, columns: int, boxes: Sequence[Memory]) -> dict[str, Any]:
     """Gates and memory bits of one render unit, one column, the array; each holds those below it."""
     levels: dict[str, Any] = {}
-    below, bits_below, area_below = 0.0, 0, 0.0
+    below, bits_below, area_below, memory_below = 0.0, 0, 0.0, 0.0
     for level, copies in zip(LEVELS, (0, rows, columns), strict=True):
         own = [unit for unit in units.values() if unit["level"] == level.name]
         logic = sum(unit["kge"] for unit in own) + copies * below
-        bits = sum(memory.bits * memory.count for memory in boxes if memory.level == level.name) + copies * bits_below
+        held = [memory for memory in boxes if memory.level == level.name]
+        bits = sum(memory.bits * memory.count for memory in held) + copies * bits_below
+        memory_um2 = sum(memories.area_um2(memory) for memory in held) + copies * memory_below
         um2 = sum(unit["um2"] or 0.0 for unit in own) + copies * area_below
         levels[level.name] = {
             "of_the_level_below": copies,
             "logic_kge": logic,
             "memory_bits": bits,
-            "memory_kge": memories.equivalent_kge(bits),
-            "kge": logic + memories.equivalent_kge(bits),
+            "memory_kge": memories.equivalent_kge(memory_um2),
+            "kge": logic + memories.equivalent_kge(memory_um2),
             "logic_um2": um2 or None,
-            "mm2_28nm": memories.area_mm2(logic, bits),
+            "mm2_28nm": memories.area_mm2(logic, memory_um2),
             "logic_mm2_28nm": memories.area_mm2(logic, 0),
         }
-        below, bits_below, area_below = logic, bits, um2
+        below, bits_below, area_below, memory_below = logic, bits, um2, memory_um2
     return levels
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from colonnade.ppa.hierarchy import LEVELS
-from colonnade.ppa.memories import CHIP_NODE, SRAM
+from colonnade.ppa.memories import CHIP_NODE, LEAST_SRAM_WORDS, REGISTER_FILE, SRAM, Rate
 from colonnade.tables import Column, Table
 
 #: What the hardware's rule allows between two registers.
@@ -119,4 +119,8 @@ def _per_node(memory: Mapping[str, Any], key: str, form: str) -> str:
 
 
 def _rates() -> str:
-    return "; ".join(f"{sram.um2_per_bit} µm² and {sram.pj_per_bit} pJ a bit at {node}" for node, sram in SRAM.items())
+    def of(rates: Mapping[str, Rate]) -> str:
+        each = (f"{rate.um2_per_bit} µm² and {rate.pj_per_bit} pJ a bit at {node}" for node, rate in rates.items())
+        return "; ".join(each)
+
+    return f"SRAM {of(SRAM)}, or below {LEAST_SRAM_WORDS} words register files {of(REGISTER_FILE)}"

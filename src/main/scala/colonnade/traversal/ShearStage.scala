@@ -38,7 +38,7 @@ final class ShearStageIO(config: ColonnadeConfig) extends Bundle {
 /** Vertices relative to the ray: translated to its origin, in its frame, sheared along it; numbers.md 4.1, 4.2.
   *
   * A vertex a cycle in phases 0 to 2: select and subtract, multiply, round and subtract. The two multipliers are lent
-  * in phase 0 and while phase 1 repeats, when no product of the shear is waiting behind them.
+  * in phase 0 and while phase 1 pauses, when no product of the shear is waiting behind them.
   */
 final class ShearStage(config: ColonnadeConfig) extends Module {
   val io = IO(new ShearStageIO(config))
@@ -63,7 +63,7 @@ final class ShearStage(config: ColonnadeConfig) extends Module {
   private val depth      = RegEnable(grid(minuend -& subtrahend), advances)
 
   // Multiply, for the shear or for somebody else
-  private val isLent = schedule.is(0) || !advances
+  private val isLent = schedule.is(0) || schedule.pauses
   io.weighing.ready := isLent
   private val products = Seq(0, 1).map { a =>
     val factor  = Mux(isLent, io.weighing.bits.weights(a).zext.pad(numbers.gridBits), io.ray.shear(a).integer)

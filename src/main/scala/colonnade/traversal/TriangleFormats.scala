@@ -67,6 +67,9 @@ final class TriangleSchedule extends Bundle {
   val phase    = UInt(2.W)
   val advances = Bool()
 
+  /** Phase 1 waits, in this cycle for the sake of whoever wants the shear's multipliers. */
+  val pauses = Bool()
+
   def is(number: Int): Bool = phase === number.U
 }
 

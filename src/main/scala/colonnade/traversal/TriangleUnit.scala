@@ -37,7 +37,8 @@ final private class TriangleTurn(config: ColonnadeConfig) extends Bundle {
   * }}}
   *
   * Sequencer, shear and edges keep step with the schedule. Only its phase 1 can wait, when a triangle's edges are
-  * known and nobody can take them; that is also when the shear's multipliers are free, so those ahead always move on.
+  * known and nobody can take them; the shear's multipliers are then lent in every second cycle, so those ahead always
+  * move on.
   *
   * A record with `count` 0 gives one miss, its last. A triangle in a plane through the ray misses.
   *
@@ -59,7 +60,10 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, turns:
   private val schedule = Wire(new TriangleSchedule)
   private val phase    = RegInit(0.U(2.W))
   when(schedule.advances) { phase := phase + 1.U }
+  private val pauses = RegInit(false.B)
+  pauses                := schedule.is(1) && !schedule.advances && !pauses
   schedule.phase        := phase
+  schedule.pauses       := pauses
   sequencer.io.schedule := schedule
   shear.io.schedule     := schedule
   edges.io.schedule     := schedule
@@ -80,8 +84,8 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, turns:
   // Phase 1: the edges decide
   private val isCrossed = edges.io.isCrossed && !tested.bits.isAbsent
   private val isTaken   = order.io.enq.ready && (!isCrossed || weights.io.crossed.ready)
-  private val decides   = schedule.is(1) && tested.valid
-  schedule.advances := !decides || isTaken
+  private val decides   = schedule.is(1) && tested.valid && !pauses
+  schedule.advances := !pauses && (!decides || isTaken)
 
   order.io.enq.valid          := decides && isTaken
   order.io.enq.bits.context   := tested.bits.context
