@@ -170,7 +170,9 @@ def _script(hierarchy: Hierarchy, top: str, own: list[str], ends: list[str], int
         large = " ".join(f"-dont_use {name}" for name in LARGE_REGISTERS)
         target = f"-D {1000 * (into.delay or 0):.0f} -constr constraints"
         sizing = ";buffer,-c;topo;upsize,{D};dnsize,{D};stime,-p"
-        script += [f"dfflibmap {large} {cells}", "opt", f"abc -script {recipe}{sizing} {cells} {target}"]
+        # A register keeps its name though its output may vanish behind an inverter
+        script += ["splitnets", "rename -wire -suffix _register t:$_*DFF*", f"dfflibmap {large} {cells}", "opt"]
+        script += [f"abc -script {recipe}{sizing} {cells} {target}"]
     return [*script, "setundef -zero", "splitnets", "opt_clean -purge"]
 
 
