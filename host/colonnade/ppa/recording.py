@@ -33,8 +33,10 @@ CLOCK, RESET, START, ROW = "clock", "reset", "io_start", "io_row"
 CHOSEN_ROW = 0
 
 _RECORDER = """
-module ColonnadeRecorder(input clock, input start, input [{inputs}:0] inputs, input [{outputs}:0] outputs);
-  integer file, limit, unused, left;
+module ColonnadeRecorder(
+  input clock, input reset, input start, input [{inputs}:0] inputs, input [{outputs}:0] outputs
+);
+  integer file, limit, unused, left, rested;
   initial begin
     left = 0;
     file = $fopen("limit", "r");
@@ -43,13 +45,15 @@ module ColonnadeRecorder(input clock, input start, input [{inputs}:0] inputs, in
     file = $fopen("recording", "w");
   end
   always @(posedge clock) begin
+    rested <= reset ? 0 : rested + 1;
+    if (start) $fwrite(file, "%0d\\n", rested);
     if (start || left != 0) $fwrite(file, "%h %h\\n", inputs, outputs);
     if (start) left <= limit - 1;
     else if (left != 0) left <= left - 1;
   end
 endmodule
 bind {module} ColonnadeRecorder recorder(
-  .clock({clock}), .start({start}{chosen}), .inputs({{{input_names}}}), .outputs({{{output_names}}})
+  .clock({clock}), .reset({reset}), .start({start}{chosen}), .inputs({{{input_names}}}), .outputs({{{output_names}}})
 );
 """
 
@@ -70,6 +74,7 @@ class Recording:
         inputs: its inputs but the clock, as they are joined: the first is the most significant.
         outputs: the same of its outputs.
         cycles: the joined inputs and outputs of each cycle.
+        rested: cycles between reset and the first of these.
         scene: what was rendered, in a report.
         counters: of the whole frame.
     """
@@ -77,24 +82,25 @@ class Recording:
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     cycles: tuple[tuple[int, int], ...]
+    rested: int
     scene: Mapping[str, Any]
     counters: Mapping[str, int]
 
-    def of(self, name: str, begin: int = 0) -> list[int]:
-        """The values of one port from the cycle `begin` on."""
+    def of(self, name: str) -> list[int]:
+        """The values of one port."""
         for index, ports in enumerate((self.inputs, self.outputs)):
             shift = sum(port.bits for port in ports)
             for port in ports:
                 shift -= port.bits
                 if port.name == name:
                     mask = (1 << port.bits) - 1
-                    return [cycle[index] >> shift & mask for cycle in self.cycles[begin:]]
+                    return [cycle[index] >> shift & mask for cycle in self.cycles]
         raise RuntimeError(f"the recorded module has no port {name}: the power of a ray cannot be told")
 
-    def handshakes(self, stream: str, begin: int = 0) -> int:
-        """How often the stream `stream` passed something on."""
-        pairs = zip(self.of(f"{stream}_valid", begin), self.of(f"{stream}_ready", begin), strict=True)
-        return sum(valid & ready for valid, ready in pairs)
+    def fires(self, stream: str) -> list[bool]:
+        """Whether the stream `stream` passes something on, in each cycle."""
+        pairs = zip(self.of(f"{stream}_valid"), self.of(f"{stream}_ready"), strict=True)
+        return [bool(valid and ready) for valid, ready in pairs]
 
 
 @dataclass(frozen=True)
@@ -161,9 +167,9 @@ def record(
     values = (line.split() for line in done.stdout.splitlines() if line.startswith("value "))
     read = {name: int(value) for _, name, value in values}
     counters = {name.removeprefix("counters."): value for name, value in read.items() if name.startswith("counters.")}
-    cycles = tuple((int(line.split()[0], 16), int(line.split()[1], 16)) for line in lines if line)
+    cycles = tuple((int(line.split()[0], 16), int(line.split()[1], 16)) for line in lines[1:] if line)
     facts = {"mesh": stimulus.mesh, "triangles": len(mesh.faces), "size": list(stimulus.size)}
-    return Recording(joined["input"], joined["output"], cycles, facts, counters)
+    return Recording(joined["input"], joined["output"], cycles, int(lines[0]), facts, counters)
 
 
 def _with_recorder(
@@ -174,6 +180,7 @@ def _with_recorder(
     text = _RECORDER.format(
         module=module,
         clock=CLOCK,
+        reset=RESET,
         start=START,
         chosen=f" && {ROW} == {CHOSEN_ROW}" if ROW in names else "",
         inputs=sum(port.bits for port in inputs) - 1,

@@ -7,6 +7,7 @@ from typing import Any
 
 from colonnade.ppa.hierarchy import LEVELS
 from colonnade.ppa.memories import CHIP_NODE, SRAM
+from colonnade.ppa.power_text import power_lines
 from colonnade.tables import Column, Table
 
 #: What the hardware's rule allows between two registers.
@@ -53,6 +54,9 @@ class UnitTable:
             (paths.get("register_to_register") or {}).get("ns"),
             *fo4,
         )
+        for part, facts in unit["parts"].items():
+            row = (facts["kge"], None, None, facts["flops"], facts["um2"], *[None] * 5)
+            self._table.print("", f" {facts['count']} × {part}", *row)
 
 
 PATHS = ("register_to_register", "input_to_register", "register_to_output", "input_to_output")
@@ -93,6 +97,8 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"slowest path of a render unit, across its units: {_path(whole['register_to_register'])}"
     if report["opensta"]:
         yield f"OpenSTA, on PATH, as a second opinion on these paths: {second_opinion(report['opensta'])}"
+    if report["power"]:
+        yield from power_lines(report)
     yield ""
     yield f"kGE: {used['gates']}. Memories: {_rates()}; in kGE as area of {CHIP_NODE}."
     if used["liberty"]:
