@@ -99,19 +99,24 @@ def load(paths: Sequence[Path]) -> Library:
 
 @dataclass
 class Group:
+    """A group: its name and arguments, its attributes by name, simple and complex, and the groups in it."""
+
     name: str
     arguments: list[str]
     values: dict[str, list[str]] = field(default_factory=dict)
     groups: list[Group] = field(default_factory=list)
 
     def of(self, *names: str) -> Iterator[Group]:
+        """The groups in it that have one of these names."""
         return (group for group in self.groups if group.name in names)
 
     def text(self, name: str, default: str = "") -> str:
+        """A simple attribute."""
         return self.values.get(name, [default])[0].strip('"').strip()
 
 
 def tokens(text: str) -> Iterator[str]:
+    """The words of a liberty, without comments."""
     return (token[1] for token in _TOKEN.finditer(text) if token[1] is not None)
 
 
@@ -165,6 +170,7 @@ class Reader:
         self._templates = {template.arguments[0]: template for template in library.of(*kinds)}
 
     def cells(self) -> Iterator[tuple[str, Cell]]:
+        """All cells that may be used, with their names."""
         for group in self._library.of("cell"):
             name = group.arguments[0].strip('"')
             if group.text("dont_use") == "true":

@@ -84,9 +84,7 @@ class Netlist:
             return
 
         def rooted(ports: Mapping[str, list[Bit]]) -> dict[str, list[Bit]]:
-            return {
-                port: [bit if isinstance(bit, bool) else root(bit) for bit in bits] for port, bits in ports.items()
-            }
+            return {port: [bit if isinstance(bit, bool) else root(bit) for bit in bits] for port, bits in ports.items()}
 
         self.instances = [
             replace(each, nets={pin: root(net) for pin, net in each.nets.items()}) for each in self.instances

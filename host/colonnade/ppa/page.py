@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,8 @@ from colonnade.bench import geometric_mean
 from colonnade.files import replacing
 from colonnade.performance_page import markdown
 from colonnade.ppa.hierarchy import LEVELS
-from colonnade.ppa.text import MOST_FO4, TITLES, second_opinion
-
-#: The files of a precision, and what their columns are called.
-LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
+from colonnade.ppa.power_page import power_table, unit_power_table
+from colonnade.ppa.text import LIBRARIES, MOST_FO4, TITLES, second_opinion
 
 Data = Mapping[str, Any]
 
@@ -38,9 +36,11 @@ def page(text: str, data: Path) -> str:
         if precision:
             reports = _reports(data, precision)
             of_precision = {"units": units, "totals": totals, "tables": tables, "paths": paths}
+            of_precision |= {"power": power_table, "unitpower": unit_power_table}
             body = of_precision[kind](reports) if reports else ""
         else:
-            body = {"bvh": bvh, "nodes": nodes, "ecp5": ecp5, "libraries": libraries}[kind](data)
+            of_all = {"bvh": bvh, "nodes": nodes, "gain": gain, "ecp5": ecp5, "libraries": libraries}
+            body = of_all[kind](data)
         return f"{match[1]}{body or 'Not measured: run `tools/ppa`.'}\n{match[3]}"
 
     return _TABLE.sub(replaced, text)
@@ -62,7 +62,18 @@ def units(reports: Mapping[str, Data]) -> str:
                 row = [name, *(f"{each['kge']:.1f}" for each in same), f"{100 * unit['share']:.1f} %"]
                 row += [f"{unit['flops']:,}", *(f"{each['um2']:,.0f}" for each in of_timed)]
                 rows.append([*row, *(_fo4(each["paths"]["register_to_register"]) for each in of_timed)])
+                rows += _parts(unit, same, of_timed)
     return markdown(titles, rows)
+
+
+def _parts(unit: Data, same: Sequence[Data], of_timed: Sequence[Data]) -> list[list[str]]:
+    """Rows of what a unit is in part: its dividers and square roots, all of a kind together."""
+    rows = []
+    for part, facts in unit.get("parts", {}).items():
+        row = [f"– {facts['count']} × {part}", *(f"{each['parts'][part]['kge']:.1f}" for each in same), ""]
+        row += [f"{facts['flops']:,}", *(f"{each['parts'][part]['um2']:,.0f}" for each in of_timed)]
+        rows.append([*row, *[""] * len(of_timed)])
+    return rows
 
 
 def totals(reports: Mapping[str, Data]) -> str:
@@ -165,6 +176,26 @@ def nodes(data: Path) -> str:
     row = ["geometric mean", *[""] * 6, f"{geometric_mean(overheads) - 1:+.1%}"]
     titles = ["mesh", "triangles", "nodes", "triangle records", "attribute records", "without a tree, all"]
     return markdown([*titles, "nodes alone", "overhead"], [*rows, row])
+
+
+def gain(data: Path) -> str:
+    """What the acceleration structure saves in cycles."""
+    file = data / "ppa-gain.json"
+    if not file.is_file():
+        return ""
+    report = json.loads(file.read_text())
+    rows = []
+    for name, mesh in report["meshes"].items():
+        cycles = mesh["cycles"]
+        row = [name, f"{mesh['triangles']:,}", f"{mesh['rays_in_box']:,}", f"{cycles['tree']:,}", f"{cycles['none']:,}"]
+        rows.append([*row, f"{mesh['gain']:.1f}"])
+    rows.append(["geometric mean", *[""] * 4, f"{report['geomean_gain']:.1f}"])
+    rows.append(["the paper", *[""] * 4, f"{report['paper_gain']}"])
+    width, height = report["size"]
+    array = report["config"]["array"]
+    head = f"{array['rows']}×{array['columns']} render units, {width}×{height}."
+    titles = ["mesh, reduced", "triangles", "rays in box", "cycles with a tree", "without", "times fewer"]
+    return f"{head}\n\n{markdown(titles, rows)}"
 
 
 def ecp5(data: Path) -> str:

@@ -48,7 +48,11 @@ def power_of(
         cycles: how many.
         megahertz: the clock.
     """
-    clock, dynamic, leakage = defaultdict[str, float](float), defaultdict[str, float](float), defaultdict[str, float](float)
+    clock, dynamic, leakage = (
+        defaultdict[str, float](float),
+        defaultdict[str, float](float),
+        defaultdict[str, float](float),
+    )
     half = energies.voltage**2 / 2
     for instance in netlist.instances:
         energy, owner = energies.cells[instance.cell.name], instance.owner
@@ -77,5 +81,3 @@ def _slew(instance: Instance, timing: NetTiming) -> float:
         return timing.slews[instance.nets[state.clock]]
     slews = [timing.slews[net] for pin, net in instance.nets.items() if instance.cell.pins[pin].direction == "input"]
     return sum(slews) / len(slews) if slews else 0.0
-
-

@@ -82,11 +82,12 @@ def measure_power(
         of_unit, kinds = _memories(netlist, hierarchy, recording, activity, begin, design, megahertz)
         rays = _rays(recording, begin)
         scale = node_scale(into.library.nand2.area, cells.voltage)
-        totals, units = {}, dict[str, dict[str, float]]()
+        totals, units = dict[str, dict[str, Any]](), dict[str, dict[str, float]]()
         for name, changes in (("zero_delay", activity.settled), ("glitch_aware", activity.changes)):
             found = _by_unit(power_of(netlist, cells, timing, changes, activity.cycles, megahertz))
             total = _total(found.values(), sum(kinds.values()))
-            totals[name] = total | {
+            totals[name] = {
+                **total,
                 **_energies(total["total_mw"], rays, activity.cycles, megahertz),
                 "at_28nm": _scaled(total, scale, rays, activity.cycles, megahertz),
             }

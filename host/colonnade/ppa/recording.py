@@ -159,7 +159,12 @@ def record(
         job, _ = write_job(folder, design.manifest, image, [registers])
         with progress.step("recording a frame"):
             done = subprocess.run(
-                [str(program), str(job)], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+                [str(program), str(job)],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                check=False,
             )
         if done.returncode != 0:
             raise RuntimeError(f"the simulated hardware failed (status {done.returncode}): {done.stderr[-300:]}")

@@ -13,6 +13,9 @@ from colonnade.tables import Column, Table
 #: What the hardware's rule allows between two registers.
 MOST_FO4 = 100
 
+#: The files of a precision in the page's data, and what their columns are called.
+LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
+
 TITLES = {"render_unit": "render unit", "column": "column", "array": "array"}
 
 
