@@ -53,8 +53,8 @@ BORDERS = frozenset({*RENDER_UNIT, *COLUMN, *DEVICE, "RenderUnit", "Column"})
 
 
 @dataclass(frozen=True)
-class Memory:
-    """A memory that is a black box: how many, where, and its shape."""
+class Storage:
+    """Words of a module: in which unit of which level, how many of the module there, and its shape."""
 
     name: str
     level: str
@@ -62,6 +62,12 @@ class Memory:
     count: int
     depth: int
     width: int
+
+
+@dataclass(frozen=True)
+class Memory(Storage):
+    """A memory that is a black box."""
+
     ports: str
 
     @property
@@ -71,15 +77,8 @@ class Memory:
 
 
 @dataclass(frozen=True)
-class FlopTable:
+class FlopTable(Storage):
     """A memory with combinational reads: it is synthesised, as flip-flops and multiplexers."""
-
-    name: str
-    level: str
-    unit: str
-    count: int
-    depth: int
-    width: int
 
     @property
     def bits(self) -> int:

@@ -13,12 +13,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from colonnade.bench import geometric_mean
 from colonnade.files import replacing
 from colonnade.performance_page import markdown
 from colonnade.ppa.hierarchy import LEVELS
 from colonnade.ppa.power_page import power_table, unit_power_table
 from colonnade.ppa.text import LIBRARIES, MOST_FO4, TITLES, second_opinion
+from colonnade.ppa.tree_page import bvh, gain, nodes
 
 Data = Mapping[str, Any]
 
@@ -140,62 +140,6 @@ def paths(reports: Mapping[str, Data]) -> str:
     verdict += f"Units above {MOST_FO4} FO4: {', '.join(above) or 'none'}."
     titles = ["slowest path", "library", "ns", "FO4", "from", "to", "gates"]
     return f"{verdict}\n\n{markdown(titles, rows)}"
-
-
-def bvh(data: Path) -> str:
-    """What the acceleration structure costs in gates."""
-    files = data / "ppa-32b32s64d-yosys.json", data / "ppa-no-bvh-yosys.json"
-    if not all(file.is_file() for file in files):
-        return ""
-    tree, none = (json.loads(file.read_text()) for file in files)
-    rows = []
-    for title, key in (("logic, kGE", "logic_kge"), ("memory, kbit", "memory_bits"), ("with memory, kGE", "kge")):
-        on, off = (report["levels"]["render_unit"][key] for report in (tree, none))
-        scale = 1000 if key == "memory_bits" else 1
-        more = f"{on / off - 1:+.1%}" if off else "–"
-        rows.append([f"render unit: {title}", f"{on / scale:,.1f}", f"{off / scale:,.1f}", more])
-    on, off = (report["levels"]["array"]["logic_kge"] for report in (tree, none))
-    rows.append(["array: logic, kGE", f"{on:,.1f}", f"{off:,.1f}", f"{on / off - 1:+.1%}"])
-    return markdown(["", "with a BVH", "without", "for the BVH"], rows)
-
-
-def nodes(data: Path) -> str:
-    """What the acceleration structure costs in memory."""
-    file = data / "ppa-nodes.json"
-    if not file.is_file():
-        return ""
-    report = json.loads(file.read_text())
-    rows, overheads = [], []
-    for name, mesh in report["meshes"].items():
-        tree, none = mesh["tree"], mesh["none"]
-        overheads.append(tree["records"] / none["records"])
-        row = [name, f"{mesh['triangles']:,}", *(f"{tree[kind]:,}" for kind in ("nodes", "triangles", "attributes"))]
-        rows.append(
-            [*row, f"{none['records']:,}", f"{tree['nodes'] / none['records']:+.1%}", f"{overheads[-1] - 1:+.1%}"]
-        )
-    row = ["geometric mean", *[""] * 6, f"{geometric_mean(overheads) - 1:+.1%}"]
-    titles = ["mesh", "triangles", "nodes", "triangle records", "attribute records", "without a tree, all"]
-    return markdown([*titles, "nodes alone", "overhead"], [*rows, row])
-
-
-def gain(data: Path) -> str:
-    """What the acceleration structure saves in cycles."""
-    file = data / "ppa-gain.json"
-    if not file.is_file():
-        return ""
-    report = json.loads(file.read_text())
-    rows = []
-    for name, mesh in report["meshes"].items():
-        cycles = mesh["cycles"]
-        row = [name, f"{mesh['triangles']:,}", f"{mesh['rays_in_box']:,}", f"{cycles['tree']:,}", f"{cycles['none']:,}"]
-        rows.append([*row, f"{mesh['gain']:.1f}"])
-    rows.append(["geometric mean", *[""] * 4, f"{report['geomean_gain']:.1f}"])
-    rows.append(["the paper", *[""] * 4, f"{report['paper_gain']}"])
-    width, height = report["size"]
-    array = report["config"]["array"]
-    head = f"{array['rows']}×{array['columns']} render units, {width}×{height}."
-    titles = ["mesh, reduced", "triangles", "rays in box", "cycles with a tree", "without", "times fewer"]
-    return f"{head}\n\n{markdown(titles, rows)}"
 
 
 def ecp5(data: Path) -> str:
