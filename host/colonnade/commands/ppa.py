@@ -30,14 +30,20 @@ from colonnade.commands.options import configuration_options, finish, json_optio
 )
 @click.option("--power/--no-power", default=True, show_default=True, help="Measure power, where there is a --liberty.")
 @click.option(
-    "--clock", "megahertz", type=click.FloatRange(min=0, min_open=True), default=200, show_default=True, metavar="MHZ"
+    "--clock",
+    "megahertz",
+    type=click.FloatRange(min=0, min_open=True),
+    default=200,
+    show_default=True,
+    metavar="MHZ",
+    help="Clock that power is told for.",
 )
 @click.option("--mesh", default="teapot", show_default=True, metavar="MESH", help="What is rendered for power.")
-@click.option("--size", default="32x24", show_default=True, metavar="WxH", help="Size of that frame in pixels.")
+@click.option("--size", metavar="WxH", help="Size of that frame in pixels. Default: small enough to be replayed whole.")
 @click.option(
     "--cycles",
     type=click.IntRange(min=1),
-    default=8000,
+    default=16000,
     show_default=True,
     metavar="N",
     help="Most cycles of that frame to replay on the gates; some tens a second.",
@@ -52,7 +58,7 @@ def ppa(
     power: bool,
     megahertz: float,
     mesh: str,
-    size: str,
+    size: str | None,
     cycles: int,
     json_file: Path | None,
 ) -> None:
@@ -66,7 +72,7 @@ def ppa(
     """
     from colonnade.sizes import parse_size
 
-    pixels = parse_size(size)
+    pixels = parse_size(size) if size is not None else None
     require_outputs(json_file)
     if target == "ecp5":
         if liberties or delay is not None:

@@ -109,13 +109,19 @@ class Stimulus:
 
     Attributes:
         mesh: name or file; the rest of the scene is the benchmark's.
-        size: width and height in pixels.
+        size: width and height in pixels; of None see `whole_frame`.
         cycles: at most so many, from the frame's start.
     """
 
     mesh: str
-    size: tuple[int, int]
+    size: tuple[int, int] | None
     cycles: int
+
+
+def whole_frame(rows: int) -> tuple[int, int]:
+    """A size at which the part of each of so many units in a column takes some ten thousand cycles."""
+    width = 4 * round(6 * rows**0.5)
+    return width, width * 3 // 4
 
 
 def record(
@@ -138,12 +144,13 @@ def record(
     """
     one_column = (*overrides, "array.columns=1")
     design = design_for(config, one_column, progress)
-    check_size(stimulus.size, design.manifest)
+    size = stimulus.size or whole_frame(int(design.manifest.config["array"]["rows"]))
+    check_size(size, design.manifest)
     scene = load_scene(project_root() / "scenes" / "object.toml").with_mesh(stimulus.mesh)
     mesh = load_mesh(scene.mesh_source)
     with progress.step("packing the scene"):
         image = pack(mesh, design.manifest)
-        registers = placement(scene, image.header, design.manifest, *stimulus.size)
+        registers = placement(scene, image.header, design.manifest, *size)
     joined = {
         direction: tuple(
             Port(name, len(port["bits"]))
@@ -173,7 +180,7 @@ def record(
     read = {name: int(value) for _, name, value in values}
     counters = {name.removeprefix("counters."): value for name, value in read.items() if name.startswith("counters.")}
     cycles = tuple((int(line.split()[0], 16), int(line.split()[1], 16)) for line in lines[1:] if line)
-    facts = {"mesh": stimulus.mesh, "triangles": len(mesh.faces), "size": list(stimulus.size)}
+    facts = {"mesh": stimulus.mesh, "triangles": len(mesh.faces), "size": list(size)}
     return Recording(joined["input"], joined["output"], cycles, int(lines[0]), facts, counters)
 
 
