@@ -11,6 +11,7 @@ from colonnade.ppa import memories, opensta
 from colonnade.ppa.hierarchy import LEVELS, Hierarchy, Level, Memory
 from colonnade.ppa.netlist import Netlist
 from colonnade.ppa.power_report import Operation, measure_power
+from colonnade.ppa.recording import require_recordable
 from colonnade.ppa.synthesis import Technology, count_gates, require_yosys, synthesise, technology
 from colonnade.ppa.timing import Analysis, Path, Timing, gates_by_name
 from colonnade.progress import QUIET, Progress
@@ -46,6 +47,8 @@ def measure(
     into = technology(tuple(liberties), delay)
     design = black_boxed_design_for(config, overrides, progress)
     hierarchy = Hierarchy(design.dir)
+    if into.library and operation:
+        require_recordable(operation.stimulus, design.manifest)
     netlists: dict[str, Any] = {}
     units: dict[str, dict[str, Any]] = {}
     for level in LEVELS:

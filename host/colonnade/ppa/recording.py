@@ -17,14 +17,15 @@ from typing import Any
 
 from colonnade.files import locked
 from colonnade.generator import GeneratedDesign, design_for
-from colonnade.meshes import load_mesh
+from colonnade.manifest import Manifest
+from colonnade.meshes import Mesh, load_mesh
 from colonnade.pack import pack
 from colonnade.placement import placement
 from colonnade.progress import QUIET, Progress
-from colonnade.scene import load_scene
+from colonnade.scene import Scene, load_scene
 from colonnade.simulate import build_simulator, write_job
 from colonnade.sizes import check_size
-from colonnade.toolchain import cache_directory, project_root
+from colonnade.toolchain import cache_directory, project_root, require_program
 
 #: Ports that the replay drives by itself, or that a recording begins with.
 CLOCK, RESET, START, ROW = "clock", "reset", "io_start", "io_row"
@@ -124,6 +125,19 @@ def whole_frame(rows: int) -> tuple[int, int]:
     return width, width * 3 // 4
 
 
+def require_recordable(stimulus: Stimulus, manifest: Manifest) -> tuple[Mesh, tuple[int, int]]:
+    """The mesh and the size of the frame; refuses before the work starts what could not be rendered."""
+    for program, package in (("verilator", "verilator"), ("g++", "g++"), ("make", "make")):
+        require_program(program, "power (--no-power leaves it out)", package)
+    size = stimulus.size or whole_frame(int(manifest.config["array"]["rows"]))
+    check_size(size, manifest)
+    return load_mesh(_scene(stimulus).mesh_source), size
+
+
+def _scene(stimulus: Stimulus) -> Scene:
+    return load_scene(project_root() / "scenes" / "object.toml").with_mesh(stimulus.mesh)
+
+
 def record(
     config: str,
     overrides: Sequence[str],
@@ -144,13 +158,10 @@ def record(
     """
     one_column = (*overrides, "array.columns=1")
     design = design_for(config, one_column, progress)
-    size = stimulus.size or whole_frame(int(design.manifest.config["array"]["rows"]))
-    check_size(size, design.manifest)
-    scene = load_scene(project_root() / "scenes" / "object.toml").with_mesh(stimulus.mesh)
-    mesh = load_mesh(scene.mesh_source)
+    mesh, size = require_recordable(stimulus, design.manifest)
     with progress.step("packing the scene"):
         image = pack(mesh, design.manifest)
-        registers = placement(scene, image.header, design.manifest, *size)
+        registers = placement(_scene(stimulus), image.header, design.manifest, *size)
     joined = {
         direction: tuple(
             Port(name, len(port["bits"]))
