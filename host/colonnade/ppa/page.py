@@ -70,10 +70,17 @@ def _parts(unit: Data, same: Sequence[Data], of_timed: Sequence[Data]) -> list[l
     """Rows of what a unit is in part: its dividers and square roots, all of a kind together."""
     rows = []
     for part, facts in unit.get("parts", {}).items():
-        row = [f"– {facts['count']} × {part}", *(f"{each['parts'][part]['kge']:.1f}" for each in same), ""]
-        row += [f"{facts['flops']:,}", *(f"{each['parts'][part]['um2']:,.0f}" for each in of_timed)]
-        rows.append([*row, *[""] * len(of_timed)])
+        kge = (_of_part(each, part, "kge", ".1f") for each in same)
+        um2 = (_of_part(each, part, "um2", ",.0f") for each in of_timed)
+        row = [f"– {facts['count']} × {part}", *kge, "", f"{facts['flops']:,}", *um2, *[""] * len(of_timed)]
+        rows.append(row)
     return rows
+
+
+def _of_part(unit: Data, part: str, key: str, form: str) -> str:
+    """A figure of a part; a dash where this library's report is older than its parts."""
+    facts = unit.get("parts", {}).get(part)
+    return f"{facts[key]:{form}}" if facts else "–"
 
 
 def totals(reports: Mapping[str, Data]) -> str:
