@@ -151,16 +151,17 @@ def render_rtl(
         raise UserError("this configuration's memory cannot be held: set columnBvhMemory.holdable=true for such stalls")
     program = build_simulator(design, progress)
     with tempfile.TemporaryDirectory(prefix="colonnade-") as place:
-        job, outputs = _write_job(Path(place), design.manifest, image, registers)
+        job, outputs = write_job(Path(place), design.manifest, image, registers)
         command = [str(program), *stalls.options, str(job)]
         with progress.step("rendering in the simulator") as report:
-            lines = _run(command, Path(place) / "results", report)
+            lines = run_program(command, Path(place) / "results", report)
         return _collect(design.manifest, registers, outputs, lines)
 
 
-def _write_job(
+def write_job(
     place: Path, manifest: Manifest, image: SceneImage, registers: list[Mapping[str, int]]
 ) -> tuple[Path, list[Path]]:
+    """The harness's job file for some frames in the folder `place`, and the file of pixels that each will write."""
     records = place / "records"
     records.write_bytes(image.records.tobytes())
     lines = [f"load {records} {manifest.record_bits // 8}"]
@@ -178,7 +179,7 @@ def _write_job(
     return job, outputs
 
 
-def _run(command: list[str], results: Path, report: Report) -> list[str]:
+def run_program(command: list[str], results: Path, report: Report) -> list[str]:
     """Lines that the harness writes to the file ``results``; its progress goes to ``report``."""
     said: deque[str] = deque(maxlen=5)
     with (

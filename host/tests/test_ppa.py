@@ -131,12 +131,28 @@ def test_a_path_crosses_modules_and_wires_straight_through_them(small: Library) 
     assert path.ns == pytest.approx((21 + 22 + 3.05) * 1e-3)
 
 
+def test_a_register_gives_its_name_to_what_it_drives(small: Library) -> None:
+    cells = {
+        "first_register": cell("DFF", C=2, D=3, Q=4),
+        "gate": cell("INV", A=4, Y=5),
+        "last_register": cell("DFF", C=2, D=5, Q=9),
+    }
+    inside = module(cells, {"hidden": 4, "h": 5})
+    inside["ports"]["z"]["bits"] = [9]
+    for name in inside["netnames"].values():
+        name["hide_name"] = 1
+    outside = module({"unit": cell("inner", clock=2, a=3, z=7)}, {"x": 7})
+    path = Analysis(Netlist({"top": outside, "inner": inside}, "top", small), small).timing().register_to_register
+    assert path is not None
+    assert (path.begin, path.end) == ("unit.first", "unit.last")
+
+
 def test_units_are_where_synthesis_stops(tmp_path: Path) -> None:
     sources = {
         "Colonnade": "  Column columns_0 (\n  Column columns_1 (\n",
         "Column": "  RenderUnit a (\n  RenderUnit b (\n  records records_0 (\n  Arbiter arbiter (\n",
         "RenderUnit": "  BoxUnit boxUnit (\n  Queue queue (\n",
-        "BoxUnit": "  Divider divider (\n",
+        "BoxUnit": "  Divider one (\n  Divider other (\n",
         "records": "  records_ext records_ext (\n",
         "Arbiter": "",
         "Queue": "",
@@ -148,6 +164,10 @@ def test_units_are_where_synthesis_stops(tmp_path: Path) -> None:
     (tmp_path / "memories.json").write_text(json.dumps([shape]))
     hierarchy = Hierarchy(tmp_path)
     assert hierarchy.closure("RenderUnit") == (["Queue", "RenderUnit"], ["BoxUnit"])
+    assert hierarchy.closure("BoxUnit") == (["BoxUnit"], ["Divider"])
+    assert hierarchy.parts("BoxUnit") == {"Divider": 2}
+    assert hierarchy.parts("RenderUnit") == {}
+    assert hierarchy.shape("records") == (8, 4)
     assert hierarchy.closure("Column") == (["Arbiter", "Column"], ["RenderUnit", "records"])
     assert hierarchy.count("BoxUnit", "Colonnade") == 4
     assert hierarchy.count("BoxUnit", "Colonnade", BORDERS) == 0
@@ -204,10 +224,13 @@ def test_a_changed_area_is_told() -> None:
 def test_opensta_finds_the_same_path(small: Library) -> None:
     cells = {"first": cell("DFF", C=2, D=3, Q=4), "gate": cell("INV", A=4, Y=5), "second": cell("DFF", C=2, D=5, Q=9)}
     top = module(cells, {"begins": 4, "between": 5, "z": 9})
-    analysis = Analysis(Netlist({"top": top}, "top", small), small)
+    netlist = Netlist({"top": top}, "top", small)
+    analysis = Analysis(netlist, small)
     path = analysis.timing().register_to_register
     assert path is not None
-    assert opensta.register_to_register(top, small, analysis.slew, analysis.output_load) == pytest.approx(path.ns, 1e-3)
+    assert opensta.register_to_register(netlist, small, analysis.slew, analysis.output_load) == pytest.approx(
+        path.ns, 1e-3
+    )
 
 
 def test_missing_yosys_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,6 +17,9 @@ from colonnade.commands.options import (
     require_outputs,
 )
 
+if TYPE_CHECKING:
+    from colonnade.measure import Conditions
+
 
 @click.command(short_help="Measure rays per cycle of the benchmark's meshes.")
 @configuration_options
@@ -28,9 +31,7 @@ def bench(
     config: str,
     overrides: tuple[str, ...],
     meshes: tuple[str, ...],
-    size: str | None,
-    jobs: int | None,
-    reuse: bool,
+    conditions: Conditions,
     plot: Path | None,
     json_file: Path | None,
 ) -> None:
@@ -41,17 +42,11 @@ def bench(
     memory the busiest unit is the limit, with perfect units the busiest port. Meshes that are not built in are looked
     for in the folders of COLONNADE_MESHES.
     """
-    from colonnade.sizes import parse_size
-
-    pixels = parse_size(size) if size is not None else None
     require_outputs(plot, json_file)
 
     from colonnade import bench as benchmark
     from colonnade import progress
-    from colonnade.measure import Conditions
-    from colonnade.parallel import processors
     from colonnade.tables import Column, Table
-    from colonnade.toolchain import project_root
 
     table = Table(
         (
@@ -86,7 +81,6 @@ def bench(
             busiest,
         )
 
-    conditions = Conditions(project_root() / "scenes" / "object.toml", pixels, jobs or processors(), reuse)
     report = benchmark.bench(
         config, overrides, meshes or benchmark.MESHES, conditions, progress.for_terminal(), finished=show
     )

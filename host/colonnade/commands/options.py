@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+if TYPE_CHECKING:
+    from colonnade.measure import Conditions
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -32,23 +36,38 @@ def configuration_options(command: Command) -> Command:
     )(command)
 
 
-def measurement_options(command: Command) -> Command:
-    """Add ``--size``, ``--jobs`` and ``--reuse``: how frames are measured."""
-    command = click.option(
+def measurement_options(command: Command) -> Callable[..., Any]:
+    """Add ``--size``, ``--jobs`` and ``--reuse``: the command gets them as `conditions`, on the benchmark's scene."""
+
+    @functools.wraps(command)
+    def with_conditions(*, size: str | None, jobs: int | None, reuse: bool, **others: Any) -> Any:
+        return command(conditions=_conditions(size, jobs, reuse), **others)
+
+    wrapped = click.option(
         "--reuse/--fresh",
         default=False,
         show_default=True,
         help="Take the counters of a kept run of the same hardware and the same scene image.",
-    )(command)
-    command = click.option(
+    )(with_conditions)
+    wrapped = click.option(
         "--jobs",
         type=click.IntRange(min=1),
         metavar="N",
         help="Frames to render at a time, each on one processor. Default: the number of processors.",
-    )(command)
+    )(wrapped)
     return click.option("--size", metavar="WxH", help="Size of the frames in pixels. Default: the benchmark scene's.")(
-        command
+        wrapped
     )
+
+
+def _conditions(size: str | None, jobs: int | None, reuse: bool) -> Conditions:
+    from colonnade.measure import Conditions
+    from colonnade.parallel import processors
+    from colonnade.sizes import parse_size
+    from colonnade.toolchain import project_root
+
+    pixels = parse_size(size) if size is not None else None
+    return Conditions(project_root() / "scenes" / "object.toml", pixels, jobs or processors(), reuse)
 
 
 def json_option(command: Command) -> Command:

@@ -28,6 +28,26 @@ from colonnade.commands.options import configuration_options, finish, json_optio
     show_default=True,
     help="Standard cells, or an FPGA of the ECP5 family.",
 )
+@click.option("--power/--no-power", default=True, show_default=True, help="Measure power, where there is a --liberty.")
+@click.option(
+    "--clock",
+    "megahertz",
+    type=click.FloatRange(min=0, min_open=True),
+    default=200,
+    show_default=True,
+    metavar="MHZ",
+    help="Clock that power is told for.",
+)
+@click.option("--mesh", default="teapot", show_default=True, metavar="MESH", help="What is rendered for power.")
+@click.option("--size", metavar="WxH", help="Size of that frame in pixels. Default: small enough to be replayed whole.")
+@click.option(
+    "--cycles",
+    type=click.IntRange(min=1),
+    default=16000,
+    show_default=True,
+    metavar="N",
+    help="Most cycles of that frame to replay on the gates; some tens a second.",
+)
 @json_option
 def ppa(
     config: str,
@@ -35,6 +55,11 @@ def ppa(
     liberties: tuple[str, ...],
     delay: float | None,
     target: str,
+    power: bool,
+    megahertz: float,
+    mesh: str,
+    size: str | None,
+    cycles: int,
     json_file: Path | None,
 ) -> None:
     """Synthesise every unit of a configuration on its own, with Yosys, and add them up.
@@ -42,7 +67,12 @@ def ppa(
     A render unit, a column and the array are composed: the hierarchy is kept at the units. Memories are black boxes,
     added by an area per bit; queues are flip-flops and count as such. Without --liberty gates are Yosys's own and
     nothing has a delay. Units are kept by content: a second run takes seconds.
+
+    For power a frame is rendered through the RTL, and what one render unit sees of it is replayed on its gates.
     """
+    from colonnade.sizes import parse_size
+
+    pixels = parse_size(size) if size is not None else None
     require_outputs(json_file)
     if target == "ecp5":
         if liberties or delay is not None:
@@ -52,11 +82,14 @@ def ppa(
 
     from colonnade import progress
     from colonnade.ppa.measure import measure
+    from colonnade.ppa.power_report import Operation
+    from colonnade.ppa.recording import Stimulus
     from colonnade.ppa.text import UnitTable, summary
 
     table = UnitTable(click.echo)
+    operation = Operation(megahertz, Stimulus(mesh, pixels, cycles)) if power else None
     report: Mapping[str, Any] = measure(
-        config, overrides, liberties, delay, progress.for_terminal(), finished=table.print
+        config, overrides, liberties, delay, operation, progress.for_terminal(), finished=table.print
     )
     for line in summary(report):
         click.echo(line)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,6 +17,9 @@ from colonnade.commands.options import (
     measurement_options,
     require_outputs,
 )
+
+if TYPE_CHECKING:
+    from colonnade.measure import Conditions
 
 
 @click.command(short_help="Measure rays per cycle while fields of the configuration vary.")
@@ -40,9 +43,7 @@ def sweep(
     variations: tuple[str, ...],
     one_by_one: bool,
     meshes: tuple[str, ...],
-    size: str | None,
-    jobs: int | None,
-    reuse: bool,
+    conditions: Conditions,
     plot: Path | None,
     json_file: Path | None,
 ) -> None:
@@ -51,17 +52,11 @@ def sweep(
     Cycles are summed over the meshes, rates are geometric means. Every configuration is checked before the first frame
     is rendered; whatever fails ends the sweep.
     """
-    from colonnade.sizes import parse_size
-
-    pixels = parse_size(size) if size is not None else None
     require_outputs(plot, json_file)
 
     from colonnade import progress
     from colonnade import sweep as sweeping
-    from colonnade.measure import Conditions
-    from colonnade.parallel import processors
     from colonnade.tables import Column, Table
-    from colonnade.toolchain import project_root
 
     varied = sweeping.parse_variations(variations)
     table = Table(
@@ -88,7 +83,6 @@ def sweep(
             ", ".join(busiest),
         )
 
-    conditions = Conditions(project_root() / "scenes" / "object.toml", pixels, jobs or processors(), reuse)
     report = sweeping.sweep(
         config,
         overrides,

@@ -66,13 +66,24 @@ class Pin:
 
 
 @dataclass(frozen=True)
+class State:
+    """What a flip-flop holds: the names of it and of its inverse in the outputs' functions; clock; what comes next."""
+
+    name: str
+    inverse: str
+    clock: str
+    following: str
+
+
+@dataclass(frozen=True)
 class Cell:
-    """A cell; area in µm²."""
+    """A cell; area in µm²; `state` is of flip-flops alone."""
 
     name: str
     area: float
     is_register: bool
     pins: dict[str, Pin]
+    state: State | None = None
 
     def is_gate(self, function: str) -> bool:
         """It computes `function`, a key of `_SPELLINGS`, and nothing else."""

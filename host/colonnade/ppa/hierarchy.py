@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,9 @@ RENDER_UNIT = (
 )
 COLUMN = ("ColumnBvhController", "TileWalker", "BackgroundWalker", "PixelCollector")
 DEVICE = ("FrameController", "RegisterFile", "CounterFile")
+
+#: Modules within a unit that are synthesised on their own and counted in it: what divides and takes roots.
+PARTS = re.compile(r"(Divider|SquareRoot)(_\d+)?")
 
 _INSTANCE = re.compile(r"^  (\w+)\s+(\w+) \(", re.MULTILINE)
 _TABLE = re.compile(r"^  reg\s+(?:\[(\d+):0\]\s+)?Memory\[0:(\d+)\];", re.MULTILINE)
@@ -50,8 +53,8 @@ BORDERS = frozenset({*RENDER_UNIT, *COLUMN, *DEVICE, "RenderUnit", "Column"})
 
 
 @dataclass(frozen=True)
-class Memory:
-    """A memory that is a black box: how many, where, and its shape."""
+class Storage:
+    """Words of a module: in which unit of which level, how many of the module there, and its shape."""
 
     name: str
     level: str
@@ -59,6 +62,12 @@ class Memory:
     count: int
     depth: int
     width: int
+
+
+@dataclass(frozen=True)
+class Memory(Storage):
+    """A memory that is a black box."""
+
     ports: str
 
     @property
@@ -68,15 +77,8 @@ class Memory:
 
 
 @dataclass(frozen=True)
-class FlopTable:
+class FlopTable(Storage):
     """A memory with combinational reads: it is synthesised, as flip-flops and multiplexers."""
-
-    name: str
-    level: str
-    unit: str
-    count: int
-    depth: int
-    width: int
 
     @property
     def bits(self) -> int:
@@ -110,13 +112,13 @@ class Hierarchy:
         return [unit for unit in level.units if unit in self.files]
 
     def closure(self, top: str) -> tuple[list[str], list[str]]:
-        """Modules to read for `top`: those that belong to it, and those where it ends: other units and memories."""
+        """Modules to read for `top`: those that belong to it, and those where it ends: other units, parts, memories."""
         own, ends, waiting = [top], [], [top]
         while waiting:
             for module in self._instances[waiting.pop()]:
                 if module in self._shapes or module in own or module in ends:
                     continue
-                if module in BORDERS or self._is_memory(module):
+                if module in BORDERS or PARTS.fullmatch(module) or self._is_memory(module):
                     ends.append(module)
                 else:
                     own.append(module)
@@ -140,31 +142,42 @@ class Hierarchy:
             for kind, number in self._instances[inside].items()
         )
 
+    def shape(self, module: str) -> tuple[int, int]:
+        """Depth and width of the memory that `module` holds."""
+        (name,) = set(self._instances[module]) & set(self._shapes)
+        return int(self._shapes[name]["depth"]), int(self._shapes[name]["width"])
+
+    def parts(self, unit: str) -> dict[str, int]:
+        """The parts of a unit, and how many of each."""
+        known = sorted(module for module in self.files if PARTS.fullmatch(module))
+        counts = {module: self.count(module, unit, BORDERS - {unit}) for module in known}
+        return {module: number for module, number in counts.items() if number}
+
     def memories(self) -> list[Memory]:
         """The memories of each unit, counted within one of its level."""
         found = []
-        for level in LEVELS:
-            for unit in (*self.units(level), level.top):
-                for name, shape in self._shapes.items():
-                    number = self.count(name, unit, BORDERS - {unit})
-                    if number:
-                        title = level.rest if unit == level.top else unit
-                        where = (name.removesuffix("_ext"), level.name, title, number)
-                        ports = ",".join(shape["ports"])
-                        found.append(Memory(*where, int(shape["depth"]), int(shape["width"]), ports))
+        for name, level, unit, number in self._inside_units(self._shapes):
+            shape = self._shapes[name]
+            facts = int(shape["depth"]), int(shape["width"]), ",".join(shape["ports"])
+            found.append(Memory(name.removesuffix("_ext"), level, unit, number, *facts))
         return found
 
     def tables(self) -> list[FlopTable]:
         """The tables of each unit that become flip-flops, counted within one of its level; largest first."""
-        found = []
+        found = [
+            FlopTable(name, level, unit, number, *self._tables[name])
+            for name, level, unit, number in self._inside_units(self._tables)
+        ]
+        return sorted(found, key=lambda table: (-table.bits, table.name))
+
+    def _inside_units(self, modules: Iterable[str]) -> Iterator[tuple[str, str, str, int]]:
+        """Module, level, unit, and how many of the module there are in the unit, where there are any."""
         for level in LEVELS:
             for unit in (*self.units(level), level.top):
-                for name, (depth, width) in self._tables.items():
-                    number = self.count(name, unit, BORDERS - {unit})
+                for module in modules:
+                    number = self.count(module, unit, BORDERS - {unit})
                     if number:
-                        title = level.rest if unit == level.top else unit
-                        found.append(FlopTable(name, level.name, title, number, depth, width))
-        return sorted(found, key=lambda table: (-table.bits, table.name))
+                        yield module, level.name, level.rest if unit == level.top else unit, number
 
     def _is_memory(self, module: str) -> bool:
         return bool(set(self._instances[module]) & set(self._shapes))

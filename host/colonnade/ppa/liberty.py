@@ -14,7 +14,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from colonnade.errors import UserError
-from colonnade.ppa.cells import Arc, Cell, Library, Pin, Table
+from colonnade.ppa.cells import Arc, Cell, Library, Pin, State, Table
 
 #: Cells for scan, clock gating, power domains and probing; delay cells.
 AVOIDED = (
@@ -27,10 +27,13 @@ _DROPPED = re.compile(
     r"(?P<group>\b(?P<name>\w+)\s*\((?P<argument>[^(){}]*)\)\s*\{)|(?P<open>\{)|(?P<close>\})",
     re.DOTALL,
 )
-_DROPPED_GROUPS = re.compile(
-    r"output_current_\w+|receiver_capacitance\w*|ccs\w*|internal_power|leakage_power|test_cell|"
-    r"normalized_driver_waveform|wire_load\w*|hyperbolic_noise\w*|dc_current|min_pulse_width|pg_pin"
+_ALWAYS_DROPPED = (
+    r"output_current_\w+|receiver_capacitance\w*|ccs\w*|test_cell|normalized_driver_waveform|wire_load\w*|"
+    r"hyperbolic_noise\w*|dc_current|min_pulse_width"
 )
+#: Groups that go from a liberty, by what it is read for.
+FOR_TIMING = re.compile(rf"{_ALWAYS_DROPPED}|internal_power|leakage_power|pg_pin")
+FOR_POWER = re.compile(rf"{_ALWAYS_DROPPED}|timing")
 _TOKEN = re.compile(r"/\*.*?\*/|//[^\n]*|\\\n|\s+|(\"[^\"]*\"|[{}();:,]|[^\s{}();:,\"]+)", re.DOTALL)
 
 
@@ -48,7 +51,7 @@ def find_liberties(names: Sequence[str]) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def pruned(path: Path) -> str:
+def pruned(path: Path, dropped: re.Pattern[str] = FOR_TIMING) -> str:
     """The text of a liberty without the groups and the cells that are of no use here."""
     try:
         text = (gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()).decode("latin-1")
@@ -61,7 +64,7 @@ def pruned(path: Path) -> str:
     for token in _DROPPED.finditer(text):
         if token["group"] or token["open"]:
             depth += 1
-            if token["group"] and not dropped_from and _is_dropped(token["name"], token["argument"]):
+            if token["group"] and not dropped_from and _is_dropped(token["name"], token["argument"], dropped):
                 kept.append(text[begin : token.start()])
                 dropped_from = depth
         elif token["close"]:
@@ -79,47 +82,51 @@ def pruned(path: Path) -> str:
     return re.sub(r"\n\s*\n+", "\n", text)
 
 
-def _is_dropped(group: str, argument: str) -> bool:
+def _is_dropped(group: str, argument: str, dropped: re.Pattern[str]) -> bool:
     name = argument.strip().strip('"')
-    return (group == "cell" and any(fnmatch(name, pattern) for pattern in AVOIDED)) or bool(
-        _DROPPED_GROUPS.fullmatch(group)
-    )
+    is_avoided = group == "cell" and any(fnmatch(name, pattern) for pattern in AVOIDED)
+    return is_avoided or dropped.fullmatch(group) is not None
 
 
 def load(paths: Sequence[Path]) -> Library:
     """Read pruned files."""
     cells: dict[str, Cell] = {}
     for path in paths:
-        top = next(_groups(_tokens(path.read_text("latin-1"))))
-        cells.update(_Reader(top).cells())
+        top = next(groups(tokens(path.read_text("latin-1"))))
+        cells.update(Reader(top).cells())
     return Library(tuple(paths), cells)
 
 
 @dataclass
-class _Group:
+class Group:
+    """A group: its name and arguments, its attributes by name, simple and complex, and the groups in it."""
+
     name: str
     arguments: list[str]
     values: dict[str, list[str]] = field(default_factory=dict)
-    groups: list[_Group] = field(default_factory=list)
+    groups: list[Group] = field(default_factory=list)
 
-    def of(self, *names: str) -> Iterator[_Group]:
+    def of(self, *names: str) -> Iterator[Group]:
+        """The groups in it that have one of these names."""
         return (group for group in self.groups if group.name in names)
 
     def text(self, name: str, default: str = "") -> str:
+        """A simple attribute."""
         return self.values.get(name, [default])[0].strip('"').strip()
 
 
-def _tokens(text: str) -> Iterator[str]:
+def tokens(text: str) -> Iterator[str]:
+    """The words of a liberty, without comments."""
     return (token[1] for token in _TOKEN.finditer(text) if token[1] is not None)
 
 
-def _groups(tokens: Iterator[str]) -> Iterator[_Group]:
+def groups(tokens: Iterator[str]) -> Iterator[Group]:
     """Groups at the top; attributes, simple and complex, become values of their group."""
-    stack = [_Group("", [])]
+    stack = [Group("", [])]
     words: list[str] = []
     for token in tokens:
         if token == "{":
-            stack.append(_Group(words[0], [word for word in words[1:] if word not in "(),"]))
+            stack.append(Group(words[0], [word for word in words[1:] if word not in "(),"]))
             stack[-2].groups.append(stack[-1])
             words = []
         elif token in ";}":
@@ -151,48 +158,53 @@ def _is_operator(word: str) -> bool:
     return word in "+-*/"
 
 
-class _Reader:
+class Reader:
     """Turns the groups of one library into cells, in ns and pF."""
 
-    def __init__(self, library: _Group) -> None:
+    def __init__(self, library: Group) -> None:
         self._library = library
-        self._time = _unit(library.text("time_unit", "1ns"), {"ps": 1e-3, "ns": 1.0})
-        amount, unit = (*library.values.get("capacitive_load_unit", []), "1", "pf")[:2]
-        self._load = float(amount) * {"ff": 1e-3, "pf": 1.0}[unit.strip('"').lower()]
-        self._templates = {template.arguments[0]: template for template in library.of("lu_table_template")}
+        self.time = unit(library, "time_unit", "1ns", {"ps": 1e-3, "ns": 1.0})
+        amount, farads = (*library.values.get("capacitive_load_unit", []), "1", "pf")[:2]
+        self.load = float(amount) * {"ff": 1e-3, "pf": 1.0}[farads.strip('"').lower()]
+        kinds = ("lu_table_template", "power_lut_template")
+        self._templates = {template.arguments[0]: template for template in library.of(*kinds)}
 
     def cells(self) -> Iterator[tuple[str, Cell]]:
+        """All cells that may be used, with their names."""
         for group in self._library.of("cell"):
             name = group.arguments[0].strip('"')
             if group.text("dont_use") == "true":
                 continue
             pins = {pin.name: pin for part in group.of("pin") for pin in [self._pin(part)]}
             is_register = any(True for _ in group.of("ff", "latch", "statetable"))
-            yield name, Cell(name, float(group.text("area", "0")), is_register, pins)
+            yield name, Cell(name, float(group.text("area", "0")), is_register, pins, _state(group))
 
-    def _pin(self, group: _Group) -> Pin:
+    def _pin(self, group: Group) -> Pin:
         arcs = tuple(self._arc(timing) for timing in group.of("timing"))
-        capacitance = float(group.text("capacitance", "0")) * self._load
+        capacitance = float(group.text("capacitance", "0")) * self.load
         return Pin(group.arguments[0].strip('"'), group.text("direction"), capacitance, group.text("function"), arcs)
 
-    def _arc(self, group: _Group) -> Arc:
-        tables = {table.name: self._table(table) for table in group.groups if table.values.get("values")}
+    def _arc(self, group: Group) -> Arc:
+        tables = {table.name: self.table(table, self.time) for table in group.groups if table.values.get("values")}
         sense = group.text("timing_sense", "non_unate")
         return Arc(group.text("related_pin"), group.text("timing_type", "combinational"), sense, tables)
 
-    def _table(self, group: _Group) -> Table:
-        """Slew, or a constrained pin's slew, becomes `slews`; load, or the clock's slew, becomes `loads`."""
+    def table(self, group: Group, scale: float) -> Table:
+        """A table with its values times `scale`.
+
+        Slew, or a constrained pin's slew, becomes `slews`; load, or the clock's slew, becomes `loads`.
+        """
         template = self._templates.get(group.arguments[0]) if group.arguments else None
         axes: dict[str, tuple[float, ...]] = {}
         for number in ("1", "2"):
             variable = template.text(f"variable_{number}") if template else ""
             words = group.values.get(f"index_{number}") or (template and template.values.get(f"index_{number}"))
             if variable and words:
-                scale = self._load if "capacitance" in variable else self._time
+                unit_of_axis = self.load if "capacitance" in variable else self.time
                 name = "loads" if "capacitance" in variable or "related" in variable else "slews"
-                axes[name] = tuple(scale * value for value in _numbers(words))
+                axes[name] = tuple(unit_of_axis * value for value in _numbers(words))
         slews, loads = axes.get("slews", (0.0,)), axes.get("loads", (0.0,))
-        flat = [self._time * value for value in _numbers(group.values["values"])]
+        flat = [scale * value for value in _numbers(group.values["values"])]
         if next(iter(axes), "slews") == "slews":
             values = tuple(tuple(flat[i * len(loads) : (i + 1) * len(loads)]) for i in range(len(slews)))
         else:
@@ -200,12 +212,23 @@ class _Reader:
         return Table(slews, loads, values)
 
 
+def _state(cell: Group) -> State | None:
+    """Of a flip-flop without set and reset; None for all other cells."""
+    for group in cell.of("ff"):
+        if "clear" not in group.values and "preset" not in group.values:
+            names = [word.strip('"') for word in group.arguments]
+            return State(names[0], names[1], group.text("clocked_on"), group.text("next_state"))
+    return None
+
+
 def _numbers(words: Sequence[str]) -> list[float]:
     return [float(number) for word in words for number in re.split(r"[\s,\\]+", word.strip('"').strip()) if number]
 
 
-def _unit(text: str, units: dict[str, float]) -> float:
+def unit(library: Group, name: str, default: str, units: dict[str, float]) -> float:
+    """A unit of the library as a multiple of ours; `units` are those that are understood, in lower case."""
+    text = library.text(name, default)
     match = re.fullmatch(r"([\d.]+)\s*(\w+)", text)
     if match is None or match[2].lower() not in units:
-        raise UserError(f"a liberty counts time in {text}: only ps and ns are understood")
+        raise UserError(f"a liberty has {text} as its {name}: only {' and '.join(units)} are understood")
     return float(match[1]) * units[match[2].lower()]

@@ -10,7 +10,9 @@ from colonnade.generator import black_boxed_design_for
 from colonnade.ppa import memories, opensta
 from colonnade.ppa.hierarchy import LEVELS, Hierarchy, Level, Memory
 from colonnade.ppa.netlist import Netlist
-from colonnade.ppa.synthesis import Gates, Technology, count_gates, require_yosys, synthesise, technology
+from colonnade.ppa.power_report import Operation, measure_power
+from colonnade.ppa.recording import require_recordable
+from colonnade.ppa.synthesis import Technology, count_gates, require_yosys, synthesise, technology
 from colonnade.ppa.timing import Analysis, Path, Timing, gates_by_name
 from colonnade.progress import QUIET, Progress
 
@@ -23,6 +25,7 @@ def measure(
     overrides: Sequence[str] = (),
     liberties: Sequence[str] = (),
     delay: float | None = None,
+    operation: Operation | None = None,
     progress: Progress = QUIET,
     finished: Finished = lambda level, name, unit: None,
 ) -> dict[str, Any]:
@@ -33,6 +36,7 @@ def measure(
         overrides: ``key.path=value`` changes.
         liberties: files or folders; Yosys's own gates without any.
         delay: target for abc in ns.
+        operation: clock and frame for power, which takes liberties; no power without.
         progress: shows the steps.
         finished: see `Finished`.
 
@@ -43,17 +47,25 @@ def measure(
     into = technology(tuple(liberties), delay)
     design = black_boxed_design_for(config, overrides, progress)
     hierarchy = Hierarchy(design.dir)
+    if into.library and operation:
+        require_recordable(operation.stimulus, design.manifest)
     netlists: dict[str, Any] = {}
     units: dict[str, dict[str, Any]] = {}
     for level in LEVELS:
         for module in (*hierarchy.units(level), level.top):
             name = level.rest if module == level.top else module
             with progress.step(f"synthesising {name}"):
-                netlists[module] = synthesise(hierarchy, module, into)
-                units[name] = _unit(level, module, netlists, into)
+                for each in (*hierarchy.parts(module), module):
+                    netlists[each] = synthesise(hierarchy, each, into)
+                units[name] = _unit(level, module, netlists, hierarchy.parts(module), into)
             finished(level.name, name, units[name])
     with progress.step("timing a render unit as a whole"):
-        whole = _timing(netlists, "RenderUnit", into)
+        whole = _timing(Netlist(netlists, "RenderUnit", into.library), into) if into.library else None
+    power = None
+    if into.library and operation:
+        power = measure_power(design, config, overrides, hierarchy, netlists, into, operation, progress)
+        for name, of_unit in power.pop("units").items():
+            units[name] |= of_unit
     array = design.manifest.config["array"]
     boxes = hierarchy.memories()
     levels = _levels(units, int(array["rows"]), int(array["columns"]), boxes)
@@ -82,35 +94,53 @@ def measure(
             "kge_per_unit": memories.chip_unit_kge(),
             "um2_per_gate": memories.CHIP_GATE_UM2,
         },
-        "power_mw": None,
-        "energy_per_ray_nj": None,
+        "power": power,
+        "power_mw": power["glitch_aware"]["total_mw"] if power else None,
+        "energy_per_ray_nj": power["glitch_aware"]["energy_per_ray_nj"] if power else None,
     }
 
 
-def _unit(level: Level, module: str, netlists: Mapping[str, Any], into: Technology) -> dict[str, Any]:
-    netlist = netlists[module]
-    gates: Gates = count_gates(netlist, into)
+def _unit(
+    level: Level, module: str, netlists: Mapping[str, Any], parts: Mapping[str, int], into: Technology
+) -> dict[str, Any]:
+    own = count_gates(netlists[module], into)
+    of_parts = {part: count_gates(netlists[part], into) for part in parts}
+    counts = [(own, 1), *((of_parts[part], number) for part, number in parts.items())]
+    registers = sum(gates.registers * number for gates, number in counts)
+    combinational = sum(gates.combinational * number for gates, number in counts)
     area = into.gate_area
-    paths = _timing({module: netlist}, module, into)
-    if paths and paths["register_to_register"] and into.library and opensta.is_there():
-        edges = Analysis.edges(into.library)
-        paths["register_to_register"]["opensta_ns"] = opensta.register_to_register(netlist, into.library, *edges)
+    paths = None
+    if into.library:
+        joined = {name: netlists[name] for name in (module, *parts)}
+        netlist = Netlist(joined, module, into.library)
+        paths = _timing(netlist, into)
+        if paths["register_to_register"] and opensta.is_there():
+            edges = Analysis.edges(into.library)
+            paths["register_to_register"]["opensta_ns"] = opensta.register_to_register(netlist, into.library, *edges)
     return {
         "level": level.name,
         "module": module,
-        "kge": gates.total / 1e3,
-        "flops": gates.flops,
-        "flops_kge": gates.registers / 1e3,
-        "combinational_kge": gates.combinational / 1e3,
-        "um2": None if area is None else gates.total * area,
+        "kge": (registers + combinational) / 1e3,
+        "flops": sum(gates.flops * number for gates, number in counts),
+        "flops_kge": registers / 1e3,
+        "combinational_kge": combinational / 1e3,
+        "um2": None if area is None else (registers + combinational) * area,
         "paths": paths,
+        "parts": {
+            part: {
+                "count": number,
+                "kge": of_parts[part].total * number / 1e3,
+                "flops": of_parts[part].flops * number,
+                "um2": None if area is None else of_parts[part].total * number * area,
+            }
+            for part, number in parts.items()
+        },
     }
 
 
-def _timing(modules: Mapping[str, Any], top: str, into: Technology) -> dict[str, Any] | None:
-    if into.library is None:
-        return None
-    return _paths(Analysis(Netlist(modules, top, into.library), into.library).timing(), into)
+def _timing(netlist: Netlist, into: Technology) -> dict[str, Any]:
+    assert into.library is not None
+    return _paths(Analysis(netlist, into.library).timing(), into)
 
 
 def _paths(timing: Timing, into: Technology) -> dict[str, Any]:

@@ -9,18 +9,16 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from colonnade.bench import geometric_mean
 from colonnade.files import replacing
 from colonnade.performance_page import markdown
 from colonnade.ppa.hierarchy import LEVELS
-from colonnade.ppa.text import MOST_FO4, TITLES, second_opinion
-
-#: The files of a precision, and what their columns are called.
-LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
+from colonnade.ppa.power_page import power_table, unit_power_table
+from colonnade.ppa.text import LIBRARIES, MOST_FO4, TITLES, second_opinion
+from colonnade.ppa.tree_page import bvh, gain, nodes
 
 Data = Mapping[str, Any]
 
@@ -38,9 +36,11 @@ def page(text: str, data: Path) -> str:
         if precision:
             reports = _reports(data, precision)
             of_precision = {"units": units, "totals": totals, "tables": tables, "paths": paths}
+            of_precision |= {"power": power_table, "unitpower": unit_power_table}
             body = of_precision[kind](reports) if reports else ""
         else:
-            body = {"bvh": bvh, "nodes": nodes, "ecp5": ecp5, "libraries": libraries}[kind](data)
+            of_all = {"bvh": bvh, "nodes": nodes, "gain": gain, "ecp5": ecp5, "libraries": libraries}
+            body = of_all[kind](data)
         return f"{match[1]}{body or 'Not measured: run `tools/ppa`.'}\n{match[3]}"
 
     return _TABLE.sub(replaced, text)
@@ -62,7 +62,25 @@ def units(reports: Mapping[str, Data]) -> str:
                 row = [name, *(f"{each['kge']:.1f}" for each in same), f"{100 * unit['share']:.1f} %"]
                 row += [f"{unit['flops']:,}", *(f"{each['um2']:,.0f}" for each in of_timed)]
                 rows.append([*row, *(_fo4(each["paths"]["register_to_register"]) for each in of_timed)])
+                rows += _parts(unit, same, of_timed)
     return markdown(titles, rows)
+
+
+def _parts(unit: Data, same: Sequence[Data], of_timed: Sequence[Data]) -> list[list[str]]:
+    """Rows of what a unit is in part: its dividers and square roots, all of a kind together."""
+    rows = []
+    for part, facts in unit.get("parts", {}).items():
+        kge = (_of_part(each, part, "kge", ".1f") for each in same)
+        um2 = (_of_part(each, part, "um2", ",.0f") for each in of_timed)
+        row = [f"– {facts['count']} × {part}", *kge, "", f"{facts['flops']:,}", *um2, *[""] * len(of_timed)]
+        rows.append(row)
+    return rows
+
+
+def _of_part(unit: Data, part: str, key: str, form: str) -> str:
+    """A figure of a part; a dash where this library's report is older than its parts."""
+    facts = unit.get("parts", {}).get(part)
+    return f"{facts[key]:{form}}" if facts else "–"
 
 
 def totals(reports: Mapping[str, Data]) -> str:
@@ -129,42 +147,6 @@ def paths(reports: Mapping[str, Data]) -> str:
     verdict += f"Units above {MOST_FO4} FO4: {', '.join(above) or 'none'}."
     titles = ["slowest path", "library", "ns", "FO4", "from", "to", "gates"]
     return f"{verdict}\n\n{markdown(titles, rows)}"
-
-
-def bvh(data: Path) -> str:
-    """What the acceleration structure costs in gates."""
-    files = data / "ppa-32b32s64d-yosys.json", data / "ppa-no-bvh-yosys.json"
-    if not all(file.is_file() for file in files):
-        return ""
-    tree, none = (json.loads(file.read_text()) for file in files)
-    rows = []
-    for title, key in (("logic, kGE", "logic_kge"), ("memory, kbit", "memory_bits"), ("with memory, kGE", "kge")):
-        on, off = (report["levels"]["render_unit"][key] for report in (tree, none))
-        scale = 1000 if key == "memory_bits" else 1
-        more = f"{on / off - 1:+.1%}" if off else "–"
-        rows.append([f"render unit: {title}", f"{on / scale:,.1f}", f"{off / scale:,.1f}", more])
-    on, off = (report["levels"]["array"]["logic_kge"] for report in (tree, none))
-    rows.append(["array: logic, kGE", f"{on:,.1f}", f"{off:,.1f}", f"{on / off - 1:+.1%}"])
-    return markdown(["", "with a BVH", "without", "for the BVH"], rows)
-
-
-def nodes(data: Path) -> str:
-    """What the acceleration structure costs in memory."""
-    file = data / "ppa-nodes.json"
-    if not file.is_file():
-        return ""
-    report = json.loads(file.read_text())
-    rows, overheads = [], []
-    for name, mesh in report["meshes"].items():
-        tree, none = mesh["tree"], mesh["none"]
-        overheads.append(tree["records"] / none["records"])
-        row = [name, f"{mesh['triangles']:,}", *(f"{tree[kind]:,}" for kind in ("nodes", "triangles", "attributes"))]
-        rows.append(
-            [*row, f"{none['records']:,}", f"{tree['nodes'] / none['records']:+.1%}", f"{overheads[-1] - 1:+.1%}"]
-        )
-    row = ["geometric mean", *[""] * 6, f"{geometric_mean(overheads) - 1:+.1%}"]
-    titles = ["mesh", "triangles", "nodes", "triangle records", "attribute records", "without a tree, all"]
-    return markdown([*titles, "nodes alone", "overhead"], [*rows, row])
 
 
 def ecp5(data: Path) -> str:

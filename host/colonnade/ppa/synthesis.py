@@ -61,11 +61,19 @@ for line in open(sys.argv[1]):
 
 @dataclass(frozen=True)
 class Technology:
-    """What units are mapped to: the cells of liberties, or without any Yosys's own gates."""
+    """What units are mapped to: the cells of liberties, or without any Yosys's own gates.
+
+    Attributes:
+        library: the cells, from pruned files.
+        digest: of these files.
+        delay: target for abc in ns.
+        sources: the files that the user named.
+    """
 
     library: Library | None
     digest: str
     delay: float | None
+    sources: tuple[Path, ...] = ()
 
     @property
     def gate_area(self) -> float | None:
@@ -108,7 +116,8 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
     folder = cache_directory(project_root()) / "liberty"
     folder.mkdir(parents=True, exist_ok=True)
     kept = []
-    for path in liberty.find_liberties(liberties):
+    sources = liberty.find_liberties(liberties)
+    for path in sources:
         text = liberty.pruned(path).encode("latin-1")
         copy = folder / f"{path.name.split('.')[0]}-{hashlib.sha256(text).hexdigest()[:20]}.lib"
         if not copy.is_file():
@@ -117,7 +126,8 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
             incoming.replace(copy)
         kept.append(copy)
     library = liberty.load(kept)
-    return Technology(library, " ".join(copy.name for copy in kept), delay or round(TARGET_FO4 * library.fo4, 4))
+    digest = " ".join(copy.name for copy in kept)
+    return Technology(library, digest, delay or round(TARGET_FO4 * library.fo4, 4), sources)
 
 
 def synthesise(hierarchy: Hierarchy, top: str, into: Technology) -> dict[str, Any]:
@@ -170,7 +180,9 @@ def _script(hierarchy: Hierarchy, top: str, own: list[str], ends: list[str], int
         large = " ".join(f"-dont_use {name}" for name in LARGE_REGISTERS)
         target = f"-D {1000 * (into.delay or 0):.0f} -constr constraints"
         sizing = ";buffer,-c;topo;upsize,{D};dnsize,{D};stime,-p"
-        script += [f"dfflibmap {large} {cells}", "opt", f"abc -script {recipe}{sizing} {cells} {target}"]
+        # A register keeps its name though its output may vanish behind an inverter
+        script += ["splitnets", "rename -wire -suffix _register t:$_*DFF*", f"dfflibmap {large} {cells}", "opt"]
+        script += [f"abc -script {recipe}{sizing} {cells} {target}"]
     return [*script, "setundef -zero", "splitnets", "opt_clean -purge"]
 
 

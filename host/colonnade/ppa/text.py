@@ -7,10 +7,14 @@ from typing import Any
 
 from colonnade.ppa.hierarchy import LEVELS
 from colonnade.ppa.memories import CHIP_NODE, LEAST_SRAM_WORDS, REGISTER_FILE, SRAM, Rate
+from colonnade.ppa.power_text import power_lines
 from colonnade.tables import Column, Table
 
 #: What the hardware's rule allows between two registers.
 MOST_FO4 = 100
+
+#: The files of a precision in the page's data, and what their columns are called.
+LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
 
 TITLES = {"render_unit": "render unit", "column": "column", "array": "array"}
 
@@ -53,6 +57,9 @@ class UnitTable:
             (paths.get("register_to_register") or {}).get("ns"),
             *fo4,
         )
+        for part, facts in unit["parts"].items():
+            row = (facts["kge"], None, None, facts["flops"], facts["um2"], *[None] * 5)
+            self._table.print("", f" {facts['count']} × {part}", *row)
 
 
 PATHS = ("register_to_register", "input_to_register", "register_to_output", "input_to_output")
@@ -93,6 +100,8 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"slowest path of a render unit, across its units: {_path(whole['register_to_register'])}"
     if report["opensta"]:
         yield f"OpenSTA, on PATH, as a second opinion on these paths: {second_opinion(report['opensta'])}"
+    if report["power"]:
+        yield from power_lines(report)
     yield ""
     yield f"kGE: {used['gates']}. Memories: {_rates()}; in kGE as area of {CHIP_NODE}."
     if used["liberty"]:

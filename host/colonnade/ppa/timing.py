@@ -48,14 +48,22 @@ class Timing:
 
 
 class Analysis:
-    """Propagates arrivals through a netlist."""
+    """Propagates arrivals through a netlist.
+
+    Attributes:
+        slew: of inputs and of the clock, in ns.
+        output_load: of outputs, in pF.
+        loads: of each net, in pF.
+        order: gates after those that drive them, without registers.
+        registers: all others.
+    """
 
     def __init__(self, netlist: Netlist, library: Library) -> None:
         self._netlist = netlist
         self.slew, self.output_load = self.edges(library)
-        self._loads = self._sum_loads()
-        self._registers = [instance for instance in netlist.instances if instance.cell.is_register]
-        self._order = self._sorted()
+        self.loads = self._sum_loads()
+        self.registers = [instance for instance in netlist.instances if instance.cell.is_register]
+        self.order = self._sorted()
         self._arcs: dict[str, list[tuple[Pin, list[Arc]]]] = {}
 
     @staticmethod
@@ -69,11 +77,11 @@ class Analysis:
     def timing(self) -> Timing:
         """The slowest paths."""
         clocked: dict[int, Edges] = {}
-        for register in self._registers:
-            for pin, arcs in self._outputs(register.cell):
+        for register in self.registers:
+            for pin, arcs in self.outputs(register.cell):
                 net = register.nets.get(pin.name)
                 if net is not None and arcs:
-                    clocked[net] = self._clocked(arcs, self._loads[net])
+                    clocked[net] = self._clocked(arcs, self.loads[net])
         begins = {net: [0.0, 0.0, self.slew, self.slew] for net in self._netlist.driven_outside}
         register_to_register, register_to_output = self._slowest(clocked)
         input_to_register, input_to_output = self._slowest(begins)
@@ -90,17 +98,17 @@ class Analysis:
     def _slowest(self, begins: dict[int, Edges]) -> tuple[Path | None, Path | None]:
         edges = {net: list(values) for net, values in begins.items()}
         before: dict[int, tuple[Instance, int]] = {}
-        for instance in self._order:
-            for pin, arcs in self._outputs(instance.cell):
+        for instance in self.order:
+            for pin, arcs in self.outputs(instance.cell):
                 net = instance.nets.get(pin.name)
                 if net is None:
                     continue
-                found = self._through(instance, arcs, edges, self._loads[net])
+                found = self._through(instance, arcs, edges, self.loads[net])
                 if found is not None:
                     edges[net], from_net = found
                     before[net] = (instance, from_net)
         to_register = max(
-            ((self._at_register(register, edges), register) for register in self._registers),
+            ((self._at_register(register, edges), register) for register in self.registers),
             key=lambda end: end[0],
             default=None,
         )
@@ -170,11 +178,12 @@ class Analysis:
         return self._netlist.names.get(net, "a net without a name")
 
     def _register_name(self, register: Instance) -> str:
-        nets = [register.nets[pin.name] for pin, _ in self._outputs(register.cell) if pin.name in register.nets]
+        nets = [register.nets[pin.name] for pin, _ in self.outputs(register.cell) if pin.name in register.nets]
         named = [self._netlist.names[net] for net in nets if net in self._netlist.names]
-        return named[0] if named else self._name(nets[0]) if nets else "a register"
+        return register.name or (named[0] if named else self._name(nets[0]) if nets else "a register")
 
-    def _outputs(self, cell: Cell) -> list[tuple[Pin, list[Arc]]]:
+    def outputs(self, cell: Cell) -> list[tuple[Pin, list[Arc]]]:
+        """The outputs of a cell with the arcs to them; of a register those from its clock."""
         found = self._arcs.get(cell.name)
         if found is None:
             wanted = ("rising_edge", "falling_edge") if cell.is_register else ("combinational",)

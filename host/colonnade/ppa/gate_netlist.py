@@ -1,0 +1,106 @@
+"""A netlist as ``harness/gates.cpp`` reads it: gates as truth tables with delays, registers, memories."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from colonnade.errors import UserError
+from colonnade.ppa.functions import truth_table
+from colonnade.ppa.hierarchy import Hierarchy
+from colonnade.ppa.netlist import Bit, Box, Instance, Netlist
+from colonnade.ppa.recording import CLOCK, Port
+
+
+def lines(
+    netlist: Netlist, hierarchy: Hierarchy, delays: Sequence[int], inputs: Sequence[Port], outputs: Sequence[Port]
+) -> Iterator[str]:
+    """The netlist's items.
+
+    Args:
+        netlist: the gates.
+        hierarchy: knows the memories' shapes.
+        delays: of each net's driver in ps.
+        inputs: those of the netlist but the clock, as they are joined.
+        outputs: those of the netlist, as they are joined.
+    """
+    require_all_driven(netlist)
+    yield f"nets {netlist.size}"
+    for port in reversed(inputs):
+        yield from ("input -" if isinstance(bit, bool) else f"input {bit}" for bit in netlist.inputs[port.name])
+    for port in reversed(outputs):
+        yield from (f"output {_text(bit)}" for bit in netlist.outputs[port.name])
+    yield from (f"tie {net} {value:d}" for net, value in netlist.ties.items())
+    tables: dict[tuple[str, ...], str] = {}
+    for net, instance, pin in netlist.drivers():
+        if instance.cell.is_register:
+            yield _register(net, instance, pin, delays[net], netlist, tables)
+        else:
+            table, nets = _function(instance, instance.cell.pins[pin].function, tables)
+            yield f"gate {net} {delays[net]} {table} {nets}"
+    for box in netlist.boxes:
+        depth, width = hierarchy.shape(box.kind)
+        yield f"memory {depth} {width}"
+        yield from _ports(box)
+
+
+def require_all_driven(netlist: Netlist) -> None:
+    """Fail on a net that something reads and nothing drives: the netlist and its parts do not match."""
+    driven = {net for net, _, _ in netlist.drivers()} | netlist.driven_outside | set(netlist.ties)
+    read = set(netlist.read_outside)
+    for instance in netlist.instances:
+        read.update(net for pin, net in instance.nets.items() if instance.cell.pins[pin].direction == "input")
+    missing = sorted(netlist.names.get(net, f"net {net}") for net in read - driven)
+    if missing:
+        raise RuntimeError(f"{len(missing)} nets of the gates have no driver, {missing[0]} among them")
+
+
+def _register(
+    net: int, instance: Instance, pin: str, delay: int, netlist: Netlist, tables: dict[tuple[str, ...], str]
+) -> str:
+    """One output of a flip-flop. It begins as if it had taken zero: so does a register of the simulated RTL."""
+    cell, state = instance.cell, instance.cell.state
+    if state is None or re.search(rf"\b({state.name}|{state.inverse})\b", state.following):
+        raise UserError(f"{cell.name} of the liberty is no plain flip-flop: power knows no others")
+    if [instance.nets.get(state.clock)] != netlist.inputs[CLOCK]:
+        raise RuntimeError(f"the register {instance.name or cell.name} has another clock than the others")
+    function = re.sub(rf"\b{state.inverse}\b", f"(!{state.name})", cell.pins[pin].function)
+    following = re.sub(rf"\b{state.name}\b", f"({state.following})", function)
+    table, nets = _function(instance, following, tables)
+    return f"register {net} {delay} {table[0]} {table} {nets}"
+
+
+def _function(instance: Instance, function: str, tables: dict[tuple[str, ...], str]) -> tuple[str, str]:
+    """The table of a function over the nets of an instance, and these nets."""
+    pins = [pin for pin in sorted(set(re.findall(r"[A-Za-z_]\w*", function))) if pin in instance.nets]
+    ties = tuple(f"{pin}={value:d}" for pin, value in sorted(instance.ties.items()))
+    key = (function, *pins, *ties)
+    if key not in tables:
+        for pin, value in instance.ties.items():
+            function = re.sub(rf"\b{pin}\b", f"{value:d}", function)
+        tables[key] = truth_table(function, pins)
+    return tables[key], " ".join(str(instance.nets[pin]) for pin in pins)
+
+
+def _ports(box: Box) -> Iterator[str]:
+    """The ports of one of firtool's memories."""
+    kinds = sorted({port.split("_")[0] for port in box.ports})
+    if any("mask" in port for port in box.ports) or not all(re.fullmatch(r"(RW|R|W)\d+", kind) for kind in kinds):
+        raise RuntimeError(f"memory {box.kind} has ports that the replay does not know: {', '.join(box.ports)}")
+    for kind in kinds:
+        address, enable = (_joined(box.ports[f"{kind}_{role}"]) for role in ("addr", "en"))
+        if kind.startswith("RW"):
+            writes, into, out = (_joined(box.ports[f"{kind}_{role}"]) for role in ("wmode", "wdata", "rdata"))
+        elif kind.startswith("R"):
+            writes, into, out = "0", "-", _joined(box.ports[f"{kind}_data"])
+        else:
+            writes, into, out = "1", _joined(box.ports[f"{kind}_data"]), "-"
+        yield f"port {address} {enable} {writes} {into} {out}"
+
+
+def _joined(bits: Sequence[Bit]) -> str:
+    return ",".join(_text(bit) for bit in bits) or "-"
+
+
+def _text(bit: Bit) -> str:
+    return f"{bit:d}" if isinstance(bit, bool) else f"n{bit}"
