@@ -27,7 +27,7 @@ LEVEL = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 1.2], [0, 0, -1.0, 0]])
 
 
 def boxes(width: int = 160, height: int = 120, steps: bool = True) -> Room:
-    """A level camera 1.2 m above the floor of a box, 4 m deep, 3 m wide, 2.4 m high; a near board in the middle."""
+    """A level camera 1.2 m above the floor of a box, 4 m deep, 3 m wide, 2.4 m high; a slanted board before it."""
     camera = RoomCamera(120.0, 120.0, width / 2 + 3, height / 2 - 2, LEVEL)
     rays = camera.directions(width, height)
     normals = np.array([[0.0, 0, -1], [0, -1, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0]])
@@ -41,7 +41,8 @@ def boxes(width: int = 160, height: int = 120, steps: bool = True) -> Room:
     facing = normals[which]
     if steps:
         board = (np.abs(rays[..., 0]) < 0.2) & (np.abs(rays[..., 1]) < 0.15)
-        depth, facing = np.where(board, 1.0, depth), np.where(board[..., np.newaxis], [0.0, 0.0, -1.0], facing)
+        slanted = 0.8 / (0.6 * rays[..., 0] + 0.8)
+        depth, facing = np.where(board, slanted, depth), np.where(board[..., np.newaxis], [-0.6, 0.0, -0.8], facing)
         albedo = np.where(board[..., np.newaxis], [0.9, 0.1, 0.1], albedo)
     return Room("boxes", albedo, facing, depth, True, camera, None)
 
