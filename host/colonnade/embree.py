@@ -6,18 +6,40 @@ Embree says which triangle a ray meets first; where on it, and how far, is compu
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from colonnade.meshes import Mesh
 
 Floats = NDArray[np.float64]
 
 #: Rays start this share of the box's edge before the box, so that 32-bit coordinates stay small.
 _RUN_UP = 1 / 64
+
+
+class Surface(Protocol):
+    """Triangles: vertices float64 [n, 3], faces int32 [m, 3]; a mesh is one."""
+
+    @property
+    def vertices(self) -> Floats:
+        """Positions."""
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """Rows of `vertices`."""
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """A surface without more.
+
+    Attributes:
+        vertices: float64 [n, 3].
+        faces: int32 [m, 3].
+    """
+
+    vertices: Floats
+    faces: NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -38,7 +60,7 @@ class SurfacePoints:
 class RayTracer:
     """A mesh that rays can be aimed at. All positions and directions are in mesh space, float64 [n, 3]."""
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Surface) -> None:
         """Build Embree's scene of ``mesh``, in its robust (watertight) mode."""
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene

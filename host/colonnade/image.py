@@ -20,6 +20,7 @@ from colonnade.bvh import TreeStatistics
 from colonnade.errors import UserError
 from colonnade.files import replacing
 from colonnade.manifest import Manifest
+from colonnade.mesh_materials import MeshMaterial
 from colonnade.meshes import Extent
 
 MAGIC = b"CLNDIMG1"
@@ -55,6 +56,7 @@ class ImageHeader:
         bounds_low, bounds_high: The object's tight box, vertex units, inclusive.
         frame: How the mesh lies in the object's cube.
         extent: Box and outline in mesh space, for framing.
+        materials: Of its faces, by their material's number.
         tree: None for an image without nodes.
     """
 
@@ -71,6 +73,7 @@ class ImageHeader:
     bounds_high: tuple[int, int, int]
     frame: ObjectFrame
     extent: Extent
+    materials: tuple[MeshMaterial, ...]
     tree: TreeStatistics | None
 
     def to_json(self) -> dict[str, Any]:
@@ -89,6 +92,7 @@ class ImageHeader:
         values["frame"] = ObjectFrame(frame["scale"], tuple(frame["offset"]))
         extent = {name: np.array(value, dtype=np.float64) for name, value in values["extent"].items()}
         values["extent"] = Extent(**extent)
+        values["materials"] = tuple(MeshMaterial(**material) for material in values["materials"])
         values["tree"] = TreeStatistics(**values["tree"]) if values["tree"] else None
         return ImageHeader(**values)
 

@@ -25,6 +25,7 @@ from colonnade.scene import Scene, load_scene
 from colonnade.simulate import build_simulator, render_rtl
 from colonnade.sizes import check_size
 from colonnade.toolchain import cache_directory, project_root
+from colonnade.viewpoint import made_of
 
 #: A build takes all processors by itself.
 _BUILDING = threading.Lock()
@@ -93,7 +94,7 @@ def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
     begun = time.perf_counter()
     try:
         with progress.step("packing the scene"):
-            image = pack(mesh, design.manifest)
+            image = pack(mesh, design.manifest, made_of(mesh.materials, scene.material))
             registers = placement(scene, image.header, design.manifest, width, height)
     except UserError as error:
         raise UserError(": ".join((*run.overrides, str(error)))) from error

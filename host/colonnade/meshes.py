@@ -10,13 +10,14 @@ import os
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from colonnade import solids, teapot
 from colonnade.errors import UserError
+from colonnade.mesh_files import read_surface
+from colonnade.mesh_materials import PLAIN, MeshMaterial
 from colonnade.surfaces import Faces, Floats, drop_faces, merge_rows, subdivide, vertex_normals
 
 #: File names that are taken for meshes.
@@ -57,7 +58,8 @@ class Mesh:
         vertices: float64 [n, 3], mesh space.
         faces: int32 [m, 3], counter-clockwise seen from outside.
         vertex_normals: float64 [n, 3], unit length, or 0 where the faces cancel.
-        face_materials: uint8 [m], index into the material table.
+        materials: What its surfaces are made of, as its file says; at least one.
+        face_materials: uint8 [m], index into `materials`.
         source_faces: int32 [m], the face's number in the source, where dropped faces count too.
         source_count: Faces of the source.
         name: For reports.
@@ -66,6 +68,7 @@ class Mesh:
     vertices: Floats
     faces: Faces
     vertex_normals: Floats
+    materials: tuple[MeshMaterial, ...]
     face_materials: npt.NDArray[np.uint8]
     source_faces: npt.NDArray[np.int32]
     source_count: int
@@ -137,12 +140,12 @@ def _read(path: Path, subdivisions: int) -> Mesh:
     if path.stat().st_size == 0:
         raise UserError(f"mesh file {path} is empty")
     try:
-        geometry = _load_geometry(path)
+        surface = read_surface(path)
     except (UserError, ImportError):
         raise
     except Exception as error:  # whatever a reader makes of noise
         raise UserError(f"{path} cannot be read as a mesh: {type(error).__name__}: {error}") from None
-    vertices, faces = geometry
+    vertices, faces = surface.vertices, surface.faces
     if len(faces) == 0:
         raise UserError(f"mesh {path} has no faces")
     vertices, faces = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
@@ -152,29 +155,28 @@ def _read(path: Path, subdivisions: int) -> Mesh:
         raise UserError(f"mesh {path}: a face names a vertex that does not exist")
     for _ in range(subdivisions):
         vertices, faces = subdivide(vertices, faces)
-    return clean_mesh(vertices, faces.astype(np.int32), name=path.stem, where=str(path))
+    return clean_mesh(
+        vertices,
+        faces.astype(np.int32),
+        name=path.stem,
+        where=str(path),
+        materials=surface.materials,
+        face_materials=np.repeat(surface.face_materials, 4**subdivisions),
+    )
 
 
-def _load_geometry(path: Path) -> tuple[Any, Any]:
-    """Vertices and faces as trimesh reads them; the parts of a scene are joined."""
-    import logging
+def clean_mesh(
+    vertices: Floats,
+    faces: Faces,
+    name: str,
+    where: str | None = None,
+    materials: tuple[MeshMaterial, ...] = (PLAIN,),
+    face_materials: npt.NDArray[np.uint8] | None = None,
+) -> Mesh:
+    """A mesh from raw vertices [n, 3] and faces [m, 3]; ``where`` names the source in errors.
 
-    import trimesh
-
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    loaded: Any = trimesh.load_scene(path, process=False)
-    parts = [part for part in loaded.dump() if isinstance(part, trimesh.Trimesh)]
-    if not parts:
-        raise UserError(f"mesh {path} has no faces")
-    if len(parts) == 1:
-        return parts[0].vertices, parts[0].faces
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
-    vertices = np.concatenate([part.vertices for part in parts])
-    return vertices, np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)])
-
-
-def clean_mesh(vertices: Floats, faces: Faces, name: str, where: str | None = None) -> Mesh:
-    """A mesh from raw vertices [n, 3] and faces [m, 3]; ``where`` names the source in errors."""
+    Without ``face_materials``, uint8 [m], all faces have the first material.
+    """
     label = f"mesh {where or name}"
     if len(faces) == 0:
         raise UserError(f"{label} has no faces")
@@ -201,7 +203,8 @@ def clean_mesh(vertices: Floats, faces: Faces, name: str, where: str | None = No
         vertices=vertices,
         faces=faces,
         vertex_normals=vertex_normals(vertices, faces),
-        face_materials=np.zeros(len(faces), dtype=np.uint8),
+        materials=materials,
+        face_materials=np.zeros(len(faces), dtype=np.uint8) if face_materials is None else face_materials[keep],
         source_faces=keep.astype(np.int32),
         source_count=source_count,
         name=name,

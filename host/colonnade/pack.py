@@ -6,6 +6,7 @@ order: nodes, triangles, attributes. Addresses in nodes are absolute.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ from colonnade.bvh import LEAF, NODE, Bvh, build_bvh
 from colonnade.errors import UserError
 from colonnade.image import ImageHeader, ObjectFrame, SceneImage
 from colonnade.manifest import Manifest
+from colonnade.mesh_materials import MeshMaterial
 from colonnade.meshes import Mesh
 from colonnade.surfaces import drop_faces, merge_rows, unit_rows
 
@@ -65,8 +67,14 @@ def quantise(mesh: Mesh, vertex_bits: int) -> QuantisedMesh:
     return QuantisedMesh(vertices.astype(np.int32), mesh.faces[keep], keep, frame)
 
 
-def pack(mesh: Mesh, manifest: Manifest) -> SceneImage:
+def pack(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | None = None) -> SceneImage:
     """The scene image of a mesh for the hardware of a manifest.
+
+    Args:
+        mesh: What to pack.
+        manifest: Of the hardware.
+        materials: What the mesh's materials are made of; their own unless given. Only which of them are glass is part
+            of the records.
 
     Raises:
         UserError: It does not fit; the message names the number and the setting.
@@ -91,7 +99,10 @@ def pack(mesh: Mesh, manifest: Manifest) -> SceneImage:
     _check_fits(mesh.name, manifest, bvh, record_count)
 
     sections = [_node_records(bvh, manifest, triangle_base)] if manifest.bvh else []
-    sections.append(_triangle_records(quantised, bvh.order, leaf_first, leaf_count, manifest))
+    materials = mesh.materials if materials is None else tuple(materials)
+    is_glass = np.array([material.kind == "glass" for material in materials])
+    is_clear = is_glass[mesh.face_materials[quantised.mesh_faces]]
+    sections.append(_triangle_records(quantised, bvh.order, leaf_first, leaf_count, is_clear, manifest))
     sections.append(_attribute_records(mesh, quantised, bvh.order, manifest, faces_per_record))
     used = quantised.vertices[quantised.faces.reshape(-1)]
     header = ImageHeader(
@@ -108,6 +119,7 @@ def pack(mesh: Mesh, manifest: Manifest) -> SceneImage:
         bounds_high=_corner(used.max(axis=0)),
         frame=quantised.frame,
         extent=mesh.extent,
+        materials=tuple(materials),
         tree=bvh.statistics if manifest.bvh else None,
     )
     return SceneImage(header, np.concatenate(sections), mesh.source_faces[quantised.mesh_faces[bvh.order]])
@@ -176,12 +188,14 @@ def _triangle_records(
     order: npt.NDArray[np.uint32],
     leaf_first: npt.NDArray[np.uint32],
     leaf_count: npt.NDArray[np.uint32],
+    is_clear: npt.NDArray[np.bool_],
     manifest: Manifest,
 ) -> Records:
     values: dict[str, npt.NDArray[Any]] = {"firstTriangle": leaf_first, "count": leaf_count}
     for k in range(int(manifest.config["geometry"]["trianglesPerRecord"])):
         present = leaf_count > k
         packed = np.minimum(leaf_first + k, len(order) - 1)
+        values[f"isClear[{k}]"] = is_clear[order[packed]] & present
         corners = quantised.vertices[quantised.faces[order[packed]]] * present[:, None, None]
         for j in range(3):
             values |= _vector(f"vertices[{3 * k + j}]", corners[:, j])

@@ -15,13 +15,13 @@ from colonnade.errors import UserError
 from colonnade.image import ImageHeader
 from colonnade.manifest import Manifest
 from colonnade.scene import Scene
+from colonnade.surface_registers import check_surfaces, surface_registers
 from colonnade.viewpoint import FloatPlacement, float_placement
 
 __all__ = ["FloatPlacement", "float_placement", "placement", "registers_of"]
 
 Floats = npt.NDArray[np.float64]
 AXES = "xyz"
-CHANNELS = "rgb"
 
 #: More cycles than a ray spends on a record, whatever the memory's latency.
 WATCHDOG_CYCLES_PER_RECORD = 32
@@ -42,17 +42,23 @@ def placement(scene: Scene, header: ImageHeader, manifest: Manifest, width: int,
                 if value > 0
                 else f"a frame of {width}x{height} has no pixels"
             )
-    return registers_of(float_placement(scene, header.extent, width, height), header, manifest)
+    return registers_of(float_placement(scene, header.extent, width, height, header.materials), header, manifest)
 
 
 def registers_of(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
-    """The registers for a frame that was placed in floats."""
-    registers: dict[str, int] = {"frame.width": view.width, "frame.height": view.height}
+    """The registers for a frame that was placed in floats; those that say nothing here are 0.
+
+    Raises:
+        UserError: The frame asks for more than the hardware has.
+    """
+    check_surfaces(view, manifest)
+    registers = dict.fromkeys((name for name, register in manifest.registers.items() if register.access == "rw"), 0)
+    registers |= {"frame.width": view.width, "frame.height": view.height}
     registers |= _positions(view, header, manifest)
     registers |= _directions(view, manifest)
     registers |= _bounds(header)
     registers |= _where_the_object_is(view, registers, manifest)
-    registers |= _shading(view, header, manifest)
+    registers |= surface_registers(view, header, manifest)
     # No frame that makes progress takes longer: every ray, and its shadow ray, reads every record.
     cycles = 1_000_000 + 2 * view.width * view.height * WATCHDOG_CYCLES_PER_RECORD * header.record_count
     registers["frame.watchdogCycles"] = min(cycles, (1 << 32) - 1)
@@ -65,12 +71,13 @@ def _positions(view: FloatPlacement, header: ImageHeader, manifest: Manifest) ->
     reach = 1 << (numbers["sceneBits"] - 1)
     offset = np.array(header.frame.offset)
     steps: dict[str, Floats] = {}
-    for name, point in (("camera", view.origin), ("light", view.light)):
+    lights = [(f"lights[{index}]", light.position) for index, light in enumerate(view.lights)]
+    for name, point in (("camera", view.origin), *lights):
         steps[name] = (point - offset) * header.frame.scale * 2.0 ** numbers["gridFraction"]
         if not np.abs(steps[name]).max() < reach - 1:
             edge = header.extent.edge * header.frame.scale * 2.0 ** numbers["gridFraction"]
             raise UserError(
-                f"the {name} is {np.abs(steps[name]).max() / edge:,.0f} object-cube edges away, the hardware reaches"
+                f"{_spoken(name)} is {np.abs(steps[name]).max() / edge:,.0f} object-cube edges away, the hardware reaches"
                 f" {reach / edge:,.0f}: move it nearer"
             )
     shift, limit = 0, (1 << (numbers["macBits"] - 1)) - 1
@@ -189,29 +196,10 @@ def _outline(pixels: Floats, manifest: Manifest) -> list[tuple[int, int, int]]:
     return edges
 
 
-def _shading(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
-    numbers = manifest.numbers
-    white = (1 << numbers["colourBits"]) - 1
-    steps = view.shadow_offset * header.frame.scale * 2.0 ** numbers["gridFraction"]
-    most = min(2.0 ** (numbers["vertexBits"] - 2 + numbers["gridFraction"]), 2.0 ** (numbers["gridBits"] - 2) - 1)
-    result = {
-        "light.shadowOffset": int(np.clip(np.rint(steps), 1, max(1.0, most))),
-        "shading.flat": int(view.flat),
-        "shading.shadows": int(view.shadows),
-    }
-    light = 1 << numbers["lightFraction"]
-    most_light = (1 << numbers["lightBits"]) - 1
-    result |= _colour("light.colour", view.light_colour * light, most_light)
-    result |= _colour("ambient", view.ambient * light, most_light)
-    result |= _colour("background", view.background * white, white)
-    for index in range(int(manifest.config["frame"]["materials"])):
-        result |= _colour(f"materials[{index}].albedo", view.albedo * white * (index == 0), white)
-    return result
-
-
 def _vector(name: str, values: Floats) -> dict[str, int]:
     return {f"{name}.{axis}": int(np.rint(values[a])) for a, axis in enumerate(AXES)}
 
 
-def _colour(name: str, values: Floats, most: int) -> dict[str, int]:
-    return {f"{name}.{channel}": min(most, int(np.rint(values[c]))) for c, channel in enumerate(CHANNELS)}
+def _spoken(name: str) -> str:
+    """The register group's name in a message."""
+    return f"light {int(name[7:-1]) + 1}" if name.startswith("lights[") else f"the {name}"

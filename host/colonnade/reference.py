@@ -1,4 +1,7 @@
-"""The reference picture: the float scene, unquantised, by the shading rules of docs/numbers.md in 64 bits."""
+"""The reference picture: the float scene, unquantised, by the shading rules of docs/shading.md in 64 bits.
+
+With a room the background is a `Backdrop`; unless another is given, that of the full maps and the depth map's mesh.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.embree import RayTracer, SurfacePoints
 from colonnade.progress import QUIET, Progress
+from colonnade.reference_object import PlacedObject
+from colonnade.reference_paths import PathTracer, Traced
 
 if TYPE_CHECKING:
+    from colonnade.backdrop import Backdrop
     from colonnade.meshes import Mesh
     from colonnade.viewpoint import FloatPlacement
 
@@ -32,6 +37,9 @@ class ReferenceResult:
         t: float64 [height, width], in lengths of the pixel's direction (depth in mesh units); not a number where the
             ray misses.
         rays: counts by kind (primary, shadow, reflection, refraction) and `in_box`, those that enter the object's box.
+        shadow_ratio: float64 [height, width, 3]: what is left of the light on a background that is seen directly; 1
+            elsewhere and without a room.
+        outside: bool [height, width]: a part of the colour is of a background beyond all maps.
     """
 
     image: Floats
@@ -39,39 +47,41 @@ class ReferenceResult:
     hit_triangles: NDArray[np.int64]
     t: Floats
     rays: dict[str, int]
+    shadow_ratio: Floats
+    outside: NDArray[np.bool_]
 
 
-def render_reference(mesh: Mesh, view: FloatPlacement, progress: Progress = QUIET) -> ReferenceResult:
-    """Render the mesh as placed by ``view``, with Embree, without any of the hardware's rounding."""
-    tracer = RayTracer(mesh)
-    shape = view.height, view.width
-    image = np.empty((*shape, 3))
-    triangles = np.full(shape, -1, dtype=np.int64)
-    distances = np.full(shape, np.nan)
-    rays = {"primary": view.width * view.height, "shadow": 0, "reflection": 0, "refraction": 0, "in_box": 0}
+def render_reference(
+    mesh: Mesh, view: FloatPlacement, progress: Progress = QUIET, backdrop: Backdrop | None = None
+) -> ReferenceResult:
+    """Render the mesh as placed by ``view``, with Embree, without any of the hardware's rounding.
+
+    ``backdrop`` is the room that the placement was made for; without one, what misses the object has one colour.
+    """
+    tracer = PathTracer(PlacedObject(mesh, view), view, backdrop)
     rows_at_once = max(1, _RAYS_AT_ONCE // view.width)
+    parts: list[Traced] = []
     with progress.step("tracing the reference") as report:
         for first in range(0, view.height, rows_at_once):
             rows = slice(first, min(first + rows_at_once, view.height))
             directions = primary_directions(view, rows)
             origins = np.broadcast_to(view.origin, directions.shape)
-            faces = tracer.first_hits(origins, directions)
-            seen = np.flatnonzero(faces >= 0)
-            rays["in_box"] += int(np.count_nonzero(tracer.enters_box(origins, directions)[0]))
-
-            colours = np.tile(view.background, (len(directions), 1))
-            points = tracer.surface_points(faces[seen], origins[seen], directions[seen])
-            colours[seen] = _shade(tracer, mesh, view, faces[seen], directions[seen], points, rays)
-
-            t = np.full(len(directions), np.nan)
-            t[seen] = points.t
-            source = np.full(len(directions), -1, dtype=np.int64)
-            source[seen] = mesh.source_faces[faces[seen]]
-            image[rows] = colours.reshape(-1, view.width, 3)
-            triangles[rows] = source.reshape(-1, view.width)
-            distances[rows] = t.reshape(-1, view.width)
+            parts.append(tracer.trace(origins, directions, _map_pixels(view, rows, backdrop)))
             report(rows.stop / view.height)
-    return ReferenceResult(image, triangles >= 0, triangles, distances, rays)
+
+    def whole(name: str, *channels: int) -> NDArray[np.generic]:
+        return np.concatenate([getattr(part, name) for part in parts]).reshape(view.height, view.width, *channels)
+
+    faces = np.asarray(whole("faces"), dtype=np.int64)
+    return ReferenceResult(
+        image=np.asarray(whole("colours", 3), dtype=np.float64),
+        object_mask=faces >= 0,
+        hit_triangles=np.where(faces >= 0, mesh.source_faces[faces].astype(np.int64), -1),
+        t=np.asarray(whole("t"), dtype=np.float64),
+        rays=tracer.rays,
+        shadow_ratio=np.asarray(whole("shadow_ratio", 3), dtype=np.float64),
+        outside=np.asarray(whole("outside"), dtype=np.bool_),
+    )
 
 
 def primary_directions(view: FloatPlacement, rows: slice) -> Floats:
@@ -81,40 +91,10 @@ def primary_directions(view: FloatPlacement, rows: slice) -> Floats:
     return np.asarray(view.direction + x * view.step_x + y * view.step_y).reshape(-1, 3)
 
 
-def _shade(
-    tracer: RayTracer,
-    mesh: Mesh,
-    view: FloatPlacement,
-    faces: NDArray[np.int64],
-    directions: Floats,
-    points: SurfacePoints,
-    rays: dict[str, int],
-) -> Floats:
-    """Linear colours, float64 [n, 3], of the points where rays meet the object; counts the shadow rays."""
-    corners = tracer.corners[faces]
-    geometric = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    back_side = np.einsum("ni,ni->n", geometric, directions) > 0
-    turned = np.where(back_side, -1.0, 1.0)[:, None]
-    facing = geometric * turned
-    normals = facing
-    if not view.flat:
-        smooth = np.einsum("nj,njk->nk", points.weights, mesh.vertex_normals[mesh.faces[faces]]) * turned
-        normals = np.where(smooth.any(axis=1, keepdims=True), smooth, facing)
-
-    # The shadow ray leaves from a little above the surface, on the side that is seen.
-    origins = points.position + view.shadow_offset * facing
-    to_light = view.light - origins
-    cosine = np.einsum("ni,ni->n", _unit(normals), _unit(to_light)).clip(min=0.0)
-    if view.shadows:
-        asking = np.flatnonzero(cosine > 0)
-        rays["shadow"] += len(asking)
-        rays["in_box"] += int(np.count_nonzero(tracer.enters_box(origins[asking], to_light[asking], limit=1.0)[0]))
-        cosine[asking[tracer.occluded(origins[asking], to_light[asking])]] = 0.0
-    lit = view.albedo * (view.ambient + view.light_colour * cosine[:, None])
-    return np.asarray(lit.clip(max=1.0), dtype=np.float64)
-
-
-def _unit(vectors: Floats) -> Floats:
-    """Vectors [n, 3] at length 1; zero stays zero."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 0, length, 1.0), dtype=np.float64)
+def _map_pixels(view: FloatPlacement, rows: slice, backdrop: Backdrop | None) -> Floats:
+    """Where in the room's maps the pixels of some rows look, (u, v), float64 [rows * width, 2]."""
+    across = along = 1.0
+    if backdrop is not None:
+        across, along = backdrop.room.width / view.width, backdrop.room.height / view.height
+    v, u = np.mgrid[rows, : view.width] + 0.5
+    return np.stack([u.ravel() * across, v.ravel() * along], axis=1)

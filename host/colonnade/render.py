@@ -22,6 +22,7 @@ from colonnade.placement import FloatPlacement, float_placement, placement
 from colonnade.progress import QUIET, Progress
 from colonnade.scene import Scene, load_scene
 from colonnade.sizes import check_size
+from colonnade.viewpoint import made_of
 
 BACKENDS = ("rtl", "model", "reference")
 
@@ -64,16 +65,16 @@ def render(
         backend: One of `BACKENDS`.
         size: (width, height); the scene's unless given.
         mesh: Replaces the scene's mesh: a name or a file.
-        background: A room; this version renders objects alone and refuses one.
+        background: A room's folder, in place of the scene's background.
         hits: The hit triangles are wanted: the hardware must be configured to deliver them.
         progress: Shows the steps.
 
     Raises:
         UserError: Something about the input is wrong, or the hardware flagged an error.
     """
-    if background is not None:
-        raise UserError("--background: this version renders the object alone, without a room; leave the option out")
     scene = load_scene(scene_path)
+    if background is not None:
+        scene = scene.with_room(background)
     if mesh is not None:
         scene = scene.with_mesh(mesh)
     width, height = size or (scene.frame.width, scene.frame.height)
@@ -81,6 +82,8 @@ def render(
     check_size((width, height), manifest)
     if backend == "reference":
         return _render_reference(scene, manifest, (width, height), progress)
+    if scene.background.room is not None:
+        raise UserError(f"--backend {backend} renders the object alone, without a room: use --backend reference")
     if hits and backend == "rtl":
         from colonnade.simulate import require_hits
 
@@ -88,7 +91,7 @@ def render(
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        image = pack(load_mesh(scene.mesh_source), manifest)
+        image = pack_scene(scene, manifest)
         registers = placement(scene, image.header, manifest, width, height)
     packed = time.perf_counter()
     seconds: dict[str, float | None] = {"pack": packed - begun, "build": None}
@@ -111,8 +114,14 @@ def render(
         seconds["run"] = time.perf_counter() - packed
     require_no_errors(frame)
     report = frame_report(backend, manifest, image.header, frame) | {"seconds": seconds} | report
-    view = float_placement(scene, image.header.extent, width, height)
+    view = float_placement(scene, image.header.extent, width, height, image.header.materials)
     return _result(frame, image, view, manifest, report)
+
+
+def pack_scene(scene: Scene, manifest: Manifest) -> SceneImage:
+    """The scene image of a scene's mesh, made of what the scene says."""
+    mesh = load_mesh(scene.mesh_source)
+    return pack(mesh, manifest, made_of(mesh.materials, scene.material))
 
 
 def require_no_errors(frame: Frame) -> None:
@@ -150,12 +159,12 @@ def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: F
     rays = {
         "primary": counters["raysPrimary"],
         "shadow": counters["raysShadow"],
-        "reflection": 0,
-        "refraction": 0,
+        "reflection": counters["raysReflection"],
+        "refraction": counters["raysRefraction"],
         "in_box": counters["raysInBox"],
     }
     cycles = counters.get("cycles")
-    everything = rays["primary"] + rays["shadow"]
+    everything = sum(count for kind, count in rays.items() if kind != "in_box")
     return {
         "backend": backend,
         "config": manifest.config,
@@ -180,9 +189,16 @@ def _render_reference(scene: Scene, manifest: Manifest, size: tuple[int, int], p
 
     begun = time.perf_counter()
     mesh = load_mesh(scene.mesh_source)
-    view = float_placement(scene, mesh.extent, *size)
+    room = backdrop = None
+    if scene.background.room is not None:
+        from colonnade.depth_mesh import full_backdrop
+        from colonnade.room import load_room
+
+        room = load_room(scene.background.room)
+        backdrop = full_backdrop(room)
+    view = float_placement(scene, mesh.extent, *size, mesh.materials, room)
     loaded = time.perf_counter()
-    reference = render_reference(mesh, view, progress)
+    reference = render_reference(mesh, view, progress, backdrop)
     report = {
         "backend": "reference",
         "config": manifest.config,

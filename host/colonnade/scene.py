@@ -59,23 +59,64 @@ class Light:
         position: World; None when relative.
         offset: From the centre of the object's cube, in its edges: right, up, towards the camera.
         colour: Intensity a channel; 1 lights a surface that faces it with its albedo.
-        shadows: Whether it casts any.
-        shadow_offset: How far from the surface a shadow ray starts, in edges of the object's cube.
+        falloff: Distance at which it has that intensity, world units; nearer it is brighter, up to four times, farther
+            darker, with the squared distance. None: equally bright everywhere.
+        shadows: Whether any light casts shadows; of several lights the first one's counts, as for the next.
+        shadow_offset: How far from the surface secondary rays start, in edges of the object's cube.
     """
 
     position: Vector | None = None
     offset: Vector = (1.2, 1.6, 1.5)
     colour: Vector = (0.9, 0.9, 0.9)
+    falloff: float | None = None
     shadows: bool = True
     shadow_offset: float = 1 / 2048
 
 
 @dataclass(frozen=True)
 class Material:
-    """A diffuse surface; flat means geometric normals instead of the vertices'."""
+    """What the object is made of; where None, the mesh's own materials say.
 
-    albedo: Vector = (0.8, 0.8, 0.8)
+    Attributes:
+        kind: diffuse, mirror or glass.
+        albedo: Reflected, or tint of what is mirrored or let through.
+        ior: Index of refraction of glass.
+        flat: Geometric normals instead of the vertices'.
+    """
+
+    kind: str | None = None
+    albedo: Vector | None = None
+    ior: float | None = None
     flat: bool = False
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Where in a room the object stands, in place of scale and translation.
+
+    Attributes:
+        stand_at: Pixel (u, v) of the room's maps: the object stands on what is seen there, the world's y up; None is
+            the middle of the picture, 0.7 of its height down.
+        size: The longest edge of the mesh's box, metres.
+        turn: About the vertical, degrees, after the transform's rotation.
+    """
+
+    stand_at: tuple[float, float] | None = None
+    size: float = 0.3
+    turn: float = 0.0
+
+
+@dataclass(frozen=True)
+class Paths:
+    """How rays go on from mirrors and glass.
+
+    Attributes:
+        bounces: Reflections and refractions of a path that are traced; the ray after them meets the background only.
+        shadow_transmittance: What glass lets through of a light.
+    """
+
+    bounces: int = 4
+    shadow_transmittance: float = 0.6
 
 
 @dataclass(frozen=True)
@@ -83,6 +124,14 @@ class Colour:
     """A linear colour."""
 
     colour: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Background:
+    """What rays meet that miss the object: a room, or one linear colour."""
+
+    colour: Vector = (0.0, 0.0, 0.0)
+    room: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -95,20 +144,35 @@ class FrameSize:
 
 @dataclass(frozen=True)
 class Scene:
-    """One object, one camera, one light."""
+    """One object, one camera, at least one light.
+
+    With a room the camera is the room's, and the world is the room's world, in metres.
+    """
 
     mesh: MeshSource
     transform: Transform = field(default_factory=Transform)
     camera: Camera = field(default_factory=lambda: Camera(direction=(0.45, 0.35, 1.0)))
     light: Light = field(default_factory=Light)
+    more_lights: tuple[Light, ...] = ()
     material: Material = field(default_factory=Material)
     ambient: Colour = field(default_factory=lambda: Colour((0.1, 0.1, 0.1)))
-    background: Colour = field(default_factory=Colour)
+    background: Background = field(default_factory=Background)
+    placing: Placing | None = None  # in a room without a [transform]: the default one
+    paths: Paths = field(default_factory=Paths)
     frame: FrameSize = field(default_factory=FrameSize)
 
     def with_mesh(self, name_or_path: str) -> Scene:
         """The scene with another mesh: a name, or a path relative to the working directory."""
         return replace(self, mesh=MeshSource(name=name_or_path))
+
+    def with_room(self, folder: Path) -> Scene:
+        """The scene in a room, a folder of maps."""
+        return replace(self, background=replace(self.background, room=folder))
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """All lights, the first one first."""
+        return self.light, *self.more_lights
 
     @property
     def mesh_source(self) -> str | Path:

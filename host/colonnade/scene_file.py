@@ -4,17 +4,35 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from colonnade.errors import UserError
-from colonnade.scene import Camera, Colour, FrameSize, Light, Material, MeshSource, Scene, Transform, Vector
+from colonnade.scene import (
+    Background,
+    Camera,
+    Colour,
+    FrameSize,
+    Light,
+    Material,
+    MeshSource,
+    Paths,
+    Placing,
+    Scene,
+    Transform,
+    Vector,
+)
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+#: Kinds of materials.
+KINDS = ("diffuse", "mirror", "glass")
+#: More would be refused by any configuration.
+MOST_BOUNCES = 15
 
 
 def read_scene(file: Path) -> Scene:
@@ -33,7 +51,8 @@ def read_scene(file: Path) -> Scene:
 class _Reader:
     """Checks and converts the tables of one file."""
 
-    tables = ("mesh", "transform", "camera", "light", "material", "ambient", "background", "frame")
+    tables = "mesh transform object camera light material paths ambient background frame".split()
+    light_keys = ("position", "offset", "colour", "falloff")
 
     def __init__(self, file: Path) -> None:
         self.file = file
@@ -43,25 +62,36 @@ class _Reader:
 
     def scene(self, data: Mapping[str, Any]) -> Scene:
         self.only(data, self.tables, "")
+        lights = self.lights(data)
+        background = self.background(self.table(data, "background", ("colour", "room")))
+        placing = self.table(data, "object", ("stand_at", "size", "turn"))
+        if background.room is not None and "camera" in data:
+            raise self.fail("the camera is the room's: leave out [camera], or background.room")
+        if background.room is None and "object" in data:
+            raise self.fail("[object] says where the object stands in a room: it needs background.room")
+        transform = self.table(data, "transform", ("rotate", "scale", "translate"))
+        if "object" in data and ("scale" in transform or "translate" in transform):
+            raise self.fail("[object] places the object: leave out transform.scale and transform.translate")
         return Scene(
             mesh=self.mesh(self.table(data, "mesh", ("name", "path"))),
-            transform=self.transform(self.table(data, "transform", ("rotate", "scale", "translate"))),
+            transform=self.transform(transform),
             camera=self.camera(self.table(data, "camera", ("position", "target", "direction", "framing", "up", "fov"))),
-            light=self.light(self.table(data, "light", ("position", "offset", "colour", "shadows", "shadow_offset"))),
-            material=self.material(self.table(data, "material", ("albedo", "flat"))),
+            light=lights[0],
+            more_lights=lights[1:],
+            material=self.material(self.table(data, "material", ("kind", "albedo", "ior", "flat"))),
             ambient=Colour(self.colour(self.table(data, "ambient", ("colour",)), "ambient.colour", (0.1,) * 3, 15.0)),
-            background=Colour(
-                self.colour(self.table(data, "background", ("colour",)), "background.colour", (0.0,) * 3, 1.0)
-            ),
+            background=background,
+            placing=self.placing(placing) if "object" in data else None,
+            paths=self.paths(self.table(data, "paths", ("bounces", "shadow_transmittance"))),
             frame=self.frame(self.table(data, "frame", ("width", "height"))),
         )
 
-    def only(self, data: Mapping[str, Any], known: tuple[str, ...], prefix: str) -> None:
+    def only(self, data: Mapping[str, Any], known: Sequence[str], prefix: str) -> None:
         for key in data:
             if key not in known:
                 raise self.fail(f"unknown key {prefix}{key}; known here: {', '.join(known)}")
 
-    def table(self, data: Mapping[str, Any], name: str, known: tuple[str, ...]) -> Mapping[str, Any]:
+    def table(self, data: Mapping[str, Any], name: str, known: Sequence[str]) -> Mapping[str, Any]:
         table = data.get(name, {})
         if not isinstance(table, dict):
             raise self.fail(f"{name} must be a table: [{name}]")
@@ -104,6 +134,16 @@ class _Reader:
                 raise self.fail(f"camera.{name} must not be zero")
         return camera
 
+    def lights(self, data: Mapping[str, Any]) -> tuple[Light, ...]:
+        """One table [light], or several [[light]]; what holds for all of them stands in the first."""
+        given = data.get("light", {})
+        tables = given if isinstance(given, list) and given else [given]
+        lights = []
+        for index, table in enumerate(tables):
+            known = (*self.light_keys, "shadows", "shadow_offset") if index == 0 else self.light_keys
+            lights.append(self.light(self.table({"light": table}, "light", known)))
+        return tuple(lights)
+
     def light(self, table: Mapping[str, Any]) -> Light:
         if "position" in table and "offset" in table:
             raise self.fail("[light] has a position or an offset, not both")
@@ -112,13 +152,50 @@ class _Reader:
             position=self.vector(table, "light.position", (0.0, 0.0, 0.0)) if "position" in table else None,
             offset=self.vector(table, "light.offset", default.offset),
             colour=self.colour(table, "light.colour", default.colour, 15.0),
+            falloff=self.number(table, "light.falloff", 1.0, 1e-6, 1e6) if "falloff" in table else None,
             shadows=self.boolean(table, "light.shadows", True),
             shadow_offset=self.number(table, "light.shadow_offset", default.shadow_offset, 0.0, 0.25),
         )
 
     def material(self, table: Mapping[str, Any]) -> Material:
-        albedo = self.colour(table, "material.albedo", Material().albedo, 1.0)
-        return Material(albedo, self.boolean(table, "material.flat", False))
+        kind = table.get("kind")
+        if kind is not None and kind not in KINDS:
+            raise self.fail(f"material.kind must be one of {', '.join(KINDS)}")
+        if "ior" in table and kind not in (None, "glass"):
+            raise self.fail(f"material.ior belongs to glass, not to a {kind} material")
+        return Material(
+            kind=kind,
+            albedo=self.colour(table, "material.albedo", (0.0,) * 3, 1.0) if "albedo" in table else None,
+            ior=self.number(table, "material.ior", 1.5, 1.0, 4.0) if "ior" in table else None,
+            flat=self.boolean(table, "material.flat", False),
+        )
+
+    def background(self, table: Mapping[str, Any]) -> Background:
+        room = table.get("room")
+        if room is not None and (not isinstance(room, str) or not room):
+            raise self.fail("background.room must be text: the folder of a room, relative to the scene file")
+        colour = self.colour(table, "background.colour", (0.0,) * 3, 1.0)
+        return Background(colour, self.file.parent / room if room is not None else None)
+
+    def placing(self, table: Mapping[str, Any]) -> Placing:
+        pixel = table.get("stand_at")
+        if pixel is not None:
+            numbers = isinstance(pixel, list) and len(pixel) == 2
+            if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) or not v >= 0 for v in pixel):
+                raise self.fail("object.stand_at must be two numbers: a pixel of the room's maps, across and down")
+            pixel = (float(pixel[0]), float(pixel[1]))
+        return Placing(
+            stand_at=pixel,
+            size=self.number(table, "object.size", Placing().size, 1e-3, 1e3),
+            turn=self.number(table, "object.turn", 0.0, -360.0, 360.0),
+        )
+
+    def paths(self, table: Mapping[str, Any]) -> Paths:
+        bounces = table.get("bounces", Paths().bounces)
+        if isinstance(bounces, bool) or not isinstance(bounces, int) or not 0 <= bounces <= MOST_BOUNCES:
+            raise self.fail(f"paths.bounces must be a whole number from 0 to {MOST_BOUNCES}")
+        transmittance = Paths().shadow_transmittance
+        return Paths(bounces, self.number(table, "paths.shadow_transmittance", transmittance, 0.0, 1.0))
 
     def frame(self, table: Mapping[str, Any]) -> FrameSize:
         sizes = {}

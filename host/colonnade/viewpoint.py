@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from colonnade.errors import UserError
+from colonnade.cameras import Camera, room_camera, scene_camera
+from colonnade.mesh_materials import PLAIN, MeshMaterial
 from colonnade.meshes import Extent
-from colonnade.scene import Scene, Transform, Vector
+from colonnade.pose import Pose, object_pose
+from colonnade.scene import Light, Material, Scene
+
+if TYPE_CHECKING:
+    from colonnade.room import Room
 
 Floats = npt.NDArray[np.float64]
 
-#: A framed object is at most this part of the picture's width.
-WIDEST = 0.9
+
+@dataclass(frozen=True)
+class PlacedLight:
+    """A point light in mesh space.
+
+    Attributes:
+        position: float64 [3].
+        colour: float64 [3], linear.
+        reach: Distance at which it has that colour, mesh units; None where it is equally bright everywhere.
+    """
+
+    position: Floats
+    colour: Floats
+    reach: float | None = None
 
 
 @dataclass(frozen=True)
@@ -28,11 +46,15 @@ class FloatPlacement:
     Attributes:
         width, height: Pixels.
         origin, direction, step_x, step_y: float64 [3].
-        light: Position, float64 [3].
-        light_colour, ambient, albedo, background: float64 [3], linear.
+        lights: At least one.
+        materials: Of the mesh's `face_materials`, at least one.
+        ambient, background: float64 [3], linear.
         flat: Shade with geometric normals.
         shadows: Trace shadow rays.
-        shadow_offset: Along the geometric normal that faces the ray, mesh units.
+        shadow_offset: How far off the surface secondary rays start, mesh units.
+        shadow_transmittance: What glass lets through of a light.
+        bounces: Reflections and refractions of a path that are traced.
+        view_to_mesh: float64 [3, 4] from a room's view space, metres, to mesh space; None without a room.
     """
 
     width: int
@@ -41,109 +63,87 @@ class FloatPlacement:
     direction: Floats
     step_x: Floats
     step_y: Floats
-    light: Floats
-    light_colour: Floats
+    lights: tuple[PlacedLight, ...]
+    materials: tuple[MeshMaterial, ...]
     ambient: Floats
-    albedo: Floats
     background: Floats
     flat: bool
     shadows: bool
     shadow_offset: float
+    shadow_transmittance: float = 0.6
+    bounces: int = 4
+    view_to_mesh: Floats | None = None
+
+    @property
+    def light(self) -> Floats:
+        """Position of the first light, float64 [3]."""
+        return self.lights[0].position
+
+    @property
+    def light_colour(self) -> Floats:
+        """Colour of the first light, float64 [3]."""
+        return self.lights[0].colour
+
+    @property
+    def albedo(self) -> Floats:
+        """Albedo of the first material, float64 [3]."""
+        return np.array(self.materials[0].albedo)
 
 
-def float_placement(scene: Scene, extent: Extent, width: int, height: int) -> FloatPlacement:
-    """The frame of a scene whose mesh has that extent (`Mesh.extent`, or that of an image's header)."""
-    rotation = rotation_matrix(scene.transform)
-    scale, translate = scene.transform.scale, np.array(scene.transform.translate)
+def float_placement(
+    scene: Scene,
+    extent: Extent,
+    width: int,
+    height: int,
+    materials: tuple[MeshMaterial, ...] = (PLAIN,),
+    room: Room | None = None,
+) -> FloatPlacement:
+    """The frame of a scene.
 
-    def to_world(points: Floats) -> Floats:
-        return np.asarray(points @ rotation.T * scale + translate, dtype=np.float64)
-
-    def to_mesh(point: Floats) -> Floats:
-        return np.asarray((point - translate) / scale @ rotation, dtype=np.float64)
-
-    centre, edge = to_world(extent.centre), extent.edge * scale
-    slope = math.tan(math.radians(scene.camera.fov) / 2)
-    if scene.camera.position is not None:
-        position = np.array(scene.camera.position)
-        target = centre if scene.camera.target is None else np.array(scene.camera.target)
-        if not (target - position).any():
-            raise UserError("the camera's position is its target: move one of them")
-        right, up, toward = camera_axes(position - target, scene.camera.up)
+    Args:
+        scene: What to render.
+        extent: Of its mesh (`Mesh.extent`, or that of an image's header).
+        width: Pixels.
+        height: Pixels.
+        materials: Of the mesh; what the scene says takes their place.
+        room: The one that `scene.background` names; then its camera sees the frame.
+    """
+    pose = object_pose(scene, extent, room)
+    centre, edge = pose.to_world(extent.centre), extent.edge * pose.scale
+    if room is not None:
+        camera = room_camera(room, width, height)
     else:
-        assert scene.camera.direction is not None
-        right, up, toward = camera_axes(np.array(scene.camera.direction), scene.camera.up)
-        outline = to_world(extent.outline) - centre
-        across, along = scene.camera.framing * 2 * slope, WIDEST * 2 * slope * width / height
-        aside, above, distance = _frame(outline @ right, outline @ up, outline @ toward, along, across, edge)
-        position = centre + aside * right + above * up + distance * toward
-
-    if scene.light.position is not None:
-        light = np.array(scene.light.position)
-    else:
-        light = centre + edge * (np.array(scene.light.offset) @ np.stack([right, up, toward]))
-    pixel = 2 * slope / height
-    corner = -toward + (0.5 - width / 2) * pixel * right + (height / 2 - 0.5) * pixel * up
+        camera = scene_camera(scene.camera, pose, extent, width, height)
     return FloatPlacement(
         width=width,
         height=height,
-        origin=to_mesh(position),
-        direction=corner @ rotation,
-        step_x=pixel * right @ rotation,
-        step_y=-pixel * up @ rotation,
-        light=to_mesh(light),
-        light_colour=np.array(scene.light.colour),
+        origin=pose.to_mesh(camera.position),
+        direction=camera.corner @ pose.rotation,
+        step_x=camera.step_x @ pose.rotation,
+        step_y=camera.step_y @ pose.rotation,
+        lights=tuple(_placed(light, camera, centre, edge, pose) for light in scene.lights),
+        materials=made_of(materials, scene.material),
         ambient=np.array(scene.ambient.colour),
-        albedo=np.array(scene.material.albedo),
         background=np.array(scene.background.colour),
         flat=scene.material.flat,
         shadows=scene.light.shadows,
         shadow_offset=scene.light.shadow_offset * extent.edge,
+        shadow_transmittance=scene.paths.shadow_transmittance,
+        bounces=scene.paths.bounces,
+        view_to_mesh=None if room is None else pose.from_view(room.camera_to_world),
     )
 
 
-def rotation_matrix(transform: Transform) -> Floats:
-    """Rotation about x, then y, then z: float64 [3, 3] for column vectors."""
-    x, y, z = np.radians(transform.rotate)
-    about_x = [[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]]
-    about_y = [[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]]
-    about_z = [[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]]
-    return np.asarray(np.array(about_z) @ np.array(about_y) @ np.array(about_x), dtype=np.float64)
+def made_of(own: Sequence[MeshMaterial], wanted: Material) -> tuple[MeshMaterial, ...]:
+    """Materials of a mesh with what the scene says in their place."""
+    given = {key: value for key in ("kind", "albedo", "ior") if (value := getattr(wanted, key)) is not None}
+    return tuple(replace(material, **given) for material in own)
 
 
-def camera_axes(toward: Floats, up: Vector) -> tuple[Floats, Floats, Floats]:
-    """Unit vectors right, up and towards the viewer; where ``up`` is along the view another axis takes its place."""
-    back = toward / np.linalg.norm(toward)
-    for candidate in (up, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)):
-        right = np.cross(candidate, back)
-        length = float(np.linalg.norm(right))
-        if length > 1e-9 * float(np.linalg.norm(candidate)):
-            break
-    right = right / length
-    return right, np.cross(back, right), back
-
-
-def _frame(x: Floats, y: Floats, z: Floats, width: float, height: float, edge: float) -> tuple[float, float, float]:
-    """Where the camera stands, from the cube's centre: right, up and back.
-
-    The outline's points are [k] right, up and towards the camera; ``width`` and ``height`` are what they may span at a
-    distance of 1. The spans shrink with the distance, so halving an interval finds where they just fit; the outline is
-    in the middle of the picture.
-    """
-    near = float(z.max()) + 1e-3 * edge
-    far = near + 1e4 * edge
-    for _ in range(64):
-        depth = (near + far) / 2 - z
-        spans = [np.ptp((across - _middle(across, depth)) / depth) for across in (x, y)]
-        near, far = (near, (near + far) / 2) if spans[0] <= width and spans[1] <= height else ((near + far) / 2, far)
-    return _middle(x, far - z), _middle(y, far - z), far
-
-
-def _middle(across: Floats, depth: Floats) -> float:
-    """The camera's shift for which (across − shift) / depth is as far to either side: the outline is in the middle."""
-    low, high = float(across.min()), float(across.max())
-    for _ in range(52):
-        shift = (low + high) / 2
-        seen = (across - shift) / depth
-        low, high = (shift, high) if seen.max() + seen.min() > 0 else (low, shift)
-    return (low + high) / 2
+def _placed(light: Light, camera: Camera, centre: Floats, edge: float, pose: Pose) -> PlacedLight:
+    if light.position is not None:
+        position = np.array(light.position)
+    else:
+        position = centre + edge * (np.array(light.offset) @ camera.axes)
+    reach = None if light.falloff is None else light.falloff / pose.scale
+    return PlacedLight(pose.to_mesh(position), np.array(light.colour), reach)

@@ -81,7 +81,7 @@ public:
         std::int64_t* ids;
         auto result = makeArray<std::int64_t>({origins.shape(0)}, ids);
         for (std::size_t i = 0; i < origins.shape(0); ++i) {
-            const Hit hit = device_.trace(setUp(requestOf(origins, directions, i), device_.frame().bounds, numbers_), false);
+            const Hit hit = device_.trace(setUp(requestOf(origins, directions, i), device_.frame().bounds, numbers_));
             ids[i] = hit.found ? static_cast<std::int64_t>(hit.id) : -1;
         }
         return nb::cast(result);
@@ -125,7 +125,11 @@ public:
     Values counters() const {
         const Counters& c = device_.counters;
         const auto value = [](std::uint64_t count) { return static_cast<std::int64_t>(count); };
-        return {{"raysPrimary", value(c.raysPrimary)}, {"raysShadow", value(c.raysShadow)}, {"raysInBox", value(c.raysInBox)},
+        return {{"raysPrimary", value(c.raysPrimary)},
+                {"raysShadow", value(c.raysShadow)},
+                {"raysReflection", value(c.raysReflection)},
+                {"raysRefraction", value(c.raysRefraction)},
+                {"raysInBox", value(c.raysInBox)},
                 {"nodeReads", value(c.nodeReads)},     {"boxTests", value(c.boxTests)},     {"triangleTests", value(c.triangleTests)},
                 {"hits", value(c.hits)},               {"deepestStack", value(c.deepestStack)}};
     }

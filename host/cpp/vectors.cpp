@@ -6,71 +6,28 @@
 //                                                         -> tests count (slot near)*count
 //   triangle axis negative[3] origin[3] shear[2] vertices[9] -> isHit t weights[3] backSide
 //   limit  t                                              -> limitUnits
-//   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] light[3] colour[3] ambient[3] albedo[3] offset flat shadows
-//                                                         -> lit[3] ambient[3] needsShadowRay origin[3] toLight[3]
+//   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat shadows
+//          count, count * (position[3] colour[3] reachMantissa reachExponent)
+//                                                         -> origin[3], count * (direct[3] needsShadowRay)
+//   bounce axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat kind etaFront etaBack reflectance
+//                                                         -> isRefraction origin[3] direction[3] reflection[3] share
 //
 // Whole pixels; the first three lines have no answer, and set the scene in this order:
 //   layout record name=offset,width,signed ...              (once for each kind of record)
 //   records triangleBase attributeBase hexadecimal ...
 //   registers name=value ...
 //   pixel  x y                                            -> colour[3] isObject triangle distance
-#include <algorithm>
-#include <iostream>
+//
+// Rooms: see room_questions.hpp.
 #include <optional>
 #include <sstream>
 
 #include "model/frame.hpp"
+#include "room_questions.hpp"
 
 namespace {
 
 using namespace colonnade;
-
-class Question {
-public:
-    explicit Question(std::istream& words) : words_(words) {}
-    Wide wide() {
-        std::string word;
-        if (!(words_ >> word)) throw std::invalid_argument("a question is too short");
-        const bool isNegative = word[0] == '-';
-        UnsignedWide value = 0;
-        for (std::size_t i = isNegative; i < word.size(); ++i) value = value * 10 + static_cast<unsigned>(word[i] - '0');
-        return isNegative ? -static_cast<Wide>(value) : static_cast<Wide>(value);
-    }
-    std::int64_t number() { return static_cast<std::int64_t>(wide()); }
-    Vector vector() {
-        Vector v;
-        for (auto& component : v) component = number();
-        return v;
-    }
-    WideVector wideVector() {
-        WideVector v;
-        for (auto& component : v) component = wide();
-        return v;
-    }
-
-private:
-    std::istream& words_;
-};
-
-class Answer {
-public:
-    Answer& operator<<(Wide value) {
-        std::string digits;
-        for (UnsignedWide rest = magnitude(value); rest != 0 || digits.empty(); rest /= 10) digits += static_cast<char>('0' + static_cast<int>(rest % 10));
-        if (value < 0) digits += '-';
-        std::reverse(digits.begin(), digits.end());
-        text_ += text_.empty() ? digits : " " + digits;
-        return *this;
-    }
-    template <class Values> Answer& all(const Values& values) {
-        for (const auto value : values) *this << static_cast<Wide>(value);
-        return *this;
-    }
-    void print() const { std::cout << text_ << '\n'; }
-
-private:
-    std::string text_;
-};
 
 void askHeading(Question& ask, Ray& ray) {
     ray.enters = true;
@@ -139,7 +96,7 @@ void answerTriangle(Question& ask, const Numbers& n) {
     answer.print();
 }
 
-void answerShade(Question& ask, const Numbers& n) {
+Surface askSurface(Question& ask, const Numbers& n) {
     const Ray ray = askTriangleRay(ask);
     Hit hit{true, ask.number(), 0, {}, false};
     for (auto& weight : hit.weights) weight = ask.number();
@@ -147,18 +104,39 @@ void answerShade(Question& ask, const Numbers& n) {
     Face face{};
     for (auto& normal : face.normals) normal = ask.vector();
     face.geometricNormal = ask.vector();
-    Lighting lighting{};
-    lighting.lightPosition = ask.wideVector();
-    lighting.lightColour = ask.vector();
-    lighting.ambient = ask.vector();
-    lighting.albedo = {ask.vector()};
-    lighting.shadowOffset = ask.number();
-    lighting.flat = ask.number() != 0;
-    lighting.shadows = ask.number() != 0;
-    const Shading shading = shade(ray, hit, face, lighting, n);
+    return surfaceOf(ray, hit, face, n);
+}
+
+void answerShade(Question& ask, const Numbers& n) {
+    const Surface surface = askSurface(ask, n);
+    const std::int64_t offset = ask.number();
+    const bool flat = ask.number() != 0, shadows = ask.number() != 0;
+    const WideVector origin = offSurface(surface.point, surface.facing, offset, n);
+    const WideVector normal = shadingNormal(surface, flat);
     Answer answer;
-    answer.all(shading.lit).all(shading.ambient) << shading.needsShadowRay;
-    answer.all(shading.shadowRay.origin).all(shading.shadowRay.direction);
+    answer.all(origin);
+    for (std::int64_t left = ask.number(); left > 0; --left) {
+        Light light{ask.wideVector(), {}, 0, 0};
+        light.colour = ask.vector();
+        light.reachMantissa = ask.number();
+        light.reachExponent = static_cast<int>(ask.number());
+        const Illumination illumination = illuminate(origin, normal, light, shadows, n);
+        answer.all(illumination.direct) << illumination.needsShadowRay;
+    }
+    answer.print();
+}
+
+void answerBounce(Question& ask, const Numbers& n) {
+    const Surface surface = askSurface(ask, n);
+    const std::int64_t offset = ask.number();
+    const bool flat = ask.number() != 0;
+    Material material{{}, static_cast<MaterialKind>(ask.number()), {}, 0};
+    for (auto& eta : material.eta) eta = ask.number();
+    material.reflectance = ask.number();
+    const Bounce next = bounce(surface, material, flat, offset, n);
+    Answer answer;
+    answer << next.isRefraction;
+    answer.all(next.ray.origin).all(next.ray.direction).all(next.reflection) << next.share;
     answer.print();
 }
 
@@ -187,6 +165,8 @@ public:
             place >> read.offset >> comma >> read.width >> comma >> read.isSigned;
         }
     }
+
+    const std::map<std::string, Layout>& layouts() const { return layouts_; }
 
     void readRecords(std::istream& words) {
         std::size_t triangleBase, attributeBase, count = 0;
@@ -227,6 +207,7 @@ int main() try {
     first >> kind;
     const Numbers numbers(readNumbers(first));
     Scene scene(numbers);
+    Room room;
     while (std::getline(std::cin, line)) {
         std::istringstream words(line);
         words >> kind;
@@ -235,10 +216,14 @@ int main() try {
         else if (kind == "box") answerBox(ask, numbers);
         else if (kind == "triangle") answerTriangle(ask, numbers);
         else if (kind == "shade") answerShade(ask, numbers);
+        else if (kind == "bounce") answerBounce(ask, numbers);
         else if (kind == "layout") scene.readLayout(words);
         else if (kind == "records") scene.readRecords(words);
         else if (kind == "registers") scene.device().start(readNumbers(words));
         else if (kind == "pixel") answerPixel(ask, scene.device());
+        else if (kind == "sizes") room.begin(readNumbers(words), scene.layouts());
+        else if (kind == "words") room.load(words);
+        else if (room.knows(kind)) room.answer(kind, ask).print();
         else if (kind == "limit") (Answer() << limitUnits(ask.number(), numbers)).print();
         else throw std::invalid_argument("unknown question '" + kind + "'");
     }

@@ -43,6 +43,8 @@ def manifest_data(
         "colourBits": 12,
         "lightBits": 16,
         "lightFraction": 12,
+        "mantissaBits": 32,
+        "etaFraction": 13,
     }
     layouts = _layouts(vertex_bits, box_bits, arity, per_record, address)
     widest = max(sum(width for _, width, _ in fields) for fields in layouts.values())
@@ -57,13 +59,15 @@ def manifest_data(
                 "bvh": bvh,
             },
             "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth},
-            "frame": {"maxWidth": max_width, "maxHeight": max_height, "materials": 2},
+            "physicalAttributeMemory": None,
+            "frame": {"maxWidth": max_width, "maxHeight": max_height, "materials": 2, "lights": 2, "maxBounces": 4},
         },
         "numbers": numbers,
         "records": {"bits": -(-widest // 32) * 32, "layouts": {k: _placed(v) for k, v in layouts.items()}},
         "registers": {"dataBits": 32, "fields": _registers(vertex_bits, mac, address, coordinate)},
         "streams": {"pixel": [], "load": []},
         "memories": {"columnBvh": {"depth": depth, "bits": -(-widest // 32) * 32, "banks": 2}},
+        "attributes": None,
         "formatHash": f"{vertex_bits:02x}{box_bits:02x}{mac:02x}{arity}{per_record}{bvh:d}",
         "configHash": "0" * 64,
     }
@@ -82,6 +86,7 @@ def _layouts(vertex: int, box: int, arity: int, per_record: int, address: int) -
     for child in range(arity):
         node += [(f"kinds[{child}]", 2, False), *_vector(f"low[{child}]", box), *_vector(f"high[{child}]", box)]
     triangles: FieldList = [("firstTriangle", address + 1, False), ("count", per_record.bit_length(), False)]
+    triangles += [(f"isClear[{k}]", 1, False) for k in range(per_record)]
     for corner in range(3 * per_record):
         triangles += _vector(f"vertices[{corner}]", vertex)
     attributes: FieldList = []
@@ -110,11 +115,18 @@ def _registers(vertex: int, mac: int, address: int, coordinate: int) -> list[dic
     fields += [("frame.unitShift", 6, False), ("frame.watchdogCycles", 32, False)]
     for name in ("position", "direction", "stepX", "stepY"):
         fields += _vector(f"camera.{name}", mac, True)
-    fields += [("camera.stepShift", 4, False), *_vector("light.position", mac, True)]
-    fields += [("light.shadowOffset", mac - 2, False), ("shading.flat", 1, False), ("shading.shadows", 1, False)]
-    for name, width in (("light.colour", 16), ("ambient", 16), ("background", 12)):
+    fields += [("camera.stepShift", 4, False)]
+    for light in range(2):
+        fields += _vector(f"lights[{light}].position", mac, True)
+        fields += [(f"lights[{light}].colour.{c}", 16, False) for c in "rgb"]
+        fields += [(f"lights[{light}].reachMantissa", 32, False), (f"lights[{light}].reachExponent", 9, True)]
+    fields += [("shading.flat", 1, False), ("shading.shadows", 1, False), ("shading.lights", 2, False)]
+    fields += [("shading.offset", mac - 2, False), ("shading.bounces", 3, False), ("shading.clearness", 13, False)]
+    for name, width in (("ambient", 16), ("background", 12)):
         fields += [(f"{name}.{c}", width, False) for c in "rgb"]
-    fields += [(f"materials[{i}].albedo.{c}", 12, False) for i in range(2) for c in "rgb"]
+    for i in range(2):
+        fields += [(f"materials[{i}].albedo.{c}", 12, False) for c in "rgb"]
+        fields += [(f"materials[{i}].{n}", w, False) for n, w in _SHINY]
     fields += _vector("bounds.low", vertex) + _vector("bounds.high", vertex)
     fields += [(f"scene.{n}", address + 1, False) for n in _SCENE]
     placed, word = [], 0
@@ -125,6 +137,7 @@ def _registers(vertex: int, mac: int, address: int, coordinate: int) -> list[dic
     return placed
 
 
+_SHINY = (("kind", 2), ("etaFront", 16), ("etaBack", 16), ("reflectance", 13))
 _SCENE = ("recordCount", "triangleBase", "triangleRecords", "attributeBase")
 
 

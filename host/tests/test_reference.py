@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from colonnade.mesh_materials import MeshMaterial
 from colonnade.meshes import Mesh, clean_mesh, load_mesh
 from colonnade.reference import primary_directions, render_reference
-from colonnade.viewpoint import FloatPlacement
+from colonnade.viewpoint import FloatPlacement, PlacedLight
 
 GREY = np.array([0.5, 0.5, 0.5])
 
@@ -26,10 +27,9 @@ def looking_down(width: int = 24, height: int = 16, distance: float = 4.0) -> Fl
         direction=centre - step_x * (width - 1) / 2 - step_y * (height - 1) / 2,
         step_x=step_x,
         step_y=step_y,
-        light=np.array([0.0, 0.0, distance]),
-        light_colour=np.ones(3),
+        lights=(PlacedLight(np.array([0.0, 0.0, distance]), np.ones(3)),),
+        materials=(MeshMaterial(albedo=(0.5, 0.5, 0.5)),),
         ambient=np.full(3, 0.25),
-        albedo=GREY,
         background=np.array([0.0, 0.1, 0.2]),
         flat=True,
         shadows=True,
@@ -106,7 +106,7 @@ def test_both_sides_of_a_surface_look_alike() -> None:
 
 
 def test_light_behind_the_surface_sends_no_shadow_ray() -> None:
-    view = replace(looking_down(), light=np.array([0.0, 0.0, -3.0]))
+    view = replace(looking_down(), lights=(PlacedLight(np.array([0.0, 0.0, -3.0]), np.ones(3)),))
     frame = render_reference(mesh_of(square(0.0, 1.0)), view)
     assert frame.rays["shadow"] == 0
     np.testing.assert_allclose(frame.image[8, 12], GREY * 0.25)
@@ -114,7 +114,7 @@ def test_light_behind_the_surface_sends_no_shadow_ray() -> None:
 
 def test_a_plate_shades_the_floor_and_only_with_shadows_on() -> None:
     mesh = mesh_of(square(0.0, 1.6), square(0.5, 0.2))
-    view = replace(looking_down(64, 64), light=np.array([1.2, 0.0, 1.4]))
+    view = replace(looking_down(64, 64), lights=(PlacedLight(np.array([1.2, 0.0, 1.4]), np.ones(3)),))
     shaded, bright = render_reference(mesh, view), render_reference(mesh, replace(view, shadows=False))
     # The ray from (x, y, 0) to the light passes z = 0.5 at x + (1.2 - x) * 0.5 / 1.4.
     directions = primary_directions(view, slice(0, 64)).reshape(64, 64, 3)
@@ -130,29 +130,28 @@ def test_a_plate_shades_the_floor_and_only_with_shadows_on() -> None:
 
 def test_a_light_between_surface_and_plate_is_not_blocked_by_the_plate() -> None:
     mesh = mesh_of(square(0.0, 1.6), square(0.9, 0.2))
-    view = replace(looking_down(), light=np.array([0.3, 0.0, 0.5]))
+    view = replace(looking_down(), lights=(PlacedLight(np.array([0.3, 0.0, 0.5]), np.ones(3)),))
     shaded, bright = render_reference(mesh, view), render_reference(mesh, replace(view, shadows=False))
     np.testing.assert_array_equal(shaded.image, bright.image)
 
 
 def test_colours_saturate() -> None:
-    view = replace(looking_down(), light_colour=np.full(3, 9.0))
+    view = replace(looking_down(), lights=(PlacedLight(np.array([0.0, 0.0, 4.0]), np.full(3, 9.0)),))
     assert render_reference(mesh_of(square(0.0, 1.0)), view).image.max() == 1.0
 
 
 def test_smooth_normals_differ_from_flat_ones_and_vary_within_a_triangle() -> None:
     mesh = load_mesh("sphere:1")
     view = looking_down(48, 48)
-    flat, smooth = (
-        render_reference(mesh, replace(view, flat=flag, light=np.array([3.0, 2.0, 4.0]))) for flag in (1, 0)
-    )
+    lights = (PlacedLight(np.array([3.0, 2.0, 4.0]), np.ones(3)),)
+    flat, smooth = (render_reference(mesh, replace(view, flat=flag, lights=lights)) for flag in (True, False))
     inside = flat.hit_triangles == flat.hit_triangles[24, 24]
     assert np.ptp(smooth.image[inside, 0]) > 4 * np.ptp(flat.image[inside, 0])
 
 
 def test_no_ray_slips_out_of_a_closed_mesh() -> None:
     mesh = load_mesh("sphere:3")
-    view = replace(looking_down(200, 200, distance=0.01), light=np.array([0.1, 0.2, 0.3]))
+    view = replace(looking_down(200, 200, distance=0.01), lights=(PlacedLight(np.array([0.1, 0.2, 0.3]), np.ones(3)),))
     frame = render_reference(mesh, view)
     assert frame.object_mask.all()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from colonnade import regions
 from colonnade.metrics import HIGHEST_PSNR, flip, flip_map
 from colonnade.regions import compare_regions, frame_regions
 
@@ -40,7 +41,23 @@ def test_the_shadow_is_background_that_is_darker(picture: np.ndarray) -> None:
     ratio[2] = 0.98
     is_object = np.zeros((4, 4), bool)
     is_object[1, 0] = True
-    regions = frame_regions(is_object, ratio)
-    assert regions["frame"].all()
-    assert regions["object"].sum() == 1
-    np.testing.assert_array_equal(np.argwhere(regions["shadow"]), [[1, 1], [1, 2], [1, 3]])
+    parts = frame_regions(is_object, ratio)
+    assert parts["frame"].all()
+    assert parts["object"].sum() == 1
+    np.testing.assert_array_equal(np.argwhere(parts["shadow"]), [[1, 1], [1, 2], [1, 3]])
+
+
+def test_dists_sees_the_region_and_a_margin_alone(picture: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def keep(reference: np.ndarray, test: np.ndarray) -> float:
+        seen.append((reference, test))
+        return 0.25
+
+    monkeypatch.setattr(regions, "dists_or_none", keep)
+    other, region = picture + np.uint8(10), np.zeros((40, 60), bool)
+    region[20:25, 50:60] = True
+    assert compare_regions(picture, other, {"part": region})["part"].dists == 0.25
+    reference, test = seen[0]
+    np.testing.assert_array_equal(reference, picture[12:33, 42:60])
+    np.testing.assert_array_equal((reference != test).any(axis=2), region[12:33, 42:60])

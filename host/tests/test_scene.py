@@ -8,7 +8,7 @@ import pytest
 
 from colonnade.errors import UserError
 from colonnade.meshes import load_mesh
-from colonnade.scene import load_scene
+from colonnade.scene import Paths, Placing, load_scene
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -62,6 +62,18 @@ def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
         ('[mesh]\nname = "a"\n[camera]\ndirection = [0, 0, 0]', "camera.direction must not be zero"),
         ('[mesh]\nname = "a"\n[transform]\nscale = 0', "transform.scale must be a number"),
         ('[mesh]\nname = "a"\n[frame]\nwidth = 0', "frame.width must be a whole number"),
+        ('[mesh]\nname = "a"\n[material]\nkind = "wood"', "material.kind must be one of diffuse, mirror, glass"),
+        ('[mesh]\nname = "a"\n[material]\nkind = "mirror"\nior = 1.5', "material.ior belongs to glass"),
+        ('[mesh]\nname = "a"\n[material]\nior = 0.5', "material.ior must be a number from 1 to 4"),
+        ('[mesh]\nname = "a"\n[light]\nfalloff = 0', "light.falloff must be a number"),
+        ('[mesh]\nname = "a"\n[[light]]\n[[light]]\nshadows = false', "unknown key light.shadows; known here: pos"),
+        ('[mesh]\nname = "a"\n[paths]\nbounces = 16', "paths.bounces must be a whole number from 0 to 15"),
+        ('[mesh]\nname = "a"\n[paths]\nshadow_transmittance = 2', "paths.shadow_transmittance must be a number"),
+        ('[mesh]\nname = "a"\n[background]\nroom = 3', "background.room must be text"),
+        ('[mesh]\nname = "a"\n[background]\nroom = "r"\n[camera]\nfov = 30', "the camera is the room's"),
+        ('[mesh]\nname = "a"\n[object]\nsize = 1', "needs background.room"),
+        ('[mesh]\nname = "a"\n[object]\n[transform]\nscale = 2\n[background]\nroom = "r"', "leave out transform.scale"),
+        ('[mesh]\nname = "a"\n[object]\nstand_at = [1, -2]\n[background]\nroom = "r"', "object.stand_at must be two"),
         ("[mesh", "is not TOML"),
     ],
 )
@@ -69,6 +81,37 @@ def test_mistakes_are_named(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(UserError, match=message) as caught:
         load_scene(write(tmp_path, text))
     assert "\n" not in str(caught.value) and "scene.toml" in str(caught.value)
+
+
+def test_a_room_with_several_lights_is_read(tmp_path: Path) -> None:
+    text = """
+    [mesh]
+    name = "teapot"
+    [background]
+    room = "rooms/living"
+    [object]
+    stand_at = [330, 297.5]
+    turn = -20
+    [material]
+    kind = "glass"
+    ior = 1.4
+    [paths]
+    bounces = 6
+    [[light]]
+    position = [0, 2, 0]
+    falloff = 1.5
+    shadow_offset = 0.001
+    [[light]]
+    offset = [1, 1, 0]
+    """
+    scene = load_scene(write(tmp_path, text))
+    assert scene.background.room == tmp_path / "rooms" / "living"
+    assert scene.placing == Placing((330.0, 297.5), turn=-20.0)
+    assert (scene.material.kind, scene.material.albedo, scene.material.ior) == ("glass", None, 1.4)
+    assert scene.paths == Paths(bounces=6)
+    assert [light.falloff for light in scene.lights] == [1.5, None]
+    assert scene.light.shadow_offset == 0.001 and scene.lights[1].position is None
+    assert scene.with_room(tmp_path).background.room == tmp_path
 
 
 def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:

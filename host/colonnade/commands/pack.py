@@ -28,6 +28,7 @@ def pack(
     from colonnade.pack import memory_use
     from colonnade.pack import pack as pack_mesh
     from colonnade.scene import load_scene
+    from colonnade.viewpoint import made_of
 
     shown = progress.for_terminal()
     described = load_scene(scene)
@@ -37,7 +38,7 @@ def pack(
     with shown.step("loading the mesh"):
         loaded = load_mesh(described.mesh_source)
     with shown.step("packing"):
-        image = pack_mesh(loaded, manifest)
+        image = pack_mesh(loaded, manifest, made_of(loaded.materials, described.material))
     file = image.save(output)
 
     click.echo(f"packed      {file}")

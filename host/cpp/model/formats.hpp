@@ -24,7 +24,7 @@ inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, co
 struct Numbers {
     int vertexBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
         entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits,
-        boxPadLog, normalFraction, colourBits, lightFraction;
+        boxPadLog, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits;
     int arity, trianglesPerRecord, stackDepth;
     bool bvh;
 
@@ -51,7 +51,10 @@ struct Numbers {
         boxPadLog = take("boxPadLog");
         normalFraction = take("normalFraction");
         colourBits = take("colourBits");
+        lightBits = take("lightBits");
         lightFraction = take("lightFraction");
+        etaFraction = take("etaFraction");
+        rootBits = take("rootBits");
         arity = take("arity");
         trianglesPerRecord = take("trianglesPerRecord");
         stackDepth = take("stackDepth");
@@ -97,6 +100,7 @@ struct Node {
 struct Triangles {
     std::uint32_t firstTriangle;
     int count;
+    std::array<bool, 2> isClear;
     std::array<std::array<Vector, 3>, 2> vertices;
 };
 
@@ -127,6 +131,7 @@ public:
         count_ = triangles.at("count");
         for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
             vertices_.push_back(vectorOf(triangles, "vertices[" + std::to_string(vertex) + "]"));
+        for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) isClear_.push_back(triangles.at("isClear[" + std::to_string(triangle) + "]"));
         const Layout& attributes = layouts.at("attributes");
         for (int face = 0; attributes.count("faces[" + std::to_string(face) + "].material"); ++face) {
             const std::string prefix = "faces[" + std::to_string(face) + "].";
@@ -166,6 +171,7 @@ public:
         if (result.count > trianglesPerRecord_) result.count = trianglesPerRecord_;
         for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
             result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
+        for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) result.isClear[triangle] = isClear_[triangle].read(record) != 0;
         return result;
     }
 
@@ -196,7 +202,7 @@ private:
     int arity_, trianglesPerRecord_;
     VectorFields origin_, exponent_;
     Field firstChild_, firstTriangles_, firstTriangle_, count_;
-    std::vector<Field> kinds_;
+    std::vector<Field> kinds_, isClear_;
     std::vector<VectorFields> low_, high_, vertices_;
     std::vector<FaceFields> faces_;
 };

@@ -1,12 +1,12 @@
 // The device without time: memories and registers are loaded, pixels come out, bit for bit as from the RTL.
 #pragma once
-#include "shading.hpp"
+#include "bounce.hpp"
 
 namespace colonnade {
 
 /// Counters that do not depend on timing, named as in the register map.
 struct Counters {
-    std::uint64_t raysPrimary, raysShadow, raysInBox, nodeReads, boxTests, triangleTests, hits, deepestStack;
+    std::uint64_t raysPrimary, raysShadow, raysReflection, raysRefraction, raysInBox, nodeReads, boxTests, triangleTests, hits, deepestStack;
 };
 
 struct Errors {
@@ -44,6 +44,8 @@ struct Frame {
     Frame() = default;
     explicit Frame(const Registers& registers) {
         const auto take = [&](const std::string& name) { return lookUp(registers, name); };
+        // What a design without bounces does not have is zero
+        const auto takeIfThere = [&](const std::string& name) { return registers.count(name) ? take(name) : 0; };
         const auto vector = [&](const std::string& name, const char* components = "xyz") {
             Vector result;
             for (int i = 0; i < 3; ++i) result[i] = take(name + "." + components[i]);
@@ -57,8 +59,8 @@ struct Frame {
         width = take("frame.width");
         height = take("frame.height");
         objectRectangle = {take("frame.objectRect.x0"), take("frame.objectRect.y0"), take("frame.objectRect.x1"), take("frame.objectRect.y1")};
-        for (int i = 0; registers.count("frame.objectOutline[" + std::to_string(i) + "].x"); ++i) {
-            const std::string edge = "frame.objectOutline[" + std::to_string(i) + "].";
+        for (int i = 0; registers.count(entry("frame.objectOutline", i) + "x"); ++i) {
+            const std::string edge = entry("frame.objectOutline", i);
             objectOutline.push_back({take(edge + "x"), take(edge + "y"), take(edge + "offset")});
         }
         cameraPosition = position("camera.position");
@@ -67,26 +69,47 @@ struct Frame {
         stepY = vector("camera.stepY");
         stepShift = static_cast<int>(take("camera.stepShift"));
         bounds = {vector("bounds.low"), vector("bounds.high")};
-        lighting.lightPosition = position("light.position");
-        lighting.lightColour = vector("light.colour", "rgb");
+        for (int i = 0; registers.count(entry("lights", i) + "colour.r"); ++i) {
+            const std::string name = entry("lights", i);
+            lighting.lights.push_back({position(name + "position"), vector(name + "colour", "rgb"), take(name + "reachMantissa"),
+                                       static_cast<int>(take(name + "reachExponent"))});
+        }
+        lighting.lights.resize(std::min(lighting.lights.size(), static_cast<std::size_t>(take("shading.lights"))));
         lighting.ambient = vector("ambient", "rgb");
         lighting.background = vector("background", "rgb");
-        lighting.shadowOffset = take("light.shadowOffset");
+        lighting.offset = take("shading.offset");
+        lighting.clearness = takeIfThere("shading.clearness");
         lighting.flat = take("shading.flat") != 0;
         lighting.shadows = take("shading.shadows") != 0;
-        for (int i = 0; registers.count("materials[" + std::to_string(i) + "].albedo.r"); ++i)
-            lighting.albedo.push_back(vector("materials[" + std::to_string(i) + "].albedo", "rgb"));
+        lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
+        for (int i = 0; registers.count(entry("materials", i) + "albedo.r"); ++i) {
+            const std::string name = entry("materials", i);
+            lighting.materials.push_back({vector(name + "albedo", "rgb"), static_cast<MaterialKind>(takeIfThere(name + "kind")),
+                                          {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")}, takeIfThere(name + "reflectance")});
+        }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));
         triangleBase = static_cast<std::size_t>(take("scene.triangleBase"));
         triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));
         attributeBase = static_cast<std::size_t>(take("scene.attributeBase"));
     }
 
+    /// What the names of a table's entry begin with.
+    static std::string entry(const std::string& table, int index) { return table + "[" + std::to_string(index) + "]."; }
+
     bool maySeeObject(std::int64_t px, std::int64_t py) const {
         const auto& rectangle = objectRectangle;
         if (px < rectangle[0] || px >= rectangle[2] || py < rectangle[1] || py >= rectangle[3]) return false;
         return std::all_of(objectOutline.begin(), objectOutline.end(), [&](const HalfPlane& edge) { return edge.x * px + edge.y * py + edge.offset >= 0; });
     }
+};
+
+/// What a shadow ray has met on its way to the light; the later the less light.
+enum class Occlusion { none, clear, opaque };
+
+/// What a path has gathered so far: the weight of what is still to come, 12 fraction bits a channel; the colour already certain; secondary rays traced.
+struct Path {
+    Colour throughput, gathered;
+    int bounces;
 };
 
 class Device {
@@ -127,35 +150,46 @@ public:
         Pixel pixel{frame_.lighting.background, false, 0, 0};
         ++counters.raysPrimary;
         if (!frame_.maySeeObject(x, y)) return pixel;
-        const Ray ray = setUp(primaryRay(x, y), frame_.bounds, numbers_);
-        const Hit hit = trace(ray, false);
-        if (!hit.found) return pixel;
-
-        ++counters.hits;
-        pixel.isObject = true;
-        pixel.triangle = static_cast<std::uint32_t>(hit.id);
-        pixel.distance = floorShift<Wide>(ray.entry, -numbers_.gridFraction) + hit.t;
-        Face face{};
-        if (hit.id < faces_.size()) face = faces_[hit.id];
-        else errors.illegalRecord = true;
-        const Shading shading = shade(ray, hit, face, frame_.lighting, numbers_);
-        pixel.colour = shading.lit;
-        if (shading.needsShadowRay) {
-            ++counters.raysShadow;
-            if (trace(setUp(shading.shadowRay, frame_.bounds, numbers_), true).found) pixel.colour = shading.ambient;
+        const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
+        Path path{{one, one, one}, {0, 0, 0}, 0};
+        RayRequest request = primaryRay(x, y);
+        for (bool isPrimary = true;; isPrimary = false) {
+            const Ray ray = setUp(request, frame_.bounds, numbers_);
+            const Hit hit = trace(ray);
+            if (!hit.found) return finish(pixel, path, frame_.lighting.background);
+            if (isPrimary) {
+                ++counters.hits;
+                pixel.isObject = true;
+                pixel.triangle = static_cast<std::uint32_t>(hit.id);
+                pixel.distance = floorShift<Wide>(ray.entry, -numbers_.gridFraction) + hit.t;
+            }
+            Face face{};
+            if (hit.id < faces_.size()) face = faces_[hit.id];
+            else errors.illegalRecord = true;
+            const Surface surface = surfaceOf(ray, hit, face, numbers_);
+            const Material& material = frame_.lighting.materialOf(face);
+            if (material.kind == MaterialKind::diffuse) return finish(pixel, path, light(surface, material));
+            if (!goOn(surface, material, path, request)) return finish(pixel, path, frame_.lighting.background);
         }
-        return pixel;
     }
 
-    /// The closest hit of a set-up ray, or with `anyHit` the first one found.
-    Hit trace(const Ray& ray, bool anyHit) {
+    /// The closest hit of a set-up ray.
+    Hit trace(const Ray& ray) {
         Hit best{false, ray.limit, ray.limitId, {}, false};
         if (!ray.enters) return best;
         ++counters.raysInBox;
-        if (numbers_.bvh) descend(ray, anyHit, best);
-        else
-            for (std::size_t i = 0; i < frame_.triangleRecords && !(anyHit && best.found); ++i) testRecord(ray, frame_.triangleBase + i, best);
-        return best;
+        Search search{ray, best, false, Occlusion::none};
+        run(search);
+        return search.best;
+    }
+
+    /// What lies on a set-up ray's way: ends with the first opaque triangle.
+    Occlusion occlusion(const Ray& ray) {
+        if (!ray.enters) return Occlusion::none;
+        ++counters.raysInBox;
+        Search search{ray, {false, ray.limit, ray.limitId, {}, false}, true, Occlusion::none};
+        run(search);
+        return search.occlusion;
     }
 
     Counters counters{};
@@ -168,7 +202,73 @@ private:
         std::int64_t near;
     };
 
-    void testRecord(const Ray& ray, std::size_t address, Hit& best) {
+    /// A ray on its way through the records. A shadow ray keeps its limit: clear triangles do not shorten it.
+    struct Search {
+        const Ray& ray;
+        Hit best;
+        bool isShadow;
+        Occlusion occlusion;
+
+        bool isOver() const { return occlusion == Occlusion::opaque; }
+    };
+
+    Pixel finish(Pixel pixel, const Path& path, const Colour& colour) const {
+        for (int channel = 0; channel < 3; ++channel)
+            pixel.colour[channel] = std::min(white(), path.gathered[channel] + ((path.throughput[channel] * colour[channel]) >> numbers_.lightFraction));
+        return pixel;
+    }
+
+    std::int64_t white() const { return (std::int64_t(1) << numbers_.colourBits) - 1; }
+
+    Colour light(const Surface& surface, const Material& material) {
+        const Lighting& lighting = frame_.lighting;
+        const WideVector normal = shadingNormal(surface, lighting.flat);
+        const WideVector origin = offSurface(surface.point, surface.facing, lighting.offset, numbers_);
+        Colour incoming = lighting.ambient;
+        for (const Light& source : lighting.lights) {
+            const Illumination illumination = illuminate(origin, normal, source, lighting.shadows, numbers_);
+            Occlusion met = Occlusion::none;
+            if (illumination.needsShadowRay) {
+                ++counters.raysShadow;
+                met = occlusion(setUp(illumination.shadowRay, frame_.bounds, numbers_));
+            }
+            for (int channel = 0; channel < 3; ++channel) {
+                const std::int64_t direct = illumination.direct[channel];
+                if (met == Occlusion::none) incoming[channel] += direct;
+                if (met == Occlusion::clear) incoming[channel] += (direct * lighting.clearness) >> numbers_.lightFraction;
+            }
+        }
+        Colour colour;
+        for (int channel = 0; channel < 3; ++channel) colour[channel] = reflected(material.albedo[channel], incoming[channel], numbers_);
+        return colour;
+    }
+
+    /// Sends the path on from a mirror or glass; false if the next ray meets the background only.
+    bool goOn(const Surface& surface, const Material& material, Path& path, RayRequest& request) {
+        const Bounce next = bounce(surface, material, frame_.lighting.flat, frame_.lighting.offset, numbers_);
+        for (int channel = 0; channel < 3; ++channel) {
+            std::int64_t& throughput = path.throughput[channel];
+            // All ones is 1.0
+            const std::int64_t albedo = material.albedo[channel] + (material.albedo[channel] >> (numbers_.colourBits - 1));
+            if (!surface.backSide || material.kind == MaterialKind::mirror) throughput = (throughput * albedo) >> numbers_.lightFraction;
+            const std::int64_t share = (throughput * next.share) >> numbers_.lightFraction;
+            path.gathered[channel] = std::min(white(), path.gathered[channel] + ((share * frame_.lighting.background[channel]) >> numbers_.lightFraction));
+            throughput -= share;
+        }
+        if (path.bounces == frame_.lighting.bounces) return false;
+        ++path.bounces;
+        ++(next.isRefraction ? counters.raysRefraction : counters.raysReflection);
+        request = next.ray;
+        return true;
+    }
+
+    void run(Search& search) {
+        if (numbers_.bvh) descend(search);
+        else
+            for (std::size_t i = 0; i < frame_.triangleRecords && !search.isOver(); ++i) testRecord(search, frame_.triangleBase + i);
+    }
+
+    void testRecord(Search& search, std::size_t address) {
         const std::size_t index = address - nodes_.size();
         if (address < nodes_.size() || index >= triangles_.size() || address >= frame_.recordCount) {
             errors.illegalRecord = true;
@@ -177,11 +277,15 @@ private:
         const Triangles& record = triangles_[index];
         for (int i = 0; i < record.count; ++i) {
             ++counters.triangleTests;
-            testTriangle(ray, record.vertices[i], record.firstTriangle + i, numbers_, best);
+            Hit hit = search.best;
+            if (!testTriangle(search.ray, record.vertices[i], record.firstTriangle + i, numbers_, hit)) continue;
+            if (search.isShadow) search.occlusion = std::max(search.occlusion, record.isClear[i] ? Occlusion::clear : Occlusion::opaque);
+            else search.best = hit;
         }
     }
 
-    void descend(const Ray& ray, bool anyHit, Hit& best) {
+    void descend(Search& search) {
+        const Hit& best = search.best;
         std::array<Entry, 256> stack;
         std::size_t depth = 0;
         std::size_t visits = 0;
@@ -189,8 +293,8 @@ private:
         for (bool busy = true; busy;) {
             busy = false;
             if (next.isLeaf) {
-                testRecord(ray, next.address, best);
-                if (anyHit && best.found) return;
+                testRecord(search, next.address);
+                if (search.isOver()) return;
             } else if (next.address >= nodes_.size() || next.address >= frame_.recordCount) {
                 errors.illegalRecord = true;
             } else {
@@ -201,7 +305,7 @@ private:
                 ++counters.nodeReads;
                 const Node& node = nodes_[next.address];
                 std::array<Entered, 4> entered;
-                const int count = testBoxes(ray, node, best.t, numbers_, entered, counters.boxTests);
+                const int count = testBoxes(search.ray, node, best.t, numbers_, entered, counters.boxTests);
                 for (int i = count - 1; i > 0; --i) {
                     if (depth < static_cast<std::size_t>(numbers_.stackDepth)) stack[depth++] = entryOf(node, entered[i]);
                     else errors.stackOverflow = true;

@@ -1,4 +1,4 @@
-// Shader: docs/numbers.md, section 5.
+// Surfaces and lights: docs/numbers.md, section 5.
 #pragma once
 #include "traversal.hpp"
 
@@ -6,29 +6,62 @@ namespace colonnade {
 
 using Colour = std::array<std::int64_t, 3>;
 
-/// What the frame registers say of light and materials; fixed point as in docs/numbers.md.
-struct Lighting {
-    WideVector lightPosition;
-    Colour lightColour, ambient, background;
-    std::int64_t shadowOffset;
-    bool flat, shadows;
-    std::vector<Colour> albedo;
+/// What becomes of a ray that meets a surface.
+enum class MaterialKind : std::uint8_t { diffuse = 0, mirror = 1, glass = 2 };
+
+/// `eta`: what refraction divides the sine by, on the front and on the back side; `reflectance` head-on, 12 fraction bits.
+struct Material {
+    Colour albedo;
+    MaterialKind kind;
+    std::array<std::int64_t, 2> eta;
+    std::int64_t reflectance;
 };
 
-/// The outcome at a hit: both colours the pixel may have, and the shadow ray that decides.
-struct Shading {
-    Colour lit, ambient;
+/// A point light. With `reachMantissa` = 0 it is equally bright at any distance; otherwise its brightness is that of its colour where the squared
+/// distance is reachMantissa · 2^reachExponent, in grid steps.
+struct Light {
+    WideVector position;
+    Colour colour;
+    std::int64_t reachMantissa;
+    int reachExponent;
+};
+
+/// What the frame registers say of lights and materials; fixed point as in docs/numbers.md.
+struct Lighting {
+    std::vector<Light> lights;
+    Colour ambient, background;
+    std::int64_t offset, clearness;
+    bool flat, shadows;
+    int bounces;
+    std::vector<Material> materials;
+
+    const Material& materialOf(const Face& face) const { return materials[static_cast<std::size_t>(face.material) % materials.size()]; }
+};
+
+/// Where a ray has met the object. `facing` and `smooth` are turned against the ray; `towards` is the ray's direction, its dominant component
+/// ±2^(shadeBits − 1).
+struct Surface {
+    WideVector point;
+    Vector facing;
+    WideVector smooth;
+    Vector towards;
+    bool backSide;
+};
+
+/// A light as a surface sees it: the light that would fall onto it, and the shadow ray that decides.
+struct Illumination {
+    Colour direct;
     bool needsShadowRay;
     RayRequest shadowRay;
 };
 
-/// Scales a vector so that its largest component takes `bits` magnitude bits.
-inline Vector blockNormalise(const WideVector& v, int bits) {
+/// Scales a vector so that its largest component takes `bits` magnitude bits; returns by how many bits it was shifted down.
+inline int blockNormalise(const WideVector& v, int bits, Vector& scaled) {
     UnsignedWide all = 0;
     for (const Wide component : v) all = std::max(all, magnitude(component));
     const int drop = bitLength(all) - bits;
-    return {static_cast<std::int64_t>(floorShift(v[0], drop)), static_cast<std::int64_t>(floorShift(v[1], drop)),
-            static_cast<std::int64_t>(floorShift(v[2], drop))};
+    for (int a = 0; a < 3; ++a) scaled[a] = static_cast<std::int64_t>(floorShift(v[a], drop));
+    return drop;
 }
 
 inline Wide dot(const Vector& a, const Vector& b) { return Wide(a[0]) * b[0] + Wide(a[1]) * b[1] + Wide(a[2]) * b[2]; }
@@ -50,48 +83,69 @@ inline std::int64_t cosineOf(Wide dotProduct, Wide nn, Wide ll, const Numbers& n
     return static_cast<std::int64_t>(std::min<Wide>(quotient, Wide(1) << n.cosineFraction));
 }
 
-inline Shading shade(const Ray& ray, const Hit& hit, const Face& face, const Lighting& lighting, const Numbers& n) {
-    // The hit point, and the shadow ray's origin above it
-    WideVector permuted, point;
+inline Surface surfaceOf(const Ray& ray, const Hit& hit, const Face& face, const Numbers& n) {
+    Surface surface{};
+    surface.backSide = hit.backSide;
+    WideVector permuted;
     for (int a = 0; a < 2; ++a) permuted[a] = ray.origin[a] + nearestEven<Wide>(Wide(ray.shear[a]) * hit.t, n.shearFraction);
     permuted[2] = ray.negative[2] ? Wide(ray.origin[2]) - hit.t : Wide(ray.origin[2]) + hit.t;
-    for (int a = 0; a < 3; ++a) point[ray.objectAxis(a)] = permuted[a];
-    Vector facing = face.geometricNormal;
-    if (hit.backSide)
-        for (auto& component : facing) component = -component;
-    for (int a = 0; a < 3; ++a) point[a] += nearestEven<Wide>(Wide(lighting.shadowOffset) * facing[a], n.normalFraction);
-
-    // The shading normal
-    WideVector normal = {facing[0], facing[1], facing[2]};
-    if (!lighting.flat) {
-        WideVector smooth = {0, 0, 0};
-        for (int corner = 0; corner < 3; ++corner)
-            for (int a = 0; a < 3; ++a) smooth[a] += Wide(hit.weights[corner]) * face.normals[corner][a];
-        if (smooth[0] != 0 || smooth[1] != 0 || smooth[2] != 0)
-            for (int a = 0; a < 3; ++a) normal[a] = hit.backSide ? -smooth[a] : smooth[a];
+    const int slopeDrop = n.shearFraction - (n.shadeBits - 1);
+    const std::int64_t one = std::int64_t(1) << (n.shadeBits - 1);
+    for (int a = 0; a < 3; ++a) {
+        const int axis = ray.objectAxis(a);
+        surface.point[axis] = permuted[a];
+        surface.towards[axis] = a < 2 ? floorShift(ray.shear[a], slopeDrop) : ray.negative[2] ? -one : one;
+        surface.facing[axis] = hit.backSide ? -face.geometricNormal[axis] : face.geometricNormal[axis];
+        for (int corner = 0; corner < 3; ++corner) surface.smooth[axis] += Wide(hit.weights[corner]) * face.normals[corner][axis];
+        if (hit.backSide) surface.smooth[axis] = -surface.smooth[axis];
     }
+    return surface;
+}
 
-    // Towards the light
-    Shading result{};
+/// A position off the surface, to the side of its facing normal or the other one.
+inline WideVector offSurface(const WideVector& point, const Vector& facing, std::int64_t offset, const Numbers& n) {
+    WideVector moved;
+    for (int a = 0; a < 3; ++a) moved[a] = point[a] + nearestEven<Wide>(Wide(offset) * facing[a], n.normalFraction);
+    return moved;
+}
+
+inline bool isZero(const WideVector& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
+
+/// The normal that light and bounces see: smooth unless that is not wanted, or is zero.
+inline WideVector shadingNormal(const Surface& surface, bool flat) {
+    return flat || isZero(surface.smooth) ? WideVector{surface.facing[0], surface.facing[1], surface.facing[2]} : surface.smooth;
+}
+
+/// What one light gives to a surface at `origin` (off the surface) with a shading normal of any length.
+inline Illumination illuminate(const WideVector& origin, const WideVector& normal, const Light& light, bool shadows, const Numbers& n) {
     WideVector toLight;
-    for (int a = 0; a < 3; ++a) toLight[a] = lighting.lightPosition[a] - point[a];
-    const Vector shadingNormal = blockNormalise(normal, n.shadeBits), shadingLight = blockNormalise(toLight, n.shadeBits);
-    const Wide facingLight = dot(shadingNormal, shadingLight);
-    const std::int64_t cosine =
-        cosineOf(facingLight, dot(shadingNormal, shadingNormal), dot(shadingLight, shadingLight), n);
-    result.needsShadowRay = lighting.shadows && facingLight > 0;
-    const int dominant = dominantAxis(toLight);
-    result.shadowRay = {point, toLight, static_cast<Wide>(magnitude(toLight[dominant])), 0};
-
-    // Both colours
-    const std::int64_t white = (std::int64_t(1) << n.colourBits) - 1;
-    const Colour albedo = lighting.albedo[static_cast<std::size_t>(face.material) % lighting.albedo.size()];
-    for (int channel = 0; channel < 3; ++channel) {
-        const std::int64_t direct = (lighting.lightColour[channel] * cosine) >> n.cosineFraction;
-        result.lit[channel] = std::min(white, (albedo[channel] * (lighting.ambient[channel] + direct)) >> n.lightFraction);
-        result.ambient[channel] = std::min(white, (albedo[channel] * lighting.ambient[channel]) >> n.lightFraction);
+    for (int a = 0; a < 3; ++a) toLight[a] = light.position[a] - origin[a];
+    Vector shadingNormal, shadingLight;
+    blockNormalise(normal, n.shadeBits, shadingNormal);
+    const int drop = blockNormalise(toLight, n.shadeBits, shadingLight);
+    const Wide facingLight = dot(shadingNormal, shadingLight), ll = dot(shadingLight, shadingLight);
+    std::int64_t cosine = cosineOf(facingLight, dot(shadingNormal, shadingNormal), ll, n);
+    if (light.reachMantissa != 0 && cosine != 0) {
+        const Normalised square = normalise(ll, n.shadeBits), divisor = normalise(square.mantissa, n.mantissaBits);
+        const int exponent = n.mantissaBits + light.reachExponent - square.exponent - 2 * drop;
+        const std::int64_t most = std::int64_t(4) << n.lightFraction;
+        const Wide quotient = divide(static_cast<std::uint64_t>(light.reachMantissa), divisor.mantissa, n.cosineFraction);
+        const std::int64_t falloff = exponent > 3 ? most : static_cast<std::int64_t>(std::min<Wide>(most, floorShift<Wide>(quotient, n.cosineFraction - n.lightFraction - exponent)));
+        cosine = (cosine * falloff) >> n.lightFraction;
     }
+    Illumination result{};
+    const std::int64_t brightest = (std::int64_t(1) << n.lightBits) - 1;
+    for (int channel = 0; channel < 3; ++channel)
+        result.direct[channel] = std::min(brightest, (light.colour[channel] * cosine) >> n.cosineFraction);
+    result.needsShadowRay = shadows && facingLight > 0;
+    const int dominant = dominantAxis(toLight);
+    result.shadowRay = {origin, toLight, static_cast<Wide>(magnitude(toLight[dominant])), 0};
     return result;
+}
+
+/// Colour of a surface in the light that falls onto it, per channel.
+inline std::int64_t reflected(std::int64_t albedo, std::int64_t incoming, const Numbers& n) {
+    return std::min((std::int64_t(1) << n.colourBits) - 1, (albedo * incoming) >> n.lightFraction);
 }
 
 } // namespace colonnade

@@ -2,6 +2,7 @@ package colonnade
 
 import chisel3._
 import chisel3.util.{Decoupled, Pipe}
+import colonnade.background.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
 import colonnade.column.Column
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
@@ -43,14 +44,21 @@ final class Colonnade(
   private val registers  = Module(new RegisterFile(config))
   private val controller = Module(new FrameController(config))
   private val counters   = Module(new CounterFile(config))
-  private val columns    = Seq.fill(config.array.columns)(
-    withReset(reset.asBool || controller.io.aborts)(Module(new Column(config, renderUnit)))
-  )
+  private val clears     = reset.asBool || controller.io.aborts
+  private val columns    = Seq.fill(config.array.columns)(withReset(clears)(Module(new Column(config, renderUnit))))
 
   // Records go to all columns
   private val load = Pipe(io.load.fire, io.load.bits)
   io.load.ready := !controller.io.status.busy
   columns.foreach(_.io.load := load)
+
+  // Maps of a room that all columns share
+  for (ports <- Some(columns.flatMap(_.io.room)) if ports.nonEmpty) {
+    val tagBits = AttributeArbiter.tagBits(config.array.rows, AttributePort.tagBits(config))
+    val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, config.array.columns, tagBits)))
+    maps.io.load := load
+    maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
+  }
 
   // A frame: tiles out, pixels back
   registers.io.register <> io.register

@@ -42,13 +42,52 @@ object ArbitraryConfig {
     holdable      <- flag
   } yield ColumnBvhMemoryConfig(depth, banks, stackDepth, snooping, recordBuffers, readLatency, holdable)
 
+  /** Maps whose bytes are between what their fixed parts need and what pointers reach. */
+  private val physicalAttributeMemory = for {
+    width       <- Gen.chooseNum(64, 1000, 640)
+    height      <- Gen.chooseNum(64, 1000, 480)
+    encoding    <- Gen.oneOf(MapEncoding.all)
+    tileSize    <- Gen.oneOf(16, 32)
+    paletteSize <- Gen.oneOf(16, 64, 256)
+    planes      <- Gen.oneOf(16, 128, 256)
+    shellPlanes <- Gen.chooseNum(2, 16)
+    mapHeap     <- Gen.chooseNum(66, 16384)
+    planeHeap   <- Gen.chooseNum(20, 16384)
+    shared      <- flag
+  } yield {
+    def parts(size: Int, edge: Int) = (size + edge - 1) / edge
+    val (tiles, blocks)             = (
+      parts(width, tileSize) * parts(height, tileSize),
+      parts(width, tileSize / 4) * parts(height, tileSize / 4)
+    )
+    val mapBytes = encoding match {
+      case MapEncoding.TwoLevel => tiles * 4 + paletteSize * 9 / 2 + mapHeap
+      case MapEncoding.Sliding  => (tiles * 9 + 1) / 2 + (blocks + 3) / 4 * 2 + mapHeap
+    }
+    val planeBytes = tiles * 2 + planes * 8 + shellPlanes * 18 + planeHeap
+    PhysicalAttributeMemoryConfig(
+      width,
+      height,
+      encoding,
+      tileSize,
+      paletteSize,
+      mapBytes,
+      planes,
+      planeBytes,
+      shellPlanes,
+      shared
+    )
+  }
+
   private val frame = for {
     maxWidth  <- Gen.chooseNum(8, 4096)
     maxHeight <- Gen.chooseNum(8, 4096)
     tileSize  <- Gen.oneOf(4, 8, 16, 32)
-    materials <- Gen.chooseNum(1, 256)
-    hits      <- flag
-  } yield FrameConfig(maxWidth, maxHeight, tileSize, materials, hits)
+    materials  <- Gen.chooseNum(1, 256)
+    lights     <- Gen.chooseNum(1, 8)
+    maxBounces <- Gen.chooseNum(0, 15)
+    hits       <- flag
+  } yield FrameConfig(maxWidth, maxHeight, tileSize, materials, lights, maxBounces, hits)
 
   val legal: Gen[ColonnadeConfig] = for {
     array     <- array
@@ -56,6 +95,7 @@ object ArbitraryConfig {
     geometry  <- geometry
     units     <- units(geometry.arity)
     memory    <- memory
+    maps      <- Gen.option(physicalAttributeMemory)
     frame     <- frame
-  } yield ColonnadeConfig(array, precision, geometry, units, memory, frame)
+  } yield ColonnadeConfig(array, precision, geometry, units, memory, maps, frame)
 }

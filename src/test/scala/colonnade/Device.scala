@@ -36,7 +36,7 @@ class Device(dut: Colonnade, config: ColonnadeConfig) {
 
   def load(records: Seq[BigInt]): Unit = {
     dut.io.load.valid.poke(true)
-    dut.io.load.bits.target.poke(LoadTarget.columnBvh)
+    dut.io.load.bits.target.poke(LoadTarget.columnBvh(config))
     for ((record, address) <- records.zipWithIndex) {
       dut.io.load.ready.expect(true)
       dut.io.load.bits.address.poke(address)

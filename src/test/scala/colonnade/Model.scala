@@ -4,8 +4,9 @@ import java.nio.charset.StandardCharsets.UTF_8
 import java.nio.file.{Files, Path, Paths, StandardCopyOption}
 import java.security.MessageDigest
 
-import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Layout, RecordFormats}
+import chisel3.Data
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.{AttributeMemories, Layout, RecordFormats}
 
 import scala.jdk.CollectionConverters._
 import scala.sys.process._
@@ -29,18 +30,38 @@ object Model {
   ): Seq[Seq[BigInt]] = {
     val formats = new RecordFormats(config)
     val kinds   = Seq("node" -> formats.node, "triangles" -> formats.triangles, "attributes" -> formats.attributes)
-    val layouts = kinds.map { case (name, kind) =>
-      val fields = Layout.of(kind).map(field =>
-        s"${field.name}=${field.offset},${field.width},${if (field.signed) 1 else 0}"
-      )
-      s"layout $name ${fields.mkString(" ")}"
-    }
-    val digits = formats.recordBits / 4
-    val hex    = records.map(record => "0" * (digits - record.toString(16).length) + record.toString(16))
-    val scene  =
+    val layouts = kinds.map { case (name, kind) => layout(name, kind) }
+    val digits  = formats.recordBits / 4
+    val hex     = records.map(record => "0" * (digits - record.toString(16).length) + record.toString(16))
+    val scene   =
       s"records ${registers("scene.triangleBase")} ${registers("scene.attributeBase")} ${hex.mkString(" ")}"
     val written = registers.map { case (name, value) => s"$name=$value" }.mkString("registers ", " ", "")
     answers(config, layouts ++ Seq(scene, written), positions.map { case (x, y) => Seq(BigInt(x), BigInt(y)) }, "pixel")
+  }
+
+  /** Answers to questions about a room's maps, in the form that room_questions.hpp documents.
+    *
+    * @param words of each of the room's memories
+    */
+  def attributes(
+      config:    ColonnadeConfig,
+      words:     Map[String, Seq[BigInt]],
+      questions: Seq[Seq[BigInt]],
+      kind:      String
+  ): Seq[Seq[BigInt]] = {
+    val layouts  = AttributeMemories.layouts.map { case (name, word) => layout(name, word()) }
+    val sizes    = AttributeLayout.of(config).entries.map { case (key, value) => s"$key=$value" }
+    val contents = AttributeMemories(config).map { memory =>
+      s"words ${memory.name} ${(memory.bits + 7) / 8} ${words(memory.name).map(_.toString(16)).mkString(" ")}"
+    }
+    answers(config, layouts ++ Seq(sizes.mkString("sizes ", " ", "")) ++ contents, questions, kind)
+  }
+
+  private def layout(name: String, kind: Data): String = {
+    val fields = Layout.of(kind).map(field =>
+      s"${field.name}=${field.offset},${field.width},${if (field.signed) 1 else 0}"
+    )
+    s"layout $name ${fields.mkString(" ")}"
   }
 
   private def answers(

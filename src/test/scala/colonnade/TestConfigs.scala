@@ -20,8 +20,43 @@ object TestConfigs {
       readLatency = 1,
       holdable = false
     ),
-    FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, hits = true)
+    physicalAttributeMemory = None,
+    FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, lights = 2, maxBounces = 3, hits = true)
   )
+
+  /** Maps of a few tiles, the last ones cut, with a heap for some of them. */
+  val room: PhysicalAttributeMemoryConfig = PhysicalAttributeMemoryConfig(
+    width = 150,
+    height = 70,
+    encoding = MapEncoding.TwoLevel,
+    tileSize = 16,
+    paletteSize = 256,
+    mapBytes = 3000,
+    planes = 128,
+    planeBytes = 2000,
+    shellPlanes = 8,
+    shared = false
+  )
+
+  def withRoom(room: PhysicalAttributeMemoryConfig): ColonnadeConfig =
+    tiny.copy(physicalAttributeMemory = Some(room))
+
+  /** In both encodings: small maps, and those of the room that the presets are made for. */
+  val rooms: Seq[ColonnadeConfig] = {
+    val large = room.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 8192)
+    val odd   = room.copy(
+      width = 331,
+      height = 97,
+      tileSize = 32,
+      paletteSize = 64,
+      planes = 32,
+      shellPlanes = 3,
+      mapBytes = 16848,
+      planeBytes = 16781
+    )
+    Seq(room, large, odd)
+      .flatMap(size => MapEncoding.all.map(encoding => withRoom(size.copy(encoding = encoding))))
+  }
 
   def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig =
     tiny.copy(precision = PrecisionConfig(mac, sqrt, div))

@@ -2,6 +2,7 @@ package colonnade.column
 
 import chisel3._
 import chisel3.util.{Decoupled, PopCount, Valid}
+import colonnade.background.{AttributePort, ColumnRoom}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{BackgroundWalker, ColumnProgress, EventSums, PixelCollector, Tile, TileWalker}
@@ -29,6 +30,9 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   /** In no particular order. */
   val pixels   = Decoupled(new Pixel(config))
   val progress = Output(new ColumnProgress)
+
+  /** Where the columns share the maps of a room. */
+  val room = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
 
   /** One cycle after they happened. */
   val events = Output(new EventSums(config, 1))
@@ -69,6 +73,14 @@ final class Column(
   memory.io.load := io.load
   memory.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
 
+  // Units will ask for the maps of a room: the column's own, or those that all columns share
+  private val room = config.physicalAttributeMemory.map(_ => Module(new ColumnRoom(config)).io)
+  for (maps <- room) {
+    maps.load := io.load
+    maps.shared.zip(io.room).foreach { case (shared, port) => port <> shared }
+    maps.ports.foreach(_.asksNothing())
+  }
+
   // Colours leave
   collector.io.sources.zip(units.map(_.pixels) :+ background.io.pixels).foreach { case (source, pixels) =>
     source <> pixels
@@ -90,5 +102,11 @@ final class Column(
 
   io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === leaves.asUInt
   io.progress.isIdle    := RegNext(units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle, true.B)
-  io.events             := RegNext(EventSums.ofColumn(config, enters, units.map(_.events), controller.io.events))
+  io.events             := RegNext(EventSums.ofColumn(
+    config,
+    enters,
+    units.map(_.events),
+    controller.io.events,
+    room.map(_.events)
+  ))
 }

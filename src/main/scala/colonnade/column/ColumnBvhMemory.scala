@@ -24,15 +24,16 @@ final class ColumnBvhMemoryIO(config: ColonnadeConfig) extends Bundle {
 final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnBvhMemoryIO(config))
 
-  private val isForUs = io.load.valid && io.load.bits.target === LoadTarget.columnBvh
+  private val isForUs = io.load.valid && io.load.bits.target === LoadTarget.columnBvh(config)
+  private val place   = io.load.bits.address(RecordFormats.addressBits(config) - 1, 0)
 
   for ((port, bank) <- io.banks.zipWithIndex) {
     val records = SyncReadMem(Banks.depth(config), new RecordFormats(config).record)
     val read    = Pipe(port.request.fire, port.request.bits, config.columnBvhMemory.readLatency - 1)
-    val writes  = isForUs && Banks.isIn(config, io.load.bits.address, bank)
+    val writes  = isForUs && Banks.isIn(config, place, bank)
     assert(!(writes && read.valid), "a load during a read")
 
-    val address = Mux(writes, Banks.addressIn(config, io.load.bits.address), read.bits)
+    val address = Mux(writes, Banks.addressIn(config, place), read.bits)
     val answer  = Wire(Decoupled(new RecordFormats(config).record))
     val answers = if (config.columnBvhMemory.holdable) Queue(answer, ReadList.room(config), flow = true) else answer
     val isHeld  = io.holds.map(_(bank)).getOrElse(false.B)

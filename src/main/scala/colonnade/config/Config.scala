@@ -88,27 +88,46 @@ final case class ColumnBvhMemoryConfig(
 
 /** What a frame may hold.
   *
-  * @param maxWidth  widest frame, pixels
-  * @param maxHeight highest frame, pixels
-  * @param tileSize  edge of the square tiles handed to columns, pixels
-  * @param materials entries of the material table
-  * @param hits      the pixel stream also carries the hit triangle and its distance
+  * @param maxWidth   widest frame, pixels
+  * @param maxHeight  highest frame, pixels
+  * @param tileSize   edge of the square tiles handed to columns, pixels
+  * @param materials  entries of the material table
+  * @param lights     point lights
+  * @param maxBounces reflections and refractions of a path that are traced; 0: every material is diffuse
+  * @param hits       the pixel stream also carries the hit triangle and its distance
   */
-final case class FrameConfig(maxWidth: Int, maxHeight: Int, tileSize: Int, materials: Int, hits: Boolean) {
+final case class FrameConfig(
+    maxWidth:   Int,
+    maxHeight:  Int,
+    tileSize:   Int,
+    materials:  Int,
+    lights:     Int,
+    maxBounces: Int,
+    hits:       Boolean
+) {
   Require.within("frame.maxWidth", maxWidth, 8, 4096)
   Require.within("frame.maxHeight", maxHeight, 8, 4096)
   Require.oneOf("frame.tileSize", tileSize, Seq(4, 8, 16, 32))
   Require.within("frame.materials", materials, 1, 256)
+  Require.within("frame.lights", lights, 1, 8)
+  Require.within("frame.maxBounces", maxBounces, 0, 15)
+
+  /** There are mirrors and glass. */
+  val hasBounces: Boolean = maxBounces > 0
 }
 
-/** A whole generator configuration: immutable, checked at construction. */
+/** A whole generator configuration: immutable, checked at construction.
+  *
+  * @param physicalAttributeMemory none: the device knows no room
+  */
 final case class ColonnadeConfig(
-    array:           ArrayConfig,
-    precision:       PrecisionConfig,
-    geometry:        GeometryConfig,
-    units:           UnitsConfig,
-    columnBvhMemory: ColumnBvhMemoryConfig,
-    frame:           FrameConfig
+    array:                   ArrayConfig,
+    precision:               PrecisionConfig,
+    geometry:                GeometryConfig,
+    units:                   UnitsConfig,
+    columnBvhMemory:         ColumnBvhMemoryConfig,
+    physicalAttributeMemory: Option[PhysicalAttributeMemoryConfig],
+    frame:                   FrameConfig
 ) {
   Require.oneOf("units.boxLanes", units.boxLanes, Seq(1, 2, 4).filter(_ <= geometry.arity))
 

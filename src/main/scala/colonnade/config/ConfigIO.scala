@@ -29,7 +29,11 @@ object ConfigIO {
   }
 
   def read(json: ujson.Value): ColonnadeConfig = {
-    val root  = new ConfigReader("", json, Seq("array", "precision", "geometry", "units", "columnBvhMemory", "frame"))
+    val root = new ConfigReader(
+      "",
+      json,
+      Seq("array", "precision", "geometry", "units", "columnBvhMemory", "physicalAttributeMemory", "frame")
+    )
     val array = root.section("array", "rows", "columns", "contexts")
     val shape = root.section(
       "geometry",
@@ -51,7 +55,7 @@ object ConfigIO {
       "readLatency",
       "holdable"
     )
-    val frame = root.section("frame", "maxWidth", "maxHeight", "tileSize", "materials", "hits")
+    val frame = root.section("frame", "maxWidth", "maxHeight", "tileSize", "materials", "lights", "maxBounces", "hits")
 
     ColonnadeConfig(
       array = ArrayConfig(
@@ -78,11 +82,28 @@ object ConfigIO {
         readLatency = memory.int("readLatency"),
         holdable = memory.boolean("holdable")
       ),
+      physicalAttributeMemory = root
+        .optionalSection(
+          "physicalAttributeMemory",
+          "width",
+          "height",
+          "encoding",
+          "tileSize",
+          "paletteSize",
+          "mapBytes",
+          "planes",
+          "planeBytes",
+          "shellPlanes",
+          "shared"
+        )
+        .map(physicalAttributeMemory),
       frame = FrameConfig(
         maxWidth = frame.int("maxWidth"),
         maxHeight = frame.int("maxHeight"),
         tileSize = frame.int("tileSize"),
         materials = frame.int("materials"),
+        lights = frame.int("lights"),
+        maxBounces = frame.int("maxBounces"),
         hits = frame.boolean("hits")
       )
     )
@@ -116,15 +137,44 @@ object ConfigIO {
         "readLatency"   -> columnBvhMemory.readLatency,
         "holdable"      -> columnBvhMemory.holdable
       ),
-      "frame" -> ujson.Obj(
+      "physicalAttributeMemory" -> config.physicalAttributeMemory.fold[ujson.Value](ujson.Null)(written),
+      "frame"                   -> ujson.Obj(
         "maxWidth"  -> frame.maxWidth,
         "maxHeight" -> frame.maxHeight,
         "tileSize"  -> frame.tileSize,
         "materials" -> frame.materials,
+        "lights"    -> frame.lights,
+        "maxBounces" -> frame.maxBounces,
         "hits"      -> frame.hits
       )
     )
   }
+
+  private def physicalAttributeMemory(memory: ConfigReader) = PhysicalAttributeMemoryConfig(
+    width = memory.int("width"),
+    height = memory.int("height"),
+    encoding = memory.choice("encoding", MapEncoding.all)(_.name),
+    tileSize = memory.int("tileSize"),
+    paletteSize = memory.int("paletteSize"),
+    mapBytes = memory.int("mapBytes"),
+    planes = memory.int("planes"),
+    planeBytes = memory.int("planeBytes"),
+    shellPlanes = memory.int("shellPlanes"),
+    shared = memory.boolean("shared")
+  )
+
+  private def written(memory: PhysicalAttributeMemoryConfig) = ujson.Obj(
+    "width"       -> memory.width,
+    "height"      -> memory.height,
+    "encoding"    -> memory.encoding.name,
+    "tileSize"    -> memory.tileSize,
+    "paletteSize" -> memory.paletteSize,
+    "mapBytes"    -> memory.mapBytes,
+    "planes"      -> memory.planes,
+    "planeBytes"  -> memory.planeBytes,
+    "shellPlanes" -> memory.shellPlanes,
+    "shared"      -> memory.shared
+  )
 
   private def precision(root: ConfigReader): PrecisionConfig = root.value("precision") match {
     case ujson.Str(notation(mac, sqrt, div)) => PrecisionConfig(mac.toInt, sqrt.toInt, div.toInt)
@@ -150,6 +200,8 @@ object ConfigIO {
         replaced(ujson.Obj("mac" -> mac.toInt, "sqrt" -> sqrt.toInt, "div" -> div.toInt), keys)
       case (ujson.Obj(fields), key :: keys) if fields.contains(key) =>
         ujson.Obj.from(fields.toSeq.map { case (k, v) => k -> (if (k == key) replaced(v, keys) else v) })
+      case (ujson.Null, _) =>
+        throw new ConfigError(s"the setting '$setting' changes a part of what is null; set the whole section first")
       case _ => throw new ConfigError(s"unknown key ${path.mkString(".")} in the setting '$setting'")
     }
     replaced(json, path)

@@ -21,6 +21,9 @@ private[config] final class ConfigReader(path: String, json: ujson.Value, known:
 
   def section(key: String, known: String*): ConfigReader = new ConfigReader(s"$path$key.", value(key), known)
 
+  def optionalSection(key: String, known: String*): Option[ConfigReader] =
+    if (value(key).isNull) None else Some(section(key, known: _*))
+
   def int(key: String): Int = value(key) match {
     case ujson.Num(number) if number.isValidInt => number.toInt
     case other                                  => throw wrong(path + key, other, "a whole number")
@@ -32,6 +35,12 @@ private[config] final class ConfigReader(path: String, json: ujson.Value, known:
     case ujson.Bool(flag) => flag
     case other            => throw wrong(path + key, other, "true or false")
   }
+
+  /** One of the known values, by its name. */
+  def choice[T](key: String, known: Seq[T])(name: T => String): T =
+    known
+      .find(candidate => value(key) == ujson.Str(name(candidate)))
+      .getOrElse(throw wrong(path + key, value(key), s"one of ${known.map(name).mkString(", ")}"))
 }
 
 private[config] object ConfigReader {

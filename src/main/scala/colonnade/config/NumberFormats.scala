@@ -37,6 +37,9 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   val radicandBits:   Int = precision.sqrt / 2 * 2
   val cosineFraction: Int = mantissaBits.min(colourBits + 4)
 
+  /** Of the squared cosine behind a refraction, unsigned: what the shader's multiplier takes, and no more than there is. */
+  val rootBits: Int = (2 * shadeBits + 1).min(gridBits.max(shadeBits + 1).max(lightBits + 2) - 1)
+
   /** Signed distances of the box test, in units. */
   val boxDistanceBits: Int = vertexBits + 3
 
@@ -84,7 +87,9 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
     "normalFraction"     -> normalFraction,
     "colourBits"         -> colourBits,
     "lightBits"          -> lightBits,
-    "lightFraction"      -> lightFraction
+    "lightFraction"      -> lightFraction,
+    "etaFraction"        -> etaFraction,
+    "rootBits"           -> rootBits
   )
 }
 
@@ -103,6 +108,10 @@ object NumberFormats {
   /** A light's intensity per channel, unsigned. */
   val lightBits:     Int = 16
   val lightFraction: Int = 12
+
+  /** A relative refractive index, or its reciprocal, unsigned: below 8, and so is its square up to 2.8. */
+  val etaBits:     Int = 16
+  val etaFraction: Int = 13
 
   def bitLength(value: Int): Int = 32 - Integer.numberOfLeadingZeros(value)
 

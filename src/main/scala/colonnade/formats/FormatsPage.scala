@@ -31,6 +31,34 @@ object FormatsPage {
       s"""What shading needs of a face: unit normals at the vertices and of the plane, and the index of its material. The face
          |with packed id t is in record `scene.attributeBase + t / ${RecordFormats.facesPerRecord}`, slot `t % ${RecordFormats.facesPerRecord}`.""".stripMargin,
       table(formats.attributes),
+      "## Physical-attribute memory",
+      room(config),
+      """A heap's words have 16 bits, and none is laid out further. A word of labels holds those of four blocks, the first in
+        |its low bits.""".stripMargin,
+      "### Tile of a two-level map",
+      """Modes 0 to 3 choose between two entries of the palette, for cells of 1/2, 1/4, 1/8 or 1/16 of the tile's edge; modes 4 to
+        |7 between four, for the same cells. Cells are counted row by row; cell c has bit c of the mask, or bits 2c and 2c + 1,
+        |from the low bit of its first word. The mask begins at the heap word `pointer`; that of mode 0 is the low bits of
+        |`pointer`. With four entries the word at `pointer` holds entries 2 (low byte) and 3, and the mask follows.""".stripMargin,
+      table(new MapDescriptor),
+      "### Albedo",
+      "An entry of a palette, or a seed: linear, all ones is 1.0.",
+      table(new AlbedoEntry),
+      "### Normal",
+      "An entry of a palette, or a seed: a unit vector in view space (x to the right, y down, z forward).",
+      table(new NormalEntry),
+      "### Tile of the plane map",
+      """Mode 0, and any beyond 4: all of the tile lies in the plane `pointer`. Modes 1 and 2: in two planes, for cells of 1/4 or 1/8
+        |of the tile's edge; the heap word `pointer` holds their ids, the first in its low byte, and the mask follows. Modes 3 and
+        |4: in four planes, for the same cells; two words of ids, then the mask. Masks are as above.""".stripMargin,
+      table(new PlaneDescriptor),
+      "### Plane",
+      """At the pixel (u, v) the inverse depth is w = (a · (u − width/2) + b · (v − height/2)) / 1024 + c, with each coefficient times
+        |2^(`exponent` − 22), in a unit that the packer chooses.""".stripMargin,
+      table(new Plane),
+      "### Shell entry",
+      "A plane beyond the view, with the one albedo and normal that it has.",
+      table(new ShellEntry),
       "## Streams",
       "### Pixel",
       "Finished pixels leave in any order.",
@@ -44,6 +72,20 @@ object FormatsPage {
       registers(RegisterMap(config))
     )
     page.mkString("\n\n") + "\n"
+  }
+
+  private def room(config: ColonnadeConfig): String = config.physicalAttributeMemory match {
+    case None =>
+      """The maps of a room; this configuration has none of them (`physicalAttributeMemory` is null). Each of their parts is a
+        |memory with a load target of its own, and a word takes the low bits of a load's record; the manifest's `memories` says
+        |how many there are, how wide, and for which target. Tiles lie row by row.""".stripMargin
+    case Some(_) =>
+      val rows = AttributeMemories(config).map(m => s"| `${m.name}` | ${m.target} | ${m.depth} | ${m.bits} |")
+      val head = Seq("| memory | load target | words | bits |", "|---|---|---|---|")
+      s"""The maps of a room. Each of their parts is a memory with a load target of its own; a word takes the low bits of a load's
+         |record. Tiles lie row by row.
+         |
+         |${(head ++ rows).mkString("\n")}""".stripMargin
   }
 
   private def table(kind: chisel3.Data): String = {

@@ -80,25 +80,80 @@ final class Camera(numbers: NumberFormats) extends Record {
   )
 }
 
+/** A point light. Its colour is its intensity where the squared distance is `reachMantissa · 2^reachExponent`, in grid
+  * steps; it falls with the squared distance. With a mantissa of 0 it is the same everywhere.
+  */
 final class Light(numbers: NumberFormats) extends Bundle {
-  val position = Vec3(SInt(numbers.macBits.W))
-  val colour   = Rgb(FrameRegisters.intensity)
-
-  /** How far a shadow ray starts from the surface, in grid steps along the normal. */
-  val shadowOffset = UInt((numbers.gridBits - 2).W)
+  val position      = Vec3(SInt(numbers.macBits.W))
+  val colour        = Rgb(FrameRegisters.intensity)
+  val reachMantissa = UInt(numbers.mantissaBits.W)
+  val reachExponent = SInt((NumberFormats.bitLength(2 * numbers.sceneBits) + 1).W)
 }
 
-final class Shading extends Bundle {
+/** A record, not a bundle: without bounces some fields are not there. */
+final class Shading(config: ColonnadeConfig) extends Record {
+  private def ifBounces[T](field: => T): Option[T] = if (config.frame.hasBounces) Some(field) else None
 
   /** Shade with geometric normals, not with the vertices'. */
   val flat = Bool()
 
   /** Send shadow rays. */
   val shadows = Bool()
+
+  /** Lights that shine: the first so many. */
+  val lights = UInt(NumberFormats.bitLength(config.frame.lights).W)
+
+  /** How far a secondary ray starts from the surface, in grid steps along the normal. */
+  val offset = UInt((config.numbers.gridBits - 2).W)
+
+  /** Reflections and refractions of a path that are traced; what comes then meets the background only. */
+  val bounces = ifBounces(UInt(NumberFormats.bitLength(config.frame.maxBounces).W))
+
+  /** What clear triangles let through of a light. */
+  val clearness = ifBounces(FrameRegisters.share)
+
+  val elements: SeqMap[String, Data] = FrameRegisters.fields(
+    Seq("flat" -> flat, "shadows" -> shadows, "lights" -> lights, "offset" -> offset) ++
+      bounces.map("bounces" -> _) ++ clearness.map("clearness" -> _): _*
+  )
 }
 
-final class Material extends Bundle {
+/** What becomes of a ray that meets a surface. */
+object MaterialKind {
+  val bits = 2
+
+  /** Lambert's: it takes light from the lights. */
+  def diffuse: UInt = 0.U(bits.W)
+
+  def mirror: UInt = 1.U(bits.W)
+
+  /** Refracts, and reflects Schlick's part. */
+  def glass: UInt = 2.U(bits.W)
+}
+
+/** A record, not a bundle: without bounces all that there is of a material is its albedo. */
+final class Material(config: ColonnadeConfig) extends Record {
+  private def ifBounces[T](field: => T): Option[T] = if (config.frame.hasBounces) Some(field) else None
+  private def eta = new Fixed(FixedPointFormat.unsigned(NumberFormats.etaBits, NumberFormats.etaFraction))
+
   val albedo = Rgb(FrameRegisters.colour)
+
+  /** See [[MaterialKind]]. */
+  val kind = ifBounces(UInt(MaterialKind.bits.W))
+
+  /** Glass: the index of the side that the ray comes from over the other one's, for a ray that meets the front or the
+    * back of a triangle.
+    */
+  val etaFront = ifBounces(eta)
+  val etaBack  = ifBounces(eta)
+
+  /** Glass: what it reflects head-on. */
+  val reflectance = ifBounces(FrameRegisters.share)
+
+  val elements: SeqMap[String, Data] = FrameRegisters.fields(
+    Seq("albedo" -> albedo) ++ kind.map("kind" -> _) ++ etaFront.map("etaFront" -> _) ++ etaBack.map("etaBack" -> _) ++
+      reflectance.map("reflectance" -> _): _*
+  )
 }
 
 /** The object's box: inclusive, in vertex units. */
@@ -123,11 +178,11 @@ final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
 
   val frame      = new FrameSettings(numbers)
   val camera     = new Camera(numbers)
-  val light      = new Light(numbers)
+  val lights     = Vec(config.frame.lights, new Light(numbers))
   val ambient    = Rgb(FrameRegisters.intensity)
-  val shading    = new Shading
+  val shading    = new Shading(config)
   val background = Rgb(FrameRegisters.colour)
-  val materials  = Vec(config.frame.materials, new Material)
+  val materials  = Vec(config.frame.materials, new Material(config))
   val bounds     = new Bounds(numbers)
   val scene      = new SceneMap(RecordFormats.idBits(config))
 }
@@ -139,6 +194,9 @@ object FrameRegisters {
 
   /** A light's intensity in one channel. */
   def intensity: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightBits, NumberFormats.lightFraction))
+
+  /** A part of the whole: 2^fraction is all of it. */
+  def share: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightFraction + 1, NumberFormats.lightFraction))
 
   /** A linear colour channel; all ones is 1.0. */
   def colour: UInt = UInt(NumberFormats.colourBits.W)
@@ -162,13 +220,18 @@ final class Errors extends Bundle {
 }
 
 /** What happened in the last frame. Sums over the array, except where a field says otherwise. */
-final class Counters extends Bundle {
-  private def counter = UInt(Counters.bits.W)
+final class Counters(config: ColonnadeConfig) extends Bundle {
+  private def counter     = UInt(Counters.bits.W)
+  private def roomCounter = config.physicalAttributeMemory.map(_ => counter)
 
   /** From start to the last pixel. */
   val cycles      = counter
   val raysPrimary = counter
   val raysShadow  = counter
+
+  /** Traced: not those that meet the background only. */
+  val raysReflection = counter
+  val raysRefraction = counter
 
   /** Rays of all kinds that entered the object's box. */
   val raysInBox     = counter
@@ -201,6 +264,12 @@ final class Counters extends Bundle {
   val contextsBox       = counter
   val contextsTriangles = counter
   val contextsShading   = counter
+
+  /** Questions that the maps of a room have answered. */
+  val albedoReads = roomCounter
+  val normalReads = roomCounter
+  val cellReads   = roomCounter
+  val planeReads  = roomCounter
 }
 
 object Counters {
@@ -208,10 +277,10 @@ object Counters {
 }
 
 /** What the host reads. */
-final class DeviceStatus extends Bundle {
+final class DeviceStatus(config: ColonnadeConfig) extends Bundle {
   val status   = new Status
   val errors   = new Errors
-  val counters = new Counters
+  val counters = new Counters(config)
 }
 
 final class Control extends Bundle {

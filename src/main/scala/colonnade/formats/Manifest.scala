@@ -29,19 +29,24 @@ object Manifest {
       "pixel" -> fields(Layout.of(new Pixel(config))),
       "load"  -> fields(Layout.of(new Load(config)))
     )
-    val memory = ujson.Obj(
-      "depth" -> config.columnBvhMemory.depth,
-      "bits"  -> formats.recordBits,
-      "banks" -> config.columnBvhMemory.banks
-    )
-    val formatHash = Json.hash(
-      ujson.Obj(
-        "records"   -> records,
-        "registers" -> registers,
-        "numbers"   -> numbers,
-        "bvh"       -> config.geometry.bvh // an image without nodes says nothing to hardware that walks them
+    val memories = ujson.Obj(
+      "columnBvh" -> ujson.Obj(
+        "depth" -> config.columnBvhMemory.depth,
+        "bits"  -> formats.recordBits,
+        "banks" -> config.columnBvhMemory.banks
       )
     )
+    for (memory <- AttributeMemories(config))
+      memories(memory.name) = ujson.Obj("depth" -> memory.depth, "bits" -> memory.bits, "target" -> memory.target)
+    val maps   = config.physicalAttributeMemory.map(_ => attributes(config))
+    val hashed = ujson.Obj(
+      "records"   -> records,
+      "registers" -> registers,
+      "numbers"   -> numbers,
+      "bvh"       -> config.geometry.bvh // an image without nodes says nothing to hardware that walks them
+    )
+    maps.foreach(hashed("attributes") = _)
+    val formatHash = Json.hash(hashed)
 
     val manifest = ujson.Obj(
       "version"    -> version,
@@ -50,12 +55,23 @@ object Manifest {
       "records"    -> records,
       "registers"  -> registers,
       "streams"    -> streams,
-      "memories"   -> ujson.Obj("columnBvh" -> memory),
+      "memories"   -> memories,
+      "attributes" -> maps.getOrElse[ujson.Value](ujson.Null),
       "formatHash" -> formatHash
     )
     manifest("configHash") = Json.hash(manifest)
     manifest
   }
+
+  /** What an image of the room's maps depends on; not how many copies of them there are. */
+  private def attributes(config: ColonnadeConfig): ujson.Obj = ujson.Obj(
+    "sizes" -> ujson.Obj.from(config.physicalAttributeMemory.toSeq.flatMap(_.layout.entries).map {
+      case (name, value) => name -> ujson.Num(value)
+    }),
+    "layouts" -> ujson.Obj.from(AttributeMemories.layouts.map { case (name, kind) =>
+      name -> fields(Layout.of(kind()))
+    })
+  )
 
   private def fields(layout: Seq[Field]): ujson.Arr = ujson.Arr.from(layout.map { field =>
     ujson.Obj(

@@ -47,6 +47,9 @@ final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
   /** From 1 to `trianglesPerRecord`. */
   val count = UInt(NumberFormats.bitLength(geometry.trianglesPerRecord).W)
 
+  /** Of each triangle: it lets some light through, see `shading.clearness`. */
+  val isClear = Vec(geometry.trianglesPerRecord, Bool())
+
   /** Three for each triangle, in vertex units. */
   val vertices = Vec(3 * geometry.trianglesPerRecord, Vec3(UInt(geometry.vertexBits.W)))
 }

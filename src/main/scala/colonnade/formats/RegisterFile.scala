@@ -1,7 +1,7 @@
 package colonnade.formats
 
 import chisel3._
-import chisel3.util.{log2Ceil, Cat, MuxLookup}
+import chisel3.util.{log2Ceil, Cat}
 import colonnade.config.ColonnadeConfig
 
 /** The host's way to the registers: one word a cycle. */
@@ -20,7 +20,7 @@ final class RegisterPort(addressBits: Int) extends Bundle {
 final class RegisterFileIO(config: ColonnadeConfig) extends Bundle {
   val register = new RegisterPort(RegisterFile.addressBits(config))
   val frame    = Output(new FrameRegisters(config))
-  val device   = Input(new DeviceStatus)
+  val device   = Input(new DeviceStatus(config))
 
   /** One cycle: a frame begins. */
   val start = Output(Bool())
@@ -58,9 +58,10 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   } yield (r.address + word).U -> wordOf(value, word)
 
   private val readData = Reg(UInt(RegisterMap.dataBits.W))
-  when(io.register.read) {
-    readData := MuxLookup(io.register.address, 0.U)(words)
+  private val found    = words.map { case (address, word) =>
+    Mux(io.register.address === address, word.pad(readData.getWidth), 0.U)
   }
+  when(io.register.read) { readData := VecInit(found).reduceTree(_ | _) }
   io.register.readData := readData
 
   private def wordOf(value: UInt, word: Int): UInt = {

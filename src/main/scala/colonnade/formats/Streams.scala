@@ -1,6 +1,7 @@
 package colonnade.formats
 
 import chisel3._
+import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
@@ -29,9 +30,13 @@ final class Pixel(config: ColonnadeConfig) extends Bundle {
 
 /** Which memories a [[Load]] is for. */
 object LoadTarget {
-  val bits: Int = 2
 
-  def columnBvh: UInt = 0.U(bits.W)
+  /** The first of the [[AttributeMemories]]. */
+  val firstAttributes: Int = 1
+
+  def bits(config: ColonnadeConfig): Int = log2Ceil(firstAttributes + AttributeMemories(config).size).max(2)
+
+  def columnBvh(config: ColonnadeConfig): UInt = 0.U(bits(config).W)
 }
 
 /** A record on its way into the device's memories: into that of every column. */
@@ -39,7 +44,11 @@ final class Load(config: ColonnadeConfig) extends Bundle {
   private val formats = new RecordFormats(config)
 
   /** See [[LoadTarget]]; a load for no memory is dropped. */
-  val target  = UInt(LoadTarget.bits.W)
-  val address = UInt(formats.addressBits.W)
-  val record  = formats.record
+  val target = UInt(LoadTarget.bits(config).W)
+
+  /** As wide as the deepest memory needs. */
+  val address = UInt((formats.addressBits +: AttributeMemories(config).map(m => log2Ceil(m.depth))).max.W)
+
+  /** A word of another memory has the low bits. */
+  val record = formats.record
 }

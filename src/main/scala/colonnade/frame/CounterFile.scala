@@ -17,7 +17,7 @@ final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
   /** What happens in this cycle counts. */
   val isCounting = Input(Bool())
 
-  val counters = Output(new Counters)
+  val counters = Output(new Counters(config))
 
   /** Sticky until cleared. */
   val stackOverflow = Output(Bool())
@@ -34,7 +34,7 @@ final class CounterFile(config: ColonnadeConfig) extends Module {
 
   val io = IO(new CounterFileIO(config))
 
-  private val counters = RegInit(0.U.asTypeOf(new Counters))
+  private val counters = RegInit(0.U.asTypeOf(new Counters(config)))
   private val overflow = RegInit(false.B)
   private val illegal  = RegInit(false.B)
   private val events   = RegNext(EventSums.ofArray(config, io.events))

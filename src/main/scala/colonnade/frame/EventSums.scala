@@ -2,6 +2,7 @@ package colonnade.frame
 
 import chisel3._
 import chisel3.util.log2Ceil
+import colonnade.background.AttributeEvents
 import colonnade.config.ColonnadeConfig
 import colonnade.unit.UnitEvents
 
@@ -20,10 +21,13 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   private def sum(most: Int): UInt = UInt(log2Ceil(most + 1).W)
   private def perUnit              = sum(units)
   private def perContext           = sum(units * config.array.contexts)
+  private def perRoom              = config.physicalAttributeMemory.map(_ => sum(columns))
 
   /** With those of the background, which go past the units. */
   val raysPrimary      = sum(units + columns)
   val raysShadow       = perUnit
+  val raysReflection   = perUnit
+  val raysRefraction   = perUnit
   val raysInBox        = perUnit
   val nodeReads        = perUnit
   val boxTests         = sum(units * config.geometry.arity)
@@ -45,6 +49,12 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val contextsTriangles = perContext
   val contextsShading   = perContext
 
+  /** Where there is a room. */
+  val albedoReads = perRoom
+  val normalReads = perRoom
+  val cellReads   = perRoom
+  val planeReads  = perRoom
+
   /** A level, not an event: the most of all units. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
 
@@ -55,17 +65,19 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
 
 object EventSums {
 
-  /** A column's, from the pixels it has begun and from those of its units and of its controller. */
+  /** A column's, from the pixels it has begun and from those of its units, of its controller and of the room's maps. */
   def ofColumn(
       config:      ColonnadeConfig,
       raysPrimary: UInt,
       units:       Seq[UnitEvents],
-      controller:  ColumnBvhEvents
+      controller:  ColumnBvhEvents,
+      room:        Option[AttributeEvents]
   ): EventSums = {
     val sums = joined(new EventSums(config, 1), units.map(_.elements.toMap))
-    sums.raysPrimary   := raysPrimary
-    sums.recordReads   := controller.recordReads
-    sums.bankConflicts := controller.bankConflicts
+    sums.raysPrimary                                                           := raysPrimary
+    sums.recordReads                                                           := controller.recordReads
+    sums.bankConflicts                                                         := controller.bankConflicts
+    for (events <- room; (name, event) <- events.elements) sums.elements(name) := event
     sums
   }
 

@@ -94,7 +94,8 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
   private val largest  = Reg(UInt(numbers.directionBits.W))
 
   // The most negative component's magnitude has as many bits as the component.
-  private val measured   = Mux(io.request.fire, io.request.bits.towards.x, towards.head)
+  private val isBetween  = step === idle || step === settled
+  private val measured   = Mux(isBetween, io.request.bits.towards.x, towards.head)
   private val magnitude  = RegEnable(magnitudeOf(measured), measures)
   private val isNegative = RegEnable(measured < 0.S, measures)
   private val isDominant = step === first || magnitude > largest

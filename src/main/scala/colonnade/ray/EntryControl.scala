@@ -87,14 +87,18 @@ final class EntryControl(slices: Int) extends Module {
   io.rayReady       := !busy || (io.outputValid && io.outputReady)
   io.quotientsReady := at(quotients + 1)
 
-  when(busy && !waits && !io.outputValid) {
-    step := Mux(at(decided) && !io.enters, finished.U, step + 1.U)
-  }
+  private val follows = Mux(at(decided) && !io.enters, finished.U, step + 1.U)
+  private val next    = Mux(io.command.loads, 0.U, Mux(busy && !waits && !io.outputValid, follows, step))
+  step := next
   when(io.outputValid && io.outputReady) { busy := false.B }
-  when(io.command.loads) {
-    busy := true.B
-    step := 0.U
-  }
+  when(io.command.loads) { busy := true.B }
+
+  // What the multiplier takes is decided a cycle before: its operands have no time to wait for it
+  private val shears     = RegNext(next >= advance.U)
+  private val shearsLast = next >= (advance + slices).U
+  private val side       = RegNext(Mux(next >= advance.U, shearsLast, next === 5.U || next === 6.U).asUInt)
+  private val slice      =
+    RegNext((next - Mux(shearsLast, (advance + slices).U, advance.U))(io.command.slice.getWidth - 1, 0))
 
   private val command = io.command
   command.loads            := io.rayValid && io.rayReady
@@ -109,9 +113,9 @@ final class EntryControl(slices: Int) extends Module {
   command.takesReciprocals := at(quotients) && io.quotientsValid
   command.takesShear       := command.takesReciprocals || at(quotients + 1)
   command.shearSide        := at(quotients + 1).asUInt
-  command.multipliesShear  := step >= advance.U
-  command.multiplySide     := Mux(command.multipliesShear, step >= (advance + slices).U, at(5, 6)).asUInt
-  command.slice            := step - Mux(command.multiplySide.asBool, (advance + slices).U, advance.U)
+  command.multipliesShear  := shears
+  command.multiplySide     := side
+  command.slice            := slice
   command.scales           := at(5, 6, 7, 8)
   command.scalesFar        := at(7, 8)
   command.scaleSide        := at(6, 7).asUInt

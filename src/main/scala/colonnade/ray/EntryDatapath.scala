@@ -142,21 +142,18 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
 
   io.enters := near.zext <= far && !ray.isZero(2)
   private val output = io.output
-  output.context  := ray.context
-  output.isShadow := ray.isShadow
-  output.enters   := io.enters
-  Seq(output.boxRay.heading, output.triangleRay.heading).foreach(_ := ray.heading)
+  output.context     := ray.context
+  output.isShadow    := ray.isShadow
+  output.enters      := io.enters
+  output.ray.heading := ray.heading
   Seq(1, 2, 0).zipWithIndex.foreach { case (from, to) =>
-    // In reach, thus within the grid and within the box test's units.
-    val position = Rounding.narrow(origin(from), numbers.gridBits)
-    val units    = Rounding.narrow(Rounding.nearestEven(position, fraction), numbers.boxDistanceBits)
-    output.triangleRay.origin(to) := Fixed(formats.grid, position)
-    output.boxRay.origin(to)      := Fixed(formats.units, units)
+    // In reach, thus within the grid.
+    output.ray.origin(to) := Fixed(formats.grid, Rounding.narrow(origin(from), numbers.gridBits))
   }
   (0 until 2).foreach { side =>
-    output.triangleRay.shear(side) := Fixed(formats.shear, shear(side))
-    output.boxRay.reciprocal(side) := Fixed(formats.reciprocal, reciprocal(side))
-    output.boxRay.exponent(side)   := Mux(isTiny(side), numbers.reciprocalFraction.U, ray.exponent(side))
+    output.ray.shear(side)      := Fixed(formats.shear, shear(side))
+    output.ray.reciprocal(side) := Fixed(formats.reciprocal, reciprocal(side))
+    output.ray.exponent(side)   := Mux(isTiny(side), numbers.reciprocalFraction.U, ray.exponent(side))
   }
   output.entry := Fixed(formats.entry, entry)
   output.limit := Fixed(formats.grid, Rounding.narrow(limit.zext, numbers.gridBits))

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.Vec3
-import colonnade.numbers.{Fixed, FixedPointFormat}
+import colonnade.numbers.{Fixed, FixedPointFormat, Rounding}
 
 /** Formats of a ray's numbers (docs/numbers.md). */
 final class RayFormats(numbers: NumberFormats) {
@@ -76,17 +76,48 @@ final class TriangleRay(numbers: NumberFormats) extends Bundle {
   val shear   = Vec(2, new Fixed(formats.shear))
 }
 
+/** What is kept of a ray while it is traced; numbers of its own frame. */
+final class TracedRay(numbers: NumberFormats) extends Bundle {
+  private val formats = new RayFormats(numbers)
+
+  val heading    = new Heading
+  val origin     = Vec(3, new Fixed(formats.grid))
+  val shear      = Vec(2, new Fixed(formats.shear))
+  val reciprocal = Vec(2, new Fixed(formats.reciprocal))
+  val exponent   = Vec(2, UInt(formats.exponentBits.W))
+
+  def forTriangles: TriangleRay = {
+    val ray = Wire(new TriangleRay(numbers))
+    ray.heading := heading
+    ray.origin  := origin
+    ray.shear   := shear
+    ray
+  }
+
+  /** Its origin in units: near the object, thus within the box test's. */
+  def forBoxes: BoxRay = {
+    val ray = Wire(new BoxRay(numbers))
+    ray.heading    := heading
+    ray.reciprocal := reciprocal
+    ray.exponent   := exponent
+    ray.origin.zip(origin).foreach { case (units, position) =>
+      val rounded = Rounding.nearestEven(position.integer, numbers.gridFraction)
+      units := Fixed(formats.units, Rounding.narrow(rounded, numbers.boxDistanceBits))
+    }
+    ray
+  }
+}
+
 /** The outcome of ray set-up. Without `enters` the rest is meaningless. */
 final class SetUpRay(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new RayFormats(numbers)
 
-  val context     = Context(config)
-  val isShadow    = Bool()
-  val enters      = Bool()
-  val boxRay      = new BoxRay(numbers)
-  val triangleRay = new TriangleRay(numbers)
-  val entry       = new Fixed(formats.entry)
+  val context  = Context(config)
+  val isShadow = Bool()
+  val enters   = Bool()
+  val ray      = new TracedRay(numbers)
+  val entry    = new Fixed(formats.entry)
 
   /** Largest t that still counts, never negative. */
   val limit = new Fixed(formats.grid)

@@ -1,132 +1,240 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{is, log2Ceil, switch, Decoupled, MuxLookup}
+import chisel3.util.{log2Ceil, Decoupled, MuxLookup, Valid}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.formats.{FrameRegisters, Light, Material, RecordFormats, Rgb}
-import colonnade.numbers.Rounding
+import colonnade.formats.{FrameRegisters, Rgb, Shading}
+import colonnade.numbers.{Fixed, Rounding}
+import colonnade.ray.Context
+import colonnade.unit.ContextTable
 
-/** Both colours that a hit's pixel may have. */
-final class HitColours extends Bundle {
-  val lit     = Rgb(FrameRegisters.colour)
-  val ambient = Rgb(FrameRegisters.colour)
+/** A path that meets its last surface. */
+final class PathEnd(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+
+  /** It meets no surface of the object: the background's colour counts. */
+  val isBackground = Bool()
+
+  /** By light: what the shadow rays have met. */
+  val occlusions = Vec(config.frame.lights, Occlusion())
+}
+
+/** What a mirror or glass does to a path. */
+final class PathTurn(config: ColonnadeConfig) extends Bundle {
+  val context  = Context(config)
+  val albedo   = Rgb(FrameRegisters.colour)
+  val isTinted = Bool()
+
+  /** The background's share, by Schlick's reflection. */
+  val share = FrameRegisters.share
+}
+
+/** The colour of a path. */
+final class PathColour(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val colour  = Rgb(FrameRegisters.colour)
 }
 
 final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
-  private val numbers = config.numbers
-  private val formats = new ShaderFormats(numbers)
+  val ambient    = Input(Rgb(FrameRegisters.intensity))
+  val background = Input(Rgb(FrameRegisters.colour))
+  val shading    = Input(new Shading(config))
 
-  /** The hit's material. */
-  val material = Flipped(Decoupled(UInt(RecordFormats.materialBits.W)))
+  /** A context takes a new pixel: its path begins. */
+  val begins = Flipped(Valid(Context(config)))
 
-  /** The same hit's cosine. */
-  val cosine = Flipped(Decoupled(UInt(formats.cosineBits.W)))
-
-  /** Constant while a hit is in work. */
-  val materials = Input(Vec(config.frame.materials, new Material))
-  val light     = Input(new Light(numbers))
-  val ambient   = Input(Rgb(FrameRegisters.intensity))
-
-  /** To the multiplier, which answers in the cycle after it took them. */
-  val factors = Decoupled(new Factors(formats))
-  val product = Input(SInt(formats.productBits.W))
-  val colours = Decoupled(new HitColours)
+  /** The surface that a context's path will end at; remembered. */
+  val surface = Flipped(Valid(new LitSurface(config)))
+  val turn    = if (config.frame.hasBounces) Some(Flipped(Decoupled(new PathTurn(config)))) else None
+  val end     = Flipped(Decoupled(new PathEnd(config)))
+  val colour  = Valid(new PathColour(config))
 }
 
-private object ColourStep extends ChiselEnum {
-
-  /** Albedo · ambient; then wait for the cosine; light · cosine; albedo · (ambient + direct). */
-  val idle, ambient, cosine, direct, lit, done = Value
-}
-
-/** The colours of a hit: docs/numbers.md, 5.8.
+/** Colours of paths: docs/numbers.md, 5.9 and 6. What a path has passed weighs what it still meets (its throughput), and
+  * what is certain is gathered.
   *
-  * One hit at a time: three products, of which nothing waits for the cosine, then six more; one a cycle while the
-  * multiplier is free, and two cycles. A material's index beyond the table takes any of its entries; the packer writes
-  * none. Where the table's size is a power of two, it counts modulo the size, as in the model.
+  * One path at a time, two cycles a product and channel: an end takes 2 + 6 · (lights + 2) cycles, one in the background
+  * 8, a turn 20. Turns go first.
+  *
+  * @note colour = gathered + throughput · albedo · (ambient + the sum of all lights, less what is in their way)
   */
 final class ColourUnit(config: ColonnadeConfig) extends Module {
-  private val formats = new ShaderFormats(config.numbers)
-  private val indices = log2Ceil(config.frame.materials)
+  private val lights     = config.frame.lights
+  private val hasBounces = config.frame.hasBounces
+  private val fraction   = NumberFormats.lightFraction
+  private val colourBits = NumberFormats.colourBits
+  private val sumBits    = NumberFormats.lightBits + log2Ceil(lights + 1)
+  private val shareBits  = fraction + 1
 
   val io = IO(new ColourUnitIO(config))
 
-  private val step     = RegInit(ColourStep.idle)
-  private val channel  = Reg(UInt(2.W))
-  private val material = Reg(UInt(indices.W))
-  private val cosine   = Reg(UInt(formats.cosineBits.W))
+  // What each context remembers
+  private val surfaces = ContextTable(config, new EndSurface(config))
+  private val paths    = if (hasBounces) Some(ContextTable(config, new PathSoFar)) else None
 
-  /** Light that falls onto the surface. */
-  private val incoming = Reg(Vec(3, UInt((NumberFormats.lightBits + 1).W)))
-  private val lit      = Reg(Vec(3, FrameRegisters.colour))
-  private val ambient  = Reg(Vec(3, FrameRegisters.colour))
+  /** The path has met neither mirror nor glass yet: its entry means nothing. */
+  private val isStraight = Reg(Vec(config.array.contexts, Bool()))
+  when(io.surface.valid) {
+    val surface = Wire(new EndSurface(config))
+    surface.albedo  := io.surface.bits.albedo
+    surface.directs := io.surface.bits.directs
+    surfaces.write(io.surface.bits.context, surface)
+  }
 
-  private def select(colour: Seq[UInt], channel: UInt): UInt =
-    MuxLookup(channel, colour(2))(Seq(0.U -> colour(0), 1.U -> colour(1)))
+  // The path in work
+  private val isBusy  = RegInit(false.B)
+  private val isEnd   = Reg(Bool())
+  private val context = Reg(Context(config))
 
-  // Factors
-  private val isDirect     = step === ColourStep.direct
-  private val isAmbient    = step === ColourStep.ambient
-  private val isLit        = step === ColourStep.lit
-  private val ambientLight = io.ambient.channels.map(_.natural)
-  private val directLight  = select(io.light.colour.channels.map(_.natural), channel)
-  private val albedo       = select(io.materials(material).albedo.channels, channel)
-  private val illumination = Mux(isAmbient, select(ambientLight, channel), select(incoming, channel))
-  io.factors.valid       := isAmbient || isDirect || isLit
-  io.factors.bits.wide   := Mux(isDirect, cosine, illumination).zext.pad(formats.wideBits)
-  io.factors.bits.narrow := Mux(isDirect, directLight, albedo).zext.pad(formats.narrowBits)
+  /** The tables' entries come. */
+  private val arrives = RegInit(false.B)
 
-  // The product of this cycle comes in the next one, whatever that does
-  private val arrivingStep    = RegNext(Mux(io.factors.fire, step, ColourStep.idle), ColourStep.idle)
-  private val arrivingChannel = RegNext(channel)
-  private val product         = io.product.asUInt
-  private val direct          =
-    Rounding.narrow(Rounding.floor(product, config.numbers.cosineFraction), NumberFormats.lightBits)
-  private val colour = Rounding.saturate(Rounding.floor(product, NumberFormats.lightFraction), NumberFormats.colourBits)
-  for (i <- 0 until 3) {
-    when(arrivingChannel === i.U) {
-      when(arrivingStep === ColourStep.ambient)(ambient(i) := colour)
-      when(arrivingStep === ColourStep.direct)(incoming(i) := ambientLight(i) +& direct)
-      when(arrivingStep === ColourStep.lit)(lit(i)         := colour)
+  /** Which product, of which channel; and whether it is there. */
+  private val step    = Reg(UInt(log2Ceil(lights + 2).max(2).W))
+  private val channel = Reg(UInt(2.W))
+  private val isThere = Reg(Bool())
+
+  private val occlusions = Reg(Vec(lights, Occlusion()))
+  private val albedo     = Reg(Vec(3, UInt(colourBits.W)))
+  private val directs    = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
+  private val share      = Reg(UInt(shareBits.W))
+  private val isTinted   = Reg(Bool())
+  private val throughput = Reg(Vec(3, UInt(shareBits.W)))
+  private val gathered   = Reg(Vec(3, UInt(colourBits.W)))
+  private val sum        = Reg(UInt(sumBits.W))
+  private val colours    = Reg(Vec(3, UInt(colourBits.W)))
+
+  private val reflects = lights
+  private val passes   = lights + 1
+  private val lastStep = Mux(isEnd, passes.U, 2.U)
+  private val isBackground = Reg(Bool())
+
+  // Take one
+  private val turns = io.turn.map(_.fire).getOrElse(false.B)
+  io.turn.foreach(_.ready := !isBusy)
+  io.end.ready := !isBusy && !io.turn.map(_.valid).getOrElse(false.B)
+  private val takes       = turns || io.end.fire
+  private val taken       = io.turn.map(turn => Mux(turn.valid, turn.bits.context, io.end.bits.context)).getOrElse(io.end.bits.context)
+  private val surfaceRead = surfaces.read(taken, takes)
+  private val pathRead    = paths.map(_.read(taken, takes))
+  arrives := takes
+  when(takes) {
+    isBusy  := true.B
+    isEnd   := !turns
+    context := taken
+    channel := 0.U
+    isThere := false.B
+    step    := Mux(!turns && io.end.bits.isBackground, passes.U, 0.U)
+    isBackground := io.end.bits.isBackground
+    occlusions   := io.end.bits.occlusions
+    io.turn.foreach { turn =>
+      albedo   := VecInit(turn.bits.albedo.channels)
+      share    := turn.bits.share.natural
+      isTinted := turn.bits.isTinted
+    }
+  }
+  when(arrives) {
+    val begun = isStraight(context)
+    throughput := VecInit.fill(3)((1 << fraction).U)
+    gathered   := VecInit.fill(3)(0.U)
+    pathRead.foreach { path =>
+      when(!begun) {
+        throughput := VecInit(path.throughput.map(_.natural))
+        gathered   := VecInit(path.gathered.channels)
+      }
+    }
+    when(isEnd) {
+      albedo  := VecInit(surfaceRead.albedo.channels)
+      directs := VecInit(surfaceRead.directs.map(direct => VecInit(direct.channels.map(_.natural))))
     }
   }
 
-  // Control
-  private val isLast = channel === 2.U
-  when(io.factors.fire)(channel := Mux(isLast, 0.U, channel + 1.U))
-  switch(step) {
-    is(ColourStep.idle) {
-      channel  := 0.U
-      material := io.material.bits
-      when(io.material.fire)(step := ColourStep.ambient)
-    }
-    is(ColourStep.ambient) {
-      when(io.factors.fire && isLast)(step := ColourStep.cosine)
-    }
-    is(ColourStep.cosine) {
-      cosine := io.cosine.bits
-      when(io.cosine.fire)(step := ColourStep.direct)
-    }
-    is(ColourStep.direct) {
-      when(io.factors.fire && isLast)(step := ColourStep.lit)
-    }
-    is(ColourStep.lit) {
-      when(io.factors.fire && isLast)(step := ColourStep.done)
-    }
-    is(ColourStep.done) {
-      when(io.colours.fire)(step := ColourStep.idle)
+  private def of[T <: Data](channels: Seq[T]): T = MuxLookup(channel, channels(2))(Seq(0.U -> channels(0), 1.U -> channels(1)))
+
+  // One product
+  private val whole      = (1 << fraction).U(shareBits.W)
+  private val clearness  = io.shading.clearness.map(_.natural).getOrElse(whole)
+  private val light      = step(log2Ceil(lights.max(2)) - 1, 0)
+  private def at[T <: Data](entries: Vec[T]): T = if (lights == 1) entries.head else entries(light)
+  private val passing    = MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> whole, Occlusion.clear -> clearness))
+  private val background = of(io.background.channels)
+  private val albedoNow  = of(albedo)
+
+  /** All ones is 1.0. */
+  private val tint  = Mux(isTinted, albedoNow +& albedoNow(colourBits - 1), whole)
+  private val left  = Mux(isEnd, Mux(step < reflects.U, of(at(directs)), Mux(isBackground, background, sum)), Mux(step === 2.U, sum, of(throughput)))
+  private val right = Mux(
+    isEnd,
+    Mux(step < reflects.U, passing, Mux(step === reflects.U, albedoNow, of(throughput))),
+    Mux(step === 0.U, tint, Mux(step === 1.U, share, background))
+  )
+  private val product = Reg(UInt((sumBits + shareBits).W))
+  product := left * right
+  private val part    = Rounding.floor(product, fraction)
+  private val colour  = Rounding.saturate(part, colourBits)
+  private val total   = Rounding.saturate(of(gathered) +& part, colourBits)
+
+  // What it means
+  private val leaves    = RegInit(false.B)
+  private val isWorking = isBusy && !arrives && !leaves
+  private val isDone    = isWorking && isThere && step === lastStep && channel === 2.U
+  private val first     = of(io.ambient.channels).natural
+  when(isWorking) {
+    isThere := !isThere
+    when(isThere) {
+      step := step + 1.U
+      when(step === lastStep) {
+        step    := Mux(isEnd && isBackground, passes.U, 0.U)
+        channel := channel + 1.U
+      }
+      when(isEnd) {
+        when(step < reflects.U) { sum := Mux(step === 0.U, first, sum) + part }
+        when(step === reflects.U) { sum := colour }
+        when(step === passes.U) { set(colours, total) }
+      }.otherwise {
+        when(step === 0.U) { set(throughput, Rounding.narrow(part, shareBits)) }
+        when(step === 1.U) {
+          sum := part
+          set(throughput, of(throughput) - Rounding.narrow(part, shareBits))
+        }
+        when(step === 2.U) { set(gathered, total) }
+      }
     }
   }
 
-  io.material.ready       := step === ColourStep.idle
-  io.cosine.ready         := step === ColourStep.cosine
-  io.colours.valid        := step === ColourStep.done && arrivingStep === ColourStep.idle
-  io.colours.bits.lit     := toRgb(lit)
-  io.colours.bits.ambient := toRgb(ambient)
-
-  private def toRgb(channels: Vec[UInt]): Rgb[UInt] = {
-    val rgb = Wire(Rgb(FrameRegisters.colour))
-    rgb.channels.zip(channels).foreach { case (to, from) => to := from }
-    rgb
+  // A turned path is remembered, an end's colour leaves, in the cycle after the last product
+  leaves := isDone
+  when(leaves) { isBusy := false.B }
+  io.colour.valid        := leaves && isEnd
+  io.colour.bits.context := context
+  io.colour.bits.colour.channels.zip(colours).foreach { case (to, from) => to := from }
+  paths.foreach { table =>
+    when(leaves && !isEnd) {
+      val path = Wire(new PathSoFar)
+      path.throughput.zip(throughput).foreach { case (to, from) => to := Fixed(to.format, from) }
+      path.gathered.channels.zip(gathered).foreach { case (to, from) => to := from }
+      table.write(context, path)
+      isStraight(context) := false.B
+    }
   }
+  when(io.begins.valid) { isStraight(io.begins.bits) := true.B }
+
+  private def set(channels: Vec[UInt], value: UInt): Unit =
+    for (index <- 0 until 3) when(channel === index.U) { channels(index) := value }
+}
+
+/** What an end needs of its surface. */
+final private class EndSurface(config: ColonnadeConfig) extends Bundle {
+  val albedo  = Rgb(FrameRegisters.colour)
+  val directs = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
+}
+
+/** What a path has passed. */
+final private class PathSoFar extends Bundle {
+
+  /** What part of what comes now counts, by channel. */
+  val throughput = Vec(3, FrameRegisters.share)
+
+  /** What is certain already. */
+  val gathered = Rgb(FrameRegisters.colour)
 }

@@ -5,6 +5,7 @@ import chisel3.util.{Cat, Mux1H, PriorityEncoder, Reverse, Valid}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{Light, Vec3}
 import colonnade.numbers.{Normalise, Rounding}
+import colonnade.ray.PermutedFrame
 
 final class GeometryDatapathIO(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
@@ -16,6 +17,7 @@ final class GeometryDatapathIO(config: ColonnadeConfig) extends Bundle {
   /** Shade with the geometric normal. */
   val isFlat    = Input(Bool())
   val light     = Input(new Light(numbers))
+  val offset    = Input(UInt((numbers.gridBits - 2).W))
   val unitShift = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
 
   /** To the multiplier, which answers in the next cycle. */
@@ -24,7 +26,11 @@ final class GeometryDatapathIO(config: ColonnadeConfig) extends Bundle {
 
   /** While the normal is counted: it is zero. */
   val normalIsZero = Output(Bool())
-  val result       = Output(new ShadingPoint(config))
+
+  /** Of the light. */
+  val angle   = Output(new Angle(formats))
+  val falloff = Output(new FalloffQuestion(numbers))
+  val surface = Output(new ShadedSurface(config))
 }
 
 /** Vector registers around one multiplier, one adder and one shifter; [[GeometryProgram]] says when each does what.
@@ -76,9 +82,13 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   private val normalZeros  = Reg(UInt(Normalise.exponentBits(formats.vectorBits).W))
   private val lightZeros   = Reg(chiselTypeOf(normalZeros))
   private val normalLength = Reg(UInt(formats.shadeBits.W))
-  private val exponent     = Reg(UInt(3.W))
-  private val dot          = Reg(UInt(formats.dotBits.W))
-  private val isAcute      = Reg(Bool())
+  private val lightLength  = Reg(UInt(formats.shadeBits.W))
+
+  /** How long the lengths' squares are, see [[Angle]]. */
+  private val normalExponent = Reg(UInt(2.W))
+  private val lightExponent  = Reg(UInt(2.W))
+  private val dot            = Reg(UInt(formats.dotBits.W))
+  private val isAcute        = Reg(Bool())
 
   // A length's mantissa and exponent: its square's highest bit is one of the top four
   private val top            = sum.asUInt(formats.dotBits - 1, formats.dotBits - 4)
@@ -105,7 +115,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
       val weight = Mux(io.isFlat, (if (corner == 0) 1 else 0).S, weights(0).zext)
       isCorner -> (weight -> Mux(io.isFlat, geometricNormal(0), normalOf(corner)))
     } ++ control.slope.zip(slopeDigits).map { case (isDigit, digit) => isDigit -> (distance -> digit) } ++ Seq(
-      control.raise   -> (io.light.shadowOffset.zext -> geometricNormal(0)),
+      control.raise   -> (io.offset.zext -> geometricNormal(0)),
       control.square  -> (scaled                     -> scaled),
       control.project -> (scaled                     -> Rounding.narrow(normal(0), formats.narrowBits)),
       control.lengths -> (normalLength.zext          -> lengthMantissa.zext)
@@ -197,7 +207,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
       Mux(
         control.pushNormal,
         Mux(backSide, total, right),
-        Rounding.floor(shiftedNow, formats.vectorBits - formats.narrowBits)
+        Mux(control.project, normal(0), Rounding.floor(shiftedNow, formats.vectorBits - formats.narrowBits))
       )
     )
   }
@@ -209,10 +219,13 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
 
   // Results
   when(control.keepNormalLength) {
-    normalLength := lengthMantissa
-    exponent     := lengthExponent
+    normalLength   := lengthMantissa
+    normalExponent := lengthExponent
   }
-  when(control.lengths)(exponent := exponent + lengthExponent)
+  when(control.lengths) {
+    lightLength   := lengthMantissa
+    lightExponent := lengthExponent
+  }
   when(control.keepDot) {
     dot     := sum.asUInt(formats.dotBits - 1, 0)
     isAcute := sum > 0.S
@@ -236,14 +249,37 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
     material   := request.face.material
   }
 
-  io.result.context        := context
-  io.result.material       := material
-  io.result.origin         := Vec3.of(point(0), point(1), point(2))
-  io.result.toLight        := Vec3.of[SInt](toLight(0), toLight(1), toLight(2))
-  io.result.angle.isAcute  := isAcute
-  io.result.angle.dot      := dot
-  io.result.angle.lengths  := sum.asUInt(formats.lengthsBits - 1, 0)
-  io.result.angle.exponent := exponent
+  io.angle.isAcute  := isAcute
+  io.angle.dot      := dot
+  io.angle.lengths  := sum.asUInt(formats.lengthsBits - 1, 0)
+  io.angle.exponent := normalExponent +& lightExponent
 
-  private def toLight(axis: Int): SInt = Rounding.narrow(normalsOrToLight(axis), formats.toLightBits)
+  // The light's squared distance has 2 · shadeBits - 1 + lightExponent bits, after its components moved up by lightZeros
+  private val moved    = 2 * (formats.vectorBits - 1 - formats.shadeBits) + 2 * formats.shadeBits - 1 - numbers.mantissaBits
+  private val squaredBits = moved.S +& lightExponent.zext -& (lightZeros << 1).zext
+  io.falloff.reach    := io.light.reachMantissa
+  io.falloff.mantissa := lightLength
+  io.falloff.exponent := io.light.reachExponent -& squaredBits
+
+  io.surface.context  := context
+  io.surface.material := material
+  io.surface.origin   := Vec3.of(point(0), point(1), point(2))
+  io.surface.normal   := Vec3.of[SInt](scaledNormal(0), scaledNormal(1), scaledNormal(2))
+  io.surface.isSmooth := !io.isFlat
+  io.surface.facing   := Vec3.of[SInt](facing(0), facing(1), facing(2))
+  io.surface.backSide := backSide
+
+  // The direction as the slopes give it, from the ray's frame to the object's
+  private val one     = (BigInt(1) << (formats.shadeBits - 1)).S((formats.shadeBits + 1).W)
+  private val towards = slopes.map(slope =>
+    Rounding.narrow(Rounding.floor(slope, numbers.shearFraction - (formats.shadeBits - 1)), formats.shadeBits + 1)
+  ) :+ Mux(isNegative, -one, one)
+  io.surface.towards := PermutedFrame.back(towards, axis)
+
+  private def scaledNormal(axis: Int): SInt = Rounding.narrow(normal(axis), formats.narrowBits)
+
+  private def facing(axis: Int): SInt = {
+    val outward = geometricNormal(axis).pad(normalBits + 1)
+    Mux(backSide, -outward, outward)
+  }
 }

@@ -98,11 +98,16 @@ final class GeometryProgram(formats: ShaderFormats) {
   private val lengths       = squareLight.last + toSum
 
   /** All is done: nothing happens in this step. */
-  val last:     Int = lengths + toSum
+  val last: Int = lengths + toSum
+
+  /** Where the next light of the same hit begins. */
+  val nextLight: Int = placeLight.head
+  require(pushLight.head > addOffset.last && scaleNormal.head > placeLight.head, "a light begins within the hit's part")
+
   val stepBits: Int = log2Ceil(last + 1)
 
-  /** Decodes a step. */
-  def control(step: UInt, load: Bool): GeometryControl = {
+  /** Decodes a step; a later light of the same hit finds its normal scaled and measured. */
+  def control(step: UInt, load: Bool, isFirstLight: Bool): GeometryControl = {
     def in(steps: Seq[Int]): Bool = steps.map(step === _.U).reduce(_ || _)
     def at(steps: Int*): Bool     = in(steps)
 
@@ -114,7 +119,7 @@ final class GeometryProgram(formats: ShaderFormats) {
     control.weighted := VecInit(Seq(0, 1, 2).map(corner => in(weighted.filter(_ % 3 == corner))))
     control.slope    := VecInit(slopes.flatten.map(at(_)))
     control.raise    := in(raise)
-    control.square   := in(squareNormal ++ squareLight)
+    control.square   := (in(squareNormal) && isFirstLight) || in(squareLight)
     control.project  := in(project)
     control.lengths  := at(lengths)
 
@@ -125,21 +130,21 @@ final class GeometryProgram(formats: ShaderFormats) {
 
     control.addSlope     := in(addSlope)
     control.addDistance  := at(addDistance)
-    control.addOffset    := in(addOffset)
+    control.addOffset    := in(addOffset) && isFirstLight
     control.pushNormal   := in(pushNormal)
     control.pushLight    := in(pushLight)
     control.measureLight := in(measureLight)
     control.turn         := VecInit(turn.map(at(_)))
 
     control.placeLight  := VecInit(placeLight.map(at(_)))
-    control.scaleNormal := in(scaleNormal)
+    control.scaleNormal := in(scaleNormal) && isFirstLight
     control.scaleLight  := in(scaleLight)
 
     control.startMeasure := at(pushNormal.head, measureLight.head)
     control.countNormal  := at(countNormal)
     control.countLight   := at(countLight)
 
-    control.keepNormalLength := at(normalSquared)
+    control.keepNormalLength := at(normalSquared) && isFirstLight
     control.keepDot          := at(projected)
     control
   }

@@ -15,12 +15,24 @@ final class ShadeRequest(config: ColonnadeConfig) extends Bundle {
   val face    = new Face
 }
 
-/** Both colours the pixel may have, and the shadow ray (from `origin` along `toLight`, grid steps) that decides. */
-final class ShadeResult(config: ColonnadeConfig) extends Bundle {
-  val context        = Context(config)
-  val lit            = Rgb(FrameRegisters.colour)
-  val ambient        = Rgb(FrameRegisters.colour)
-  val needsShadowRay = Bool()
-  val origin         = Vec3(new Fixed(new RayFormats(config.numbers).scene))
-  val toLight        = Vec3(SInt(config.numbers.directionBits.W))
+/** A diffuse surface and what each light gives to it, unless something is in its way; shadow rays, from `origin`, say
+  * what.
+  */
+final class LitSurface(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val albedo  = Rgb(FrameRegisters.colour)
+  val origin  = Vec3(new Fixed(new RayFormats(config.numbers).scene))
+
+  /** By light; 0 from one that does not shine. */
+  val directs         = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
+  val needsShadowRays = Vec(config.frame.lights, Bool())
+}
+
+/** A ray that goes on from a mirror or from glass. */
+final class BouncedRay(config: ColonnadeConfig) extends Bundle {
+  val bounce = new BounceResult(config)
+  val albedo = Rgb(FrameRegisters.colour)
+
+  /** The path takes the material's colour. */
+  val isTinted = Bool()
 }

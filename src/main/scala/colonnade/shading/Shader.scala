@@ -1,106 +1,144 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.Decoupled
+import chisel3.util.{log2Ceil, Decoupled}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.formats.{FrameRegisters, Light, Material, Rgb, Shading, Vec3}
+import colonnade.formats.{FrameRegisters, Light, Material, MaterialKind, Rgb, Shading, Vec3}
 import colonnade.numbers.Fixed
-import colonnade.ray.{Context, RayFormats}
+import colonnade.ray.RayFormats
 
 /** The ports of the shader; the registers are constant while it is busy. */
 final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
 
-  val light     = Input(new Light(numbers))
+  val lights    = Input(Vec(config.frame.lights, new Light(numbers)))
   val unitShift = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
-  val ambient   = Input(Rgb(FrameRegisters.intensity))
-  val shading   = Input(new Shading)
-  val materials = Input(Vec(config.frame.materials, new Material))
+  val shading   = Input(new Shading(config))
+  val materials = Input(Vec(config.frame.materials, new Material(config)))
   val request   = Flipped(Decoupled(new ShadeRequest(config)))
-  val result    = Decoupled(new ShadeResult(config))
+
+  /** `request` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
+
+  /** Hits on diffuse surfaces. */
+  val lit = Decoupled(new LitSurface(config))
+
+  /** Hits on the others. */
+  val bounced = if (config.frame.hasBounces) Some(Decoupled(new BouncedRay(config))) else None
 
   /** Holds a hit. */
   val busy = Output(Bool())
 }
 
-/** Lambert's shading of hits: both colours that a pixel may have and the shadow ray that decides; docs/numbers.md, 5.
+/** What becomes of hits: on a diffuse surface, what each light gives to it (Lambert's cosine, the light's falloff); on a
+  * mirror or glass, the ray that goes on. docs/numbers.md, 5 and 6.
   *
-  * Results come in order. Two hits are in work, one in the geometry and one in the cosine and its colours; they share a
-  * multiplier. At 32b32s64d a hit enters every 41 to 45 cycles (12 more where the smooth normal is zero) and leaves some
-  * 85 cycles later. A hit that faces away from the light needs neither root nor quotient.
+  * Hits of one kind leave in order. One hit is in the geometry, one light in the cosine and its colour, one hit in the
+  * bounce unit; the first two share a multiplier. At 32b32s64d a hit with one light enters every 41 to 45 cycles (12 more
+  * where the smooth normal is zero) and leaves some 85 cycles later; a light more takes 20 to 40 cycles. A surface that
+  * faces away from a light needs neither root nor quotient.
+  *
+  * A material's index beyond the table takes any of its entries; the packer writes none. Where the table's size is a
+  * power of two, it counts modulo the size, as in the model.
   */
 final class Shader(config: ColonnadeConfig) extends Module {
-  private val formats  = new ShaderFormats(config.numbers)
-  private val scene    = new RayFormats(config.numbers).scene
-  private val lightWay = config.numbers.directionBits
+  private val formats = new ShaderFormats(config.numbers)
+  private val scene   = new RayFormats(config.numbers).scene
 
   val io = IO(new ShaderIO(config))
 
   private val geometry   = Module(new ShaderGeometry(config))
   private val cosine     = Module(new CosineUnit(config.numbers))
-  private val colour     = Module(new ColourUnit(config))
+  private val direct     = Module(new DirectUnit(config))
   private val multiplier = Module(new ShaderMultiplier(formats))
 
-  /** The hit whose cosine and colours are in work. */
-  private val isHeld = RegInit(false.B)
-  private val held   = Reg(new HeldHit(config))
-
   // Geometry
+  private val point    = geometry.io.result
+  private val surface  = point.bits.surface
+  private val material = Wire(new Material(config))
+  material := io.materials(surface.material(log2Ceil(config.frame.materials.max(2)) - 1, 0))
+  private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse).getOrElse(false.B)
   geometry.io.request <> io.request
-  geometry.io.isFlat    := io.shading.flat
-  geometry.io.light     := io.light
-  geometry.io.unitShift := io.unitShift
+  io.takesNext           := geometry.io.takesNext
+  geometry.io.shading    := io.shading
+  geometry.io.lights     := io.lights
+  geometry.io.unitShift  := io.unitShift
+  geometry.io.lightCount := Mux(isBounce, 1.U, io.shading.lights)
 
-  // From the geometry to the cosine and the colours, both at once; the rest of the hit is held
-  private val point  = geometry.io.result
-  private val isFree = !isHeld && cosine.io.angle.ready && colour.io.material.ready
-  point.ready              := isFree
-  cosine.io.angle.valid    := point.valid && isFree
-  cosine.io.angle.bits     := point.bits.angle
-  colour.io.material.valid := point.valid && isFree
-  colour.io.material.bits  := point.bits.material
-  when(point.fire) {
-    isHeld              := true.B
-    held.context        := point.bits.context
-    held.needsShadowRay := io.shading.shadows && point.bits.angle.isAcute
-    held.origin         := point.bits.origin
-    held.toLight        := point.bits.toLight
+  // A light goes to the cosine; what it gives is held with the surface until the last one is through
+  private val isHeld = RegInit(false.B)
+  private val light  = Reg(chiselTypeOf(point.bits.light))
+  private val isLast = Reg(Bool())
+  private val lit    = Reg(new LitSurface(config))
+  private val shines = point.bits.light < io.shading.lights
+  private val isFree = !isHeld && cosine.io.angle.ready
+  cosine.io.angle.valid        := point.valid && !isBounce && isFree
+  cosine.io.angle.bits         := point.bits.angle
+  cosine.io.angle.bits.isAcute := point.bits.angle.isAcute && shines
+  cosine.io.falloff            := point.bits.falloff
+  when(cosine.io.angle.fire) {
+    val Seq(x, y, z) = surface.origin.axes.map(Fixed(scene, _))
+    isHeld      := true.B
+    light       := point.bits.light
+    isLast      := point.bits.isLast
+    lit.context := surface.context
+    lit.albedo  := material.albedo
+    lit.origin  := Vec3.of(x, y, z)
+    when(point.bits.light === 0.U) {
+      lit.directs         := 0.U.asTypeOf(lit.directs)
+      lit.needsShadowRays := 0.U.asTypeOf(lit.needsShadowRays)
+    }
+    at(lit.needsShadowRays, point.bits.light) := io.shading.shadows && point.bits.angle.isAcute && shines
   }
-  when(io.result.fire)(isHeld := false.B)
+  direct.io.brightness <> cosine.io.brightness
+  direct.io.colour       := at(io.lights, light).colour
+  direct.io.direct.ready := isHeld && (!isLast || io.lit.ready)
+  when(direct.io.direct.fire) {
+    isHeld                 := false.B
+    at(lit.directs, light) := direct.io.direct.bits
+  }
+  io.lit.valid                   := isHeld && isLast && direct.io.direct.valid
+  io.lit.bits                    := lit
+  at(io.lit.bits.directs, light) := direct.io.direct.bits
 
-  // Colours
-  colour.io.cosine <> cosine.io.cosine
-  colour.io.materials := io.materials
-  colour.io.light     := io.light
-  colour.io.ambient   := io.ambient
+  // Mirrors and glass
+  private val bounces = io.bounced.map { bounced =>
+    val unit     = Module(new BounceUnit(config))
+    val albedo   = Reg(Rgb(FrameRegisters.colour))
+    val isTinted = Reg(Bool())
+    unit.io.offset                   := io.shading.offset
+    unit.io.request.valid            := point.valid && isBounce
+    unit.io.request.bits.context     := surface.context
+    unit.io.request.bits.origin      := surface.origin
+    unit.io.request.bits.normal      := surface.normal
+    unit.io.request.bits.isSmooth    := surface.isSmooth
+    unit.io.request.bits.facing      := surface.facing
+    unit.io.request.bits.towards     := surface.towards
+    unit.io.request.bits.backSide    := surface.backSide
+    unit.io.request.bits.isGlass     := material.kind.get === MaterialKind.glass
+    unit.io.request.bits.eta         := Mux(surface.backSide, material.etaBack.get, material.etaFront.get)
+    unit.io.request.bits.reflectance := material.reflectance.get
+    when(unit.io.request.fire) {
+      albedo   := material.albedo
+      isTinted := !surface.backSide || material.kind.get === MaterialKind.mirror
+    }
+    bounced.valid         := unit.io.result.valid
+    bounced.bits.bounce   := unit.io.result.bits
+    bounced.bits.albedo   := albedo
+    bounced.bits.isTinted := isTinted
+    unit.io.result.ready  := bounced.ready
+    unit
+  }
+  point.ready := Mux(isBounce, bounces.map(_.io.request.ready).getOrElse(false.B), isFree)
 
   // Multiplier
   multiplier.io.geometry := geometry.io.factors
-  multiplier.io.colour <> colour.io.factors
+  multiplier.io.colour <> direct.io.factors
   geometry.io.product := multiplier.io.product
-  colour.io.product   := multiplier.io.product
-
-  // Result
-  private val Seq(originX, originY, originZ)    = held.origin.axes.map(Fixed(scene, _))
-  private val Seq(toLightX, toLightY, toLightZ) = held.toLight.axes.map(_.pad(lightWay))
-  colour.io.colours.ready       := io.result.ready
-  io.result.valid               := colour.io.colours.valid
-  io.result.bits.context        := held.context
-  io.result.bits.lit            := colour.io.colours.bits.lit
-  io.result.bits.ambient        := colour.io.colours.bits.ambient
-  io.result.bits.needsShadowRay := held.needsShadowRay
-  io.result.bits.origin         := Vec3.of(originX, originY, originZ)
-  io.result.bits.toLight        := Vec3.of(toLightX, toLightY, toLightZ)
+  direct.io.product   := multiplier.io.product
 
   io.busy := !geometry.io.request.ready
-}
 
-/** What the shader keeps of a hit while its colours are in work. */
-private final class HeldHit(config: ColonnadeConfig) extends Bundle {
-  private val formats = new ShaderFormats(config.numbers)
-
-  val context        = Context(config)
-  val needsShadowRay = Bool()
-  val origin         = Vec3(SInt(formats.pointBits.W))
-  val toLight        = Vec3(SInt(formats.toLightBits.W))
+  /** A light's entry; there may be only one. */
+  private def at[T <: Data](entries: Vec[T], index: UInt): T = if (config.frame.lights == 1) entries.head else entries(index)
 }

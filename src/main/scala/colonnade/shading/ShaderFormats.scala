@@ -1,6 +1,7 @@
 package colonnade.shading
 
 import chisel3._
+import chisel3.util.log2Ceil
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{RecordFormats, Vec3}
 import colonnade.ray.Context
@@ -26,11 +27,17 @@ final class ShaderFormats(numbers: NumberFormats) {
   /** The widest component of a vector, signed. */
   val vectorBits: Int = toLightBits.max(normalBits)
 
+  /** A cosine, from 0 to 1 inclusive. */
+  val cosineBits: Int = numbers.cosineFraction + 1
+
+  /** A cosine times a falloff. */
+  val brightnessBits: Int = cosineBits + Falloff.integerBits
+
   /** Operands of the multiplier, signed. The narrow one takes a scaled component or a light's intensity, the wide one
     * also a distance or a colour's sum.
     */
   val narrowBits:  Int = shadeBits + 1
-  val wideBits:    Int = numbers.gridBits.max(shadeBits + 1).max(NumberFormats.lightBits + 2)
+  val wideBits:    Int = numbers.gridBits.max(shadeBits + 1).max(brightnessBits + 1)
   val productBits: Int = wideBits + narrowBits
 
   /** Digits of `shadeBits` bits, least significant first, in which a slope is multiplied; the last one is signed. */
@@ -42,8 +49,9 @@ final class ShaderFormats(numbers: NumberFormats) {
   /** The product of both lengths' mantissas; it lacks at most one bit. */
   val lengthsBits: Int = 2 * shadeBits
 
-  /** A cosine, from 0 to 1 inclusive. */
-  val cosineBits: Int = numbers.cosineFraction + 1
+  /** Log2 of a light's reach over its distance, both squared. */
+  val falloffExponentBits: Int = NumberFormats.bitLength(4 * numbers.sceneBits + 2 * shadeBits + numbers.mantissaBits) + 2
+
 }
 
 /** Two numbers to multiply. */
@@ -69,17 +77,65 @@ final class Angle(formats: ShaderFormats) extends Bundle {
   val exponent = UInt(3.W)
 }
 
-/** What the geometry part of the shader finds out. */
+/** How much of a light's colour is left at a distance, from 0 to 4. */
+object Falloff {
+  val integerBits: Int = 3
+  val bits:        Int = integerBits + NumberFormats.lightFraction
+
+  def apply(): UInt = UInt(bits.W)
+
+  def one: UInt = (1 << NumberFormats.lightFraction).U(bits.W)
+
+  def most: UInt = (4 << NumberFormats.lightFraction).U(bits.W)
+}
+
+/** What a light's falloff is made of: `mantissa`, of `shadeBits` bits, is that of the squared distance.
+  *
+  * @note falloff = reach · 2^exponent / mantissa, both mantissas taken as numbers from a half to one
+  */
+final class FalloffQuestion(numbers: NumberFormats) extends Bundle {
+  private val formats = new ShaderFormats(numbers)
+
+  /** 0: the light is the same everywhere. */
+  val reach    = UInt(numbers.mantissaBits.W)
+  val mantissa = UInt(formats.shadeBits.W)
+  val exponent = SInt(formats.falloffExponentBits.W)
+}
+
+/** What the geometry part of the shader finds out of one hit and one light. */
 final class ShadingPoint(config: ColonnadeConfig) extends Bundle {
+  private val formats = new ShaderFormats(config.numbers)
+
+  /** The light, and whether it is the hit's last one. */
+  val light  = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val isLast = Bool()
+
+  /** Between the shading normal and the way to the light. */
+  val angle   = new Angle(formats)
+  val falloff = new FalloffQuestion(config.numbers)
+
+  /** Of the hit, whatever the light. */
+  val surface = new ShadedSurface(config)
+}
+
+/** A hit, and the ray that has met it. */
+final class ShadedSurface(config: ColonnadeConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   val context  = Context(config)
   val material = UInt(RecordFormats.materialBits.W)
 
-  /** The shadow ray's origin, above the surface, and its way to the light: grid steps. */
-  val origin  = Vec3(SInt(formats.pointBits.W))
-  val toLight = Vec3(SInt(formats.toLightBits.W))
+  /** Where shadow rays and reflections start, off the surface: grid steps. */
+  val origin = Vec3(SInt(formats.pointBits.W))
 
-  /** Between the shading normal and the way to the light. */
-  val angle = new Angle(formats)
+  /** The shading normal against the ray, its largest component of `shadeBits` bits; and whether it is the vertices'. */
+  val normal   = Vec3(SInt(formats.narrowBits.W))
+  val isSmooth = Bool()
+
+  /** The geometric normal against the ray. */
+  val facing = Vec3(SInt((NumberFormats.normalBits + 1).W))
+
+  /** The ray's direction; its dominant component is ±2^(shadeBits − 1). */
+  val towards  = Vec3(SInt((formats.shadeBits + 1).W))
+  val backSide = Bool()
 }

@@ -69,6 +69,9 @@ final class TriangleResult(config: ColonnadeConfig) extends Bundle {
   val isHit = Bool()
   val hit   = new TriangleHit(config)
 
+  /** It lets some light through. */
+  val isClear = Bool()
+
   /** The record's last triangle. */
   val isLast = Bool()
 }

@@ -76,6 +76,9 @@ final class TriangleTag(config: ColonnadeConfig) extends Bundle {
   val id      = UInt(RecordFormats.idBits(config).W)
   val isLast  = Bool()
 
+  /** It lets some light through. */
+  val isClear = Bool()
+
   /** The record holds no triangle; this one stands in its place and misses. */
   val isAbsent = Bool()
 

@@ -9,6 +9,9 @@ import colonnade.frame.Dispatcher
 final class TriangleLanesIO(config: ColonnadeConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
 
+  /** `candidate` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
+
   /** Those of one record in their order. */
   val result = Decoupled(new TriangleResult(config))
 
@@ -32,5 +35,6 @@ final class TriangleLanes(config: ColonnadeConfig) extends Module {
     result :<>= lane.result
   }
   io.result :<>= results.io.out
-  io.busy := PopCount(lanes.map(_.busy))
+  io.takesNext := VecInit(lanes.map(_.takesNext)).asUInt.orR
+  io.busy      := PopCount(lanes.map(_.busy))
 }

@@ -10,6 +10,9 @@ final class TriangleSequencerIO(config: ColonnadeConfig) extends Bundle {
   val schedule  = Input(new TriangleSchedule)
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
 
+  /** `candidate` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
+
   /** The vertex of this phase (phases 0 to 2). */
   val vertex = Output(Vec3(UInt(config.geometry.vertexBits.W)))
 
@@ -39,7 +42,9 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   private val isLast = index === (perRecord - 1).U || index +& 1.U >= record.count
   private val isEnd  = io.schedule.is(3)
 
-  io.candidate.ready := isEnd && (!isOccupied || isLast)
+  private val isFree = !isOccupied || isLast
+  io.candidate.ready := isEnd && isFree
+  io.takesNext       := io.schedule.is(2) && isFree
   when(isEnd) {
     index := index + 1.U
     when(io.candidate.ready) {
@@ -62,6 +67,9 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   io.tag.bits.context    := candidate.context
   io.tag.bits.id         := record.firstTriangle + index
   io.tag.bits.isLast     := isLast
+  io.tag.bits.isClear    := triangles.indices.tail.foldLeft(record.isClear(0)) { case (other, k) =>
+    Mux(index === k.U, record.isClear(k), other)
+  }
   io.tag.bits.isAbsent   := record.count === 0.U
   io.tag.bits.isNegative := candidate.ray.heading.negative(2)
 }

@@ -9,6 +9,9 @@ final class TriangleUnitIO(config: ColonnadeConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
   val result    = Decoupled(new TriangleResult(config))
 
+  /** `candidate` will be ready in the next cycle. */
+  val takesNext = Output(Bool())
+
   /** A triangle's vertices go in. */
   val busy = Output(Bool())
 }
@@ -17,6 +20,7 @@ final class TriangleUnitIO(config: ColonnadeConfig) extends Bundle {
 final private class TriangleTurn(config: ColonnadeConfig) extends Bundle {
   val context   = Context(config)
   val isLast    = Bool()
+  val isClear   = Bool()
   val isCrossed = Bool()
 }
 
@@ -62,6 +66,7 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, turns:
 
   // The way of every triangle
   sequencer.io.candidate <> io.candidate
+  io.takesNext     := sequencer.io.takesNext
   shear.io.vertex  := sequencer.io.vertex
   shear.io.ray     := sequencer.io.ray
   edges.io.sheared := shear.io.sheared
@@ -81,6 +86,7 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, turns:
   order.io.enq.valid          := decides && isTaken
   order.io.enq.bits.context   := tested.bits.context
   order.io.enq.bits.isLast    := tested.bits.isLast
+  order.io.enq.bits.isClear   := tested.bits.isClear
   order.io.enq.bits.isCrossed := isCrossed
 
   // The way of crossed triangles
@@ -100,6 +106,7 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, turns:
   io.result.valid        := order.io.deq.valid && isReady
   io.result.bits.context := turn.context
   io.result.bits.isLast  := turn.isLast
+  io.result.bits.isClear := turn.isClear
   io.result.bits.isHit   := turn.isCrossed && distance.io.hit.bits.t.integer >= 0.S
   io.result.bits.hit     := distance.io.hit.bits
   order.io.deq.ready     := io.result.ready && isReady

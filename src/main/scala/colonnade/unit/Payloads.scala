@@ -30,6 +30,8 @@ final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   private def contexts = UInt(log2Ceil(config.array.contexts + 1).W)
 
   val raysShadow       = Bool()
+  val raysReflection   = Bool()
+  val raysRefraction   = Bool()
   val raysInBox        = Bool()
   val nodeReads        = Bool()
   val boxTests         = UInt(log2Ceil(config.geometry.arity + 1).W)

@@ -1,7 +1,17 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, PopCount, PriorityEncoder, PriorityEncoderOH, Valid}
+import chisel3.util.{
+  log2Ceil,
+  Decoupled,
+  Mux1H,
+  OHToUInt,
+  PopCount,
+  PriorityEncoder,
+  PriorityEncoderOH,
+  RegEnable,
+  Valid
+}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 import colonnade.ray.Context
@@ -38,8 +48,12 @@ final class RefusedWish(config: ColonnadeConfig) extends Bundle {
   * context waits for, whoever had asked for it; a buffer keeps its record until another needs the place. Without, a
   * context takes only the answer to its own read.
   *
-  * A record is offered from one cycle after its broadcast until the context is served; a wish that a buffer can grant
-  * at once is offered two cycles after it.
+  * Who is served is decided one cycle before: `chosen` is then the address of whatever is known of the context, and
+  * `served` comes with the record from a register. A unit therefore says in which cycles it will take a record in the
+  * next one, and keeps to it. Triangles go first and nodes last, for the triangle unit can begin only in every fourth
+  * cycle, and the shader's wishes are few.
+  *
+  * A record is served at the earliest two cycles after its broadcast, and two cycles after the wish if a buffer has it.
   */
 final class RecordFetch(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
@@ -55,8 +69,11 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val requests    = Decoupled(new RecordRequest(config))
     val broadcasts  = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
 
-    /** Units that take a record in this cycle, one for each [[RecordUse]]; and the record that one of them takes. */
-    val isReady = Input(Vec(RecordUse.all.size, Bool()))
+    /** Units that take a record in the next cycle if there is one, one for each [[RecordUse]]. */
+    val takesNext = Input(Vec(RecordUse.all.size, Bool()))
+
+    /** Who is served in the next cycle; and who is in this one, and with what. */
+    val chosen  = Output(Valid(Context(config)))
     val served  = Output(Valid(new ServedRecord(config)))
     val refused = Output(Valid(new RefusedWish(config)))
 
@@ -194,20 +211,35 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     wishes.zip(seekers).foreach { case (wish, seeks) => when(seeks) { wish.isWaiting := false.B } }
   }
 
-  // Serve one context whose unit is ready
-  private val servedOnes = PriorityEncoderOH(wishes.map { wish =>
-    wish.hasRecord && RecordUse.all.zip(
-      io.isReady
-    ).map { case (use, isReady) => wish.use === use && isReady }.reduce(_ || _)
-  })
-  private val place = Mux1H(servedOnes, wishes.map(_.buffer))
-  io.served.valid        := servedOnes.reduce(_ || _)
-  io.served.bits.context := OHToUInt(servedOnes)
-  io.served.bits.use     := useOf(servedOnes)
-  io.served.bits.record  := Mux1H(buffers.zipWithIndex.map { case (buffer, index) =>
-    (place === index.U) -> buffer.record
-  })
-  wishes.zip(servedOnes).foreach { case (wish, isServed) => when(isServed) { wish.hasRecord := false.B } }
+  // Choose a context for each use, and of these one whose unit will be ready. Its record may be replaced while it is
+  // served, for it leaves its buffer in that cycle
+  private val isServable = wishes.zip(takes).map { case (wish, taken) => wish.hasRecord || taken.reduce(_ || _) }
+  private val foremost   = RecordUse.all.map { use =>
+    PriorityEncoderOH(wishes.zip(isServable).map { case (wish, servable) => servable && wish.use === use })
+  }
+  private val chosenUse = {
+    val isWanted = foremost.zip(io.takesNext).map { case (ones, takes) => ones.reduce(_ || _) && takes }
+    PriorityEncoderOH(RecordFetch.precedence.map(isWanted(_)))
+      .zip(RecordFetch.precedence)
+      .sortBy { case (_, use) => use }
+      .map { case (isChosen, _) => isChosen }
+  }
+  private val chosenOnes = foremost.transpose.map(_.zip(chosenUse).map { case (one, use) => one && use }.reduce(_ || _))
+  private val chosenPlace = buffers.indices.map { index =>
+    wishes.zip(takes).zip(chosenOnes).map { case ((wish, taken), isChosen) =>
+      isChosen && Mux(wish.hasRecord, wish.buffer === index.U, PriorityEncoderOH(taken)(index))
+    }.reduce(_ || _)
+  }
+  io.chosen.valid := chosenUse.reduce(_ || _)
+  io.chosen.bits  := OHToUInt(chosenOnes)
+  wishes.zip(chosenOnes).foreach { case (wish, isChosen) => when(isChosen) { wish.hasRecord := false.B } }
+
+  // Serve it
+  private val place = RegEnable(VecInit(chosenPlace), io.chosen.valid)
+  io.served.valid        := RegNext(io.chosen.valid, false.B)
+  io.served.bits.context := RegEnable(io.chosen.bits, io.chosen.valid)
+  io.served.bits.use     := RecordUse.safe(RegEnable(OHToUInt(chosenUse), io.chosen.valid))._1
+  io.served.bits.record  := Mux1H(place, buffers.map(_.record))
 
   // New wishes
   for (port <- io.wishes; (wish, context) <- wishes.zipWithIndex) {
@@ -221,5 +253,12 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   when(io.start) { buffers.foreach(_.state := BufferState.empty) }
 
   io.waiting := PopCount(wishes.map(_.isWaiting))
-  io.holding := PopCount(wishes.map(_.hasRecord))
+  io.holding := PopCount(wishes.map(_.hasRecord) :+ io.served.valid)
+}
+
+object RecordFetch {
+
+  /** Uses of records, the most urgent first. */
+  private val precedence: Seq[Int] =
+    Seq(RecordUse.triangles, RecordUse.attributes, RecordUse.node).map(_.litValue.toInt)
 }

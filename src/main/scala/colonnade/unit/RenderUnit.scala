@@ -1,19 +1,13 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, Valid}
+import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, RegEnable, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
 import colonnade.numbers.Rounding
-import colonnade.ray.{BoxRay, Context, RayGenerator, RayRequest, RaySetup, TriangleRay}
-import colonnade.shading.Shader
+import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
+import colonnade.shading.{ColourUnit, ShadowRays, Shader}
 import colonnade.traversal.{TriangleLanes, Visit}
-
-/** Both colours that a context's pixel may have. */
-private final class PixelColours extends Bundle {
-  val lit     = Rgb(FrameRegisters.colour)
-  val ambient = Rgb(FrameRegisters.colour)
-}
 
 /** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
   *
@@ -26,6 +20,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   val io = IO(new RenderUnitIO(config))
 
+  private val events       = io.events
   private val controller   = Module(new RtController(config))
   private val rayGenerator = Module(new RayGenerator(config))
   private val raySetup     = Module(new RaySetup(config))
@@ -34,14 +29,15 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val triangleUnit = Module(new TriangleLanes(config))
   private val hitTable     = Module(new HitTable(config))
   private val shader       = Module(new Shader(config))
+  private val shadowRays   = Module(new ShadowRays(config))
+  private val colourUnit   = Module(new ColourUnit(config))
 
-  // What each context remembers
-  private val positions    = Mem(contexts, new PixelPosition(config))
-  private val boxRays      = Mem(contexts, new BoxRay(numbers))
-  private val triangleRays = Mem(contexts, new TriangleRay(numbers))
-  private val entries      = Mem(contexts, UInt(numbers.entryBits.W))
-  private val colours      = Mem(contexts, new PixelColours)
-  private val isObject     = Reg(Vec(contexts, Bool()))
+  // What each context remembers, in memories that are read a cycle before
+  private val positions = ContextTable(config, new PixelPosition(config))
+  private val rays      = ContextTable(config, new TracedRay(numbers))
+  private val entries   = ContextTable(config, UInt(numbers.entryBits.W))
+  private val colours   = ContextTable(config, Rgb(FrameRegisters.colour))
+  private val isObject  = Reg(Vec(contexts, Bool()))
 
   // A position takes a free context
   private val position = io.positions.bits
@@ -58,11 +54,12 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   rayGenerator.io.registers.camera    := io.registers.camera
   rayGenerator.io.registers.unitShift := io.registers.frame.unitShift
 
-  // Rays: shadow rays first, since their pixels are nearer to their end
-  private val requests   = Module(new Arbiter(new RayRequest(config), 2))
-  private val shadowRays = Wire(Decoupled(new RayRequest(config)))
-  requests.io.in(0) :<>= shadowRays
-  requests.io.in(1) :<>= rayGenerator.io.ray
+  // Rays: those first whose pixels are nearer to their end
+  private val requests    = Module(new Arbiter(new RayRequest(config), 3))
+  private val bouncedRays = Wire(Decoupled(new RayRequest(config)))
+  requests.io.in(0) :<>= shadowRays.io.ray
+  requests.io.in(1) :<>= bouncedRays
+  requests.io.in(2) :<>= rayGenerator.io.ray
   raySetup.io.request :<>= requests.io.out
   raySetup.io.bounds := io.registers.bounds
 
@@ -70,8 +67,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val enters   = setUpRay.fire && setUpRay.bits.enters
   setUpRay.ready := true.B
   when(enters) {
-    boxRays.write(setUpRay.bits.context, setUpRay.bits.boxRay)
-    triangleRays.write(setUpRay.bits.context, setUpRay.bits.triangleRay)
+    rays.write(setUpRay.bits.context, setUpRay.bits.ray)
     entries.write(setUpRay.bits.context, setUpRay.bits.entry.natural)
   }
   hitTable.io.search.valid        := setUpRay.fire
@@ -84,12 +80,12 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   traversal.io.clear := io.start
   traversal.io.scene := io.registers.scene
   connect(traversal.io.start, enters, setUpRay.bits.context)
-  private val served      = recordFetch.io.served
-  private val triangleRay = triangleRays.read(served.bits.context)
-  recordFetch.io.isReady := VecInit(traversal.io.nodes.ready, triangleUnit.io.candidate.ready, shader.io.request.ready)
+  private val (chosen, served) = (recordFetch.io.chosen, recordFetch.io.served)
+  private val ray              = rays.read(chosen.bits, chosen.valid)
+  recordFetch.io.takesNext  := VecInit(traversal.io.takesNext, triangleUnit.io.takesNext, shader.io.takesNext)
   traversal.io.nodes.valid  := isFor(RecordUse.node)
   traversal.io.nodes.bits   := served.bits
-  traversal.io.ray          := boxRays.read(served.bits.context)
+  traversal.io.ray          := ray.forBoxes
   traversal.io.limits       := hitTable.io.limits
   traversal.io.visits.ready := true.B
   private val next = traversal.io.visits
@@ -101,7 +97,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   triangleUnit.io.candidate.valid        := isFor(RecordUse.triangles)
   triangleUnit.io.candidate.bits.context := served.bits.context
   triangleUnit.io.candidate.bits.record  := formats.asTriangles(served.bits.record)
-  triangleUnit.io.candidate.bits.ray     := triangleRay
+  triangleUnit.io.candidate.bits.ray     := ray.forTriangles
 
   // A result either ends its ray (a shadow ray that is occluded) or lets it go on
   private val tested     = triangleUnit.io.result
@@ -125,84 +121,126 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   resumes.io.in(0).bits  := refused.bits.context
   connect(controller.io.dropped, refused.valid && isAttributes, refused.bits.context)
 
-  // An ended ray: a primary hit wishes for its attributes
+  // An ended ray: a hit wishes for its attributes, unless it is in a light's way
   private val judged = controller.io.judged
-  controller.io.hasHit           := hitTable.io.hasHit
-  hitTable.io.readers(0).context := judged.bits
-  private val judgedHit = hitTable.io.readers(0).hit
-  private val isSeen    = judged.valid && hitTable.io.hasHit(judged.bits) && !controller.io.isShadow(judged.bits)
-  recordFetch.io.wishes(2).valid        := isSeen
-  recordFetch.io.wishes(2).bits.context := judged.bits
-  recordFetch.io.wishes(2).bits.use     := RecordUse.attributes
-  recordFetch.io.wishes(
-    2
-  ).bits.address := io.registers.scene.attributeBase + (judgedHit.id >> RecordFormats.faceSlotBits)
+  private val isSeen = judged.valid && hitTable.io.hasHit(judged.bits) && !controller.io.isShadow(judged.bits)
+  controller.io.hasHit     := hitTable.io.hasHit
+  controller.io.occlusions := hitTable.io.occlusions
   when(isSeen) { isObject(judged.bits) := true.B }
+  private val seen    = RegNext(isSeen, false.B)
+  private val isFirst = RegNext(isSeen && controller.io.isPrimary(judged.bits), false.B)
+  hitTable.io.nearest.context := RegEnable(judged.bits, isSeen)
+  private val nearest = hitTable.io.nearest
+  recordFetch.io.wishes(2).valid        := seen
+  recordFetch.io.wishes(2).bits.context := nearest.context
+  recordFetch.io.wishes(2).bits.use     := RecordUse.attributes
+  recordFetch.io.wishes(2).bits.address :=
+    io.registers.scene.attributeBase + (nearest.id >> RecordFormats.faceSlotBits)
 
   // Shading
-  hitTable.io.readers(1).context := served.bits.context
-  private val shadedHit = hitTable.io.readers(1).hit
+  hitTable.io.chosen := chosen
+  hitTable.io.served := served.bits.context
+  private val shadedHit = hitTable.io.hit
   shader.io.request.valid        := isFor(RecordUse.attributes)
   shader.io.request.bits.context := served.bits.context
-  shader.io.request.bits.ray     := triangleRay
+  shader.io.request.bits.ray     := ray.forTriangles
   shader.io.request.bits.hit     := shadedHit
   shader.io.request.bits.face    := formats.asAttributes(served.bits.record).faces(shadedHit.id(
     RecordFormats.faceSlotBits - 1,
     0
   ))
-  shader.io.light     := io.registers.light
+  shader.io.lights    := io.registers.lights
   shader.io.unitShift := io.registers.frame.unitShift
-  shader.io.ambient   := io.registers.ambient
   shader.io.shading   := io.registers.shading
   shader.io.materials := io.registers.materials
 
-  private val shaded = shader.io.result
-  shaded.ready                             := !shaded.bits.needsShadowRay || shadowRays.ready
-  shadowRays.valid                         := shaded.valid && shaded.bits.needsShadowRay
-  shadowRays.bits.context                  := shaded.bits.context
-  shadowRays.bits.isShadow                 := true.B
-  shadowRays.bits.origin                   := shaded.bits.origin
-  shadowRays.bits.towards                  := shaded.bits.toLight
-  controller.io.shaded.valid               := shaded.fire
-  controller.io.shaded.bits.context        := shaded.bits.context
-  controller.io.shaded.bits.needsShadowRay := shaded.bits.needsShadowRay
-  when(shaded.fire) {
-    val pixelColours = Wire(new PixelColours)
-    pixelColours.lit     := shaded.bits.lit
-    pixelColours.ambient := shaded.bits.ambient
-    colours.write(shaded.bits.context, pixelColours)
+  // A surface that ends its path asks for its lights, one after the other
+  private val lit = shader.io.lit
+  lit.ready                                    := true.B
+  controller.io.shaded.valid                   := lit.valid
+  controller.io.shaded.bits.context            := lit.bits.context
+  controller.io.shaded.bits.needsShadowRays    := lit.bits.needsShadowRays
+  shadowRays.io.lights                         := io.registers.lights
+  shadowRays.io.unitShift                      := io.registers.frame.unitShift
+  shadowRays.io.surface.valid                  := lit.valid
+  shadowRays.io.surface.bits                   := lit.bits
+  shadowRays.io.question :<>= controller.io.shadow
+
+  // A mirror or glass turns its path; the next ray is traced as long as there are bounces left
+  private val bounceCounts = Reg(Vec(contexts, chiselTypeOf(io.registers.shading.bounces.getOrElse(0.U(1.W)))))
+  bouncedRays.valid        := false.B
+  bouncedRays.bits         := DontCare
+  controller.io.bounced    := 0.U.asTypeOf(controller.io.bounced)
+  events.raysReflection    := false.B
+  events.raysRefraction    := false.B
+  for ((bounced, turn) <- shader.io.bounced.zip(colourUnit.io.turn)) {
+    val bounce   = bounced.bits.bounce
+    val isTraced = bounceCounts(bounce.context) =/= io.registers.shading.bounces.get
+    bounced.ready := turn.ready && (!isTraced || bouncedRays.ready)
+
+    bouncedRays.valid         := bounced.valid && isTraced && turn.ready
+    bouncedRays.bits.context  := bounce.context
+    bouncedRays.bits.isShadow := false.B
+    bouncedRays.bits.origin   := bounce.origin
+    bouncedRays.bits.towards  := bounce.towards
+
+    turn.valid         := bounced.valid && (!isTraced || bouncedRays.ready)
+    turn.bits.context  := bounce.context
+    turn.bits.albedo   := bounced.bits.albedo
+    turn.bits.isTinted := bounced.bits.isTinted
+    turn.bits.share    := bounce.share
+
+    controller.io.bounced.valid         := bounced.fire
+    controller.io.bounced.bits.context  := bounce.context
+    controller.io.bounced.bits.isTraced := isTraced
+    when(bounced.fire && isTraced) { bounceCounts(bounce.context) := bounceCounts(bounce.context) + 1.U }
+    when(controller.io.allocate) { bounceCounts(controller.io.free.bits) := 0.U }
+    events.raysReflection := bouncedRays.fire && !bounce.isRefraction
+    events.raysRefraction := bouncedRays.fire && bounce.isRefraction
   }
 
-  // Pixels
+  // Colours
+  colourUnit.io.ambient       := io.registers.ambient
+  colourUnit.io.background    := io.registers.background
+  colourUnit.io.shading       := io.registers.shading
+  colourUnit.io.begins.valid  := controller.io.allocate
+  colourUnit.io.begins.bits   := controller.io.free.bits
+  colourUnit.io.surface.valid := lit.valid
+  colourUnit.io.surface.bits  := lit.bits
+  colourUnit.io.end :<>= controller.io.end
+  private val coloured = colourUnit.io.colour
+  connect(controller.io.coloured, coloured.valid, coloured.bits.context)
+  when(coloured.valid) { colours.write(coloured.bits.context, coloured.bits.colour) }
+
+  // Pixels: a context is free as soon as its tables are being read, when there is a place for what they hold
   private val complete = controller.io.complete
   private val finished = Wire(Decoupled(new Pixel(config)))
-  private val isDark   = controller.io.isShadow(complete.bits) && hitTable.io.hasHit(complete.bits)
-  finished.valid         := complete.valid
-  finished.bits.x        := positions.read(complete.bits).x
-  finished.bits.y        := positions.read(complete.bits).y
-  finished.bits.colour   := io.registers.background
-  finished.bits.isObject := false.B
+  private val outgoing = Module(new Queue(new Pixel(config), 1))
+  private val leaves   = complete.valid && outgoing.io.enq.ready && !finished.valid
+  controller.io.leave := leaves
+  private val colour = colours.read(complete.bits, leaves)
+  private val place        = positions.read(complete.bits, leaves)
+  finished.valid         := RegNext(leaves, false.B)
+  finished.bits.x        := place.x
+  finished.bits.y        := place.y
+  finished.bits.colour   :=
+    Mux(RegEnable(controller.io.isColoured(complete.bits), leaves), colour, io.registers.background)
+  finished.bits.isObject := RegEnable(isObject(complete.bits), leaves)
   finished.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
-  when(isObject(complete.bits)) {
-    val pixelColours = colours.read(complete.bits)
-    finished.bits.colour   := Mux(isDark, pixelColours.ambient, pixelColours.lit)
-    finished.bits.isObject := true.B
-  }
-  controller.io.leave := finished.fire
   if (config.frame.hits) {
-    val pixelHits = Mem(contexts, new PixelHit(config))
-    when(isSeen) {
+    val pixelHits = ContextTable(config, new PixelHit(config))
+    val entry     = entries.read(judged.bits, isSeen)
+    when(isFirst) {
       val pixelHit = Wire(new PixelHit(config))
-      pixelHit.triangle     := judgedHit.id
-      pixelHit.distance.raw := (Rounding.floor(
-        entries.read(judged.bits),
-        -numbers.gridFraction
-      ) +& judgedHit.t.integer.asUInt)
-      pixelHits.write(judged.bits, pixelHit)
+      pixelHit.triangle     := nearest.id
+      pixelHit.distance.raw := Rounding.floor(entry, -numbers.gridFraction) +& nearest.t.integer.asUInt
+      pixelHits.write(nearest.context, pixelHit)
     }
-    when(isObject(complete.bits)) { finished.bits.hit.get := pixelHits.read(complete.bits) }
+    val pixelHit = pixelHits.read(complete.bits, leaves)
+    when(finished.bits.isObject) { finished.bits.hit.get := pixelHit }
   }
-  io.pixels :<>= Queue(finished, 2)
+  outgoing.io.enq :<>= finished
+  io.pixels :<>= outgoing.io.deq
 
   // The record port
   recordFetch.io.start       := io.start
@@ -212,13 +250,12 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   io.requests :<>= recordFetch.io.requests
 
   // Counters
-  private val events = io.events
-  events.raysShadow       := shadowRays.fire
+  events.raysShadow       := shadowRays.io.ray.fire
   events.raysInBox        := enters
   events.nodeReads        := traversal.io.nodes.fire
   events.boxTests         := traversal.io.boxTests
   events.triangleTests    := tested.fire
-  events.hits             := isSeen
+  events.hits             := isFirst
   events.snoopHits        := recordFetch.io.snoopHits
   events.busyRaySetup     := raySetup.io.busy
   events.busyBoxUnit      := traversal.io.busy
@@ -231,18 +268,25 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   events.waitUnit          := recordFetch.io.holding
   events.contextsBox       := population(Seq(traversal.io.nodes.fire, traversal.io.resume.fire), next.fire)
   events.contextsTriangles := population(Seq(triangleUnit.io.candidate.fire), tested.fire && tested.bits.isLast)
-  events.contextsShading   := population(Seq(shader.io.request.fire), shaded.fire)
+  events.contextsShading   := population(
+    Seq(shader.io.request.fire),
+    PopCount(lit.fire +: shader.io.bounced.map(_.fire).toSeq)
+  )
 
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
   events.illegalRecord := refused.valid
-  io.isIdle            := controller.io.freeCount === contexts.U && !io.pixels.valid
+  io.isIdle            := controller.io.freeCount === contexts.U && !finished.valid && !io.pixels.valid
+
+  // A record comes only to a unit that takes it
+  for ((unit, index) <- Seq(traversal.io.nodes, triangleUnit.io.candidate, shader.io.request).zipWithIndex)
+    assert(!unit.valid || unit.ready, s"unit $index has a record that it does not take")
 
   /** The record served is for this use. */
   private def isFor(use: RecordUse.Type): Bool = served.valid && served.bits.use === use
 
   /** Contexts that have entered and not left. */
-  private def population(enter: Seq[Bool], leaves: Bool): UInt = {
+  private def population(enter: Seq[Bool], leaves: UInt): UInt = {
     val count = RegInit(0.U(log2Ceil(contexts + 1).W))
     count := count + PopCount(enter) - leaves
     count

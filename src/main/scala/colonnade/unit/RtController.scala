@@ -1,9 +1,10 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, PopCount, PriorityEncoder, Valid}
+import chisel3.util.{log2Ceil, Decoupled, PopCount, PriorityEncoder, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.ray.Context
+import colonnade.shading.{Occlusion, PathEnd, ShadowQuestion}
 
 /** What a context is at. */
 object Stage extends ChiselEnum {
@@ -23,24 +24,43 @@ object Stage extends ChiselEnum {
   /** Its hit waits for attributes, or is in the shader. */
   val shading = Value
 
+  /** Its surface is known; lights may be left to ask for. */
+  val lit = Value
+
+  /** Its path's end is known; its colour waits to be made, or is being made. */
+  val colouring, coloured = Value
+
   /** Its pixel's colour is known. */
   val complete = Value
 }
 
-/** A context that has been shaded. */
+/** A context whose hit has been shaded. */
 final class Shaded(config: ColonnadeConfig) extends Bundle {
-  val context        = Context(config)
-  val needsShadowRay = Bool()
+  val context = Context(config)
+
+  /** By light, of a surface that ends the path. */
+  val needsShadowRays = Vec(config.frame.lights, Bool())
+}
+
+/** A context whose path goes on from a mirror or glass. */
+final class Bounced(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+
+  /** The ray meets the object's records; otherwise the background only. */
+  val isTraced = Bool()
 }
 
 /** Decides which ray goes to which stage next; knows no arithmetic.
   *
-  * A context goes free → set-up → traversal → ended → shading → (set-up → traversal → ended, of its shadow ray) →
-  * complete → free. Contexts are tokens: no more than `contexts` of them exist, so whatever they wait in never
-  * overflows. One ended ray is judged a cycle, one pixel leaves a cycle; all else is without limit.
+  * A context goes free → set-up → traversal → ended → shading, from a mirror or glass again → set-up and so on; then
+  * lit → (set-up → traversal → ended, of a shadow ray, → lit, light by light) → colouring → complete → free. A primary
+  * ray that meets nothing is complete at once; a later ray goes to colouring. Contexts are tokens: no more than `contexts`
+  * of them exist, so whatever they wait in never overflows. One ended ray is judged a cycle, one lit context goes on, one
+  * pixel leaves; all else is without limit.
   */
 final class RtController(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
+  private val lights   = config.frame.lights
 
   val io = IO(new Bundle {
 
@@ -54,60 +74,137 @@ final class RtController(config: ColonnadeConfig) extends Module {
     /** Rays that ended: outside the box, with nothing left to visit, or occluded. */
     val ended = Flipped(Vec(3, Valid(Context(config))))
 
-    /** The ended ray that is judged now; a primary one that has hit goes on to shading. */
-    val judged = Output(Valid(Context(config)))
-    val hasHit = Input(Vec(contexts, Bool()))
+    /** The ended ray that is judged now; one that is no shadow ray and has hit goes on to shading. */
+    val judged     = Output(Valid(Context(config)))
+    val hasHit     = Input(Vec(contexts, Bool()))
+    val occlusions = Input(Vec(contexts, Occlusion()))
 
-    val shaded = Flipped(Valid(new Shaded(config)))
+    val shaded  = Flipped(Valid(new Shaded(config)))
+    val bounced = Flipped(Valid(new Bounced(config)))
 
-    /** Attributes that cannot be had: the pixel ends as it is. */
+    /** Attributes that cannot be had: the path ends in the background. */
     val dropped = Flipped(Valid(Context(config)))
+
+    /** A light that a lit context has not asked for yet. */
+    val shadow = Decoupled(new ShadowQuestion(config))
+
+    /** A path whose end is known, and the context whose colour is. */
+    val end      = Decoupled(new PathEnd(config))
+    val coloured = Flipped(Valid(Context(config)))
 
     /** A complete pixel, and whether it leaves. */
     val complete = Output(Valid(Context(config)))
     val leave    = Input(Bool())
 
-    /** By context: its ray is a shadow ray. */
-    val isShadow = Output(Vec(contexts, Bool()))
+    /** By context: its ray is a shadow ray; its ray is the primary one; its pixel has a colour of its own. */
+    val isShadow   = Output(Vec(contexts, Bool()))
+    val isPrimary  = Output(Vec(contexts, Bool()))
+    val isColoured = Output(Vec(contexts, Bool()))
 
     /** Contexts that hold no pixel, and whose ray is generated or set up. */
     val freeCount  = Output(UInt(log2Ceil(contexts + 1).W))
     val setUpCount = Output(UInt(log2Ceil(contexts + 1).W))
   })
 
-  private val stage    = RegInit(VecInit(Seq.fill(contexts)(Stage.free)))
-  private val isShadow = Reg(Vec(contexts, Bool()))
-  io.isShadow := isShadow
+  private val stage        = RegInit(VecInit(Seq.fill(contexts)(Stage.free)))
+  private val isShadow     = Reg(Vec(contexts, Bool()))
+  private val isPrimary    = Reg(Vec(contexts, Bool()))
+  private val isColoured   = Reg(Vec(contexts, Bool()))
+  private val isBackground = Reg(Vec(contexts, Bool()))
+
+  /** By light: a shadow ray is wanted; what those that were sent have met. */
+  private val wanted     = Reg(Vec(contexts, Vec(lights, Bool())))
+  private val occlusions = Reg(Vec(contexts, Vec(lights, Occlusion())))
+
+  /** The light of a context's shadow ray. */
+  private val asked = Reg(Vec(contexts, chiselTypeOf(io.shadow.bits.light)))
+  io.isShadow   := isShadow
+  io.isPrimary  := isPrimary
+  io.isColoured := isColoured
 
   private def isAt(wanted: Stage.Type): Seq[Bool] = stage.map(_ === wanted)
 
-  private def anyAt(wanted: Stage.Type): Valid[UInt] = {
+  private def anyOf(claims: Seq[Bool]): Valid[UInt] = {
     val found = Wire(Valid(Context(config)))
-    found.valid := isAt(wanted).reduce(_ || _)
-    found.bits  := PriorityEncoder(isAt(wanted))
+    found.valid := claims.reduce(_ || _)
+    found.bits  := PriorityEncoder(claims)
     found
   }
 
-  io.free       := anyAt(Stage.free)
-  io.judged     := anyAt(Stage.ended)
-  io.complete   := anyAt(Stage.complete)
+  io.free       := anyOf(isAt(Stage.free))
+  io.judged     := anyOf(isAt(Stage.ended))
+  io.complete   := anyOf(isAt(Stage.complete))
   io.freeCount  := PopCount(isAt(Stage.free))
   io.setUpCount := PopCount(isAt(Stage.setUp))
 
   when(io.allocate) {
-    stage(io.free.bits)    := Stage.setUp
-    isShadow(io.free.bits) := false.B
+    stage(io.free.bits)      := Stage.setUp
+    isShadow(io.free.bits)   := false.B
+    isPrimary(io.free.bits)  := true.B
+    isColoured(io.free.bits) := false.B
   }
   when(io.entered.valid) { stage(io.entered.bits) := Stage.traversal }
   io.ended.foreach(ended => when(ended.valid) { stage(ended.bits) := Stage.ended })
+
+  // Judge
+  private val judged = io.judged.bits
   when(io.judged.valid) {
-    val isSeen = !isShadow(io.judged.bits) && io.hasHit(io.judged.bits)
-    stage(io.judged.bits) := Mux(isSeen, Stage.shading, Stage.complete)
+    when(isShadow(judged)) {
+      stage(judged) := Stage.lit
+      for (light <- 0 until lights)
+        when((lights == 1).B || asked(judged) === light.U) { occlusions(judged)(light) := io.occlusions(judged) }
+    }.elsewhen(io.hasHit(judged)) {
+      stage(judged) := Stage.shading
+    }.otherwise {
+      stage(judged) := Mux(isPrimary(judged), Stage.complete, Stage.colouring)
+    }
+    isBackground(judged) := !isShadow(judged) && !io.hasHit(judged)
   }
+
+  // After the shader
   when(io.shaded.valid) {
-    stage(io.shaded.bits.context)    := Mux(io.shaded.bits.needsShadowRay, Stage.setUp, Stage.complete)
-    isShadow(io.shaded.bits.context) := io.shaded.bits.needsShadowRay
+    stage(io.shaded.bits.context)        := Stage.lit
+    wanted(io.shaded.bits.context)       := io.shaded.bits.needsShadowRays
+    occlusions(io.shaded.bits.context)   := VecInit.fill(lights)(Occlusion.none)
+    isBackground(io.shaded.bits.context) := false.B
   }
-  when(io.dropped.valid) { stage(io.dropped.bits) := Stage.complete }
+  when(io.bounced.valid) {
+    stage(io.bounced.bits.context)        := Mux(io.bounced.bits.isTraced, Stage.setUp, Stage.colouring)
+    isPrimary(io.bounced.bits.context)    := false.B
+    isBackground(io.bounced.bits.context) := true.B
+  }
+  when(io.dropped.valid) {
+    stage(io.dropped.bits)        := Stage.colouring
+    isBackground(io.dropped.bits) := true.B
+  }
+
+  // Lit contexts ask for one light after the other, then go on
+  private val isDark   = stage.zip(wanted).map { case (at, lights) => at === Stage.lit && lights.reduce(_ || _) }
+  private val seeker   = anyOf(isDark)
+  private val wishes   = wanted(seeker.bits)
+  io.shadow.valid        := seeker.valid
+  io.shadow.bits.context := seeker.bits
+  io.shadow.bits.light   := PriorityEncoder(wishes)
+  when(io.shadow.fire) {
+    stage(seeker.bits)    := Stage.setUp
+    isShadow(seeker.bits) := true.B
+    asked(seeker.bits)    := io.shadow.bits.light
+    for (light <- 0 until lights) when(io.shadow.bits.light === light.U) { wanted(seeker.bits)(light) := false.B }
+  }
+
+  // A lit context that wants no light any more, or a path into the background, ends
+  private val ends = stage.zip(wanted).map { case (at, lights) =>
+    at === Stage.colouring || (at === Stage.lit && !lights.reduce(_ || _))
+  }
+  private val ending = anyOf(ends)
+  io.end.valid             := ending.valid
+  io.end.bits.context      := ending.bits
+  io.end.bits.isBackground := isBackground(ending.bits)
+  io.end.bits.occlusions   := occlusions(ending.bits)
+  when(io.end.fire) { stage(ending.bits) := Stage.coloured }
+  when(io.coloured.valid) {
+    stage(io.coloured.bits)      := Stage.complete
+    isColoured(io.coloured.bits) := true.B
+  }
   when(io.leave) { stage(io.complete.bits) := Stage.free }
 }

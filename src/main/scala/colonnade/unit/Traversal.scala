@@ -22,6 +22,9 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     /** A node for a context. */
     val nodes = Flipped(Decoupled(new ServedRecord(config)))
 
+    /** `nodes` will be ready in the next cycle. */
+    val takesNext = Output(Bool())
+
     /** The ray of `nodes.bits.context`. */
     val ray = Input(new BoxRay(config.numbers))
 
@@ -50,6 +53,7 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     boxUnit.io.in.bits.ray     := io.ray
     boxUnit.io.in.bits.limit   := io.limits(io.nodes.bits.context)
     io.nodes.ready             := boxUnit.io.in.ready
+    io.takesNext               := boxUnit.io.takesNext
 
     stack.io.clear := io.clear
     stack.io.start := io.start
@@ -70,6 +74,7 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     io.visits :<>= walk.io.visits
 
     io.nodes.ready := true.B
+    io.takesNext   := true.B
     io.boxTests    := 0.U
     io.busy        := false.B
     io.deepest     := 0.U

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Load, LoadTarget, RecordFormats}
+import colonnade.formats.{Load, RecordFormats}
 import colonnade.unit.{RecordBroadcast, RecordRequest}
 import colonnade.{Proofs, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -49,8 +49,8 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
 
   private def load(dut: ControllerAndMemory, records: Seq[BigInt]): Unit = {
     dut.load.valid.poke(true)
-    for ((record, address) <- records.zipWithIndex; target <- Seq(LoadTarget.columnBvh.litValue, BigInt(1))) {
-      dut.load.bits.target.poke(target.U(LoadTarget.bits.W))
+    for ((record, address) <- records.zipWithIndex; target <- Seq(0, 1)) {
+      dut.load.bits.target.poke(target)
       dut.load.bits.address.poke(address)
       dut.load.bits.record.poke((if (target == 0) record else record ^ 1).U(dut.load.bits.record.getWidth.W))
       dut.clock.step()

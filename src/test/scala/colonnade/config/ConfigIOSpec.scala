@@ -1,6 +1,6 @@
 package colonnade.config
 
-import colonnade.{ArbitraryConfig, Properties}
+import colonnade.{ArbitraryConfig, Properties, TestConfigs}
 import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
@@ -103,6 +103,37 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     refusal("tiny", "array.rows=0") shouldBe "array.rows is 0; it must be at least 1"
     refusal("tiny", "geometry.arity=3") shouldBe "geometry.arity is 3; it must be one of 2, 4"
     refusal("tiny", "frame.tileSize=5") shouldBe "frame.tileSize is 5; it must be one of 4, 8, 16, 32"
+  }
+
+  private def room(changes: String*): Seq[String] =
+    s"physicalAttributeMemory=${ConfigIO.write(TestConfigs.withRoom(TestConfigs.room))("physicalAttributeMemory").render()}" +:
+      changes.map(change => s"physicalAttributeMemory.$change")
+
+  it should "read the maps of a room, or that there are none" in {
+    ConfigIO.load("tiny").physicalAttributeMemory shouldBe None
+    ConfigIO.load("tiny", room()).physicalAttributeMemory shouldBe Some(TestConfigs.room)
+    ConfigIO.load(
+      "tiny",
+      room("encoding=slic")
+    ).physicalAttributeMemory.map(_.encoding) shouldBe Some(MapEncoding.Sliding)
+    ConfigIO.load("tiny", room() :+ "physicalAttributeMemory=null").physicalAttributeMemory shouldBe None
+  }
+
+  it should "refuse maps that do not fit, with what they need" in {
+    def refused(changes: String*): String =
+      refusal("tiny", room(changes: _*): _*).stripPrefix("physicalAttributeMemory")
+    refused(
+      "mapBytes=1417"
+    ) shouldBe ".mapBytes is 1417; it must be at least 1418: 50 tile descriptors take 200 bytes " +
+      "and 256 palette entries 1152, the finest tile 66"
+    refused("mapBytes=17737") should startWith(".mapBytes is 17737; it must be at most 17736: 50 tile descriptors")
+    refused("planeBytes=1287") should startWith(".planeBytes is 1287; it must be at least 1288: 50 tile descriptors")
+    refused("encoding=slic", "mapBytes=566") shouldBe ".mapBytes is 566; it must be at least 567: " +
+      "50 seeds take 225 bytes and the labels of blocks 342"
+    refused("tileSize=24") shouldBe ".tileSize is 24; it must be one of 16, 32"
+    refused("encoding=jpeg") shouldBe ".encoding is \"jpeg\"; it must be one of twoLevel, slic"
+    refusal("tiny", "physicalAttributeMemory.width=320") shouldBe
+      "the setting 'physicalAttributeMemory.width=320' changes a part of what is null; set the whole section first"
   }
 
   it should "refuse values of the wrong type" in {

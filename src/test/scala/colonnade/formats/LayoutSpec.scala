@@ -38,7 +38,9 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
   private def kinds(config: ColonnadeConfig): Seq[Data] = {
     val formats = new RecordFormats(config)
     Seq(formats.node, formats.triangles, formats.attributes, new Pixel(config), new Load(config)) ++
-      Seq(new FrameRegisters(config), new DeviceStatus)
+      Seq(new FrameRegisters(config), new DeviceStatus(config)) ++ AttributeMemories.layouts.map { case (_, kind) =>
+        kind()
+      }
   }
 
   it should "cover each bit of a type once, under unique names" in {
@@ -74,6 +76,19 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
       val packed = new Packed(kind)
       packed.unpack(packed.pack(values)) == values
     }
+  }
+
+  it should "lay out the words of a room's maps as their encoder packs them" in {
+    def places(kind: Data): Map[String, (Int, Int)] =
+      Layout.of(kind).map(field => field.name -> (field.offset, field.width)).toMap
+    places(new MapDescriptor) shouldBe
+      Map("mode" -> (0, 3), "pointer" -> (3, 13), "entries[0]" -> (16, 8), "entries[1]" -> (24, 8))
+    places(new AlbedoEntry) shouldBe Map("r" -> (0, 12), "g" -> (12, 12), "b" -> (24, 12))
+    places(new NormalEntry) shouldBe Map("x" -> (0, 12), "y" -> (12, 12), "z" -> (24, 12))
+    places(new PlaneDescriptor) shouldBe Map("mode" -> (0, 3), "pointer" -> (3, 13))
+    places(new Plane) shouldBe Map("a" -> (0, 20), "b" -> (20, 20), "c" -> (40, 20), "exponent" -> (60, 4))
+    val shell = places(new ShellEntry)
+    Seq("plane.a", "albedo.r", "normal.x").map(shell(_)._1) shouldBe Seq(0, 64, 100)
   }
 
   it should "fit every kind of record into whole words" in {

@@ -1,11 +1,15 @@
 package colonnade.formats
 
-import colonnade.config.ConfigIO
+import colonnade.TestConfigs
+import colonnade.config.{ConfigIO, MapEncoding, PhysicalAttributeMemoryConfig}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
 class ManifestSpec extends AnyFlatSpec with Matchers {
   behavior of "Manifest"
+
+  private val room =
+    TestConfigs.room.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 8192)
 
   private def manifest(settings: String*): ujson.Obj = Manifest(ConfigIO.load("tiny", settings))
 
@@ -16,7 +20,18 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
   it should "name what the host relies on" in {
     val whole = manifest()
     whole.value.keys.toSeq shouldBe
-      Seq("version", "config", "numbers", "records", "registers", "streams", "memories", "formatHash", "configHash")
+      Seq(
+        "version",
+        "config",
+        "numbers",
+        "records",
+        "registers",
+        "streams",
+        "memories",
+        "attributes",
+        "formatHash",
+        "configHash"
+      )
     whole("records")("layouts").obj.keys.toSeq shouldBe Seq("node", "triangles", "attributes")
     whole("memories")("columnBvh") shouldBe ujson.Obj("depth" -> 131072, "bits" -> 320, "banks" -> 2)
     val names = whole("registers")("fields").arr.map(_("name").str)
@@ -29,7 +44,8 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
       "frame.objectRect.x1",
       "camera.direction.z",
       "camera.stepShift",
-      "light.shadowOffset",
+      "lights[0].reachExponent",
+      "shading.offset",
       "ambient.g",
       "shading.shadows",
       "background.b",
@@ -38,6 +54,44 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
       "scene.attributeBase"
     )
     names should not contain "materials[8].albedo.r"
+  }
+
+  it should "name the memories of a room's maps, their words and their sizes" in {
+    val whole  = Manifest(TestConfigs.withRoom(room))
+    val target =
+      whole("memories").obj.collect { case (name, memory) if name != "columnBvh" => name -> memory("target").num }
+    target shouldBe Map(
+      "albedo.descriptors"  -> 1,
+      "albedo.palette"      -> 2,
+      "albedo.heap"         -> 3,
+      "normals.descriptors" -> 4,
+      "normals.palette"     -> 5,
+      "normals.heap"        -> 6,
+      "planes.descriptors"  -> 7,
+      "planes.heap"         -> 8,
+      "planes.planes"       -> 9,
+      "planes.shell"        -> 10
+    )
+    whole("memories")("albedo.heap") shouldBe ujson.Obj("depth" -> 5216, "bits" -> 16, "target" -> 3)
+    whole("memories")("planes.heap") shouldBe ujson.Obj("depth" -> 2312, "bits" -> 16, "target" -> 8)
+    whole("memories")("planes.shell") shouldBe ujson.Obj("depth" -> 8, "bits" -> 136, "target" -> 10)
+    whole("attributes")("sizes")("tileColumns").num shouldBe 40
+    whole("attributes")("layouts").obj.keys.toSeq shouldBe
+      Seq("mapDescriptor", "albedo", "normal", "planeDescriptor", "plane", "shellEntry")
+    whole("registers")("fields").arr.map(_("name").str) should contain("counters.cellReads")
+    manifest()("registers")("fields").arr.map(_("name").str) should not contain "counters.cellReads"
+  }
+
+  it should "hash what an image of a room depends on, and not who shares it" in {
+    def hash(room: PhysicalAttributeMemoryConfig): String = Manifest(TestConfigs.withRoom(room))("formatHash").str
+    hash(room.copy(shared = true)) shouldBe hash(room)
+    val others = Seq(
+      room.copy(encoding = MapEncoding.Sliding),
+      room.copy(paletteSize = 128),
+      room.copy(height = 464),
+      room.copy(planeBytes = 8190)
+    )
+    (others.map(hash) :+ hash(room) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 6
   }
 
   it should "give every word of the register map to one register" in {

@@ -3,11 +3,22 @@ package colonnade.ray
 import chisel3._
 import chiseltest._
 import colonnade.TestConfigs
+import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
 import scala.util.Random
+
+/** With the ray as box tests take it. */
+private class RaySetupHarness(config: ColonnadeConfig) extends Module {
+  private val setup = Module(new RaySetup(config))
+
+  val io       = IO(chiselTypeOf(setup.io))
+  val forBoxes = IO(Output(new BoxRay(config.numbers)))
+  io :<>= setup.io
+  forBoxes := setup.io.ray.bits.ray.forBoxes
+}
 
 /** Set-up rays equal the model's, bit for bit. */
 class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
@@ -16,7 +27,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
   TestConfigs.formats.foreach { config =>
     it should s"equal the model under random stalls, ${config.precision} with ${config.geometry.vertexBits}-bit vertices" in {
-      test(new RaySetup(config)) { setup =>
+      test(new RaySetupHarness(config)) { setup =>
         val random = new Random(2)
         val cases  = new SetUpCases(config, random).all(raysPerBox = 14)
         val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
@@ -27,7 +38,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
   it should "take a ray every 16 cycles at 32b32s64d, and lose none" in {
     val config = TestConfigs.tiny
-    test(new RaySetup(config)) { setup =>
+    test(new RaySetupHarness(config)) { setup =>
       val random   = new Random(3)
       val box      = new SetUpCases(config, random).all(raysPerBox = 40).head
       val answers  = box.answers(config)
@@ -41,7 +52,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
   /** Sends all requests and checks all answers; the cycles in which these left. */
   private def run(
-      setup:   RaySetup,
+      setup:   RaySetupHarness,
       box:     SetUpCase,
       answers: Seq[Seq[BigInt]],
       random:  Random,
@@ -63,7 +74,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       if (shown != offered) offer(setup.io.request.bits, requests(shown))
       offered = shown
       if (accepts && setup.io.ray.valid.peekBoolean()) {
-        expect(setup.io.ray.bits, requests(left.size), answers(left.size))
+        expect(setup.io.ray.bits, setup.forBoxes.origin, requests(left.size), answers(left.size))
         left :+= cycle
       }
       if (offers && setup.io.request.ready.peekBoolean()) sent += 1
@@ -73,18 +84,20 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     left
   }
 
-  private def expect(ray: SetUpRay, request: SetUpRequest, answer: Seq[BigInt]): Unit = withClue(s"$request: ") {
+  private def expect(
+      ray:     SetUpRay,
+      units:   Seq[Fixed],
+      request: SetUpRequest,
+      answer:  Seq[BigInt]
+  ): Unit = withClue(s"$request: ") {
     ray.context.peekInt() shouldBe request.context
     ray.isShadow.peekBoolean() shouldBe request.isShadow
     ray.enters.peekInt() shouldBe answer.head
     if (answer.head == 1) {
-      val box      = ray.boxRay
-      val triangle = ray.triangleRay
-      box.heading.negative.map(_.peekInt()) shouldBe triangle.heading.negative.map(_.peekInt())
-      box.heading.axis.peekInt() shouldBe triangle.heading.axis.peekInt()
-      val numbers = Seq(triangle.heading.axis.peekInt()) ++ triangle.heading.negative.map(_.peekInt()) ++
-        triangle.origin.map(raw) ++ box.origin.map(raw) ++ triangle.shear.map(raw) ++ box.reciprocal.map(raw) ++
-        box.exponent.map(_.peekInt()) ++ Seq(raw(ray.entry), raw(ray.limit))
+      val traced  = ray.ray
+      val numbers = Seq(traced.heading.axis.peekInt()) ++ traced.heading.negative.map(_.peekInt()) ++
+        traced.origin.map(raw) ++ units.map(raw) ++ traced.shear.map(raw) ++ traced.reciprocal.map(raw) ++
+        traced.exponent.map(_.peekInt()) ++ Seq(raw(ray.entry), raw(ray.limit))
       numbers shouldBe answer.tail
     }
   }

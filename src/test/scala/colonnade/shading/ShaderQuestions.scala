@@ -19,26 +19,35 @@ final case class HitQuestion(
     material:        Int
 )
 
-/** What the registers say, in raw integers. */
+/** A light, in raw integers. */
+final case class LightSource(position: Seq[BigInt], colour: Seq[BigInt], reachMantissa: BigInt, reachExponent: Int)
+
+/** What the registers say, in raw integers; the first `shining` sources shine. */
 final case class LightQuestion(
-    position:  Seq[BigInt],
+    sources:   Seq[LightSource],
+    shining:   Int,
     unitShift: Int,
-    colour:    Seq[BigInt],
-    ambient:   Seq[BigInt],
     albedos:   Seq[Seq[BigInt]],
     offset:    BigInt,
     isFlat:    Boolean,
     shadows:   Boolean
-)
+) {
+
+  /** With all lights at one place. */
+  def at(position: Seq[BigInt]): LightQuestion = copy(sources = sources.map(_.copy(position = position)))
+}
 
 object ShaderQuestions {
 
   /** The words of the model's question. */
   def words(hit: HitQuestion, light: LightQuestion): Seq[BigInt] =
     (BigInt(hit.axis) +: hit.negative.map(bit)) ++ hit.origin ++ hit.shear ++ (hit.t +: hit.weights) ++
-      (bit(hit.backSide) +: hit.normals.flatten) ++ hit.geometricNormal ++ light.position.map(_ << light.unitShift) ++
-      light.colour ++ light.ambient ++ light.albedos(hit.material) ++
-      Seq(light.offset, bit(light.isFlat), bit(light.shadows))
+      (bit(hit.backSide) +: hit.normals.flatten) ++ hit.geometricNormal ++
+      Seq(light.offset, bit(light.isFlat), bit(light.shadows), BigInt(light.shining)) ++
+      light.sources.take(light.shining).flatMap(source =>
+        source.position.map(_ << light.unitShift) ++ source.colour ++
+          Seq(source.reachMantissa, BigInt(source.reachExponent))
+      )
 
   def bit(claim: Boolean): BigInt = if (claim) 1 else 0
 }
@@ -72,14 +81,26 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
     val shift = random.nextInt((numbers.sceneBits - 4).min(if (random.nextBoolean()) 6 else 64))
     val bits  = numbers.macBits.min(numbers.sceneBits - shift)
     LightQuestion(
-      position = three(signed(bits)),
+      sources = Seq.fill(config.frame.lights)(source(bits)),
+      shining = if (chance(4)) random.nextInt(config.frame.lights + 1) else config.frame.lights,
       unitShift = shift,
-      colour = three(natural(NumberFormats.lightBits)),
-      ambient = three(natural(if (chance(4)) NumberFormats.lightBits else 11)),
       albedos = Seq.fill(config.frame.materials)(three(natural(NumberFormats.colourBits))),
       offset = natural(numbers.gridBits - 2),
       isFlat = chance(4),
       shadows = !chance(4)
+    )
+  }
+
+  /** Without a falloff, or with one that reaches somewhere near the scene, or anywhere. */
+  private def source(positionBits: Int): LightSource = {
+    val reach   = if (chance(3)) BigInt(0) else (BigInt(1) << (numbers.mantissaBits - 1)) + BigInt(numbers.mantissaBits - 1, random)
+    val nearby  = 2 * numbers.gridBits - numbers.mantissaBits + random.nextInt(16) - 10
+    val largest = 1 << (NumberFormats.bitLength(2 * numbers.sceneBits))
+    LightSource(
+      position = three(signed(positionBits)),
+      colour = three(natural(NumberFormats.lightBits)),
+      reachMantissa = reach,
+      reachExponent = if (chance(6)) random.nextInt(2 * largest) - largest else nearby
     )
   }
 
@@ -93,7 +114,7 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
 
   /** A surface of unit normals, turned to the light or away from it, more or less. */
   def surfaceHit(light: LightQuestion): HitQuestion = {
-    val way     = light.position.map(x => (x << light.unitShift).toDouble)
+    val way     = light.sources.head.position.map(x => (x << light.unitShift).toDouble)
     val facing  = if (way.forall(_ == 0)) anyUnit else unit(way.map(x => if (chance(10)) -x else x))
     val average = if (chance(3)) anyUnit else if (chance(3)) facing else nearly(facing)
     val normals = three(if (chance(5)) average else nearly(average))

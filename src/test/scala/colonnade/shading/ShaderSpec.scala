@@ -24,8 +24,6 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       ((all >> (i * fieldBits)) & ((BigInt(1) << fieldBits) - 1)) - (BigInt(1) << (fieldBits - 1))
     )
 
-  private val answerNumbers = 14
-
   private def pokeFixed(port: Fixed, raw: BigInt): Unit = port.raw match {
     case signed: SInt => signed.poke(raw)
     case other        => other.asInstanceOf[UInt].poke(raw)
@@ -38,11 +36,15 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     port.channels.zip(raw).foreach { case (to, value) => to.poke(value) }
 
   private def pokeLight(io: ShaderIO, light: LightQuestion): Unit = {
-    io.light.position.axes.zip(light.position).foreach { case (to, value) => to.poke(value) }
-    io.light.colour.channels.zip(light.colour).foreach { case (to, value) => pokeFixed(to, value) }
-    io.light.shadowOffset.poke(light.offset)
+    for ((port, source) <- io.lights.zip(light.sources)) {
+      port.position.axes.zip(source.position).foreach { case (to, value) => to.poke(value) }
+      port.colour.channels.zip(source.colour).foreach { case (to, value) => pokeFixed(to, value) }
+      port.reachMantissa.poke(source.reachMantissa)
+      port.reachExponent.poke(source.reachExponent)
+    }
     io.unitShift.poke(light.unitShift)
-    io.ambient.channels.zip(light.ambient).foreach { case (to, value) => pokeFixed(to, value) }
+    io.shading.offset.poke(light.offset)
+    io.shading.lights.poke(light.shining)
     io.shading.flat.poke(light.isFlat)
     io.shading.shadows.poke(light.shadows)
     io.materials.zip(light.albedos).foreach { case (to, value) => pokeColour(to.albedo, value) }
@@ -63,10 +65,17 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     port.face.material.poke(hit.material)
   }
 
-  private def peek(port: ShadeResult): BigInt = pack(
-    (port.lit.channels ++ port.ambient.channels).map(_.peekInt()) ++ (port.needsShadowRay.peekInt() +:
-      port.origin.axes.map(_.integer.peekInt())) ++ port.toLight.axes.map(_.peekInt()) :+ port.context.peekInt()
+  private def peek(port: LitSurface): BigInt = pack(
+    port.origin.axes.map(_.integer.peekInt()) ++
+      port.directs.zip(port.needsShadowRays).flatMap { case (direct, needs) =>
+        direct.channels.map(_.natural.peekInt()) :+ needs.peekInt()
+      } ++ port.albedo.channels.map(_.peekInt()) :+ port.context.peekInt()
   )
+
+  /** The model's answer, of lights that do not shine as well, and what the hit says itself. */
+  private def expected(answer: Seq[BigInt], hit: HitQuestion, light: LightQuestion): Seq[BigInt] =
+    answer ++ Seq.fill(4 * (light.sources.size - light.shining))(BigInt(0)) ++ light.albedos(hit.material) :+
+      BigInt(hit.context)
 
   /** Shades hits, a light after another, and compares with the model. */
   private def check(
@@ -86,13 +95,13 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
       pokeLight(shader.io, light)
       val results =
-        StreamTester.exchange(shader.clock, shader.io.request, shader.io.result, hits)(
+        StreamTester.exchange(shader.clock, shader.io.request, shader.io.lit, hits)(
           poke,
           peek
         )(random, stalls(round), 400)
       results.zip(hits).foreach { case (result, hit) =>
-        val answer = answers.next() :+ BigInt(hit.context)
-        assert(unpack(result, answerNumbers) == answer, s"of $hit under $light in ${config.precision}")
+        val answer = expected(answers.next(), hit, light)
+        assert(unpack(result, answer.size) == answer, s"of $hit under $light in ${config.precision}")
       }
     }
   }
@@ -120,8 +129,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     val lowest   = Seq.fill(3)(BigInt(-2048))
     val full     = Seq.fill(3)((BigInt(1) << config.numbers.barycentricBits) - 1)
     for (sign <- Seq(1, -1); isFlat <- Seq(false, true)) yield {
-      val light = questions.light().copy(
-        position = Seq.fill(3)(farLight * sign),
+      val light = questions.light().at(Seq.fill(3)(farLight * sign)).copy(
         unitShift = 0,
         offset = (BigInt(1) << (config.numbers.gridBits - 2)) - 1,
         isFlat = isFlat,
@@ -151,17 +159,22 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
         geometricNormal = normal,
         weights = Seq(BigInt(1), BigInt(3), BigInt(0))
       )
-      val light = questions.light().copy(position = normal.map(_.signum * distance), unitShift = 0, offset = 0)
+      val light = questions.light().at(normal.map(_.signum * distance)).copy(unitShift = 0, offset = 0)
       light -> Seq(hit.copy(backSide = false), hit.copy(backSide = true))
     }
 
-  it should "take a hit at least every 50 cycles at 32b32s64d" in test(new Shader(TestConfigs.tiny)) { shader =>
+  it should "take a hit with a light at least every 50 cycles at 32b32s64d" in test(new Shader(TestConfigs.tiny)) { shader =>
     val random    = new Random(23)
     val questions = new ShaderQuestions(TestConfigs.tiny, random)
-    val light = questions.light().copy(position = Seq(3000, 5000, 9000), unitShift = 12, isFlat = false, shadows = true)
+    val light = questions.light().at(Seq(3000, 5000, 9000)).copy(
+      shining = 1,
+      unitShift = 12,
+      isFlat = false,
+      shadows = true
+    )
     pokeLight(shader.io, light)
     shader.io.request.valid.poke(true)
-    shader.io.result.ready.poke(true)
+    shader.io.lit.ready.poke(true)
     val taken = for (_ <- 0 until 20) yield {
       pokeHit(shader.io.request.bits, questions.surfaceHit(light).copy(weights = Seq(BigInt(1), BigInt(1), BigInt(2))))
       var cycles = 1
@@ -178,7 +191,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "tell the materials of a table apart, whatever its size" in {
     for (materials <- Seq(1, 5, 8)) {
-      val config = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(materials = materials))
+      val config = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(materials = materials, maxBounces = 0))
       test(new Shader(config)) { shader =>
         val random    = new Random(24)
         val questions = new ShaderQuestions(config, random)

@@ -5,6 +5,7 @@ import chiseltest._
 import colonnade.{Model, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.FixedPorts._
+import colonnade.shading.Occlusion
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -43,6 +44,18 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.hasHit(1).expect(true)
     }
 
+  it should "let a shadow ray pass what is clear, and remember it" in
+    test(new HitTable(TestConfigs.tiny)) { dut =>
+      val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
+      driver.begin(context = 1, limit = 100, isShadow = true)
+      driver.offer(1, driver.result(t = 30, id = 0, isClear = true))
+      dut.io.hasHit(1).expect(false)
+      dut.io.occlusions(1).expect(Occlusion.clear)
+      driver.offer(1, driver.result(t = 60, id = 4))
+      dut.io.hasHit(1).expect(true)
+      dut.io.occlusions(1).expect(Occlusion.opaque)
+    }
+
   it should "forget the hit of the ray before" in
     test(new HitTable(TestConfigs.tiny)) { dut =>
       val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
@@ -57,10 +70,23 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
 }
 
 private object HitTableSpec {
-  final case class Result(isHit: Boolean, t: BigInt, id: BigInt, weights: Seq[BigInt], backSide: Boolean)
+  final case class Result(
+      isHit:    Boolean,
+      t:        BigInt,
+      id:       BigInt,
+      weights:  Seq[BigInt],
+      backSide: Boolean,
+      isClear:  Boolean
+  )
 
   final case class Search(limit: BigInt, isShadow: Boolean, results: Vector[Result] = Vector.empty) {
-    def hits: Vector[Result] = results.filter(result => result.isHit && result.t < limit)
+    private val within = results.filter(result => result.isHit && result.t < limit)
+
+    /** A shadow ray only hits what is opaque. */
+    def hits: Vector[Result] = within.filter(hit => !isShadow || !hit.isClear)
+
+    def occlusion: Occlusion.Type =
+      if (hits.nonEmpty) Occlusion.opaque else if (within.nonEmpty) Occlusion.clear else Occlusion.none
 
     def best: Option[Result] = hits.minByOption(hit => (hit.t, hit.id))
   }
@@ -80,12 +106,13 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
 
   dut.io.search.valid.poke(false)
   dut.io.result.valid.poke(false)
+  dut.io.chosen.valid.poke(true)
 
   def best(context: Int): Option[Result] = searches(context).flatMap(_.best)
 
-  def result(t: BigInt, id: BigInt, isHit: Boolean = true): Result = {
+  def result(t: BigInt, id: BigInt, isHit: Boolean = true, isClear: Boolean = false): Result = {
     val bits = config.numbers.barycentricBits
-    Result(isHit, t, id, Seq.fill(3)(BigInt(bits, random)), random.nextBoolean())
+    Result(isHit, t, id, Seq.fill(3)(BigInt(bits, random)), random.nextBoolean(), isClear)
   }
 
   def begin(context: Int, limit: BigInt, isShadow: Boolean): Unit = {
@@ -106,7 +133,7 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
       begun.foreach(pokeSearch(_, limit(), random.nextInt(3) == 0))
       val tested = random.nextInt(contexts)
       if (random.nextInt(4) > 0 && !begun.contains(tested))
-        pokeResult(tested, result(distance(tested), random.nextInt(8), isHit = random.nextInt(5) > 0))
+        pokeResult(tested, result(distance(tested), random.nextInt(8), random.nextInt(5) > 0, random.nextBoolean()))
       step()
       check()
     }
@@ -114,17 +141,23 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     assert(found == Model.answers(config, asked.map(Seq(_)), "limit").map(_.head))
   }
 
+  /** Looks at every ray; the hit of one of them that is chosen comes a cycle later. */
   def check(): Unit = for ((search, context) <- searches.zipWithIndex; ray <- search) {
     dut.io.hasHit(context).expect(ray.hits.nonEmpty, s"context $context, $ray")
-    // A shadow ray needs no more than the answer that it has hit
-    if (!ray.isShadow || ray.hits.isEmpty)
-      limits += ray.best.fold(ray.limit)(_.t) -> dut.io.limits(context).peekRaw()
-    for (reader <- dut.io.readers; hit <- ray.best if !ray.isShadow) {
-      reader.context.poke(context)
-      assert(reader.hit.t.peekRaw() == hit.t, s"context $context, $ray")
-      assert(reader.hit.id.peekInt() == hit.id, s"context $context, $ray")
-      assert(reader.hit.weights.map(_.peekRaw()) == hit.weights)
-      reader.hit.backSide.expect(hit.backSide)
+    // What lies in a shadow ray's way does not shorten it
+    limits += (if (ray.isShadow) ray.limit else ray.best.fold(ray.limit)(_.t)) -> dut.io.limits(context).peekRaw()
+    if (ray.isShadow) dut.io.occlusions(context).expect(ray.occlusion)
+    for (hit <- ray.best if !ray.isShadow) {
+      dut.io.nearest.context.poke(context)
+      assert(dut.io.nearest.t.peekRaw() == hit.t, s"context $context, $ray")
+      assert(dut.io.nearest.id.peekInt() == hit.id, s"context $context, $ray")
+      dut.io.chosen.bits.poke(context)
+      dut.clock.step()
+      dut.io.served.poke(context)
+      assert(dut.io.hit.t.peekRaw() == hit.t, s"context $context, $ray")
+      assert(dut.io.hit.id.peekInt() == hit.id, s"context $context, $ray")
+      assert(dut.io.hit.weights.map(_.peekRaw()) == hit.weights)
+      dut.io.hit.backSide.expect(hit.backSide)
     }
   }
 
@@ -155,6 +188,7 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     bits.hit.id.poke(result.id)
     bits.hit.weights.zip(result.weights).foreach { case (port, weight) => port.pokeRaw(weight) }
     bits.hit.backSide.poke(result.backSide)
+    bits.isClear.poke(result.isClear)
     dut.io.isShadow.poke(search.isShadow)
     dut.io.hasHitNow.expect(searches(context).get.hits.nonEmpty, s"context $context, ${searches(context).get}")
   }

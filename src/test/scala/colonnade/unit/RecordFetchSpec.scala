@@ -64,6 +64,8 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     private var now      = 0
     private var made     = 0
     private var served   = 0
+    private var takers   = Seq.empty[RecordUse.Type]
+    private var chosen   = Option.empty[Int]
 
     dut.io.row.poke(row.U)
     dut.io.recordCount.poke(recordCount.U)
@@ -119,22 +121,27 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       }
     }
 
+    /** Who is served was chosen in the cycle before, for a unit that had promised to take it. */
     private def takeServed(): Unit = {
-      val takers = RecordUse.all.zip(dut.io.isReady).filter { case (_, port) =>
-        val takes = random.nextInt(3) > 0
-        port.poke(takes.B)
-        takes
-      }
       val port = dut.io.served
-      if (port.valid.peekBoolean()) {
-        val context = port.bits.context.peekInt().toInt
-        val use     = port.bits.use.peek()
-        takers.map(_._1.litValue) should contain(use.litValue)
+      port.valid.expect(chosen.nonEmpty)
+      for (context <- chosen) {
+        port.bits.context.expect(context)
+        val use = port.bits.use.peek()
+        takers.map(_.litValue) should contain(use.litValue)
         withClue(s"context $context: ") { wanted.get(context).map(_._2.litValue) shouldBe Some(use.litValue) }
         port.bits.record.peekInt() shouldBe contentOf(wanted(context)._1)
         wanted -= context
         served += 1
       }
+      takers = RecordUse.all.zip(dut.io.takesNext).collect { case (use, port) if promises(port) => use }
+      chosen = Option.when(dut.io.chosen.valid.peekBoolean())(dut.io.chosen.bits.peekInt().toInt)
+    }
+
+    private def promises(port: Bool): Boolean = {
+      val takes = random.nextInt(3) > 0
+      port.poke(takes)
+      takes
     }
   }
 }

@@ -34,7 +34,8 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
             assert(found(position) == pixel.take(found(position).size), s"at $position, seed $seed")
           assert(column.hits == hits)
           assert(
-            hits > positions.size / 6 && (if (shadows) column.shadowRays > hits / 4 else column.shadowRays == 0),
+            hits > positions.size / 6 && (if (shadows) column.shadowRays > hits / 8 else column.shadowRays == 0) &&
+              (column.bouncedRays > 0) == config.frame.hasBounces,
             "there is something to see"
           )
         }
@@ -56,6 +57,10 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       frame = TestConfigs.tiny.frame.copy(hits = false)
     ),
     "no tree, one context, nobody snoops"
+  )
+  render(
+    TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(lights = 1, maxBounces = 0)),
+    "one light, nothing bounces"
   )
 }
 
@@ -81,7 +86,8 @@ private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene:
   private var now      = 0
 
   /** Events that the unit has reported. */
-  var shadowRays = 0
+  var shadowRays  = 0
+  var bouncedRays = 0
   var hits       = 0
 
   dut.clock.setTimeout(0)
@@ -118,6 +124,7 @@ private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene:
       dut.io.events.illegalRecord.expect(false)
       dut.io.events.stackOverflow.expect(false)
       if (dut.io.events.raysShadow.peekBoolean()) shadowRays += 1
+      if (dut.io.events.raysReflection.peekBoolean() || dut.io.events.raysRefraction.peekBoolean()) bouncedRays += 1
       if (dut.io.events.hits.peekBoolean()) hits += 1
       if (accepts && dut.io.pixels.valid.peekBoolean()) {
         pixels :+= read(dut.pixel.peekInt())

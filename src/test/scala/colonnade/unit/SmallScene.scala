@@ -66,8 +66,16 @@ final class SmallScene(
       "attributeBase"   -> (nodes.size + ordered.size)
     )
     val materials = Seq.tabulate(config.frame.materials) { i =>
-      vector(s"materials[$i].albedo", "rgb", Seq.fill(3)(BigInt(1000 + random.nextInt(3000))))
+      vector(s"materials[$i].albedo", "rgb", Seq.fill(3)(BigInt(1000 + random.nextInt(3000)))) ++
+        (if (config.frame.hasBounces) glossy(i) else Map.empty[String, BigInt])
     }
+    val lights = Seq.tabulate(config.frame.lights) { i =>
+      vector(s"lights[$i].position", "xyz", at(cube / 4 + cube * i / 2, cube * 3 / 2, -cube)) ++
+        vector(s"lights[$i].colour", "rgb", Seq(4000, 3000, 2500).map(_ / (i + 1))) ++ reach(cube, i)
+    }
+    val bounces =
+      if (config.frame.hasBounces) Map("bounces" -> config.frame.maxBounces, "clearness" -> 2500)
+      else Map.empty[String, Int]
     Map[String, BigInt](
       "frame.width"          -> wide,
       "frame.height"         -> high,
@@ -76,22 +84,43 @@ final class SmallScene(
       "frame.objectRect.x1"  -> wide,
       "frame.objectRect.y1"  -> high,
       "camera.stepShift"     -> 2,
-      "light.shadowOffset"   -> (cube >> 8).max(1),
+      "shading.offset"       -> (cube >> 8).max(1),
+      "shading.lights"       -> config.frame.lights,
       "shading.flat"         -> seed % 2,
       "shading.shadows"      -> (if (shadows) 1 else 0),
       "frame.objectRect.y0"  -> 0,
       "frame.watchdogCycles" -> 0
-    ) ++ scene.map { case (name, value) => s"scene.$name" -> BigInt(value) } ++ materials.flatten ++
+    ) ++ scene.map { case (name, value) => s"scene.$name" -> BigInt(value) } ++ bounces.map { case (name, value) => s"shading.$name" -> BigInt(value) } ++
+      materials.flatten ++ lights.flatten ++
       vector("camera.position", "xyz", at(cube / 2, cube / 2, -cube)) ++
       vector("camera.direction", "xyz", Seq(-step * wide / 2 + 1, step * high / 2, forwards).map(_ >> 2)) ++
       vector("camera.stepX", "xyz", Seq(step, 0, 0)) ++
       vector("camera.stepY", "xyz", Seq(0, -step, 0)) ++
-      vector("light.position", "xyz", at(cube / 4, cube * 3 / 2, -cube)) ++
-      vector("light.colour", "rgb", Seq(4000, 3000, 2500)) ++
       vector("ambient", "rgb", Seq(500, 600, 700)) ++
       vector("background", "rgb", Seq(100, 200, 300)) ++
       vector("bounds.low", "xyz", (0 until 3).map(axis => BigInt(points.map(_(axis)).min))) ++
       vector("bounds.high", "xyz", (0 until 3).map(axis => BigInt(points.map(_(axis)).max)))
+  }
+
+  /** Every second light falls off: a squared distance as mantissa and exponent. */
+  private def reach(cube: BigInt, light: Int): Map[String, BigInt] = {
+    val square = if (light % 2 == 0) BigInt(0) else cube * cube * 3
+    val drop   = square.bitLength - numbers.mantissaBits
+    Map(
+      s"lights[$light].reachMantissa" -> (if (drop < 0) square << -drop else square >> drop),
+      s"lights[$light].reachExponent" -> BigInt(drop)
+    )
+  }
+
+  /** Diffuse, mirror and glass by turns. */
+  private def glossy(material: Int): Map[String, BigInt] = {
+    val one = BigInt(1) << NumberFormats.etaFraction
+    Map[String, BigInt](
+      "kind"        -> (material + seed) % 3,
+      "etaFront"    -> one * 2 / 3,
+      "etaBack"     -> one * 3 / 2,
+      "reflectance" -> 164
+    ).map { case (name, value) => s"materials[$material].$name" -> value }
   }
 
   private def vector(name: String, parts: String, values: Seq[BigInt]): Map[String, BigInt] =
@@ -134,7 +163,8 @@ final class SmallScene(
       vector(s"vertices[$i]", "xyz", point.map(BigInt(_)))
     }
     new Packed(formats.triangles).pack(
-      points.toMap ++ Map("firstTriangle" -> BigInt(first), "count" -> BigInt(leaf.size))
+      points.toMap ++ Map("firstTriangle" -> BigInt(first), "count" -> BigInt(leaf.size)) ++
+        leaf.indices.map(k => s"isClear[$k]" -> BigInt(random.nextInt(2)))
     )
   }
 

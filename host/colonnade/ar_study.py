@@ -1,0 +1,157 @@
+"""What an AR frame loses on its way into the device: by clustering, by the rebuild, by fixed point.
+
+The truth is the float reference with full maps and the depth map's mesh; see `colonnade.clustered_room.backdrops`.
+
+`python -m colonnade.ar_study ROOM …` prints the losses of three objects in rooms, marched in 64 bits.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.clustered_room import backdrops
+from colonnade.pictures import encode_srgb
+from colonnade.progress import QUIET, Progress
+from colonnade.reference import ReferenceResult, render_reference
+from colonnade.regions import RegionDifference, compare_regions, frame_regions
+from colonnade.scene import Background, Colour, Light, Material, MeshSource, Placing, Scene
+
+if TYPE_CHECKING:
+    from colonnade.attributes import AttributeImage
+    from colonnade.meshes import Mesh
+    from colonnade.rebuild import Rebuild
+    from colonnade.room import Room
+    from colonnade.viewpoint import FloatPlacement
+
+Floats = NDArray[np.float64]
+#: Differences by part of the picture: frame, object, shadow.
+Regions = Mapping[str, RegionDifference]
+
+
+@dataclass(frozen=True)
+class Losses:
+    """What lies between the truth and a frame.
+
+    Attributes:
+        pictures: The frames in 64 bits by loss: `full` is the truth, `clustering` and `rebuild` have one loss each,
+            `both` has both.
+        by_loss: Each of them against the truth; with a device's frame also `fixed point`, that frame against `both`,
+            and `device`, that frame against the truth.
+    """
+
+    pictures: Mapping[str, ReferenceResult]
+    by_loss: Mapping[str, Regions]
+
+
+def losses(
+    mesh: Mesh,
+    view: FloatPlacement,
+    room: Room,
+    image: AttributeImage,
+    rebuild: Rebuild,
+    device: Floats | None = None,
+    with_dists: bool = True,
+    progress: Progress = QUIET,
+) -> Losses:
+    """Split the loss of a frame.
+
+    Args:
+        mesh: The object.
+        view: The frame's placement in the room.
+        room: With its full maps.
+        image: Its clustered maps and planes.
+        rebuild: Where rays meet the rebuilt room.
+        device: The device's frame, linear, float64 [height, width, 3], relit as the reference.
+        with_dists: Judge by DISTS too.
+        progress: Shows the frames.
+    """
+    pictures = {
+        name: render_reference(mesh, view, progress, backdrop)
+        for name, backdrop in backdrops(room, image, rebuild).items()
+    }
+    truth = pictures["full"]
+    regions = frame_regions(truth.object_mask, truth.shadow_ratio)
+    encoded = {name: encode_srgb(picture.image) for name, picture in pictures.items()}
+    pairs = {name: (encoded["full"], encoded[name]) for name in encoded if name != "full"}
+    if device is not None:
+        judged = encode_srgb(device)
+        pairs |= {"fixed point": (encoded["both"], judged), "device": (encoded["full"], judged)}
+    return Losses(pictures, {name: compare_regions(*pair, regions, with_dists) for name, pair in pairs.items()})
+
+
+#: Where objects stand in the rooms that come along: on the table, on the bed, on the table.
+STANDING = {
+    "living": Placing((345.0, 304.0), 0.24, 25.0),
+    "office": Placing((170.0, 392.0), 0.40, 25.0),
+    "attic": Placing((318.0, 284.0), 0.40, 25.0),
+}
+#: Mesh and material of the frames that are measured.
+OBJECTS = {
+    "teapot, mirror": ("teapot", Material("mirror", (0.95, 0.95, 0.95))),
+    "teapot, glass": ("teapot", Material("glass", (0.92, 0.97, 0.95))),
+    "bunny, diffuse": ("bunny", Material("diffuse", (0.75, 0.6, 0.5))),
+}
+
+
+def standing_scene(mesh: str, material: Material, room: Room, placing: Placing) -> Scene:
+    """An object in a room, under a lamp a metre and a half off, above it, and ambient light."""
+    from colonnade.pose import standing_point
+
+    x, y, z = standing_point(placing, room)
+    return Scene(
+        MeshSource(mesh),
+        placing=placing,
+        material=material,
+        light=Light((x - 0.5, y + 1.3, z + 0.5), colour=(0.75, 0.72, 0.65), falloff=1.4),
+        ambient=Colour((0.30, 0.31, 0.33)),
+        background=Background((0.0, 0.0, 0.0), Path(room.name)),
+    )
+
+
+def table(by_frame: Mapping[str, Mapping[str, Regions]]) -> str:
+    """Losses by frame as a table in Markdown: PSNR, FLIP and DISTS of each part."""
+    parts = ("frame", "object", "shadow")
+    lines = [("frame", "loss", *(f"{part}: dB, FLIP, DISTS" for part in parts)), ("---",) * (2 + len(parts))]
+    for frame, by_loss in by_frame.items():
+        for loss, regions in by_loss.items():
+            lines.append((frame, loss, *(_shown(regions[part]) for part in parts)))
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _shown(difference: RegionDifference) -> str:
+    if difference.psnr is None or difference.flip is None:
+        return "none"
+    dists = "-" if difference.dists is None else f"{difference.dists:.3f}"
+    return f"{difference.psnr:.1f}, {difference.flip:.3f}, {dists}"
+
+
+def main(folders: list[str]) -> None:
+    """Print the losses of `OBJECTS` in rooms."""
+    from colonnade.attributes import AttributeLayout, encoded_room
+    from colonnade.clustered_room import plane_march
+    from colonnade.meshes import load_mesh
+    from colonnade.room import load_room
+    from colonnade.viewpoint import float_placement
+
+    by_frame = {}
+    for folder in folders:
+        room = load_room(Path(folder))
+        image = encoded_room(room, AttributeLayout(width=room.width, height=room.height))
+        march = plane_march(room, image)
+        for name, (mesh_name, material) in OBJECTS.items():
+            mesh = load_mesh(mesh_name)
+            scene = standing_scene(mesh_name, material, room, STANDING.get(room.name, Placing()))
+            view = float_placement(scene, mesh.extent, room.width, room.height, mesh.materials, room)
+            by_frame[f"{room.name}: {name}"] = losses(mesh, view, room, image, march).by_loss
+    print(table(by_frame))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,88 @@
+"""Where the object is: between mesh space, the world, and a room's view space."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.errors import UserError
+from colonnade.scene import Placing, Scene, Transform
+
+if TYPE_CHECKING:
+    from colonnade.meshes import Extent
+    from colonnade.room import Room
+
+Floats = npt.NDArray[np.float64]
+
+#: Without a word in the scene the object stands in the middle of the picture, this far down.
+_STANDS_DOWN = 0.7
+
+
+@dataclass(frozen=True)
+class Pose:
+    """World = rotation · scale · mesh + translate.
+
+    Attributes:
+        rotation: float64 [3, 3], for column vectors.
+        scale: World units a mesh unit.
+        translate: float64 [3].
+    """
+
+    rotation: Floats
+    scale: float
+    translate: Floats
+
+    def to_world(self, points: Floats) -> Floats:
+        """Points [..., 3] of the mesh, in the world."""
+        return np.asarray(points @ self.rotation.T * self.scale + self.translate, dtype=np.float64)
+
+    def to_mesh(self, point: Floats) -> Floats:
+        """Points [..., 3] of the world, in mesh space."""
+        return np.asarray((point - self.translate) / self.scale @ self.rotation, dtype=np.float64)
+
+    def from_view(self, camera_to_world: Floats) -> Floats:
+        """From a camera's view space to mesh space, float64 [3, 4]."""
+        turn = self.rotation.T @ camera_to_world[:, :3] / self.scale
+        return np.column_stack([turn, self.to_mesh(camera_to_world[:, 3])])
+
+
+def object_pose(scene: Scene, extent: Extent, room: Room | None) -> Pose:
+    """Where the scene puts its mesh: by its transform, or on what the room's camera sees at a pixel."""
+    placing = scene.placing
+    if placing is None and room is not None and scene.transform == Transform():
+        placing = Placing()
+    rotation = rotation_matrix(scene.transform)
+    if room is None or placing is None:
+        return Pose(rotation, scene.transform.scale, np.array(scene.transform.translate))
+    turned = rotation_matrix(Transform(rotate=(0.0, placing.turn, 0.0))) @ rotation
+    outline = extent.outline @ turned.T
+    foot = extent.centre @ turned.T
+    foot[1] = outline[:, 1].min()
+    scale = placing.size / extent.edge
+    return Pose(turned, scale, standing_point(placing, room) - foot * scale)
+
+
+def standing_point(placing: Placing, room: Room) -> Floats:
+    """What the room's camera sees where the object stands, world, float64 [3]."""
+    u, v = placing.stand_at or (room.width / 2, room.height * _STANDS_DOWN)
+    if u >= room.width or v >= room.height:
+        raise UserError(
+            f"object.stand_at is ({u:g}, {v:g}), outside the maps of room {room.name}: they are"
+            f" {room.width}x{room.height} pixels"
+        )
+    depth = room.depth[int(v), int(u)]
+    seen = np.array([(u - room.cx) / room.fx, (v - room.cy) / room.fy, 1.0]) * depth
+    return np.asarray(room.camera_to_world[:, :3] @ seen + room.camera_to_world[:, 3], dtype=np.float64)
+
+
+def rotation_matrix(transform: Transform) -> Floats:
+    """Rotation about x, then y, then z: float64 [3, 3] for column vectors."""
+    x, y, z = np.radians(transform.rotate)
+    about_x = [[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]]
+    about_y = [[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]]
+    about_z = [[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]]
+    return np.asarray(np.array(about_z) @ np.array(about_y) @ np.array(about_x), dtype=np.float64)

@@ -1,0 +1,93 @@
+// The words of the physical-attribute memory and how large its maps are, by the manifest (docs/attributes.md).
+#pragma once
+#include <string>
+#include <vector>
+
+#include "formats.hpp"
+
+namespace colonnade {
+
+/// w' = (a·(u − W/2) + b·(v − H/2))/1024 + c, every coefficient its field · 2^(e − 22).
+struct PlaneWord {
+    std::int64_t a, b, c;
+    int e;
+};
+
+/// The manifest's `attributes.sizes`.
+struct AttributeSizes {
+    int width, height, tileLog, tileColumns, tileRows, blockLog, blockColumns, blockRows, paletteSize, planes, shellPlanes;
+    /// Labels and seeds (`slic`), not descriptors, palette and heap (`twoLevel`).
+    bool sliding;
+
+    explicit AttributeSizes(const std::map<std::string, std::int64_t>& values) {
+        const auto take = [&](const char* key) { return static_cast<int>(lookUp(values, key)); };
+        width = take("width");
+        height = take("height");
+        tileLog = take("tileLog");
+        tileColumns = take("tileColumns");
+        tileRows = take("tileRows");
+        blockLog = take("blockLog");
+        blockColumns = take("blockColumns");
+        blockRows = take("blockRows");
+        paletteSize = take("paletteSize");
+        planes = take("planes");
+        shellPlanes = take("shellPlanes");
+        sliding = take("sliding") != 0;
+    }
+
+    bool covers(int x, int y) const { return x >= 0 && y >= 0 && x < width && y < height; }
+    int tileOf(int x, int y) const { return (y >> tileLog) * tileColumns + (x >> tileLog); }
+
+    /// The cell of a pixel in its tile, row-major, for cells of 2^cellLog pixels.
+    int cellOf(int x, int y, int cellLog) const {
+        const int inTile = (1 << tileLog) - 1;
+        return (((y & inTile) >> cellLog) << (tileLog - cellLog)) + ((x & inTile) >> cellLog);
+    }
+};
+
+/// 16-bit words that tiles point into. A legal image never reads beyond the end; here such a word is 0.
+class AttributeHeap {
+public:
+    void load(const std::uint8_t* words, std::size_t count, std::size_t stride) {
+        words_.resize(count);
+        for (std::size_t i = 0; i < count; ++i) words_[i] = static_cast<std::uint16_t>(words[i * stride] | words[i * stride + 1] << 8);
+    }
+    std::size_t size() const { return words_.size(); }
+    int word(int address) const { return static_cast<std::size_t>(address) < words_.size() ? words_[address] : 0; }
+    int low(int address) const { return word(address) & 255; }
+    int high(int address) const { return word(address) >> 8; }
+
+    /// Element `index` of a mask of `bits` (1, 2 or 4) bits each that begins at `address`.
+    int select(int address, int index, int bits) const {
+        const int bit = index * bits;
+        return (word(address + bit / 16) >> (bit % 16)) & ((1 << bits) - 1);
+    }
+
+private:
+    std::vector<std::uint16_t> words_;
+};
+
+/// Reads words of `stride` bytes, low byte first, by their layout.
+class AttributeWords {
+public:
+    AttributeWords(const Layout& layout, const std::uint8_t* words, std::size_t count, std::size_t stride)
+        : layout_(layout), words_(words), count_(count), stride_(stride) {}
+    std::size_t count() const { return count_; }
+    std::int64_t field(std::size_t index, const std::string& name) const { return layout_.at(name).read(words_ + index * stride_); }
+    std::array<int, 3> three(std::size_t index, const std::string& prefix, const char* axes) const {
+        std::array<int, 3> values;
+        for (int i = 0; i < 3; ++i) values[i] = static_cast<int>(field(index, prefix + axes[i]));
+        return values;
+    }
+    PlaneWord plane(std::size_t index, const std::string& prefix) const {
+        return {field(index, prefix + "a"), field(index, prefix + "b"), field(index, prefix + "c"),
+                static_cast<int>(field(index, prefix + "exponent"))};
+    }
+
+private:
+    const Layout& layout_;
+    const std::uint8_t* words_;
+    std::size_t count_, stride_;
+};
+
+} // namespace colonnade

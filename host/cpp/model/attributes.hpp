@@ -1,0 +1,196 @@
+// The physical-attribute memory's words, read pixel by pixel: what AttributeMap and PlaneMap answer (docs/attributes.md).
+#pragma once
+#include "attribute_words.hpp"
+
+namespace colonnade {
+
+/// Linear; 4095 is 1.0.
+struct Rgb12 {
+    int r, g, b;
+};
+
+/// In view space (x right, y down, z forward); 11 fraction bits.
+struct Normal12 {
+    int x, y, z;
+};
+
+/// Which planes the pixels of a tile lie in.
+struct TileInfo {
+    /// Log2 of a cell's edge in pixels; of the tile's where it is flat, so that it has one cell.
+    int cellLog2;
+    /// 1, 2 or 4; the other ids are 0.
+    int count;
+    std::array<int, 4> ids;
+};
+
+/// A plane beyond the view, with the one colour and normal it has.
+struct ShellEntry {
+    PlaneWord plane;
+    Rgb12 albedo;
+    Normal12 normal;
+};
+
+/// One map of three 12-bit components a pixel (albedo or normals), in either encoding.
+class ComponentMap {
+public:
+    using Components = std::array<int, 3>;
+
+    explicit ComponentMap(const AttributeSizes& sizes) : sizes_(sizes) {}
+
+    void loadDescriptors(const AttributeWords& words) {
+        descriptors_.clear();
+        for (std::size_t i = 0; i < words.count(); ++i)
+            descriptors_.push_back({static_cast<int>(words.field(i, "mode")), static_cast<int>(words.field(i, "pointer")),
+                                    {static_cast<int>(words.field(i, "entries[0]")), static_cast<int>(words.field(i, "entries[1]"))}});
+    }
+    void loadEntries(const AttributeWords& words, const char* axes) {
+        entries_.clear();
+        for (std::size_t i = 0; i < words.count(); ++i) entries_.push_back(words.three(i, "", axes));
+    }
+    AttributeHeap& heap() { return heap_; }
+    const AttributeHeap& heap() const { return heap_; }
+
+    Components at(int x, int y) const { return entries_.at(sizes_.sliding ? seedAt(x, y) : entryAt(x, y)); }
+
+    /// Index of a pixel's palette entry.
+    int entryAt(int x, int y) const {
+        const Descriptor& tile = descriptors_.at(sizes_.tileOf(x, y));
+        const int cell = sizes_.cellOf(x, y, sizes_.tileLog - 1 - (tile.mode & 3));
+        int entry;
+        if (tile.mode == 0) entry = tile.entries[(tile.pointer >> cell) & 1];
+        else if (tile.mode < 4) entry = tile.entries[heap_.select(tile.pointer, cell, 1)];
+        else {
+            const int choice = heap_.select(tile.pointer + 1, cell, 2);
+            entry = choice < 2 ? tile.entries[choice] : choice == 2 ? heap_.low(tile.pointer) : heap_.high(tile.pointer);
+        }
+        return entry & (sizes_.paletteSize - 1);
+    }
+
+    /// Index of a pixel's seed. A label that names no neighbour names the tile itself; a neighbour outside is the nearest inside.
+    int seedAt(int x, int y) const {
+        const int block = (y >> sizes_.blockLog) * sizes_.blockColumns + (x >> sizes_.blockLog);
+        const int label = heap_.select(0, block, 4), place = label > 8 ? 4 : label;
+        const int column = clamp((x >> sizes_.tileLog) + place % 3 - 1, 0, sizes_.tileColumns - 1);
+        const int row = clamp((y >> sizes_.tileLog) + place / 3 - 1, 0, sizes_.tileRows - 1);
+        return row * sizes_.tileColumns + column;
+    }
+
+private:
+    struct Descriptor {
+        int mode, pointer;
+        std::array<int, 2> entries;
+    };
+
+    AttributeSizes sizes_;
+    std::vector<Descriptor> descriptors_;
+    std::vector<Components> entries_;
+    AttributeHeap heap_; // of labels, where they slide
+};
+
+/// Which plane a pixel lies in.
+class PlaneIds {
+public:
+    explicit PlaneIds(const AttributeSizes& sizes) : sizes_(sizes) {}
+
+    void loadDescriptors(const AttributeWords& words) {
+        descriptors_.clear();
+        for (std::size_t i = 0; i < words.count(); ++i)
+            descriptors_.push_back({static_cast<int>(words.field(i, "mode")), static_cast<int>(words.field(i, "pointer"))});
+    }
+    AttributeHeap& heap() { return heap_; }
+    const AttributeHeap& heap() const { return heap_; }
+
+    TileInfo tileAt(int x, int y) const {
+        const Descriptor& tile = descriptors_.at(sizes_.tileOf(x, y));
+        const int count = tile.count(), known = sizes_.planes - 1;
+        if (count == 1) return {sizes_.tileLog, 1, {tile.pointer & known, 0, 0, 0}};
+        TileInfo info{cellLog(tile), count, {}};
+        for (int i = 0; i < count; ++i)
+            info.ids[i] = (i % 2 ? heap_.high(tile.pointer + i / 2) : heap_.low(tile.pointer + i / 2)) & known;
+        return info;
+    }
+
+    int idAt(int x, int y) const {
+        const TileInfo info = tileAt(x, y);
+        if (info.count == 1) return info.ids[0];
+        const Descriptor& tile = descriptors_[sizes_.tileOf(x, y)];
+        return info.ids[heap_.select(tile.pointer + info.count / 2, sizes_.cellOf(x, y, info.cellLog2), info.count / 2)];
+    }
+
+private:
+    struct Descriptor {
+        int mode, pointer;
+
+        /// Ids of a tile; one of an illegal mode.
+        int count() const { return mode == 0 || mode > 4 ? 1 : mode < 3 ? 2 : 4; }
+    };
+
+    int cellLog(const Descriptor& tile) const { return sizes_.tileLog - (tile.mode % 2 ? 2 : 3); }
+
+    AttributeSizes sizes_;
+    std::vector<Descriptor> descriptors_;
+    AttributeHeap heap_;
+};
+
+/// All maps of a room, as the device holds them. Pixels outside the map are an error of the caller.
+class AttributeImage {
+public:
+    /// @param layouts the manifest's `attributes.layouts`
+    AttributeImage(const AttributeSizes& sizes, const std::map<std::string, Layout>& layouts)
+        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes) {}
+
+    /// Fills a memory, by its name in the manifest, with words of `stride` bytes, low byte first.
+    void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
+        const auto by = [&](const char* layout) { return AttributeWords(layouts_.at(layout), words, count, stride); };
+        if (memory == "albedo.descriptors") albedo_.loadDescriptors(by("mapDescriptor"));
+        else if (memory == "normals.descriptors") normals_.loadDescriptors(by("mapDescriptor"));
+        else if (memory == "albedo.palette" || memory == "albedo.seeds") albedo_.loadEntries(by("albedo"), "rgb");
+        else if (memory == "normals.palette" || memory == "normals.seeds") normals_.loadEntries(by("normal"), "xyz");
+        else if (memory == "albedo.heap" || memory == "albedo.labels") albedo_.heap().load(words, count, stride);
+        else if (memory == "normals.heap" || memory == "normals.labels") normals_.heap().load(words, count, stride);
+        else if (memory == "planes.descriptors") ids_.loadDescriptors(by("planeDescriptor"));
+        else if (memory == "planes.heap") ids_.heap().load(words, count, stride);
+        else if (memory == "planes.planes") loadPlanes(by("plane"));
+        else if (memory == "planes.shell") loadShell(by("shellEntry"));
+        else throw std::invalid_argument("there is no attribute memory '" + memory + "'");
+    }
+
+    const AttributeSizes& sizes() const { return sizes_; }
+
+    Rgb12 albedoAt(int x, int y) const {
+        const auto [r, g, b] = albedo_.at(x, y);
+        return {r, g, b};
+    }
+    Normal12 normalAt(int x, int y) const {
+        const auto [nx, ny, nz] = normals_.at(x, y);
+        return {nx, ny, nz};
+    }
+    TileInfo tileAt(int x, int y) const { return ids_.tileAt(x, y); }
+    /// Id of the plane that a pixel's cell lies in.
+    int cellAt(int x, int y) const { return ids_.idAt(x, y); }
+    const PlaneWord& planeOf(int id) const { return planes_.at(id); }
+    const ShellEntry& shell(int index) const { return shell_.at(index); }
+
+private:
+    void loadPlanes(const AttributeWords& words) {
+        planes_.clear();
+        for (std::size_t i = 0; i < words.count(); ++i) planes_.push_back(words.plane(i, ""));
+    }
+    void loadShell(const AttributeWords& words) {
+        shell_.clear();
+        for (std::size_t i = 0; i < words.count(); ++i) {
+            const auto [r, g, b] = words.three(i, "albedo.", "rgb");
+            const auto [x, y, z] = words.three(i, "normal.", "xyz");
+            shell_.push_back({words.plane(i, "plane."), {r, g, b}, {x, y, z}});
+        }
+    }
+
+    AttributeSizes sizes_;
+    std::map<std::string, Layout> layouts_;
+    ComponentMap albedo_, normals_;
+    PlaneIds ids_;
+    std::vector<PlaneWord> planes_;
+    std::vector<ShellEntry> shell_;
+};
+
+} // namespace colonnade

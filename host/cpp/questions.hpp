@@ -1,0 +1,59 @@
+// A question of the RTL's specs, and its answer: integers in a line of text.
+#pragma once
+#include <algorithm>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+
+#include "model/traversal.hpp"
+
+namespace colonnade {
+
+class Question {
+public:
+    explicit Question(std::istream& words) : words_(words) {}
+    Wide wide() {
+        std::string word;
+        if (!(words_ >> word)) throw std::invalid_argument("a question is too short");
+        const bool isNegative = word[0] == '-';
+        UnsignedWide value = 0;
+        for (std::size_t i = isNegative; i < word.size(); ++i) value = value * 10 + static_cast<unsigned>(word[i] - '0');
+        return isNegative ? -static_cast<Wide>(value) : static_cast<Wide>(value);
+    }
+    std::int64_t number() { return static_cast<std::int64_t>(wide()); }
+    Vector vector() {
+        Vector v;
+        for (auto& component : v) component = number();
+        return v;
+    }
+    WideVector wideVector() {
+        WideVector v;
+        for (auto& component : v) component = wide();
+        return v;
+    }
+
+private:
+    std::istream& words_;
+};
+
+class Answer {
+public:
+    Answer& operator<<(Wide value) {
+        std::string digits;
+        for (UnsignedWide rest = magnitude(value); rest != 0 || digits.empty(); rest /= 10) digits += static_cast<char>('0' + static_cast<int>(rest % 10));
+        if (value < 0) digits += '-';
+        std::reverse(digits.begin(), digits.end());
+        text_ += text_.empty() ? digits : " " + digits;
+        return *this;
+    }
+    template <class Values> Answer& all(const Values& values) {
+        for (const auto value : values) *this << static_cast<Wide>(value);
+        return *this;
+    }
+    void print() const { std::cout << text_ << '\n'; }
+
+private:
+    std::string text_;
+};
+
+} // namespace colonnade

@@ -1,0 +1,81 @@
+// Questions about the room's maps, after lines that fill them; those have no answer and come in this order:
+//
+//   layout word name=offset,width,signed ...                (once for each of the manifest's `attributes.layouts`)
+//   sizes  name=value ...                                   (`attributes.sizes`)
+//   words  memory bytes hexadecimal ...                     (once for each memory: bytes of a word, and the words)
+//   albedo x y                                            -> r g b
+//   normal x y                                            -> x y z
+//   tile   x y                                            -> cellLog count ids[4]
+//   cell   x y                                            -> id
+//   plane  id                                             -> a b c exponent
+//   shell  index                                          -> a b c exponent albedo[3] normal[3]
+#pragma once
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "model/attributes.hpp"
+#include "questions.hpp"
+
+namespace colonnade {
+
+/// The maps that questions are about.
+class Room {
+public:
+    void begin(const std::map<std::string, std::int64_t>& sizes, const std::map<std::string, Layout>& layouts) {
+        image_.emplace(AttributeSizes(sizes), layouts);
+    }
+
+    void load(std::istream& words) {
+        std::string memory;
+        std::size_t stride, count = 0;
+        words >> memory >> stride;
+        std::vector<std::uint8_t> bytes;
+        for (std::string digits; words >> digits; ++count) {
+            digits.insert(0, 2 * stride - digits.size(), '0');
+            for (std::size_t end = 2 * stride; end > 0; end -= 2)
+                bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
+        }
+        image().load(memory, bytes.data(), count, stride);
+    }
+
+    bool knows(const std::string& kind) const {
+        return kind == "albedo" || kind == "normal" || kind == "tile" || kind == "cell" || kind == "plane" || kind == "shell";
+    }
+
+    Answer answer(const std::string& kind, Question& ask) {
+        const int first = static_cast<int>(ask.number());
+        Answer answer;
+        if (kind == "plane") return put(answer, image().planeOf(first));
+        if (kind == "shell") {
+            const ShellEntry& entry = image().shell(first);
+            put(answer, entry.plane) << entry.albedo.r << entry.albedo.g << entry.albedo.b;
+            return answer << entry.normal.x << entry.normal.y << entry.normal.z;
+        }
+        const int x = first, y = static_cast<int>(ask.number());
+        if (!image().sizes().covers(x, y)) throw std::invalid_argument("a pixel outside the map");
+        if (kind == "albedo") {
+            const Rgb12 albedo = image().albedoAt(x, y);
+            return answer << albedo.r << albedo.g << albedo.b;
+        }
+        if (kind == "normal") {
+            const Normal12 normal = image().normalAt(x, y);
+            return answer << normal.x << normal.y << normal.z;
+        }
+        if (kind == "cell") return answer << image().cellAt(x, y);
+        const TileInfo tile = image().tileAt(x, y);
+        return (answer << tile.cellLog2 << tile.count).all(tile.ids);
+    }
+
+private:
+    static Answer& put(Answer& answer, const PlaneWord& plane) { return answer << plane.a << plane.b << plane.c << plane.e; }
+
+    AttributeImage& image() {
+        if (!image_) throw std::invalid_argument("there is no room yet");
+        return *image_;
+    }
+
+    std::optional<AttributeImage> image_;
+};
+
+} // namespace colonnade

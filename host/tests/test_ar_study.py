@@ -1,0 +1,78 @@
+"""What an AR frame loses, part by part, and the shell around a clustered room."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from colonnade.ar_study import Losses, losses, standing_scene, table
+from colonnade.attic import attic
+from colonnade.attributes import AttributeImage, AttributeLayout, encode_room
+from colonnade.clustered_room import PlaneShell, plane_march, rebuilt_depth
+from colonnade.meshes import load_mesh
+from colonnade.metrics import HIGHEST_PSNR
+from colonnade.room import Room
+from colonnade.scene import Material, Placing
+from colonnade.viewpoint import float_placement
+
+
+@pytest.fixture(scope="module")
+def room() -> Room:
+    return attic(160, 120).room
+
+
+@pytest.fixture(scope="module")
+def image(room: Room) -> AttributeImage:
+    return encode_room(room, AttributeLayout(width=160, height=120, map_bytes=4096, plane_bytes=4096))
+
+
+@pytest.fixture(scope="module")
+def measured(room: Room, image: AttributeImage) -> Losses:
+    mesh, march = load_mesh("teapot:4"), plane_march(room, image)
+    scene = standing_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), room, Placing((79.5, 71.0), 0.4))
+    view = float_placement(scene, mesh.extent, 160, 120, mesh.materials, room)
+    first = losses(mesh, view, room, image, march, with_dists=False)
+    device = first.pictures["both"].image
+    return losses(mesh, view, room, image, march, device, with_dists=False)
+
+
+def test_the_shell_is_all_around_and_faces_inward(room: Room, image: AttributeImage) -> None:
+    shell = PlaneShell(room, image)
+    directions = np.random.default_rng(7).normal(size=(2000, 3))
+    origins = np.broadcast_to([0.0, 0.0, 1.0], directions.shape)
+    met = shell.meet(origins, directions)
+    away = np.einsum("ni,ni->n", met.position - origins, directions)
+    # Where no plane of the shell stands, above and beside, a ray may leave for ever.
+    assert met.outside.mean() < 0.4
+    assert (np.einsum("ni,ni->n", met.normals, directions)[~met.outside] < 0).all()
+    assert (away[~met.outside] > 0).all()
+    behind = shell.meet(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]]))
+    np.testing.assert_allclose(behind.position[0], [0, 0, -0.5], atol=0.01)
+    np.testing.assert_allclose(behind.normals[0], [0, 0, 1], atol=1e-3)
+
+
+def test_planes_stand_where_the_room_is(room: Room, image: AttributeImage) -> None:
+    away = np.abs(rebuilt_depth(room, image) - room.depth) / room.depth
+    assert np.median(away) < 0.01 and np.percentile(away, 90) < 0.05
+
+
+def test_each_loss_is_seen_where_it_is(measured: Losses) -> None:
+    loss = measured.by_loss
+    assert set(loss) == {"clustering", "rebuild", "both", "fixed point", "device"}
+    truth = measured.pictures["full"]
+    for picture in measured.pictures.values():
+        np.testing.assert_array_equal(picture.object_mask, truth.object_mask)
+        np.testing.assert_array_equal(picture.hit_triangles, truth.hit_triangles)
+    assert loss["fixed point"]["frame"].psnr == HIGHEST_PSNR
+    assert loss["device"] == loss["both"]
+    psnr = {name: loss[name]["frame"].psnr or 0 for name in loss}
+    assert psnr["rebuild"] > psnr["clustering"] >= psnr["both"] - 0.5
+    assert loss["rebuild"]["shadow"].pixels == np.count_nonzero(
+        ~truth.object_mask & (truth.shadow_ratio < 0.97).any(axis=2)
+    )
+    assert loss["rebuild"]["shadow"].pixels > 20
+
+
+def test_losses_read_as_a_table(measured: Losses) -> None:
+    lines = table({"attic: teapot": measured.by_loss}).splitlines()
+    assert len(lines) == 2 + 5 and all(line.count("|") == 6 for line in lines)

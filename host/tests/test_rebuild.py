@@ -1,0 +1,110 @@
+"""Measuring a rebuilt room: the rays, the figures, and the march through the full depth map."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from colonnade.attic import Attic, attic
+from colonnade.backdrop import Backdrop
+from colonnade.embree import RayTracer
+from colonnade.rebuild import HIDDEN, HIT, LEFT, LOST, DepthMarch, Rebuilt, RebuiltGeometry, from_march, positions
+from colonnade.rebuild_rays import RADIUS, cosine_rays, glass_rays, mirror_rays, standing_spheres
+from colonnade.rebuild_study import study, table
+
+
+@pytest.fixture(scope="module")
+def made() -> Attic:
+    return attic(160, 120)
+
+
+def test_spheres_stand_free_and_in_sight(made: Attic) -> None:
+    room, tracer = made.room, RayTracer(made.surface)
+    centres = standing_spheres(room)
+    assert len(centres) == 6
+    for centre in centres:
+        rays = mirror_rays(centre)
+        on_sphere = rays.origins @ room.camera_to_world[:, :3].T + room.camera_to_world[:, 3]
+        eye = np.broadcast_to(room.camera_to_world[:, 3], on_sphere.shape)
+        assert not tracer.occluded(eye, (on_sphere - eye) * 0.999).any()
+        np.testing.assert_allclose(np.linalg.norm(rays.origins - centre, axis=1), RADIUS, rtol=1e-2)
+    gaps = np.linalg.norm(centres[:, None] - centres, axis=2) + 9 * np.eye(6)
+    assert gaps.min() > 2 * RADIUS
+
+
+def test_rays_leave_their_sphere(made: Attic) -> None:
+    centre = standing_spheres(made.room)[0]
+    for rays in (mirror_rays(centre), glass_rays(centre), cosine_rays(centre, 500, np.random.default_rng(1))):
+        outward = np.einsum("ni,ni->n", rays.origins - centre, rays.directions)
+        assert (outward > 0).all()
+        np.testing.assert_allclose(np.linalg.norm(rays.directions, axis=1), 1)
+    straight = glass_rays(centre)
+    axis = centre / np.linalg.norm(centre)
+    middle = np.argmax(straight.directions @ axis)
+    np.testing.assert_allclose(straight.directions[middle], axis, atol=0.02)
+
+
+def test_the_march_meets_what_the_true_room_has_there(made: Attic) -> None:
+    room = made.room
+    march = DepthMarch(room)
+    rays = cosine_rays(standing_spheres(room)[0], 2000, np.random.default_rng(5))
+    met = march(rays.origins, rays.directions)
+    met = replace(met, z=np.where(met.kind == HIT, met.z, 1.0))
+    world, turn = room.camera_to_world, room.camera_to_world[:, :3]
+    origins, directions = rays.origins @ turn.T + world[:, 3], rays.directions @ turn.T
+    tracer = RayTracer(made.surface)
+    truth = tracer.surface_points(tracer.first_hits(origins, directions), origins, directions).position
+    hit = met.kind == HIT
+    away = np.linalg.norm(positions(room, met) @ turn.T + world[:, 3] - truth, axis=1)[hit]
+    assert 0.2 < hit.mean() < 0.95 and set(np.unique(met.kind)) <= {HIT, HIDDEN, LEFT, LOST}
+    assert (away < 0.1).mean() > 0.9
+
+
+def test_the_study_knows_a_good_rebuild_from_a_bad_one(made: Attic) -> None:
+    room = made.room
+    march = DepthMarch(room)
+
+    def shifted(origins: np.ndarray, directions: np.ndarray) -> Rebuilt:
+        met = march(origins, directions)
+        return replace(met, seen_u=met.seen_u + 12, z=met.z * 1.2)
+
+    def blind(origins: np.ndarray, directions: np.ndarray) -> Rebuilt:
+        nothing, count = np.zeros(len(origins)), np.full(len(origins), 3)
+        return Rebuilt(*[nothing] * 2, nothing + 1, *[nothing] * 2, np.full(len(origins), LEFT), count)
+
+    good = study(room, march, room.depth)
+    assert good.mirror.ok > 0.85 and good.cosine.ok > 0.85 and good.mirror.missed < 0.1
+    assert good.receiver_mean == 0 and good.receiver_p95 == 0
+    bad = study(room, shifted, room.depth + 0.1)
+    assert bad.mirror.ok < 0.2 and bad.mirror.missed == good.mirror.missed
+    assert bad.mirror_psnr < good.mirror_psnr - 1 and bad.mirror_flip > 2 * good.mirror_flip
+    assert bad.receiver_mean is not None and 0.1 <= bad.receiver_mean < 0.15
+    none = study(room, blind)
+    assert (none.mirror.ok, none.mirror.missed, none.mirror.invented) == (0, 1, 0)
+    assert none.mean_steps == 3 and none.receiver_mean is None
+    assert len(table({"good": good, "none": none}).splitlines()) == 4
+
+
+def test_a_march_that_returns_arrays_is_a_rebuild_and_a_geometry(made: Attic) -> None:
+    room = made.room
+    march = DepthMarch(room)
+    rays = mirror_rays(standing_spheres(room)[0])
+    rebuild = from_march(lambda origins, directions: vars(march(origins, directions)))
+    met, again = rebuild(rays.origins, rays.directions), march(rays.origins, rays.directions)
+    for name in ("u", "v", "z", "seen_u", "seen_v", "kind", "steps"):
+        np.testing.assert_array_equal(getattr(met, name), getattr(again, name))
+    points = Backdrop(room, RebuiltGeometry(room, rebuild), room.albedo, room.normals).meet(
+        rays.origins, rays.directions
+    )
+    np.testing.assert_array_equal(points.outside, (met.kind != HIT) & (met.kind != HIDDEN))
+
+
+def test_a_start_just_behind_the_surface_is_on_it(made: Attic) -> None:
+    room = made.room
+    row, column = 100, 80
+    point = room.points()[row, column]
+    inward = -room.normals[row, column] + [0.3, 0, 0]
+    met = DepthMarch(room)((point * 1.002)[None], inward[None])
+    assert met.kind[0] == HIT and np.hypot(met.u[0] - column - 0.5, met.v[0] - row - 0.5) < 2

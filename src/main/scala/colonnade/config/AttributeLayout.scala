@@ -1,0 +1,150 @@
+package colonnade.config
+
+/** Sizes of the physical-attribute memory's parts. Words are laid out in `formats.AttributeRecords`.
+  *
+  * A map has a descriptor for each tile; what the fixed parts leave of its bytes is its heap, which tiles point into.
+  */
+final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
+  import AttributeLayout._
+  import config._
+
+  /** Log2 of a tile's edge. */
+  val tileLog:     Int = log2(tileSize)
+  val tileColumns: Int = (width + tileSize - 1) / tileSize
+  val tileRows:    Int = (height + tileSize - 1) / tileSize
+  val tiles:       Int = tileColumns * tileRows
+
+  /** Log2 of the edge of a labelled block. */
+  val blockLog:     Int = tileLog - log2(cellsPerBlockRow)
+  val blockColumns: Int = (width + (1 << blockLog) - 1) >> blockLog
+  val blockRows:    Int = (height + (1 << blockLog) - 1) >> blockLog
+
+  /** Heap words of labels. */
+  val labelWords: Int = (blockColumns * blockRows * labelBits + heapWordBits - 1) / heapWordBits
+
+  val xBits:          Int     = bitsOf(width)
+  val yBits:          Int     = bitsOf(height)
+  val tileBits:       Int     = bitsOf(tiles)
+  val paletteBits:    Int     = bitsOf(paletteSize)
+  val planeIdBits:    Int     = bitsOf(planes)
+  val shellIndexBits: Int     = bitsOf(shellPlanes)
+  val tableIndexBits: Int     = planeIdBits.max(shellIndexBits)
+  val isSliding:      Boolean = encoding == MapEncoding.Sliding
+
+  /** Heap words of a two-level map; 0 of a sliding one, which has none. */
+  val mapHeapWords: Int = {
+    val descriptors = tiles * mapDescriptorBits / 8
+    if (isSliding) {
+      val (labels, seeds) = (labelWords * heapWordBits / 8, bytes(tiles * entryBits))
+      fits("mapBytes", mapBytes, labels + seeds, s"$tiles seeds take $seeds bytes and the labels of blocks $labels")
+      0
+    } else {
+      val palette = bytes(paletteSize * entryBits)
+      heapWords(
+        "mapBytes",
+        mapBytes,
+        descriptors + palette,
+        s"$tiles tile descriptors take $descriptors bytes and $paletteSize palette entries $palette",
+        largestTile = 1 + 2 * (1 << 8) / heapWordBits
+      )
+    }
+  }
+
+  val planeHeapWords: Int = {
+    val descriptors    = tiles * planeDescriptorBits / 8
+    val (table, shell) = (planes * planeBits / 8, shellPlanes * shellEntryBytes)
+    heapWords(
+      "planeBytes",
+      planeBytes,
+      descriptors + table + shell,
+      s"$tiles tile descriptors take $descriptors bytes, $planes planes $table and $shellPlanes shell planes $shell",
+      largestTile = 2 + 2 * (1 << 6) / heapWordBits
+    )
+  }
+
+  /** All values by their manifest key. */
+  def entries: Seq[(String, Int)] = Seq(
+    "width"          -> width,
+    "height"         -> height,
+    "sliding"        -> (if (isSliding) 1 else 0),
+    "tileLog"        -> tileLog,
+    "tileColumns"    -> tileColumns,
+    "tileRows"       -> tileRows,
+    "blockLog"       -> blockLog,
+    "blockColumns"   -> blockColumns,
+    "blockRows"      -> blockRows,
+    "labelWords"     -> labelWords,
+    "paletteSize"    -> paletteSize,
+    "mapHeapWords"   -> mapHeapWords,
+    "mapBytes"       -> mapBytes,
+    "planes"         -> planes,
+    "planeHeapWords" -> planeHeapWords,
+    "planeBytes"     -> planeBytes,
+    "shellPlanes"    -> shellPlanes
+  )
+
+  /** Words of what is left.
+    *
+    * @param largestTile words of the finest mode
+    */
+  private def heapWords(field: String, all: Int, fixed: Int, because: String, largestTile: Int): Int = {
+    def bytesOf(words: Int): Int = words * heapWordBits / 8
+    fits(field, all, fixed + bytesOf(largestTile), s"$because, the finest tile ${bytesOf(largestTile)}")
+    val most = fixed + bytesOf(1 << pointerBits)
+    if (all > most)
+      throw new ConfigError(
+        s"${name(field)} is $all; it must be at most $most: $because, and tiles reach ${bytesOf(1 << pointerBits)} more"
+      )
+    (all - fixed) / bytesOf(1)
+  }
+
+  private def fits(field: String, all: Int, needed: Int, because: String): Unit =
+    if (all < needed) throw new ConfigError(s"${name(field)} is $all; it must be at least $needed: $because")
+
+  private def name(field: String): String = s"${PhysicalAttributeMemoryConfig.section}.$field"
+}
+
+object AttributeLayout {
+
+  /** Of a configuration that has the memory. */
+  def of(config: ColonnadeConfig): AttributeLayout = config.physicalAttributeMemory match {
+    case Some(memory) => memory.layout
+    case None         => throw new ConfigError("physicalAttributeMemory is null; a unit of the background needs it")
+  }
+
+  val heapWordBits: Int = 16
+
+  /** Of a heap word; also holds the mask of a tile's coarsest mode, and a flat tile's plane id. */
+  val pointerBits: Int = 13
+  val modeBits:    Int = 3
+
+  /** An index into a palette, or into the plane table, as tiles and heap hold it. */
+  val indexBits: Int = 8
+
+  /** Components of a palette entry or a seed. */
+  val componentBits: Int = 12
+  val entryBits:     Int = 3 * componentBits
+
+  /** Of a block: which of the nine seeds around. */
+  val labelBits: Int = 4
+
+  val mapDescriptorBits:   Int = modeBits + pointerBits + 2 * indexBits
+  val planeDescriptorBits: Int = modeBits + pointerBits
+
+  /** A plane's coefficients share an exponent. */
+  val coefficientBits: Int = 20
+  val exponentBits:    Int = 4
+  val planeBits:       Int = 3 * coefficientBits + exponentBits
+
+  /** A shell entry counts whole heap words. */
+  val shellEntryBytes: Int = (planeBits + 2 * entryBits + heapWordBits - 1) / heapWordBits * (heapWordBits / 8)
+
+  private val cellsPerBlockRow = 4
+
+  private def bytes(bits: Int): Int = (bits + 7) / 8
+
+  private def log2(power: Int): Int = Integer.numberOfTrailingZeros(power)
+
+  /** Bits of an index of so many things; at least one. */
+  private def bitsOf(count: Int): Int = NumberFormats.bitLength(count - 1).max(1)
+}

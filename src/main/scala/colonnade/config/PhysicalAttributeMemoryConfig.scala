@@ -1,0 +1,60 @@
+package colonnade.config
+
+/** How a map of colours or normals is stored. */
+sealed abstract class MapEncoding(val name: String)
+
+object MapEncoding {
+
+  /** Tiles with a mode: two or four palette entries, chosen for cells of the size that the tile needs. */
+  case object TwoLevel extends MapEncoding("twoLevel")
+
+  /** SLIC superpixels, one seed a tile: a block of pixels names the one of nine neighbouring seeds that it belongs to. */
+  case object Sliding extends MapEncoding("slic")
+
+  val all: Seq[MapEncoding] = Seq(TwoLevel, Sliding)
+}
+
+/** The room's maps on chip: albedo, normals, and planes.
+  *
+  * @param width       of the maps, pixels
+  * @param height      of the maps, pixels
+  * @param encoding    of albedo and normals
+  * @param tileSize    edge of a tile, pixels
+  * @param paletteSize entries of a two-level map's palette
+  * @param mapBytes    of albedo, and of normals
+  * @param planes      entries of the plane table
+  * @param planeBytes  of the plane map, its table and its shell
+  * @param shellPlanes planes beyond the view
+  * @param shared      one memory for the device; or else a copy in every column
+  */
+final case class PhysicalAttributeMemoryConfig(
+    width:       Int,
+    height:      Int,
+    encoding:    MapEncoding,
+    tileSize:    Int,
+    paletteSize: Int,
+    mapBytes:    Int,
+    planes:      Int,
+    planeBytes:  Int,
+    shellPlanes: Int,
+    shared:      Boolean
+) {
+  import PhysicalAttributeMemoryConfig._
+
+  Require.within(s"$section.width", width, 64, 4096)
+  Require.within(s"$section.height", height, 64, 4096)
+  Require.oneOf(s"$section.tileSize", tileSize, Seq(16, 32))
+  Require.oneOf(s"$section.paletteSize", paletteSize, powers)
+  Require.oneOf(s"$section.planes", planes, powers)
+  Require.within(s"$section.shellPlanes", shellPlanes, 2, 16)
+
+  /** All sizes that follow. */
+  val layout: AttributeLayout = AttributeLayout(this)
+}
+
+object PhysicalAttributeMemoryConfig {
+  private[config] val section = "physicalAttributeMemory"
+
+  /** An index takes a byte at most. */
+  private val powers = Seq(16, 32, 64, 128, 256)
+}

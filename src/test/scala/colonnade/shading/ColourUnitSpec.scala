@@ -1,0 +1,140 @@
+package colonnade.shading
+
+import chisel3._
+import chiseltest._
+import colonnade.TestConfigs
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.Rgb
+import colonnade.numbers.Fixed
+import colonnade.numbers.FixedPorts._
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+/** A path's colour is that of its end, weighed by what it has passed, whatever other paths do meanwhile. */
+class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "ColourUnit"
+
+  private def config(lights: Int, maxBounces: Int): ColonnadeConfig =
+    TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(lights = lights, maxBounces = maxBounces))
+
+  for ((lights, maxBounces) <- Seq((1, 0), (2, 0), (1, 2), (3, 15)))
+    it should s"colour paths with $lights lights and $maxBounces bounces" in
+      test(new ColourUnit(config(lights, maxBounces))) { dut =>
+        new ColouredPaths(dut, config(lights, maxBounces), seed = lights).run(paths = 60)
+      }
+}
+
+/** Paths of all contexts at a time, in integers as docs/numbers.md has them, sections 5.9 and 6.7. */
+private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int) {
+  private val random   = new Random(seed)
+  private val contexts = config.array.contexts
+  private val one      = 4096
+  private val white    = 4095
+
+  private def three(value: => Int): Seq[Int] = Seq.fill(3)(value)
+
+  private def colour(): Seq[Int] = three(if (random.nextInt(4) == 0) random.nextInt(2) * white else random.nextInt(4096))
+
+  private def intensity(): Seq[Int] = three(if (random.nextInt(6) == 0) 65535 else random.nextInt(9000))
+
+  private val ambient    = intensity()
+  private val background = colour()
+  private val clearness  = random.nextInt(one + 1)
+
+  private var throughput = Seq.fill(contexts)(Seq.fill(3)(one))
+  private var gathered   = Seq.fill(contexts)(Seq.fill(3)(0))
+
+  def run(paths: Int): Unit = {
+    poke(dut.io.ambient, ambient)
+    pokeUInt(dut.io.background, background)
+    dut.io.shading.clearness.foreach(_.pokeRaw(clearness))
+    for (_ <- 0 until paths) {
+      // Some contexts pass mirrors and glass by turns, then all of them end, in any order
+      (0 until contexts).foreach(begin)
+      for (_ <- 0 until random.nextInt(8); turn <- dut.io.turn) pass(turn, random.nextInt(contexts))
+      random.shuffle((0 until contexts).toList).foreach(end)
+    }
+  }
+
+  private def begin(context: Int): Unit = {
+    dut.io.begins.valid.poke(true)
+    dut.io.begins.bits.poke(context)
+    dut.clock.step()
+    dut.io.begins.valid.poke(false)
+    throughput = throughput.updated(context, Seq.fill(3)(one))
+    gathered = gathered.updated(context, Seq.fill(3)(0))
+  }
+
+  private def pass(port: chisel3.util.DecoupledIO[PathTurn], context: Int): Unit = {
+    val (albedo, isTinted, share) = (colour(), random.nextBoolean(), random.nextInt(3) * random.nextInt(one / 2))
+    port.bits.context.poke(context)
+    pokeUInt(port.bits.albedo, albedo)
+    port.bits.isTinted.poke(isTinted)
+    port.bits.share.pokeRaw(share)
+    port.valid.poke(true)
+    while (!port.ready.peekBoolean()) dut.clock.step()
+    dut.clock.step()
+    port.valid.poke(false)
+
+    val tinted = throughput(context).zip(albedo).map { case (weight, tint) =>
+      if (isTinted) weight * (tint + (tint >> 11)) >> 12 else weight
+    }
+    val parts = tinted.map(_ * share >> 12)
+    gathered = gathered.updated(
+      context,
+      gathered(context).zip(parts.zip(background)).map { case (sure, (part, behind)) =>
+        white.min(sure + (part * behind >> 12))
+      }
+    )
+    throughput = throughput.updated(context, tinted.zip(parts).map { case (weight, part) => weight - part })
+  }
+
+  private def end(context: Int): Unit = {
+    val albedo       = colour()
+    val directs      = Seq.fill(config.frame.lights)(intensity())
+    val isBackground = random.nextInt(4) == 0
+    val met          = directs.map(_ => random.shuffle(if (config.frame.hasBounces) Occlusion.all.toList else List(Occlusion.none, Occlusion.opaque)).head)
+    dut.io.surface.valid.poke(true)
+    dut.io.surface.bits.context.poke(context)
+    pokeUInt(dut.io.surface.bits.albedo, albedo)
+    dut.io.surface.bits.directs.zip(directs).foreach { case (port, direct) => poke(port, direct) }
+    dut.clock.step()
+    dut.io.surface.valid.poke(false)
+
+    dut.io.end.bits.context.poke(context)
+    dut.io.end.bits.isBackground.poke(isBackground)
+    dut.io.end.bits.occlusions.zip(met).foreach { case (port, what) => port.poke(what) }
+    dut.io.end.valid.poke(true)
+    while (!dut.io.end.ready.peekBoolean()) dut.clock.step()
+    dut.clock.step()
+    dut.io.end.valid.poke(false)
+    var cycles = 1
+    while (!dut.io.colour.valid.peekBoolean()) {
+      dut.clock.step()
+      cycles += 1
+    }
+    assert(cycles == (if (isBackground) 8 else 2 + 6 * (config.frame.lights + 2)), "cycles from an end to its colour")
+
+    val incoming = (0 until 3).map { channel =>
+      ambient(channel) + directs.zip(met).map {
+        case (direct, Occlusion.none)  => direct(channel)
+        case (direct, Occlusion.clear) => (direct(channel).toLong * clearness >> 12).toInt
+        case _                         => 0
+      }.sum
+    }
+    val surface = albedo.zip(incoming).map { case (a, light) => (a.toLong * light >> 12).min(white).toInt }
+    val last    = if (isBackground) background else surface
+    val whole   = gathered(context).zip(throughput(context).zip(last)).map { case (sure, (weight, seen)) =>
+      white.min(sure + (weight * seen >> 12))
+    }
+    dut.io.colour.bits.context.expect(context)
+    assert(dut.io.colour.bits.colour.channels.map(_.peekInt().toInt) == whole)
+  }
+
+  private def poke(port: Rgb[Fixed], values: Seq[Int]): Unit =
+    port.channels.zip(values).foreach { case (channel, value) => channel.pokeRaw(value) }
+
+  private def pokeUInt(port: Rgb[UInt], values: Seq[Int]): Unit =
+    port.channels.zip(values).foreach { case (channel, value) => channel.poke(value) }
+}
