@@ -222,7 +222,7 @@ def test_refusals(room: Path, damage: Callable[[Path], None], message: str) -> N
 def test_a_colour_picture_is_no_depth(room: Path) -> None:
     (room / "depth.npy").unlink()
     Image.fromarray(np.random.default_rng(1).integers(0, 255, (48, 64, 3), dtype=np.uint8)).save(room / "depth.png")
-    with pytest.raises(UserError, match="colour picture"):
+    with pytest.raises(UserError, match="colours or transparency"):
         load_room(room)
 
 
