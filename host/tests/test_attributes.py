@@ -177,6 +177,10 @@ def test_a_budget_is_kept_and_spent_where_it_helps() -> None:
     assert list(within_budget(errors, sizes, 1)) == [1, 0, 0]
     assert list(within_budget(errors, sizes, 0)) == [0, 0, 0]
     assert list(within_budget(errors, sizes, 5)) == [1, 2, 0]
+    random = np.random.default_rng(8)
+    for budget in range(60):
+        choice = within_budget(-np.sort(-random.random((12, 4)), axis=1), np.array([0, 1, 4, 16]), budget)
+        assert np.array([0, 1, 4, 16])[choice].sum() <= budget
 
 
 @pytest.mark.parametrize(

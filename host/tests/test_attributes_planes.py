@@ -27,7 +27,7 @@ LEVEL = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 1.2], [0, 0, -1.0, 0]])
 
 
 def boxes(width: int = 160, height: int = 120, steps: bool = True) -> Room:
-    """A level camera 1.2 m above the floor of a box, 4 m deep, 3 m wide, 2.4 m high; a near board in the middle."""
+    """A level camera 1.2 m above the floor of a box, 4 m deep, 3 m wide, 2.4 m high; a slanted board before it."""
     camera = RoomCamera(120.0, 120.0, width / 2 + 3, height / 2 - 2, LEVEL)
     rays = camera.directions(width, height)
     normals = np.array([[0.0, 0, -1], [0, -1, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0]])
@@ -41,7 +41,8 @@ def boxes(width: int = 160, height: int = 120, steps: bool = True) -> Room:
     facing = normals[which]
     if steps:
         board = (np.abs(rays[..., 0]) < 0.2) & (np.abs(rays[..., 1]) < 0.15)
-        depth, facing = np.where(board, 1.0, depth), np.where(board[..., np.newaxis], [0.0, 0.0, -1.0], facing)
+        slanted = 0.8 / (0.6 * rays[..., 0] + 0.8)
+        depth, facing = np.where(board, slanted, depth), np.where(board[..., np.newaxis], [-0.6, 0.0, -0.8], facing)
         albedo = np.where(board[..., np.newaxis], [0.9, 0.1, 0.1], albedo)
     return Room("boxes", albedo, facing, depth, True, camera, None)
 
@@ -92,7 +93,7 @@ def slow_id(content: PlaneMap, u: int, v: int, layout: AttributeLayout) -> int:
     number, pointer = descriptor % 8, descriptor // 8
     if number == 0:
         return pointer
-    count, cells = ((2, 4), (2, 8), (4, 4), (4, 8))[number - 1]
+    count, cells = ((2, 4), (2, 8), (4, 4), (4, 8), (2, 16), (4, 16))[number - 1]
     heap = [int(word) for word in content.heap]
     ids = [heap[pointer] & 255, heap[pointer] >> 8]
     if count == 4:
@@ -111,18 +112,19 @@ def bumps(width: int, height: int) -> Room:
     return Room("bumps", room.albedo, room.normals, depth, True, room.camera, None)
 
 
-@pytest.mark.parametrize("plane_bytes", [3000, 8192])
-def test_random_access_follows_the_words(plane_bytes: int) -> None:
-    layout = AttributeLayout(150, 110, plane_bytes=plane_bytes)
+@pytest.mark.parametrize(("plane_bytes", "cells"), [(3000, 8), (8192, 8), (3000, 16), (8192, 16)])
+def test_random_access_follows_the_words(plane_bytes: int, cells: int) -> None:
+    layout = AttributeLayout(150, 110, plane_bytes=plane_bytes, plane_cells=cells)
     content = encode_planes(bumps(150, 110), layout)
     v, u = np.mgrid[:110, :150]
     ids = content.ids_at(u, v, layout)
     assert np.array_equal(ids.ravel(), [slow_id(content, x, y, layout) for y in range(110) for x in range(150)])
     sizes = np.array([mode.words for mode in PLANE_MODES])
-    assert list(sizes) == [0, 2, 5, 4, 10]
+    assert list(sizes) == [0, 2, 5, 4, 10, 17, 34]
     assert sizes[content.descriptors & 7].sum() <= layout.plane_heap_words
     assert int(content.planes[layout.nothing]) == 0
-    assert (content.descriptors & 7).max() > 2
+    assert (content.descriptors & 7).max() > (2 if cells == 8 else 4)
+    assert (content.descriptors & 7).max() < (5 if cells == 8 else 7)
 
 
 def shell_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -212,6 +214,15 @@ def test_a_room_is_encoded_once(encoding: str, tmp_path: Path, monkeypatch: pyte
     (kept,) = tmp_path.glob("*.npz")
     kept.write_bytes(b"broken")
     assert all_words(encoded_room(room, layout, tmp_path)) == all_words(first)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1, 1), (5, 3), (16, 16), (33, 2)])
+def test_tiny_rooms(width: int, height: int) -> None:
+    room = boxes(width, height, steps=False)
+    image = encode_room(room, AttributeLayout(width, height))
+    depth = image.decoded_depth(Picture.of(room, image.depth_unit))
+    assert np.abs(depth / room.depth - 1).max() < 0.02
+    assert np.abs(image.decoded_albedo() - room.albedo).max() < 0.01
 
 
 def test_a_room_of_another_size() -> None:

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from numpy.typing import NDArray
 from PIL import Image
 
+from colonnade.cli import cli
 from colonnade.errors import UserError
 from colonnade.room import load_room
 from colonnade.srgb import curved
@@ -65,7 +67,9 @@ def test_the_rooms_that_come_along(name: str, ceiling: float) -> None:
     room = load_room(ROOMS / name)
     assert (room.width, room.height, room.has_depth, room.notes) == (640, 480, True, ())
     assert room.photo is not None and room.photo.shape == (480, 640, 3)
-    # The pose, the depth and the sign of each axis: floor and ceiling lie level in the world
+    # The pose, the depth and the sign of each axis: right is right, floor and ceiling lie level in the world
+    assert np.linalg.det(room.camera_to_world[:, :3]) > 0.999
+    assert room.camera_to_world[0, 0] > 0.98
     world = room.points() @ room.camera_to_world[:, :3].T + room.camera_to_world[:, 3]
     assert abs(world[..., 1].min()) < 0.002
     assert abs(world[..., 1].max() - ceiling) < 0.002
@@ -218,8 +222,24 @@ def test_refusals(room: Path, damage: Callable[[Path], None], message: str) -> N
 def test_a_colour_picture_is_no_depth(room: Path) -> None:
     (room / "depth.npy").unlink()
     Image.fromarray(np.random.default_rng(1).integers(0, 255, (48, 64, 3), dtype=np.uint8)).save(room / "depth.png")
-    with pytest.raises(UserError, match="colour picture"):
+    with pytest.raises(UserError, match="colours or transparency"):
         load_room(room)
+
+
+def test_inspect_shows_what_clustering_costs(room: Path, tmp_path: Path) -> None:
+    output, report = tmp_path / "maps", tmp_path / "report.json"
+    arguments = ["inspect", "--background", str(room), "--output", str(output), "--no-dists", "--json", str(report)]
+    result = CliRunner().invoke(cli, arguments)
+    assert result.exit_code == 0, result.output
+    assert "16,384 bytes" in result.output
+    figures = json.loads(report.read_text())
+    assert figures["bytes"] == {"albedo": 16384, "normals": 16384, "planes": 8192}
+    assert figures["albedo"]["dists"] is None
+    assert figures["planes"]["median_cm"] < 0.1
+    kinds = ("before", "after", "difference")
+    names = {f"{name}-{kind}.png" for name in ("albedo", "normals", "depth", "relit") for kind in kinds}
+    assert {file.name for file in output.iterdir()} == names | {"planes.png"}
+    assert Image.open(output / "depth-after.png").size == SIZE
 
 
 def test_no_folder(tmp_path: Path) -> None:

@@ -47,6 +47,7 @@ class AttributeLayout:
         map_bytes: For the albedo map, and as many for the normals.
         planes: Plane table, 2 to 128; its last one is nothing, infinitely far away.
         plane_bytes: For planes, their map and the shell.
+        plane_cells: Most cells on a tile's edge in the plane map, 8 or 16.
         shell_planes: Planes around the room, for rays that leave the view.
     """
 
@@ -59,6 +60,7 @@ class AttributeLayout:
     map_bytes: int = 16384
     planes: int = 128
     plane_bytes: int = 8192
+    plane_cells: int = 8
     shell_planes: int = 8
 
     def __post_init__(self) -> None:
@@ -75,6 +77,10 @@ class AttributeLayout:
         within("shell_planes", 1, 16)
         if self.tile_size not in (8, 16, 32):
             raise UserError(f"background layout: tile_size is {self.tile_size}, it must be 8, 16 or 32")
+        if self.plane_cells not in (8, 16) or self.plane_cells > self.tile_size:
+            raise UserError(
+                f"background layout: plane_cells is {self.plane_cells}, it must be 8, or 16 in larger tiles"
+            )
         if self.encoding not in ("twoLevel", "slic"):
             raise UserError(f"background layout: encoding is {self.encoding!r}, it must be twoLevel or slic")
         if self.encoding == "twoLevel":

@@ -107,8 +107,8 @@ def refitted(samples: Samples, planes: NDArray[np.float64], owner: NDArray[np.in
 
 def _candidates(room: Room, picture: Picture) -> NDArray[np.float64]:
     """Local planes, float64 [n, 3]."""
-    y = np.arange(_CANDIDATE_STEP // 2, room.height, _CANDIDATE_STEP)
-    x = np.arange(_CANDIDATE_STEP // 2, room.width, _CANDIDATE_STEP)
+    y = np.arange(min(_CANDIDATE_STEP, room.height) // 2, room.height, _CANDIDATE_STEP)
+    x = np.arange(min(_CANDIDATE_STEP, room.width) // 2, room.width, _CANDIDATE_STEP)
     rows, columns = (grid.ravel() for grid in np.meshgrid(y, x, indexing="ij"))
     points = room.camera.directions(room.width, room.height)[rows, columns] * room.depth[rows, columns, np.newaxis]
     normals = room.normals[rows, columns]

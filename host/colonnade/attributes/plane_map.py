@@ -9,8 +9,10 @@ A descriptor, low bit first: mode (3), plane id or pointer (13).
 | 2 | 2 | 8x8 | ids, 4 of mask |
 | 3 | 4 | 4x4 | 2 of ids, 2 of mask |
 | 4 | 4 | 8x8 | 2 of ids, 8 of mask |
+| 5 | 2 | 16x16 | ids, 16 of mask |
+| 6 | 4 | 16x16 | 2 of ids, 32 of mask |
 
-Cells are numbered, and masks filled, as in the two-level map.
+Cells are numbered, and masks filled, as in the two-level map. Modes 5 and 6 occur where `plane_cells` is 16.
 """
 
 from __future__ import annotations
@@ -53,7 +55,15 @@ class PlaneMode:
 
 
 #: By number.
-PLANE_MODES = (PlaneMode(1, 1), PlaneMode(2, 4), PlaneMode(2, 8), PlaneMode(4, 4), PlaneMode(4, 8))
+PLANE_MODES = (
+    PlaneMode(1, 1),
+    PlaneMode(2, 4),
+    PlaneMode(2, 8),
+    PlaneMode(4, 4),
+    PlaneMode(4, 8),
+    PlaneMode(2, 16),
+    PlaneMode(4, 16),
+)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,13 @@ from colonnade.commands.options import FILE, finish, json_option, require_output
     help="How the room's maps are clustered.",
 )
 @click.option(
+    "--plane-cells",
+    type=click.Choice(["8", "16"]),
+    default="8",
+    show_default=True,
+    help="Most cells on a tile's edge in the plane map.",
+)
+@click.option(
     "--output", type=FILE, metavar="FOLDER", help="Write the room's maps as pictures: before, after, difference."
 )
 @click.option("--no-dists", is_flag=True, help="Leave out DISTS, whose weights (64 MB) are fetched at its first use.")
@@ -32,6 +39,7 @@ def inspect(
     overrides: tuple[str, ...],
     background: Path | None,
     encoding: str,
+    plane_cells: str,
     output: Path | None,
     no_dists: bool,
     json_file: Path | None,
@@ -51,7 +59,7 @@ def inspect(
         raise click.UsageError("--output is for the maps of --background", context)
     require_outputs(json_file)
     if background is not None:
-        _inspect_room(background, encoding, output, not no_dists, json_file)
+        _inspect_room(background, encoding, int(plane_cells), output, not no_dists, json_file)
     elif directory is not None:
         _inspect_image(directory, config, overrides, json_file)
 
@@ -69,7 +77,7 @@ def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ..
 
 
 def _inspect_room(
-    background: Path, encoding: str, output: Path | None, with_dists: bool, json_file: Path | None
+    background: Path, encoding: str, plane_cells: int, output: Path | None, with_dists: bool, json_file: Path | None
 ) -> None:
     from colonnade.attributes import AttributeLayout, encoded_room
     from colonnade.attributes.measure import measure, report_lines
@@ -79,7 +87,7 @@ def _inspect_room(
     room = load_room(background)
     for note in room.notes:
         click.echo(f"colonnade: note: {room.name}: {note}", err=True)
-    image = encoded_room(room, AttributeLayout(room.width, room.height, encoding))
+    image = encoded_room(room, AttributeLayout(room.width, room.height, encoding, plane_cells=plane_cells))
     report = measure(room, image, with_dists)
     for line in report_lines(report):
         click.echo(line)

@@ -50,8 +50,8 @@ def read_colour(file: Path) -> NDArray[np.float64]:
 def read_grey(file: Path) -> NDArray[np.float64]:
     """A grey picture's samples as the whole numbers they are: float64 [height, width]."""
     samples = _samples(file)
-    if samples.shape[2] != 1 and (samples != samples[..., :1]).any():
-        raise UserError(f"{file} is a colour picture: depth must be grey, of 16 bits, or a .npy file")
+    if samples.shape[2] != 1:
+        raise UserError(f"{file} has colours or transparency: depth must be plain grey, of 16 bits, or a .npy file")
     return samples[..., 0].astype(np.float64)
 
 
