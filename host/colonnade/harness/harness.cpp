@@ -100,14 +100,17 @@ public:
     }
     ~Harness() { top_.final(); }
 
-    void load(const std::string& file, std::size_t bytes) {
+    /// Words for a memory other than that of the columns (target 0) may be narrower than the port.
+    void load(const std::string& file, std::size_t bytes, std::uint64_t target) {
         std::ifstream stream(file, std::ios::binary);
         std::vector<char> record(bytes);
         for (std::uint64_t address = 0; stream.read(record.data(), static_cast<std::streamsize>(bytes)); ++address) {
-            if (bytes != sizeof top_.io_load_bits_record) throw std::runtime_error("records of another width than the load port's");
+            const std::size_t port = sizeof top_.io_load_bits_record;
+            if (target == 0 ? bytes != port : bytes > port) throw std::runtime_error("records of another width than the load port's");
             top_.io_load_valid = 1;
-            top_.io_load_bits_target = 0;
+            top_.io_load_bits_target = static_cast<std::uint8_t>(target);
             top_.io_load_bits_address = static_cast<std::uint32_t>(address);
+            std::memset(&top_.io_load_bits_record, 0, port);
             std::memcpy(&top_.io_load_bits_record, record.data(), bytes);
             for (int wait = 0; !ready(top_.io_load_ready); ++wait) {
                 if (wait > 1000) throw std::runtime_error("the load port takes no records");
@@ -240,7 +243,7 @@ void run(const std::string& job, const Options& options) {
         std::string command, name;
         std::uint64_t a = 0, b = 0, c = 0;
         words >> command;
-        if (command == "load" && words >> name >> a) harness.load(name, a);
+        if (command == "load" && words >> name >> a) harness.load(name, a, words >> b ? b : 0);
         else if (command == "write" && words >> a >> b) harness.write(a, static_cast<std::uint32_t>(b));
         else if (command == "frame" && words >> name >> a >> b >> c) harness.frame(name, a, b, c);
         else if (command == "read" && words >> name >> a >> b) std::cout << "value " << name << ' ' << decimal(harness.read(a, static_cast<unsigned>(b))) << '\n';
