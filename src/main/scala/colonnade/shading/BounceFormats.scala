@@ -39,10 +39,17 @@ final class BounceFormats(numbers: NumberFormats) {
   /** How many times a squared length is quartered, at most, to fit the square root. */
   val quarters: Int = ((lengthBits - numbers.radicandBits + 1) / 2).max(0)
 
-  /** Operands of the multiplier, signed. */
-  val narrowBits:  Int = (shadeBits + 2).max(etaSquareBits + 1)
-  val wideBits:    Int = (numbers.gridBits - 1).max(acrossBits).max(numbers.rootBits + 1)
-  val productBits: Int = wideBits + narrowBits
+  /** Factors, signed: one at once, the other one digit by digit, most significant first. Most need two digits, long ones
+    * (a squared length, an offset) more.
+    */
+  val wideBits:   Int = acrossBits.max(etaSquareBits + 1)
+  val digitBits:  Int = 11
+  val digits:     Int = 2
+  val longBits:   Int = (numbers.gridBits - 1).max(numbers.rootBits + 1).max(digits * digitBits)
+  val longDigits: Int = (longBits + digitBits - 1) / digitBits
+  require((shadeBits + 2).max(etaSquareBits + 1) <= digits * digitBits, "a factor has more than two digits")
+
+  val productBits: Int = wideBits + longBits
 
   /** Signed: a dot product and a bit to tell its length by; what is left of a squared length after an index's square;
     * an offset's product.

@@ -4,79 +4,16 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.NumberFormats
 
-/** What the bounce datapath does in one cycle. Registers that nothing here names keep their values. */
-final class BounceControl extends Bundle {
-  val load = Bool()
-
-  /** Take the geometric normal; then double it while its largest component is too short. */
-  val startOver = Bool()
-  val normalise = Bool()
-
-  // Factors of a product: at most one of these
-  val squareNormal = Bool()
-  val project      = Bool()
-  val squareRay    = Bool()
-  val parallel     = Bool()
-  val acrossTwice  = Bool()
-  val across       = Bool()
-  val whole        = Bool()
-  val upright      = Bool()
-  val squareEta    = Bool()
-  val bend         = Bool()
-  val etaAlong     = Bool()
-  val etaSquare    = Bool()
-  val side         = Bool()
-  val offset       = Bool()
-  val lengths      = Bool()
-  val power        = Bool()
-  val powerSquare  = Bool()
-  val powerRest    = Bool()
-
-  // The adder: at most one of these
-  val accumulate     = Bool()
-  val takeProduct    = Bool()
-  val lengthen       = Vec(3, Bool())
-  val lengthenAgain  = Vec(3, Bool())
-  val lessUpright    = Bool()
-  val lessBent       = Bool()
-  val takeRoot       = Bool()
-  val pushOrigin     = Bool()
-  val away           = Bool()
-  val addReflectance = Bool()
-
-  /** Accumulate from the first product on; subtract what is accumulated. */
-  val first    = Bool()
-  val subtract = Bool()
-
-  // Registers that take the sum or the product
-  val keepSquare     = Bool()
-  val keepAlong      = Bool()
-  val keepRay        = Bool()
-  val keepWhole      = Bool()
-  val keepSquareEta  = Bool()
-  val keepParallel   = Bool()
-  val keepAcross     = Bool()
-  val pushReflection = Bool()
-  val pushRefraction = Bool()
-
-  // Root and quotient; the program waits for them
-  val root         = Bool()
-  val cosineRoot   = Bool()
-  val divide       = Bool()
-  val takeQuotient = Bool()
-  val lower        = Bool()
-}
-
-/** The bounces' microprogram: which step does what, one step a cycle.
+/** The bounces' microprogram: which step does what. A step takes one cycle, or one a digit if it multiplies.
   *
   * {{{
   * measure | n·n | −n·d | d·d                              | n may turn away: start over
   * reflect | |n|²·d + 2(n·d)·n                             | a mirror goes on at `side`
-  * glass   | |n|²|d|², (n·d)², η² | rest | root | η|n|², η(n·d) − root    | total reflection goes on at `side`
-  * refract | η|n|²·d + (…)·n
+  * glass   | |n|²|d|², (n·d)², η² | root, η(n·d), η|n|²   | total reflection goes on at `side`
+  * refract | η|n|²·d + (η(n·d) − root)·n                   |
   * side    | direction · facing                            | the wrong side: start over; a reflection ends
   * offset  | origin − 2 · offset · facing                  | on the back side a refraction ends
-  * share   | n·n | −n·d | |n|²|d|² | root | quotient | 1 − cosine | ⁵ |
+  * share   | n·n | −n·d | |n|²|d|² | cosine | (1 − cosine)⁵ |
   * }}}
   * To start over is to take the geometric normal, which the first steps normalise. Products of step s reach the sum in
   * s + 1; the sum is there to use in s + 2.
@@ -134,6 +71,7 @@ final class BounceProgram {
 
   private val refract        = directions(keepAcross + 1)
   private val pushRefraction = refract.map(_._2 + toSum)
+  private val products       = reflect ++ refract
 
   val side: Int = pushRefraction.last + 1
   private val sideProducts = three(side)
@@ -170,67 +108,72 @@ final class BounceProgram {
   val last:     Int = powers.last + toSum
   val stepBits: Int = log2Ceil(last + 1)
 
-  /** Decodes a step. */
-  def control(step: UInt): BounceControl = {
-    def in(steps: Seq[Int]): Bool = steps.map(step === _.U).reduce(_ || _)
-    def at(steps: Int*): Bool     = in(steps)
+  private def in(step: UInt)(steps: Seq[Int]): Bool = steps.map(step === _.U).reduce(_ || _)
 
-    val products = reflect ++ refract
-    val sums     =
+  /** Decodes a step. */
+  def factors(step: UInt): BounceFactors = {
+    def at(steps: Int*): Bool = in(step)(steps)
+
+    val factors = Wire(new BounceFactors)
+    factors.squareNormal := in(step)(squareNormal ++ squareAgain)
+    factors.project      := in(step)(project ++ projectAgain)
+    factors.squareRay    := in(step)(squareRay)
+    factors.parallel     := in(step)(products.map(_._1))
+    factors.acrossTwice  := in(step)(reflect.map(_._2))
+    factors.across       := in(step)(refract.map(_._2))
+    factors.whole        := at(whole)
+    factors.upright      := at(upright)
+    factors.squareEta    := at(squareEta)
+    factors.bend         := at(bend)
+    factors.etaAlong     := at(etaAlong)
+    factors.etaSquare    := at(etaSquare)
+    factors.side         := in(step)(sideProducts)
+    factors.offset       := in(step)(offset)
+    factors.lengths      := at(lengths)
+    factors.power        := at(powers(0), powers(2))
+    factors.powerSquare  := at(powers(1))
+    factors.powerRest    := at(powers(3))
+    factors
+  }
+
+  /** Decodes a step. */
+  def work(step: UInt): BounceWork = {
+    def at(steps: Int*): Bool = in(step)(steps)
+
+    val sums =
       Seq(squareNormal, project, squareRay, Seq(whole), Seq(upright), sideProducts, squareAgain, projectAgain) ++
         products.map { case (parallel, across) => Seq(parallel, across) } ++ offset.map(Seq(_))
-    val control = Wire(new BounceControl)
-    control.load      := false.B
-    control.startOver := false.B
-    control.normalise := in(normalise)
+    val work = Wire(new BounceWork)
+    work.normalise := in(step)(normalise)
 
-    control.squareNormal := in(squareNormal ++ squareAgain)
-    control.project      := in(project ++ projectAgain)
-    control.squareRay    := in(squareRay)
-    control.parallel     := in(products.map(_._1))
-    control.acrossTwice  := in(reflect.map(_._2))
-    control.across       := in(refract.map(_._2))
-    control.whole        := at(whole)
-    control.upright      := at(upright)
-    control.squareEta    := at(squareEta)
-    control.bend         := at(bend)
-    control.etaAlong     := at(etaAlong)
-    control.etaSquare    := at(etaSquare)
-    control.side         := in(sideProducts)
-    control.offset       := in(offset)
-    control.lengths      := at(lengths)
-    control.power        := at(powers(0), powers(2))
-    control.powerSquare  := at(powers(1))
-    control.powerRest    := at(powers(3))
+    work.accumulate     := in(step)(sums.flatten.map(_ + 1))
+    work.first          := in(step)(sums.map(_.head + 1))
+    work.subtract       := in(step)((project ++ projectAgain ++ offset).map(_ + 1))
+    work.takeProduct    := in(step)(takeProduct)
+    work.lengthen       := VecInit(lengthen.map(at(_)))
+    work.lengthenAgain  := VecInit(lengthenAgain.map(at(_)))
+    work.lessUpright    := at(lessUpright)
+    work.lessBent       := at(lessBent)
+    work.takeRoot       := at(takeRoot)
+    work.pushOrigin     := in(step)(pushOrigin)
+    work.away           := at(away)
+    work.addReflectance := at(powers.last + 1)
 
-    control.accumulate     := in(sums.flatten.map(_ + 1))
-    control.first          := in(sums.map(_.head + 1))
-    control.subtract       := in((project ++ projectAgain ++ offset).map(_ + 1))
-    control.takeProduct    := in(takeProduct)
-    control.lengthen       := VecInit(lengthen.map(at(_)))
-    control.lengthenAgain  := VecInit(lengthenAgain.map(at(_)))
-    control.lessUpright    := at(lessUpright)
-    control.lessBent       := at(lessBent)
-    control.takeRoot       := at(takeRoot)
-    control.pushOrigin     := in(pushOrigin)
-    control.away           := at(away)
-    control.addReflectance := at(powers.last + 1)
+    work.keepSquare     := at(keepSquare, keepSquareAgain)
+    work.keepAlong      := at(keepAlong)
+    work.keepRay        := at(keepRay)
+    work.keepWhole      := at(keepWhole)
+    work.keepSquareEta  := at(keepSquareEta)
+    work.keepParallel   := at(keepParallel)
+    work.keepAcross     := at(keepAcross)
+    work.pushReflection := in(step)(pushReflection)
+    work.pushRefraction := in(step)(pushRefraction)
 
-    control.keepSquare     := at(keepSquare, keepSquareAgain)
-    control.keepAlong      := at(keepAlong)
-    control.keepRay        := at(keepRay)
-    control.keepWhole      := at(keepWhole)
-    control.keepSquareEta  := at(keepSquareEta)
-    control.keepParallel   := at(keepParallel)
-    control.keepAcross     := at(keepAcross)
-    control.pushReflection := in(pushReflection)
-    control.pushRefraction := in(pushRefraction)
-
-    control.root         := at(root)
-    control.cosineRoot   := at(cosineRoot)
-    control.divide       := at(divide)
-    control.takeQuotient := at(takeQuotient)
-    control.lower        := at(lower)
-    control
+    work.root         := at(root)
+    work.cosineRoot   := at(cosineRoot)
+    work.divide       := at(divide)
+    work.takeQuotient := at(takeQuotient)
+    work.lower        := at(lower)
+    work
   }
 }

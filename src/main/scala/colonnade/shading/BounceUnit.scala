@@ -17,10 +17,12 @@ final class BounceUnitIO(config: ColonnadeConfig) extends Bundle {
 
 /** Reflection at mirrors, refraction and Schlick's share at glass: docs/bounce.md.
   *
-  * One bounce at a time, in a program of one step a cycle. The shading normal is the smooth one, unless that turns away
-  * from the ray or would send it to the wrong side of the surface: then the program starts over with the geometric one.
+  * One bounce at a time, in a program of one product in two cycles or more. The shading normal is the smooth one, unless
+  * that turns away from the ray or would send it to the wrong side of the surface: then the program starts over with the
+  * geometric one.
   */
 final class BounceUnit(config: ColonnadeConfig) extends Module {
+  private val formats = new BounceFormats(config.numbers)
   private val program = new BounceProgram
 
   val io = IO(new BounceUnitIO(config))
@@ -37,6 +39,19 @@ final class BounceUnit(config: ColonnadeConfig) extends Module {
   /** There is a share. */
   private val isShared = Reg(Bool())
 
+  private val nextStep = Wire(chiselTypeOf(step))
+  private val work     = program.work(step)
+  private val control  = Wire(new BounceControl(formats))
+
+  /** Of the step; decoded a step ahead, since they are where the slowest path begins. */
+  private val factors = RegInit(0.U.asTypeOf(new BounceFactors))
+
+  /** Digits that this step has still to multiply after its first cycle. */
+  private val digitsLeft = RegInit(0.U(control.digit.getWidth.W))
+  private val isFirst    = digitsLeft === 0.U
+  private val firstDigit = Mux(factors.isLong, (formats.longDigits - 1).U, (formats.digits - 1).U)
+  private val digit      = Mux(isFirst, firstDigit, digitsLeft - 1.U)
+
   private def at(other: Int): Bool = step === other.U
 
   // Of the sum
@@ -46,27 +61,33 @@ final class BounceUnit(config: ColonnadeConfig) extends Module {
   private val startOver   =
     isBusy && isSmooth && ((at(program.checkFacing) && !isPositive) || (at(program.checkSide) && isWrongSide))
 
+  nextStep   := step
+  digitsLeft := 0.U
   when(io.request.fire) {
     isBusy       := true.B
-    step         := program.measure.U
+    nextStep     := program.measure.U
     isGlass      := io.request.bits.isGlass
     isSmooth     := io.request.bits.isSmooth
     backSide     := io.request.bits.backSide
     isRefraction := false.B
     isShared     := false.B
   }.elsewhen(startOver) {
-    step         := 0.U
+    nextStep     := 0.U
     isSmooth     := false.B
     isRefraction := false.B
   }.elsewhen((at(program.checkGlass) && !isGlass) || (at(program.checkRest) && isNegative)) {
-    step := program.side.U
+    nextStep := program.side.U
   }.elsewhen((at(program.checkSide) && !isRefraction) || (at(program.checkShare) && backSide)) {
-    step := program.last.U
+    nextStep := program.last.U
   }.elsewhen(at(program.cosineRoot) && !isPositive) {
-    step := program.away.U
+    nextStep := program.away.U
+  }.elsewhen(factors.any && digit =/= 0.U) {
+    digitsLeft := digit
   }.elsewhen(!isDone && !datapath.io.waits) {
-    step := step + 1.U
+    nextStep := step + 1.U
   }
+  step    := nextStep
+  factors := program.factors(nextStep)
   when(at(program.checkRest) && !isNegative)(isRefraction := true.B)
   when(at(program.checkShare) && !backSide)(isShared      := true.B)
   when(io.result.fire)(isBusy                             := false.B)
@@ -75,10 +96,12 @@ final class BounceUnit(config: ColonnadeConfig) extends Module {
   io.result.valid  := isBusy && isDone
   io.busy          := isBusy
 
-  private val control = Wire(new BounceControl)
-  control           := program.control(step)
   control.load      := io.request.fire
   control.startOver := startOver
+  control.factors   := factors
+  control.isFirst   := isFirst
+  control.digit     := digit
+  control.work      := Mux(isFirst, work, 0.U.asTypeOf(work))
 
   datapath.io.control      := control
   datapath.io.request      := io.request.bits

@@ -12,6 +12,8 @@ import scala.util.Random
 class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "BounceUnit"
 
+  private val simulation = Seq(VerilatorBackendAnnotation)
+
   /** Answers are compared as one integer each: a field of this many bits for each number. */
   private val fieldBits = 96
 
@@ -84,10 +86,10 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (config <- TestConfigs.formats) {
     val name = s"${config.precision} and ${config.geometry.vertexBits}-bit vertices"
 
-    it should s"equal the model with $name" in test(new BounceUnit(config)) { unit =>
+    it should s"equal the model with $name" in test(new BounceUnit(config)).withAnnotations(simulation) { unit =>
       val random    = new Random(31)
       val questions = new BounceQuestions(config, random)
-      val rounds    = Seq.fill(12) {
+      val rounds    = Seq.fill(5) {
         val all =
           Seq.fill(6)(questions.surface()) ++ Seq.fill(4)(questions.any()) ++ Seq.fill(4)(questions.grazing()) ++
             Seq.fill(4)(questions.critical()) ++ Seq.fill(2)(questions.extreme()) ++
@@ -96,5 +98,44 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
       check(config, rounds, random, _ % 2 * 0.7)(unit)
     }
+  }
+
+  /** Cycles from taking each request to offering its result; the unit is idle before. */
+  private def latencies(config: ColonnadeConfig, questions: Seq[BounceQuestion])(unit: BounceUnit): Seq[Int] = {
+    unit.io.offset.poke(100)
+    unit.io.result.ready.poke(true)
+    for (question <- questions) yield {
+      poke(config, 100)(unit.io.request.bits, question)
+      unit.io.request.valid.poke(true)
+      unit.clock.step()
+      unit.io.request.valid.poke(false)
+      var cycles = 1
+      while (!unit.io.result.valid.peekBoolean()) {
+        unit.clock.step()
+        cycles += 1
+      }
+      unit.clock.step()
+      assert(unit.io.request.ready.peekBoolean(), "the next bounce has to wait")
+      cycles
+    }
+  }
+
+  it should "hold its latencies at 32b32s64d" in test(new BounceUnit(TestConfigs.tiny)).withAnnotations(simulation) {
+    unit =>
+      val questions = new BounceQuestions(TestConfigs.tiny, new Random(37))
+
+      def held(name: String, most: Int)(question: => BounceQuestion): Unit = {
+        val cycles = latencies(TestConfigs.tiny, Seq.fill(12)(question))(unit)
+        info(s"$name: ${cycles.min} to ${cycles.max} cycles")
+        assert(cycles.max <= most, s"$name: $cycles")
+      }
+      // From outside into glass, and head-on: neither total reflection nor the geometric normal's turn
+      def glass(backSide: Boolean) = {
+        val question = questions.straight().copy(isGlass = true, etas = Seq.fill(2)(BigInt(5461)))
+        question.copy(backSide = backSide, geometricNormal = question.facing.map(x => if (backSide) -x else x))
+      }
+      held("mirror", 60)(questions.surface().copy(isGlass = false, isFlat = true))
+      held("glass from behind", 150)(glass(backSide = true))
+      held("glass from the front", 240)(glass(backSide = false))
   }
 }

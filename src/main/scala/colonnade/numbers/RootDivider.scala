@@ -1,0 +1,85 @@
+package colonnade.numbers
+
+import chisel3._
+import chisel3.util.{log2Ceil, Cat, Decoupled}
+
+/** A square root to draw, or two mantissas to divide.
+  *
+  * @param operand   the radicand, or the denominator: its top bit, that of the mantissa's bits, is set
+  * @param numerator of a division: less than twice the denominator
+  */
+final class RootOrDivision(radicandBits: Int, mantissaBits: Int) extends Bundle {
+  val isDivision = Bool()
+  val operand    = UInt(radicandBits.max(mantissaBits).W)
+  val numerator  = UInt(mantissaBits.W)
+}
+
+final class RootDividerIO(radicandBits: Int, mantissaBits: Int, digits: Int) extends Bundle {
+  val operation = Flipped(Decoupled(new RootOrDivision(radicandBits, mantissaBits)))
+
+  /** ⌊√radicand⌋ or ⌊numerator · 2^digits / denominator⌋ */
+  val result = Decoupled(UInt(RootDivider.resultBits(radicandBits, digits).W))
+}
+
+/** [[SquareRoot]] and [[Divider]] in one, around one subtractor: restoring, a bit a cycle. Half as large as both.
+  *
+  * Latency rootBits + 1 or digits + 2 cycles, one operation at a time; the next one enters in the cycle in which a
+  * result leaves.
+  */
+final class RootDivider(radicandBits: Int, mantissaBits: Int, digits: Int) extends Module {
+  require(radicandBits >= 2 && radicandBits % 2 == 0, s"a square root of $radicandBits bits; they must be even")
+  require(mantissaBits >= 1, s"a divider of $mantissaBits-bit mantissas; they must have at least 1 bit")
+  require(digits >= 0, s"a divider for $digits digits; it must be for at least 0")
+
+  val io = IO(new RootDividerIO(radicandBits, mantissaBits, digits))
+
+  private val rootBits      = SquareRoot.rootBits(radicandBits)
+  private val resultBits    = RootDivider.resultBits(radicandBits, digits)
+  private val remainderBits = (rootBits + 3).max(mantissaBits + 1)
+
+  private val busy       = RegInit(false.B)
+  private val bitsLeft   = Reg(UInt(log2Ceil(rootBits.max(digits + 1) + 1).W))
+  private val isDivision = Reg(Bool())
+  private val result     = Reg(UInt(resultBits.W))
+
+  /** The radicand's bits not yet used, at the top of its bits; or the denominator. */
+  private val operand = Reg(chiselTypeOf(io.operation.bits.operand))
+
+  /** At most twice the root, or less than twice the denominator. */
+  private val remainder = Reg(UInt(remainderBits.W))
+
+  private val finished = busy && bitsLeft === 0.U
+
+  // The next bit is set if (2 root + 1)² still fits, or the denominator
+  private val pair       = operand(radicandBits - 1, radicandBits - 2)
+  private val minuend    = Mux(isDivision, remainder, Cat(remainder(remainderBits - 3, 0), pair))
+  private val subtrahend =
+    Mux(isDivision, operand(mantissaBits - 1, 0), Cat(result(rootBits - 1, 0), 1.U(2.W))).pad(remainderBits)
+  private val difference = minuend -& subtrahend
+  private val bit        = !difference(remainderBits)
+  private val rest       = Mux(bit, difference, minuend)(remainderBits - 1, 0)
+
+  when(busy && !finished) {
+    remainder := Mux(isDivision, Cat(rest(remainderBits - 2, 0), 0.U(1.W)), rest)
+    result    := Cat(result, bit)(resultBits - 1, 0)
+    bitsLeft  := bitsLeft - 1.U
+    when(!isDivision)(operand := operand << 2)
+  }
+  when(io.result.fire)(busy := false.B)
+  when(io.operation.fire) {
+    busy       := true.B
+    isDivision := io.operation.bits.isDivision
+    bitsLeft   := Mux(io.operation.bits.isDivision, (digits + 1).U, rootBits.U)
+    remainder  := Mux(io.operation.bits.isDivision, io.operation.bits.numerator, 0.U)
+    operand    := io.operation.bits.operand
+    result     := 0.U
+  }
+
+  io.operation.ready := !busy || io.result.fire
+  io.result.valid    := finished
+  io.result.bits     := result
+}
+
+object RootDivider {
+  def resultBits(radicandBits: Int, digits: Int): Int = SquareRoot.rootBits(radicandBits).max(digits + 1)
+}
