@@ -27,6 +27,7 @@ def bench(
     conditions: Conditions,
     progress: Progress = QUIET,
     finished: Finished = lambda name, result: None,
+    mirror: bool = False,
 ) -> dict[str, Any]:
     """Render every mesh once and gather the figures.
 
@@ -37,11 +38,12 @@ def bench(
         conditions: scene, size, and how many at a time.
         progress: shows the steps.
         finished: called with each mesh's name and figures as they come, in order.
+        mirror: the meshes are mirrors, whose reflections are traced once.
 
     Returns:
         The report that `colonnade bench --json` writes.
     """
-    runs = [Run(config, tuple(overrides), mesh) for mesh in dict.fromkeys(meshes)]
+    runs = [Run(config, tuple(overrides), mesh, mirror) for mesh in dict.fromkeys(meshes)]
     reports: dict[str, dict[str, Any]] = {}
     for run, report in zip(runs, measure(runs, conditions, progress), strict=True):
         reports[run.mesh] = report

@@ -7,7 +7,7 @@ import json
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +39,27 @@ class Run:
         config: name of the configuration, with `overrides` applied.
         overrides: ``key.path=value`` changes.
         mesh: name or file.
+        mirror: its surface is a mirror, whose reflections are traced once, in place of the scene's material.
     """
 
     config: str
     overrides: tuple[str, ...]
     mesh: str
+    mirror: bool = False
 
     @property
     def title(self) -> str:
         """For progress."""
-        return " ".join((self.mesh, *self.overrides))
+        return " ".join((self.mesh, *("mirror" for _ in range(self.mirror)), *self.overrides))
+
+    def scene(self, scene: Scene) -> Scene:
+        """The benchmark's scene with this mesh and its surface."""
+        scene = scene.with_mesh(self.mesh)
+        if not self.mirror:
+            return scene
+        return replace(
+            scene, material=replace(scene.material, kind="mirror"), paths=replace(scene.paths, bounces=1)
+        )
 
 
 @dataclass(frozen=True)
@@ -86,7 +97,7 @@ def measure(runs: Sequence[Run], conditions: Conditions, progress: Progress = QU
 
 
 def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progress: Progress) -> dict[str, Any]:
-    scene = scene.with_mesh(run.mesh)
+    scene = run.scene(scene)
     with _BUILDING:
         design = design_for(run.config, run.overrides, progress)
     width, height = conditions.size or (scene.frame.width, scene.frame.height)

@@ -70,6 +70,30 @@ def rates(bench: Data, _: Path) -> str:
     return f"{conditions} The geometric mean is {ratio}\n\n{markdown(titles, rows)}"
 
 
+def mirror(bench: Data, _: Path) -> str:
+    """The same meshes as mirrors."""
+    reflected = bench["mirror"]
+    rows: list[tuple[str, ...]] = [
+        (
+            name,
+            f"{mesh['cycles']:,}",
+            f"{mesh['rays']['reflection']:,}",
+            f"{mesh['rays']['shadow']:,}",
+            f"{mesh['rays']['in_box']:,}",
+            f"**{mesh['rays_per_cycle_in_box']:.2f}**",
+            f"{mesh['rays_per_cycle']:.2f}",
+            f"{mesh['bottleneck']}, {_percent(mesh['utilisation'][mesh['bottleneck']])}",
+        )
+        for name, mesh in reflected["meshes"].items()
+    ]
+    in_box = f"**{reflected['geomean_rays_per_cycle_in_box']:.2f}**"
+    rows.append(("geometric mean", "", "", "", "", in_box, _number(reflected["geomean_rays_per_cycle"]), ""))
+    titles = ["mesh", "cycles", "reflections", "shadow rays", "in-box rays", "in-box rays per cycle"]
+    titles += ["all rays per cycle", "bottleneck"]
+    ratio = f"**{reflected['ratio_to_paper']:.1f} times** the chip's {PAPER_RAYS_PER_CYCLE}."
+    return f"The geometric mean is {ratio}\n\n{markdown(titles, rows)}"
+
+
 def limits(bench: Data, _: Path) -> str:
     """In-box rays per cycle that each unit or port alone would allow."""
     meshes = bench["meshes"]
@@ -178,6 +202,7 @@ def _percent(share: float) -> str:
 #: Tables by the name in the page: the part of `tools/performance` whose data they show, and what writes them.
 TABLES: dict[str, tuple[str, Callable[[Data, Path], str]]] = {
     "rates": ("bench", rates),
+    "mirror": ("bench", mirror),
     "limits": ("bench", limits),
     "work": ("bench", work),
     "stages": ("bench", stages),
