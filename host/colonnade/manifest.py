@@ -185,7 +185,7 @@ class Manifest:
             registers={r["name"]: _register(r) for r in data["registers"]["fields"]},
             streams={name: _layout(name, fields, None) for name, fields in data["streams"].items()},
             memories=data["memories"],
-            attributes=_attributes(data["attributes"]),
+            attributes=_attributes(data.get("attributes")),
             format_hash=data["formatHash"],
             config_hash=data["configHash"],
         )
