@@ -15,11 +15,12 @@ final class BounceUnitIO(config: ColonnadeConfig) extends Bundle {
   val busy = Output(Bool())
 }
 
-/** Reflection at mirrors, refraction and Schlick's share at glass: docs/bounce.md.
+/** Reflection at mirrors, refraction and Schlick's share at glass: docs/numbers.md, section 6; docs/bounce.md.
   *
   * One bounce at a time, in a program of one product in two cycles or more. The shading normal is the smooth one, unless
   * that turns away from the ray or would send it to the wrong side of the surface: then the program starts over with the
-  * geometric one.
+  * geometric one. At 32b32s64d a mirror takes 44 cycles, glass 104 from behind and some 170 from the front; to start over
+  * takes 25 or as many as so far and 11.
   */
 final class BounceUnit(config: ColonnadeConfig) extends Module {
   private val formats = new BounceFormats(config.numbers)

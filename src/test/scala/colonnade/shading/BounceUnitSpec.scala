@@ -129,13 +129,15 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
         info(s"$name: ${cycles.min} to ${cycles.max} cycles")
         assert(cycles.max <= most, s"$name: $cycles")
       }
-      // From outside into glass, and head-on: neither total reflection nor the geometric normal's turn
-      def glass(backSide: Boolean) = {
-        val question = questions.straight().copy(isGlass = true, etas = Seq.fill(2)(BigInt(5461)))
-        question.copy(backSide = backSide, geometricNormal = question.facing.map(x => if (backSide) -x else x))
-      }
-      held("mirror", 60)(questions.surface().copy(isGlass = false, isFlat = true))
-      held("glass from behind", 150)(glass(backSide = true))
-      held("glass from the front", 240)(glass(backSide = false))
+      // With the geometric normal, so that nothing starts over
+    def surface(eta: Int, backSide: Boolean, isGlass: Boolean = true) = {
+      val question = questions.surface().copy(isFlat = true, isGlass = isGlass, etas = Seq.fill(2)(BigInt(eta)))
+      val facing   = question.facing
+      question.copy(backSide = backSide, geometricNormal = facing.map(x => if (backSide) -x else x))
+    }
+    held("mirror", 44)(surface(8192, backSide = false, isGlass = false))
+    held("total reflection", 56)(surface(65535, backSide = true))
+    held("glass from behind", 104)(surface(5461, backSide = true))
+    held("glass from the front", 200)(surface(5461, backSide = false))
   }
 }
