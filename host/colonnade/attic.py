@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,14 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade import solids
+from colonnade.attic_paints import Paint, boards, plaster, rings, spiral, stripes
 from colonnade.embree import RayTracer, Triangles
 from colonnade.files import replacing
 from colonnade.pictures import encode_srgb, write_png
 from colonnade.room.room import Room, RoomCamera
 
 Floats = NDArray[np.float64]
-#: Albedo of points [n, 3] of a part, in its own coordinates: float64 [n, 3].
-Paint = Callable[[Floats], Floats]
 
 EYE, TARGET = np.array([0.9, 1.55, 2.5]), np.array([-0.05, 0.85, -1.0])
 #: Focal length in picture widths.
@@ -148,31 +146,31 @@ def _camera(width: int, height: int) -> RoomCamera:
 def _parts() -> list[Part]:
     knee, ridge, front, back, far = 1.1, 3.1, 3.0, -2.4, -4.9
     west, east, bend = -2.5, 2.5, 0.4
-    plaster, boards = _plaster((0.72, 0.68, 0.60)), _boards((0.52, 0.36, 0.22), 0, 2, 0.16)
-    roof = _boards((0.60, 0.47, 0.33), 2, 0, 0.45)
+    walls, floor = plaster((0.72, 0.68, 0.60)), boards((0.52, 0.36, 0.22), 0, 2, 0.16)
+    roof = boards((0.60, 0.47, 0.33), 2, 0, 0.45)
     parts = [
-        _quad([west, 0, front], [east, 0, front], [east, 0, far], [west, 0, far], boards),
-        _quad([west, 0, front], [west, knee, front], [west, knee, back], [west, 0, back], plaster),
-        _quad([east, 0, front], [east, knee, front], [east, knee, far], [east, 0, far], plaster),
+        _quad([west, 0, front], [east, 0, front], [east, 0, far], [west, 0, far], floor),
+        _quad([west, 0, front], [west, knee, front], [west, knee, back], [west, 0, back], walls),
+        _quad([east, 0, front], [east, knee, front], [east, knee, far], [east, 0, far], walls),
         _quad([west, knee, front], [0, ridge, front], [0, ridge, far], [west, knee, far], roof),
         _quad([east, knee, front], [0, ridge, front], [0, ridge, far], [east, knee, far], roof),
         # The L: a wall to the left of the bend, and an arm that goes on to the right of it.
-        _quad([west, 0, back], [bend, 0, back], [bend, ridge, back], [west, ridge, back], _plaster((0.35, 0.48, 0.58))),
-        _quad([bend, 0, back], [bend, 0, far], [bend, ridge, far], [bend, ridge, back], plaster),
-        _quad([west, 0, far], [east, 0, far], [east, ridge, far], [west, ridge, far], _plaster((0.66, 0.42, 0.34))),
-        _quad([west, 0, front], [east, 0, front], [east, ridge, front], [west, ridge, front], plaster),
-        _turned((-0.95, 1.5, -1.55), 0.13, 1.5, _spiral((0.80, 0.78, 0.72), (0.45, 0.20, 0.16))),
-        _turned((1.45, 1.5, -2.75), 0.13, 1.5, _spiral((0.80, 0.78, 0.72), (0.16, 0.30, 0.22))),
+        _quad([west, 0, back], [bend, 0, back], [bend, ridge, back], [west, ridge, back], plaster((0.35, 0.48, 0.58))),
+        _quad([bend, 0, back], [bend, 0, far], [bend, ridge, far], [bend, ridge, back], walls),
+        _quad([west, 0, far], [east, 0, far], [east, ridge, far], [west, ridge, far], plaster((0.66, 0.42, 0.34))),
+        _quad([west, 0, front], [east, 0, front], [east, ridge, front], [west, ridge, front], walls),
+        _turned((-0.95, 1.5, -1.55), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.45, 0.20, 0.16))),
+        _turned((1.45, 1.5, -2.75), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.16, 0.30, 0.22))),
         # A round table, a rug, a chest that stands askew.
-        _turned((0.15, 0.70, -0.35), 0.55, 0.025, _rings((0.62, 0.42, 0.24), 0.055)),
-        _turned((0.15, 0.35, -0.35), 0.07, 0.35, _plaster((0.30, 0.22, 0.16))),
-        _turned((-0.2, 0.004, -0.6), 1.25, 0.004, _rings((0.55, 0.14, 0.16), 0.21)),
-        _box((1.6, 0.3, -0.9), (0.45, 0.3, 0.3), 32.0, _boards((0.36, 0.44, 0.25), 0, 1, 0.14)),
+        _turned((0.15, 0.70, -0.35), 0.55, 0.025, rings((0.62, 0.42, 0.24), 0.055)),
+        _turned((0.15, 0.35, -0.35), 0.07, 0.35, plaster((0.30, 0.22, 0.16))),
+        _turned((-0.2, 0.004, -0.6), 1.25, 0.004, rings((0.55, 0.14, 0.16), 0.21)),
+        _box((1.6, 0.3, -0.9), (0.45, 0.3, 0.3), 32.0, boards((0.36, 0.44, 0.25), 0, 1, 0.14)),
     ]
     ball, faces = solids.sphere(6)
-    parts.append(Part(ball * 0.38 + (-1.5, 0.38, -0.5), faces, _stripes, (-1.5, 0.38, -0.5), True))
+    parts.append(Part(ball * 0.38 + (-1.5, 0.38, -0.5), faces, stripes, (-1.5, 0.38, -0.5), True))
     lamp = ball * (0.14, 0.10, 0.14) + (-0.25, 2.35, -1.2)
-    parts.append(Part(lamp, faces, _plaster((0.82, 0.80, 0.70)), (-0.25, 2.35, -1.2), True))
+    parts.append(Part(lamp, faces, plaster((0.82, 0.80, 0.70)), (-0.25, 2.35, -1.2), True))
     return parts
 
 
@@ -203,57 +201,6 @@ def _smooth(points: Floats, flat: Floats, part: Part) -> Floats:
         return _unit(away / size**2)
     around = _unit(away * (1.0, 0.0, 1.0))
     return np.where(np.abs(flat[:, 1:2]) > 0.9, flat, around)
-
-
-def _plaster(colour: tuple[float, float, float]) -> Paint:
-    """One colour with slow clouds."""
-
-    def paint(points: Floats) -> Floats:
-        cloud = np.sin(points @ (2.1, 1.3, 1.7)) * np.sin(points @ (-1.1, 2.9, 1.9))
-        return np.asarray(np.array(colour) * (1 + 0.06 * cloud[:, None]))
-
-    return paint
-
-
-def _boards(colour: tuple[float, float, float], along: int, across: int, width: float) -> Paint:
-    """Boards of that width along one axis, each in its own shade, with seams and staggered ends."""
-
-    def paint(points: Floats) -> Floats:
-        board = np.floor(points[:, across] / width)
-        place = points[:, along] / (7 * width) + 0.37 * board
-        shade = 0.82 + 0.30 * _noise(board * 7.0 + np.floor(place))
-        seam = (np.abs(points[:, across] / width - np.rint(points[:, across] / width)) < 0.03) | (place % 1 < 0.01)
-        grain = 1 + 0.05 * np.sin(points[:, across] * 240 + 3 * np.sin(points[:, along] * 9))
-        return np.asarray(np.array(colour) * (np.where(seam, 0.45, shade) * grain)[:, None])
-
-    return paint
-
-
-def _spiral(light: tuple[float, float, float], dark: tuple[float, float, float]) -> Paint:
-    def paint(points: Floats) -> Floats:
-        turn = np.arctan2(points[:, 2], points[:, 0]) / (2 * np.pi) + points[:, 1] * 1.5
-        return np.where((turn % 0.5 < 0.17)[:, None], np.array(dark), np.array(light))
-
-    return paint
-
-
-def _rings(colour: tuple[float, float, float], width: float) -> Paint:
-    def paint(points: Floats) -> Floats:
-        ring = np.floor(np.hypot(points[:, 0], points[:, 2]) / width) % 2
-        return np.asarray(np.array(colour) * (1 - 0.35 * ring)[:, None])
-
-    return paint
-
-
-def _stripes(points: Floats) -> Floats:
-    """A ball in gores."""
-    gore = np.floor(np.arctan2(points[:, 2], points[:, 0]) / (2 * np.pi) * 10).astype(np.intp) % 3
-    return np.array([[0.80, 0.20, 0.12], [0.85, 0.80, 0.66], [0.12, 0.30, 0.62]])[gore]
-
-
-def _noise(number: Floats) -> Floats:
-    """A share from 0 to 1 that looks random, for whole numbers."""
-    return np.asarray(np.abs(np.sin(number * 12.9898) * 43758.5453) % 1, dtype=np.float64)
 
 
 def _unit(vectors: Floats) -> Floats:

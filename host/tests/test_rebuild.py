@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from colonnade.attic import Attic, attic
+from colonnade.attic import Attic, attic, write_attic
 from colonnade.backdrop import Backdrop
+from colonnade.cli import cli
 from colonnade.embree import RayTracer
 from colonnade.rebuild import HIDDEN, HIT, LEFT, LOST, DepthMarch, Rebuilt, RebuiltGeometry, from_march, positions
 from colonnade.rebuild_rays import RADIUS, cosine_rays, glass_rays, mirror_rays, standing_spheres
@@ -108,3 +112,14 @@ def test_a_start_just_behind_the_surface_is_on_it(made: Attic) -> None:
     inward = -room.normals[row, column] + [0.3, 0, 0]
     met = DepthMarch(room)((point * 1.002)[None], inward[None])
     assert met.kind[0] == HIT and np.hypot(met.u[0] - column - 0.5, met.v[0] - row - 0.5) < 2
+
+
+def test_the_command_prints_a_table_and_writes_json(tmp_path: Path) -> None:
+    write_attic(tmp_path / "attic", 160, 120)
+    output = tmp_path / "r.json"
+    result = CliRunner().invoke(cli, ["study", str(tmp_path / "attic"), "--json", str(output)])
+    assert result.exit_code == 0, result.output
+    report = json.loads(output.read_text())
+    assert list(report) == ["attic, full maps", "attic, planes"]
+    assert report["attic, planes"]["mirror"]["ok"] > 0.8
+    assert len(result.output.splitlines()) == 4
