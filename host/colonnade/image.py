@@ -92,7 +92,9 @@ class ImageHeader:
         values["frame"] = ObjectFrame(frame["scale"], tuple(frame["offset"]))
         extent = {name: np.array(value, dtype=np.float64) for name, value in values["extent"].items()}
         values["extent"] = Extent(**extent)
-        values["materials"] = tuple(MeshMaterial(**material) for material in values["materials"])
+        values["materials"] = tuple(
+            MeshMaterial(**{**material, "albedo": tuple(material["albedo"])}) for material in values["materials"]
+        )
         values["tree"] = TreeStatistics(**values["tree"]) if values["tree"] else None
         return ImageHeader(**values)
 

@@ -72,7 +72,9 @@ def rates(bench: Data, _: Path) -> str:
 
 def mirror(bench: Data, _: Path) -> str:
     """The same meshes as mirrors."""
-    reflected = bench["mirror"]
+    reflected = bench.get("mirror")
+    if reflected is None:
+        return "Run `tools/performance bench`."
     rows: list[tuple[str, ...]] = [
         (
             name,

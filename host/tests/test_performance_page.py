@@ -34,7 +34,7 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
     keys = ("array.contexts", "columnBvhMemory.snooping", "columnBvhMemory.banks")
     rates = dict(zip(kinds, (0.5, 0.75, 1.0, 1.25), strict=True))
     data = {
-        "bench": base,
+        "bench": base | {"mirror": base},
         "scaling": {"base": base, "points": [point(2.0, "array.rows", **{"array.rows": 4})]},
         "ablation": {
             "base": base,

@@ -69,7 +69,7 @@ def test_rays_are_those_of_the_float_camera(make_manifest: MakeManifest, mac: in
         exact = unit(view.direction + x * view.step_x + y * view.step_y)
         np.testing.assert_allclose(unit(ray(registers, x, y)), exact, atol=tolerance)
     scale = 2.0 ** (registers["frame.unitShift"] - manifest.numbers["gridFraction"]) / header.frame.scale
-    for name, point in (("camera", view.origin), ("light", view.light)):
+    for name, point in (("camera", view.origin), ("lights[0]", view.light)):
         position = vector(registers, f"{name}.position") * scale + np.array(header.frame.offset)
         np.testing.assert_allclose(position, point, atol=0.51 * scale * 1.001)
     largest = max(np.abs(ray(registers, x, y)).max() for x in (0, 639) for y in (0, 479))
@@ -172,7 +172,7 @@ def test_a_camera_out_of_reach_is_refused(manifest: Manifest, image: SceneImage)
     with pytest.raises(UserError, match=r"the camera is .* object-cube edges away, the hardware reaches 1,024"):
         placement(placed((0.0, 0.0, 1e5)), image.header, manifest, 64, 48)
     far = dataclasses.replace(SCENE, light=Light(position=(1e9, 0.0, 0.0)))
-    with pytest.raises(UserError, match="the light is"):
+    with pytest.raises(UserError, match="light 1 is"):
         placement(far, image.header, manifest, 64, 48)
 
 
