@@ -197,7 +197,7 @@ def frame_report(in_box: float) -> dict[str, Any]:
         "size": [15, 10],
         "mesh": {"triangles": 12},
         "cycles": 100,
-        "rays": {"in_box": 50},
+        "rays": {"reflection": 7, "shadow": 5, "in_box": 50},
         "counters": COUNTERS,
         "rays_per_cycle": 2 * in_box,
         "rays_per_cycle_in_box": in_box,
