@@ -4,8 +4,8 @@ Each gate has one delay, from the liberty's tables, so that glitches show; what 
 what changes without them. Flip-flops and memories begin with zero, as they do in the simulation that was recorded.
 Outputs are held against the recorded ones in every cycle; the data of a stream counts where the stream is valid.
 
-The simulator is ``harness/gates.cpp``. Icarus Verilog was tried first: after ten minutes and with a gigabyte it was
-still elaborating the 150,000 gates of a render unit, of which this one simulates tens of cycles a second.
+The simulator is ``harness/gates.cpp``. Icarus Verilog was tried first: after more than four minutes of processor time,
+and with a gigabyte, it was still elaborating the 150,000 gates of a render unit.
 """
 
 from __future__ import annotations
