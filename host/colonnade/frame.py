@@ -18,6 +18,8 @@ class Frame:
         triangle: int64 [height, width]; packed id, -1 where there is no object.
         distance: float64 [height, width]; t from the camera along the ray's dominant axis, vertex units.
         counters: By the register map's names; the model has only those that do not depend on timing.
+        ratio: uint16 [height, width, 3]; light left on the room with the object there, 4096 is all of it; None
+            without a room.
         errors: Names of the sticky error bits that are set.
     """
 
@@ -27,3 +29,4 @@ class Frame:
     distance: npt.NDArray[np.float64]
     counters: dict[str, int]
     errors: list[str]
+    ratio: npt.NDArray[np.uint16] | None = None

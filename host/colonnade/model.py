@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from colonnade.frame import Frame
 from colonnade.image import SceneImage
-from colonnade.manifest import Manifest
+from colonnade.manifest import Manifest, RecordLayout
+
+if TYPE_CHECKING:
+    from colonnade.attributes import AttributeImage
 
 ROWS_AT_ONCE = 16
 
@@ -26,11 +29,15 @@ def new_model(manifest: Manifest) -> Any:
         "stackDepth": config["columnBvhMemory"]["stackDepth"],
         "bvh": int(config["geometry"]["bvh"]),
     }
-    layouts = {
+    return _core.Model(numbers, field_places(manifest.layouts))
+
+
+def field_places(layouts: Mapping[str, RecordLayout]) -> dict[str, dict[str, tuple[int, int, bool]]]:
+    """Where the fields of words lie: offset, width, signed; by kind of word and name."""
+    return {
         name: {field.name: (field.offset, field.width, field.signed) for field in layout.fields.values()}
-        for name, layout in manifest.layouts.items()
+        for name, layout in layouts.items()
     }
-    return _core.Model(numbers, layouts)
 
 
 def load_scene(model: Any, image: SceneImage) -> None:
@@ -38,20 +45,34 @@ def load_scene(model: Any, image: SceneImage) -> None:
     model.load(image.records, image.header.triangle_base, image.header.attribute_base)
 
 
+def load_room(model: Any, room: AttributeImage, manifest: Manifest) -> None:
+    """Gives the model a physical-attribute memory and fills it."""
+    from colonnade.room_march import memory_words
+
+    assert manifest.attributes is not None
+    model.add_room(dict(manifest.attributes.sizes), field_places(manifest.attributes.layouts))
+    for memory, words in memory_words(room):
+        model.load_room(memory, words)
+
+
 def render_model(
     manifest: Manifest,
     image: SceneImage,
     registers: Mapping[str, int],
     progress: Callable[[int, int], None] = lambda done, total: None,
+    room: AttributeImage | None = None,
 ) -> Frame:
     """Renders one frame.
 
     Args:
         registers: Every rw register by name (``placement.placement``).
         progress: Called with (rows done, rows in all).
+        room: What the physical-attribute memory holds.
     """
     model = new_model(manifest)
     load_scene(model, image)
+    if room is not None:
+        load_room(model, room, manifest)
     model.start(dict(registers))
     height = registers["frame.height"]
     bands = []
@@ -66,4 +87,5 @@ def render_model(
         distance=pixels["distance"],
         counters=model.counters(),
         errors=[name for name, is_set in model.errors().items() if is_set],
+        ratio=None if room is None else pixels["ratio"],
     )

@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 from colonnade.errors import UserError
 from colonnade.image import ImageHeader
 from colonnade.manifest import Manifest
+from colonnade.room_registers import HeldRoom
 from colonnade.scene import Scene
 from colonnade.surface_registers import check_surfaces, surface_registers
 from colonnade.viewpoint import FloatPlacement, float_placement
@@ -27,8 +28,23 @@ AXES = "xyz"
 WATCHDOG_CYCLES_PER_RECORD = 32
 
 
-def placement(scene: Scene, header: ImageHeader, manifest: Manifest, width: int, height: int) -> dict[str, int]:
+def placement(
+    scene: Scene,
+    header: ImageHeader,
+    manifest: Manifest,
+    width: int,
+    height: int,
+    room: HeldRoom | None = None,
+) -> dict[str, int]:
     """All rw registers of a frame by name; signed ones are signed integers.
+
+    Args:
+        scene: What to render.
+        header: Of its mesh, packed.
+        manifest: Of the hardware.
+        width: Pixels.
+        height: Pixels.
+        room: The scene's, and how its maps are held.
 
     Raises:
         UserError: The frame, or the camera's or light's distance, is more than the hardware can hold.
@@ -42,7 +58,9 @@ def placement(scene: Scene, header: ImageHeader, manifest: Manifest, width: int,
                 if value > 0
                 else f"a frame of {width}x{height} has no pixels"
             )
-    return registers_of(float_placement(scene, header.extent, width, height, header.materials), header, manifest)
+    view = float_placement(scene, header.extent, width, height, header.materials, None if room is None else room.room)
+    registers = registers_of(view, header, manifest)
+    return registers if room is None else registers | room.registers(view, header, manifest)
 
 
 def registers_of(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +18,16 @@ from colonnade.image import ImageHeader, SceneImage
 from colonnade.manifest import Manifest
 from colonnade.meshes import load_mesh
 from colonnade.pack import pack
+from colonnade.pictures import decode_srgb
 from colonnade.placement import FloatPlacement, float_placement, placement
 from colonnade.progress import QUIET, Progress
+from colonnade.room_registers import HeldRoom
 from colonnade.scene import Scene, load_scene
 from colonnade.sizes import check_size
 from colonnade.viewpoint import made_of
+
+if TYPE_CHECKING:
+    from colonnade.room import Room
 
 BACKENDS = ("rtl", "model", "reference")
 
@@ -56,6 +61,7 @@ def render(
     background: Path | None = None,
     hits: bool = False,
     progress: Progress = QUIET,
+    relit: bool = False,
 ) -> RenderResult:
     """Renders one frame of a scene file.
 
@@ -68,6 +74,7 @@ def render(
         background: A room's folder, in place of the scene's background.
         hits: The hit triangles are wanted: the hardware must be configured to deliver them.
         progress: Shows the steps.
+        relit: Show the room in the scene's lights even if there is a photo of it.
 
     Raises:
         UserError: Something about the input is wrong, or the hardware flagged an error.
@@ -82,8 +89,9 @@ def render(
     check_size((width, height), manifest)
     if backend == "reference":
         return _render_reference(scene, manifest, (width, height), progress)
-    if scene.background.room is not None:
-        raise UserError(f"--backend {backend} renders the object alone, without a room: use --backend reference")
+    folder = scene.background.room
+    if folder is not None and backend == "rtl":
+        raise UserError("--backend rtl renders the object alone, without a room: use --backend model or reference")
     if hits and backend == "rtl":
         from colonnade.simulate import require_hits
 
@@ -91,8 +99,9 @@ def render(
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
+        room = None if folder is None else HeldRoom.load(folder, manifest)
         image = pack_scene(scene, manifest)
-        registers = placement(scene, image.header, manifest, width, height)
+        registers = placement(scene, image.header, manifest, width, height, room)
     packed = time.perf_counter()
     seconds: dict[str, float | None] = {"pack": packed - begun, "build": None}
     report: dict[str, Any] = {}
@@ -110,12 +119,34 @@ def render(
         from colonnade.model import render_model
 
         with progress.step("rendering in the model") as share:
-            frame = render_model(manifest, image, registers, lambda done, total: share(done / total))
+            held = None if room is None else room.image
+            frame = render_model(manifest, image, registers, lambda done, total: share(done / total), held)
         seconds["run"] = time.perf_counter() - packed
     require_no_errors(frame)
     report = frame_report(backend, manifest, image.header, frame) | {"seconds": seconds} | report
-    view = float_placement(scene, image.header.extent, width, height, image.header.materials)
-    return _result(frame, image, view, manifest, report)
+    seen = None if room is None else room.room
+    view = float_placement(scene, image.header.extent, width, height, image.header.materials, seen)
+    result = _result(frame, image, view, manifest, report)
+    if room is None:
+        return result
+    report["bytes"] = room.image.byte_counts()
+    return result if relit else replace(result, image=composited(result.image, frame, room.room))
+
+
+def composited(image: npt.NDArray[np.float64], frame: Frame, room: Room) -> npt.NDArray[np.float64]:
+    """The object in the room's photo, darkened where the object takes its light (differential rendering after Debevec,
+    1998); the frame as it is if there is no photo. Linear, float64 [height, width, 3].
+    """
+    if room.photo is None or frame.ratio is None:
+        return image
+    height, width = frame.is_object.shape
+    photo = room.photo
+    if photo.shape[:2] != (height, width):
+        from PIL import Image
+
+        photo = np.asarray(Image.fromarray(photo).resize((width, height), Image.Resampling.BOX))
+    behind = decode_srgb(photo) * (frame.ratio / 4096.0)
+    return np.where(frame.is_object[..., None], image, behind)
 
 
 def pack_scene(scene: Scene, manifest: Manifest) -> SceneImage:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.attributes.plane_numbers import SLOPE_PIXELS
 from colonnade.manifest import Manifest
+from colonnade.model import field_places
 from colonnade.rebuild import HIDDEN, HIT, LEFT, LOST, Rebuilt
+from colonnade.room_registers import projection_of, view_registers
 
 if TYPE_CHECKING:
     from colonnade.attributes import AttributeImage
@@ -34,21 +35,15 @@ class DeviceMarch:
         attributes = manifest.attributes
         if attributes is None:
             raise ValueError("the hardware has no physical-attribute memory")
-        numbers = {name: manifest.numbers.get(name, 0) for name in manifest.numbers}
-        numbers |= dict.fromkeys(("arity", "trianglesPerRecord", "stackDepth", "bvh"), 0)
-        layouts = {
-            name: {field.name: (field.offset, field.width, field.signed) for field in layout.fields.values()}
-            for name, layout in attributes.layouts.items()
-        }
-        self._model: Any = _core.RoomModel(numbers, dict(attributes.sizes), layouts)
-        for map_name, words in image.memories().items():
-            for name, values in words.items():
-                memory = f"{map_name}.{'table' if (map_name, name) == ('planes', 'planes') else name}"
-                rows = np.ascontiguousarray(values).reshape(len(values), -1)
-                self._model.load(memory, rows.view(np.uint8).reshape(len(rows), -1))
+        numbers = dict(manifest.numbers) | dict.fromkeys(("arity", "trianglesPerRecord", "stackDepth", "bvh"), 0)
+        self._model: Any = _core.RoomModel(numbers, dict(attributes.sizes), field_places(attributes.layouts))
+        for memory, words in memory_words(image):
+            self._model.load(memory, words)
         self._room = room
         self._component = 1 << (manifest.numbers["shadeBits"] - 1)
-        self._registers = _view_registers(room, image, manifest)
+        registers = view_registers(projection_of(room, image) / 2.0**GRID_LOG, np.zeros(3), manifest)
+        self._registers = {name.removeprefix("room."): value for name, value in registers.items()}
+        self._registers["shellPlanes"] = int(image.planes.shell.any(axis=1).sum())
 
     def __call__(self, origins: Floats, directions: Floats) -> Rebuilt:
         """Where rays of view space, float64 [n, 3] each, metres, meet the room."""
@@ -69,14 +64,9 @@ class DeviceMarch:
         return Rebuilt(u, v, z, kind.astype(np.int64), met["steps"])
 
 
-def _view_registers(room: Room, image: AttributeImage, manifest: Manifest) -> dict[str, int]:
-    """Registers of the room's view for positions in view space, `GRID_LOG` grid steps a metre."""
-    projection = np.array([[room.fx, 0.0, room.cx], [0.0, room.fy, room.cy], [0.0, 0.0, SLOPE_PIXELS]]) / SLOPE_PIXELS
-    projection /= image.depth_unit * 2.0**GRID_LOG
-    most = (1 << (manifest.numbers["macBits"] - 1)) - 1
-    exponent = math.floor(math.log2(most / float(np.abs(projection).max())))
-    matrix = np.rint(projection * 2.0**exponent).astype(np.int64)
-    registers = {f"matrix[{row}].{axis}": int(matrix[row, a]) for row in range(3) for a, axis in enumerate("xyz")}
-    registers |= {f"offset.{axis}": 0 for axis in "xyz"}
-    used = int(image.planes.shell.any(axis=1).sum())
-    return registers | {"offsetShift": 0, "exponent": exponent, "shellPlanes": used}
+def memory_words(image: AttributeImage) -> Iterator[tuple[str, NDArray[np.uint8]]]:
+    """Name and words, uint8 [words, bytes], low byte first, of each memory."""
+    for map_name, words in image.memories().items():
+        for name, values in words.items():
+            rows = np.ascontiguousarray(values).reshape(len(values), -1)
+            yield f"{map_name}.{name}", rows.view(np.uint8).reshape(len(rows), -1)

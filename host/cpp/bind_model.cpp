@@ -6,6 +6,7 @@
 #include <nanobind/stl/tuple.h>
 
 #include <cmath>
+#include <memory>
 #include <tuple>
 
 #include "model/frame.hpp"
@@ -47,18 +48,28 @@ public:
         device_.load(records.data(), records.shape(0), records.shape(1), triangleBase, attributeBase);
     }
 
+    /// Gives the device a physical-attribute memory.
+    void addRoom(const Values& sizes, const FieldTuples& layouts) { room_ = std::make_unique<AttributeImage>(AttributeSizes(sizes), layoutsOf(layouts)); }
+
+    void loadRoom(const std::string& memory, const Records& words) {
+        if (!room_) throw std::invalid_argument("there is no physical-attribute memory");
+        room_->load(memory, words.data(), words.shape(0), words.shape(1));
+        device_.load(*room_);
+    }
+
     /// Rows [first, last) of the frame; `start` also takes the registers over.
     void start(const Values& registers) { device_.start(registers); }
 
     nb::dict rows(std::int64_t first, std::int64_t last) {
         const std::int64_t width = device_.frame().width;
         const auto size = static_cast<std::size_t>(width), count = static_cast<std::size_t>(last - first);
-        std::uint16_t* colour;
+        std::uint16_t *colour, *ratio;
         bool* isObject;
         std::int64_t* triangle;
         double* distance;
         nb::dict result;
         result["colour"] = makeArray<std::uint16_t>({count, size, 3}, colour);
+        result["ratio"] = makeArray<std::uint16_t>({count, size, 3}, ratio);
         result["is_object"] = makeArray<bool>({count, size}, isObject);
         result["triangle"] = makeArray<std::int64_t>({count, size}, triangle);
         result["distance"] = makeArray<double>({count, size}, distance);
@@ -68,7 +79,10 @@ public:
         for (std::int64_t y = first; y < last; ++y)
             for (std::int64_t x = 0; x < width; ++x, ++i) {
                 const Pixel pixel = device_.render(x, y);
-                for (int channel = 0; channel < 3; ++channel) colour[3 * i + channel] = static_cast<std::uint16_t>(pixel.colour[channel]);
+                for (int channel = 0; channel < 3; ++channel) {
+                    colour[3 * i + channel] = static_cast<std::uint16_t>(pixel.colour[channel]);
+                    ratio[3 * i + channel] = static_cast<std::uint16_t>(pixel.ratio[channel]);
+                }
                 isObject[i] = pixel.isObject;
                 triangle[i] = pixel.isObject ? static_cast<std::int64_t>(pixel.triangle) : -1;
                 distance[i] = static_cast<double>(pixel.distance) * step;
@@ -151,6 +165,7 @@ private:
 
     Numbers numbers_;
     Device device_;
+    std::unique_ptr<AttributeImage> room_;
 };
 
 } // namespace
@@ -160,9 +175,11 @@ void bind_model(nb::module_& module) {
         .def(nb::init<const Values&, const FieldTuples&>(), "numbers"_a, "layouts"_a,
              "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh) and its record layouts: record -> field -> (offset, width, signed).")
         .def("load", &Model::load, "records"_a, "triangle_base"_a, "attribute_base"_a, "Loads the column memory: uint8 [records, bytes].")
+        .def("add_room", &Model::addRoom, "sizes"_a, "layouts"_a, "Gives the device a physical-attribute memory, of the manifest's attributes.")
+        .def("load_room", &Model::loadRoom, "memory"_a, "words"_a, "Fills one of its memories by name: uint8 [words, bytes], low byte first.")
         .def("start", &Model::start, "registers"_a, "Takes registers over (name -> value); clears counters and errors.")
         .def("rows", &Model::rows, "first"_a, "last"_a,
-             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
+             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light left with the object there (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
         .def("trace", &Model::trace, "origins"_a, "directions"_a, "Packed ids int64 [n] of the closest hits, -1 for a miss; int64 [n, 3] grid steps.")
         .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a, "high"_a,
              "Each ray against one box (planes corner + (low << exponent), corner + (high << exponent), units): enters (the object's box), is_hit, "

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -95,6 +96,13 @@ class AttributeLayout:
                 f"background layout: {name} is {available:,}, but {self.width}x{self.height} pixels in tiles of"
                 f" {self.tile_size} need {-(-needed_bits // 8):,} at least: raise it, or take larger tiles"
             )
+
+    @staticmethod
+    def from_config(section: Mapping[str, Any]) -> AttributeLayout:
+        """The layout of a configuration's section ``physicalAttributeMemory``."""
+        names = {"tileSize": "tile_size", "paletteSize": "palette_size", "mapBytes": "map_bytes"}
+        names |= {"planeBytes": "plane_bytes", "shellPlanes": "shell_planes"}
+        return AttributeLayout(**{names.get(key, key): value for key, value in section.items() if key != "shared"})
 
     def to_config(self) -> dict[str, Any]:
         """The section ``physicalAttributeMemory`` of a configuration with these sizes."""

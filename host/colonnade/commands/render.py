@@ -23,6 +23,7 @@ from colonnade.commands.options import FILE, configuration_options, finish, json
 @click.option("--size", metavar="WxH", help="Size of the frame in pixels, e.g. 640x480. Default: the scene's.")
 @click.option("--mesh", metavar="MESH", help="A mesh (name or file) in place of the scene's.")
 @click.option("--background", type=FILE, metavar="DIR", help="A background in place of the scene's.")
+@click.option("--relit", is_flag=True, help="Show a room in the scene's lights, not the camera's photo of it.")
 @click.option("--output", type=FILE, metavar="FILE", help="Write the picture, a PNG.")
 @click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances, an .npz file.")
 @json_option
@@ -34,6 +35,7 @@ def render(
     size: str | None,
     mesh: str | None,
     background: Path | None,
+    relit: bool,
     output: Path | None,
     hits_file: Path | None,
     json_file: Path | None,
@@ -59,6 +61,7 @@ def render(
         background=background,
         hits=hits_file is not None,
         progress=progress.for_terminal(),
+        relit=relit,
     )
     if output is not None:
         write_png(output, result.image)

@@ -12,6 +12,13 @@ struct RoomView {
     Vector offset;
     int offsetShift, exponent;
     int shellPlanes;
+    std::array<std::int64_t, 2> step;
+};
+
+/// What a point of the room is made of; the normal in object space, 11 fraction bits.
+struct RoomTexel {
+    Colour albedo;
+    Vector normal;
 };
 
 /// Where a ray meets the room: it has the albedo and the normal of pixel (x, y), or of a shell's entry. The way there is travel · 2^travelExponent
@@ -49,7 +56,54 @@ public:
         return point;
     }
 
+    /// The point that the map's own camera sees in pixel (x, y) of the frame; `direction` is that of the pixel's ray.
+    RoomPoint seen(std::int64_t x, std::int64_t y, const Vector& direction, const RoomView& view) const {
+        RoomPoint point{};
+        Vector place{};
+        const std::array<std::int64_t, 2> pixel = {x, y};
+        for (int a = 0; a < 2; ++a) place[a] = ((2 * pixel[a] + 1) * view.step[a]) >> stepGuard;
+        point.x = static_cast<int>(clamp<std::int64_t>(place[0] >> (f_ - mapLog), 0, sizes_.width - 1));
+        point.y = static_cast<int>(clamp<std::int64_t>(place[1] >> (f_ - mapLog), 0, sizes_.height - 1));
+        MapRay ray{};
+        ray.position = place;
+        const Depth depth = depthOf(ray, image_.planeOf(image_.cellAt(point.x, point.y)), 0);
+        const std::int64_t w = -inW(depth.value, depth);
+        WideVector towards;
+        for (int i = 0; i < 3; ++i) towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
+        ray.towardsShift = blockNormalise(towards, f_, ray.towards);
+        if (w <= 0 || ray.towards[2] <= 0) return point;
+        point.kind = RoomPoint::Kind::map;
+        const Normalised speed = normalise(UnsignedWide(Wide(w) * ray.towards[2]), f_);
+        point.travel = reciprocal(speed.mantissa);
+        point.travelExponent = 1 - speed.exponent + view.exponent - ray.towardsShift;
+        return point;
+    }
+
+    /// Albedo and normal of a point.
+    RoomTexel texelOf(const RoomPoint& point, const RoomView& view) const {
+        const bool isShell = point.kind == RoomPoint::Kind::shell;
+        const Rgb12 albedo = isShell ? image_.shell(point.entry).albedo : image_.albedoAt(point.x, point.y);
+        const Normal12 normal = isShell ? image_.shell(point.entry).normal : image_.normalAt(point.x, point.y);
+        RoomTexel texel{{albedo.r, albedo.g, albedo.b}, {}};
+        for (int a = 0; a < 3; ++a)
+            texel.normal[a] = nearestEven<std::int64_t>(view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z, rotationFraction);
+        return texel;
+    }
+
+    /// Where a ray has met the room, grid steps; at most as far as a scene reaches.
+    WideVector reached(const WideVector& origin, const Vector& direction, const RoomPoint& point) const {
+        WideVector result;
+        const Wide most = largest(n_.sceneBits);
+        for (int a = 0; a < 3; ++a) {
+            const Wide way = point.travelExponent > n_.sceneBits ? (direction[a] < 0 ? -most : direction[a] > 0 ? most : 0)
+                                                                 : floorShift<Wide>(Wide(point.travel) * direction[a], -point.travelExponent);
+            result[a] = clamp<Wide>(origin[a] + way, -most, most);
+        }
+        return result;
+    }
+
 private:
+    static constexpr int stepGuard = 12, rotationFraction = 14;
     /// A plane along a ray: how far the ray is in front of it, value + slope · s, in steps of 2^(exponent − 22).
     struct Depth {
         int id;

@@ -1,5 +1,8 @@
 // The device without time: memories and registers are loaded, pixels come out, bit for bit as from the RTL.
 #pragma once
+#include <optional>
+
+#include "background.hpp"
 #include "bounce.hpp"
 
 namespace colonnade {
@@ -13,9 +16,10 @@ struct Errors {
     bool stackOverflow, illegalRecord, watchdog;
 };
 
-/// One pixel of the stream. `triangle` (packed id) and `distance` (t from the camera, grid steps) hold for object pixels.
+/// One pixel of the stream. `triangle` (packed id) and `distance` (t from the camera, grid steps) hold for object pixels; `ratio`, what is left of the
+/// light with the object there, 12 fraction bits, for those of the room.
 struct Pixel {
-    Colour colour;
+    Colour colour, ratio;
     bool isObject;
     std::uint32_t triangle;
     Wide distance;
@@ -40,6 +44,8 @@ struct Frame {
     Bounds bounds;
     Lighting lighting;
     std::size_t recordCount, triangleBase, triangleRecords, attributeBase;
+    bool hasRoom;
+    RoomView room;
 
     Frame() = default;
     explicit Frame(const Registers& registers) {
@@ -91,6 +97,17 @@ struct Frame {
         triangleBase = static_cast<std::size_t>(take("scene.triangleBase"));
         triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));
         attributeBase = static_cast<std::size_t>(take("scene.attributeBase"));
+        hasRoom = takeIfThere("room.isThere") != 0;
+        if (!hasRoom) return;
+        for (int row = 0; row < 3; ++row) {
+            room.matrix[row] = vector("room.matrix[" + std::to_string(row) + "]");
+            room.rotation[row] = vector("room.rotation[" + std::to_string(row) + "]");
+        }
+        room.offset = vector("room.offset");
+        room.offsetShift = static_cast<int>(take("room.offsetShift"));
+        room.exponent = static_cast<int>(take("room.exponent"));
+        room.shellPlanes = static_cast<int>(take("room.shellPlanes"));
+        room.step = {take("room.stepX"), take("room.stepY")};
     }
 
     /// What the names of a table's entry begin with.
@@ -130,6 +147,9 @@ public:
         }
     }
 
+    /// What the physical-attribute memory holds; it outlives the device.
+    void load(const AttributeImage& image) { background_.emplace(numbers_, image); }
+
     /// Takes the registers over and clears counters and errors, as a start of a frame does.
     void start(const Registers& registers) {
         frame_ = Frame(registers);
@@ -147,16 +167,17 @@ public:
     }
 
     Pixel render(std::int64_t x, std::int64_t y) {
-        Pixel pixel{frame_.lighting.background, false, 0, 0};
-        ++counters.raysPrimary;
-        if (!frame_.maySeeObject(x, y)) return pixel;
         const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
-        Path path{{one, one, one}, {0, 0, 0}, 0};
+        Pixel pixel{frame_.lighting.background, {one, one, one}, false, 0, 0};
+        ++counters.raysPrimary;
         RayRequest request = primaryRay(x, y);
+        if (!frame_.maySeeObject(x, y)) return seen(pixel, x, y, request);
+        Path path{{one, one, one}, {0, 0, 0}, 0};
         for (bool isPrimary = true;; isPrimary = false) {
             const Ray ray = setUp(request, frame_.bounds, numbers_);
             const Hit hit = trace(ray);
-            if (!hit.found) return finish(pixel, path, frame_.lighting.background);
+            if (!hit.found && isPrimary) return seen(pixel, x, y, request);
+            if (!hit.found) return finish(pixel, path, met(request));
             if (isPrimary) {
                 ++counters.hits;
                 pixel.isObject = true;
@@ -169,7 +190,7 @@ public:
             const Surface surface = surfaceOf(ray, hit, face, numbers_);
             const Material& material = frame_.lighting.materialOf(face);
             if (material.kind == MaterialKind::diffuse) return finish(pixel, path, light(surface, material));
-            if (!goOn(surface, material, path, request)) return finish(pixel, path, frame_.lighting.background);
+            if (!goOn(surface, material, path, request)) return finish(pixel, path, met(request));
         }
     }
 
@@ -220,13 +241,16 @@ private:
 
     std::int64_t white() const { return (std::int64_t(1) << numbers_.colourBits) - 1; }
 
-    Colour light(const Surface& surface, const Material& material) {
+    /// Light that falls onto a surface off which shadow rays start at `origin`: all of it, and what the object lets through.
+    struct Incoming {
+        Colour all, visible;
+    };
+
+    Incoming incoming(const WideVector& origin, const WideVector& normal, bool shadows) {
         const Lighting& lighting = frame_.lighting;
-        const WideVector normal = shadingNormal(surface, lighting.flat);
-        const WideVector origin = offSurface(surface.point, surface.facing, lighting.offset, numbers_);
-        Colour incoming = lighting.ambient;
+        Incoming result{lighting.ambient, lighting.ambient};
         for (const Light& source : lighting.lights) {
-            const Illumination illumination = illuminate(origin, normal, source, lighting.shadows, numbers_);
+            const Illumination illumination = illuminate(origin, normal, source, lighting.shadows && shadows, numbers_);
             Occlusion met = Occlusion::none;
             if (illumination.needsShadowRay) {
                 ++counters.raysShadow;
@@ -234,31 +258,88 @@ private:
             }
             for (int channel = 0; channel < 3; ++channel) {
                 const std::int64_t direct = illumination.direct[channel];
-                if (met == Occlusion::none) incoming[channel] += direct;
-                if (met == Occlusion::clear) incoming[channel] += (direct * lighting.clearness) >> numbers_.lightFraction;
+                result.all[channel] += direct;
+                if (met == Occlusion::none) result.visible[channel] += direct;
+                if (met == Occlusion::clear) result.visible[channel] += (direct * lighting.clearness) >> numbers_.lightFraction;
             }
         }
+        return result;
+    }
+
+    Colour reflectedBy(const Colour& albedo, const Colour& light) const {
         Colour colour;
-        for (int channel = 0; channel < 3; ++channel) colour[channel] = reflected(material.albedo[channel], incoming[channel], numbers_);
+        for (int channel = 0; channel < 3; ++channel) colour[channel] = reflected(albedo[channel], light[channel], numbers_);
         return colour;
+    }
+
+    Colour light(const Surface& surface, const Material& material) {
+        const WideVector origin = offSurface(surface.point, surface.facing, frame_.lighting.offset, numbers_);
+        return reflectedBy(material.albedo, incoming(origin, shadingNormal(surface, frame_.lighting.flat), true).visible);
+    }
+
+    /// The room's light at a point of it; `normal` has 11 fraction bits.
+    Incoming roomLight(const WideVector& point, const Vector& normal, bool shadows) {
+        return incoming(offSurface(point, normal, frame_.lighting.offset, numbers_), {normal[0], normal[1], normal[2]}, shadows);
+    }
+
+    /// The colour of what a ray meets that meets nothing of the object.
+    Colour met(const RayRequest& ray, bool shadows = true) {
+        if (!frame_.hasRoom || !background_) return frame_.lighting.background;
+        Vector direction;
+        blockNormalise(ray.direction, numbers_.shadeBits, direction);
+        const RoomPoint point = background_->meet(ray.origin, direction, frame_.room);
+        if (point.kind == RoomPoint::Kind::nothing) return frame_.lighting.background;
+        const RoomTexel texel = background_->texelOf(point, frame_.room);
+        return reflectedBy(texel.albedo, roomLight(background_->reached(ray.origin, direction, point), texel.normal, shadows).visible);
+    }
+
+    /// A pixel that shows the room itself.
+    Pixel seen(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray) {
+        if (!frame_.hasRoom || !background_) return pixel;
+        Vector direction;
+        blockNormalise(ray.direction, numbers_.shadeBits, direction);
+        const RoomPoint point = background_->seen(x, y, direction, frame_.room);
+        if (point.kind == RoomPoint::Kind::nothing) return pixel;
+        const RoomTexel texel = background_->texelOf(point, frame_.room);
+        const Incoming light = roomLight(background_->reached(ray.origin, direction, point), texel.normal, true);
+        pixel.colour = reflectedBy(texel.albedo, light.visible);
+        for (int channel = 0; channel < 3; ++channel) pixel.ratio[channel] = ratioOf(light.visible[channel], light.all[channel]);
+        return pixel;
+    }
+
+    /// part / whole, 12 fraction bits, 1 for 0 / 0; part is not the larger one.
+    std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const {
+        const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
+        if (part == whole) return one;
+        const Normalised dividend = normalise(UnsignedWide(part), numbers_.mantissaBits), divisor = normalise(UnsignedWide(whole), numbers_.mantissaBits);
+        const Wide quotient = divide(dividend.mantissa, divisor.mantissa, numbers_.lightFraction);
+        return static_cast<std::int64_t>(std::min<Wide>(one, floorShift<Wide>(quotient, divisor.exponent - dividend.exponent)));
     }
 
     /// Sends the path on from a mirror or glass; false if the next ray meets the background only.
     bool goOn(const Surface& surface, const Material& material, Path& path, RayRequest& request) {
         const Bounce next = bounce(surface, material, frame_.lighting.flat, frame_.lighting.offset, numbers_);
+        Colour behind = frame_.lighting.background;
+        if (frame_.hasRoom && next.share != 0) {
+            RayRequest reflection = next.ray;
+            // Schlick's part starts on the other side of the surface than the refracted ray
+            reflection.origin = offSurface(surface.point, surface.facing, frame_.lighting.offset, numbers_);
+            for (int a = 0; a < 3; ++a) reflection.direction[a] = next.reflection[a];
+            behind = met(reflection, false);
+        }
         for (int channel = 0; channel < 3; ++channel) {
             std::int64_t& throughput = path.throughput[channel];
             // All ones is 1.0
             const std::int64_t albedo = material.albedo[channel] + (material.albedo[channel] >> (numbers_.colourBits - 1));
             if (!surface.backSide || material.kind == MaterialKind::mirror) throughput = (throughput * albedo) >> numbers_.lightFraction;
             const std::int64_t share = (throughput * next.share) >> numbers_.lightFraction;
-            path.gathered[channel] = std::min(white(), path.gathered[channel] + ((share * frame_.lighting.background[channel]) >> numbers_.lightFraction));
+            path.gathered[channel] = std::min(white(), path.gathered[channel] + ((share * behind[channel]) >> numbers_.lightFraction));
             throughput -= share;
         }
+        request = next.ray;
         if (path.bounces == frame_.lighting.bounces) return false;
         ++path.bounces;
         ++(next.isRefraction ? counters.raysRefraction : counters.raysReflection);
-        request = next.ray;
         return true;
     }
 
@@ -336,6 +417,7 @@ private:
     std::vector<Node> nodes_;
     std::vector<Triangles> triangles_;
     std::vector<Face> faces_;
+    std::optional<Background> background_;
     Frame frame_;
 };
 

@@ -172,8 +172,44 @@ final class SceneMap(countBits: Int) extends Bundle {
   val attributeBase   = UInt(countBits.W)
 }
 
-/** What the host writes before a frame. Constant while a frame runs. */
-final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
+/** Where the room is; docs/background.md.
+  *
+  * A position P in grid steps has the projection p = matrix · P + (offset << offsetShift), in steps of 2^-exponent. It is
+  * seen at the map's pixel 1024 · (p.x, p.y) / p.z, and its w, the plane map's unit over its depth, is 1 / p.z.
+  */
+final class RoomView(numbers: NumberFormats) extends Bundle {
+  val matrix      = Vec(3, Vec3(SInt(numbers.macBits.W)))
+  val offset      = Vec3(SInt(numbers.macBits.W))
+  val offsetShift = UInt(NumberFormats.bitLength(numbers.sceneBits).W)
+  val exponent    = SInt((NumberFormats.bitLength(2 * numbers.sceneBits) + 1).W)
+
+  /** Turns a normal of the maps, in view space, into object space. */
+  val rotation = Vec(3, Vec3(new Fixed(FixedPointFormat.signed(RoomView.rotationBits, RoomView.rotationFraction))))
+
+  /** Of the map's 1024 pixels, half a pixel of the frame: pixel (x, y)'s centre is at (2x + 1, 2y + 1) of these. */
+  val stepX = UInt((numbers.shadeBits + RoomView.stepGuard).W)
+  val stepY = UInt((numbers.shadeBits + RoomView.stepGuard).W)
+
+  /** Entries of the shell. */
+  val shellPlanes = UInt(8.W)
+
+  /** Rays that meet nothing of the object meet the room; otherwise the background's colour. */
+  val isThere = Bool()
+}
+
+object RoomView {
+  val rotationBits:     Int = 16
+  val rotationFraction: Int = 14
+
+  /** Fraction bits of a step beyond those of a place in the map. */
+  val stepGuard: Int = 12
+}
+
+/** What the host writes before a frame. Constant while a frame runs.
+  *
+  * A record, not a bundle: without a physical-attribute memory there is no room.
+  */
+final class FrameRegisters(config: ColonnadeConfig) extends Record {
   private val numbers = config.numbers
 
   val frame      = new FrameSettings(numbers)
@@ -185,6 +221,21 @@ final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
   val materials  = Vec(config.frame.materials, new Material(config))
   val bounds     = new Bounds(numbers)
   val scene      = new SceneMap(RecordFormats.idBits(config))
+  val room       = config.physicalAttributeMemory.map(_ => new RoomView(numbers))
+
+  val elements: SeqMap[String, Data] = FrameRegisters.fields(
+    Seq(
+      "frame"      -> frame,
+      "camera"     -> camera,
+      "lights"     -> lights,
+      "ambient"    -> ambient,
+      "shading"    -> shading,
+      "background" -> background,
+      "materials"  -> materials,
+      "bounds"     -> bounds,
+      "scene"      -> scene
+    ) ++ room.map("room" -> _): _*
+  )
 }
 
 object FrameRegisters {
