@@ -80,9 +80,9 @@ object ArbitraryConfig {
   }
 
   private val frame = for {
-    maxWidth  <- Gen.chooseNum(8, 4096)
-    maxHeight <- Gen.chooseNum(8, 4096)
-    tileSize  <- Gen.oneOf(4, 8, 16, 32)
+    maxWidth   <- Gen.chooseNum(8, 4096)
+    maxHeight  <- Gen.chooseNum(8, 4096)
+    tileSize   <- Gen.oneOf(4, 8, 16, 32)
     materials  <- Gen.chooseNum(1, 256)
     lights     <- Gen.chooseNum(1, 8)
     maxBounces <- Gen.chooseNum(0, 15)

@@ -139,13 +139,13 @@ object ConfigIO {
       ),
       "physicalAttributeMemory" -> config.physicalAttributeMemory.fold[ujson.Value](ujson.Null)(written),
       "frame"                   -> ujson.Obj(
-        "maxWidth"  -> frame.maxWidth,
-        "maxHeight" -> frame.maxHeight,
-        "tileSize"  -> frame.tileSize,
-        "materials" -> frame.materials,
-        "lights"    -> frame.lights,
+        "maxWidth"   -> frame.maxWidth,
+        "maxHeight"  -> frame.maxHeight,
+        "tileSize"   -> frame.tileSize,
+        "materials"  -> frame.materials,
+        "lights"     -> frame.lights,
         "maxBounces" -> frame.maxBounces,
-        "hits"      -> frame.hits
+        "hits"       -> frame.hits
       )
     )
   }

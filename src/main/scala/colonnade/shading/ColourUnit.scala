@@ -104,27 +104,28 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val sum        = Reg(UInt(sumBits.W))
   private val colours    = Reg(Vec(3, UInt(colourBits.W)))
 
-  private val reflects = lights
-  private val passes   = lights + 1
-  private val lastStep = Mux(isEnd, passes.U, 2.U)
+  private val reflects     = lights
+  private val passes       = lights + 1
+  private val lastStep     = Mux(isEnd, passes.U, 2.U)
   private val isBackground = Reg(Bool())
 
   // Take one
   private val turns = io.turn.map(_.fire).getOrElse(false.B)
   io.turn.foreach(_.ready := !isBusy)
   io.end.ready := !isBusy && !io.turn.map(_.valid).getOrElse(false.B)
-  private val takes       = turns || io.end.fire
-  private val taken       = io.turn.map(turn => Mux(turn.valid, turn.bits.context, io.end.bits.context)).getOrElse(io.end.bits.context)
+  private val takes = turns || io.end.fire
+  private val taken =
+    io.turn.map(turn => Mux(turn.valid, turn.bits.context, io.end.bits.context)).getOrElse(io.end.bits.context)
   private val surfaceRead = surfaces.read(taken, takes)
   private val pathRead    = paths.map(_.read(taken, takes))
   arrives := takes
   when(takes) {
-    isBusy  := true.B
-    isEnd   := !turns
-    context := taken
-    channel := 0.U
-    isThere := false.B
-    step    := Mux(!turns && io.end.bits.isBackground, passes.U, 0.U)
+    isBusy       := true.B
+    isEnd        := !turns
+    context      := taken
+    channel      := 0.U
+    isThere      := false.B
+    step         := Mux(!turns && io.end.bits.isBackground, passes.U, 0.U)
     isBackground := io.end.bits.isBackground
     occlusions   := io.end.bits.occlusions
     io.turn.foreach { turn =>
@@ -149,20 +150,25 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     }
   }
 
-  private def of[T <: Data](channels: Seq[T]): T = MuxLookup(channel, channels(2))(Seq(0.U -> channels(0), 1.U -> channels(1)))
+  private def of[T <: Data](channels: Seq[T]): T =
+    MuxLookup(channel, channels(2))(Seq(0.U -> channels(0), 1.U -> channels(1)))
 
   // One product
-  private val whole      = (1 << fraction).U(shareBits.W)
-  private val clearness  = io.shading.clearness.map(_.natural).getOrElse(whole)
-  private val light      = step(log2Ceil(lights.max(2)) - 1, 0)
+  private val whole                             = (1 << fraction).U(shareBits.W)
+  private val clearness                         = io.shading.clearness.map(_.natural).getOrElse(whole)
+  private val light                             = step(log2Ceil(lights.max(2)) - 1, 0)
   private def at[T <: Data](entries: Vec[T]): T = if (lights == 1) entries.head else entries(light)
   private val passing    = MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> whole, Occlusion.clear -> clearness))
   private val background = of(io.background.channels)
   private val albedoNow  = of(albedo)
 
   /** All ones is 1.0. */
-  private val tint  = Mux(isTinted, albedoNow +& albedoNow(colourBits - 1), whole)
-  private val left  = Mux(isEnd, Mux(step < reflects.U, of(at(directs)), Mux(isBackground, background, sum)), Mux(step === 2.U, sum, of(throughput)))
+  private val tint = Mux(isTinted, albedoNow +& albedoNow(colourBits - 1), whole)
+  private val left = Mux(
+    isEnd,
+    Mux(step < reflects.U, of(at(directs)), Mux(isBackground, background, sum)),
+    Mux(step === 2.U, sum, of(throughput))
+  )
   private val right = Mux(
     isEnd,
     Mux(step < reflects.U, passing, Mux(step === reflects.U, albedoNow, of(throughput))),
@@ -170,9 +176,9 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   )
   private val product = Reg(UInt((sumBits + shareBits).W))
   product := left * right
-  private val part    = Rounding.floor(product, fraction)
-  private val colour  = Rounding.saturate(part, colourBits)
-  private val total   = Rounding.saturate(of(gathered) +& part, colourBits)
+  private val part   = Rounding.floor(product, fraction)
+  private val colour = Rounding.saturate(part, colourBits)
+  private val total  = Rounding.saturate(of(gathered) +& part, colourBits)
 
   // What it means
   private val leaves    = RegInit(false.B)

@@ -137,10 +137,10 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
   squareRoot.io.radicand.bits  := Mux(exponent(0), mantissa, mantissa >> 1)
 
   private val divides = step === CosineStep.root && isHigh
-  squareRoot.io.root.ready             := divides && divider.io.division.ready
+  squareRoot.io.root.ready := divides && divider.io.division.ready
   private val isFalloff = step === CosineStep.fall
-  divider.io.division.valid            := isFalloff || (divides && squareRoot.io.root.valid)
-  divider.io.division.bits.numerator   :=
+  divider.io.division.valid          := isFalloff || (divides && squareRoot.io.root.valid)
+  divider.io.division.bits.numerator :=
     Mux(isFalloff, reach, Rounding.floor(dot, formats.dotBits - numbers.mantissaBits))
   divider.io.division.bits.denominator := Mux(
     isFalloff,

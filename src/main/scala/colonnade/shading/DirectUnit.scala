@@ -43,8 +43,8 @@ final class DirectUnit(config: ColonnadeConfig) extends Module {
   private val direct     = Reg(Vec(3, UInt(NumberFormats.lightBits.W)))
 
   // Factors
-  private val light   = io.colour.channels.map(_.natural)
-  private val falls   = step === DirectStep.fall
+  private val light         = io.colour.channels.map(_.natural)
+  private val falls         = step === DirectStep.fall
   private val channelColour = MuxLookup(channel, light(2))(Seq(0.U -> light(0), 1.U -> light(1)))
   io.factors.valid       := falls || step === DirectStep.shine
   io.factors.bits.wide   := brightness.zext.pad(formats.wideBits)
@@ -68,8 +68,11 @@ final class DirectUnit(config: ColonnadeConfig) extends Module {
       when(io.factors.fire)(step := DirectStep.fallen)
     }
     is(DirectStep.fallen) {
-      brightness := Rounding.narrow(Rounding.floor(io.product.asUInt, NumberFormats.lightFraction), formats.brightnessBits)
-      step       := DirectStep.shine
+      brightness := Rounding.narrow(
+        Rounding.floor(io.product.asUInt, NumberFormats.lightFraction),
+        formats.brightnessBits
+      )
+      step := DirectStep.shine
     }
     is(DirectStep.shine) {
       when(io.factors.fire) {

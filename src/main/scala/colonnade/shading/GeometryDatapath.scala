@@ -115,10 +115,10 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
       val weight = Mux(io.isFlat, (if (corner == 0) 1 else 0).S, weights(0).zext)
       isCorner -> (weight -> Mux(io.isFlat, geometricNormal(0), normalOf(corner)))
     } ++ control.slope.zip(slopeDigits).map { case (isDigit, digit) => isDigit -> (distance -> digit) } ++ Seq(
-      control.raise   -> (io.offset.zext -> geometricNormal(0)),
-      control.square  -> (scaled                     -> scaled),
-      control.project -> (scaled                     -> Rounding.narrow(normal(0), formats.narrowBits)),
-      control.lengths -> (normalLength.zext          -> lengthMantissa.zext)
+      control.raise   -> (io.offset.zext    -> geometricNormal(0)),
+      control.square  -> (scaled            -> scaled),
+      control.project -> (scaled            -> Rounding.narrow(normal(0), formats.narrowBits)),
+      control.lengths -> (normalLength.zext -> lengthMantissa.zext)
     )
   io.factors.valid       := choices.map(_._1).reduce(_ || _)
   io.factors.bits.wide   := Mux1H(choices.map { case (when, (wide, _)) => when -> wide.pad(formats.wideBits) })
@@ -255,7 +255,8 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   io.angle.exponent := normalExponent +& lightExponent
 
   // The light's squared distance has 2 · shadeBits - 1 + lightExponent bits, after its components moved up by lightZeros
-  private val moved    = 2 * (formats.vectorBits - 1 - formats.shadeBits) + 2 * formats.shadeBits - 1 - numbers.mantissaBits
+  private val moved =
+    2 * (formats.vectorBits - 1 - formats.shadeBits) + 2 * formats.shadeBits - 1 - numbers.mantissaBits
   private val squaredBits = moved.S +& lightExponent.zext -& (lightZeros << 1).zext
   io.falloff.reach    := io.light.reachMantissa
   io.falloff.mantissa := lightLength

@@ -140,5 +140,6 @@ final class Shader(config: ColonnadeConfig) extends Module {
   io.busy := !geometry.io.request.ready
 
   /** A light's entry; there may be only one. */
-  private def at[T <: Data](entries: Vec[T], index: UInt): T = if (config.frame.lights == 1) entries.head else entries(index)
+  private def at[T <: Data](entries: Vec[T], index: UInt): T =
+    if (config.frame.lights == 1) entries.head else entries(index)
 }

@@ -50,7 +50,8 @@ final class ShaderFormats(numbers: NumberFormats) {
   val lengthsBits: Int = 2 * shadeBits
 
   /** Log2 of a light's reach over its distance, both squared. */
-  val falloffExponentBits: Int = NumberFormats.bitLength(4 * numbers.sceneBits + 2 * shadeBits + numbers.mantissaBits) + 2
+  val falloffExponentBits: Int =
+    NumberFormats.bitLength(4 * numbers.sceneBits + 2 * shadeBits + numbers.mantissaBits) + 2
 
 }
 

@@ -18,7 +18,7 @@ final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
 
   /** Results wanted of the hit in work; one at least. */
   val lightCount = Input(UInt(NumberFormats.bitLength(config.frame.lights).W))
-  val unitShift = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
+  val unitShift  = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
 
   /** To the multiplier, which answers in the next cycle. */
   val factors = Valid(new Factors(formats))

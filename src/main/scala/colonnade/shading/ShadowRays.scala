@@ -38,19 +38,20 @@ final class ShadowRays(config: ColonnadeConfig) extends Module {
   private val origins = ContextTable(config, Vec3(new Fixed(scene)))
   when(io.surface.valid) { origins.write(io.surface.bits.context, io.surface.bits.origin) }
 
-  private val isBusy = RegInit(false.B)
-  private val step   = Reg(UInt(3.W))
-  private val asked  = Reg(new ShadowQuestion(config))
-  private val origin = Reg(Vec3(new Fixed(scene)))
-  private val placed = Reg(SInt(scene.width.W))
+  private val isBusy  = RegInit(false.B)
+  private val step    = Reg(UInt(3.W))
+  private val asked   = Reg(new ShadowQuestion(config))
+  private val origin  = Reg(Vec3(new Fixed(scene)))
+  private val placed  = Reg(SInt(scene.width.W))
   private val towards = Reg(Vec(3, SInt((scene.width + 1).W)))
 
   // The surface comes with step 0; the light's axes are placed in steps 0 to 2, and the way to it is known after step 3
   private val read = origins.read(io.question.bits.context, io.question.fire)
   when(step === 0.U) { origin := read }
   private val light    = if (config.frame.lights == 1) io.lights.head else io.lights(asked.light)
-  private val position = light.position.axes.zipWithIndex.tail.foldLeft(light.position.x) { case (other, (axis, index)) =>
-    Mux(step === index.U, axis, other)
+  private val position = light.position.axes.zipWithIndex.tail.foldLeft(light.position.x) {
+    case (other, (axis, index)) =>
+      Mux(step === index.U, axis, other)
   }
   placed := Rounding.narrow((position.pad(scene.width) << io.unitShift).asSInt, scene.width)
   for (axis <- 0 until 3) {

@@ -63,11 +63,11 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   io.vertex := Mux(io.schedule.is(0), vertices(0), Mux(io.schedule.is(1), vertices(1), vertices(2)))
   io.ray    := candidate.ray
 
-  io.tag.valid           := isOccupied
-  io.tag.bits.context    := candidate.context
-  io.tag.bits.id         := record.firstTriangle + index
-  io.tag.bits.isLast     := isLast
-  io.tag.bits.isClear    := triangles.indices.tail.foldLeft(record.isClear(0)) { case (other, k) =>
+  io.tag.valid        := isOccupied
+  io.tag.bits.context := candidate.context
+  io.tag.bits.id      := record.firstTriangle + index
+  io.tag.bits.isLast  := isLast
+  io.tag.bits.isClear := triangles.indices.tail.foldLeft(record.isClear(0)) { case (other, k) =>
     Mux(index === k.U, record.isClear(k), other)
   }
   io.tag.bits.isAbsent   := record.count === 0.U

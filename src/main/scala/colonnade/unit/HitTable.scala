@@ -50,14 +50,14 @@ final class HitTable(config: ColonnadeConfig) extends Module {
     val hit    = Output(new TriangleHit(config))
   })
 
-  private val bests   = Reg(Vec(contexts, new Fixed(formats.grid)))
-  private val ids     = Reg(Vec(contexts, UInt(RecordFormats.idBits(config).W)))
-  private val limits  = Reg(Vec(contexts, new Fixed(formats.units)))
-  private val hasHit  = Reg(Vec(contexts, Bool()))
+  private val bests  = Reg(Vec(contexts, new Fixed(formats.grid)))
+  private val ids    = Reg(Vec(contexts, UInt(RecordFormats.idBits(config).W)))
+  private val limits = Reg(Vec(contexts, new Fixed(formats.units)))
+  private val hasHit = Reg(Vec(contexts, Bool()))
 
   /** A shadow ray has met a clear triangle. */
   private val hasPassed = Reg(Vec(contexts, Bool()))
-  private val details = ContextTable(config, new HitDetails(config))
+  private val details   = ContextTable(config, new HitDetails(config))
 
   // Hold a result against the best so far
   private val context  = io.result.bits.context
@@ -81,14 +81,14 @@ final class HitTable(config: ColonnadeConfig) extends Module {
   }
 
   when(io.search.valid) {
-    bests(io.search.bits.context)  := io.search.bits.limit
-    limits(io.search.bits.context) := LimitUnits(config.numbers)(io.search.bits.limit)
-    hasHit(io.search.bits.context) := false.B
+    bests(io.search.bits.context)     := io.search.bits.limit
+    limits(io.search.bits.context)    := LimitUnits(config.numbers)(io.search.bits.limit)
+    hasHit(io.search.bits.context)    := false.B
     hasPassed(io.search.bits.context) := false.B
   }
 
-  io.limits := limits
-  io.hasHit := hasHit
+  io.limits     := limits
+  io.hasHit     := hasHit
   io.occlusions := VecInit(hasHit.zip(hasPassed).map { case (hit, passed) =>
     Mux(hit, Occlusion.opaque, Mux(passed, Occlusion.clear, Occlusion.none))
   })

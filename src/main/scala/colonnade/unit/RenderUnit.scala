@@ -6,7 +6,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
 import colonnade.numbers.Rounding
 import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
-import colonnade.shading.{ColourUnit, ShadowRays, Shader}
+import colonnade.shading.{ColourUnit, Shader, ShadowRays}
 import colonnade.traversal.{TriangleLanes, Visit}
 
 /** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
@@ -156,23 +156,23 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   // A surface that ends its path asks for its lights, one after the other
   private val lit = shader.io.lit
-  lit.ready                                    := true.B
-  controller.io.shaded.valid                   := lit.valid
-  controller.io.shaded.bits.context            := lit.bits.context
-  controller.io.shaded.bits.needsShadowRays    := lit.bits.needsShadowRays
-  shadowRays.io.lights                         := io.registers.lights
-  shadowRays.io.unitShift                      := io.registers.frame.unitShift
-  shadowRays.io.surface.valid                  := lit.valid
-  shadowRays.io.surface.bits                   := lit.bits
+  lit.ready                                 := true.B
+  controller.io.shaded.valid                := lit.valid
+  controller.io.shaded.bits.context         := lit.bits.context
+  controller.io.shaded.bits.needsShadowRays := lit.bits.needsShadowRays
+  shadowRays.io.lights                      := io.registers.lights
+  shadowRays.io.unitShift                   := io.registers.frame.unitShift
+  shadowRays.io.surface.valid               := lit.valid
+  shadowRays.io.surface.bits                := lit.bits
   shadowRays.io.question :<>= controller.io.shadow
 
   // A mirror or glass turns its path; the next ray is traced as long as there are bounces left
   private val bounceCounts = Reg(Vec(contexts, chiselTypeOf(io.registers.shading.bounces.getOrElse(0.U(1.W)))))
-  bouncedRays.valid        := false.B
-  bouncedRays.bits         := DontCare
-  controller.io.bounced    := 0.U.asTypeOf(controller.io.bounced)
-  events.raysReflection    := false.B
-  events.raysRefraction    := false.B
+  bouncedRays.valid     := false.B
+  bouncedRays.bits      := DontCare
+  controller.io.bounced := 0.U.asTypeOf(controller.io.bounced)
+  events.raysReflection := false.B
+  events.raysRefraction := false.B
   for ((bounced, turn) <- shader.io.bounced.zip(colourUnit.io.turn)) {
     val bounce   = bounced.bits.bounce
     val isTraced = bounceCounts(bounce.context) =/= io.registers.shading.bounces.get
@@ -219,11 +219,11 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val leaves   = complete.valid && outgoing.io.enq.ready && !finished.valid
   controller.io.leave := leaves
   private val colour = colours.read(complete.bits, leaves)
-  private val place        = positions.read(complete.bits, leaves)
-  finished.valid         := RegNext(leaves, false.B)
-  finished.bits.x        := place.x
-  finished.bits.y        := place.y
-  finished.bits.colour   :=
+  private val place  = positions.read(complete.bits, leaves)
+  finished.valid       := RegNext(leaves, false.B)
+  finished.bits.x      := place.x
+  finished.bits.y      := place.y
+  finished.bits.colour :=
     Mux(RegEnable(controller.io.isColoured(complete.bits), leaves), colour, io.registers.background)
   finished.bits.isObject := RegEnable(isObject(complete.bits), leaves)
   finished.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))

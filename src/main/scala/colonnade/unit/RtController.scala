@@ -179,9 +179,9 @@ final class RtController(config: ColonnadeConfig) extends Module {
   }
 
   // Lit contexts ask for one light after the other, then go on
-  private val isDark   = stage.zip(wanted).map { case (at, lights) => at === Stage.lit && lights.reduce(_ || _) }
-  private val seeker   = anyOf(isDark)
-  private val wishes   = wanted(seeker.bits)
+  private val isDark = stage.zip(wanted).map { case (at, lights) => at === Stage.lit && lights.reduce(_ || _) }
+  private val seeker = anyOf(isDark)
+  private val wishes = wanted(seeker.bits)
   io.shadow.valid        := seeker.valid
   io.shadow.bits.context := seeker.bits
   io.shadow.bits.light   := PriorityEncoder(wishes)

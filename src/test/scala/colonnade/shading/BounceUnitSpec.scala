@@ -130,14 +130,14 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
         assert(cycles.max <= most, s"$name: $cycles")
       }
       // With the geometric normal, so that nothing starts over
-    def surface(eta: Int, backSide: Boolean, isGlass: Boolean = true) = {
-      val question = questions.surface().copy(isFlat = true, isGlass = isGlass, etas = Seq.fill(2)(BigInt(eta)))
-      val facing   = question.facing
-      question.copy(backSide = backSide, geometricNormal = facing.map(x => if (backSide) -x else x))
-    }
-    held("mirror", 44)(surface(8192, backSide = false, isGlass = false))
-    held("total reflection", 56)(surface(65535, backSide = true))
-    held("glass from behind", 104)(surface(5461, backSide = true))
-    held("glass from the front", 200)(surface(5461, backSide = false))
+      def surface(eta: Int, backSide: Boolean, isGlass: Boolean = true) = {
+        val question = questions.surface().copy(isFlat = true, isGlass = isGlass, etas = Seq.fill(2)(BigInt(eta)))
+        val facing   = question.facing
+        question.copy(backSide = backSide, geometricNormal = facing.map(x => if (backSide) -x else x))
+      }
+      held("mirror", 44)(surface(8192, backSide = false, isGlass = false))
+      held("total reflection", 56)(surface(65535, backSide = true))
+      held("glass from behind", 104)(surface(5461, backSide = true))
+      held("glass from the front", 200)(surface(5461, backSide = false))
   }
 }

@@ -34,7 +34,8 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
 
   private def three(value: => Int): Seq[Int] = Seq.fill(3)(value)
 
-  private def colour(): Seq[Int] = three(if (random.nextInt(4) == 0) random.nextInt(2) * white else random.nextInt(4096))
+  private def colour(): Seq[Int] =
+    three(if (random.nextInt(4) == 0) random.nextInt(2) * white else random.nextInt(4096))
 
   private def intensity(): Seq[Int] = three(if (random.nextInt(6) == 0) 65535 else random.nextInt(9000))
 
@@ -94,7 +95,9 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     val albedo       = colour()
     val directs      = Seq.fill(config.frame.lights)(intensity())
     val isBackground = random.nextInt(4) == 0
-    val met          = directs.map(_ => random.shuffle(if (config.frame.hasBounces) Occlusion.all.toList else List(Occlusion.none, Occlusion.opaque)).head)
+    val met          = directs.map(_ =>
+      random.shuffle(if (config.frame.hasBounces) Occlusion.all.toList else List(Occlusion.none, Occlusion.opaque)).head
+    )
     dut.io.surface.valid.poke(true)
     dut.io.surface.bits.context.poke(context)
     pokeUInt(dut.io.surface.bits.albedo, albedo)

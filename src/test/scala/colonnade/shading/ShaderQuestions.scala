@@ -93,7 +93,8 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
 
   /** Without a falloff, or with one that reaches somewhere near the scene, or anywhere. */
   private def source(positionBits: Int): LightSource = {
-    val reach   = if (chance(3)) BigInt(0) else (BigInt(1) << (numbers.mantissaBits - 1)) + BigInt(numbers.mantissaBits - 1, random)
+    val reach =
+      if (chance(3)) BigInt(0) else (BigInt(1) << (numbers.mantissaBits - 1)) + BigInt(numbers.mantissaBits - 1, random)
     val nearby  = 2 * numbers.gridBits - numbers.mantissaBits + random.nextInt(16) - 10
     val largest = 1 << (NumberFormats.bitLength(2 * numbers.sceneBits))
     LightSource(

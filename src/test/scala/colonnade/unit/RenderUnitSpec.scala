@@ -88,7 +88,7 @@ private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene:
   /** Events that the unit has reported. */
   var shadowRays  = 0
   var bouncedRays = 0
-  var hits       = 0
+  var hits        = 0
 
   dut.clock.setTimeout(0)
   dut.registers.poke(new Packed(new FrameRegisters(config)).pack(scene.registers))

@@ -90,7 +90,9 @@ final class SmallScene(
       "shading.shadows"      -> (if (shadows) 1 else 0),
       "frame.objectRect.y0"  -> 0,
       "frame.watchdogCycles" -> 0
-    ) ++ scene.map { case (name, value) => s"scene.$name" -> BigInt(value) } ++ bounces.map { case (name, value) => s"shading.$name" -> BigInt(value) } ++
+    ) ++ scene.map { case (name, value) => s"scene.$name" -> BigInt(value) } ++ bounces.map { case (name, value) =>
+      s"shading.$name" -> BigInt(value)
+    } ++
       materials.flatten ++ lights.flatten ++
       vector("camera.position", "xyz", at(cube / 2, cube / 2, -cube)) ++
       vector("camera.direction", "xyz", Seq(-step * wide / 2 + 1, step * high / 2, forwards).map(_ >> 2)) ++
