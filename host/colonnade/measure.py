@@ -57,9 +57,7 @@ class Run:
         scene = scene.with_mesh(self.mesh)
         if not self.mirror:
             return scene
-        return replace(
-            scene, material=replace(scene.material, kind="mirror"), paths=replace(scene.paths, bounces=1)
-        )
+        return replace(scene, material=replace(scene.material, kind="mirror"), paths=replace(scene.paths, bounces=1))
 
 
 @dataclass(frozen=True)

@@ -95,8 +95,8 @@ def _positions(view: FloatPlacement, header: ImageHeader, manifest: Manifest) ->
         if not np.abs(steps[name]).max() < reach - 1:
             edge = header.extent.edge * header.frame.scale * 2.0 ** numbers["gridFraction"]
             raise UserError(
-                f"{_spoken(name)} is {np.abs(steps[name]).max() / edge:,.0f} object-cube edges away, the hardware reaches"
-                f" {reach / edge:,.0f}: move it nearer"
+                f"{_spoken(name)} is {np.abs(steps[name]).max() / edge:,.0f} object-cube edges away, the hardware"
+                f" reaches {reach / edge:,.0f}: move it nearer"
             )
     shift, limit = 0, (1 << (numbers["macBits"] - 1)) - 1
     while max(float(np.abs(np.rint(value / 2.0**shift)).max()) for value in steps.values()) > limit:

@@ -56,12 +56,12 @@ class DeviceMarch:
         kind = np.where(met["kind"] == _MAP, np.where(met["is_hidden"], HIDDEN, HIT), LOST)
         kind = np.where(met["kind"] == _SHELL, LEFT, kind)
         z = points[:, 2]
-        u, v = met["x"] + 0.5, met["y"] + 0.5
-        seen = (kind == HIT) & (z > 0)
-        depth = np.where(seen, z, 1.0)
-        u = np.where(seen, points[:, 0] / depth * room.fx + room.cx, u)
-        v = np.where(seen, points[:, 1] / depth * room.fy + room.cy, v)
-        return Rebuilt(u, v, z, kind.astype(np.int64), met["steps"])
+        seen_u, seen_v = met["x"] + 0.5, met["y"] + 0.5
+        is_ahead = ((kind == HIT) | (kind == HIDDEN)) & (z > 0)
+        depth = np.where(is_ahead, z, 1.0)
+        u = np.where(is_ahead, points[:, 0] / depth * room.fx + room.cx, seen_u)
+        v = np.where(is_ahead, points[:, 1] / depth * room.fy + room.cy, seen_v)
+        return Rebuilt(u, v, z, seen_u, seen_v, kind.astype(np.int64), met["steps"])
 
 
 def memory_words(image: AttributeImage) -> Iterator[tuple[str, NDArray[np.uint8]]]:

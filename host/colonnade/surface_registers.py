@@ -28,7 +28,10 @@ def check_surfaces(view: FloatPlacement, manifest: Manifest) -> None:
         UserError: It says how many there may be, and which setting raises that.
     """
     frame = manifest.config["frame"]
-    for what, count, setting in (("lights", len(view.lights), "lights"), ("materials", len(view.materials), "materials")):
+    for what, count, setting in (
+        ("lights", len(view.lights), "lights"),
+        ("materials", len(view.materials), "materials"),
+    ):
         if count > int(frame[setting]):
             raise UserError(
                 f"the scene has {count} {what}, the hardware {frame[setting]}: leave some out or raise frame.{setting}"
@@ -41,7 +44,8 @@ def check_surfaces(view: FloatPlacement, manifest: Manifest) -> None:
         )
     if shiny and view.bounces > most:
         raise UserError(
-            f"the scene traces {view.bounces} bounces, the hardware {most}: lower paths.bounces or raise frame.maxBounces"
+            f"the scene traces {view.bounces} bounces, the hardware {most}: lower paths.bounces or raise"
+            " frame.maxBounces"
         )
     for material in shiny:
         if material.kind == "glass" and not 1.0 <= material.ior <= MOST_IOR:

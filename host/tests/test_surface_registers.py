@@ -74,7 +74,7 @@ def test_too_many_materials_are_refused(make_manifest: Callable[..., Manifest]) 
     mesh = load_mesh("cube")
     header = pack(mesh, manifest).header
     view = float_placement(SCENE, mesh.extent, 32, 24, (MeshMaterial(),) * 3)
-    with pytest.raises(UserError, match="the scene has 3 materials, the hardware 2: .* raise frame.materials"):
+    with pytest.raises(UserError, match=r"the scene has 3 materials, the hardware 2: .* raise frame.materials"):
         registers_of(view, header, manifest)
 
 
