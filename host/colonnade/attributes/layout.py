@@ -35,6 +35,10 @@ LABEL_BITS = 4
 BLOCKS_A_TILE_EDGE = 4
 
 
+#: What the hardware has not got a choice of.
+HOST_ONLY = ("field_bits", "plane_cells")
+
+
 @dataclass(frozen=True)
 class AttributeLayout:
     """What the configuration says of the background's maps.
@@ -108,7 +112,7 @@ class AttributeLayout:
         """The section ``physicalAttributeMemory`` of a configuration with these sizes."""
         names = {"tile_size": "tileSize", "palette_size": "paletteSize", "map_bytes": "mapBytes"}
         names |= {"plane_bytes": "planeBytes", "shell_planes": "shellPlanes"}
-        sizes = {names.get(name, name): value for name, value in asdict(self).items() if name != "field_bits"}
+        sizes = {names.get(name, name): value for name, value in asdict(self).items() if name not in HOST_ONLY}
         return {**sizes, "shared": False}
 
     @property
