@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -74,6 +74,7 @@ def test_layouts_that_cannot_be(settings: dict[str, int | str], message: str) ->
         AttributeLayout(**settings)  # type: ignore[arg-type]
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(*[st.integers(-2048, 2047)] * 3), min_size=1), st.booleans())
 def test_words_hold_three_fields(fields: list[tuple[int, int, int]], signed: bool) -> None:
     values = np.array(fields) if signed else np.array(fields) + 2048
