@@ -120,6 +120,7 @@ def test_the_command_prints_a_table_and_writes_json(tmp_path: Path) -> None:
     result = CliRunner().invoke(cli, ["study", str(tmp_path / "attic"), "--json", str(output)])
     assert result.exit_code == 0, result.output
     report = json.loads(output.read_text())
-    assert list(report) == ["attic, full maps", "attic, planes"]
+    assert list(report) == ["attic, full maps", "attic, planes", "attic, device"]
     assert report["attic, planes"]["mirror"]["ok"] > 0.8
-    assert len(result.output.splitlines()) == 4
+    assert report["attic, device"]["mirror"]["ok"] > 0.8
+    assert len(result.output.splitlines()) == 5

@@ -12,13 +12,13 @@ from pathlib import Path
 #: Units of a level, in the order of the data; what is left of the level's module is a unit too, named last.
 RENDER_UNIT = (
     *("RayGenerator", "RaySetup", "BoxUnit", "TraversalStack", "TriangleUnit", "Shader"),
-    *("RtController", "RecordFetch", "HitTable"),
+    *("ShadowRays", "ColourUnit", "RtController", "RecordFetch", "HitTable"),
 )
 COLUMN = ("ColumnBvhController", "TileWalker", "BackgroundWalker", "PixelCollector")
 DEVICE = ("FrameController", "RegisterFile", "CounterFile")
 
 #: Modules within a unit that are synthesised on their own and counted in it: what divides and takes roots.
-PARTS = re.compile(r"(Divider|SquareRoot)(_\d+)?")
+PARTS = re.compile(r"(Divider|SquareRoot|RootDivider)(_\d+)?")
 
 _INSTANCE = re.compile(r"^  (\w+)\s+(\w+) \(", re.MULTILINE)
 _TABLE = re.compile(r"^  reg\s+(?:\[(\d+):0\]\s+)?Memory\[0:(\d+)\];", re.MULTILINE)

@@ -13,6 +13,9 @@ import scala.util.Random
 class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "Shader"
 
+  /** Faster than the interpreter for so wide a unit. */
+  private val verilator = Seq(VerilatorBackendAnnotation)
+
   /** Answers are compared as one integer each: a field of this many bits for each number. */
   private val fieldBits = 96
 
@@ -109,7 +112,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (config <- TestConfigs.formats) {
     val name = s"${config.precision} and ${config.geometry.vertexBits}-bit vertices"
 
-    it should s"equal the model with $name" in test(new Shader(config)) { shader =>
+    it should s"equal the model with $name" in test(new Shader(config)).withAnnotations(verilator) { shader =>
       val random    = new Random(20)
       val questions = new ShaderQuestions(config, random)
       val rounds    = Seq.fill(8) {
