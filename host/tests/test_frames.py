@@ -17,13 +17,15 @@ from colonnade.model import load_scene, new_model, render_model
 from colonnade.pack import pack
 from colonnade.placement import placement
 from colonnade.render import frame_report
-from colonnade.scene import Camera, Light, Material, MeshSource, Scene
+from colonnade.scene import Background, Camera, Light, Material, MeshSource, Paths, Scene
 from colonnade.simulate import Stalls, render_rtl
 from colonnade.throughput import figures, records_taken
+from colonnade.viewpoint import made_of
 
 pytestmark = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 
 TEAPOT = Scene(MeshSource(name="teapot:4"))
+SKY = Background(colour=(0.2, 0.3, 0.5))
 
 #: Name, configuration, overrides, mesh, stalls of the pixel sink.
 CASES = [
@@ -60,6 +62,34 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     for frame, settings in zip(simulated.frames, registers, strict=True):
         assert_equal(frame, render_model(design.manifest, image, settings))
     assert simulated.frames[0].is_object.any()
+
+
+#: Name, configuration, what the surface is made of, lights.
+SHINY = [
+    ("mirror", "small", Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), (Light(),)),
+    ("glass", "small", Material(kind="glass", albedo=(0.9, 1.0, 0.95), ior=1.45), (Light(),)),
+    ("two lights", "small", Material(), (Light(falloff=3.0), Light(offset=(-1.0, 0.5, 2.0), colour=(0.2, 0.4, 0.9)))),
+    ("narrow glass", "16b16s32d", Material(kind="glass", ior=2.4), (Light(falloff=0.5),)),
+]
+
+
+@pytest.mark.parametrize("case", SHINY, ids=lambda case: case[0])
+def test_mirrors_glass_and_lights_are_the_models(case: tuple[str, str, Material, tuple[Light, ...]]) -> None:
+    _, config, material, lights = case
+    design = design_for(config, ())
+    mesh = load_mesh("teapot:4")
+    image = pack(mesh, design.manifest, made_of(mesh.materials, material))
+    scene = replace(TEAPOT, material=material, light=lights[0], more_lights=lights[1:], background=SKY)
+    registers = [
+        placement(replace(scene, paths=Paths(bounces=bounces)), image.header, design.manifest, 48, 37)
+        for bounces in (4, 1, 0)
+    ]
+    simulated = render_rtl(design, image, registers, Stalls(20, 5))
+    for frame, settings in zip(simulated.frames, registers, strict=True):
+        assert_equal(frame, render_model(design.manifest, image, settings))
+    counters = simulated.frames[0].counters
+    assert (counters["raysReflection"] > 0) == (material.kind is not None)
+    assert (counters["raysRefraction"] > 0) == (material.kind == "glass")
 
 
 @pytest.fixture(scope="module")

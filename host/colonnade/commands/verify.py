@@ -7,12 +7,15 @@ from typing import Any
 
 import click
 
-from colonnade.commands.options import configuration_options, finish, json_option, require_outputs
+from colonnade.commands.options import FILE, configuration_options, finish, json_option, require_outputs
 
 
 @click.command(short_help="Compare the hardware with its model, and the model with Embree.")
 @configuration_options
 @click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Only this mesh. May be repeated.")
+@click.option(
+    "--scene", type=FILE, metavar="FILE", help="Its surface, lights and paths. Default: the benchmark's scene."
+)
 @click.option("--size", metavar="WxH", help="Size of the frames in pixels. Default: the benchmark scene's.")
 @click.option("--rtl/--no-rtl", default=True, show_default=True, help="Render through the hardware too.")
 @click.option("--reference/--no-reference", default=True, show_default=True, help="Compare with the float scene too.")
@@ -23,6 +26,7 @@ def verify(
     config: str,
     overrides: tuple[str, ...],
     meshes: tuple[str, ...],
+    scene: Path | None,
     size: str | None,
     rtl: bool,
     reference: bool,
@@ -64,7 +68,7 @@ def verify(
         table.print(name, result["triangles"], *compared)
 
     report = verification.verify(
-        project_root() / "scenes" / "object.toml",
+        scene or project_root() / "scenes" / "object.toml",
         config,
         overrides,
         meshes or bench.MESHES,
