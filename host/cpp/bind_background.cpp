@@ -1,40 +1,14 @@
 // colonnade._core.RoomModel: the bit-exact model of a room in the physical-attribute memory (cpp/model) for Python.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-#include <nanobind/stl/map.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-
 #include <cmath>
-#include <tuple>
 
+#include "binding.hpp"
 #include "model/background.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
+using namespace nanobind::literals;
 using namespace colonnade;
+using namespace colonnade::binding;
 
 namespace {
-
-using Values = std::map<std::string, std::int64_t>;
-using FieldTuples = std::map<std::string, std::map<std::string, std::tuple<int, int, bool>>>;
-using Words = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Vectors = nb::ndarray<const std::int64_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-
-template <class T> using Values1 = nb::ndarray<nb::numpy, T, nb::ndim<1>>;
-
-template <class T> Values1<T> newArray(std::size_t size, T*& data) {
-    data = new T[size]();
-    nb::capsule owner(data, [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
-    return Values1<T>(data, {size}, owner);
-}
-
-std::map<std::string, Layout> layoutsOf(const FieldTuples& tuples) {
-    std::map<std::string, Layout> layouts;
-    for (const auto& [record, fields] : tuples)
-        for (const auto& [name, field] : fields) layouts[record][name] = {std::get<0>(field), std::get<1>(field), std::get<2>(field)};
-    return layouts;
-}
 
 RoomView viewOf(const Values& registers) {
     RoomView view{};
@@ -52,7 +26,7 @@ public:
     RoomModel(const Values& numbers, const Values& sizes, const FieldTuples& layouts)
         : numbers_(numbers), image_(AttributeSizes(sizes), layoutsOf(layouts)) {}
 
-    void load(const std::string& memory, const Words& words) { image_.load(memory, words.data(), words.shape(0), words.shape(1)); }
+    void load(const std::string& memory, const Records& words) { image_.load(memory, words.data(), words.shape(0), words.shape(1)); }
 
     nb::dict march(const Values& registers, const Vectors& origins, const Vectors& directions) {
         const RoomView view = viewOf(registers);
@@ -62,13 +36,13 @@ public:
         bool* isHidden;
         double* travel;
         nb::dict result;
-        result["kind"] = newArray(count, kind);
-        result["x"] = newArray(count, x);
-        result["y"] = newArray(count, y);
-        result["entry"] = newArray(count, entry);
-        result["steps"] = newArray(count, steps);
-        result["is_hidden"] = newArray(count, isHidden);
-        result["travel"] = newArray(count, travel);
+        result["kind"] = makeArray({count}, kind);
+        result["x"] = makeArray({count}, x);
+        result["y"] = makeArray({count}, y);
+        result["entry"] = makeArray({count}, entry);
+        result["steps"] = makeArray({count}, steps);
+        result["is_hidden"] = makeArray({count}, isHidden);
+        result["travel"] = makeArray({count}, travel);
         nb::gil_scoped_release release;
         for (std::size_t i = 0; i < count; ++i) {
             WideVector origin;

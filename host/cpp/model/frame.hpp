@@ -2,8 +2,7 @@
 #pragma once
 #include <optional>
 
-#include "background.hpp"
-#include "bounce.hpp"
+#include "registers.hpp"
 
 namespace colonnade {
 
@@ -23,101 +22,6 @@ struct Pixel {
     bool isObject;
     std::uint32_t triangle;
     Wide distance;
-};
-
-/// Register values by their flattened names.
-using Registers = std::map<std::string, std::int64_t>;
-
-/// The pixels with x · px + y · py + offset ≥ 0.
-struct HalfPlane {
-    std::int64_t x, y, offset;
-};
-
-/// The frame registers, decoded.
-struct Frame {
-    std::int64_t width, height;
-    std::array<std::int64_t, 4> objectRectangle;
-    std::vector<HalfPlane> objectOutline;
-    WideVector cameraPosition;
-    Vector cameraDirection, stepX, stepY;
-    int stepShift;
-    Bounds bounds;
-    Lighting lighting;
-    std::size_t recordCount, triangleBase, triangleRecords, attributeBase;
-    bool hasRoom;
-    RoomView room;
-
-    Frame() = default;
-    explicit Frame(const Registers& registers) {
-        const auto take = [&](const std::string& name) { return lookUp(registers, name); };
-        // What a design without bounces does not have is zero
-        const auto takeIfThere = [&](const std::string& name) { return registers.count(name) ? take(name) : 0; };
-        const auto vector = [&](const std::string& name, const char* components = "xyz") {
-            Vector result;
-            for (int i = 0; i < 3; ++i) result[i] = take(name + "." + components[i]);
-            return result;
-        };
-        const int unitShift = static_cast<int>(take("frame.unitShift"));
-        const auto position = [&](const std::string& name) {
-            const Vector raw = vector(name);
-            return WideVector{floorShift<Wide>(raw[0], -unitShift), floorShift<Wide>(raw[1], -unitShift), floorShift<Wide>(raw[2], -unitShift)};
-        };
-        width = take("frame.width");
-        height = take("frame.height");
-        objectRectangle = {take("frame.objectRect.x0"), take("frame.objectRect.y0"), take("frame.objectRect.x1"), take("frame.objectRect.y1")};
-        for (int i = 0; registers.count(entry("frame.objectOutline", i) + "x"); ++i) {
-            const std::string edge = entry("frame.objectOutline", i);
-            objectOutline.push_back({take(edge + "x"), take(edge + "y"), take(edge + "offset")});
-        }
-        cameraPosition = position("camera.position");
-        cameraDirection = vector("camera.direction");
-        stepX = vector("camera.stepX");
-        stepY = vector("camera.stepY");
-        stepShift = static_cast<int>(take("camera.stepShift"));
-        bounds = {vector("bounds.low"), vector("bounds.high")};
-        for (int i = 0; registers.count(entry("lights", i) + "colour.r"); ++i) {
-            const std::string name = entry("lights", i);
-            lighting.lights.push_back({position(name + "position"), vector(name + "colour", "rgb"), take(name + "reachMantissa"),
-                                       static_cast<int>(take(name + "reachExponent"))});
-        }
-        lighting.lights.resize(std::min(lighting.lights.size(), static_cast<std::size_t>(take("shading.lights"))));
-        lighting.ambient = vector("ambient", "rgb");
-        lighting.background = vector("background", "rgb");
-        lighting.offset = take("shading.offset");
-        lighting.clearness = takeIfThere("shading.clearness");
-        lighting.flat = take("shading.flat") != 0;
-        lighting.shadows = take("shading.shadows") != 0;
-        lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
-        for (int i = 0; registers.count(entry("materials", i) + "albedo.r"); ++i) {
-            const std::string name = entry("materials", i);
-            lighting.materials.push_back({vector(name + "albedo", "rgb"), static_cast<MaterialKind>(takeIfThere(name + "kind")),
-                                          {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")}, takeIfThere(name + "reflectance")});
-        }
-        recordCount = static_cast<std::size_t>(take("scene.recordCount"));
-        triangleBase = static_cast<std::size_t>(take("scene.triangleBase"));
-        triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));
-        attributeBase = static_cast<std::size_t>(take("scene.attributeBase"));
-        hasRoom = takeIfThere("room.isThere") != 0;
-        if (!hasRoom) return;
-        for (int row = 0; row < 3; ++row) {
-            room.matrix[row] = vector("room.matrix[" + std::to_string(row) + "]");
-            room.rotation[row] = vector("room.rotation[" + std::to_string(row) + "]");
-        }
-        room.offset = vector("room.offset");
-        room.offsetShift = static_cast<int>(take("room.offsetShift"));
-        room.exponent = static_cast<int>(take("room.exponent"));
-        room.shellPlanes = static_cast<int>(take("room.shellPlanes"));
-        room.step = {take("room.stepX"), take("room.stepY")};
-    }
-
-    /// What the names of a table's entry begin with.
-    static std::string entry(const std::string& table, int index) { return table + "[" + std::to_string(index) + "]."; }
-
-    bool maySeeObject(std::int64_t px, std::int64_t py) const {
-        const auto& rectangle = objectRectangle;
-        if (px < rectangle[0] || px >= rectangle[2] || py < rectangle[1] || py >= rectangle[3]) return false;
-        return std::all_of(objectOutline.begin(), objectOutline.end(), [&](const HalfPlane& edge) { return edge.x * px + edge.y * py + edge.offset >= 0; });
-    }
 };
 
 /// What a shadow ray has met on its way to the light; the later the less light.
