@@ -26,7 +26,7 @@ final class MarchAxes(m: MarchDatapath) {
   private val speed      = m.way(m.axis)
   private val inTile     = VecInit(coordinate.map(_(tileWidth - 1, 0)))(m.axis(0))
 
-  def isNegative(axis: UInt): Bool = m.way(axis.pad(2)) < 0.S
+  def isNegative(axis: UInt): Bool = m.way(axis | 0.U(2.W)) < 0.S
 
   /** Steps that end with the position counted from the map's middle; jumps if it is outside of the map. */
   def describe(outside: String): Unit = {

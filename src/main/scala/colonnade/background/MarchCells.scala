@@ -66,7 +66,10 @@ final class MarchCells(
     step("first cell") {
       val inTile = Seq(pixels.x, pixels.y).map(_(layout.tileLog - 1, 0))
       set(m.axis, 0.U)
-      for (a <- 0 to 1) set(walk.cell(a), Mux(isFine, inTile(a) >> (layout.tileLog - 3), inTile(a) >> (layout.tileLog - 2)))
+      for (a <- 0 to 1) {
+        val cell = Mux(isFine, inTile(a) >> (layout.tileLog - 3), inTile(a) >> (layout.tileLog - 2))
+        set(walk.cell(a), cell)
+      }
     }
     step("cell edge") {
       val cell = walk.cell(m.axis(0))
@@ -76,7 +79,8 @@ final class MarchCells(
     step(set(latest, m.combine(axes.edge(m.axis(0)).zext, m.product, subtract = true)))
     step {
       val isLater = latest > walk.begin.zext
-      set(edge(m.axis(0)), Mux(m.way(m.axis) === 0.S, axes.farthest, Mux(isLater, latest.asUInt(wayBits, 0), walk.begin)))
+      val next    = Mux(isLater, latest.asUInt(wayBits, 0), walk.begin)
+      set(edge(m.axis(0)), Mux(m.way(m.axis) === 0.S, axes.farthest, next))
       set(m.axis, 1.U)
       branch((m.axis === 0.U) -> "cell edge", true.B -> "cell")
     }

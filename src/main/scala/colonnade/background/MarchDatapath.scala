@@ -122,12 +122,10 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
   /** Bit length of a sum that is not negative. */
   val measured: UInt = Normalise.bitLength(sum.asUInt).pad(lengthBits)
 
-  /** A step that measures a sum which is not negative; the next one finds its f highest bits in [[shifted]], or `more`
-    * further down.
-    */
-  def measure(more: => SInt = 0.S): Unit = {
+  /** In a step: measures a sum that is not negative. The next step finds its f highest bits in [[shifted]]. */
+  def measure(): Unit = {
     program.set(length, measured)
-    program.set(drop, Rounding.narrow(measured.zext +& more, exponentBits))
+    program.set(drop, measured.zext.pad(exponentBits))
   }
 
   /** Three steps that measure any sum. */

@@ -41,7 +41,11 @@ final class MarchTiles(
       set(walk.stop, walk.end)
       set(planes.id, answer.ids(0))
       set(planes.purpose, Mux(isOne, planes.forTile, planes.forSurvey))
-      awaitOr(channel.answer.valid, (channel.answer.valid && !isOne && walk.isBehind) -> "cells", channel.answer.valid -> "plane")
+      awaitOr(
+        channel.answer.valid,
+        (channel.answer.valid && !isOne && walk.isBehind) -> "cells",
+        channel.answer.valid                              -> "plane"
+      )
     }
     survey()
     step("keep") {
@@ -49,7 +53,9 @@ final class MarchTiles(
       set(walk.steps, walk.steps + 1.U)
     }
     step("tile passed") {
-      val isOver = walk.steps >= mostSteps.U || walk.end === axes.farthest || walk.there <= 0.S || walk.there >= ((BigInt(1) << alongBits) - 1).S
+      val most   = ((BigInt(1) << alongBits) - 1).S
+      val isSeen = walk.there > 0.S && walk.there < most
+      val isOver = walk.steps >= mostSteps.U || walk.end === axes.farthest || !isSeen
       val axis   = walk.isSecond.asUInt
       val next   = m.combine(axes.edge(axis).zext, axes.stride(axis).zext)
       set(walk.begin, walk.end)

@@ -65,7 +65,8 @@ final class Microprogram {
     }
     active = None
     val targets = jumps.groupBy(_._2).toSeq.sortBy(_._1).map { case (name, from) =>
-      from.map(_._1).reduce(_ || _) -> labels.getOrElse(name, throw new NoSuchElementException(name)).U(state.getWidth.W)
+      val index = labels.getOrElse(name, throw new NoSuchElementException(name))
+      from.map(_._1).reduce(_ || _) -> index.U(state.getWidth.W)
     }
     state := Mux(targets.map(_._1).reduce(_ || _), Mux1H(targets), state + 1.U)
   }
@@ -86,5 +87,6 @@ final class Operand(program: Microprogram, width: Int) {
     Mux1H(different.map(value => choices.filter(_._2 eq value).map(_._1).reduce(_ || _) -> fit(value)))
   }
 
-  private def fit(value: SInt): SInt = if (value.getWidth > width) value.asUInt(width - 1, 0).asSInt else value.pad(width)
+  private def fit(value: SInt): SInt =
+    if (value.getWidth > width) value.asUInt(width - 1, 0).asSInt else value.pad(width)
 }

@@ -42,12 +42,15 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
     def turned(p: Seq[Double]): Seq[Double] =
       Seq(math.cos(turn) * p(0) + math.sin(turn) * p(2), p(1), -math.sin(turn) * p(0) + math.cos(turn) * p(2))
 
-    def steps(p: Seq[Double]): Seq[BigInt] = turned(p).zip(place).map { case (a, b) => BigDecimal((a + b) * metre).toBigInt }
+    def steps(p: Seq[Double]): Seq[BigInt] =
+      turned(p).zip(place).map { case (a, b) => BigDecimal((a + b) * metre).toBigInt }
 
     val view: ViewQuestion = {
       val axes     = Seq(Seq(1.0, 0, 0), Seq(0, 1.0, 0), Seq(0, 0, 1.0)).map(turned)
-      def row(a: Double, x: Seq[Double], b: Double) = x.zip(axes(2)).map { case (p, q) => (a * p + b * q) / (metre * RoomScene.depthUnit) }
-      val rows     = Seq(row(focal / 1024, axes(0), middle(0) / 1024), row(focal / 1024, axes(1), middle(1) / 1024), row(0, axes(0), 1))
+      def row(a: Double, x: Seq[Double], b: Double) =
+        x.zip(axes(2)).map { case (p, q) => (a * p + b * q) / (metre * RoomScene.depthUnit) }
+      val seen     = Seq(0, 1).map(axis => row(focal / 1024, axes(axis), middle(axis) / 1024))
+      val rows     = seen :+ row(0, axes(0), 1)
       val largest  = rows.flatten.map(_.abs).max
       val bits     = numbers.macBits.min(50) - 2
       val exponent = bits - math.getExponent(largest) - 1
@@ -63,7 +66,8 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
   def ray(camera: Camera, from: Seq[Double], towards: Seq[Double]): MarchQuestion = {
     val length = towards.map(_.abs).max
     val scale  = math.pow(2, numbers.shadeBits.toDouble) - 1
-    MarchQuestion(context(), camera.steps(from), camera.turned(towards.map(_ / (1.5 * length))).map(t => BigDecimal(t * scale).toBigInt))
+    val turned = camera.turned(towards.map(_ / (1.5 * length)))
+    MarchQuestion(context(), camera.steps(from), turned.map(t => BigDecimal(t * scale).toBigInt))
   }
 
   /** Within the room, on its surfaces, just behind them, beyond the view, behind the camera; in any direction, along an

@@ -55,7 +55,10 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private def load(unit: RoomMarchHarness, config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Unit = {
     unit.load.valid.poke(true)
-    for (memory <- AttributeMemories(config) if memory.name.startsWith("planes"); (word, address) <- words(memory.name).zipWithIndex) {
+    for {
+      memory          <- AttributeMemories(config) if memory.name.startsWith("planes")
+      (word, address) <- words(memory.name).zipWithIndex
+    } {
       unit.load.bits.target.poke(memory.target)
       unit.load.bits.address.poke(address)
       unit.load.bits.record.poke(word)
@@ -81,10 +84,14 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
       val axes = Seq("x", "y", "z")
       request.pack(
         axes.zip(ray.origin).map { case (axis, value) => s"origin.$axis" -> value }.toMap ++
-          axes.zip(ray.towards).map { case (axis, value) => s"towards.$axis" -> value } + ("context" -> BigInt(ray.context))
+          axes.zip(ray.towards).map { case (axis, value) => s"towards.$axis" -> value } +
+          ("context" -> BigInt(ray.context))
       )
     }
-    val found   = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)((port: UInt, bits: BigInt) => port.poke(bits), (port: UInt) => port.peekInt())(random, if (isSlow) 0.5 else 0, 20000)
+    val found   = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
+      (port: UInt, bits: BigInt) => port.poke(bits),
+      (port: UInt) => port.peekInt()
+    )(random, if (isSlow) 0.5 else 0, 20000)
     val answers = Model.attributes(config, words, rays.map(ray => view.words ++ ray.words), "march")
     for (((bits, answer), ray) <- found.zip(answers).zip(rays)) {
       val expected = names.zip(answer).toMap + ("context" -> BigInt(ray.context))
