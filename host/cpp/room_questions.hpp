@@ -9,12 +9,14 @@
 //   cell   x y                                            -> id
 //   plane  id                                             -> a b c exponent
 //   shell  index                                          -> a b c exponent albedo[3] normal[3]
+//   march  matrix[9] offset[3] offsetShift exponent shellPlanes origin[3] direction[3]
+//                                                         -> kind x y entry isHidden travel travelExponent steps
 #pragma once
 #include <map>
 #include <optional>
 #include <vector>
 
-#include "model/attributes.hpp"
+#include "model/background.hpp"
 #include "questions.hpp"
 
 namespace colonnade {
@@ -40,10 +42,11 @@ public:
     }
 
     bool knows(const std::string& kind) const {
-        return kind == "albedo" || kind == "normal" || kind == "tile" || kind == "cell" || kind == "plane" || kind == "shell";
+        return kind == "albedo" || kind == "normal" || kind == "tile" || kind == "cell" || kind == "plane" || kind == "shell" || kind == "march";
     }
 
-    Answer answer(const std::string& kind, Question& ask) {
+    Answer answer(const std::string& kind, Question& ask, const Numbers& numbers) {
+        if (kind == "march") return march(ask, numbers);
         const int first = static_cast<int>(ask.number());
         Answer answer;
         if (kind == "plane") return put(answer, image().planeOf(first));
@@ -69,6 +72,21 @@ public:
 
 private:
     static Answer& put(Answer& answer, const PlaneWord& plane) { return answer << plane.a << plane.b << plane.c << plane.e; }
+
+    Answer march(Question& ask, const Numbers& numbers) {
+        RoomView view{};
+        for (auto& row : view.matrix) row = ask.vector();
+        view.offset = ask.vector();
+        view.offsetShift = static_cast<int>(ask.number());
+        view.exponent = static_cast<int>(ask.number());
+        view.shellPlanes = static_cast<int>(ask.number());
+        const WideVector origin = ask.wideVector();
+        const Vector direction = ask.vector();
+        const RoomPoint point = Background(numbers, image()).meet(origin, direction, view);
+        Answer answer;
+        answer << static_cast<int>(point.kind) << point.x << point.y << point.entry << point.isHidden;
+        return answer << point.travel << point.travelExponent << point.steps;
+    }
 
     AttributeImage& image() {
         if (!image_) throw std::invalid_argument("there is no room yet");

@@ -223,7 +223,7 @@ int main() try {
         else if (kind == "pixel") answerPixel(ask, scene.device());
         else if (kind == "sizes") room.begin(readNumbers(words), scene.layouts());
         else if (kind == "words") room.load(words);
-        else if (room.knows(kind)) room.answer(kind, ask).print();
+        else if (room.knows(kind)) room.answer(kind, ask, numbers).print();
         else if (kind == "limit") (Answer() << limitUnits(ask.number(), numbers)).print();
         else throw std::invalid_argument("unknown question '" + kind + "'");
     }

@@ -319,11 +319,12 @@ private:
         }
     }
 
-    /// The pixel at s, within a cell.
+    /// The pixel at s, within a cell and the map.
     std::array<int, 2> pixelIn(const MapRay& ray, const std::array<int, 2>& corner, int cellLog, std::int64_t s) const {
         std::array<int, 2> pixel;
+        const std::array<int, 2> size = {sizes_.width, sizes_.height};
         for (int a = 0; a < 2; ++a)
-            pixel[a] = static_cast<int>(clamp<std::int64_t>(along(ray, a, s) >> (f_ - mapLog), corner[a], corner[a] + (1 << cellLog) - 1));
+            pixel[a] = static_cast<int>(clamp<std::int64_t>(along(ray, a, s) >> (f_ - mapLog), corner[a], std::min(size[a], corner[a] + (1 << cellLog)) - 1));
         return pixel;
     }
 

@@ -1,0 +1,122 @@
+package colonnade.background
+
+import colonnade.config.ColonnadeConfig
+
+import scala.util.Random
+
+/** A view's registers. */
+final case class ViewQuestion(
+    matrix:      Seq[BigInt],
+    offset:      Seq[BigInt],
+    offsetShift: Int,
+    exponent:    Int,
+    shellPlanes: Int
+) {
+  def words: Seq[BigInt] = matrix ++ offset ++ Seq[BigInt](offsetShift, exponent, shellPlanes)
+
+  def fields: Map[String, BigInt] =
+    matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}][${i % 3}]" -> value }.toMap ++
+      offset.zipWithIndex.map { case (value, i) => s"offset[$i]" -> value } ++
+      Map("offsetShift" -> BigInt(offsetShift), "exponent" -> BigInt(exponent), "shellPlanes" -> BigInt(shellPlanes))
+}
+
+/** A ray: grid steps, and a direction of any length. */
+final case class MarchQuestion(context: Int, origin: Seq[BigInt], towards: Seq[BigInt]) {
+  def words: Seq[BigInt] = origin ++ towards
+}
+
+/** Views of a room, and rays in it. */
+final class MarchQuestions(config: ColonnadeConfig, random: Random) {
+  private val numbers = config.numbers
+  private val shells  = config.physicalAttributeMemory.get.shellPlanes
+
+  /** Steps in a metre. */
+  private val metre = math.pow(2, numbers.sceneBits - 7.0)
+
+  /** A camera somewhere, turned somehow; metres. */
+  final class Camera(focal: Double, middle: Seq[Double], isTurned: Boolean) {
+    private val turn = if (isTurned) random.nextDouble() * 6.3 else 0.0
+    val place: Seq[Double] = if (isTurned) Seq.fill(3)(random.nextDouble() * 4 - 2) else Seq(0.0, 0.0, 0.0)
+
+    /** A point of view space in the scene. */
+    def turned(p: Seq[Double]): Seq[Double] =
+      Seq(math.cos(turn) * p(0) + math.sin(turn) * p(2), p(1), -math.sin(turn) * p(0) + math.cos(turn) * p(2))
+
+    def steps(p: Seq[Double]): Seq[BigInt] =
+      turned(p).zip(place).map { case (a, b) => BigDecimal((a + b) * metre).toBigInt }
+
+    val view: ViewQuestion = {
+      val axes     = Seq(Seq(1.0, 0, 0), Seq(0, 1.0, 0), Seq(0, 0, 1.0)).map(turned)
+      def row(a: Double, x: Seq[Double], b: Double) =
+        x.zip(axes(2)).map { case (p, q) => (a * p + b * q) / (metre * RoomScene.depthUnit) }
+      val seen     = Seq(0, 1).map(axis => row(focal / 1024, axes(axis), middle(axis) / 1024))
+      val rows     = seen :+ row(0, axes(0), 1)
+      val largest  = rows.flatten.map(_.abs).max
+      val bits     = numbers.macBits.min(50) - 2
+      val exponent = bits - math.getExponent(largest) - 1
+      val matrix   = rows.map(_.map(value => BigDecimal(value * math.pow(2, exponent)).toBigInt))
+      val camera   = steps(Seq(0, 0, 0))
+      val offset   = matrix.map(row => -row.zip(camera).map { case (m, c) => m * c }.sum)
+      val shift    = (offset.map(_.bitLength).max - numbers.macBits + 1).max(0)
+      ViewQuestion(matrix.flatten, offset.map(_ >> shift), shift, exponent, shells.min(5))
+    }
+  }
+
+  /** From a point of view space along a direction. */
+  def ray(camera: Camera, from: Seq[Double], towards: Seq[Double]): MarchQuestion = {
+    val length = towards.map(_.abs).max
+    val scale  = math.pow(2, numbers.shadeBits.toDouble) - 1
+    val turned = camera.turned(towards.map(_ / (1.5 * length)))
+    MarchQuestion(context(), camera.steps(from), turned.map(t => BigDecimal(t * scale).toBigInt))
+  }
+
+  /** Within the room, on its surfaces, just behind them, beyond the view, behind the camera; in any direction, along an
+    * axis, to the camera or away from it.
+    */
+  def inRoom(camera: Camera): MarchQuestion = {
+    def spread(size: Double) = (random.nextDouble() * 2 - 1) * size
+    val from = random.nextInt(8) match {
+      case 0 => Seq(spread(1.9), 1.2 + spread(0.02), 0.5 + random.nextDouble() * 3)
+      case 1 => Seq(spread(0.5), 0.4 + spread(0.02), 2.1 + random.nextDouble() * 0.5)
+      case 2 => Seq(spread(2), spread(1), -random.nextDouble())
+      case 3 => Seq(0.0, 0.0, 0.3 + random.nextDouble() * 4)
+      case 4 => Seq(spread(3), spread(3), random.nextDouble() * 5)
+      case _ => Seq(spread(1), spread(0.6), 1 + random.nextDouble() * 2.8)
+    }
+    val towards = random.nextInt(6) match {
+      case 0 => from.map(-_)
+      case 1 => from
+      case 2 => Seq.tabulate(3)(i => if (i == random.nextInt(3)) 1.0 else 0.0).updated(2, spread(1))
+      case 3 => Seq(0.0, 0.0, 1.0).map(_ * (if (random.nextBoolean()) 1 else -1))
+      case _ => Seq.fill(3)(spread(1))
+    }
+    ray(camera, from, if (towards.forall(_ == 0)) Seq(1.0, 0, 0) else towards)
+  }
+
+  /** Any registers that the model's widest number has room for. */
+  def anyView(): ViewQuestion = {
+    val bits   = numbers.macBits.min(45)
+    val shift  = random.nextInt(numbers.sceneBits.min(60) - 2)
+    val length = bits + numbers.sceneBits.min(60)
+    ViewQuestion(
+      Seq.fill(9)(signed(bits)),
+      Seq.fill(3)(signed((length - shift).min(numbers.macBits) - 1)),
+      shift,
+      (length - random.nextInt(12)).min(500),
+      random.nextInt(shells + 1)
+    )
+  }
+
+  def anyRay(): MarchQuestion =
+    MarchQuestion(context(), Seq.fill(3)(signed(numbers.sceneBits.min(60))), Seq.fill(3)(signed(numbers.shadeBits + 1)))
+
+  private def context(): Int = random.nextInt(config.array.contexts)
+
+  /** Small ones too, and powers of two. */
+  private def signed(bits: Int): BigInt = {
+    val size = if (random.nextInt(4) == 0) random.nextInt(bits - 1) + 1 else bits - 1
+    val most = (BigInt(1) << size) - 1
+    val some = if (random.nextInt(8) == 0) BigInt(1) << random.nextInt(size) else BigInt(size, random)
+    if (random.nextBoolean()) some.min(most) else -some
+  }
+}

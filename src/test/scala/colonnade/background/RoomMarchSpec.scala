@@ -1,0 +1,137 @@
+package colonnade.background
+
+import chisel3._
+import chisel3.util.Valid
+import chisel3.util.random.LFSR
+import chiseltest._
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{AttributeMemories, Load}
+import colonnade.numbers.StreamTester
+import colonnade.traversal.{Packed, PackedUnit}
+import colonnade.{Model, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+/** A march with the maps that answer it, later than they could if `isSlow`. */
+private class RoomMarchHarness(config: ColonnadeConfig)
+    extends PackedUnit(new MarchRequest(config), new MarchResult(config)) {
+  private val march = Module(new RoomMarch(config))
+  private val map   = Module(new PlaneMap(config, RoomMarch.tagBits))
+
+  val load   = IO(Flipped(Valid(new Load(config))))
+  val view   = IO(Input(UInt(march.io.view.getWidth.W)))
+  val isSlow = IO(Input(Bool()))
+  val events = IO(Output(new MarchEvents))
+
+  private val noise = LFSR(16)
+  connect(march.io.request, march.io.result)
+  join(march.io.cells, map.io.cells, noise(0))
+  join(march.io.planes, map.io.planes, noise(5))
+  map.io.load   := load
+  march.io.view := view.asTypeOf(march.io.view)
+  events        := march.io.events
+
+  private def join[Q <: Data, A <: Data](asks: AttributeChannel[Q, A], knows: AttributeChannel[Q, A], stall: Bool): Unit = {
+    val holds = isSlow && stall
+    knows.question.valid := asks.question.valid && !holds
+    knows.question.bits  := asks.question.bits
+    asks.question.ready  := knows.question.ready && !holds
+
+    // An answer waits, for there is one at most
+    val waiting = RegInit(false.B)
+    val kept    = Reg(chiselTypeOf(knows.answer.bits))
+    when(knows.answer.valid)(kept := knows.answer.bits)
+    asks.answer.valid := (knows.answer.valid || waiting) && !holds
+    asks.answer.bits  := Mux(knows.answer.valid, knows.answer.bits, kept)
+    waiting           := (knows.answer.valid || waiting) && holds
+  }
+}
+
+class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "RoomMarch"
+
+  private val names = Seq("kind", "x", "y", "entry", "isHidden", "travel", "travelExponent", "steps")
+
+  private def load(unit: RoomMarchHarness, config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Unit = {
+    unit.load.valid.poke(true)
+    for {
+      memory          <- AttributeMemories(config) if memory.name.startsWith("planes")
+      (word, address) <- words(memory.name).zipWithIndex
+    } {
+      unit.load.bits.target.poke(memory.target)
+      unit.load.bits.address.poke(address)
+      unit.load.bits.record.poke(word)
+      unit.clock.step()
+    }
+    unit.load.valid.poke(false)
+  }
+
+  /** Compares with the model; returns its answers. */
+  private def check(
+      unit:   RoomMarchHarness,
+      config: ColonnadeConfig,
+      words:  Map[String, Seq[BigInt]],
+      view:   ViewQuestion,
+      rays:   Seq[MarchQuestion],
+      random: Random,
+      isSlow: Boolean
+  ): Seq[Map[String, BigInt]] = {
+    val (request, result) = (new Packed(new MarchRequest(config)), new Packed(new MarchResult(config)))
+    unit.view.poke(new Packed(new RoomView(config)).pack(view.fields))
+    unit.isSlow.poke(isSlow)
+    val inputs = rays.map { ray =>
+      val axes = Seq("x", "y", "z")
+      request.pack(
+        axes.zip(ray.origin).map { case (axis, value) => s"origin.$axis" -> value }.toMap ++
+          axes.zip(ray.towards).map { case (axis, value) => s"towards.$axis" -> value } +
+          ("context" -> BigInt(ray.context))
+      )
+    }
+    val found   = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
+      (port: UInt, bits: BigInt) => port.poke(bits),
+      (port: UInt) => port.peekInt()
+    )(random, if (isSlow) 0.5 else 0, 20000)
+    val answers = Model.attributes(config, words, rays.map(ray => view.words ++ ray.words), "march")
+    for (((bits, answer), ray) <- found.zip(answers).zip(rays)) {
+      val expected = names.zip(answer).toMap + ("context" -> BigInt(ray.context))
+      assert(result.unpack(bits) == expected, s"of $ray in $view with ${config.precision}")
+    }
+    answers.map(names.zip(_).toMap)
+  }
+
+  private def rooms: Seq[ColonnadeConfig] =
+    TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.room))) ++
+      TestConfigs.rooms.filterNot(_.physicalAttributeMemory.get.layout.isSliding).tail
+
+  for ((config, seed) <- rooms.zipWithIndex) {
+    val size = config.physicalAttributeMemory.get
+    val name = s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a map of ${size.width}x${size.height}"
+
+    it should s"meet what the model meets with $name" in {
+      val random    = new Random(seed)
+      val questions = new MarchQuestions(config, random)
+      test(new RoomMarchHarness(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { unit =>
+        unit.clock.setTimeout(0)
+        val scene = new RoomScene(config, random)
+        load(unit, config, scene.words)
+        val met = for (round <- 0 until 4) yield {
+          val middle = if (round == 3) Seq(0.0, 0.0) else scene.middle
+          val camera = new questions.Camera(scene.focal, middle, isTurned = round % 2 == 1)
+          check(unit, config, scene.words, camera.view, Seq.fill(60)(questions.inRoom(camera)), random, isSlow = round == 1)
+        }
+        val kinds = met.flatten.map(_("kind").toInt)
+        assert(Seq(RoomKind.nothing, RoomKind.map, RoomKind.shell).forall(kinds.contains), "every end")
+        assert(met.flatten.exists(_("isHidden") == 1) && met.flatten.exists(_("steps") > 5))
+
+        val image = new RoomImage(config, random)
+        load(unit, config, image.words)
+        for (round <- 0 until 6) {
+          val camera = new questions.Camera(scene.focal, scene.middle, isTurned = true)
+          check(unit, config, image.words, camera.view, Seq.fill(30)(questions.inRoom(camera)), random, isSlow = round == 1)
+          check(unit, config, image.words, questions.anyView(), Seq.fill(20)(questions.anyRay()), random, isSlow = round == 1)
+        }
+      }
+    }
+  }
+}
