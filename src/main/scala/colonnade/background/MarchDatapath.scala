@@ -161,7 +161,7 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
       Rounding.narrow(a + (b ^ Mux(subtract, (-1).S(width.W), 0.S(width.W))) + Cat(0.U(1.W), subtract).asSInt, width)
 
     when(wideFactor.isChosen)(product := wideFactor.value * narrowFactor.value)
-    when(base.isChosen)(sum := sumOf(base.value, addend.value, subtracts.value =/= 0.S, sumBits))
+    when(base.isChosen)(sum           := sumOf(base.value, addend.value, subtracts.value =/= 0.S, sumBits))
     combined := sumOf(first.value, second.value, combineSubtracts.value =/= 0.S, combineBits)
 
     divider.io.division.valid            := division(0).isChosen

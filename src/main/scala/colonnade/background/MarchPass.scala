@@ -32,13 +32,13 @@ final class MarchPass(m: MarchDatapath, walk: MarchWalk, planes: MarchPlanes) {
       walk.keep(walk.isFront && !isSurvey)
       val isSame = walk.hasPlane && walk.kept.id === planes.id
       branch(
-        (isSurvey && !walk.isFront)                              -> "cells",
-        isSurvey                                                 -> "survey",
-        (walk.isFront && isCell)                                 -> "cell passed",
-        walk.isFront                                             -> "tile passed",
-        walk.isBehind                                            -> "behind",
-        (walk.enters >= 0.S)                                     -> "crosses",
-        isSame                                                   -> "meets"
+        (isSurvey && !walk.isFront) -> "cells",
+        isSurvey                    -> "survey",
+        (walk.isFront && isCell)    -> "cell passed",
+        walk.isFront                -> "tile passed",
+        walk.isBehind               -> "behind",
+        (walk.enters >= 0.S)        -> "crosses",
+        isSame                      -> "meets"
       )
     }
     near()

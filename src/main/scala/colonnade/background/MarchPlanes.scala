@@ -32,8 +32,8 @@ final class MarchPlanes(
   /** The one that was wanted, once it is found. */
   val depth: PlaneDepth = slots(chosen)
 
-  question.valid     := false.B
-  question.bits.tag  := 0.U
+  question.valid                := false.B
+  question.bits.tag             := 0.U
   question.bits.content.isShell := purpose === forShell
   question.bits.content.index   := id
 

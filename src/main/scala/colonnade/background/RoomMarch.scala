@@ -52,7 +52,7 @@ final class RoomMarch(config: ColonnadeConfig) extends Module {
   pixels.describe()
   ends.describeShell()
   program.step("finish") {
-    when(program.now)(io.result.valid := true.B)
+    when(program.now)(io.result.valid                := true.B)
     program.awaitOr(io.result.ready, io.result.ready -> "start")
   }
   program.build()

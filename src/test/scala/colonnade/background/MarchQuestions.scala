@@ -46,7 +46,7 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
       turned(p).zip(place).map { case (a, b) => BigDecimal((a + b) * metre).toBigInt }
 
     val view: ViewQuestion = {
-      val axes     = Seq(Seq(1.0, 0, 0), Seq(0, 1.0, 0), Seq(0, 0, 1.0)).map(turned)
+      val axes                                      = Seq(Seq(1.0, 0, 0), Seq(0, 1.0, 0), Seq(0, 0, 1.0)).map(turned)
       def row(a: Double, x: Seq[Double], b: Double) =
         x.zip(axes(2)).map { case (p, q) => (a * p + b * q) / (metre * RoomScene.depthUnit) }
       val seen     = Seq(0, 1).map(axis => row(focal / 1024, axes(axis), middle(axis) / 1024))
@@ -75,7 +75,7 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
     */
   def inRoom(camera: Camera): MarchQuestion = {
     def spread(size: Double) = (random.nextDouble() * 2 - 1) * size
-    val from = random.nextInt(8) match {
+    val from                 = random.nextInt(8) match {
       case 0 => Seq(spread(1.9), 1.2 + spread(0.02), 0.5 + random.nextDouble() * 3)
       case 1 => Seq(spread(0.5), 0.4 + spread(0.02), 2.1 + random.nextDouble() * 0.5)
       case 2 => Seq(spread(2), spread(1), -random.nextDouble())

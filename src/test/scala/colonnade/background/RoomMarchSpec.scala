@@ -32,7 +32,11 @@ private class RoomMarchHarness(config: ColonnadeConfig)
   march.io.view := view.asTypeOf(march.io.view)
   events        := march.io.events
 
-  private def join[Q <: Data, A <: Data](asks: AttributeChannel[Q, A], knows: AttributeChannel[Q, A], stall: Bool): Unit = {
+  private def join[Q <: Data, A <: Data](
+      asks:  AttributeChannel[Q, A],
+      knows: AttributeChannel[Q, A],
+      stall: Bool
+  ): Unit = {
     val holds = isSlow && stall
     knows.question.valid := asks.question.valid && !holds
     knows.question.bits  := asks.question.bits
@@ -43,8 +47,8 @@ private class RoomMarchHarness(config: ColonnadeConfig)
     val kept    = Reg(chiselTypeOf(knows.answer.bits))
     when(knows.answer.valid)(kept := knows.answer.bits)
     asks.answer.valid := (knows.answer.valid || waiting) && !holds
-    asks.answer.bits  := Mux(knows.answer.valid, knows.answer.bits, kept)
-    waiting           := (knows.answer.valid || waiting) && holds
+    asks.answer.bits := Mux(knows.answer.valid, knows.answer.bits, kept)
+    waiting := (knows.answer.valid || waiting) && holds
   }
 }
 
@@ -88,7 +92,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
           ("context" -> BigInt(ray.context))
       )
     }
-    val found   = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
+    val found = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),
       (port: UInt) => port.peekInt()
     )(random, if (isSlow) 0.5 else 0, 20000)
@@ -106,7 +110,8 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for ((config, seed) <- rooms.zipWithIndex) {
     val size = config.physicalAttributeMemory.get
-    val name = s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a map of ${size.width}x${size.height}"
+    val name =
+      s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a map of ${size.width}x${size.height}"
 
     it should s"meet what the model meets with $name" in {
       val random    = new Random(seed)
@@ -118,7 +123,15 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
         val met = for (round <- 0 until 4) yield {
           val middle = if (round == 3) Seq(0.0, 0.0) else scene.middle
           val camera = new questions.Camera(scene.focal, middle, isTurned = round % 2 == 1)
-          check(unit, config, scene.words, camera.view, Seq.fill(60)(questions.inRoom(camera)), random, isSlow = round == 1)
+          check(
+            unit,
+            config,
+            scene.words,
+            camera.view,
+            Seq.fill(60)(questions.inRoom(camera)),
+            random,
+            isSlow = round == 1
+          )
         }
         val kinds = met.flatten.map(_("kind").toInt)
         assert(Seq(RoomKind.nothing, RoomKind.map, RoomKind.shell).forall(kinds.contains), "every end")
@@ -128,8 +141,24 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
         load(unit, config, image.words)
         for (round <- 0 until 6) {
           val camera = new questions.Camera(scene.focal, scene.middle, isTurned = true)
-          check(unit, config, image.words, camera.view, Seq.fill(30)(questions.inRoom(camera)), random, isSlow = round == 1)
-          check(unit, config, image.words, questions.anyView(), Seq.fill(20)(questions.anyRay()), random, isSlow = round == 1)
+          check(
+            unit,
+            config,
+            image.words,
+            camera.view,
+            Seq.fill(30)(questions.inRoom(camera)),
+            random,
+            isSlow = round == 1
+          )
+          check(
+            unit,
+            config,
+            image.words,
+            questions.anyView(),
+            Seq.fill(20)(questions.anyRay()),
+            random,
+            isSlow = round == 1
+          )
         }
       }
     }

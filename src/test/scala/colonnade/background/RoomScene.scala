@@ -16,8 +16,8 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
   private val layout = AttributeLayout.of(config)
 
   /** Pixels. */
-  val focal: Double        = 0.8 * layout.config.width
-  val middle: Seq[Double]  = Seq(layout.config.width / 2.0 + 3.2, layout.config.height / 2.0 - 1.7)
+  val focal:  Double      = 0.8 * layout.config.width
+  val middle: Seq[Double] = Seq(layout.config.width / 2.0 + 3.2, layout.config.height / 2.0 - 1.7)
 
   /** Inverse depth at a pixel; nothing where the plane is behind the camera. */
   private def inverse(plane: Surface, x: Double, y: Double): Double = {
@@ -37,11 +37,12 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
   }
 
   private def word(surface: Surface): Map[String, BigInt] = {
-    val (x, y) = (layout.config.width / 2.0, layout.config.height / 2.0)
-    val a      = (inverse(surface, x + 1, y) - inverse(surface, x, y)) * 1024 * depthUnit
-    val b      = (inverse(surface, x, y + 1) - inverse(surface, x, y)) * 1024 * depthUnit
-    val all    = Seq("a" -> a, "b" -> b, "c" -> inverse(surface, x, y) * depthUnit)
-    def field(value: Double, exponent: Int) = BigDecimal(value * math.pow(2, 22.0 - exponent)).setScale(0, BigDecimal.RoundingMode.HALF_EVEN).toBigInt
+    val (x, y)                              = (layout.config.width / 2.0, layout.config.height / 2.0)
+    val a                                   = (inverse(surface, x + 1, y) - inverse(surface, x, y)) * 1024 * depthUnit
+    val b                                   = (inverse(surface, x, y + 1) - inverse(surface, x, y)) * 1024 * depthUnit
+    val all                                 = Seq("a" -> a, "b" -> b, "c" -> inverse(surface, x, y) * depthUnit)
+    def field(value: Double, exponent: Int) =
+      BigDecimal(value * math.pow(2, 22.0 - exponent)).setScale(0, BigDecimal.RoundingMode.HALF_EVEN).toBigInt
     val exponent = (0 to 15).find(e => all.forall(c => field(c._2, e).abs < (1 << 19))).get
     all.map { case (name, value) => name -> field(value, exponent) }.toMap + ("exponent" -> BigInt(exponent))
   }
@@ -75,8 +76,15 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
       }
     }
     val table = surfaces.map(surface => new Packed(new Plane).pack(word(surface)))
-    val shell = surfaces.take(5).map(surface => new Packed(new ShellEntry).pack(word(surface).map { case (name, value) => s"plane.$name" -> value }))
-    val made  = Map("planes.descriptors" -> descriptors, "planes.heap" -> heap.toSeq, "planes.planes" -> table, "planes.shell" -> shell)
+    val shell = surfaces.take(5).map(surface =>
+      new Packed(new ShellEntry).pack(word(surface).map { case (name, value) => s"plane.$name" -> value })
+    )
+    val made = Map(
+      "planes.descriptors" -> descriptors,
+      "planes.heap"        -> heap.toSeq,
+      "planes.planes"      -> table,
+      "planes.shell"       -> shell
+    )
     AttributeMemories(config).map { memory =>
       memory.name -> made.getOrElse(memory.name, Nil).take(memory.depth).padTo(memory.depth, BigInt(0))
     }.toMap
