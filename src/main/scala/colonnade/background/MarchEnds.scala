@@ -1,6 +1,7 @@
 package colonnade.background
 
 import chisel3._
+import colonnade.formats.RoomView
 
 /** How a march ends: at a point that the map shows, at the nearest plane of the shell, or nowhere. */
 final class MarchEnds(

@@ -3,28 +3,8 @@ package colonnade.background
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.{ShellEntry, Vec3}
+import colonnade.formats.{RoomView, ShellEntry, Vec3}
 import colonnade.numbers.{Fixed, FixedPointFormat}
-
-/** How a position in the scene is seen: P in grid steps has the projection p = matrix · P + (offset << offsetShift) in
-  * steps of 2^-exponent, at the map's pixel 1024 · (p0, p1) / p2 and with the inverse depth 1 / p2. Constant while a
-  * ray marches.
-  */
-final class RoomView(config: ColonnadeConfig) extends Bundle {
-  private val formats = new MarchFormats(config)
-  private val numbers = config.numbers
-
-  /** By rows. */
-  val matrix = Vec(3, Vec(3, SInt(numbers.macBits.W)))
-  val offset = Vec(3, SInt(numbers.macBits.W))
-
-  /** Less than 21 times the digits of a position. */
-  val offsetShift = UInt(log2Ceil(formats.digitBits * formats.digits(numbers.sceneBits)).W)
-  val exponent    = SInt(10.W)
-
-  /** Entries of the shell that are used. */
-  val shellPlanes = UInt(log2Ceil(formats.layout.config.shellPlanes + 1).W)
-}
 
 /** A ray that leaves the objects. */
 final class MarchRequest(config: ColonnadeConfig) extends Bundle {
@@ -88,7 +68,8 @@ final class MarchEvents extends Bundle {
 final class RoomMarchIO(config: ColonnadeConfig) extends Bundle {
   private val layout = AttributeLayout.of(config)
 
-  val view    = Input(new RoomView(config))
+  /** Constant while a ray marches. */
+  val view    = Input(new RoomView(config.numbers))
   val request = Flipped(Decoupled(new MarchRequest(config)))
   val result  = Decoupled(new MarchResult(config))
 

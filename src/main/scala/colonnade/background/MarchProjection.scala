@@ -2,6 +2,7 @@ package colonnade.background
 
 import chisel3._
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.RoomView
 import colonnade.numbers.Rounding
 
 /** Projects a ray: (u, v, w) of its origin and along its direction, in which it is straight.
@@ -13,8 +14,8 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
   import m.formats._
   import m.program._
 
-  private val row         = VecInit(view.matrix(0), view.matrix(1), view.matrix(2))(m.axis)
-  private val offset      = view.offset(m.axis)
+  private val row         = VecInit(view.matrix.map(row => VecInit(row.axes)))(m.axis)
+  private val offset      = VecInit(view.offset.axes)(m.axis)
   private val offsetPower = 1.U(1.W) << view.offsetShift
   private val origin      = request.origin.axes.map(_.integer)
 

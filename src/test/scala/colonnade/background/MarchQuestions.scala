@@ -15,8 +15,8 @@ final case class ViewQuestion(
   def words: Seq[BigInt] = matrix ++ offset ++ Seq[BigInt](offsetShift, exponent, shellPlanes)
 
   def fields: Map[String, BigInt] =
-    matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}][${i % 3}]" -> value }.toMap ++
-      offset.zipWithIndex.map { case (value, i) => s"offset[$i]" -> value } ++
+    matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}].${"xyz" (i % 3)}" -> value }.toMap ++
+      offset.zipWithIndex.map { case (value, i) => s"offset.${"xyz" (i)}" -> value } ++
       Map("offsetShift" -> BigInt(offsetShift), "exponent" -> BigInt(exponent), "shellPlanes" -> BigInt(shellPlanes))
 }
 

@@ -5,7 +5,7 @@ import chisel3.util.Valid
 import chisel3.util.random.LFSR
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{AttributeMemories, Load}
+import colonnade.formats.{AttributeMemories, Load, RoomView}
 import colonnade.numbers.StreamTester
 import colonnade.traversal.{Packed, PackedUnit}
 import colonnade.{Model, TestConfigs}
@@ -82,7 +82,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
       isSlow: Boolean
   ): Seq[Map[String, BigInt]] = {
     val (request, result) = (new Packed(new MarchRequest(config)), new Packed(new MarchResult(config)))
-    unit.view.poke(new Packed(new RoomView(config)).pack(view.fields))
+    unit.view.poke(new Packed(new RoomView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
     val inputs = rays.map { ray =>
       val axes = Seq("x", "y", "z")
