@@ -10,20 +10,11 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
+  import AnswerPacking._
+
   behavior of "BounceUnit"
 
   private val simulation = Seq(VerilatorBackendAnnotation)
-
-  /** Answers are compared as one integer each: a field of this many bits for each number. */
-  private val fieldBits = 96
-
-  private def pack(numbers: Seq[BigInt]): BigInt =
-    numbers.reverse.foldLeft(BigInt(0))((all, number) => (all << fieldBits) + number + (BigInt(1) << (fieldBits - 1)))
-
-  private def unpack(all: BigInt, count: Int): Seq[BigInt] =
-    Seq.tabulate(count)(i =>
-      ((all >> (i * fieldBits)) & ((BigInt(1) << fieldBits) - 1)) - (BigInt(1) << (fieldBits - 1))
-    )
 
   private def poke(config: ColonnadeConfig, offset: BigInt)(port: BounceRequest, question: BounceQuestion): Unit = {
     val numbers                                         = config.numbers

@@ -11,21 +11,12 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
+  import AnswerPacking._
+
   behavior of "Shader"
 
   /** Faster than the interpreter for so wide a unit. */
   private val verilator = Seq(VerilatorBackendAnnotation)
-
-  /** Answers are compared as one integer each: a field of this many bits for each number. */
-  private val fieldBits = 96
-
-  private def pack(numbers: Seq[BigInt]): BigInt =
-    numbers.reverse.foldLeft(BigInt(0))((all, number) => (all << fieldBits) + number + (BigInt(1) << (fieldBits - 1)))
-
-  private def unpack(all: BigInt, count: Int): Seq[BigInt] =
-    Seq.tabulate(count)(i =>
-      ((all >> (i * fieldBits)) & ((BigInt(1) << fieldBits) - 1)) - (BigInt(1) << (fieldBits - 1))
-    )
 
   private def pokeFixed(port: Fixed, raw: BigInt): Unit = port.raw match {
     case signed: SInt => signed.poke(raw)

@@ -1,0 +1,16 @@
+package colonnade.shading
+
+/** Answers of several numbers as one integer each, so that streams of them are compared at once. */
+object AnswerPacking {
+
+  /** Bits of each number's field. */
+  private val fieldBits = 96
+
+  def pack(numbers: Seq[BigInt]): BigInt =
+    numbers.reverse.foldLeft(BigInt(0))((all, number) => (all << fieldBits) + number + (BigInt(1) << (fieldBits - 1)))
+
+  def unpack(all: BigInt, count: Int): Seq[BigInt] =
+    Seq.tabulate(count)(i =>
+      ((all >> (i * fieldBits)) & ((BigInt(1) << fieldBits) - 1)) - (BigInt(1) << (fieldBits - 1))
+    )
+}
