@@ -56,7 +56,7 @@ public:
         return point;
     }
 
-    /// The point that the map's own camera sees in pixel (x, y) of the frame; `direction` is that of the pixel's ray.
+    /// The point that the map's own camera sees in pixel (x, y) of the frame; `direction` is that of the pixel's ray, as for `meet`.
     RoomPoint seen(std::int64_t x, std::int64_t y, const Vector& direction, const RoomView& view) const {
         RoomPoint point{};
         Vector place{};
@@ -67,15 +67,13 @@ public:
         MapRay ray{};
         ray.position = place;
         const Depth depth = depthOf(ray, image_.planeOf(image_.cellAt(point.x, point.y)), 0);
-        const std::int64_t w = -inW(depth.value, depth);
-        WideVector towards;
-        for (int i = 0; i < 3; ++i) towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
-        ray.towardsShift = blockNormalise(towards, f_, ray.towards);
-        if (w <= 0 || ray.towards[2] <= 0) return point;
+        const std::int64_t w = std::min(most(), -inW(depth.value, depth));
+        const Wide towards = times(view.matrix[2], {direction[0], direction[1], direction[2]});
+        if (w <= 0 || towards <= 0) return {};
         point.kind = RoomPoint::Kind::map;
-        const Normalised speed = normalise(UnsignedWide(Wide(w) * ray.towards[2]), f_);
+        const Normalised fall = normalise(UnsignedWide(towards), f_), speed = normalise(UnsignedWide(w) * fall.mantissa, f_);
         point.travel = reciprocal(speed.mantissa);
-        point.travelExponent = 1 - speed.exponent + view.exponent - ray.towardsShift;
+        point.travelExponent = 1 + f_ - speed.exponent - fall.exponent + view.exponent;
         return point;
     }
 
@@ -85,19 +83,22 @@ public:
         const Rgb12 albedo = isShell ? image_.shell(point.entry).albedo : image_.albedoAt(point.x, point.y);
         const Normal12 normal = isShell ? image_.shell(point.entry).normal : image_.normalAt(point.x, point.y);
         RoomTexel texel{{albedo.r, albedo.g, albedo.b}, {}};
-        for (int a = 0; a < 3; ++a)
-            texel.normal[a] = nearestEven<std::int64_t>(view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z, rotationFraction);
+        const std::int64_t one = std::int64_t(1) << n_.normalFraction;
+        for (int a = 0; a < 3; ++a) {
+            const std::int64_t turned = view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z;
+            texel.normal[a] = clamp<std::int64_t>(nearestEven(turned, rotationFraction), -one, one - 1);
+        }
         return texel;
     }
 
-    /// Where a ray has met the room, grid steps; at most as far as a scene reaches.
+    /// Where a ray has met the room, grid steps; at most half as far as a scene reaches, so that there is room for an offset and for the way to a light.
     WideVector reached(const WideVector& origin, const Vector& direction, const RoomPoint& point) const {
         WideVector result;
         const Wide most = largest(n_.sceneBits);
         for (int a = 0; a < 3; ++a) {
-            const Wide way = point.travelExponent > n_.sceneBits ? (direction[a] < 0 ? -most : direction[a] > 0 ? most : 0)
-                                                                 : floorShift<Wide>(Wide(point.travel) * direction[a], -point.travelExponent);
-            result[a] = clamp<Wide>(origin[a] + way, -most, most);
+            const Wide way = point.travelExponent > f_ ? (direction[a] < 0 ? -most - 1 : direction[a] > 0 ? most : 0)
+                                                       : floorShift<Wide>(Wide(point.travel) * direction[a], -point.travelExponent);
+            result[a] = clamp<Wide>(origin[a] + clamp<Wide>(way, -most - 1, most), -(most / 2) - 1, most / 2);
         }
         return result;
     }

@@ -212,13 +212,7 @@ private:
     }
 
     /// part / whole, 12 fraction bits, 1 for 0 / 0; part is not the larger one.
-    std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const {
-        const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
-        if (part == whole) return one;
-        const Normalised dividend = normalise(UnsignedWide(part), numbers_.mantissaBits), divisor = normalise(UnsignedWide(whole), numbers_.mantissaBits);
-        const Wide quotient = divide(dividend.mantissa, divisor.mantissa, numbers_.lightFraction);
-        return static_cast<std::int64_t>(std::min<Wide>(one, floorShift<Wide>(quotient, divisor.exponent - dividend.exponent)));
-    }
+    std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const { return part == whole ? std::int64_t(1) << numbers_.lightFraction : (part << numbers_.lightFraction) / whole; }
 
     /// Sends the path on from a mirror or glass; false if the next ray meets the background only.
     bool goOn(const Surface& surface, const Material& material, Path& path, RayRequest& request) {

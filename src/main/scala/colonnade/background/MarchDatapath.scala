@@ -22,6 +22,9 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
   import formats._
 
   // The ray
+  /** Its direction, as long as f bits hold. */
+  val heading: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))
+
   /** The origin's projection; then u and v from the map's middle, and w. */
   val place: Vec[SInt] = Reg(Vec(3, SInt(placeBits.W)))
 
@@ -107,7 +110,7 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
   val shifted: SInt = Rounding.narrow(Cat(sum, 0.U(f.W)).asSInt >> by, scaledBits)
 
   /** The sum's bit length after that is more than `bits`. The sum is measured. */
-  private def exceeds(bits: Int): Bool = sum =/= 0.S && length.zext +& (f - bits).S > drop
+  private def exceeds(bits: Int): Bool = sum =/= 0.S && (drop < 0.S || length.zext +& (f - bits).S > drop)
 
   /** The nearest number of so many bits and a sign. */
   def saturated(bits: Int): SInt = {
