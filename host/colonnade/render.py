@@ -42,6 +42,7 @@ class RenderResult:
         hit_triangles: int64 [height, width]; face index in the mesh's file, -1 where the ray missed.
         t: float64 [height, width]; depth in mesh units (lengths of the pixel's direction), not a number for a miss.
         report: What ``--json`` writes.
+        ratio: uint16 [height, width, 3], see `Frame`; None without a room.
     """
 
     image: npt.NDArray[np.float64]
@@ -49,6 +50,7 @@ class RenderResult:
     hit_triangles: npt.NDArray[np.int64]
     t: npt.NDArray[np.float64]
     report: dict[str, Any]
+    ratio: npt.NDArray[np.uint16] | None = None
 
 
 def render(
@@ -90,8 +92,6 @@ def render(
     if backend == "reference":
         return _render_reference(scene, manifest, (width, height), progress)
     folder = scene.background.room
-    if folder is not None and backend == "rtl":
-        raise UserError("--backend rtl renders the object alone, without a room: use --backend model or reference")
     if hits and backend == "rtl":
         from colonnade.simulate import require_hits
 
@@ -111,7 +111,8 @@ def render(
         design = design_for(config, overrides, progress)
         build_simulator(design, progress)
         built = time.perf_counter()
-        simulated = render_rtl(design, image, [registers], progress=progress)
+        held = None if room is None else room.image
+        simulated = render_rtl(design, image, [registers], progress=progress, room=held)
         frame = simulated.frames[0]
         seconds |= {"build": built - packed, "run": time.perf_counter() - built}
         report["simulated_cycles_per_second"] = simulated.cycles_per_second
@@ -180,6 +181,7 @@ def _result(
         hit_triangles=source[np.where(frame.is_object, frame.triangle, -1)],
         t=np.where(frame.is_object, depth, np.nan),
         report=report,
+        ratio=frame.ratio,
     )
 
 

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,9 +25,19 @@ from colonnade.manifest import Manifest
 from colonnade.progress import QUIET, Progress, Report
 from colonnade.toolchain import cache_directory, project_root, require_simulator
 
+if TYPE_CHECKING:
+    from colonnade.attributes import AttributeImage
+
 #: One pixel as the harness writes it (``struct PixelBytes``).
 PIXEL = np.dtype(
-    [("colour", "<u2", 3), ("is_object", "u1"), ("is_seen", "u1"), ("triangle", "<u4"), ("distance", "<f8")]
+    [
+        ("colour", "<u2", 3),
+        ("ratio", "<u2", 3),
+        ("is_object", "u1"),
+        ("is_seen", "u1"),
+        ("triangle", "<u4"),
+        ("distance", "<f8"),
+    ]
 )
 
 VERILATOR_OPTIONS = (
@@ -103,7 +114,7 @@ def _build(verilator: Path, design: GeneratedDesign, harness: Path, place: Path,
     config, sources = design.manifest.config, design.sources
     columns = int(config["array"]["columns"])
     each = " ".join(f"DO({column})" for column in range(columns))
-    header = f"#pragma once\n#define EACH_COLUMN(DO) {each}\n" + _hit_distance(sources)
+    header = f"#pragma once\n#define EACH_COLUMN(DO) {each}\n" + _pixel_ports(sources)
     if is_holdable(design.manifest):
         header += f"#define MEMORY_BANKS {columns * int(config['columnBvhMemory']['banks'])}\n"
     (place / "columns.hpp").write_text(header)
@@ -123,14 +134,16 @@ def _build(verilator: Path, design: GeneratedDesign, harness: Path, place: Path,
     return program
 
 
-def _hit_distance(sources: list[Path]) -> str:
-    """The name of the distance's port ends with its format, which the harness need not know."""
+def _pixel_ports(sources: list[Path]) -> str:
+    """Names of ports that end with their format, which the harness need not know; those that the stream has."""
     top = next(path for path in sources if path.stem == "Colonnade").read_text()
-    match = re.search(r"io_pixels_0_bits_hit_distance_\w+", top)
-    if match is None:
-        return ""
-    suffix = match.group(0).removeprefix("io_pixels_0_")
-    return f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_{suffix}\n"
+    macros = ""
+    if match := re.search(r"io_pixels_0_bits_hit_distance_(\w+)", top):
+        macros += f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_bits_hit_distance_{match.group(1)}\n"
+    if match := re.search(r"io_pixels_0_bits_ratio_r_(\w+)", top):
+        port = f"top_.io_pixels_##column##_bits_ratio_##channel##_{match.group(1)}"
+        macros += f"#define RATIO(column, channel) {port}\n"
+    return macros
 
 
 def render_rtl(
@@ -139,8 +152,9 @@ def render_rtl(
     registers: list[Mapping[str, int]],
     stalls: Stalls | None = None,
     progress: Progress = QUIET,
+    room: AttributeImage | None = None,
 ) -> Simulated:
-    """Renders frames, one for each set of registers; the image is loaded once.
+    """Renders frames, one for each set of registers; the image, and what the room's memories hold, are loaded once.
 
     Raises:
         UserError: the stalls hold banks, and the design has no input for that.
@@ -151,7 +165,7 @@ def render_rtl(
         raise UserError("this configuration's memory cannot be held: set columnBvhMemory.holdable=true for such stalls")
     program = build_simulator(design, progress)
     with tempfile.TemporaryDirectory(prefix="colonnade-") as place:
-        job, outputs = write_job(Path(place), design.manifest, image, registers)
+        job, outputs = write_job(Path(place), design.manifest, image, registers, room)
         command = [str(program), *stalls.options, str(job)]
         with progress.step("rendering in the simulator") as report:
             lines = run_program(command, Path(place) / "results", report)
@@ -159,12 +173,18 @@ def render_rtl(
 
 
 def write_job(
-    place: Path, manifest: Manifest, image: SceneImage, registers: list[Mapping[str, int]]
+    place: Path,
+    manifest: Manifest,
+    image: SceneImage,
+    registers: list[Mapping[str, int]],
+    room: AttributeImage | None = None,
 ) -> tuple[Path, list[Path]]:
     """The harness's job file for some frames in the folder `place`, and the file of pixels that each will write."""
     records = place / "records"
     records.write_bytes(image.records.tobytes())
     lines = [f"load {records} {manifest.record_bits // 8}"]
+    if room is not None:
+        lines += _room_loads(place, manifest, room)
     readable = [register for register in manifest.registers.values() if register.access == "ro"]
     start = manifest.registers["control.start"].address
     outputs = []
@@ -177,6 +197,18 @@ def write_job(
     job = place / "job"
     job.write_text("\n".join(lines) + "\n")
     return job, outputs
+
+
+def _room_loads(place: Path, manifest: Manifest, room: AttributeImage) -> list[str]:
+    """The harness's commands that fill the physical-attribute memory."""
+    from colonnade.room_march import memory_words
+
+    lines = []
+    for memory, words in memory_words(room):
+        path = place / memory
+        path.write_bytes(words.tobytes())
+        lines.append(f"load {path} {words.shape[1]} {manifest.memories[memory]['target']}")
+    return lines
 
 
 def run_program(command: list[str], results: Path, report: Report) -> list[str]:
@@ -237,6 +269,7 @@ def _frame(manifest: Manifest, registers: Mapping[str, int], output: Path, value
             name.removeprefix("counters."): value for name, value in values.items() if name.startswith("counters.")
         },
         errors=errors,
+        ratio=pixels["ratio"].copy() if registers.get("room.isThere", 0) else None,
     )
 
 

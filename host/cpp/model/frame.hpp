@@ -9,6 +9,8 @@ namespace colonnade {
 /// Counters that do not depend on timing, named as in the register map.
 struct Counters {
     std::uint64_t raysPrimary, raysShadow, raysReflection, raysRefraction, raysInBox, nodeReads, boxTests, triangleTests, hits, deepestStack;
+    /// Of the room: rays that look for a point of it, tiles and cells that they pass, points whose pixel is looked up.
+    std::uint64_t raysRoom, marchSteps, albedoReads;
 };
 
 struct Errors {
@@ -186,12 +188,19 @@ private:
         return incoming(offSurface(point, normal, frame_.lighting.offset, numbers_), {normal[0], normal[1], normal[2]}, shadows);
     }
 
+    const RoomPoint& count(const RoomPoint& point) {
+        ++counters.raysRoom;
+        counters.marchSteps += static_cast<std::uint64_t>(point.steps);
+        counters.albedoReads += point.kind == RoomPoint::Kind::map;
+        return point;
+    }
+
     /// The colour of what a ray meets that meets nothing of the object.
     Colour met(const RayRequest& ray, bool shadows = true) {
         if (!frame_.hasRoom || !background_) return frame_.lighting.background;
         Vector direction;
         blockNormalise(ray.direction, numbers_.shadeBits, direction);
-        const RoomPoint point = background_->meet(ray.origin, direction, frame_.room);
+        const RoomPoint point = count(background_->meet(ray.origin, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return frame_.lighting.background;
         const RoomTexel texel = background_->texelOf(point, frame_.room);
         return reflectedBy(texel.albedo, roomLight(background_->reached(ray.origin, direction, point), texel.normal, shadows).visible);
@@ -202,7 +211,7 @@ private:
         if (!frame_.hasRoom || !background_) return pixel;
         Vector direction;
         blockNormalise(ray.direction, numbers_.shadeBits, direction);
-        const RoomPoint point = background_->seen(x, y, direction, frame_.room);
+        const RoomPoint point = count(background_->seen(x, y, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return pixel;
         const RoomTexel texel = background_->texelOf(point, frame_.room);
         const Incoming light = roomLight(background_->reached(ray.origin, direction, point), texel.normal, true);

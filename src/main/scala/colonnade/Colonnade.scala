@@ -64,6 +64,7 @@ final class Colonnade(
   registers.io.register <> io.register
   controller.io.start := registers.io.start
   controller.io.frame := registers.io.frame.frame
+  controller.io.takesAll := registers.io.frame.room.map(_.isThere).getOrElse(false.B)
   for ((column, index) <- columns.zipWithIndex) {
     column.io.registers := registers.io.frame
     column.io.start     := controller.io.begins

@@ -9,6 +9,9 @@ import colonnade.formats.FrameSettings
 final class TileDealerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 
+  /** Render units take all pixels: every tile counts as one that meets the object. */
+  val takesAll = Input(Bool())
+
   /** Deals the tiles of a frame; only while idle. */
   val start = Input(Bool())
 
@@ -49,7 +52,7 @@ final class TileDealer(config: ColonnadeConfig, ofObject: Boolean) extends Modul
   scan.io.cells.ready       := outline.io.squares.ready
 
   private val tested  = outline.io.tested
-  private val isMeant = tested.bits.meetsObject === ofObject.B
+  private val isMeant = (tested.bits.meetsObject || io.takesAll) === ofObject.B
   tiles.valid  := tested.valid && isMeant
   tiles.bits.x := tested.bits.first.x
   tiles.bits.y := tested.bits.first.y

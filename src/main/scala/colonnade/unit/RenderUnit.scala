@@ -2,11 +2,12 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, RegEnable, Valid}
+import colonnade.background.{AttributePort, RoomStage, RoomStageIO}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
+import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats}
 import colonnade.numbers.Rounding
 import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
-import colonnade.shading.{ColourUnit, Shader, ShadowRays}
+import colonnade.shading.{BouncedRay, BounceResult, ColourUnit, PathColour, PathTurn, Shader, ShadowRays}
 import colonnade.traversal.{TriangleLanes, Visit}
 
 /** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
@@ -31,13 +32,17 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val shader       = Module(new Shader(config))
   private val shadowRays   = Module(new ShadowRays(config))
   private val colourUnit   = Module(new ColourUnit(config))
+  private val room         = if (config.hasRoom) Some(Module(new RoomStage(config)).io) else None
 
   // What each context remembers, in memories that are read a cycle before
   private val positions = ContextTable(config, new PixelPosition(config))
   private val rays      = ContextTable(config, new TracedRay(numbers))
   private val entries   = ContextTable(config, UInt(numbers.entryBits.W))
-  private val colours   = ContextTable(config, Rgb(FrameRegisters.colour))
+  private val colours   = ContextTable(config, new PathColour(config))
   private val isObject  = Reg(Vec(contexts, Bool()))
+
+  /** The pixel's own ray may meet the object. */
+  private val meetsObject = if (config.hasRoom) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(true.B)
 
   // A position takes a free context
   private val position = io.positions.bits
@@ -48,8 +53,9 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   io.positions.ready                    := rayGenerator.io.position.ready && controller.io.free.valid
   controller.io.allocate                := rayGenerator.io.position.fire
   when(rayGenerator.io.position.fire) {
-    positions.write(controller.io.free.bits, position)
-    isObject(controller.io.free.bits) := false.B
+    positions.write(controller.io.free.bits, pixelOf(position.x, position.y))
+    isObject(controller.io.free.bits)    := false.B
+    meetsObject(controller.io.free.bits) := position.meetsObject.getOrElse(true.B)
   }
   rayGenerator.io.registers.camera    := io.registers.camera
   rayGenerator.io.registers.unitShift := io.registers.frame.unitShift
@@ -59,7 +65,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val bouncedRays = Wire(Decoupled(new RayRequest(config)))
   requests.io.in(0) :<>= shadowRays.io.ray
   requests.io.in(1) :<>= bouncedRays
-  requests.io.in(2) :<>= rayGenerator.io.ray
+  if (!config.hasRoom) requests.io.in(2) :<>= rayGenerator.io.ray
   raySetup.io.request :<>= requests.io.out
   raySetup.io.bounds := io.registers.bounds
 
@@ -168,36 +174,43 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   // A mirror or glass turns its path; the next ray is traced as long as there are bounces left
   private val bounceCounts = Reg(Vec(contexts, chiselTypeOf(io.registers.shading.bounces.getOrElse(0.U(1.W)))))
+  private val turned       = shader.io.bounced.map(_ => Wire(Decoupled(new TurnedPath(config))))
   bouncedRays.valid     := false.B
   bouncedRays.bits      := DontCare
   controller.io.bounced := 0.U.asTypeOf(controller.io.bounced)
   events.raysReflection := false.B
   events.raysRefraction := false.B
-  for ((bounced, turn) <- shader.io.bounced.zip(colourUnit.io.turn)) {
-    val bounce   = bounced.bits.bounce
-    val isTraced = bounceCounts(bounce.context) =/= io.registers.shading.bounces.get
-    bounced.ready := turn.ready && (!isTraced || bouncedRays.ready)
+  for ((path, turn) <- turned.zip(colourUnit.io.turn)) {
+    val next     = path.bits
+    val context  = next.turn.context
+    val isTraced = bounceCounts(context) =/= io.registers.shading.bounces.get
+    path.ready := turn.ready && (!isTraced || bouncedRays.ready)
 
-    bouncedRays.valid         := bounced.valid && isTraced && turn.ready
-    bouncedRays.bits.context  := bounce.context
+    bouncedRays.valid         := path.valid && isTraced && turn.ready
+    bouncedRays.bits.context  := context
     bouncedRays.bits.isShadow := false.B
-    bouncedRays.bits.origin   := bounce.origin
-    bouncedRays.bits.towards  := bounce.towards
+    bouncedRays.bits.origin   := next.origin
+    bouncedRays.bits.towards  := next.towards
 
-    turn.valid         := bounced.valid && (!isTraced || bouncedRays.ready)
-    turn.bits.context  := bounce.context
-    turn.bits.albedo   := bounced.bits.albedo
-    turn.bits.isTinted := bounced.bits.isTinted
-    turn.bits.share    := bounce.share
+    turn.valid := path.valid && (!isTraced || bouncedRays.ready)
+    turn.bits  := next.turn
 
-    controller.io.bounced.valid         := bounced.fire
-    controller.io.bounced.bits.context  := bounce.context
+    controller.io.bounced.valid         := path.fire
+    controller.io.bounced.bits.context  := context
     controller.io.bounced.bits.isTraced := isTraced
-    when(bounced.fire && isTraced) { bounceCounts(bounce.context) := bounceCounts(bounce.context) + 1.U }
+    when(path.fire && isTraced) { bounceCounts(context) := bounceCounts(context) + 1.U }
     when(controller.io.allocate) { bounceCounts(controller.io.free.bits) := 0.U }
-    events.raysReflection := bouncedRays.fire && !bounce.isRefraction
-    events.raysRefraction := bouncedRays.fire && bounce.isRefraction
+    events.raysReflection := bouncedRays.fire && !next.isRefraction
+    events.raysRefraction := bouncedRays.fire && next.isRefraction
   }
+  for ((bounced, path) <- shader.io.bounced.zip(turned) if !config.hasRoom) {
+    path.valid    := bounced.valid
+    path.bits     := TurnedPath(config, bounced.bits)
+    bounced.ready := path.ready
+  }
+
+  // Rays beyond the object
+  for (stage <- room; control <- controller.io.room; maps <- io.maps) meetRoom(stage, control, maps)
 
   // Colours
   colourUnit.io.ambient       := io.registers.ambient
@@ -210,7 +223,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   colourUnit.io.end :<>= controller.io.end
   private val coloured = colourUnit.io.colour
   connect(controller.io.coloured, coloured.valid, coloured.bits.context)
-  when(coloured.valid) { colours.write(coloured.bits.context, coloured.bits.colour) }
+  when(coloured.valid) { colours.write(coloured.bits.context, coloured.bits) }
 
   // Pixels: a context is free as soon as its tables are being read, when there is a place for what they hold
   private val complete = controller.io.complete
@@ -223,8 +236,12 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   finished.valid       := RegNext(leaves, false.B)
   finished.bits.x      := place.x
   finished.bits.y      := place.y
+  private val isColoured = RegEnable(controller.io.isColoured(complete.bits), leaves)
   finished.bits.colour :=
-    Mux(RegEnable(controller.io.isColoured(complete.bits), leaves), colour, io.registers.background)
+    Mux(isColoured, colour.colour, io.registers.background)
+  for (ratio <- finished.bits.ratio; left <- colour.ratio; channel <- 0 until 3)
+    ratio.channels(channel) :=
+      Mux(isColoured && !finished.bits.isObject, left.channels(channel), FrameRegisters.whole)
   finished.bits.isObject := RegEnable(isObject(complete.bits), leaves)
   finished.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
   if (config.frame.hits) {
@@ -269,9 +286,14 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   events.contextsBox       := population(Seq(traversal.io.nodes.fire, traversal.io.resume.fire), next.fire)
   events.contextsTriangles := population(Seq(triangleUnit.io.candidate.fire), tested.fire && tested.bits.isLast)
   events.contextsShading   := population(
-    Seq(shader.io.request.fire),
+    shader.io.request.fire +: shader.io.room.map(_.fire).toSeq,
     PopCount(lit.fire +: shader.io.bounced.map(_.fire).toSeq)
   )
+
+  events.raysRoom.foreach(_ := controller.io.room.get.question.fire)
+  events.marchSteps.foreach(_ := room.get.events.step)
+  events.busyRoom.foreach(_ := room.get.events.busy)
+  events.contextsRoom.foreach(_ := controller.io.roomCount.get)
 
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
@@ -281,6 +303,83 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   // A record comes only to a unit that takes it
   for ((unit, index) <- Seq(traversal.io.nodes, triangleUnit.io.candidate, shader.io.request).zipWithIndex)
     assert(!unit.valid || unit.ready, s"unit $index has a record that it does not take")
+
+  /** What rays do that meet nothing of the object, in a frame with a room. */
+  private def meetRoom(stage: RoomStageIO, control: RoomControl, maps: AttributePort): Unit = {
+    val view = io.registers.room.get
+    control.isThere := view.isThere
+    stage.view      := view
+    maps <> stage.maps
+    stage.question :<>= control.question
+    control.nothing := stage.nothing
+    shader.io.room.get :<>= stage.surface
+    connect(control.met, stage.surface.fire, stage.surface.bits.context)
+
+    // A path with something beside it waits, with all that its turn needs
+    val waiting = ContextTable(config, new TurnedPath(config))
+    val resumed = RegInit(false.B)
+    val beside  = RegEnable(control.turn.bits, control.turn.fire)
+    val resumes = Reg(new TurnedPath(config))
+    val isRead  = RegNext(control.turn.fire, false.B)
+    val read    = waiting.read(control.turn.bits.context, control.turn.fire)
+    val goesOn  = WireInit(false.B)
+    when(isRead) {
+      resumes := read
+      resumed := true.B
+    }.elsewhen(goesOn) { resumed := false.B }
+    control.turn.ready := !isRead && !resumed
+
+    // Every ray that may meet the room is remembered: where a path goes on, what lies beside it, the camera's
+    val isAside = WireInit(false.B)
+    val turns   = WireInit(false.B)
+    stage.ray.valid := false.B
+    stage.ray.bits  := DontCare
+    control.aside   := 0.U.asTypeOf(control.aside)
+    for ((bounced, path) <- shader.io.bounced.zip(turned)) {
+      val bounce = bounced.bits.bounce
+      val direct = TurnedPath(config, bounced.bits)
+      isAside    := bounced.valid && view.isThere && bounce.share.natural =/= 0.U && !path.fire
+      turns      := path.fire
+      goesOn     := path.fire
+      path.valid := resumed || (bounced.valid && !(view.isThere && bounce.share.natural =/= 0.U))
+      path.bits  := direct
+      when(resumed) {
+        path.bits                     := resumes
+        path.bits.turn.hasSurface.get := !beside.isBackground
+      }
+      bounced.ready := Mux(view.isThere && bounce.share.natural =/= 0.U, !path.fire, path.ready && !resumed)
+      connect(control.aside, isAside, bounce.context)
+      when(isAside) { waiting.write(bounce.context, direct) }
+
+      stage.ray.bits.context     := Mux(turns, path.bits.turn.context, bounce.context)
+      stage.ray.bits.ray.origin  := Mux(turns, path.bits.origin, bounced.bits.beside.get)
+      stage.ray.bits.ray.towards := path.bits.towards
+      when(!turns) {
+        stage.ray.bits.ray.towards.axes.zip(bounce.reflection.axes).foreach { case (to, from) => to := from }
+      }
+    }
+    val first   = rayGenerator.io.ray
+    val isFree  = !turns && !isAside
+    val context = first.bits.context
+    requests.io.in(2).valid := first.valid && isFree && meetsObject(context)
+    requests.io.in(2).bits  := first.bits
+    first.ready             := isFree && (requests.io.in(2).ready || !meetsObject(context))
+    connect(control.passes, first.fire && !meetsObject(context), context)
+    stage.ray.valid := turns || isAside || first.fire
+    when(isFree) {
+      stage.ray.bits.context     := context
+      stage.ray.bits.ray.origin  := first.bits.origin
+      stage.ray.bits.ray.towards := first.bits.towards
+    }
+    stage.ray.bits.ray.pixel := pixelOf(rayGenerator.io.pixel.x, rayGenerator.io.pixel.y)
+  }
+
+  private def pixelOf(x: UInt, y: UInt): PixelPosition = {
+    val pixel = Wire(new PixelPosition(config))
+    pixel.x := x
+    pixel.y := y
+    pixel
+  }
 
   /** The record served is for this use. */
   private def isFor(use: RecordUse.Type): Bool = served.valid && served.bits.use === use
@@ -302,5 +401,30 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     recordFetch.io.wishes(port).bits.context := context
     recordFetch.io.wishes(port).bits.use     := Mux(visit.isLeaf, RecordUse.triangles, RecordUse.node)
     recordFetch.io.wishes(port).bits.address := visit.address
+  }
+}
+
+/** A path that turns, and the ray that goes on. */
+final private class TurnedPath(config: ColonnadeConfig) extends Bundle {
+  val turn         = new PathTurn(config)
+  val isRefraction = Bool()
+  val origin       = new BounceResult(config).origin.cloneType
+  val towards      = new BounceResult(config).towards.cloneType
+}
+
+private object TurnedPath {
+
+  /** With the background beside it. */
+  def apply(config: ColonnadeConfig, bounced: BouncedRay): TurnedPath = {
+    val path = Wire(new TurnedPath(config))
+    path.turn.context  := bounced.bounce.context
+    path.turn.albedo   := bounced.albedo
+    path.turn.isTinted := bounced.isTinted
+    path.turn.share    := bounced.bounce.share
+    path.turn.hasSurface.foreach(_ := false.B)
+    path.isRefraction := bounced.bounce.isRefraction
+    path.origin       := bounced.bounce.origin
+    path.towards      := bounced.bounce.towards
+    path
   }
 }

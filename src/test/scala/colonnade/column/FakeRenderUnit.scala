@@ -39,6 +39,7 @@ class FakeRenderUnit(config: ColonnadeConfig) extends Module {
   io.requests.valid        := state === asking && !isShown
   io.requests.bits.address := address
   io.pixels.valid          := state === leaving
+  io.maps.foreach(_.asksNothing())
   io.pixels.bits           := 0.U.asTypeOf(new Pixel(config))
   io.pixels.bits.x         := position.x
   io.pixels.bits.y         := position.y
@@ -47,7 +48,8 @@ class FakeRenderUnit(config: ColonnadeConfig) extends Module {
 
   when(io.positions.fire) {
     state    := asking
-    position := io.positions.bits
+    position.x := io.positions.bits.x
+    position.y := io.positions.bits.y
     address  := io.positions.bits.x * 7.U + io.positions.bits.y * 13.U
     colour   := 0.U
     left     := (reads - 1).U
