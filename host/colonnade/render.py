@@ -101,7 +101,8 @@ def render(
     with progress.step("packing the scene"):
         room = None if folder is None else HeldRoom.load(folder, manifest)
         image = pack_scene(scene, manifest)
-        registers = placement(scene, image.header, manifest, width, height, room)
+        shows_room = relit or room is None or room.room.photo is None
+        registers = placement(scene, image.header, manifest, width, height, room, shows_room)
     packed = time.perf_counter()
     seconds: dict[str, float | None] = {"pack": packed - begun, "build": None}
     report: dict[str, Any] = {}

@@ -13,6 +13,10 @@ struct RoomView {
     int offsetShift, exponent;
     int shellPlanes;
     std::array<std::int64_t, 2> step;
+    /// Pixels that show the room itself: x0, y0, x1, y1, the latter exclusive.
+    std::array<std::int64_t, 4> window;
+
+    bool shows(std::int64_t x, std::int64_t y) const { return x >= window[0] && x < window[2] && y >= window[1] && y < window[3]; }
 };
 
 /// What a point of the room is made of; the normal in object space, 11 fraction bits.

@@ -208,7 +208,7 @@ private:
 
     /// A pixel that shows the room itself.
     Pixel seen(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray) {
-        if (!frame_.hasRoom || !background_) return pixel;
+        if (!frame_.hasRoom || !background_ || (!frame_.maySeeObject(x, y) && !frame_.room.shows(x, y))) return pixel;
         Vector direction;
         blockNormalise(ray.direction, numbers_.shadeBits, direction);
         const RoomPoint point = count(background_->seen(x, y, direction, frame_.room));

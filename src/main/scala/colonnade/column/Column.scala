@@ -5,7 +5,7 @@ import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.background.{AttributePort, ColumnRoom}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Load, Pixel}
-import colonnade.frame.{BackgroundWalker, ColumnProgress, EventSums, PixelCollector, Tile, TileWalker}
+import colonnade.frame.{BackgroundWalker, ColumnProgress, EventSums, PixelCollector, RoomWindow, Tile, TileWalker}
 import colonnade.unit.{RenderUnit, RenderUnitIO}
 
 /** Ports of [[Column]]. */
@@ -57,7 +57,7 @@ final class Column(
 
   // Tiles become pixels to render
   walker.io.frame    := io.registers.frame
-  walker.io.takesAll := io.registers.room.map(_.isThere).getOrElse(false.B)
+  walker.io.window := RoomWindow(config, io.registers)
   walker.io.tiles <> io.tiles
   units.zip(walker.io.positions).foreach { case (unit, positions) => unit.positions <> positions }
 

@@ -195,6 +195,9 @@ final class RoomView(numbers: NumberFormats) extends Bundle {
 
   /** Rays that meet nothing of the object meet the room; otherwise the background's colour. */
   val isThere = Bool()
+
+  /** Pixels that show the room itself: only here. Elsewhere they have the background's colour and all the light. */
+  val window = new PixelRect(numbers.coordinateBits)
 }
 
 object RoomView {

@@ -9,8 +9,8 @@ import colonnade.formats.FrameSettings
 final class TileDealerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 
-  /** Render units take all pixels: every tile counts as one that meets the object. */
-  val takesAll = Input(Bool())
+  /** Tiles that meet it count as those that meet the object. */
+  val window = Input(new RoomWindow(config))
 
   /** Deals the tiles of a frame; only while idle. */
   val start = Input(Bool())
@@ -46,13 +46,14 @@ final class TileDealer(config: ColonnadeConfig, ofObject: Boolean) extends Modul
   scan.io.size.bits.high := tilesIn(io.frame.pixelsHigh)
 
   outline.io.frame          := io.frame
+  outline.io.window         := io.window
   outline.io.squares.valid  := scan.io.cells.valid
   outline.io.squares.bits.x := firstPixel(scan.io.cells.bits.x)
   outline.io.squares.bits.y := firstPixel(scan.io.cells.bits.y)
   scan.io.cells.ready       := outline.io.squares.ready
 
   private val tested  = outline.io.tested
-  private val isMeant = (tested.bits.meetsObject || io.takesAll) === ofObject.B
+  private val isMeant = tested.bits.isForUnits === ofObject.B
   tiles.valid  := tested.valid && isMeant
   tiles.bits.x := tested.bits.first.x
   tiles.bits.y := tested.bits.first.y

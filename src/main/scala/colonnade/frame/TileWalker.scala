@@ -14,8 +14,8 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   /** Pixels that may see the object, one port for each render unit. */
   val positions = Vec(config.array.rows, Decoupled(new UnitPosition(config)))
 
-  /** Render units take all pixels: they show a room. */
-  val takesAll = Input(Bool())
+  /** Render units get its pixels too. */
+  val window = Input(new RoomWindow(config))
 
   /** Pixels that do not. */
   val others = Decoupled(new PixelPosition(config))
@@ -40,11 +40,12 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
 
   scan.io.frame := io.frame
   scan.io.tiles <> io.tiles
-  outline.io.frame := io.frame
+  outline.io.frame  := io.frame
+  outline.io.window := io.window
   outline.io.squares <> scan.io.positions
 
   private val tested = outline.io.tested
-  private val forUnits = tested.bits.meetsObject || io.takesAll
+  private val forUnits = tested.bits.isForUnits
   dispatch.io.items.valid  := tested.valid && forUnits
   dispatch.io.items.bits.x := tested.bits.first.x
   dispatch.io.items.bits.y := tested.bits.first.y
