@@ -100,7 +100,7 @@ def render(
     begun = time.perf_counter()
     with progress.step("packing the scene"):
         room = None if folder is None else HeldRoom.load(folder, manifest)
-        image = pack_scene(scene, manifest)
+        image = pack_scene(scene, manifest, room)
         registers = placement(scene, image.header, manifest, width, height, room)
     packed = time.perf_counter()
     seconds: dict[str, float | None] = {"pack": packed - begun, "build": None}
@@ -149,10 +149,15 @@ def composited(image: npt.NDArray[np.float64], frame: Frame, room: Room) -> npt.
     return np.where(frame.is_object[..., None], image, behind)
 
 
-def pack_scene(scene: Scene, manifest: Manifest) -> SceneImage:
-    """The scene image of a scene's mesh, made of what the scene says."""
+def pack_scene(scene: Scene, manifest: Manifest, room: HeldRoom | None = None) -> SceneImage:
+    """The scene image of a scene's mesh, made of what the scene says, and of its room."""
     mesh = load_mesh(scene.mesh_source)
-    return pack(mesh, manifest, made_of(mesh.materials, scene.material))
+    image = pack(mesh, manifest, made_of(mesh.materials, scene.material))
+    if room is None:
+        return image
+    from colonnade.room_image import with_room
+
+    return with_room(image, room, manifest)
 
 
 def require_no_errors(frame: Frame) -> None:
