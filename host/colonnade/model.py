@@ -62,17 +62,33 @@ def render_model(
     progress: Callable[[int, int], None] = lambda done, total: None,
     room: AttributeImage | None = None,
 ) -> Frame:
-    """Renders one frame.
+    """Renders one frame; see `loaded_model` and `model_frame`."""
+    return model_frame(loaded_model(manifest, image, room), registers, progress, room is not None)
 
-    Args:
-        registers: Every rw register by name (``placement.placement``).
-        progress: Called with (rows done, rows in all).
-        room: What the physical-attribute memory holds.
-    """
+
+def loaded_model(manifest: Manifest, image: SceneImage, room: AttributeImage | None = None) -> Any:
+    """A model with a scene image in its memories, and a room in its physical-attribute memory."""
     model = new_model(manifest)
     load_scene(model, image)
     if room is not None:
         load_room(model, room, manifest)
+    return model
+
+
+def model_frame(
+    model: Any,
+    registers: Mapping[str, int],
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    with_ratio: bool = False,
+) -> Frame:
+    """A frame of what a model has loaded; any number may follow each other.
+
+    Args:
+        model: Of `loaded_model`.
+        registers: Every rw register by name (``placement.placement``).
+        progress: Called with (rows done, rows in all).
+        with_ratio: There is a room: the frame has the light that is left on it.
+    """
     model.start(dict(registers))
     height = registers["frame.height"]
     bands = []
@@ -87,5 +103,5 @@ def render_model(
         distance=pixels["distance"],
         counters=model.counters(),
         errors=[name for name, is_set in model.errors().items() if is_set],
-        ratio=None if room is None else pixels["ratio"],
+        ratio=pixels["ratio"] if with_ratio else None,
     )

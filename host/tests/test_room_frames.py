@@ -12,7 +12,7 @@ from colonnade.attic import attic, write_attic
 from colonnade.errors import UserError
 from colonnade.manifest import Manifest
 from colonnade.progress import QUIET
-from colonnade.render import _render_reference
+from colonnade.reference_frames import reference_frames
 from colonnade.room import load_room
 from colonnade.scene import load_scene
 
@@ -52,7 +52,7 @@ def test_the_attic_is_read_as_it_was_made(scene: Path) -> None:
 
 
 def test_the_reference_shows_object_and_room(scene: Path, make_manifest: Callable[..., Manifest]) -> None:
-    result = _render_reference(load_scene(scene), make_manifest(), (64, 48), QUIET)
+    (result,) = reference_frames([load_scene(scene)], make_manifest(), (64, 48), QUIET)
     rays = result.report["rays"]
     assert 20 < result.object_mask.sum() < 400
     assert rays["refraction"] > result.object_mask.sum() and rays["primary"] == 64 * 48
@@ -64,7 +64,7 @@ def test_the_reference_shows_object_and_room(scene: Path, make_manifest: Callabl
 
 def test_what_is_wrong_with_a_room_is_one_line(scene: Path, make_manifest: Callable[..., Manifest]) -> None:
     with pytest.raises(UserError, match="64x64 pixels is not in the proportions of room attic, 64x48"):
-        _render_reference(load_scene(scene), make_manifest(), (64, 64), QUIET)
+        list(reference_frames([load_scene(scene)], make_manifest(), (64, 64), QUIET))
     (scene.parent / "rooms" / "attic" / "normal.png").unlink()
     with pytest.raises(UserError, match=r"lacks normal\.png"):
-        _render_reference(load_scene(scene), make_manifest(), (64, 48), QUIET)
+        list(reference_frames([load_scene(scene)], make_manifest(), (64, 48), QUIET))
