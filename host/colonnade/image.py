@@ -1,7 +1,8 @@
 """The scene image: one file with the memory contents of a packed scene.
 
 Layout, little-endian: 8 bytes magic; uint32 length of the header; header as JSON; records; the face table, int32 for
-each packed id; SHA-256 of all that went before. The placement of camera, light and object is no part of it.
+each packed id; words of a room's memories, in the header's order; SHA-256 of all that went before. The placement of
+camera, light and object is no part of it.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from colonnade.manifest import Manifest
 from colonnade.mesh_materials import MeshMaterial
 from colonnade.meshes import Extent
 
-MAGIC = b"CLNDIMG1"
+MAGIC = b"CLNDIMG2"
 FILE_NAME = "scene.image"
 _DIGEST_BYTES = 32
 _ADVICE = "pack the scene again"
@@ -43,6 +44,41 @@ class ObjectFrame:
 
 
 @dataclass(frozen=True)
+class HeldMemory:
+    """How many words the image has for a memory.
+
+    Attributes:
+        memory: Its name in the manifest, such as ``albedo.palette``.
+        words: From address 0.
+        word_bytes: The least that hold the memory's word.
+    """
+
+    memory: str
+    words: int
+    word_bytes: int
+
+    @property
+    def bytes(self) -> int:
+        """In the file."""
+        return self.words * self.word_bytes
+
+
+@dataclass(frozen=True)
+class RoomHeader:
+    """The room whose maps an image holds.
+
+    Attributes:
+        name: Of the room.
+        depth_unit: Metres: the plane map's w is this divided by the depth.
+        memories: Of the physical-attribute memory, in the file's order.
+    """
+
+    name: str
+    depth_unit: float
+    memories: tuple[HeldMemory, ...]
+
+
+@dataclass(frozen=True)
 class ImageHeader:
     """What a scene image holds.
 
@@ -58,6 +94,7 @@ class ImageHeader:
         extent: Box and outline in mesh space, for framing.
         materials: Of its faces, by their material's number.
         tree: None for an image without nodes.
+        room: None for an image without a room's maps.
     """
 
     format_hash: str
@@ -75,6 +112,7 @@ class ImageHeader:
     extent: Extent
     materials: tuple[MeshMaterial, ...]
     tree: TreeStatistics | None
+    room: RoomHeader | None = None
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object; floats survive it unchanged."""
@@ -96,7 +134,23 @@ class ImageHeader:
             MeshMaterial(**{**material, "albedo": tuple(material["albedo"])}) for material in values["materials"]
         )
         values["tree"] = TreeStatistics(**values["tree"]) if values["tree"] else None
+        if room := values["room"]:
+            memories = tuple(HeldMemory(**memory) for memory in room["memories"])
+            values["room"] = RoomHeader(room["name"], room["depth_unit"], memories)
         return ImageHeader(**values)
+
+
+@dataclass(frozen=True)
+class LoadSection:
+    """Contents of one memory of the physical-attribute memory.
+
+    Attributes:
+        memory: Its name in the manifest, which knows its load target.
+        words: uint8 [words, bytes of a word], low byte first; row i goes to address i.
+    """
+
+    memory: str
+    words: npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -107,11 +161,13 @@ class SceneImage:
         header: What it holds.
         records: uint8 [record_count, record_bits / 8], little-endian.
         source_faces: int32 [triangles], the face in the mesh's file of each packed id.
+        attributes: A room's maps, memory by memory as `RoomHeader.memories` has them; empty without a room.
     """
 
     header: ImageHeader
     records: npt.NDArray[np.uint8]
     source_faces: npt.NDArray[np.int32]
+    attributes: tuple[LoadSection, ...] = ()
 
     def save(self, path: str | Path) -> Path:
         """Writes the file, or ``scene.image`` in a folder, which is made; returns its path. Whole or not at all."""
@@ -125,6 +181,7 @@ class SceneImage:
         header = json.dumps(self.header.to_json(), separators=(",", ":"), sort_keys=True).encode()
         parts = [MAGIC, struct.pack("<I", len(header)), header]
         parts += [self.records.tobytes(), self.source_faces.astype("<i4").tobytes()]
+        parts += [section.words.tobytes() for section in self.attributes]
         digest = hashlib.sha256()
         with replacing(file) as stream:
             for part in parts:
@@ -146,20 +203,29 @@ class SceneImage:
         except OSError as error:
             raise UserError(f"cannot read the scene image {file}: {error.strerror}") from None
         if data[: len(MAGIC)] != MAGIC:
+            if data[: len(MAGIC) - 1] == MAGIC[:-1]:
+                raise UserError(f"{file} is a scene image of another version: {_ADVICE}")
             raise UserError(f"{file} is not a scene image")
         header, start = _header(data, file)
         records_end = start + header.record_count * header.record_bits // 8
         faces_end = records_end + 4 * header.triangles
-        if len(data) < faces_end + _DIGEST_BYTES:
-            expected = faces_end + _DIGEST_BYTES
-            raise UserError(f"{file} is truncated ({len(data):,} of {expected:,} bytes): {_ADVICE}")
-        if len(data) > faces_end + _DIGEST_BYTES or hashlib.sha256(data[:faces_end]).digest() != data[faces_end:]:
+        memories = header.room.memories if header.room else ()
+        end = faces_end + sum(memory.bytes for memory in memories)
+        if len(data) < end + _DIGEST_BYTES:
+            raise UserError(f"{file} is truncated ({len(data):,} of {end + _DIGEST_BYTES:,} bytes): {_ADVICE}")
+        if len(data) > end + _DIGEST_BYTES or hashlib.sha256(data[:end]).digest() != data[end:]:
             raise UserError(f"{file} is corrupt (its checksum does not match): {_ADVICE}")
         if manifest is not None:
             _check_fits(header, manifest, file)
         raw = np.frombuffer(data, dtype=np.uint8)
         records = raw[start:records_end].reshape(header.record_count, header.record_bits // 8)
-        return SceneImage(header, records, np.frombuffer(data[records_end:faces_end], dtype="<i4").astype(np.int32))
+        faces = np.frombuffer(data[records_end:faces_end], dtype="<i4").astype(np.int32)
+        attributes, first = [], faces_end
+        for memory in memories:
+            words = raw[first : first + memory.bytes].reshape(memory.words, memory.word_bytes)
+            attributes.append(LoadSection(memory.memory, words))
+            first += memory.bytes
+        return SceneImage(header, records, faces, tuple(attributes))
 
 
 def _check_fits(header: ImageHeader, manifest: Manifest, file: Path) -> None:

@@ -34,6 +34,7 @@ def describe(image: SceneImage) -> dict[str, Any]:
             "sections": {name: {"first": first, "records": count} for name, first, count in sections(header)},
         },
         "tree": asdict(header.tree) if header.tree is not None else None,
+        "room": asdict(header.room) if header.room is not None else None,
         "format_hash": header.format_hash,
     }
 
@@ -62,17 +63,40 @@ def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[
         used += f", {header.record_count / depth:.1%} of {depth:,}"
     lines.append(f"memory      {used} ({header.record_count * header.record_bits // 8:,} bytes a column)")
     lines += [f"  {name:<10}{count:>9,} records from {first:,}" for name, first, count in sections(header) if count]
+    return lines + _tree_lines(header, manifest) + _room_lines(header, manifest)
+
+
+def _tree_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
     tree = header.tree
     if tree is None:
-        lines.append("tree        none: every ray tests every triangle")
-        return lines
+        return ["tree        none: every ray tests every triangle"]
     stack = f"{tree.stack_bound} entries"
     if manifest is not None:
         stack += f" of {manifest.config['columnBvhMemory']['stackDepth']}"
-    lines.append(f"tree        {tree.nodes:,} nodes, {tree.leaves:,} leaves, depth {tree.depth}, stack bound {stack}")
-    lines.append(f"cost        {tree.cost:.2f} records for a random ray through the box")
+    lines = [
+        f"tree        {tree.nodes:,} nodes, {tree.leaves:,} leaves, depth {tree.depth}, stack bound {stack}",
+        f"cost        {tree.cost:.2f} records for a random ray through the box",
+    ]
     if tree.height_limit:
         lines.append(f"            held to {tree.height_limit} binary levels so that the stack suffices")
+    return lines
+
+
+def _room_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
+    if header.room is None:
+        return []
+    lines = [f"room        {header.room.name}: {sum(memory.bytes for memory in header.room.memories):,} bytes to load"]
+    if manifest is not None:
+        from colonnade.room_image import room_use
+
+        for name, use in room_use(header, manifest).items():
+            lines.append(
+                f"  {name:<10}{use['bytes']:>9,} bytes of memory, {use['ratio']:.1f} times less than the map's"
+                f" {use['source_bytes']:,}"
+            )
+    for memory in header.room.memories:
+        target = "" if manifest is None else f", load target {manifest.memories[memory.memory]['target']}"
+        lines.append(f"  {memory.memory:<19}{memory.words:>6,} words of {memory.word_bytes} bytes{target}")
     return lines
 
 

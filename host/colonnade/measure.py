@@ -137,6 +137,7 @@ def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
 def _digest(design: GeneratedDesign, image: SceneImage, registers: Mapping[str, int]) -> str:
     """Of all that a frame's counters follow from."""
     digest = hashlib.sha256(design.digest().encode())
-    digest.update(image.records.tobytes())
+    for words in (image.records, *(section.words for section in image.attributes)):
+        digest.update(words.tobytes())
     digest.update(json.dumps(dict(registers), sort_keys=True, default=int).encode())
     return digest.hexdigest()[:24]

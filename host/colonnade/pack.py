@@ -126,7 +126,9 @@ def pack(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | Non
 
 
 def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
-    """What an image takes of each memory, for reports: records, bytes and the stack."""
+    """What an image takes of each memory, for reports: records, bytes, the stack, and a room's maps."""
+    from colonnade.room_image import room_use
+
     depth = int(manifest.memories["columnBvh"]["depth"])
     use: dict[str, Any] = {
         "columnBvhMemory": {
@@ -142,6 +144,8 @@ def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
     if header.tree is not None:
         stack_depth = int(manifest.config["columnBvhMemory"]["stackDepth"])
         use["stack"] = {"bound": header.tree.stack_bound, "depth": stack_depth}
+    if header.room is not None:
+        use["physicalAttributeMemory"] = room_use(header, manifest)
     return use
 
 

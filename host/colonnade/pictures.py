@@ -1,7 +1,8 @@
-"""Pictures as files: linear colours to 8-bit sRGB PNG and back."""
+"""Pictures as files: linear colours to 8-bit sRGB, PNG or animated WebP, and back."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,9 @@ from colonnade.srgb import curved, straightened
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+#: How long a frame of an animation is shown.
+FRAME_MILLISECONDS = 50
 
 
 def encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -34,6 +38,25 @@ def write_png(path: Path, linear: NDArray[np.float64]) -> None:
 
     with replacing(path) as stream:
         Image.fromarray(encode_srgb(linear)).save(stream, format="PNG")
+
+
+def write_webp(path: Path, frames: Iterable[NDArray[np.uint8]]) -> None:
+    """Write 8-bit sRGB pictures, uint8 [height, width, 3], as a WebP without loss, `FRAME_MILLISECONDS` each, over and
+    over.
+    """
+    from PIL import Image
+
+    first, *others = (Image.fromarray(frame) for frame in frames)
+    with replacing(path) as stream:
+        first.save(
+            stream,
+            format="WEBP",
+            save_all=True,
+            append_images=others,
+            duration=FRAME_MILLISECONDS,
+            loop=0,
+            lossless=True,
+        )
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.errors import UserError
-from colonnade.scene import Placing, Scene, Transform
+from colonnade.scene import Placing, Scene, Transform, Vector, between
 
 if TYPE_CHECKING:
     from colonnade.meshes import Extent
@@ -51,32 +51,57 @@ class Pose:
 
 
 def object_pose(scene: Scene, extent: Extent, room: Room | None) -> Pose:
-    """Where the scene puts its mesh: by its transform, or on what the room's camera sees at a pixel."""
-    placing = scene.placing
+    """Where the scene puts its mesh: by its transform, or on what the room's camera sees at a pixel; and where its
+    motion has taken it from there.
+
+    Raises:
+        UserError: The place is outside the room's maps, or the motion is one of another kind of place.
+    """
+    placing, motion, share = scene.placing, scene.motion, scene.share
     if placing is None and room is not None and scene.transform == Transform():
         placing = Placing()
     rotation = rotation_matrix(scene.transform)
     if room is None or placing is None:
-        return Pose(rotation, scene.transform.scale, np.array(scene.transform.translate))
-    turned = rotation_matrix(Transform(rotate=(0.0, placing.turn, 0.0))) @ rotation
+        if motion.stand_at is not None:
+            raise UserError("motion.stand_at is for an object that stands in a room: give motion.translate")
+        start, scale = scene.transform.translate, scene.transform.scale
+        moved = start if motion.translate is None else between(start, motion.translate, share)
+        turned = turning((0.0, 1.0, 0.0) if room is not None else scene.camera.up, motion.turn * share) @ rotation
+        return Pose(turned, scale, np.array(moved) + scale * (rotation - turned) @ extent.centre)
+    if motion.translate is not None:
+        raise UserError("motion.translate is for an object that does not stand in a room: give motion.stand_at")
+    turned = rotation_matrix(Transform(rotate=(0.0, placing.turn + motion.turn * share, 0.0))) @ rotation
     outline = extent.outline @ turned.T
     foot = extent.centre @ turned.T
     foot[1] = outline[:, 1].min()
     scale = placing.size / extent.edge
-    return Pose(turned, scale, standing_point(placing, room) - foot * scale)
+    point = standing_point(placing, room)
+    if motion.stand_at is not None:
+        point = (1.0 - share) * point + share * _seen_at(motion.stand_at, room, "motion.stand_at")
+    return Pose(turned, scale, point - foot * scale)
 
 
 def standing_point(placing: Placing, room: Room) -> Floats:
     """What the room's camera sees where the object stands, world, float64 [3]."""
-    u, v = placing.stand_at or (room.width / 2, room.height * _STANDS_DOWN)
+    return _seen_at(placing.stand_at or (room.width / 2, room.height * _STANDS_DOWN), room, "object.stand_at")
+
+
+def _seen_at(pixel: tuple[float, float], room: Room, key: str) -> Floats:
+    u, v = pixel
     if u >= room.width or v >= room.height:
         raise UserError(
-            f"object.stand_at is ({u:g}, {v:g}), outside the maps of room {room.name}: they are"
-            f" {room.width}x{room.height} pixels"
+            f"{key} is ({u:g}, {v:g}), outside the maps of room {room.name}: they are {room.width}x{room.height} pixels"
         )
     depth = room.depth[int(v), int(u)]
     seen = np.array([(u - room.cx) / room.fx, (v - room.cy) / room.fy, 1.0]) * depth
     return np.asarray(room.camera_to_world[:, :3] @ seen + room.camera_to_world[:, 3], dtype=np.float64)
+
+
+def turning(axis: Vector, degrees: float) -> Floats:
+    """Rotation about an axis through the origin, float64 [3, 3] for column vectors; Rodrigues' formula."""
+    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    angle, across = math.radians(degrees), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across)
 
 
 def rotation_matrix(transform: Transform) -> Floats:

@@ -1,9 +1,9 @@
-"""One frame of a scene through a backend, and the report of what it took."""
+"""Frames of a scene through a backend, and the reports of what they took."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.compositing import composited
 from colonnade.errors import UserError
 from colonnade.frame import Frame
-from colonnade.generator import design_for, manifest_for
+from colonnade.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.image import ImageHeader, SceneImage
 from colonnade.manifest import Manifest
 from colonnade.meshes import load_mesh
 from colonnade.pack import pack
-from colonnade.pictures import decode_srgb
 from colonnade.placement import FloatPlacement, float_placement, placement
 from colonnade.progress import QUIET, Progress
 from colonnade.room_registers import HeldRoom
@@ -27,7 +27,7 @@ from colonnade.sizes import check_size
 from colonnade.viewpoint import made_of
 
 if TYPE_CHECKING:
-    from colonnade.room import Room
+    pass
 
 BACKENDS = ("rtl", "model", "reference")
 
@@ -65,13 +65,32 @@ def render(
     progress: Progress = QUIET,
     relit: bool = False,
 ) -> RenderResult:
-    """Renders one frame of a scene file.
+    """Renders one frame of a scene file: the first of `render_frames`."""
+    (result,) = render_frames(scene_path, config, overrides, backend, size, 1, mesh, background, hits, progress, relit)
+    return result
+
+
+def render_frames(
+    scene_path: Path,
+    config: str,
+    overrides: Sequence[str],
+    backend: str,
+    size: tuple[int, int] | None,
+    frames: int,
+    mesh: str | None = None,
+    background: Path | None = None,
+    hits: bool = False,
+    progress: Progress = QUIET,
+    relit: bool = False,
+) -> Iterator[RenderResult]:
+    """Renders the frames of a scene file's motion; mesh and room are loaded once.
 
     Args:
         scene_path: TOML.
         config: Preset, path, or precision such as ``32b32s64d``; changed by ``overrides`` (``key=value``).
         backend: One of `BACKENDS`.
         size: (width, height); the scene's unless given.
+        frames: How many, from 1: the first is the scene as it stands.
         mesh: Replaces the scene's mesh: a name or a file.
         background: A room's folder, in place of the scene's background.
         hits: The hit triangles are wanted: the hardware must be configured to deliver them.
@@ -89,8 +108,12 @@ def render(
     width, height = size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(config, overrides, progress).manifest
     check_size((width, height), manifest)
+    places = [scene.at(share) for share in scene.motion.shares(frames)]
     if backend == "reference":
-        return _render_reference(scene, manifest, (width, height), progress)
+        from colonnade.reference_frames import reference_frames
+
+        yield from reference_frames(places, manifest, (width, height), progress)
+        return
     folder = scene.background.room
     if hits and backend == "rtl":
         from colonnade.simulate import require_hits
@@ -100,61 +123,74 @@ def render(
     begun = time.perf_counter()
     with progress.step("packing the scene"):
         room = None if folder is None else HeldRoom.load(folder, manifest)
-        image = pack_scene(scene, manifest)
+        image = pack_scene(scene, manifest, room)
         shows_room = relit or room is None or room.room.photo is None
-        registers = placement(scene, image.header, manifest, width, height, room, shows_room)
-    packed = time.perf_counter()
-    seconds: dict[str, float | None] = {"pack": packed - begun, "build": None}
-    report: dict[str, Any] = {}
-    if backend == "rtl":
-        from colonnade.simulate import build_simulator, render_rtl
-
-        design = design_for(config, overrides, progress)
-        build_simulator(design, progress)
-        built = time.perf_counter()
-        held = None if room is None else room.image
-        simulated = render_rtl(design, image, [registers], progress=progress, room=held)
-        frame = simulated.frames[0]
-        seconds |= {"build": built - packed, "run": time.perf_counter() - built}
-        report["simulated_cycles_per_second"] = simulated.cycles_per_second
-    else:
-        from colonnade.model import render_model
-
-        with progress.step("rendering in the model") as share:
-            held = None if room is None else room.image
-            frame = render_model(manifest, image, registers, lambda done, total: share(done / total), held)
-        seconds["run"] = time.perf_counter() - packed
-    require_no_errors(frame)
-    report = frame_report(backend, manifest, image.header, frame) | {"seconds": seconds} | report
+        registers = [placement(place, image.header, manifest, width, height, room, shows_room) for place in places]
+    packed = time.perf_counter() - begun
     seen = None if room is None else room.room
-    view = float_placement(scene, image.header.extent, width, height, image.header.materials, seen)
-    result = _result(frame, image, view, manifest, report)
-    if room is None:
-        return result
-    report["bytes"] = room.image.byte_counts()
-    return result if relit else replace(result, image=composited(result.image, frame, room.room))
+    if backend == "rtl":
+        rendered = _rtl_frames(design_for(config, overrides, progress), image, registers, progress)
+    else:
+        rendered = _model_frames(manifest, image, registers, progress)
+    for place, (frame, more) in zip(places, rendered, strict=True):
+        require_no_errors(frame)
+        report = frame_report(backend, manifest, image.header, frame) | {"share": place.share} | more
+        report["seconds"] = {"pack": packed, "build": None} | report["seconds"]
+        view = float_placement(place, image.header.extent, width, height, image.header.materials, seen)
+        result = _result(frame, image, view, manifest, report)
+        if room is not None:
+            report["bytes"] = room.image.byte_counts()
+            if not relit:
+                result = replace(result, image=composited(result.image, frame, room.room))
+        yield result
 
 
-def composited(image: npt.NDArray[np.float64], frame: Frame, room: Room) -> npt.NDArray[np.float64]:
-    """The object in the room's photo, darkened where the object takes its light (differential rendering after Debevec,
-    1998); the frame as it is if there is no photo. Linear, float64 [height, width, 3].
-    """
-    if room.photo is None or frame.ratio is None:
-        return image
-    height, width = frame.is_object.shape
-    photo = room.photo
-    if photo.shape[:2] != (height, width):
-        from PIL import Image
-
-        photo = np.asarray(Image.fromarray(photo).resize((width, height), Image.Resampling.BOX))
-    behind = decode_srgb(photo) * (frame.ratio / 4096.0)
-    return np.where(frame.is_object[..., None], image, behind)
+#: A frame, and what its report says beyond `frame_report`.
+Rendered = tuple[Frame, dict[str, Any]]
 
 
-def pack_scene(scene: Scene, manifest: Manifest) -> SceneImage:
-    """The scene image of a scene's mesh, made of what the scene says."""
+def _rtl_frames(
+    design: GeneratedDesign, image: SceneImage, registers: list[dict[str, int]], progress: Progress
+) -> Iterator[Rendered]:
+    """All frames of one run; each has its part of the seconds."""
+    from colonnade.simulate import build_simulator, render_rtl
+
+    begun = time.perf_counter()
+    build_simulator(design, progress)
+    built = time.perf_counter()
+    simulated = render_rtl(design, image, list(registers), progress=progress)
+    run = (time.perf_counter() - built) / len(registers)
+    for frame in simulated.frames:
+        seconds = {"build": built - begun, "run": run}
+        yield frame, {"seconds": seconds, "simulated_cycles_per_second": simulated.cycles_per_second}
+
+
+def _model_frames(
+    manifest: Manifest, image: SceneImage, registers: list[dict[str, int]], progress: Progress
+) -> Iterator[Rendered]:
+    """Frame by frame of a model that is loaded once."""
+    from colonnade.model import loaded_model, model_frame
+
+    model = loaded_model(manifest, image)
+
+    def one(values: dict[str, int]) -> Rendered:
+        begun = time.perf_counter()
+        with progress.step("rendering in the model") as share:
+            frame = model_frame(model, values, lambda done, total: share(done / total))
+        return frame, {"seconds": {"run": time.perf_counter() - begun}}
+
+    yield from map(one, registers)
+
+
+def pack_scene(scene: Scene, manifest: Manifest, room: HeldRoom | None = None) -> SceneImage:
+    """The scene image of a scene's mesh, made of what the scene says, and of its room."""
     mesh = load_mesh(scene.mesh_source)
-    return pack(mesh, manifest, made_of(mesh.materials, scene.material))
+    image = pack(mesh, manifest, made_of(mesh.materials, scene.material))
+    if room is None:
+        return image
+    from colonnade.room_image import with_room
+
+    return with_room(image, room, manifest)
 
 
 def require_no_errors(frame: Frame) -> None:
@@ -216,34 +252,3 @@ def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: F
 def mesh_report(header: ImageHeader) -> dict[str, Any]:
     """What a report says about the mesh."""
     return {"name": header.mesh, "triangles": header.triangles, "source_triangles": header.source_triangles}
-
-
-def _render_reference(scene: Scene, manifest: Manifest, size: tuple[int, int], progress: Progress) -> RenderResult:
-    from colonnade.reference import render_reference
-
-    begun = time.perf_counter()
-    mesh = load_mesh(scene.mesh_source)
-    room = backdrop = None
-    if scene.background.room is not None:
-        from colonnade.depth_mesh import full_backdrop
-        from colonnade.room import load_room
-
-        room = load_room(scene.background.room)
-        backdrop = full_backdrop(room)
-    view = float_placement(scene, mesh.extent, *size, mesh.materials, room)
-    loaded = time.perf_counter()
-    reference = render_reference(mesh, view, progress, backdrop)
-    report = {
-        "backend": "reference",
-        "config": manifest.config,
-        "mesh": {"name": mesh.name, "triangles": len(mesh.faces), "source_triangles": mesh.source_count},
-        "size": list(size),
-        "cycles": None,
-        "rays": reference.rays,
-        "rays_per_cycle": None,
-        "rays_per_cycle_in_box": None,
-        "counters": {},
-        "errors": [],
-        "seconds": {"pack": loaded - begun, "build": None, "run": time.perf_counter() - loaded},
-    }
-    return RenderResult(reference.image, reference.object_mask, reference.hit_triangles, reference.t, report)

@@ -107,6 +107,35 @@ class Placing:
 
 
 @dataclass(frozen=True)
+class Motion:
+    """The way that an object and a light go while frames are rendered, from where the scene has them.
+
+    Attributes:
+        turn: Of the object about the vertical through its middle, degrees.
+        stand_at: Pixel of the room's maps where an object that stands there ends; it goes straight to that point.
+        translate: What ``transform.translate`` ends as, where the object does not stand in a room.
+        light: World position where the first light ends.
+    """
+
+    turn: float = 360.0
+    stand_at: tuple[float, float] | None = None
+    translate: Vector | None = None
+    light: Vector | None = None
+
+    @property
+    def is_closed(self) -> bool:
+        """It ends as it began."""
+        return self.turn % 360.0 == 0.0 and self.stand_at is None and self.translate is None and self.light is None
+
+    def shares(self, frames: int) -> list[float]:
+        """How far along the way each frame is, 0.0 to 1.0: evenly spaced from the beginning to the end. The end of a
+        closed way is left out, so that the frames repeat without a pause.
+        """
+        steps = frames if self.is_closed else frames - 1
+        return [frame / max(steps, 1) for frame in range(frames)]
+
+
+@dataclass(frozen=True)
 class Paths:
     """How rays go on from mirrors and glass.
 
@@ -146,7 +175,8 @@ class FrameSize:
 class Scene:
     """One object, one camera, at least one light.
 
-    With a room the camera is the room's, and the world is the room's world, in metres.
+    With a room the camera is the room's, and the world is the room's world, in metres. ``share`` is how far along its
+    motion the scene is, 0.0 to 1.0.
     """
 
     mesh: MeshSource
@@ -160,6 +190,12 @@ class Scene:
     placing: Placing | None = None  # in a room without a [transform]: the default one
     paths: Paths = field(default_factory=Paths)
     frame: FrameSize = field(default_factory=FrameSize)
+    motion: Motion = field(default_factory=Motion)
+    share: float = 0.0
+
+    def at(self, share: float) -> Scene:
+        """The scene so far along its motion."""
+        return replace(self, share=share)
 
     def with_mesh(self, name_or_path: str) -> Scene:
         """The scene with another mesh: a name, or a path relative to the working directory."""
@@ -171,8 +207,11 @@ class Scene:
 
     @property
     def lights(self) -> tuple[Light, ...]:
-        """All lights, the first one first."""
-        return self.light, *self.more_lights
+        """All lights, the first one first, where the motion has it."""
+        first, end = self.light, self.motion.light
+        if first.position is not None and end is not None:
+            first = replace(first, position=between(first.position, end, self.share))
+        return first, *self.more_lights
 
     @property
     def mesh_source(self) -> str | Path:
@@ -181,6 +220,12 @@ class Scene:
             return self.mesh.path
         assert self.mesh.name is not None
         return self.mesh.name
+
+
+def between(start: Vector, end: Vector, share: float) -> Vector:
+    """The point at a share of the straight way; both ends are exact."""
+    x, y, z = ((1.0 - share) * a + share * b for a, b in zip(start, end, strict=True))
+    return x, y, z
 
 
 def load_scene(path: str | Path) -> Scene:

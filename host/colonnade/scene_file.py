@@ -17,6 +17,7 @@ from colonnade.scene import (
     Light,
     Material,
     MeshSource,
+    Motion,
     Paths,
     Placing,
     Scene,
@@ -51,7 +52,7 @@ def read_scene(file: Path) -> Scene:
 class _Reader:
     """Checks and converts the tables of one file."""
 
-    tables = "mesh transform object camera light material paths ambient background frame".split()
+    tables = "mesh transform object camera light material paths ambient background motion frame".split()
     light_keys = ("position", "offset", "colour", "falloff")
 
     def __init__(self, file: Path) -> None:
@@ -72,6 +73,9 @@ class _Reader:
         transform = self.table(data, "transform", ("rotate", "scale", "translate"))
         if "object" in data and ("scale" in transform or "translate" in transform):
             raise self.fail("[object] places the object: leave out transform.scale and transform.translate")
+        motion = self.motion(data)
+        if motion.light is not None and lights[0].position is None:
+            raise self.fail("motion.light moves the first light from its place: give light.position")
         return Scene(
             mesh=self.mesh(self.table(data, "mesh", ("name", "path"))),
             transform=self.transform(transform),
@@ -84,6 +88,7 @@ class _Reader:
             placing=self.placing(placing) if "object" in data else None,
             paths=self.paths(self.table(data, "paths", ("bounces", "shadow_transmittance"))),
             frame=self.frame(self.table(data, "frame", ("width", "height"))),
+            motion=motion,
         )
 
     def only(self, data: Mapping[str, Any], known: Sequence[str], prefix: str) -> None:
@@ -178,16 +183,23 @@ class _Reader:
         return Background(colour, self.file.parent / room if room is not None else None)
 
     def placing(self, table: Mapping[str, Any]) -> Placing:
-        pixel = table.get("stand_at")
-        if pixel is not None:
-            numbers = isinstance(pixel, list) and len(pixel) == 2
-            if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) or not v >= 0 for v in pixel):
-                raise self.fail("object.stand_at must be two numbers: a pixel of the room's maps, across and down")
-            pixel = (float(pixel[0]), float(pixel[1]))
         return Placing(
-            stand_at=pixel,
+            stand_at=self.pixel(table, "object.stand_at"),
             size=self.number(table, "object.size", Placing().size, 1e-3, 1e3),
             turn=self.number(table, "object.turn", 0.0, -360.0, 360.0),
+        )
+
+    def motion(self, data: Mapping[str, Any]) -> Motion:
+        if "motion" not in data:
+            return Motion()
+        table = self.table(data, "motion", ("turn", "stand_at", "translate", "light"))
+        if not table:
+            raise self.fail("[motion] moves nothing: give turn, stand_at, translate or light")
+        return Motion(
+            turn=self.number(table, "motion.turn", 0.0, -36000.0, 36000.0),
+            stand_at=self.pixel(table, "motion.stand_at"),
+            translate=self.vector(table, "motion.translate", (0.0,) * 3) if "translate" in table else None,
+            light=self.vector(table, "motion.light", (0.0,) * 3) if "light" in table else None,
         )
 
     def paths(self, table: Mapping[str, Any]) -> Paths:
@@ -205,6 +217,15 @@ class _Reader:
                 raise self.fail(f"frame.{key} must be a whole number of pixels from 1")
             sizes[key] = value
         return FrameSize(**sizes)
+
+    def pixel(self, table: Mapping[str, Any], key: str) -> tuple[float, float] | None:
+        pixel = table.get(key.split(".")[1])
+        if pixel is None:
+            return None
+        numbers = isinstance(pixel, list) and len(pixel) == 2
+        if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) or not v >= 0 for v in pixel):
+            raise self.fail(f"{key} must be two numbers: a pixel of the room's maps, across and down")
+        return float(pixel[0]), float(pixel[1])
 
     def number(self, table: Mapping[str, Any], key: str, default: float, low: float, high: float) -> float:
         value = table.get(key.split(".")[1], default)

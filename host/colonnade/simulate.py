@@ -12,7 +12,6 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,9 +23,6 @@ from colonnade.image import SceneImage
 from colonnade.manifest import Manifest
 from colonnade.progress import QUIET, Progress, Report
 from colonnade.toolchain import cache_directory, project_root, require_simulator
-
-if TYPE_CHECKING:
-    from colonnade.attributes import AttributeImage
 
 #: One pixel as the harness writes it (``struct PixelBytes``).
 PIXEL = np.dtype(
@@ -152,9 +148,8 @@ def render_rtl(
     registers: list[Mapping[str, int]],
     stalls: Stalls | None = None,
     progress: Progress = QUIET,
-    room: AttributeImage | None = None,
 ) -> Simulated:
-    """Renders frames, one for each set of registers; the image, and what the room's memories hold, are loaded once.
+    """Renders frames, one for each set of registers; the image is loaded once.
 
     Raises:
         UserError: the stalls hold banks, and the design has no input for that.
@@ -165,7 +160,7 @@ def render_rtl(
         raise UserError("this configuration's memory cannot be held: set columnBvhMemory.holdable=true for such stalls")
     program = build_simulator(design, progress)
     with tempfile.TemporaryDirectory(prefix="colonnade-") as place:
-        job, outputs = write_job(Path(place), design.manifest, image, registers, room)
+        job, outputs = write_job(Path(place), design.manifest, image, registers)
         command = [str(program), *stalls.options, str(job)]
         with progress.step("rendering in the simulator") as report:
             lines = run_program(command, Path(place) / "results", report)
@@ -173,18 +168,16 @@ def render_rtl(
 
 
 def write_job(
-    place: Path,
-    manifest: Manifest,
-    image: SceneImage,
-    registers: list[Mapping[str, int]],
-    room: AttributeImage | None = None,
+    place: Path, manifest: Manifest, image: SceneImage, registers: list[Mapping[str, int]]
 ) -> tuple[Path, list[Path]]:
     """The harness's job file for some frames in the folder `place`, and the file of pixels that each will write."""
     records = place / "records"
     records.write_bytes(image.records.tobytes())
     lines = [f"load {records} {manifest.record_bits // 8}"]
-    if room is not None:
-        lines += _room_loads(place, manifest, room)
+    for section in image.attributes:
+        words = place / section.memory
+        words.write_bytes(section.words.tobytes())
+        lines.append(f"load {words} {section.words.shape[1]} {manifest.memories[section.memory]['target']}")
     readable = [register for register in manifest.registers.values() if register.access == "ro"]
     start = manifest.registers["control.start"].address
     outputs = []
@@ -197,18 +190,6 @@ def write_job(
     job = place / "job"
     job.write_text("\n".join(lines) + "\n")
     return job, outputs
-
-
-def _room_loads(place: Path, manifest: Manifest, room: AttributeImage) -> list[str]:
-    """The harness's commands that fill the physical-attribute memory."""
-    from colonnade.room_march import memory_words
-
-    lines = []
-    for memory, words in memory_words(room):
-        path = place / memory
-        path.write_bytes(words.tobytes())
-        lines.append(f"load {path} {words.shape[1]} {manifest.memories[memory]['target']}")
-    return lines
 
 
 def run_program(command: list[str], results: Path, report: Report) -> list[str]:

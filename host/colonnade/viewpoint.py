@@ -98,7 +98,8 @@ def float_placement(
     materials: tuple[MeshMaterial, ...] = (PLAIN,),
     room: Room | None = None,
 ) -> FloatPlacement:
-    """The frame of a scene.
+    """The frame of a scene. What is placed relative to the object, the camera or lights, stays where it is at the
+    beginning of the scene's motion.
 
     Args:
         scene: What to render.
@@ -109,11 +110,12 @@ def float_placement(
         room: The one that `scene.background` names; then its camera sees the frame.
     """
     pose = object_pose(scene, extent, room)
-    centre, edge = pose.to_world(extent.centre), extent.edge * pose.scale
+    start = object_pose(scene.at(0.0), extent, room)
+    centre, edge = start.to_world(extent.centre), extent.edge * start.scale
     if room is not None:
         camera = room_camera(room, width, height)
     else:
-        camera = scene_camera(scene.camera, pose, extent, width, height)
+        camera = scene_camera(scene.camera, start, extent, width, height)
     return FloatPlacement(
         width=width,
         height=height,

@@ -1,4 +1,4 @@
-"""``colonnade render``: one frame of a scene."""
+"""``colonnade render``: one frame of a scene, or those of its motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 from colonnade.commands.options import FILE, configuration_options, finish, json_option, require_outputs
 
 
-@click.command(short_help="Render a frame through the hardware, its model, or Embree.")
+@click.command(short_help="Render frames through the hardware, its model, or Embree.")
 @click.argument("scene", type=FILE)
 @configuration_options
 @click.option(
@@ -24,7 +24,13 @@ from colonnade.commands.options import FILE, configuration_options, finish, json
 @click.option("--mesh", metavar="MESH", help="A mesh (name or file) in place of the scene's.")
 @click.option("--background", type=FILE, metavar="DIR", help="A background in place of the scene's.")
 @click.option("--relit", is_flag=True, help="Show a room in the scene's lights, not the camera's photo of it.")
-@click.option("--output", type=FILE, metavar="FILE", help="Write the picture, a PNG.")
+@click.option(
+    "--frames",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Render N frames of the scene's [motion]; a full turn of the object without one. Files are numbered.",
+)
+@click.option("--output", type=FILE, metavar="FILE", help="Write the picture, a PNG; with --frames also one .webp.")
 @click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances, an .npz file.")
 @json_option
 def render(
@@ -36,46 +42,64 @@ def render(
     mesh: str | None,
     background: Path | None,
     relit: bool,
+    frames: int | None,
     output: Path | None,
     hits_file: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Render one frame of SCENE, a TOML file, and print what it took."""
+    """Render one frame of SCENE, a TOML file, and print what it took. With --frames the object or the light moves."""
+    from colonnade.frames import frames_report, numbered, picture_files
     from colonnade.sizes import parse_size
 
     pixels = parse_size(size) if size is not None else None
-    require_outputs(output, hits_file, json_file)
+    pictures = [output] if output is not None else []
+    hits_files = [hits_file] if hits_file is not None else []
+    if frames is not None:
+        pictures = picture_files(output, frames) if output is not None else []
+        hits_files = numbered(hits_file, frames) if hits_file is not None else []
+    require_outputs(*pictures, *hits_files, json_file)
 
     from colonnade import progress
     from colonnade.hits import Hits, write_hits
-    from colonnade.pictures import write_png
-    from colonnade.render import render as render_frame
+    from colonnade.pictures import encode_srgb, write_png, write_webp
+    from colonnade.render import render_frames
 
-    result = render_frame(
+    results = render_frames(
         scene,
         config,
         overrides,
         backend,
         pixels,
+        frames or 1,
         mesh=mesh,
         background=background,
         hits=hits_file is not None,
         progress=progress.for_terminal(),
         relit=relit,
     )
-    if output is not None:
-        write_png(output, result.image)
-    if hits_file is not None:
-        write_hits(hits_file, Hits(result.hit_triangles, result.t))
-    click.echo(summary(result.report))
-    finish(result.report, json_file)
+    is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"
+    reports, film = [], []
+    for index, result in enumerate(results):
+        if is_film:
+            film.append(encode_srgb(result.image))
+        elif pictures:
+            write_png(pictures[index], result.image)
+        if hits_files:
+            write_hits(hits_files[index], Hits(result.hit_triangles, result.t))
+        reports.append(result.report)
+    if is_film:
+        write_webp(pictures[0], film)
+    report = reports[0] if frames is None else frames_report(reports)
+    click.echo(summary(report))
+    finish(report, json_file)
 
 
 def summary(report: dict[str, Any]) -> str:
     """One or two lines for people from a render's report."""
     rays = report["rays"]
+    several = f"{len(report['frames'])} frames, " if "frames" in report else ""
     words = [
-        f"{report['backend']}: {report['mesh']['triangles']:,} triangles",
+        f"{report['backend']}: {several}{report['mesh']['triangles']:,} triangles",
         f"{sum(rays[kind] for kind in ('primary', 'shadow', 'reflection', 'refraction') if rays.get(kind)):,} rays",
     ]
     if report.get("cycles"):

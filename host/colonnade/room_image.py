@@ -1,0 +1,44 @@
+"""A room as part of the scene image: what each memory of the hardware's physical-attribute memory is loaded with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from colonnade.attributes.image import SOURCE_BYTES_A_PIXEL
+from colonnade.image import HeldMemory, ImageHeader, LoadSection, RoomHeader, SceneImage
+from colonnade.manifest import Manifest
+from colonnade.room_march import memory_words
+from colonnade.room_registers import HeldRoom, layout_of
+
+
+def with_room(image: SceneImage, room: HeldRoom, manifest: Manifest) -> SceneImage:
+    """A mesh's image with a room's maps.
+
+    Raises:
+        ValueError: Words do not fit the manifest's memories.
+    """
+    sections = []
+    for memory, words in memory_words(room.image):
+        place = manifest.memories[memory]
+        word_bytes = -(-int(place["bits"]) // 8)
+        if len(words) != int(place["depth"]) or words[:, word_bytes:].any():
+            raise ValueError(f"{memory}: {words.shape} bytes do not fit {place['depth']} words of {place['bits']} bits")
+        sections.append(LoadSection(memory, np.ascontiguousarray(words[:, :word_bytes])))
+    memories = tuple(HeldMemory(section.memory, *section.words.shape) for section in sections)
+    header = RoomHeader(room.room.name, room.image.depth_unit, memories)
+    return replace(image, header=replace(image.header, room=header), attributes=tuple(sections))
+
+
+def room_use(header: ImageHeader, manifest: Manifest) -> dict[str, dict[str, float]]:
+    """Bytes of memory that each of an image's maps takes, and how much less than the map as it comes; none without a
+    room.
+    """
+    if header.room is None:
+        return {}
+    layout = layout_of(manifest)
+    source = layout.width * layout.height * SOURCE_BYTES_A_PIXEL
+    of_map, planes = layout.map_memory_bytes, layout.plane_memory_bytes
+    counts = {"albedo": of_map, "normals": of_map, "planes": planes}
+    return {name: {"bytes": count, "source_bytes": source, "ratio": source / count} for name, count in counts.items()}

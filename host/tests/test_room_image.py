@@ -1,0 +1,118 @@
+"""A room in the scene image: every memory's words survive the file, fit the hardware, and are in its report."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from colonnade.attributes import AttributeImage
+from colonnade.cli import cli
+from colonnade.errors import UserError
+from colonnade.image import SceneImage
+from colonnade.inspect import describe, report_lines
+from colonnade.manifest import Manifest
+from colonnade.meshes import load_mesh
+from colonnade.pack import memory_use, pack
+from colonnade.room import load_room
+from colonnade.room_image import with_room
+from colonnade.room_march import memory_words
+from colonnade.room_registers import HeldRoom, layout_of
+
+ROOT = Path(__file__).resolve().parents[2]
+#: How the host keeps words of each width.
+WORDS = ((16, np.uint16), (32, np.uint32), (64, np.uint64))
+
+
+@pytest.fixture(scope="module")
+def hardware() -> Manifest:
+    return Manifest.load(ROOT / "configs" / "golden" / "small.json")
+
+
+@pytest.fixture(scope="module")
+def held(hardware: Manifest) -> HeldRoom:
+    """A room whose words are random, every bit of them."""
+    random, memories = np.random.default_rng(5), dict[str, dict[str, Any]]()
+    for name, place in hardware.memories.items():
+        part, _, memory = name.partition(".")
+        if memory:
+            kind = next((kind for width, kind in WORDS if int(place["bits"]) <= width), np.uint64)
+            parts = -(-int(place["bits"]) // 64)
+            words = random.integers(0, 1 << 64, (int(place["depth"]), parts), dtype=np.uint64)
+            words[:, -1] &= np.uint64((1 << (int(place["bits"]) - 64 * (parts - 1))) - 1)
+            memories.setdefault(part, {})[memory] = (words if parts > 1 else words[:, 0]).astype(kind)
+    return HeldRoom(
+        load_room(ROOT / "scenes" / "rooms" / "attic"),
+        AttributeImage.from_memories(layout_of(hardware), memories, 1.25),
+    )
+
+
+@pytest.fixture(scope="module")
+def image(hardware: Manifest, held: HeldRoom) -> SceneImage:
+    return with_room(pack(load_mesh("cube"), hardware), held, hardware)
+
+
+def test_all_memories_survive_the_file(tmp_path: Path, hardware: Manifest, held: HeldRoom, image: SceneImage) -> None:
+    loaded = SceneImage.load(image.save(tmp_path), hardware)
+    assert loaded.header.room == image.header.room
+    assert loaded.header.room is not None and loaded.header.room.depth_unit == 1.25
+    assert {section.memory for section in loaded.attributes} == set(hardware.memories) - {"columnBvh"}
+    for section, (memory, words) in zip(loaded.attributes, memory_words(held.image), strict=True):
+        place, width = hardware.memories[memory], section.words.shape[1]
+        assert section.memory == memory
+        assert section.words.shape == (place["depth"], -(-place["bits"] // 8))
+        np.testing.assert_array_equal(section.words, words[:, :width])
+        assert not words[:, width:].any()
+    np.testing.assert_array_equal(loaded.source_faces, image.source_faces)
+    np.testing.assert_array_equal(loaded.records, image.records)
+
+
+def test_a_file_that_lacks_words_or_has_others_is_refused(tmp_path: Path, image: SceneImage) -> None:
+    file = image.save(tmp_path)
+    data = bytearray(file.read_bytes())
+    file.write_bytes(data[:-33])
+    with pytest.raises(UserError, match="truncated"):
+        SceneImage.load(file)
+    data[-40] ^= 4
+    file.write_bytes(data)
+    with pytest.raises(UserError, match="corrupt"):
+        SceneImage.load(file)
+    file.write_bytes(b"CLNDIMG1" + data[8:])
+    with pytest.raises(UserError, match="of another version: pack the scene again"):
+        SceneImage.load(file)
+
+
+def test_words_that_no_memory_holds_are_a_bug(hardware: Manifest, held: HeldRoom) -> None:
+    planes = held.image.planes
+    for changed in (replace(planes, heap=planes.heap[:-1]), replace(planes, shell=planes.shell | np.uint64(1 << 40))):
+        wrong = HeldRoom(held.room, replace(held.image, planes=changed))
+        with pytest.raises(ValueError, match="do not fit"):
+            with_room(pack(load_mesh("cube"), hardware), wrong, hardware)
+
+
+def test_the_report_has_the_bytes_of_each_map(hardware: Manifest, image: SceneImage) -> None:
+    use = memory_use(image.header, hardware)["physicalAttributeMemory"]
+    assert {name: part["bytes"] for name, part in use.items()} == {"albedo": 16384, "normals": 16384, "planes": 8192}
+    assert use["albedo"]["source_bytes"] == 921600 and use["albedo"]["ratio"] == pytest.approx(56.25)
+    lines = "\n".join(report_lines(image.header, hardware))
+    assert "16,384 bytes of memory, 56.2 times less than the map's 921,600" in lines
+    assert "planes.shell            8 words of 17 bytes, load target 10" in lines
+    assert "albedo.palette" in "\n".join(report_lines(image.header))
+    assert json.loads(json.dumps(describe(image)))["room"]["name"] == "attic"
+
+
+def test_pack_refuses_a_room_that_the_hardware_has_no_memory_for(tmp_path: Path) -> None:
+    """As `render` does; nothing is written."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[mesh]\nname = "cube"\n')
+    room = ROOT / "scenes" / "rooms" / "attic"
+    arguments = ["pack", str(scene), "--background", str(room), "--output", str(tmp_path / "packed")]
+    result = CliRunner().invoke(cli, [*arguments, "--config", "tiny"])
+    assert result.exit_code == 2
+    assert "no memory for a room: set physicalAttributeMemory" in result.output
+    assert not (tmp_path / "packed").exists()
