@@ -87,7 +87,7 @@ private:
         const std::int64_t x = ask.number(), y = ask.number();
         const WideVector origin = ask.wideVector();
         Vector direction;
-        blockNormalise(ask.wideVector(), numbers.shadeBits, direction);
+        blockScale(ask.wideVector(), numbers.shadeBits, direction);
         const Background background(numbers, image());
         const RoomPoint point = isSeen ? background.seen(x, y, direction, view) : background.meet(origin, direction, view);
         Answer answer;

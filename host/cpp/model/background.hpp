@@ -45,6 +45,14 @@ struct MapRay {
     int fromShift, towardsShift, directionShift;
 };
 
+/// Scales a vector so that its components take `bits` bits and a sign; returns by how many bits it was shifted down.
+inline int blockScale(const WideVector& v, int bits, Vector& scaled) {
+    int length = 0;
+    for (const Wide component : v) length = std::max(length, bitLength(UnsignedWide(component < 0 ? ~component : component)));
+    for (int a = 0; a < 3; ++a) scaled[a] = static_cast<std::int64_t>(floorShift(v[a], length - bits));
+    return length - bits;
+}
+
 class Background {
 public:
     /// Steps of a march at most: then the ray meets the shell.
@@ -109,6 +117,7 @@ public:
 
 private:
     static constexpr int stepGuard = 12, rotationFraction = 14;
+
     /// A plane along a ray: how far the ray is in front of it, value + slope · s, in steps of 2^(exponent − 22).
     struct Depth {
         int id;
@@ -134,8 +143,8 @@ private:
             from[i] = times(view.matrix[i], origin) + floorShift<Wide>(view.offset[i], -view.offsetShift);
             towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
         }
-        ray.fromShift = blockNormalise(from, f_, ray.from);
-        ray.towardsShift = blockNormalise(towards, f_, ray.towards);
+        ray.fromShift = blockScale(from, f_, ray.from);
+        ray.towardsShift = blockScale(towards, f_, ray.towards);
         ray.isInFront = ray.from[2] > 0;
         if (!ray.isInFront) return ray;
 
@@ -149,7 +158,7 @@ private:
         WideVector way;
         for (int i = 0; i < 2; ++i) way[i] = (Wide(ray.towards[i]) << f_) - Wide(ray.position[i]) * ray.towards[2];
         way[2] = -Wide(ray.position[2]) * ray.towards[2];
-        ray.directionShift = blockNormalise(way, f_, ray.direction);
+        ray.directionShift = blockScale(way, f_, ray.direction);
         return ray;
     }
 

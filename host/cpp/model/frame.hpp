@@ -199,7 +199,7 @@ private:
     Colour met(const RayRequest& ray, bool shadows = true) {
         if (!frame_.hasRoom || !background_) return frame_.lighting.background;
         Vector direction;
-        blockNormalise(ray.direction, numbers_.shadeBits, direction);
+        blockScale(ray.direction, numbers_.shadeBits, direction);
         const RoomPoint point = count(background_->meet(ray.origin, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return frame_.lighting.background;
         const RoomTexel texel = background_->texelOf(point, frame_.room);
@@ -210,7 +210,7 @@ private:
     Pixel seen(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray) {
         if (!frame_.hasRoom || !background_ || (!frame_.maySeeObject(x, y) && !frame_.room.shows(x, y))) return pixel;
         Vector direction;
-        blockNormalise(ray.direction, numbers_.shadeBits, direction);
+        blockScale(ray.direction, numbers_.shadeBits, direction);
         const RoomPoint point = count(background_->seen(x, y, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return pixel;
         const RoomTexel texel = background_->texelOf(point, frame_.room);

@@ -62,8 +62,8 @@ final class Colonnade(
 
   // A frame: tiles out, pixels back
   registers.io.register <> io.register
-  controller.io.start := registers.io.start
-  controller.io.frame := registers.io.frame.frame
+  controller.io.start  := registers.io.start
+  controller.io.frame  := registers.io.frame.frame
   controller.io.window := RoomWindow(config, registers.io.frame)
   for ((column, index) <- columns.zipWithIndex) {
     column.io.registers := registers.io.frame

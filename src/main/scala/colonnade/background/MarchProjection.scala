@@ -61,8 +61,10 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
     step(set(m.axis, 0.U))
     step("position")(m.multiply(m.place(m.axis), m.quotient.zext))
     step(m.load(m.product))
-    m.measureSigned()
-    step(set(m.drop, m.depthLength.zext +& (f - 1).S))
+    step {
+      set(m.length, m.measured)
+      set(m.drop, m.depthLength.zext +& (f - 1).S)
+    }
     step {
       set(m.place(m.axis), m.saturated(alongBits))
       next("position", 1)
@@ -121,7 +123,7 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
 
   /** Makes a component of the sum, and goes on with the next; in the end aligns all three. */
   private def normalise(name: String, vector: Vec[SInt], top: UInt): Unit = {
-    m.measureSigned()
+    step(m.measure())
     step {
       set(vector(m.axis), Rounding.narrow(m.shifted, f + 1).pad(vector(0).getWidth))
       set(m.lengths(m.axis), m.length)

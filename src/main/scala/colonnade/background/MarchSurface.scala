@@ -21,20 +21,20 @@ final class MarchSurface(
   import m.formats._
   import m.program._
 
-  private val albedo    = Reg(new AlbedoEntry)
-  private val mapNormal = Reg(new NormalEntry)
-  private val hasAlbedo = Reg(Bool())
-  private val hasNormal = Reg(Bool())
+  private val albedo     = Reg(new AlbedoEntry)
+  private val mapNormal  = Reg(new NormalEntry)
+  private val hasAlbedo  = Reg(Bool())
+  private val hasNormal  = Reg(Bool())
   private val coordinate = Reg(SInt((sceneBits + 1).W))
-  private val point     = Reg(Vec(3, SInt(sceneBits.W)))
-  private val normal    = Reg(Vec(3, SInt(NumberFormats.normalBits.W)))
+  private val point      = Reg(Vec(3, SInt(sceneBits.W)))
+  private val normal     = Reg(Vec(3, SInt(NumberFormats.normalBits.W)))
 
-  maps.albedo.question.valid              := false.B
-  maps.albedo.question.bits.tag           := 0.U
-  maps.albedo.question.bits.content.x     := pixels.x
-  maps.albedo.question.bits.content.y     := pixels.y
-  maps.normals.question.valid             := false.B
-  maps.normals.question.bits              := maps.albedo.question.bits
+  maps.albedo.question.valid          := false.B
+  maps.albedo.question.bits.tag       := 0.U
+  maps.albedo.question.bits.content.x := pixels.x
+  maps.albedo.question.bits.content.y := pixels.y
+  maps.normals.question.valid         := false.B
+  maps.normals.question.bits          := maps.albedo.question.bits
 
   /** Once the program is at "finish". */
   def result(to: MarchResult): Unit = {
@@ -42,7 +42,7 @@ final class MarchSurface(
     to.albedo := Mux(isThere, albedo, 0.U.asTypeOf(albedo))
     for (axis <- 0 until 3) {
       to.point.axes(axis)  := Fixed(to.point.x.format, Mux(isThere, point(axis), 0.S))
-      to.normal.axes(axis)    := Mux(isThere, normal(axis), 0.S)
+      to.normal.axes(axis) := Mux(isThere, normal(axis), 0.S)
     }
   }
 
@@ -96,8 +96,10 @@ final class MarchSurface(
     step("reach")(set(m.axis, 0.U))
     step("coordinate")(m.multiply(m.quotient.zext, m.heading(m.axis)))
     step(m.load(m.product))
-    m.measureSigned()
-    step(set(m.drop, f.S - ends.exponent))
+    step {
+      set(m.length, m.measured)
+      set(m.drop, f.S - ends.exponent)
+    }
     step(set(coordinate, m.saturated(farBits)))
     step(set(coordinate, m.combine(coordinate, VecInit(request.ray.origin.axes.map(_.integer))(m.axis))))
     step {
@@ -114,7 +116,10 @@ final class MarchSurface(
   private def turn(): Unit = {
     val matrixRow = VecInit(view.rotation.map(row => VecInit(row.axes.map(_.integer))))(m.axis)
     val turned    =
-      Rounding.nearestEven(Rounding.narrow(m.sum, RoomView.rotationBits + NumberFormats.normalBits + 2), RoomView.rotationFraction)
+      Rounding.nearestEven(
+        Rounding.narrow(m.sum, RoomView.rotationBits + NumberFormats.normalBits + 2),
+        RoomView.rotationFraction
+      )
     step("turn")(m.multiply(mapNormal.x.integer, matrixRow(0)))
     step {
       m.multiply(mapNormal.y.integer, matrixRow(1))

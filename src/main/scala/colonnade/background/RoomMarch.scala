@@ -28,8 +28,8 @@ final class RoomMarch(config: ColonnadeConfig) extends Module {
   private val surface    = new MarchSurface(datapath, planes, pixels, ends, io.maps, io.view, asked)
   private val isBusy     = WireInit(true.B)
 
-  io.request.ready                         := false.B
-  io.result.valid                          := false.B
+  io.request.ready                              := false.B
+  io.result.valid                               := false.B
   io.maps.cells.question.valid                  := false.B
   io.maps.cells.question.bits.tag               := 0.U
   io.maps.cells.question.bits.content.pixel     := walk.cellCorner

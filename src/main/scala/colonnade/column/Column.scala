@@ -56,7 +56,7 @@ final class Column(
   private val collector  = Module(new PixelCollector(config, config.array.rows + 1))
 
   // Tiles become pixels to render
-  walker.io.frame    := io.registers.frame
+  walker.io.frame  := io.registers.frame
   walker.io.window := RoomWindow(config, io.registers)
   walker.io.tiles <> io.tiles
   units.zip(walker.io.positions).foreach { case (unit, positions) => unit.positions <> positions }

@@ -44,7 +44,7 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
   outline.io.window := io.window
   outline.io.squares <> scan.io.positions
 
-  private val tested = outline.io.tested
+  private val tested   = outline.io.tested
   private val forUnits = tested.bits.isForUnits
   dispatch.io.items.valid  := tested.valid && forUnits
   dispatch.io.items.bits.x := tested.bits.first.x

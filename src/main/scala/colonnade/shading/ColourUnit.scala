@@ -120,8 +120,8 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
 
   /** Beside that of the turn where a turn may have a surface. */
   private val surfaceAlbedo = if (hasBounces && config.hasRoom) Reg(Vec(3, UInt(colourBits.W))) else albedo
-  private val colours    = Reg(Vec(3, UInt(colourBits.W)))
-  private val ratios     = if (config.hasRoom) Some(new Ratios(sumBits)) else None
+  private val colours       = Reg(Vec(3, UInt(colourBits.W)))
+  private val ratios        = if (config.hasRoom) Some(new Ratios(sumBits)) else None
 
   private val reflects = step === lights.U
   private val lastStep = Mux(ofSurface, lights.U, Mux(isEnd, 0.U, 2.U))
@@ -137,16 +137,16 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val pathRead    = paths.map(_.read(taken, takes))
   arrives := takes
   when(takes) {
-    isBusy       := true.B
-    isEnd        := !turns
-    context      := taken
-    channel      := 0.U
-    isThere      := false.B
-    step         := 0.U
+    isBusy  := true.B
+    isEnd   := !turns
+    context := taken
+    channel := 0.U
+    isThere := false.B
+    step    := 0.U
     val before = Mux(turns, io.turn.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
-    ofSurface    := before
-    hasSurface   := before
-    occlusions   := io.end.bits.occlusions
+    ofSurface  := before
+    hasSurface := before
+    occlusions := io.end.bits.occlusions
     when(turns) { occlusions.foreach(_ := Occlusion.none) }
     io.turn.foreach { turn =>
       albedo   := VecInit(turn.bits.albedo.channels)
@@ -166,7 +166,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     }
     when(hasSurface) {
       surfaceAlbedo := VecInit(surfaceRead.albedo.channels)
-      directs := VecInit(surfaceRead.directs.map(direct => VecInit(direct.channels.map(_.natural))))
+      directs       := VecInit(surfaceRead.directs.map(direct => VecInit(direct.channels.map(_.natural))))
     }
   }
 
@@ -179,9 +179,9 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val light                             = step(log2Ceil(lights.max(2)) - 1, 0)
   private val reflectance                       = of(surfaceAlbedo)
   private def at[T <: Data](entries: Vec[T]): T = if (lights == 1) entries.head else entries(light)
-  private val passing    = MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> whole, Occlusion.clear -> clearness))
-  private val behind     = Mux(hasSurface, surface, of(io.background.channels))
-  private val albedoNow  = of(albedo)
+  private val passing   = MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> whole, Occlusion.clear -> clearness))
+  private val behind    = Mux(hasSurface, surface, of(io.background.channels))
+  private val albedoNow = of(albedo)
 
   /** All ones is 1.0. */
   private val tint = Mux(isTinted, albedoNow +& albedoNow(colourBits - 1), whole)

@@ -49,7 +49,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
 
   val io = IO(new GeometryDatapathIO(config))
 
-  private val pointBits  = ShaderFormats.originBits(config)
+  private val pointBits = ShaderFormats.originBits(config)
 
   private val control = io.control
 

@@ -117,9 +117,9 @@ final class Shader(config: ColonnadeConfig) extends Module {
     val unit     = Module(new BounceUnit(config))
     val albedo   = Reg(Rgb(FrameRegisters.colour))
     val isTinted = Reg(Bool())
-    unit.io.offset                   := io.shading.offset
-    unit.io.request.valid            := point.valid && isBounce
-    unit.io.request.bits.context     := surface.context
+    unit.io.offset               := io.shading.offset
+    unit.io.request.valid        := point.valid && isBounce
+    unit.io.request.bits.context := surface.context
     unit.io.request.bits.origin.axes.zip(surface.origin.axes).foreach { case (to, from) =>
       to := Rounding.narrow(from, to.getWidth)
     }

@@ -75,12 +75,12 @@ final class ShaderGeometry(config: ColonnadeConfig) extends Module {
 
   io.request.ready := !isBusy
   io.room.foreach(_.ready := !isBusy && !io.request.valid)
-  io.takesNext     := (!isBusy && !io.request.valid && !isRoom) || (io.result.fire && isLast)
-  io.result.valid  := isBusy && isDone
+  io.takesNext    := (!isBusy && !io.request.valid && !isRoom) || (io.result.fire && isLast)
+  io.result.valid := isBusy && isDone
 
-  datapath.io.control   := control
-  datapath.io.request   := io.request.bits
-  datapath.io.isRoom    := isRoom
+  datapath.io.control := control
+  datapath.io.request := io.request.bits
+  datapath.io.isRoom  := isRoom
   datapath.io.room.zip(io.room).foreach { case (to, room) => to := room.bits }
   datapath.io.isFlat    := isFlat
   datapath.io.light     := io.lights(if (config.frame.lights == 1) 0.U else light)

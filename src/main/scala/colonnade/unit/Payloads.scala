@@ -35,7 +35,7 @@ final class RecordBroadcast(config: ColonnadeConfig) extends Bundle {
 
 /** What happened in a render unit in one cycle; names as in `Counters`. */
 final class UnitEvents(config: ColonnadeConfig) extends Bundle {
-  private def contexts = UInt(log2Ceil(config.array.contexts + 1).W)
+  private def contexts                               = UInt(log2Ceil(config.array.contexts + 1).W)
   private def ifRoom[T <: Data](event: T): Option[T] = if (config.hasRoom) Some(event) else None
 
   val raysShadow       = Bool()
@@ -90,7 +90,8 @@ final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
   val pixels     = Decoupled(new Pixel(config))
 
   /** To the maps of a room. */
-  val maps = if (config.hasRoom) Some(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))) else None
+  val maps =
+    if (config.hasRoom) Some(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))) else None
 
   /** No pixel is in flight. */
   val isIdle = Output(Bool())

@@ -7,7 +7,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats}
 import colonnade.numbers.Rounding
 import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
-import colonnade.shading.{BouncedRay, BounceResult, ColourUnit, PathColour, PathTurn, Shader, ShadowRays}
+import colonnade.shading.{BounceResult, BouncedRay, ColourUnit, PathColour, PathTurn, Shader, ShadowRays}
 import colonnade.traversal.{TriangleLanes, Visit}
 
 /** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
@@ -233,9 +233,9 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   controller.io.leave := leaves
   private val colour = colours.read(complete.bits, leaves)
   private val place  = positions.read(complete.bits, leaves)
-  finished.valid       := RegNext(leaves, false.B)
-  finished.bits.x      := place.x
-  finished.bits.y      := place.y
+  finished.valid  := RegNext(leaves, false.B)
+  finished.bits.x := place.x
+  finished.bits.y := place.y
   private val isColoured = RegEnable(controller.io.isColoured(complete.bits), leaves)
   finished.bits.colour :=
     Mux(isColoured, colour.colour, io.registers.background)

@@ -297,7 +297,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
     when(room.met.valid) { stage(room.met.bits) := Stage.shading }
     val none = room.nothing.bits
     when(room.nothing.valid) {
-      stage(none) := Mux(isAside(none), Stage.turning, Mux(isPrimary(none), Stage.complete, Stage.colouring))
+      stage(none)        := Mux(isAside(none), Stage.turning, Mux(isPrimary(none), Stage.complete, Stage.colouring))
       isBackground(none) := true.B
     }
     val turns = anyOf(isAt(Stage.turning).zip(isLit.zip(isAside)).map { case (turning, (lit, aside)) =>

@@ -101,12 +101,17 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
     MarchQuestion(context(), camera.steps(from), turned.map(t => BigDecimal(t * scale).toBigInt))
   }
 
+  private def spread(size: Double): Double = (random.nextDouble() * 2 - 1) * size
+
+  /** To the back wall where the box hides it. */
+  def behindBox(camera: Camera): MarchQuestion =
+    ray(camera, Seq(spread(0.3), 0.1, 3 + spread(0.2)), Seq(spread(0.1), 0.7 + spread(0.1), 1.0))
+
   /** Within the room, on its surfaces, just behind them, beyond the view, behind the camera; in any direction, along an
     * axis, to the camera or away from it.
     */
   def inRoom(camera: Camera): MarchQuestion = {
-    def spread(size: Double) = (random.nextDouble() * 2 - 1) * size
-    val from                 = random.nextInt(8) match {
+    val from = random.nextInt(8) match {
       case 0 => Seq(spread(1.9), 1.2 + spread(0.02), 0.5 + random.nextDouble() * 3)
       case 1 => Seq(spread(0.5), 0.4 + spread(0.02), 2.1 + random.nextDouble() * 0.5)
       case 2 => Seq(spread(2), spread(1), -random.nextDouble())
@@ -158,7 +163,8 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
   }
 
   /** Along any direction, forth and back. */
-  def anyPixel(): MarchQuestion = anyRay().copy(pixel = frame.map(BigInt(_)).map(BigInt(8, random).min(_)), isSeen = true)
+  def anyPixel(): MarchQuestion =
+    anyRay().copy(pixel = frame.map(BigInt(_)).map(BigInt(8, random).min(_)), isSeen = true)
 
   /** Pixels of the map in one of the frame, doubled, in steps of the registers. */
   private def stepWidths(less: Int): Seq[BigInt] =

@@ -90,7 +90,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     unit.view.poke(new Packed(new RoomView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
     val inputs = rays.map(ray => request.pack(ray.fields))
-    val found = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
+    val found  = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),
       (port: UInt) => port.peekInt()
     )(random, if (isSlow) 0.5 else 0, 20000)
@@ -126,7 +126,8 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             scene.words,
             camera.view,
-            Seq.fill(150)(questions.inRoom(camera)) ++ Seq.fill(30)(questions.fromCamera(camera)),
+            Seq.fill(60)(questions.inRoom(camera)) ++ Seq.fill(20)(questions.behindBox(camera)) ++
+              Seq.fill(30)(questions.fromCamera(camera)),
             random,
             isSlow = round == 1
           )

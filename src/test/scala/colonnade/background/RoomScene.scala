@@ -91,7 +91,10 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
       "planes.shell"       -> shell
     )
     AttributeMemories(config).map { memory =>
-      memory.name -> made.get(memory.name).fold(others(memory.name))(_.take(memory.depth).padTo(memory.depth, BigInt(0)))
+      memory.name -> made.get(memory.name).fold(others(memory.name))(_.take(memory.depth).padTo(
+        memory.depth,
+        BigInt(0)
+      ))
     }.toMap
   }
 

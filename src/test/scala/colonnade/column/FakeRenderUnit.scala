@@ -40,19 +40,19 @@ class FakeRenderUnit(config: ColonnadeConfig) extends Module {
   io.requests.bits.address := address
   io.pixels.valid          := state === leaving
   io.maps.foreach(_.asksNothing())
-  io.pixels.bits           := 0.U.asTypeOf(new Pixel(config))
-  io.pixels.bits.x         := position.x
-  io.pixels.bits.y         := position.y
-  io.pixels.bits.colour.g  := colour
-  io.isIdle                := state === free
+  io.pixels.bits          := 0.U.asTypeOf(new Pixel(config))
+  io.pixels.bits.x        := position.x
+  io.pixels.bits.y        := position.y
+  io.pixels.bits.colour.g := colour
+  io.isIdle               := state === free
 
   when(io.positions.fire) {
-    state    := asking
+    state      := asking
     position.x := io.positions.bits.x
     position.y := io.positions.bits.y
-    address  := io.positions.bits.x * 7.U + io.positions.bits.y * 13.U
-    colour   := 0.U
-    left     := (reads - 1).U
+    address    := io.positions.bits.x * 7.U + io.positions.bits.y * 13.U
+    colour     := 0.U
+    left       := (reads - 1).U
   }
   when(io.requests.fire) { state := waiting }
   when(takes) {
