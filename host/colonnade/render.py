@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -246,7 +246,24 @@ def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: F
         "rays_per_cycle_in_box": rays["in_box"] / cycles if cycles else None,
         "counters": counters,
         "errors": frame.errors,
+        "room": room_report(manifest, counters),
     }
+
+
+def room_report(manifest: Manifest, counters: Mapping[str, int]) -> dict[str, float] | None:
+    """What the march through a room took, of the RTL; None without a room.
+
+    Returns:
+        ``look_ups``; of each, the mean ``cycles`` and ``steps``; ``busy``, the share of the cycles in which a render
+        unit's march works.
+    """
+    look_ups, busy = counters.get("raysRoom", 0), counters.get("busyRoom")
+    if look_ups == 0 or busy is None:
+        return None
+    array = manifest.config["array"]
+    unit_cycles = int(array["rows"]) * int(array["columns"]) * counters["cycles"]
+    steps = counters["marchSteps"] / look_ups
+    return {"look_ups": look_ups, "cycles": busy / look_ups, "steps": steps, "busy": busy / unit_cycles}
 
 
 def mesh_report(header: ImageHeader) -> dict[str, Any]:
