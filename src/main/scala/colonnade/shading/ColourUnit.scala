@@ -1,48 +1,12 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{log2Ceil, Cat, Decoupled, MuxLookup, Valid}
+import chisel3.util.{log2Ceil, Decoupled, MuxLookup, Valid}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.Context
 import colonnade.unit.ContextTable
-
-/** A path that meets its last surface. */
-final class PathEnd(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config)
-
-  /** It meets no surface of the object: the background's colour counts. */
-  val isBackground = Bool()
-
-  /** By light: what the shadow rays have met. */
-  val occlusions = Vec(config.frame.lights, Occlusion())
-
-  /** The surface is the room's, seen directly: what part of the light is left counts as well. */
-  val isSeen = if (config.hasRoom) Some(Bool()) else None
-}
-
-/** What a mirror or glass does to a path. */
-final class PathTurn(config: ColonnadeConfig) extends Bundle {
-  val context  = Context(config)
-  val albedo   = Rgb(FrameRegisters.colour)
-  val isTinted = Bool()
-
-  /** The share of what lies behind, by Schlick's reflection. */
-  val share = FrameRegisters.share
-
-  /** That is the remembered surface, in all its light; otherwise the background's colour. */
-  val hasSurface = if (config.hasRoom) Some(Bool()) else None
-}
-
-/** The colour of a path. */
-final class PathColour(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config)
-  val colour  = Rgb(FrameRegisters.colour)
-
-  /** Of a surface that is seen: the light left. */
-  val ratio = if (config.hasRoom) Some(Rgb(FrameRegisters.share)) else None
-}
 
 final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   val ambient    = Input(Rgb(FrameRegisters.intensity))
@@ -260,36 +224,6 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
 
   private def set(channels: Vec[UInt], value: UInt): Unit =
     for (index <- 0 until 3) when(channel === index.U) { channels(index) := value }
-}
-
-/** Parts of a whole, channel by channel: a bit of the quotient a cycle. */
-final private class Ratios(bits: Int) {
-  private val fraction  = NumberFormats.lightFraction
-  private val remainder = Reg(UInt(bits.W))
-  private val bitsLeft  = RegInit(0.U(log2Ceil(fraction + 1).W))
-  private val channel   = Reg(UInt(2.W))
-
-  val isWanted: Bool      = Reg(Bool())
-  val whole:    UInt      = Reg(UInt(bits.W))
-  val found:    Vec[UInt] = Reg(Vec(3, UInt((fraction + 1).W)))
-  val isBusy:   Bool      = bitsLeft =/= 0.U
-
-  /** All of it needs no division; a part is less than the whole. */
-  def begin(part: UInt, ofChannel: UInt): Unit = when(isWanted) {
-    remainder := part
-    channel   := ofChannel
-    when(part =/= whole) { bitsLeft := fraction.U }
-    for (index <- 0 until 3) when(ofChannel === index.U) { found(index) := (1 << fraction).U }
-  }
-
-  /** In every cycle. */
-  def work(): Unit = when(isBusy) {
-    val twice = remainder << 1
-    val fits  = twice >= whole
-    remainder := Mux(fits, twice - whole, twice)
-    bitsLeft  := bitsLeft - 1.U
-    for (index <- 0 until 3) when(channel === index.U) { found(index) := Cat(found(index)(fraction - 1, 0), fits) }
-  }
 }
 
 /** What an end needs of its surface. */

@@ -7,7 +7,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats}
 import colonnade.numbers.Rounding
 import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
-import colonnade.shading.{BounceResult, BouncedRay, ColourUnit, PathColour, PathTurn, Shader, ShadowRays}
+import colonnade.shading.{ColourUnit, PathColour, Shader, ShadowRays}
 import colonnade.traversal.{TriangleLanes, Visit}
 
 /** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
@@ -54,17 +54,15 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   controller.io.allocate                := rayGenerator.io.position.fire
   when(rayGenerator.io.position.fire) {
     positions.write(controller.io.free.bits, pixelOf(position.x, position.y))
-    isObject(controller.io.free.bits)    := false.B
-    meetsObject(controller.io.free.bits) := position.meetsObject.getOrElse(true.B)
+    isObject(controller.io.free.bits) := false.B
+    position.meetsObject.foreach(meetsObject(controller.io.free.bits) := _)
   }
   rayGenerator.io.registers.camera    := io.registers.camera
   rayGenerator.io.registers.unitShift := io.registers.frame.unitShift
 
   // Rays: those first whose pixels are nearer to their end
-  private val requests    = Module(new Arbiter(new RayRequest(config), 3))
-  private val bouncedRays = Wire(Decoupled(new RayRequest(config)))
+  private val requests = Module(new Arbiter(new RayRequest(config), 3))
   requests.io.in(0) :<>= shadowRays.io.ray
-  requests.io.in(1) :<>= bouncedRays
   if (!config.hasRoom) requests.io.in(2) :<>= rayGenerator.io.ray
   raySetup.io.request :<>= requests.io.out
   raySetup.io.bounds := io.registers.bounds
@@ -172,41 +170,23 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   shadowRays.io.surface.bits                := lit.bits
   shadowRays.io.question :<>= controller.io.shadow
 
-  // A mirror or glass turns its path; the next ray is traced as long as there are bounces left
-  private val bounceCounts = Reg(Vec(contexts, chiselTypeOf(io.registers.shading.bounces.getOrElse(0.U(1.W)))))
-  private val turned       = shader.io.bounced.map(_ => Wire(Decoupled(new TurnedPath(config))))
-  bouncedRays.valid     := false.B
-  bouncedRays.bits      := DontCare
-  controller.io.bounced := 0.U.asTypeOf(controller.io.bounced)
-  events.raysReflection := false.B
-  events.raysRefraction := false.B
-  for ((path, turn) <- turned.zip(colourUnit.io.turn)) {
-    val next     = path.bits
-    val context  = next.turn.context
-    val isTraced = bounceCounts(context) =/= io.registers.shading.bounces.get
-    path.ready := turn.ready && (!isTraced || bouncedRays.ready)
-
-    bouncedRays.valid         := path.valid && isTraced && turn.ready
-    bouncedRays.bits.context  := context
-    bouncedRays.bits.isShadow := false.B
-    bouncedRays.bits.origin   := next.origin
-    bouncedRays.bits.towards  := next.towards
-
-    turn.valid := path.valid && (!isTraced || bouncedRays.ready)
-    turn.bits  := next.turn
-
-    controller.io.bounced.valid         := path.fire
-    controller.io.bounced.bits.context  := context
-    controller.io.bounced.bits.isTraced := isTraced
-    when(path.fire && isTraced) { bounceCounts(context) := bounceCounts(context) + 1.U }
-    when(controller.io.allocate) { bounceCounts(controller.io.free.bits) := 0.U }
-    events.raysReflection := bouncedRays.fire && !next.isRefraction
-    events.raysRefraction := bouncedRays.fire && next.isRefraction
-  }
-  for ((bounced, path) <- shader.io.bounced.zip(turned) if !config.hasRoom) {
-    path.valid    := bounced.valid
-    path.bits     := TurnedPath(config, bounced.bits)
-    bounced.ready := path.ready
+  // A mirror or glass turns its path
+  requests.io.in(1).valid := false.B
+  requests.io.in(1).bits  := DontCare
+  controller.io.bounced   := 0.U.asTypeOf(controller.io.bounced)
+  events.raysReflection   := false.B
+  events.raysRefraction   := false.B
+  private val turns = shader.io.bounced.zip(colourUnit.io.turn).map { case (bounced, turn) =>
+    val turns = Module(new PathTurns(config)).io
+    turns.shading := io.registers.shading
+    connect(turns.begins, controller.io.allocate, controller.io.free.bits)
+    turns.bounced :<>= bounced
+    turn :<>= turns.turn
+    requests.io.in(1) :<>= turns.ray
+    controller.io.bounced := turns.turned
+    events.raysReflection := turns.ray.fire && !turns.isRefraction
+    events.raysRefraction := turns.ray.fire && turns.isRefraction
+    turns
   }
 
   // Rays beyond the object
@@ -315,62 +295,28 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     shader.io.room.get :<>= stage.surface
     connect(control.met, stage.surface.fire, stage.surface.bits.context)
 
-    // A path with something beside it waits, with all that its turn needs
-    val waiting = ContextTable(config, new TurnedPath(config))
-    val resumed = RegInit(false.B)
-    val beside  = RegEnable(control.turn.bits, control.turn.fire)
-    val resumes = Reg(new TurnedPath(config))
-    val isRead  = RegNext(control.turn.fire, false.B)
-    val read    = waiting.read(control.turn.bits.context, control.turn.fire)
-    val goesOn  = WireInit(false.B)
-    when(isRead) {
-      resumes := read
-      resumed := true.B
-    }.elsewhen(goesOn) { resumed := false.B }
-    control.turn.ready := !isRead && !resumed
-
-    // Every ray that may meet the room is remembered: where a path goes on, what lies beside it, the camera's
-    val isAside = WireInit(false.B)
-    val turns   = WireInit(false.B)
-    stage.ray.valid := false.B
-    stage.ray.bits  := DontCare
-    control.aside   := 0.U.asTypeOf(control.aside)
-    for ((bounced, path) <- shader.io.bounced.zip(turned)) {
-      val bounce = bounced.bits.bounce
-      val direct = TurnedPath(config, bounced.bits)
-      isAside    := bounced.valid && view.isThere && bounce.share.natural =/= 0.U && !path.fire
-      turns      := path.fire
-      goesOn     := path.fire
-      path.valid := resumed || (bounced.valid && !(view.isThere && bounce.share.natural =/= 0.U))
-      path.bits  := direct
-      when(resumed) {
-        path.bits                     := resumes
-        path.bits.turn.hasSurface.get := !beside.isBackground
-      }
-      bounced.ready := Mux(view.isThere && bounce.share.natural =/= 0.U, !path.fire, path.ready && !resumed)
-      connect(control.aside, isAside, bounce.context)
-      when(isAside) { waiting.write(bounce.context, direct) }
-
-      stage.ray.bits.context     := Mux(turns, path.bits.turn.context, bounce.context)
-      stage.ray.bits.ray.origin  := Mux(turns, path.bits.origin, bounced.bits.beside.get)
-      stage.ray.bits.ray.towards := path.bits.towards
-      when(!turns) {
-        stage.ray.bits.ray.towards.axes.zip(bounce.reflection.axes).foreach { case (to, from) => to := from }
-      }
+    control.aside      := 0.U.asTypeOf(control.aside)
+    control.turn.ready := false.B
+    for (turning <- turns.flatMap(_.room)) {
+      turning.isThere := view.isThere
+      control.aside   := turning.aside
+      turning.resume :<>= control.turn
     }
-    val first   = rayGenerator.io.ray
-    val isFree  = !turns && !isAside
-    val context = first.bits.context
-    requests.io.in(2).valid := first.valid && isFree && meetsObject(context)
+
+    // Every ray that may meet the room is remembered; those of turning paths come first
+    val first     = rayGenerator.io.ray
+    val context   = first.bits.context
+    val turning   = turns.flatMap(_.room).map(_.ray)
+    val isTurning = turning.map(_.valid).getOrElse(false.B)
+    requests.io.in(2).valid := first.valid && !isTurning && meetsObject(context)
     requests.io.in(2).bits  := first.bits
-    first.ready             := isFree && (requests.io.in(2).ready || !meetsObject(context))
+    first.ready             := !isTurning && (requests.io.in(2).ready || !meetsObject(context))
     connect(control.passes, first.fire && !meetsObject(context), context)
-    stage.ray.valid := turns || isAside || first.fire
-    when(isFree) {
-      stage.ray.bits.context     := context
-      stage.ray.bits.ray.origin  := first.bits.origin
-      stage.ray.bits.ray.towards := first.bits.towards
-    }
+    stage.ray.valid            := isTurning || first.fire
+    stage.ray.bits.context     := context
+    stage.ray.bits.ray.origin  := first.bits.origin
+    stage.ray.bits.ray.towards := first.bits.towards
+    for (ray <- turning) when(ray.valid) { stage.ray.bits := ray.bits }
     stage.ray.bits.ray.pixel := pixelOf(rayGenerator.io.pixel.x, rayGenerator.io.pixel.y)
   }
 
@@ -401,30 +347,5 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     recordFetch.io.wishes(port).bits.context := context
     recordFetch.io.wishes(port).bits.use     := Mux(visit.isLeaf, RecordUse.triangles, RecordUse.node)
     recordFetch.io.wishes(port).bits.address := visit.address
-  }
-}
-
-/** A path that turns, and the ray that goes on. */
-final private class TurnedPath(config: ColonnadeConfig) extends Bundle {
-  val turn         = new PathTurn(config)
-  val isRefraction = Bool()
-  val origin       = new BounceResult(config).origin.cloneType
-  val towards      = new BounceResult(config).towards.cloneType
-}
-
-private object TurnedPath {
-
-  /** With the background beside it. */
-  def apply(config: ColonnadeConfig, bounced: BouncedRay): TurnedPath = {
-    val path = Wire(new TurnedPath(config))
-    path.turn.context  := bounced.bounce.context
-    path.turn.albedo   := bounced.albedo
-    path.turn.isTinted := bounced.isTinted
-    path.turn.share    := bounced.bounce.share
-    path.turn.hasSurface.foreach(_ := false.B)
-    path.isRefraction := bounced.bounce.isRefraction
-    path.origin       := bounced.bounce.origin
-    path.towards      := bounced.bounce.towards
-    path
   }
 }
