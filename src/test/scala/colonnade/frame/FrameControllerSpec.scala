@@ -141,6 +141,19 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
+  it should "deal every tile to the columns where units take all, whatever the object's rectangle meets" in {
+    test(new FrameController(config)) { dut =>
+      dut.clock.setTimeout(0)
+      val bench = new Bench(dut)
+      for ((takesAll, tiles) <- Seq(true -> 48, false -> 1, true -> 48)) {
+        dut.io.takesAll.poke(takesAll)
+        assert(bench.frame(64, 48, watchdog = 0, rect = Some((9, 9, 15, 15))).nonEmpty)
+        bench.expectTiles(64, 48, tile => takesAll || tile == (8, 8))
+        assert(bench.columns.map(_.tiles.size).sum == tiles)
+      }
+    }
+  }
+
   it should "end a frame without pixels at once" in {
     test(new FrameController(config)) { dut =>
       val bench = new Bench(dut)

@@ -10,20 +10,18 @@ import scala.util.Random
 class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "TileWalker"
 
-  private def config(rows: Int, tileSize: Int): ColonnadeConfig =
-    TestConfigs.tiny.copy(
-      array = TestConfigs.tiny.array.copy(rows = rows),
-      frame = TestConfigs.tiny.frame.copy(tileSize = tileSize)
-    )
+  private def config(rows: Int, tileSize: Int, base: ColonnadeConfig = TestConfigs.tiny): ColonnadeConfig =
+    base.copy(array = base.array.copy(rows = rows), frame = base.frame.copy(tileSize = tileSize))
 
   /** The positions that leave, by row and in the order of time, and the cycles that took. Those that cannot see the
-    * object have the row -1.
+    * object have the row -1, unless render units take all; `meets` hears of each pixel that they take.
     */
   private def walk(
       dut:     TileWalker,
       size:    (Int, Int),
       tiles:   Seq[(Int, Int)],
-      isReady: Int => Boolean
+      isReady: Int => Boolean,
+      meets:   ((Int, Int), Boolean) => Unit = (_, _) => ()
   ): (Seq[(Int, (Int, Int))], Int) = {
     dut.io.frame.pixelsWide.poke(size._1)
     dut.io.frame.pixelsHigh.poke(size._2)
@@ -41,8 +39,11 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       for ((port, row) <- (dut.io.others +: dut.io.positions).zip(-1 until dut.io.positions.size)) {
         val ready = isReady(row)
         port.ready.poke(ready)
-        if (ready && port.valid.peekBoolean())
+        if (ready && port.valid.peekBoolean()) {
           positions :+= row -> (port.bits.x.peekInt().toInt, port.bits.y.peekInt().toInt)
+          if (row >= 0)
+            dut.io.positions(row).bits.meetsObject.foreach(claim => meets(positions.last._2, claim.peekBoolean()))
+        }
       }
       if (waiting.nonEmpty && dut.io.tiles.ready.peekBoolean()) waiting = waiting.tail
       dut.clock.step()
@@ -76,21 +77,34 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "sort out the pixels outside the outline, whoever is ready" in {
-    val random = new Random(3)
-    test(new TileWalker(config(rows = 3, tileSize = 8))) { dut =>
-      val edge = dut.io.frame.objectOutline(2)
-      edge.x.poke(3)
-      edge.y.poke(-2)
-      edge.offset.poke(-9)
-      val (positions, _)   = walk(dut, (640, 480), Seq((0, 0), (8, 8)), row => random.nextInt(3 + 2 * row + 2) == 0)
-      val (others, inside) = positions.partition(_._1 < 0)
-      val expected         = Seq((0, 0), (8, 8)).flatMap(pixels((640, 480), _, 8))
-      val sees             = (pixel: (Int, Int)) => 3 * pixel._1 - 2 * pixel._2 - 9 >= 0
-      assert(inside.map(_._2).sorted == expected.filter(sees).sorted)
-      assert(others.map(_._2) == expected.filterNot(sees))
+  for ((takesAll, claim) <- Seq(false -> "sort out the pixels", true -> "give units the pixels of a room, too,"))
+    it should s"$claim outside the outline, whoever is ready" in {
+      val random = new Random(3)
+      test(new TileWalker(config(rows = 3, tileSize = 8, TestConfigs.withRoom(TestConfigs.room)))) { dut =>
+        val edge = dut.io.frame.objectOutline(2)
+        edge.x.poke(3)
+        edge.y.poke(-2)
+        edge.offset.poke(-9)
+        dut.io.takesAll.poke(takesAll)
+        var claims         = Map.empty[(Int, Int), Boolean]
+        val (positions, _) =
+          walk(
+            dut,
+            (640, 480),
+            Seq((0, 0), (8, 8)),
+            row => random.nextInt(3 + 2 * row + 2) == 0,
+            (pixel, meets) => claims += pixel -> meets
+          )
+        val (others, units)     = positions.partition(_._1 < 0)
+        val expected            = Seq((0, 0), (8, 8)).flatMap(pixels((640, 480), _, 8))
+        val sees                = (pixel: (Int, Int)) => 3 * pixel._1 - 2 * pixel._2 - 9 >= 0
+        val (isTaken, isOthers) = expected.partition(pixel => takesAll || sees(pixel))
+        assert(units.map(_._2).sorted == isTaken.sorted)
+        assert(others.map(_._2) == isOthers)
+        assert(claims == isTaken.map(pixel => pixel -> sees(pixel)).toMap)
+        assert(expected.exists(sees) && !expected.forall(sees))
+      }
     }
-  }
 
   it should "give every pixel of clipped tiles once, whoever is ready" in {
     val random = new Random(2)

@@ -15,14 +15,14 @@ import scala.util.Random
 class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ColourUnit"
 
-  private def config(lights: Int, maxBounces: Int): ColonnadeConfig =
-    TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(lights = lights, maxBounces = maxBounces))
-
-  for ((lights, maxBounces) <- Seq((1, 0), (2, 0), (1, 2), (3, 15)))
-    it should s"colour paths with $lights lights and $maxBounces bounces" in
-      test(new ColourUnit(config(lights, maxBounces))) { dut =>
-        new ColouredPaths(dut, config(lights, maxBounces), seed = lights).run(paths = 60)
-      }
+  for {
+    (base, where)        <- Seq(TestConfigs.tiny -> "", TestConfigs.withRoom(TestConfigs.room) -> " in a room")
+    (lights, maxBounces) <- Seq((1, 0), (2, 0), (1, 2), (3, 15))
+  } {
+    val config = base.copy(frame = base.frame.copy(lights = lights, maxBounces = maxBounces))
+    it should s"colour paths with $lights lights and $maxBounces bounces$where" in
+      test(new ColourUnit(config)) { dut => new ColouredPaths(dut, config, seed = lights).run(paths = 60) }
+  }
 }
 
 /** Paths of all contexts at a time, in integers as docs/numbers.md has them, sections 5.9 and 6.7. */
@@ -37,7 +37,8 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   private def colour(): Seq[Int] =
     three(if (random.nextInt(4) == 0) random.nextInt(2) * white else random.nextInt(4096))
 
-  private def intensity(): Seq[Int] = three(if (random.nextInt(6) == 0) 65535 else random.nextInt(9000))
+  private def intensity(): Seq[Int] =
+    three(if (random.nextInt(6) == 0) 65535 else random.nextInt(6) * random.nextInt(1800))
 
   private val ambient    = intensity()
   private val background = colour()
@@ -67,16 +68,27 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     gathered = gathered.updated(context, Seq.fill(3)(0))
   }
 
+  /** Where there is a room, some paths have a surface of it beside them, in all its light. */
   private def pass(port: chisel3.util.DecoupledIO[PathTurn], context: Int): Unit = {
     val (albedo, isTinted, share) = (colour(), random.nextBoolean(), random.nextInt(3) * random.nextInt(one / 2))
+    val surface                   = Option.when(config.hasRoom && random.nextBoolean())(remember(context))
+    val behind                    = surface.fold(background)(surface => reflected(surface.albedo, surface.all))
     port.bits.context.poke(context)
     pokeUInt(port.bits.albedo, albedo)
     port.bits.isTinted.poke(isTinted)
     port.bits.share.pokeRaw(share)
-    port.valid.poke(true)
-    while (!port.ready.peekBoolean()) dut.clock.step()
-    dut.clock.step()
-    port.valid.poke(false)
+    port.bits.hasSurface.foreach(_.poke(surface.nonEmpty))
+    offer(port)
+    // What the ports say later does not matter any more
+    dut.io.end.bits.occlusions.foreach(_.poke(Occlusion.opaque))
+    if (random.nextBoolean()) {
+      var cycles = 0
+      while (!port.ready.peekBoolean()) {
+        dut.clock.step()
+        cycles += 1
+      }
+      assert(cycles == 20 + surface.fold(0)(_ => 6 * (config.frame.lights + 1)), "cycles of a turn")
+    }
 
     val tinted = throughput(context).zip(albedo).map { case (weight, tint) =>
       if (isTinted) weight * (tint + (tint >> 11)) >> 12 else weight
@@ -84,55 +96,87 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     val parts = tinted.map(_ * share >> 12)
     gathered = gathered.updated(
       context,
-      gathered(context).zip(parts.zip(background)).map { case (sure, (part, behind)) =>
-        white.min(sure + (part * behind >> 12))
+      gathered(context).zip(parts.zip(behind)).map { case (sure, (part, beside)) =>
+        white.min(sure + (part * beside >> 12))
       }
     )
     throughput = throughput.updated(context, tinted.zip(parts).map { case (weight, part) => weight - part })
   }
 
   private def end(context: Int): Unit = {
-    val albedo       = colour()
-    val directs      = Seq.fill(config.frame.lights)(intensity())
+    val surface      = remember(context)
     val isBackground = random.nextInt(4) == 0
-    val met          = directs.map(_ =>
-      random.shuffle(if (config.frame.hasBounces) Occlusion.all.toList else List(Occlusion.none, Occlusion.opaque)).head
-    )
-    dut.io.surface.valid.poke(true)
-    dut.io.surface.bits.context.poke(context)
-    pokeUInt(dut.io.surface.bits.albedo, albedo)
-    dut.io.surface.bits.directs.zip(directs).foreach { case (port, direct) => poke(port, direct) }
-    dut.clock.step()
-    dut.io.surface.valid.poke(false)
+    val isSeen       = random.nextBoolean()
+    val kinds        = if (config.frame.hasBounces) Occlusion.all.toList else List(Occlusion.none, Occlusion.opaque)
+    val met = surface.directs.map(_ => if (random.nextInt(3) == 0) Occlusion.none else random.shuffle(kinds).head)
 
     dut.io.end.bits.context.poke(context)
     dut.io.end.bits.isBackground.poke(isBackground)
+    dut.io.end.bits.isSeen.foreach(_.poke(isSeen))
     dut.io.end.bits.occlusions.zip(met).foreach { case (port, what) => port.poke(what) }
-    dut.io.end.valid.poke(true)
-    while (!dut.io.end.ready.peekBoolean()) dut.clock.step()
-    dut.clock.step()
-    dut.io.end.valid.poke(false)
+    offer(dut.io.end)
     var cycles = 1
     while (!dut.io.colour.valid.peekBoolean()) {
       dut.clock.step()
       cycles += 1
     }
-    assert(cycles == (if (isBackground) 8 else 2 + 6 * (config.frame.lights + 2)), "cycles from an end to its colour")
 
-    val incoming = (0 until 3).map { channel =>
-      ambient(channel) + directs.zip(met).map {
+    val visible = ambient.zipWithIndex.map { case (light, channel) =>
+      light + surface.directs.zip(met).map {
         case (direct, Occlusion.none)  => direct(channel)
         case (direct, Occlusion.clear) => (direct(channel).toLong * clearness >> 12).toInt
         case _                         => 0
       }.sum
     }
-    val surface = albedo.zip(incoming).map { case (a, light) => (a.toLong * light >> 12).min(white).toInt }
-    val last    = if (isBackground) background else surface
-    val whole   = gathered(context).zip(throughput(context).zip(last)).map { case (sure, (weight, seen)) =>
+    val last  = if (isBackground) background else reflected(surface.albedo, visible)
+    val whole = gathered(context).zip(throughput(context).zip(last)).map { case (sure, (weight, seen)) =>
       white.min(sure + (weight * seen >> 12))
     }
     dut.io.colour.bits.context.expect(context)
     assert(dut.io.colour.bits.colour.channels.map(_.peekInt().toInt) == whole)
+
+    // The light left, of what is seen of the room
+    val parts   = visible.zip(surface.all)
+    val hasPart = config.hasRoom && isSeen && !isBackground
+    for (ratio <- dut.io.colour.bits.ratio if hasPart)
+      assert(
+        ratio.channels.map(_.raw.asUInt.peekInt().toInt) ==
+          parts.map { case (part, all) => if (part == all) one else (part.toLong * one / all).toInt },
+        s"of $parts"
+      )
+    val divisions = if (hasPart) parts.count { case (part, all) => part != all } else 0
+    assert(
+      cycles == (if (isBackground) 8 else 2 + 6 * (config.frame.lights + 2)) + 12 * divisions,
+      "cycles from an end to its colour"
+    )
+  }
+
+  /** A surface of the context. */
+  private def remember(context: Int): TestSurface = {
+    val surface = TestSurface(colour(), Seq.fill(config.frame.lights)(intensity()))
+    dut.io.surface.valid.poke(true)
+    dut.io.surface.bits.context.poke(context)
+    pokeUInt(dut.io.surface.bits.albedo, surface.albedo)
+    dut.io.surface.bits.directs.zip(surface.directs).foreach { case (port, direct) => poke(port, direct) }
+    dut.clock.step()
+    dut.io.surface.valid.poke(false)
+    surface
+  }
+
+  private def offer(port: chisel3.util.DecoupledIO[_]): Unit = {
+    port.valid.poke(true)
+    while (!port.ready.peekBoolean()) dut.clock.step()
+    dut.clock.step()
+    port.valid.poke(false)
+  }
+
+  private def reflected(albedo: Seq[Int], light: Seq[Int]): Seq[Int] =
+    albedo.zip(light).map { case (a, light) => (a.toLong * light >> 12).min(white).toInt }
+
+  private case class TestSurface(albedo: Seq[Int], directs: Seq[Seq[Int]]) {
+
+    /** The light that falls onto it without anything in its way. */
+    def all: Seq[Int] = ambient.indices.map(channel => ambient(channel) + directs.map(_(channel)).sum)
   }
 
   private def poke(port: Rgb[Fixed], values: Seq[Int]): Unit =
