@@ -2,11 +2,13 @@
 
 The truth is the float reference with full maps and the depth map's mesh; see `colonnade.clustered_room.backdrops`.
 
-`colonnade study --frames ROOM …` prints the losses of three objects in rooms, marched in 64 bits.
+`colonnade study --frames ROOM …` prints the losses of three objects in rooms. The device's frames are the bit-exact
+model's.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.clustered_room import backdrops
-from colonnade.pictures import encode_srgb
+from colonnade.pictures import encode_srgb, write_png
 from colonnade.progress import QUIET, Progress
 from colonnade.reference import ReferenceResult, render_reference
 from colonnade.regions import RegionDifference, compare_regions, frame_regions
@@ -24,9 +26,11 @@ from colonnade.scene import Background, Colour, Light, Material, MeshSource, Pla
 
 if TYPE_CHECKING:
     from colonnade.attributes import AttributeImage
+    from colonnade.manifest import Manifest
     from colonnade.meshes import Mesh
     from colonnade.rebuild import Rebuild
     from colonnade.room import Room
+    from colonnade.room_registers import HeldRoom
     from colonnade.viewpoint import FloatPlacement
 
 Floats = NDArray[np.float64]
@@ -131,26 +135,57 @@ def _shown(difference: RegionDifference) -> str:
     return f"{difference.psnr:.1f}, {difference.flip:.3f}, {dists}"
 
 
+def device_frame(mesh: Mesh, view: FloatPlacement, held: HeldRoom, manifest: Manifest) -> Floats:
+    """The device's frame, relit and linear: float64 [height, width, 3].
+
+    Args:
+        mesh: The object.
+        view: The frame's placement in the room.
+        held: The room, and its maps as the device has them.
+        manifest: Of the hardware.
+    """
+    from colonnade.model import render_model
+    from colonnade.pack import pack
+    from colonnade.placement import registers_of
+    from colonnade.render import require_no_errors
+
+    packed = pack(mesh, manifest, view.materials)
+    registers = registers_of(view, packed.header, manifest) | held.registers(view, packed.header, manifest)
+    frame = render_model(manifest, packed, registers, room=held.image)
+    require_no_errors(frame)
+    return frame.colour / float((1 << manifest.numbers["colourBits"]) - 1)
+
+
 def study_frames(
-    folders: Iterable[Path], with_dists: bool = True, progress: Progress = QUIET
+    folders: Iterable[Path], with_dists: bool = True, progress: Progress = QUIET, output: Path | None = None
 ) -> dict[str, Mapping[str, Regions]]:
-    """The losses of `OBJECTS` in rooms, by room and object, marched in 64 bits."""
+    """The losses of `OBJECTS` in rooms, by room and object; the pictures in the folder ``output``, if there is one."""
     from colonnade.attributes import AttributeLayout, encoded_room
     from colonnade.clustered_room import plane_march
+    from colonnade.generator import manifest_for
     from colonnade.meshes import load_mesh
     from colonnade.room import load_room
+    from colonnade.room_registers import HeldRoom
     from colonnade.viewpoint import float_placement
 
     by_frame = {}
     meshes = {name: load_mesh(name) for name, _ in OBJECTS.values()}
     for folder in folders:
         room = load_room(folder)
-        image = encoded_room(room, AttributeLayout(width=room.width, height=room.height))
+        layout = AttributeLayout(width=room.width, height=room.height)
+        image = encoded_room(room, layout)
+        hardware = f"physicalAttributeMemory={json.dumps(layout.to_config())}"
+        manifest = manifest_for("room", (hardware,), progress).manifest
         march = plane_march(room, image)
         for name, (mesh_name, material) in OBJECTS.items():
             mesh = meshes[mesh_name]
             scene = standing_scene(mesh_name, material, room, STANDING.get(room.name, Placing()))
             view = float_placement(scene, mesh.extent, room.width, room.height, mesh.materials, room)
-            measured = losses(mesh, view, room, image, march, None, with_dists, progress)
+            device = device_frame(mesh, view, HeldRoom(room, image), manifest)
+            measured = losses(mesh, view, room, image, march, device, with_dists, progress)
             by_frame[f"{room.name}: {name}"] = measured.by_loss
+            if output is not None:
+                frames = {loss: picture.image for loss, picture in measured.pictures.items()} | {"device": device}
+                for loss, picture in frames.items():
+                    write_png(output / f"{room.name}-{name.replace(', ', '-')}-{loss}.png", picture)
     return by_frame

@@ -39,6 +39,14 @@ def check_writable(path: Path) -> None:
         raise UserError(f"{path.parent} is not writable: name another place for {path.name}")
 
 
+def make_folder(path: Path) -> None:
+    """Make the folder ``path``, and those around it, unless it is there."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"cannot make the folder {path}: {error.strerror}") from None
+
+
 def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from colonnade.bvh import TreeStatistics
 from colonnade.errors import UserError
-from colonnade.files import replacing
+from colonnade.files import make_folder, replacing
 from colonnade.manifest import Manifest
 from colonnade.mesh_materials import MeshMaterial
 from colonnade.meshes import Extent
@@ -173,10 +173,7 @@ class SceneImage:
         """Writes the file, or ``scene.image`` in a folder, which is made; returns its path. Whole or not at all."""
         file = Path(path)
         if file.is_dir() or not file.suffix:
-            try:
-                file.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise UserError(f"cannot make the folder {file}: {error.strerror}") from None
+            make_folder(file)
             file = file / FILE_NAME
         header = json.dumps(self.header.to_json(), separators=(",", ":"), sort_keys=True).encode()
         parts = [MAGIC, struct.pack("<I", len(header)), header]

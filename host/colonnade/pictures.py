@@ -60,7 +60,7 @@ def write_webp(path: Path, frames: Iterable[NDArray[np.uint8]]) -> None:
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:
-    """Read a picture as 8-bit sRGB, uint8 [height, width, 3]; transparency is dropped."""
+    """Read a picture of 8 or 16 bits as 8-bit sRGB, uint8 [height, width, 3]; transparency is dropped."""
     import numpy as np
     from PIL import Image, UnidentifiedImageError
 
@@ -68,6 +68,9 @@ def read_picture(path: Path) -> NDArray[np.uint8]:
         raise UserError(f"no picture {path}: check the path")
     try:
         with Image.open(path) as picture:
+            if picture.mode.startswith("I"):  # grey of 16 bits, which Pillow would cut off at 255
+                grey = np.rint(np.clip(np.asarray(picture, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
+                return np.repeat(grey[..., np.newaxis], 3, axis=2)
             return np.asarray(picture.convert("RGB"))
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
         raise UserError(f"{path} is no readable picture: {error}") from error

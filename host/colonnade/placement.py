@@ -96,9 +96,11 @@ def _positions(view: FloatPlacement, header: ImageHeader, manifest: Manifest) ->
         steps[name] = (point - offset) * header.frame.scale * 2.0 ** numbers["gridFraction"]
         if not np.abs(steps[name]).max() < reach - 1:
             edge = header.extent.edge * header.frame.scale * 2.0 ** numbers["gridFraction"]
+            in_room = name == "camera" and view.view_to_mesh is not None
+            advice = "make the object larger" if in_room else "move it nearer"
             raise UserError(
                 f"{_spoken(name)} is {np.abs(steps[name]).max() / edge:,.0f} object-cube edges away, the hardware"
-                f" reaches {reach / edge:,.0f}: move it nearer"
+                f" reaches {reach / edge:,.0f}: {advice}"
             )
     shift, limit = 0, (1 << (numbers["macBits"] - 1)) - 1
     while max(float(np.abs(np.rint(value / 2.0**shift)).max()) for value in steps.values()) > limit:

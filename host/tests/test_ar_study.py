@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
-from colonnade.ar_study import Losses, losses, standing_scene, table
+from colonnade.ar_study import Losses, device_frame, losses, standing_scene, table
 from colonnade.attic import attic
 from colonnade.attributes import AttributeImage, AttributeLayout, encode_room
 from colonnade.clustered_room import PlaneShell, plane_march, rebuilt_depth
+from colonnade.generator import manifest_for
 from colonnade.meshes import load_mesh
 from colonnade.metrics import HIGHEST_PSNR
+from colonnade.pictures import encode_srgb
+from colonnade.regions import compare_regions, frame_regions
 from colonnade.room import Room
+from colonnade.room_registers import HeldRoom
 from colonnade.scene import Material, Placing
 from colonnade.viewpoint import float_placement
 
@@ -76,3 +82,21 @@ def test_each_loss_is_seen_where_it_is(measured: Losses) -> None:
 def test_losses_read_as_a_table(measured: Losses) -> None:
     lines = table({"attic: teapot": measured.by_loss}).splitlines()
     assert len(lines) == 2 + 5 and all(line.count("|") == 6 for line in lines)
+
+
+def test_the_device_shows_the_rebuilt_room_but_for_its_rounding(
+    room: Room, image: AttributeImage, measured: Losses
+) -> None:
+    """The rows `fixed point` and `device`: of the model's frame of the very same scene."""
+    mesh = load_mesh("teapot:4")
+    scene = standing_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), room, Placing((79.5, 71.0), 0.4))
+    view = float_placement(scene, mesh.extent, 160, 120, mesh.materials, room)
+    hardware = f"physicalAttributeMemory={json.dumps(image.layout.to_config())}"
+    frame = device_frame(mesh, view, HeldRoom(room, image), manifest_for("room", (hardware,)).manifest)
+    truth, both = measured.pictures["full"], measured.pictures["both"]
+    regions = frame_regions(truth.object_mask, truth.shadow_ratio)
+    rounding = compare_regions(encode_srgb(both.image), encode_srgb(frame), regions, with_dists=False)
+    loss = compare_regions(encode_srgb(truth.image), encode_srgb(frame), regions, with_dists=False)
+    assert (rounding["frame"].psnr or 0) > (measured.by_loss["both"]["frame"].psnr or 0) + 3
+    assert (loss["frame"].psnr or 0) > (measured.by_loss["both"]["frame"].psnr or 0) - 1
+    assert np.median(np.abs(frame - both.image)) < 2 / 4095

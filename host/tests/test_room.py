@@ -120,6 +120,14 @@ def test_grey_and_16_bit_albedo(room: Path) -> None:
     assert np.allclose(load_room(room).albedo, 0.4)
 
 
+def test_a_grey_photo_of_8_or_16_bits_keeps_its_grey(room: Path) -> None:
+    width, height = SIZE
+    for dtype, value in ((np.uint8, 102), (np.uint16, 102 * 257)):
+        Image.fromarray(np.full((height, width), value, dtype)).save(room / "photo.png")
+        photo = load_room(room).photo
+        assert photo is not None and photo.shape == (height, width, 3) and (photo == 102).all()
+
+
 def test_holes_take_their_neighbours_depth(room: Path) -> None:
     depth, _ = corner()
     for k, nothing in enumerate((0.0, -1.0, np.nan, np.inf)):
@@ -184,6 +192,27 @@ def save(name: str, array: NDArray[np.generic]) -> Callable[[Path], None]:
 
 HOLES = np.zeros((48, 64))
 TILTED = np.array([[-1, 0, 0, 0], [0, 2, 0, 1], [0, 0, -1, 0]])
+
+
+@pytest.mark.parametrize(
+    ("picture", "message"),
+    [
+        (np.full((48, 64), 90, np.uint8), "depth.png has 8 bits a pixel, too few for depth"),
+        (np.zeros((48, 64), np.uint16), "3,072 of 3,072 pixels have no depth"),
+    ],
+)
+def test_depth_pictures_that_say_nothing(room: Path, picture: NDArray[np.generic], message: str) -> None:
+    (room / "depth.npy").unlink()
+    Image.fromarray(picture).save(room / "depth.png")
+    with pytest.raises(UserError, match=message):
+        load_room(room)
+
+
+def test_real_numbers_are_no_samples(room: Path) -> None:
+    """A picture of floats, which says nothing of what white is."""
+    Image.fromarray(np.full((48, 64), 0.4, np.float32)).save(room / "albedo.png", format="TIFF")
+    with pytest.raises(UserError, match=r"albedo\.png holds real numbers: give 8 or 16 bits"):
+        load_room(room)
 
 
 @pytest.mark.parametrize(

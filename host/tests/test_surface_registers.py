@@ -69,6 +69,13 @@ def test_more_than_the_hardware_has_is_refused(
         registers(make_manifest(), **changes)
 
 
+def test_mirrors_need_bounces(make_manifest: Callable[..., Manifest]) -> None:
+    manifest = make_manifest()
+    config = {**manifest.config, "frame": {**manifest.config["frame"], "maxBounces": 0}}
+    with pytest.raises(UserError, match=r"the scene has mirror, the hardware only diffuse .* raise frame.maxBounces"):
+        registers(dataclasses.replace(manifest, config=config), material=Material(kind="mirror"))
+
+
 def test_too_many_materials_are_refused(make_manifest: Callable[..., Manifest]) -> None:
     manifest = make_manifest()
     mesh = load_mesh("cube")

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from colonnade.attributes.image import AttributeImage
 from colonnade.attributes.measure import angles, ray_errors, relit
 from colonnade.attributes.plane_numbers import Picture
-from colonnade.errors import UserError
-from colonnade.files import replacing
+from colonnade.files import make_folder, replacing
 from colonnade.pictures import encode_srgb
 from colonnade.room.room import Room
 
@@ -46,10 +45,7 @@ def write_pictures(folder: Path, pictures: dict[str, NDArray[np.uint8]]) -> None
     """Write ``NAME.png`` for each into ``folder``, which is made."""
     from PIL import Image
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"cannot make the folder {folder}: {error.strerror}") from None
+    make_folder(folder)
     for name, picture in pictures.items():
         with replacing(folder / f"{name}.png") as stream:
             Image.fromarray(picture).save(stream, format="PNG")

@@ -15,23 +15,30 @@ from colonnade.commands.options import FILE, finish, json_option, require_output
 @click.argument("rooms", type=FILE, nargs=-1, required=True)
 @click.option("--frames", is_flag=True, help="Measure frames with objects instead of the rays of spheres.")
 @click.option("--no-dists", is_flag=True, help="Leave out DISTS, whose weights (64 MB) are fetched at its first use.")
+@click.option("--output", type=FILE, metavar="FOLDER", help="With --frames: write the frames as pictures.")
 @json_option
-def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, json_file: Path | None) -> None:
-    """Measure the folders ROOMS against their depth maps, in 64 bits.
+def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | None, json_file: Path | None) -> None:
+    """Measure the folders ROOMS against their depth maps.
 
     Of mirror, matt and glass spheres: which rays meet the right point, with planes of the full maps and with those of
-    the attribute memory. With --frames: what clustering and the rebuild each cost, as dB, FLIP and DISTS of the whole
-    frame, of the object and of its shadow. Tables are in Markdown.
+    the attribute memory. With --frames: what clustering, the rebuild and the device's numbers each cost, as dB, FLIP
+    and DISTS of the whole frame, of the object and of its shadow. Tables are in Markdown.
     """
+    if output is not None and not frames:
+        raise click.UsageError("--output is for the pictures of --frames", click.get_current_context())
     require_outputs(json_file)
 
     from colonnade import progress
+    from colonnade.files import make_folder
+
+    if output is not None:
+        make_folder(output)
 
     report: dict[str, Any]
     if frames:
         from colonnade import ar_study
 
-        by_frame = ar_study.study_frames(rooms, not no_dists, progress.for_terminal())
+        by_frame = ar_study.study_frames(rooms, not no_dists, progress.for_terminal(), output)
         click.echo(ar_study.table(by_frame))
         report = {
             frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}

@@ -48,10 +48,12 @@ def read_colour(file: Path) -> NDArray[np.float64]:
 
 
 def read_grey(file: Path) -> NDArray[np.float64]:
-    """A grey picture's samples as the whole numbers they are: float64 [height, width]."""
+    """The whole numbers of a grey picture of 16 bits: float64 [height, width]."""
     samples = _samples(file)
     if samples.shape[2] != 1:
         raise UserError(f"{file} has colours or transparency: depth must be plain grey, of 16 bits, or a .npy file")
+    if samples.dtype != np.uint16:
+        raise UserError(f"{file} has 8 bits a pixel, too few for depth: give grey of 16 bits, or a .npy file")
     return samples[..., 0].astype(np.float64)
 
 
@@ -79,7 +81,9 @@ def _samples(file: Path) -> NDArray[Any]:
             if picture.mode.startswith("I;16"):
                 samples = np.asarray(picture).astype(np.uint16)
                 return samples[..., np.newaxis]
-            if picture.mode in ("I", "F"):
+            if picture.mode == "F":
+                raise UserError(f"{file} holds real numbers: give 8 or 16 bits a sample")
+            if picture.mode == "I":
                 samples = np.clip(np.asarray(picture, dtype=np.float64), 0, 65535).astype(np.uint16)
                 return samples[..., np.newaxis]
             grey = picture.mode in ("1", "L", "LA", "La")
