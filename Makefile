@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .PHONY: help setup render test test-hardware test-host verify bench check format clean
 
 venv := .venv/bin
-SCENE ?= scenes/first-light.toml
+SCENE ?= scenes/room.toml
 CONFIG ?= small
 SIZE ?= 640x480
 BENCH_CONFIG ?= edge

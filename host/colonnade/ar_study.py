@@ -150,7 +150,7 @@ def device_frame(mesh: Mesh, view: FloatPlacement, held: HeldRoom, manifest: Man
     from colonnade.render import require_no_errors
 
     packed = pack(mesh, manifest, view.materials)
-    registers = registers_of(view, packed.header, manifest) | held.registers(view, packed.header, manifest)
+    registers = registers_of(view, packed.header, manifest) | held.registers(view, packed.header, manifest, relit=True)
     frame = render_model(manifest, packed, registers, room=held.image)
     require_no_errors(frame)
     return frame.colour / float((1 << manifest.numbers["colourBits"]) - 1)
@@ -175,7 +175,7 @@ def study_frames(
         layout = AttributeLayout(width=room.width, height=room.height)
         image = encoded_room(room, layout)
         hardware = f"physicalAttributeMemory={json.dumps(layout.to_config())}"
-        manifest = manifest_for("room", (hardware,), progress).manifest
+        manifest = manifest_for("small", (hardware,), progress).manifest
         march = plane_march(room, image)
         for name, (mesh_name, material) in OBJECTS.items():
             mesh = meshes[mesh_name]

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from colonnade.frame import Frame
 from colonnade.image import SceneImage
 from colonnade.manifest import Manifest, RecordLayout
-
-if TYPE_CHECKING:
-    from colonnade.attributes import AttributeImage
 
 ROWS_AT_ONCE = 16
 
@@ -45,14 +42,12 @@ def load_scene(model: Any, image: SceneImage) -> None:
     model.load(image.records, image.header.triangle_base, image.header.attribute_base)
 
 
-def load_room(model: Any, room: AttributeImage, manifest: Manifest) -> None:
-    """Gives the model a physical-attribute memory and fills it."""
-    from colonnade.room_march import memory_words
-
+def load_room(model: Any, image: SceneImage, manifest: Manifest) -> None:
+    """Gives the model a physical-attribute memory and fills it with the image's room."""
     assert manifest.attributes is not None
     model.add_room(dict(manifest.attributes.sizes), field_places(manifest.attributes.layouts))
-    for memory, words in memory_words(room):
-        model.load_room(memory, words)
+    for section in image.attributes:
+        model.load_room(section.memory, section.words)
 
 
 def render_model(
@@ -60,18 +55,17 @@ def render_model(
     image: SceneImage,
     registers: Mapping[str, int],
     progress: Callable[[int, int], None] = lambda done, total: None,
-    room: AttributeImage | None = None,
 ) -> Frame:
     """Renders one frame; see `loaded_model` and `model_frame`."""
-    return model_frame(loaded_model(manifest, image, room), registers, progress, room is not None)
+    return model_frame(loaded_model(manifest, image), registers, progress)
 
 
-def loaded_model(manifest: Manifest, image: SceneImage, room: AttributeImage | None = None) -> Any:
-    """A model with a scene image in its memories, and a room in its physical-attribute memory."""
+def loaded_model(manifest: Manifest, image: SceneImage) -> Any:
+    """A model with a scene image in its memories."""
     model = new_model(manifest)
     load_scene(model, image)
-    if room is not None:
-        load_room(model, room, manifest)
+    if image.attributes:
+        load_room(model, image, manifest)
     return model
 
 
@@ -79,7 +73,6 @@ def model_frame(
     model: Any,
     registers: Mapping[str, int],
     progress: Callable[[int, int], None] = lambda done, total: None,
-    with_ratio: bool = False,
 ) -> Frame:
     """A frame of what a model has loaded; any number may follow each other.
 
@@ -87,7 +80,6 @@ def model_frame(
         model: Of `loaded_model`.
         registers: Every rw register by name (``placement.placement``).
         progress: Called with (rows done, rows in all).
-        with_ratio: There is a room: the frame has the light that is left on it.
     """
     model.start(dict(registers))
     height = registers["frame.height"]
@@ -103,5 +95,5 @@ def model_frame(
         distance=pixels["distance"],
         counters=model.counters(),
         errors=[name for name, is_set in model.errors().items() if is_set],
-        ratio=pixels["ratio"] if with_ratio else None,
+        ratio=pixels["ratio"] if registers.get("room.isThere", 0) else None,
     )

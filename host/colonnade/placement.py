@@ -35,6 +35,7 @@ def placement(
     width: int,
     height: int,
     room: HeldRoom | None = None,
+    relit: bool = True,
 ) -> dict[str, int]:
     """All rw registers of a frame by name; signed ones are signed integers.
 
@@ -45,6 +46,7 @@ def placement(
         width: Pixels.
         height: Pixels.
         room: The scene's, and how its maps are held.
+        relit: Render all of the room, not only where the object may take its light.
 
     Raises:
         UserError: The frame, or the camera's or light's distance, is more than the hardware can hold.
@@ -60,7 +62,7 @@ def placement(
             )
     view = float_placement(scene, header.extent, width, height, header.materials, None if room is None else room.room)
     registers = registers_of(view, header, manifest)
-    return registers if room is None else registers | room.registers(view, header, manifest)
+    return registers if room is None else registers | room.registers(view, header, manifest, relit)
 
 
 def registers_of(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:

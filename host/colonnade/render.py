@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,7 @@ from colonnade.sizes import check_size
 from colonnade.viewpoint import made_of
 
 if TYPE_CHECKING:
-    from colonnade.attributes import AttributeImage
+    pass
 
 BACKENDS = ("rtl", "model", "reference")
 
@@ -42,6 +42,7 @@ class RenderResult:
         hit_triangles: int64 [height, width]; face index in the mesh's file, -1 where the ray missed.
         t: float64 [height, width]; depth in mesh units (lengths of the pixel's direction), not a number for a miss.
         report: What ``--json`` writes.
+        ratio: uint16 [height, width, 3], see `Frame`; None without a room.
     """
 
     image: npt.NDArray[np.float64]
@@ -49,6 +50,7 @@ class RenderResult:
     hit_triangles: npt.NDArray[np.int64]
     t: npt.NDArray[np.float64]
     report: dict[str, Any]
+    ratio: npt.NDArray[np.uint16] | None = None
 
 
 def render(
@@ -113,8 +115,6 @@ def render_frames(
         yield from reference_frames(places, manifest, (width, height), progress)
         return
     folder = scene.background.room
-    if folder is not None and backend == "rtl":
-        raise UserError("--backend rtl renders the object alone, without a room: use --backend model or reference")
     if hits and backend == "rtl":
         from colonnade.simulate import require_hits
 
@@ -124,13 +124,14 @@ def render_frames(
     with progress.step("packing the scene"):
         room = None if folder is None else HeldRoom.load(folder, manifest)
         image = pack_scene(scene, manifest, room)
-        registers = [placement(place, image.header, manifest, width, height, room) for place in places]
+        shows_room = relit or room is None or room.room.photo is None
+        registers = [placement(place, image.header, manifest, width, height, room, shows_room) for place in places]
     packed = time.perf_counter() - begun
     seen = None if room is None else room.room
     if backend == "rtl":
         rendered = _rtl_frames(design_for(config, overrides, progress), image, registers, progress)
     else:
-        rendered = _model_frames(manifest, image, registers, None if room is None else room.image, progress)
+        rendered = _model_frames(manifest, image, registers, progress)
     for place, (frame, more) in zip(places, rendered, strict=True):
         require_no_errors(frame)
         report = frame_report(backend, manifest, image.header, frame) | {"share": place.share} | more
@@ -165,21 +166,17 @@ def _rtl_frames(
 
 
 def _model_frames(
-    manifest: Manifest,
-    image: SceneImage,
-    registers: list[dict[str, int]],
-    room: AttributeImage | None,
-    progress: Progress,
+    manifest: Manifest, image: SceneImage, registers: list[dict[str, int]], progress: Progress
 ) -> Iterator[Rendered]:
     """Frame by frame of a model that is loaded once."""
     from colonnade.model import loaded_model, model_frame
 
-    model = loaded_model(manifest, image, room)
+    model = loaded_model(manifest, image)
 
     def one(values: dict[str, int]) -> Rendered:
         begun = time.perf_counter()
         with progress.step("rendering in the model") as share:
-            frame = model_frame(model, values, lambda done, total: share(done / total), room is not None)
+            frame = model_frame(model, values, lambda done, total: share(done / total))
         return frame, {"seconds": {"run": time.perf_counter() - begun}}
 
     yield from map(one, registers)
@@ -221,6 +218,7 @@ def _result(
         hit_triangles=source[np.where(frame.is_object, frame.triangle, -1)],
         t=np.where(frame.is_object, depth, np.nan),
         report=report,
+        ratio=frame.ratio,
     )
 
 
@@ -248,7 +246,24 @@ def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: F
         "rays_per_cycle_in_box": rays["in_box"] / cycles if cycles else None,
         "counters": counters,
         "errors": frame.errors,
+        "room": room_report(manifest, counters),
     }
+
+
+def room_report(manifest: Manifest, counters: Mapping[str, int]) -> dict[str, float] | None:
+    """What the march through a room took, of the RTL; None without a room.
+
+    Returns:
+        ``look_ups``; of each, the mean ``cycles`` and ``steps``; ``busy``, the share of the cycles in which a render
+        unit's march works.
+    """
+    look_ups, busy = counters.get("raysRoom", 0), counters.get("busyRoom")
+    if look_ups == 0 or busy is None:
+        return None
+    array = manifest.config["array"]
+    unit_cycles = int(array["rows"]) * int(array["columns"]) * counters["cycles"]
+    steps = counters["marchSteps"] / look_ups
+    return {"look_ups": look_ups, "cycles": busy / look_ups, "steps": steps, "busy": busy / unit_cycles}
 
 
 def mesh_report(header: ImageHeader) -> dict[str, Any]:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from colonnade.attributes.plane_numbers import SLOPE_PIXELS
+from colonnade.attributes.plane_numbers import SLOPE_PIXELS, Picture
 from colonnade.errors import UserError
+from colonnade.shadow_window import shadow_window, whole_frame
 
 if TYPE_CHECKING:
     from colonnade.attributes import AttributeImage, AttributeLayout
@@ -52,9 +53,17 @@ class HeldRoom:
             )
         return HeldRoom(room, encoded_room(room, layout))
 
-    def registers(self, view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
-        """Registers ``room.*``; see `room_registers`."""
-        return room_registers(view, self.room, self.image, header, manifest)
+    def registers(self, view: FloatPlacement, header: ImageHeader, manifest: Manifest, relit: bool) -> dict[str, int]:
+        """Registers ``room.*``; see `room_registers`. Without ``relit`` the room is rendered only where the object may
+        take its light.
+        """
+        registers = room_registers(view, self.room, self.image, header, manifest)
+        if relit:
+            window = whole_frame(view)
+        else:
+            depth = self.image.decoded_depth(Picture.of(self.room, self.image.depth_unit))
+            window = shadow_window(view, self.room, depth, header.extent)
+        return registers | dict(zip((f"room.window.{edge}" for edge in ("x0", "y0", "x1", "y1")), window, strict=True))
 
 
 def layout_of(manifest: Manifest) -> AttributeLayout:
@@ -67,14 +76,14 @@ def layout_of(manifest: Manifest) -> AttributeLayout:
 
     sizes = manifest.config["physicalAttributeMemory"]
     if sizes is None:
-        raise UserError("the hardware has no memory for a room: set physicalAttributeMemory, as in the preset room")
+        raise UserError("the hardware has no memory for a room: set physicalAttributeMemory, as in the preset small")
     return AttributeLayout.from_config(sizes)
 
 
 def room_registers(
     view: FloatPlacement, room: Room, image: AttributeImage, header: ImageHeader, manifest: Manifest
 ) -> dict[str, int]:
-    """Registers ``room.*`` of a frame.
+    """Registers ``room.*`` of a frame, but for the window.
 
     Args:
         view: With the room's pose, `FloatPlacement.view_to_mesh`.

@@ -26,7 +26,14 @@ from colonnade.toolchain import cache_directory, project_root, require_simulator
 
 #: One pixel as the harness writes it (``struct PixelBytes``).
 PIXEL = np.dtype(
-    [("colour", "<u2", 3), ("is_object", "u1"), ("is_seen", "u1"), ("triangle", "<u4"), ("distance", "<f8")]
+    [
+        ("colour", "<u2", 3),
+        ("ratio", "<u2", 3),
+        ("is_object", "u1"),
+        ("is_seen", "u1"),
+        ("triangle", "<u4"),
+        ("distance", "<f8"),
+    ]
 )
 
 VERILATOR_OPTIONS = (
@@ -103,7 +110,7 @@ def _build(verilator: Path, design: GeneratedDesign, harness: Path, place: Path,
     config, sources = design.manifest.config, design.sources
     columns = int(config["array"]["columns"])
     each = " ".join(f"DO({column})" for column in range(columns))
-    header = f"#pragma once\n#define EACH_COLUMN(DO) {each}\n" + _hit_distance(sources)
+    header = f"#pragma once\n#define EACH_COLUMN(DO) {each}\n" + _pixel_ports(sources)
     if is_holdable(design.manifest):
         header += f"#define MEMORY_BANKS {columns * int(config['columnBvhMemory']['banks'])}\n"
     (place / "columns.hpp").write_text(header)
@@ -123,14 +130,16 @@ def _build(verilator: Path, design: GeneratedDesign, harness: Path, place: Path,
     return program
 
 
-def _hit_distance(sources: list[Path]) -> str:
-    """The name of the distance's port ends with its format, which the harness need not know."""
+def _pixel_ports(sources: list[Path]) -> str:
+    """Names of ports that end with their format, which the harness need not know; those that the stream has."""
     top = next(path for path in sources if path.stem == "Colonnade").read_text()
-    match = re.search(r"io_pixels_0_bits_hit_distance_\w+", top)
-    if match is None:
-        return ""
-    suffix = match.group(0).removeprefix("io_pixels_0_")
-    return f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_{suffix}\n"
+    macros = ""
+    if match := re.search(r"io_pixels_0_bits_hit_distance_(\w+)", top):
+        macros += f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_bits_hit_distance_{match.group(1)}\n"
+    if match := re.search(r"io_pixels_0_bits_ratio_r_(\w+)", top):
+        port = f"top_.io_pixels_##column##_bits_ratio_##channel##_{match.group(1)}"
+        macros += f"#define RATIO(column, channel) {port}\n"
+    return macros
 
 
 def render_rtl(
@@ -165,6 +174,10 @@ def write_job(
     records = place / "records"
     records.write_bytes(image.records.tobytes())
     lines = [f"load {records} {manifest.record_bits // 8}"]
+    for section in image.attributes:
+        words = place / section.memory
+        words.write_bytes(section.words.tobytes())
+        lines.append(f"load {words} {section.words.shape[1]} {manifest.memories[section.memory]['target']}")
     readable = [register for register in manifest.registers.values() if register.access == "ro"]
     start = manifest.registers["control.start"].address
     outputs = []
@@ -237,6 +250,7 @@ def _frame(manifest: Manifest, registers: Mapping[str, int], output: Path, value
             name.removeprefix("counters."): value for name, value in values.items() if name.startswith("counters.")
         },
         errors=errors,
+        ratio=pixels["ratio"].copy() if registers.get("room.isThere", 0) else None,
     )
 
 

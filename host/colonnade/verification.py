@@ -20,7 +20,7 @@ class Equality:
     """The RTL's frame against the model's; zero everywhere, or the hardware is wrong.
 
     Attributes:
-        pixels: Pixels whose 12-bit colours differ.
+        pixels: Pixels whose 12-bit colours differ, or the parts of the light that are left to the room.
         triangles: Pixels whose hit triangles or distances differ.
         counters: Counters independent of timing that differ.
     """
@@ -54,8 +54,12 @@ def equality(rtl: RenderResult, model: RenderResult) -> Equality:
     """How the RTL's frame differs from the model's."""
     same_t = (rtl.t == model.t) | (np.isnan(rtl.t) & np.isnan(model.t))
     theirs: dict[str, int] = model.report["counters"]
+    differs = (rtl.image != model.image).any(axis=2)
+    if model.ratio is not None:
+        assert rtl.ratio is not None
+        differs |= (rtl.ratio != model.ratio).any(axis=2)
     return Equality(
-        pixels=int((rtl.image != model.image).any(axis=2).sum()),
+        pixels=int(differs.sum()),
         triangles=int(((rtl.hit_triangles != model.hit_triangles) | ~same_t).sum()),
         counters=sum(rtl.report["counters"][name] != value for name, value in theirs.items()),
     )
@@ -94,7 +98,7 @@ def verify(
 
         def frame(backend: str, mesh: str = name) -> RenderResult:
             hits = backend == "rtl"
-            return render(scene, config, overrides, backend, size, mesh=mesh, hits=hits, progress=progress)
+            return render(scene, config, overrides, backend, size, mesh=mesh, hits=hits, progress=progress, relit=True)
 
         model = frame("model")
         result: dict[str, Any] = {"triangles": model.report["mesh"]["triangles"], "rtl": None, "reference": None}

@@ -110,14 +110,17 @@ public:
     Values counters() const {
         const Counters& c = device_.counters;
         const auto value = [](std::uint64_t count) { return static_cast<std::int64_t>(count); };
-        return {{"raysPrimary", value(c.raysPrimary)},
+        Values values = {{"raysPrimary", value(c.raysPrimary)},
                 {"raysShadow", value(c.raysShadow)},
                 {"raysReflection", value(c.raysReflection)},
                 {"raysRefraction", value(c.raysRefraction)},
                 {"raysInBox", value(c.raysInBox)},
                 {"nodeReads", value(c.nodeReads)},     {"boxTests", value(c.boxTests)},     {"triangleTests", value(c.triangleTests)},
                 {"hits", value(c.hits)},               {"deepestStack", value(c.deepestStack)}};
+        if (room_) values.merge(Values{{"raysRoom", value(c.raysRoom)}, {"marchSteps", value(c.marchSteps)}, {"albedoReads", value(c.albedoReads)}, {"normalReads", value(c.albedoReads)}});
+        return values;
     }
+
 
     std::map<std::string, bool> errors() const {
         const Errors& e = device_.errors;

@@ -9,8 +9,9 @@
 //   cell   x y                                            -> id
 //   plane  id                                             -> a b c exponent
 //   shell  index                                          -> a b c exponent albedo[3] normal[3]
-//   march  matrix[9] offset[3] offsetShift exponent shellPlanes origin[3] direction[3]
-//                                                         -> kind x y entry isHidden travel travelExponent steps
+//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY shellPlanes isSeen pixel[2] origin[3] direction[3]
+//                                                         -> kind x y entry isHidden travel travelExponent steps point[3] albedo[3] normal[3]
+//          the point that the ray meets, or else (isSeen) that the pixel shows; all 0 of a point that there is not
 #pragma once
 #include <map>
 #include <optional>
@@ -79,13 +80,22 @@ private:
         view.offset = ask.vector();
         view.offsetShift = static_cast<int>(ask.number());
         view.exponent = static_cast<int>(ask.number());
+        for (auto& row : view.rotation) row = ask.vector();
+        for (auto& step : view.step) step = ask.number();
         view.shellPlanes = static_cast<int>(ask.number());
+        const bool isSeen = ask.number() != 0;
+        const std::int64_t x = ask.number(), y = ask.number();
         const WideVector origin = ask.wideVector();
-        const Vector direction = ask.vector();
-        const RoomPoint point = Background(numbers, image()).meet(origin, direction, view);
+        Vector direction;
+        blockScale(ask.wideVector(), numbers.shadeBits, direction);
+        const Background background(numbers, image());
+        const RoomPoint point = isSeen ? background.seen(x, y, direction, view) : background.meet(origin, direction, view);
         Answer answer;
         answer << static_cast<int>(point.kind) << point.x << point.y << point.entry << point.isHidden;
-        return answer << point.travel << point.travelExponent << point.steps;
+        answer << point.travel << point.travelExponent << point.steps;
+        if (point.kind == RoomPoint::Kind::nothing) return answer.all(std::array<int, 9>{});
+        const RoomTexel texel = background.texelOf(point, view);
+        return answer.all(background.reached(origin, direction, point)).all(texel.albedo).all(texel.normal);
     }
 
     AttributeImage& image() {

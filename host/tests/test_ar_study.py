@@ -92,7 +92,7 @@ def test_the_device_shows_the_rebuilt_room_but_for_its_rounding(
     scene = standing_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), room, Placing((79.5, 71.0), 0.4))
     view = float_placement(scene, mesh.extent, 160, 120, mesh.materials, room)
     hardware = f"physicalAttributeMemory={json.dumps(image.layout.to_config())}"
-    frame = device_frame(mesh, view, HeldRoom(room, image), manifest_for("room", (hardware,)).manifest)
+    frame = device_frame(mesh, view, HeldRoom(room, image), manifest_for("small", (hardware,)).manifest)
     truth, both = measured.pictures["full"], measured.pictures["both"]
     regions = frame_regions(truth.object_mask, truth.shadow_ratio)
     rounding = compare_regions(encode_srgb(both.image), encode_srgb(frame), regions, with_dists=False)

@@ -68,7 +68,7 @@ def same(one: RenderResult, other: RenderResult) -> bool:
 
 
 def in_room(file: Path, backend: str, frames: int) -> list[RenderResult]:
-    return list(render_frames(file, "room", ROOM, backend, (96, 72), frames))
+    return list(render_frames(file, "small", ROOM, backend, (96, 72), frames))
 
 
 @pytest.mark.parametrize("backend", ["model", "reference"])
@@ -85,7 +85,7 @@ def test_each_frame_is_the_single_frame_of_its_place(folder: Path, backend: str)
 def test_without_a_motion_the_object_turns_once(folder: Path) -> None:
     frames = in_room(scene_file(folder, standing()), "model", 4)
     for index, frame in enumerate(frames):
-        assert same(frame, render(scene_file(folder, standing(10.0 + 90.0 * index)), "room", ROOM, "model", (96, 72)))
+        assert same(frame, render(scene_file(folder, standing(10.0 + 90.0 * index)), "small", ROOM, "model", (96, 72)))
 
 
 def test_one_frame_is_the_plain_one(folder: Path) -> None:

@@ -31,7 +31,7 @@ WORDS = ((16, np.uint16), (32, np.uint32), (64, np.uint64))
 
 @pytest.fixture(scope="module")
 def hardware() -> Manifest:
-    return Manifest.load(ROOT / "configs" / "golden" / "room.json")
+    return Manifest.load(ROOT / "configs" / "golden" / "small.json")
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_pack_refuses_a_room_that_the_hardware_has_no_memory_for(tmp_path: Path)
     scene.write_text('[mesh]\nname = "cube"\n')
     room = ROOT / "scenes" / "rooms" / "attic"
     arguments = ["pack", str(scene), "--background", str(room), "--output", str(tmp_path / "packed")]
-    result = CliRunner().invoke(cli, [*arguments, "--config", "small"])
+    result = CliRunner().invoke(cli, [*arguments, "--config", "tiny"])
     assert result.exit_code == 2
     assert "no memory for a room: set physicalAttributeMemory" in result.output
     assert not (tmp_path / "packed").exists()

@@ -42,8 +42,8 @@ def scene(tmp_path: Path) -> Path:
 
 
 def test_a_frame_in_a_room_is_near_the_reference(scene: Path) -> None:
-    model = render(scene, "room", (), "model", (320, 240), relit=True)
-    reference = render(scene, "room", (), "reference", (320, 240))
+    model = render(scene, "small", (), "model", (320, 240), relit=True)
+    reference = render(scene, "small", (), "reference", (320, 240))
     np.testing.assert_array_equal(model.object_mask, reference.object_mask)
     # Clustering alone costs the living room's picture to 30 dB
     assert psnr(encode_srgb(reference.image), encode_srgb(model.image)) > 24
@@ -53,7 +53,7 @@ def test_a_frame_in_a_room_is_near_the_reference(scene: Path) -> None:
 def test_the_photo_is_kept_but_for_object_and_shadow(scene: Path) -> None:
     photo = load_room(ROOMS / "living").photo
     assert photo is not None
-    result = render(scene, "room", (), "model", (640, 480))
+    result = render(scene, "small", (), "model", (640, 480))
     before, after = decode_srgb(photo), result.image
     untouched = ~result.object_mask & (np.abs(after - before).max(axis=2) < 1e-9)
     shadow = ~result.object_mask & ~untouched
@@ -63,7 +63,5 @@ def test_the_photo_is_kept_but_for_object_and_shadow(scene: Path) -> None:
 
 
 def test_hardware_without_a_memory_for_rooms_refuses_one(scene: Path) -> None:
-    with pytest.raises(UserError, match="set physicalAttributeMemory, as in the preset room"):
-        render(scene, "small", (), "model", None)
-    with pytest.raises(UserError, match="--backend rtl renders the object alone"):
-        render(scene, "room", (), "rtl", None)
+    with pytest.raises(UserError, match="set physicalAttributeMemory, as in the preset small"):
+        render(scene, "tiny", (), "model", None)

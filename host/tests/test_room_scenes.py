@@ -42,8 +42,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def both(folder: Path, text: str) -> tuple[RenderResult, RenderResult]:
     """The model's frame, and the reference's."""
     (folder / "scene.toml").write_text(text)
-    model = render(folder / "scene.toml", "room", ROOM, "model", SIZE, relit=True)
-    return model, render(folder / "scene.toml", "room", ROOM, "reference", SIZE)
+    model = render(folder / "scene.toml", "small", ROOM, "model", SIZE, relit=True)
+    return model, render(folder / "scene.toml", "small", ROOM, "reference", SIZE)
 
 
 def assert_alike(model: RenderResult, reference: RenderResult) -> None:
@@ -127,8 +127,8 @@ THREE = LAMP.replace("light = ", "[[light]]\n").replace("{", "").replace("}", ""
     [
         (STANDING.replace("attic", "nowhere"), (), "there is no room .*nowhere: name a folder with meta.json"),
         (STANDING.replace("attic", "attic/meta.json"), (), "there is no room .*meta.json: name a folder"),
-        (STANDING, ("--config", "small"), "no memory for a room: set physicalAttributeMemory"),
-        (STANDING, ("--config", "room"), "are 96x72, physicalAttributeMemory holds 640x480: set its width and height"),
+        (STANDING, ("--config", "tiny"), "no memory for a room: set physicalAttributeMemory"),
+        (STANDING, ("--config", "small"), "are 96x72, physicalAttributeMemory holds 640x480: set its width and height"),
         (STANDING, ("--size", "96x96"), "96x96 pixels is not in the proportions of room attic"),
         (STANDING + THREE, (), "the scene has 3 lights, the hardware 2: leave some out or raise frame.lights"),
         (
@@ -148,7 +148,7 @@ def test_what_cannot_be_is_one_line(
 ) -> None:
     (folder / "scene.toml").write_text(text)
     sets = [word for override in ROOM for word in ("--set", override)]
-    hardware = () if "--config" in options else ("--config", "room", *sets)
+    hardware = () if "--config" in options else ("--config", "small", *sets)
     common = ["render", str(folder / "scene.toml"), "--backend", "model", *hardware, *options]
     result = CliRunner().invoke(cli, [*common, "--output", str(tmp_path / "f.png")])
     assert result.exit_code == 2, result.output

@@ -106,5 +106,7 @@ def summary(report: dict[str, Any]) -> str:
         words.append(f"{report['cycles']:,} cycles")
         words.append(f"{report['rays_per_cycle_in_box']:.3f} rays per cycle in box")
         words.append(f"{report['rays_per_cycle']:.3f} of all")
+    if room := report.get("room"):
+        words.append(f"{room['look_ups']:,} look-ups in the room of {room['cycles']:.0f} cycles")
     seconds = ", ".join(f"{step} {value:.1f} s" for step, value in report["seconds"].items() if value is not None)
     return ", ".join(words) + (f" ({seconds})" if seconds else "")

@@ -1,6 +1,6 @@
 // Runs the generated hardware under Verilator: carries out the commands of a job file, one a line.
 //
-//   load FILE BYTES          records of BYTES bytes each, through the load port, to consecutive addresses
+//   load FILE BYTES TARGET   words of BYTES bytes each, through the load port, to consecutive addresses of a target
 //   write ADDRESS VALUE      one register word
 //   frame FILE WIDTH HEIGHT START  starts a frame by a write to register START, waits for its end, writes its pixels
 //                            (struct PixelBytes, row by row)
@@ -24,15 +24,15 @@
 #include <vector>
 
 #include "VColonnade.h"
-#include "columns.hpp" // EACH_COLUMN(DO): DO(column) for each column; HIT_DISTANCE(column) where the stream carries hits;
-                       // MEMORY_BANKS, of all columns, where they can be held
+#include "columns.hpp" // EACH_COLUMN(DO): DO(column) for each column; HIT_DISTANCE(column) where the stream carries hits,
+                       // RATIO(column, channel) where it carries the light left to a room; MEMORY_BANKS, of all columns, where they can be held
 #include "verilated.h"
 
 namespace {
 
 #pragma pack(push, 1)
 struct PixelBytes {
-    std::uint16_t colour[3];
+    std::uint16_t colour[3], ratio[3];
     std::uint8_t isObject, isSeen;
     std::uint32_t triangle;
     double distance;
@@ -192,8 +192,17 @@ private:
         pixel.colour[1] = top_.io_pixels_##column##_bits_colour_g;                                                                        \
         pixel.colour[2] = top_.io_pixels_##column##_bits_colour_b;                                                                        \
         pixel.isObject = top_.io_pixels_##column##_bits_isObject;                                                                         \
+        TAKE_RATIO(column)                                                                                                                \
         TAKE_HIT(column)                                                                                                                  \
     }
+#ifdef RATIO
+#define TAKE_RATIO(column)                                                                                                                \
+    pixel.ratio[0] = RATIO(column, r);                                                                                                    \
+    pixel.ratio[1] = RATIO(column, g);                                                                                                    \
+    pixel.ratio[2] = RATIO(column, b);
+#else
+#define TAKE_RATIO(column)
+#endif
 #ifdef HIT_DISTANCE
 #define TAKE_HIT(column)                                                                                                                  \
     pixel.triangle = top_.io_pixels_##column##_bits_hit_triangle;                                                                         \

@@ -13,6 +13,10 @@ struct RoomView {
     int offsetShift, exponent;
     int shellPlanes;
     std::array<std::int64_t, 2> step;
+    /// Pixels that show the room itself: x0, y0, x1, y1, the latter exclusive.
+    std::array<std::int64_t, 4> window;
+
+    bool shows(std::int64_t x, std::int64_t y) const { return x >= window[0] && x < window[2] && y >= window[1] && y < window[3]; }
 };
 
 /// What a point of the room is made of; the normal in object space, 11 fraction bits.
@@ -41,6 +45,14 @@ struct MapRay {
     int fromShift, towardsShift, directionShift;
 };
 
+/// Scales a vector so that its components take `bits` bits and a sign; returns by how many bits it was shifted down.
+inline int blockScale(const WideVector& v, int bits, Vector& scaled) {
+    int length = 0;
+    for (const Wide component : v) length = std::max(length, bitLength(UnsignedWide(component < 0 ? ~component : component)));
+    for (int a = 0; a < 3; ++a) scaled[a] = static_cast<std::int64_t>(floorShift(v[a], length - bits));
+    return length - bits;
+}
+
 class Background {
 public:
     /// Steps of a march at most: then the ray meets the shell.
@@ -56,7 +68,7 @@ public:
         return point;
     }
 
-    /// The point that the map's own camera sees in pixel (x, y) of the frame; `direction` is that of the pixel's ray.
+    /// The point that the map's own camera sees in pixel (x, y) of the frame; `direction` is that of the pixel's ray, as for `meet`.
     RoomPoint seen(std::int64_t x, std::int64_t y, const Vector& direction, const RoomView& view) const {
         RoomPoint point{};
         Vector place{};
@@ -67,15 +79,13 @@ public:
         MapRay ray{};
         ray.position = place;
         const Depth depth = depthOf(ray, image_.planeOf(image_.cellAt(point.x, point.y)), 0);
-        const std::int64_t w = -inW(depth.value, depth);
-        WideVector towards;
-        for (int i = 0; i < 3; ++i) towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
-        ray.towardsShift = blockNormalise(towards, f_, ray.towards);
-        if (w <= 0 || ray.towards[2] <= 0) return point;
+        const std::int64_t w = std::min(most(), -inW(depth.value, depth));
+        const Wide towards = times(view.matrix[2], {direction[0], direction[1], direction[2]});
+        if (w <= 0 || towards <= 0) return {};
         point.kind = RoomPoint::Kind::map;
-        const Normalised speed = normalise(UnsignedWide(Wide(w) * ray.towards[2]), f_);
+        const Normalised fall = normalise(UnsignedWide(towards), f_), speed = normalise(UnsignedWide(w) * fall.mantissa, f_);
         point.travel = reciprocal(speed.mantissa);
-        point.travelExponent = 1 - speed.exponent + view.exponent - ray.towardsShift;
+        point.travelExponent = 1 + f_ - speed.exponent - fall.exponent + view.exponent;
         return point;
     }
 
@@ -85,25 +95,29 @@ public:
         const Rgb12 albedo = isShell ? image_.shell(point.entry).albedo : image_.albedoAt(point.x, point.y);
         const Normal12 normal = isShell ? image_.shell(point.entry).normal : image_.normalAt(point.x, point.y);
         RoomTexel texel{{albedo.r, albedo.g, albedo.b}, {}};
-        for (int a = 0; a < 3; ++a)
-            texel.normal[a] = nearestEven<std::int64_t>(view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z, rotationFraction);
+        const std::int64_t one = std::int64_t(1) << n_.normalFraction;
+        for (int a = 0; a < 3; ++a) {
+            const std::int64_t turned = view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z;
+            texel.normal[a] = clamp<std::int64_t>(nearestEven(turned, rotationFraction), -one, one - 1);
+        }
         return texel;
     }
 
-    /// Where a ray has met the room, grid steps; at most as far as a scene reaches.
+    /// Where a ray has met the room, grid steps; at most half as far as a scene reaches, so that there is room for an offset and for the way to a light.
     WideVector reached(const WideVector& origin, const Vector& direction, const RoomPoint& point) const {
         WideVector result;
         const Wide most = largest(n_.sceneBits);
         for (int a = 0; a < 3; ++a) {
-            const Wide way = point.travelExponent > n_.sceneBits ? (direction[a] < 0 ? -most : direction[a] > 0 ? most : 0)
-                                                                 : floorShift<Wide>(Wide(point.travel) * direction[a], -point.travelExponent);
-            result[a] = clamp<Wide>(origin[a] + way, -most, most);
+            const Wide way = point.travelExponent > f_ ? (direction[a] < 0 ? -most - 1 : direction[a] > 0 ? most : 0)
+                                                       : floorShift<Wide>(Wide(point.travel) * direction[a], -point.travelExponent);
+            result[a] = clamp<Wide>(origin[a] + clamp<Wide>(way, -most - 1, most), -(most / 2) - 1, most / 2);
         }
         return result;
     }
 
 private:
     static constexpr int stepGuard = 12, rotationFraction = 14;
+
     /// A plane along a ray: how far the ray is in front of it, value + slope · s, in steps of 2^(exponent − 22).
     struct Depth {
         int id;
@@ -129,8 +143,8 @@ private:
             from[i] = times(view.matrix[i], origin) + floorShift<Wide>(view.offset[i], -view.offsetShift);
             towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
         }
-        ray.fromShift = blockNormalise(from, f_, ray.from);
-        ray.towardsShift = blockNormalise(towards, f_, ray.towards);
+        ray.fromShift = blockScale(from, f_, ray.from);
+        ray.towardsShift = blockScale(towards, f_, ray.towards);
         ray.isInFront = ray.from[2] > 0;
         if (!ray.isInFront) return ray;
 
@@ -144,7 +158,7 @@ private:
         WideVector way;
         for (int i = 0; i < 2; ++i) way[i] = (Wide(ray.towards[i]) << f_) - Wide(ray.position[i]) * ray.towards[2];
         way[2] = -Wide(ray.position[2]) * ray.towards[2];
-        ray.directionShift = blockNormalise(way, f_, ray.direction);
+        ray.directionShift = blockScale(way, f_, ray.direction);
         return ray;
     }
 

@@ -9,6 +9,8 @@ namespace colonnade {
 /// Counters that do not depend on timing, named as in the register map.
 struct Counters {
     std::uint64_t raysPrimary, raysShadow, raysReflection, raysRefraction, raysInBox, nodeReads, boxTests, triangleTests, hits, deepestStack;
+    /// Of the room: rays that look for a point of it, tiles and cells that they pass, points whose pixel is looked up.
+    std::uint64_t raysRoom, marchSteps, albedoReads;
 };
 
 struct Errors {
@@ -186,12 +188,19 @@ private:
         return incoming(offSurface(point, normal, frame_.lighting.offset, numbers_), {normal[0], normal[1], normal[2]}, shadows);
     }
 
+    const RoomPoint& count(const RoomPoint& point) {
+        ++counters.raysRoom;
+        counters.marchSteps += static_cast<std::uint64_t>(point.steps);
+        counters.albedoReads += point.kind == RoomPoint::Kind::map;
+        return point;
+    }
+
     /// The colour of what a ray meets that meets nothing of the object.
     Colour met(const RayRequest& ray, bool shadows = true) {
         if (!frame_.hasRoom || !background_) return frame_.lighting.background;
         Vector direction;
-        blockNormalise(ray.direction, numbers_.shadeBits, direction);
-        const RoomPoint point = background_->meet(ray.origin, direction, frame_.room);
+        blockScale(ray.direction, numbers_.shadeBits, direction);
+        const RoomPoint point = count(background_->meet(ray.origin, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return frame_.lighting.background;
         const RoomTexel texel = background_->texelOf(point, frame_.room);
         return reflectedBy(texel.albedo, roomLight(background_->reached(ray.origin, direction, point), texel.normal, shadows).visible);
@@ -199,10 +208,10 @@ private:
 
     /// A pixel that shows the room itself.
     Pixel seen(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray) {
-        if (!frame_.hasRoom || !background_) return pixel;
+        if (!frame_.hasRoom || !background_ || (!frame_.maySeeObject(x, y) && !frame_.room.shows(x, y))) return pixel;
         Vector direction;
-        blockNormalise(ray.direction, numbers_.shadeBits, direction);
-        const RoomPoint point = background_->seen(x, y, direction, frame_.room);
+        blockScale(ray.direction, numbers_.shadeBits, direction);
+        const RoomPoint point = count(background_->seen(x, y, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return pixel;
         const RoomTexel texel = background_->texelOf(point, frame_.room);
         const Incoming light = roomLight(background_->reached(ray.origin, direction, point), texel.normal, true);
@@ -212,13 +221,7 @@ private:
     }
 
     /// part / whole, 12 fraction bits, 1 for 0 / 0; part is not the larger one.
-    std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const {
-        const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
-        if (part == whole) return one;
-        const Normalised dividend = normalise(UnsignedWide(part), numbers_.mantissaBits), divisor = normalise(UnsignedWide(whole), numbers_.mantissaBits);
-        const Wide quotient = divide(dividend.mantissa, divisor.mantissa, numbers_.lightFraction);
-        return static_cast<std::int64_t>(std::min<Wide>(one, floorShift<Wide>(quotient, divisor.exponent - dividend.exponent)));
-    }
+    std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const { return part == whole ? std::int64_t(1) << numbers_.lightFraction : (part << numbers_.lightFraction) / whole; }
 
     /// Sends the path on from a mirror or glass; false if the next ray meets the background only.
     bool goOn(const Surface& surface, const Material& material, Path& path, RayRequest& request) {

@@ -88,6 +88,7 @@ struct Frame {
         room.exponent = static_cast<int>(take("room.exponent"));
         room.shellPlanes = static_cast<int>(take("room.shellPlanes"));
         room.step = {take("room.stepX"), take("room.stepY")};
+        room.window = {take("room.window.x0"), take("room.window.y0"), take("room.window.x1"), take("room.window.y1")};
     }
 
     /// What the names of a table's entry begin with.

@@ -6,7 +6,7 @@ import colonnade.background.{AttributeArbiter, AttributePort, PhysicalAttributeM
 import colonnade.column.Column
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
-import colonnade.frame.{CounterFile, FrameController}
+import colonnade.frame.{CounterFile, FrameController, RoomWindow}
 import colonnade.unit.{RenderUnit, RenderUnitIO}
 
 /** Ports of [[Colonnade]]. */
@@ -62,8 +62,9 @@ final class Colonnade(
 
   // A frame: tiles out, pixels back
   registers.io.register <> io.register
-  controller.io.start := registers.io.start
-  controller.io.frame := registers.io.frame.frame
+  controller.io.start  := registers.io.start
+  controller.io.frame  := registers.io.frame.frame
+  controller.io.window := RoomWindow(config, registers.io.frame)
   for ((column, index) <- columns.zipWithIndex) {
     column.io.registers := registers.io.frame
     column.io.start     := controller.io.begins

@@ -22,6 +22,9 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
   import formats._
 
   // The ray
+  /** Its direction, as long as f bits hold. */
+  val heading: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))
+
   /** The origin's projection; then u and v from the map's middle, and w. */
   val place: Vec[SInt] = Reg(Vec(3, SInt(placeBits.W)))
 
@@ -42,7 +45,6 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
   val axis:      UInt      = Reg(UInt(2.W))
   val lengths:   Vec[UInt] = Reg(Vec(3, UInt(lengthBits.W)))
   val length:    UInt      = Reg(UInt(lengthBits.W))
-  val isFlipped: Bool      = Reg(Bool())
   val mantissa:  UInt      = Reg(UInt(f.W))
   val numerator: UInt      = Reg(UInt(f.W))
   val quotient:  UInt      = Reg(UInt((f + 1).W))
@@ -79,7 +81,7 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
 
   def load(value: SInt): Unit = base.choose(value)
 
-  /** Turns a negative sum, and back. */
+  /** Turns the sum's sign. */
   def flip(condition: Bool): Unit = {
     addend.choose(Mux(condition, sum, 0.S))
     base.choose(Mux(condition, 0.S, sum))
@@ -107,7 +109,7 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
   val shifted: SInt = Rounding.narrow(Cat(sum, 0.U(f.W)).asSInt >> by, scaledBits)
 
   /** The sum's bit length after that is more than `bits`. The sum is measured. */
-  private def exceeds(bits: Int): Bool = sum =/= 0.S && length.zext +& (f - bits).S > drop
+  private def exceeds(bits: Int): Bool = sum =/= 0.S && (drop < 0.S || length.zext +& (f - bits).S > drop)
 
   /** The nearest number of so many bits and a sign. */
   def saturated(bits: Int): SInt = {
@@ -119,23 +121,13 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
   def saturatedNatural(bits: Int): UInt =
     Mux(exceeds(bits), ((BigInt(1) << bits) - 1).U(bits.W), shifted.asUInt(bits - 1, 0))
 
-  /** Bit length of a sum that is not negative. */
-  val measured: UInt = Normalise.bitLength(sum.asUInt).pad(lengthBits)
+  /** Bits of the sum without its sign. */
+  val measured: UInt = Normalise.bitLength(Mux(sum < 0.S, ~sum, sum).asUInt).pad(lengthBits)
 
-  /** In a step: measures a sum that is not negative. The next step finds its f highest bits in [[shifted]]. */
+  /** In a step: measures the sum. The next step finds its f highest bits, beside the sign, in [[shifted]]. */
   def measure(): Unit = {
     program.set(length, measured)
     program.set(drop, measured.zext.pad(exponentBits))
-  }
-
-  /** Three steps that measure any sum. */
-  def measureSigned(): Unit = {
-    program.step {
-      program.set(isFlipped, sum < 0.S)
-      flip(sum < 0.S)
-    }
-    program.step(measure())
-    program.step(flip(isFlipped))
   }
 
   /** Two steps: quotient = ⌊numerator · 2^f / denominator⌋. */

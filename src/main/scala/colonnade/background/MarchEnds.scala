@@ -15,9 +15,12 @@ final class MarchEnds(
   import m.formats._
   import m.program._
 
-  private val kind         = Reg(UInt(RoomKind.bits.W))
-  private val entry        = Reg(UInt(layout.shellIndexBits.W))
-  private val exponent     = Reg(SInt(exponentBits.W))
+  val kind:  UInt = Reg(UInt(RoomKind.bits.W))
+  val entry: UInt = Reg(UInt(layout.shellIndexBits.W))
+
+  /** The way to the point is the quotient · 2^exponent times the heading. */
+  val exponent: SInt = Reg(SInt(exponentBits.W))
+
   private val index        = Reg(UInt(view.shellPlanes.getWidth.W))
   private val bestMantissa = Reg(UInt((f + 1).W))
   private val bestLength   = Reg(SInt(exponentBits.W))
@@ -121,7 +124,7 @@ final class MarchEnds(
     m.divide(m.depthMantissa, (bestMantissa >> 1)(f - 1, 0))
     step {
       set(exponent, m.depthLength.zext +& m.placeTop.zext - bestLength - m.towardsTop.zext)
-      goto("finish")
+      goto("point")
     }
   }
 

@@ -10,8 +10,9 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
 final class MarchFormats(config: ColonnadeConfig) {
   private val numbers = config.numbers
 
-  val layout: AttributeLayout = AttributeLayout.of(config)
-  val f:      Int             = numbers.shadeBits
+  val layout:    AttributeLayout = AttributeLayout.of(config)
+  val f:         Int             = numbers.shadeBits
+  val sceneBits: Int             = numbers.sceneBits
 
   /** Log2 of the map's unit in pixels. */
   val mapLog: Int = 10
@@ -49,10 +50,10 @@ final class MarchFormats(config: ColonnadeConfig) {
   val depthBits: Int = valueBits + 2
 
   /** The model's widest number has 128 bits. */
-  val sumBits: Int = (numbers.macBits + numbers.sceneBits + 3).min(128).max(productBits)
+  val sumBits: Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits)
 
-  /** A depth in steps of w. */
-  val scaledBits:   Int = depthBits + f - 7
+  /** A depth in steps of w, or a position in the scene. */
+  val scaledBits:   Int = (depthBits + f - 7).max(sceneBits)
   val combineBits:  Int = scaledBits + 1
   val lengthBits:   Int = 8
   val exponentBits: Int = 12

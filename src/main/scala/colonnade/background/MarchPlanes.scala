@@ -13,8 +13,8 @@ final class MarchPlanes(
   import m.program._
 
   /** What a plane's depth is wanted for: it decides where the program goes on. */
-  val Seq(forTile, forSurvey, forKeeping, forCell, forShell) = Enum(5)
-  val purpose                                                = Reg(UInt(3.W))
+  val Seq(forTile, forSurvey, forKeeping, forCell, forShell, forPixel) = Enum(6)
+  val purpose                                                          = Reg(UInt(3.W))
 
   /** The plane that is wanted. */
   val id: UInt = Reg(UInt(layout.planeIdBits.W))
@@ -40,7 +40,16 @@ final class MarchPlanes(
   /** In a step: of another ray none is known. */
   def forget(): Unit = isKnown.foreach(set(_, false.B))
 
-  /** Steps from the label "plane" on. They end at "depth", or at "shell depth" with the shell's products in the sum. */
+  /** In a step: asks for an entry of the shell as a whole. */
+  def askShell(index: UInt): Unit = when(now) {
+    question.valid                := true.B
+    question.bits.content.isShell := true.B
+    question.bits.content.index   := index
+  }
+
+  /** Steps from the label "plane" on. They end at "depth", "seen depth", or "shell depth" with the shell's products in
+    * the sum.
+    */
   def describe(): Unit = {
     step("plane") {
       val isFound = matches.asUInt.orR && purpose =/= forShell
@@ -83,7 +92,12 @@ final class MarchPlanes(
     step {
       m.accumulate()
       set(depth.slope, m.combine(raised, sumShare, subtract = true))
-      branch((purpose === forShell) -> "shell depth", (purpose === forKeeping) -> "keep", true.B -> "depth")
+      branch(
+        (purpose === forShell)   -> "shell depth",
+        (purpose === forPixel)   -> "seen depth",
+        (purpose === forKeeping) -> "keep",
+        true.B                   -> "depth"
+      )
     }
   }
 

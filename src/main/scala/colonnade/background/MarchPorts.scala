@@ -1,22 +1,34 @@
 package colonnade.background
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.{RoomView, ShellEntry, Vec3}
-import colonnade.numbers.{Fixed, FixedPointFormat}
+import chisel3.util.Decoupled
+import colonnade.config.{AttributeLayout, ColonnadeConfig, NumberFormats}
+import colonnade.formats.{AlbedoEntry, RoomView, Vec3}
+import colonnade.numbers.Fixed
+import colonnade.ray.{Context, RayFormats}
+import colonnade.unit.PixelPosition
 
-/** A ray that leaves the objects. */
-final class MarchRequest(config: ColonnadeConfig) extends Bundle {
+/** A ray that meets nothing of the object. */
+final class RoomRay(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
 
-  val context = UInt(log2Ceil(config.array.contexts.max(2)).W)
-
   /** Grid steps. */
-  val origin = Vec3(new Fixed(FixedPointFormat.signed(numbers.sceneBits, numbers.gridFraction)))
+  val origin = Vec3(new Fixed(new RayFormats(numbers).scene))
 
   /** Of any length. */
-  val towards = Vec3(SInt((numbers.shadeBits + 1).W))
+  val towards = Vec3(SInt(numbers.directionBits.W))
+
+  /** Of a ray from the camera: its pixel. */
+  val pixel = new PixelPosition(config)
+}
+
+/** Which point of the room does a ray meet? */
+final class MarchRequest(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+
+  /** The ray comes from the camera: it meets what the maps show in its pixel. */
+  val isSeen = Bool()
+  val ray    = new RoomRay(config)
 }
 
 /** What a ray meets in the room. */
@@ -33,7 +45,7 @@ final class MarchResult(config: ColonnadeConfig) extends Bundle {
   private val formats = new MarchFormats(config)
   private val layout  = AttributeLayout.of(config)
 
-  val context = UInt(log2Ceil(config.array.contexts.max(2)).W)
+  val context = Context(config)
 
   /** Of [[RoomKind]]. */
   val kind = UInt(RoomKind.bits.W)
@@ -54,6 +66,13 @@ final class MarchResult(config: ColonnadeConfig) extends Bundle {
 
   /** Tiles and cells that the ray has passed. */
   val steps = UInt(formats.stepBits.W)
+
+  /** Grid steps, at most half as far as a scene reaches. */
+  val point = Vec3(new Fixed(new RayFormats(config.numbers).scene))
+
+  /** What the maps say of it; the normal in the object's space. */
+  val albedo = new AlbedoEntry
+  val normal = Vec3(SInt(NumberFormats.normalBits.W))
 }
 
 /** For the counters, in this cycle. */
@@ -73,8 +92,7 @@ final class RoomMarchIO(config: ColonnadeConfig) extends Bundle {
   val request = Flipped(Decoupled(new MarchRequest(config)))
   val result  = Decoupled(new MarchResult(config))
 
-  /** One question in flight at most; tags are 0. */
-  val cells  = new AttributeChannel(new CellQuestion(layout), new CellAnswer(layout), RoomMarch.tagBits)
-  val planes = new AttributeChannel(new PlaneQuestion(layout), new ShellEntry, RoomMarch.tagBits)
+  /** One question in flight in each channel at most; tags are 0. */
+  val maps   = new AttributePort(layout, AttributePort.tagBits(config))
   val events = Output(new MarchEvents)
 }

@@ -14,21 +14,34 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
   import m.formats._
   import m.program._
 
-  private val row         = VecInit(view.matrix.map(row => VecInit(row.axes)))(m.axis)
+  private val matrixRow   = VecInit(view.matrix.map(row => VecInit(row.axes)))(m.axis)
   private val offset      = VecInit(view.offset.axes)(m.axis)
   private val offsetPower = 1.U(1.W) << view.offsetShift
-  private val origin      = request.origin.axes.map(_.integer)
+  private val origin      = request.ray.origin.axes.map(_.integer)
 
-  /** Steps for a ray whose direction is to be marched along; jumps if its origin is behind the camera.
-    *
-    * @param accept is called in the step after which the request is not needed any more
-    */
-  def describe(behind: String)(accept: => Unit): Unit = {
+  /** Steps that scale the direction, the first ones for every ray; they jump to "seen" for one from the camera. */
+  def describeHeading(): Unit = {
+    step {
+      set(m.axis, 0.U)
+      set(m.towardsTop, 0.U)
+    }
+    step("heading")(m.load(VecInit(request.ray.towards.axes)(m.axis)))
+    normalise("heading", m.heading, m.towardsTop)
+    step(branch(request.isSeen -> "seen"))
+  }
+
+  /** Steps that leave the last row of the matrix, times the direction, in the sum. */
+  def describeDepth(): Unit = {
+    step(set(m.axis, 2.U))
+    row(terms(m.heading))
+  }
+
+  /** Steps for a ray whose direction is to be marched along; jumps if its origin is behind the camera. */
+  def describe(behind: String): Unit = {
     val offsetTerm = (offset, digitsOf(offsetPower.zext))
     block("origin", m.place, m.placeTop)(terms(origin) :+ offsetTerm)
-    block("direction", m.towards, m.towardsTop)(terms(request.towards.axes))
+    block("direction", m.towards, m.towardsTop)(terms(m.heading))
     step {
-      accept
       m.load(m.place(2))
       branch((m.place(2) <= 0.S) -> behind)
     }
@@ -48,8 +61,10 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
     step(set(m.axis, 0.U))
     step("position")(m.multiply(m.place(m.axis), m.quotient.zext))
     step(m.load(m.product))
-    m.measureSigned()
-    step(set(m.drop, m.depthLength.zext +& (f - 1).S))
+    step {
+      set(m.length, m.measured)
+      set(m.drop, m.depthLength.zext +& (f - 1).S)
+    }
     step {
       set(m.place(m.axis), m.saturated(alongBits))
       next("position", 1)
@@ -76,24 +91,29 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
 
   /** A row of the matrix times a vector, for every row. */
   private def block(name: String, vector: Vec[SInt], top: UInt)(factors: Seq[(SInt, Seq[SInt])]): Unit = {
+    step {
+      set(m.axis, 0.U)
+      set(top, 0.U)
+    }
+    label(name)
+    row(factors)
+    normalise(name, vector, top)
+  }
+
+  /** The sum of products, digit by digit. */
+  private def row(factors: Seq[(SInt, Seq[SInt])]): Unit = {
     val products = for {
       ((entry, vectorDigits), _) <- factors.zipWithIndex
       (entryDigit, i)            <- digitsOf(entry).zipWithIndex
       (vectorDigit, j)           <- vectorDigits.zipWithIndex
     } yield (i + j, vectorDigit, entryDigit)
     val ordered = products.sortBy(-_._1)
-    step {
-      set(m.axis, 0.U)
-      set(top, 0.U)
-    }
-    label(name)
     for (((weight, wide, narrow), index) <- ordered.zipWithIndex)
       step {
         m.multiply(wide, narrow)
         if (index > 0) add(index - 1)
       }
     step(add(ordered.size - 1))
-    normalise(name, vector, top)
 
     def add(index: Int): Unit =
       if (index == 0) m.load(m.product)
@@ -103,7 +123,7 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
 
   /** Makes a component of the sum, and goes on with the next; in the end aligns all three. */
   private def normalise(name: String, vector: Vec[SInt], top: UInt): Unit = {
-    m.measureSigned()
+    step(m.measure())
     step {
       set(vector(m.axis), Rounding.narrow(m.shifted, f + 1).pad(vector(0).getWidth))
       set(m.lengths(m.axis), m.length)
@@ -128,9 +148,9 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
   }
 
   private def terms(vector: Seq[SInt]): Seq[(SInt, Seq[SInt])] =
-    vector.zipWithIndex.map { case (component, column) => (row(column), digitsOf(component)) }
+    vector.zipWithIndex.map { case (component, column) => (matrixRow(column), digitsOf(component)) }
 
-  private def digitsOf(number: SInt): Seq[SInt] = {
+  def digitsOf(number: SInt): Seq[SInt] = {
     val count = digits(number.getWidth)
     Seq.tabulate(count) { i =>
       if (i == count - 1) Rounding.floor(number, i * digitBits)

@@ -3,34 +3,37 @@ package colonnade.background
 import chisel3._
 import colonnade.config.ColonnadeConfig
 
-/** Finds the point of the room that a ray meets: projects the ray into the map, where it is straight, and goes along it
-  * from tile to tile until it is no longer in front of what the map shows. Rays that leave the map meet the shell.
+/** Finds the point of the room that a ray meets, and what it is made of: projects the ray into the map, where it is
+  * straight, and goes along it from tile to tile until it is no longer in front of what the map shows. Rays that leave the
+  * map meet the shell. For a ray from the camera the pixel itself says what it meets.
   *
-  * One ray at a time, and one question in flight. `docs/march.md` says how, and how long it takes.
+  * One ray at a time: its request is taken together with its result. `docs/march.md` says how, and how long it takes.
   */
 final class RoomMarch(config: ColonnadeConfig) extends Module {
   val io = IO(new RoomMarchIO(config))
 
   private val program    = new Microprogram
   private val datapath   = new MarchDatapath(config, program)
-  private val projection = new MarchProjection(config, datapath, io.view, io.request.bits)
+  private val asked      = io.request.bits
+  private val projection = new MarchProjection(config, datapath, io.view, asked)
   private val axes       = new MarchAxes(datapath)
-  private val planes     = new MarchPlanes(datapath, io.planes)
+  private val planes     = new MarchPlanes(datapath, io.maps.planes)
   private val walk       = new MarchWalk(datapath, planes, axes)
-  private val tiles      = new MarchTiles(datapath, walk, planes, axes, io.cells)
+  private val tiles      = new MarchTiles(datapath, walk, planes, axes, io.maps.cells)
   private val pass       = new MarchPass(datapath, walk, planes)
   private val pixels     = new MarchPixels(datapath, walk, pass.met)
-  private val cells      = new MarchCells(datapath, walk, planes, axes, pixels, io.cells)
+  private val cells      = new MarchCells(datapath, walk, planes, axes, pixels, io.maps.cells)
   private val ends       = new MarchEnds(datapath, walk, planes, pixels, pass.met, io.view)
-  private val context    = Reg(chiselTypeOf(io.request.bits.context))
+  private val seen       = new MarchSeen(datapath, projection, planes, pixels, ends, io.maps.cells, io.view, asked)
+  private val surface    = new MarchSurface(datapath, planes, pixels, ends, io.maps, io.view, asked)
   private val isBusy     = WireInit(true.B)
 
-  io.request.ready                         := false.B
-  io.result.valid                          := false.B
-  io.cells.question.valid                  := false.B
-  io.cells.question.bits.tag               := 0.U
-  io.cells.question.bits.content.pixel     := walk.cellCorner
-  io.cells.question.bits.content.wholeTile := false.B
+  io.request.ready                              := false.B
+  io.result.valid                               := false.B
+  io.maps.cells.question.valid                  := false.B
+  io.maps.cells.question.bits.tag               := 0.U
+  io.maps.cells.question.bits.content.pixel     := walk.cellCorner
+  io.maps.cells.question.bits.content.wholeTile := false.B
 
   program.step("start") {
     ends.clear()
@@ -38,10 +41,8 @@ final class RoomMarch(config: ColonnadeConfig) extends Module {
     when(program.now)(isBusy := io.request.valid)
     program.await(io.request.valid)
   }
-  projection.describe(behind = "finish") {
-    when(program.now)(io.request.ready := true.B)
-    program.set(context, io.request.bits.context)
-  }
+  projection.describeHeading()
+  projection.describe(behind = "finish")
   axes.describe(outside = "shell")
   tiles.describe()
   planes.describe()
@@ -51,21 +52,21 @@ final class RoomMarch(config: ColonnadeConfig) extends Module {
   ends.describeMet()
   pixels.describe()
   ends.describeShell()
+  seen.describe()
+  surface.describe()
   program.step("finish") {
-    when(program.now)(io.result.valid                := true.B)
+    when(program.now) {
+      io.result.valid  := true.B
+      io.request.ready := io.result.ready
+    }
     program.awaitOr(io.result.ready, io.result.ready -> "start")
   }
   program.build()
   datapath.build()
 
   ends.result(io.result.bits)
-  io.result.bits.context := context
+  surface.result(io.result.bits)
+  io.result.bits.context := asked.context
   io.events.step         := RegNext(walk.steps, 0.U) =/= walk.steps && walk.steps =/= 0.U
   io.events.busy         := isBusy
-}
-
-object RoomMarch {
-
-  /** Of its questions: it knows what they are about. */
-  val tagBits: Int = 1
 }

@@ -5,7 +5,7 @@ import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.background.{AttributePort, ColumnRoom}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Load, Pixel}
-import colonnade.frame.{BackgroundWalker, ColumnProgress, EventSums, PixelCollector, Tile, TileWalker}
+import colonnade.frame.{BackgroundWalker, ColumnProgress, EventSums, PixelCollector, RoomWindow, Tile, TileWalker}
 import colonnade.unit.{RenderUnit, RenderUnitIO}
 
 /** Ports of [[Column]]. */
@@ -56,7 +56,8 @@ final class Column(
   private val collector  = Module(new PixelCollector(config, config.array.rows + 1))
 
   // Tiles become pixels to render
-  walker.io.frame := io.registers.frame
+  walker.io.frame  := io.registers.frame
+  walker.io.window := RoomWindow(config, io.registers)
   walker.io.tiles <> io.tiles
   units.zip(walker.io.positions).foreach { case (unit, positions) => unit.positions <> positions }
 
@@ -73,12 +74,12 @@ final class Column(
   memory.io.load := io.load
   memory.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
 
-  // Units will ask for the maps of a room: the column's own, or those that all columns share
+  // Units ask for the maps of a room: the column's own, or those that all columns share
   private val room = config.physicalAttributeMemory.map(_ => Module(new ColumnRoom(config)).io)
   for (maps <- room) {
     maps.load := io.load
     maps.shared.zip(io.room).foreach { case (shared, port) => port <> shared }
-    maps.ports.foreach(_.asksNothing())
+    maps.ports.zip(units.flatMap(_.maps)).foreach { case (port, unit) => port <> unit }
   }
 
   // Colours leave

@@ -132,4 +132,7 @@ final case class ColonnadeConfig(
   Require.oneOf("units.boxLanes", units.boxLanes, Seq(1, 2, 4).filter(_ <= geometry.arity))
 
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
+
+  /** Rays may meet a room. */
+  val hasRoom: Boolean = physicalAttributeMemory.nonEmpty
 }

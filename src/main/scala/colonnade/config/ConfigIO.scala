@@ -10,7 +10,7 @@ import java.nio.file.{Files, InvalidPathException, Path, Paths}
 object ConfigIO {
 
   /** Configurations that are always there, by name. */
-  val presets: Seq[String] = Seq("tiny", "small", "edge", "room")
+  val presets: Seq[String] = Seq("tiny", "small", "edge")
 
   private val notation = """(\d{1,6})b(\d{1,6})s(\d{1,6})d""".r
 

@@ -195,6 +195,9 @@ final class RoomView(numbers: NumberFormats) extends Bundle {
 
   /** Rays that meet nothing of the object meet the room; otherwise the background's colour. */
   val isThere = Bool()
+
+  /** Pixels that show the room itself: only here. Elsewhere they have the background's colour and all the light. */
+  val window = new PixelRect(numbers.coordinateBits)
 }
 
 object RoomView {
@@ -248,6 +251,9 @@ object FrameRegisters {
 
   /** A part of the whole: 2^fraction is all of it. */
   def share: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightFraction + 1, NumberFormats.lightFraction))
+
+  /** All of it. */
+  def whole: Fixed = Fixed.literal(share.format, BigInt(1) << NumberFormats.lightFraction)
 
   /** A linear colour channel; all ones is 1.0. */
   def colour: UInt = UInt(NumberFormats.colourBits.W)
@@ -315,6 +321,14 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
   val contextsBox       = counter
   val contextsTriangles = counter
   val contextsShading   = counter
+
+  /** Rays that looked for a point of the room, and the tiles and cells that they passed; unit cycles in which the march
+    * was busy; context cycles in which a context waited for it, or its point was in work.
+    */
+  val raysRoom     = roomCounter
+  val marchSteps   = roomCounter
+  val busyRoom     = roomCounter
+  val contextsRoom = roomCounter
 
   /** Questions that the maps of a room have answered. */
   val albedoReads = roomCounter

@@ -25,7 +25,10 @@ final class Pixel(config: ColonnadeConfig) extends Bundle {
   /** Linear. */
   val colour   = Rgb(FrameRegisters.colour)
   val isObject = Bool()
-  val hit      = if (config.frame.hits) Some(new PixelHit(config)) else None
+
+  /** Of a pixel that shows the room: the part of the light that the object leaves to it; otherwise all. */
+  val ratio = if (config.hasRoom) Some(Rgb(FrameRegisters.share)) else None
+  val hit   = if (config.frame.hits) Some(new PixelHit(config)) else None
 }
 
 /** Which memories a [[Load]] is for. */

@@ -21,7 +21,9 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   private def sum(most: Int): UInt = UInt(log2Ceil(most + 1).W)
   private def perUnit              = sum(units)
   private def perContext           = sum(units * config.array.contexts)
-  private def perRoom              = config.physicalAttributeMemory.map(_ => sum(columns))
+  private def perRoom              = ifRoom(sum(columns))
+
+  private def ifRoom[T <: Data](event: T): Option[T] = if (config.hasRoom) Some(event) else None
 
   /** With those of the background, which go past the units. */
   val raysPrimary      = sum(units + columns)
@@ -50,6 +52,11 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val contextsShading   = perContext
 
   /** Where there is a room. */
+  val raysRoom     = ifRoom(perUnit)
+  val marchSteps   = ifRoom(perUnit)
+  val busyRoom     = ifRoom(perUnit)
+  val contextsRoom = ifRoom(perContext)
+
   val albedoReads = perRoom
   val normalReads = perRoom
   val cellReads   = perRoom

@@ -33,6 +33,9 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   val start = Input(Bool())
   val frame = Input(new FrameSettings(config.numbers))
 
+  /** Render units get its pixels too. */
+  val window = Input(new RoomWindow(config))
+
   /** Valid only where ready is set, see [[Dispatcher]]. */
   val tiles = Vec(columns, Decoupled(new Tile(config)))
 
@@ -120,8 +123,9 @@ final class FrameController(config: ColonnadeConfig) extends Module {
   watchdog.io.hold    := io.traffic.stalls || state === State.waiting
 
   dealers.zip(Seq(io.tiles, io.backgroundTiles)).foreach { case (dealer, tiles) =>
-    dealer.io.frame := io.frame
-    dealer.io.start := io.begins
+    dealer.io.frame  := io.frame
+    dealer.io.window := io.window
+    dealer.io.start  := io.begins
     tiles <> dealer.io.tiles
   }
 

@@ -3,20 +3,41 @@ package colonnade.frame
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.FrameSettings
+import colonnade.formats.{FrameRegisters, FrameSettings, PixelRect}
 import colonnade.unit.PixelPosition
 
 /** A square of pixels, by its first one. */
 final class TestedSquare(config: ColonnadeConfig) extends Bundle {
   val first = new PixelPosition(config)
 
-  /** One of its pixels may see the object. */
+  /** One of its pixels may see the object; or that, or show the room. */
   val meetsObject = Bool()
+  val isForUnits  = Bool()
+}
+
+/** Where pixels show the room, if there is one. */
+final class RoomWindow(config: ColonnadeConfig) extends Bundle {
+  val isThere = Bool()
+  val rect    = new PixelRect(config.numbers.coordinateBits)
+}
+
+object RoomWindow {
+
+  /** As the registers say. */
+  def apply(config: ColonnadeConfig, registers: FrameRegisters): RoomWindow = {
+    val window = WireInit(0.U.asTypeOf(new RoomWindow(config)))
+    for (room <- registers.room) {
+      window.isThere := room.isThere
+      window.rect    := room.window
+    }
+    window
+  }
 }
 
 /** Ports of [[OutlineTest]]. */
 final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
   val frame   = Input(new FrameSettings(config.numbers))
+  val window  = Input(new RoomWindow(config))
   val squares = Flipped(Decoupled(new PixelPosition(config)))
   val tested  = Decoupled(new TestedSquare(config))
 
@@ -25,7 +46,8 @@ final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Holds squares of `size` pixels against the object's rectangle and outline: a square meets the object unless it lies
-  * outside the rectangle or wholly outside one edge's half-plane.
+  * outside the rectangle or wholly outside one edge's half-plane. Render units get the squares that meet the object or
+  * the room's window.
   *
   * One square a cycle, in order, two cycles after it came: products, then their sums.
   */
@@ -48,7 +70,8 @@ final class OutlineTest(config: ColonnadeConfig, size: Int) extends Module {
 
   // Products, of the corner that is furthest inside
   private val square   = io.squares.bits
-  private val inRect   = spans(square.x, rectangle.x0, rectangle.x1) && spans(square.y, rectangle.y0, rectangle.y1)
+  private val inRect   = meets(rectangle)
+  private val inWindow = io.window.isThere && meets(io.window.rect)
   private val products = outline.map { edge =>
     Seq(edge.x -> square.x, edge.y -> square.y).map { case (normal, first) =>
       val furthest = Mux(normal > 0.S, first +& (size - 1).U, first)
@@ -57,12 +80,16 @@ final class OutlineTest(config: ColonnadeConfig, size: Int) extends Module {
   }
   private val multiplied = RegEnable(square, multiplies)
   private val isInRect   = RegEnable(inRect, multiplies)
+  private val isInWindow = RegEnable(inWindow, multiplies)
 
   // Sums
   private val isInside =
     outline.zip(products).map { case (edge, Seq(ofX, ofY)) => (ofX +& ofY) +& edge.offset >= 0.S }.reduce(_ && _)
   io.tested.bits.first       := RegEnable(multiplied, adds)
   io.tested.bits.meetsObject := RegEnable(isInRect && isInside, adds)
+  io.tested.bits.isForUnits  := RegEnable((isInRect && isInside) || isInWindow, adds)
+
+  private def meets(rect: PixelRect): Bool = spans(square.x, rect.x0, rect.x1) && spans(square.y, rect.y0, rect.y1)
 
   /** The square, and an interval that may be empty, have pixels in common in one direction. */
   private def spans(first: UInt, low: UInt, high: UInt): Bool =

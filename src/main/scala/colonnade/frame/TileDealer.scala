@@ -9,6 +9,9 @@ import colonnade.formats.FrameSettings
 final class TileDealerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 
+  /** Tiles that meet it count as those that meet the object. */
+  val window = Input(new RoomWindow(config))
+
   /** Deals the tiles of a frame; only while idle. */
   val start = Input(Bool())
 
@@ -43,13 +46,14 @@ final class TileDealer(config: ColonnadeConfig, ofObject: Boolean) extends Modul
   scan.io.size.bits.high := tilesIn(io.frame.pixelsHigh)
 
   outline.io.frame          := io.frame
+  outline.io.window         := io.window
   outline.io.squares.valid  := scan.io.cells.valid
   outline.io.squares.bits.x := firstPixel(scan.io.cells.bits.x)
   outline.io.squares.bits.y := firstPixel(scan.io.cells.bits.y)
   scan.io.cells.ready       := outline.io.squares.ready
 
   private val tested  = outline.io.tested
-  private val isMeant = tested.bits.meetsObject === ofObject.B
+  private val isMeant = tested.bits.isForUnits === ofObject.B
   tiles.valid  := tested.valid && isMeant
   tiles.bits.x := tested.bits.first.x
   tiles.bits.y := tested.bits.first.y

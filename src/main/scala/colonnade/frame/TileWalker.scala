@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, Queue}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.FrameSettings
-import colonnade.unit.PixelPosition
+import colonnade.unit.{PixelPosition, UnitPosition}
 
 /** Ports of [[TileWalker]]. */
 final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
@@ -12,7 +12,10 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val tiles = Flipped(Decoupled(new Tile(config)))
 
   /** Pixels that may see the object, one port for each render unit. */
-  val positions = Vec(config.array.rows, Decoupled(new PixelPosition(config)))
+  val positions = Vec(config.array.rows, Decoupled(new UnitPosition(config)))
+
+  /** Render units get its pixels too. */
+  val window = Input(new RoomWindow(config))
 
   /** Pixels that do not. */
   val others = Decoupled(new PixelPosition(config))
@@ -33,19 +36,23 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
 
   private val scan     = Module(new TileScan(config))
   private val outline  = Module(new OutlineTest(config, size = 1))
-  private val dispatch = Module(new Dispatcher(new PixelPosition(config), config.array.rows))
+  private val dispatch = Module(new Dispatcher(new UnitPosition(config), config.array.rows))
 
   scan.io.frame := io.frame
   scan.io.tiles <> io.tiles
-  outline.io.frame := io.frame
+  outline.io.frame  := io.frame
+  outline.io.window := io.window
   outline.io.squares <> scan.io.positions
 
-  private val tested = outline.io.tested
-  dispatch.io.items.valid := tested.valid && tested.bits.meetsObject
-  dispatch.io.items.bits  := tested.bits.first
-  io.others.valid         := tested.valid && !tested.bits.meetsObject
-  io.others.bits          := tested.bits.first
-  tested.ready            := Mux(tested.bits.meetsObject, dispatch.io.items.ready, io.others.ready)
+  private val tested   = outline.io.tested
+  private val forUnits = tested.bits.isForUnits
+  dispatch.io.items.valid  := tested.valid && forUnits
+  dispatch.io.items.bits.x := tested.bits.first.x
+  dispatch.io.items.bits.y := tested.bits.first.y
+  dispatch.io.items.bits.meetsObject.foreach(_ := tested.bits.meetsObject)
+  io.others.valid := tested.valid && !forUnits
+  io.others.bits  := tested.bits.first
+  tested.ready    := Mux(forUnits, dispatch.io.items.ready, io.others.ready)
 
   io.positions.zip(dispatch.io.takers).foreach { case (position, taker) => position <> Queue(taker, 1, pipe = true) }
   io.isIdle := scan.io.isIdle && outline.io.isIdle && !io.positions.map(_.valid).reduce(_ || _)

@@ -25,6 +25,9 @@ final class RayGeneratorIO(config: ColonnadeConfig) extends Bundle {
   val registers = Input(new CameraRegisters(config))
   val position  = Flipped(Decoupled(new RayPosition(config)))
   val ray       = Decoupled(new RayRequest(config))
+
+  /** The pixel whose ray is offered. */
+  val pixel = Output(new RayPosition(config))
 }
 
 /** Primary rays: `towards = (camera.towards << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
@@ -92,6 +95,7 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
     origin.last := Rounding.narrow(shifted, scene.width)
   }
 
+  io.pixel             := position
   io.ray.bits.context  := position.context
   io.ray.bits.isShadow := false.B
   io.ray.bits.origin.axes.zip(origin).foreach { case (to, from) => to := Fixed(scene, from) }

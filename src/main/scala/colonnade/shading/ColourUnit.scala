@@ -8,33 +8,6 @@ import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.Context
 import colonnade.unit.ContextTable
 
-/** A path that meets its last surface. */
-final class PathEnd(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config)
-
-  /** It meets no surface of the object: the background's colour counts. */
-  val isBackground = Bool()
-
-  /** By light: what the shadow rays have met. */
-  val occlusions = Vec(config.frame.lights, Occlusion())
-}
-
-/** What a mirror or glass does to a path. */
-final class PathTurn(config: ColonnadeConfig) extends Bundle {
-  val context  = Context(config)
-  val albedo   = Rgb(FrameRegisters.colour)
-  val isTinted = Bool()
-
-  /** The background's share, by Schlick's reflection. */
-  val share = FrameRegisters.share
-}
-
-/** The colour of a path. */
-final class PathColour(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config)
-  val colour  = Rgb(FrameRegisters.colour)
-}
-
 final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   val ambient    = Input(Rgb(FrameRegisters.intensity))
   val background = Input(Rgb(FrameRegisters.colour))
@@ -54,7 +27,8 @@ final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   * what is certain is gathered.
   *
   * One path at a time, two cycles a product and channel: an end takes 2 + 6 · (lights + 2) cycles, one in the background
-  * 8, a turn 20. Turns go first.
+  * 8, a turn 20, and 6 · (lights + 1) more before a surface. Turns go first. A ratio takes 12 cycles a channel, if some
+  * light is missing.
   *
   * @note colour = gathered + throughput · albedo · (ambient + the sum of all lights, less what is in their way)
   */
@@ -90,9 +64,13 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val arrives = RegInit(false.B)
 
   /** Which product, of which channel; and whether it is there. */
-  private val step    = Reg(UInt(log2Ceil(lights + 2).max(2).W))
+  private val step    = Reg(UInt(log2Ceil(lights + 1).max(2).W))
   private val channel = Reg(UInt(2.W))
   private val isThere = Reg(Bool())
+
+  /** Products of the surface, before those of the path. */
+  private val ofSurface  = Reg(Bool())
+  private val hasSurface = Reg(Bool())
 
   private val occlusions = Reg(Vec(lights, Occlusion()))
   private val albedo     = Reg(Vec(3, UInt(colourBits.W)))
@@ -102,12 +80,15 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val throughput = Reg(Vec(3, UInt(shareBits.W)))
   private val gathered   = Reg(Vec(3, UInt(colourBits.W)))
   private val sum        = Reg(UInt(sumBits.W))
-  private val colours    = Reg(Vec(3, UInt(colourBits.W)))
+  private val surface    = Reg(UInt(colourBits.W))
 
-  private val reflects     = lights
-  private val passes       = lights + 1
-  private val lastStep     = Mux(isEnd, passes.U, 2.U)
-  private val isBackground = Reg(Bool())
+  /** Beside that of the turn where a turn may have a surface. */
+  private val surfaceAlbedo = if (hasBounces && config.hasRoom) Reg(Vec(3, UInt(colourBits.W))) else albedo
+  private val colours       = Reg(Vec(3, UInt(colourBits.W)))
+  private val ratios        = if (config.hasRoom) Some(new Ratios(sumBits)) else None
+
+  private val reflects = step === lights.U
+  private val lastStep = Mux(ofSurface, lights.U, Mux(isEnd, 0.U, 2.U))
 
   // Take one
   private val turns = io.turn.map(_.fire).getOrElse(false.B)
@@ -120,14 +101,17 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val pathRead    = paths.map(_.read(taken, takes))
   arrives := takes
   when(takes) {
-    isBusy       := true.B
-    isEnd        := !turns
-    context      := taken
-    channel      := 0.U
-    isThere      := false.B
-    step         := Mux(!turns && io.end.bits.isBackground, passes.U, 0.U)
-    isBackground := io.end.bits.isBackground
-    occlusions   := io.end.bits.occlusions
+    isBusy  := true.B
+    isEnd   := !turns
+    context := taken
+    channel := 0.U
+    isThere := false.B
+    step    := 0.U
+    val before = Mux(turns, io.turn.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
+    ofSurface  := before
+    hasSurface := before
+    occlusions := io.end.bits.occlusions
+    when(turns) { occlusions.foreach(_ := Occlusion.none) }
     io.turn.foreach { turn =>
       albedo   := VecInit(turn.bits.albedo.channels)
       share    := turn.bits.share.natural
@@ -144,9 +128,9 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
         gathered   := VecInit(path.gathered.channels)
       }
     }
-    when(isEnd) {
-      albedo  := VecInit(surfaceRead.albedo.channels)
-      directs := VecInit(surfaceRead.directs.map(direct => VecInit(direct.channels.map(_.natural))))
+    when(hasSurface) {
+      surfaceAlbedo := VecInit(surfaceRead.albedo.channels)
+      directs       := VecInit(surfaceRead.directs.map(direct => VecInit(direct.channels.map(_.natural))))
     }
   }
 
@@ -157,22 +141,23 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val whole                             = (1 << fraction).U(shareBits.W)
   private val clearness                         = io.shading.clearness.map(_.natural).getOrElse(whole)
   private val light                             = step(log2Ceil(lights.max(2)) - 1, 0)
+  private val reflectance                       = of(surfaceAlbedo)
   private def at[T <: Data](entries: Vec[T]): T = if (lights == 1) entries.head else entries(light)
-  private val passing    = MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> whole, Occlusion.clear -> clearness))
-  private val background = of(io.background.channels)
-  private val albedoNow  = of(albedo)
+  private val passing   = MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> whole, Occlusion.clear -> clearness))
+  private val behind    = Mux(hasSurface, surface, of(io.background.channels))
+  private val albedoNow = of(albedo)
 
   /** All ones is 1.0. */
   private val tint = Mux(isTinted, albedoNow +& albedoNow(colourBits - 1), whole)
   private val left = Mux(
-    isEnd,
-    Mux(step < reflects.U, of(at(directs)), Mux(isBackground, background, sum)),
-    Mux(step === 2.U, sum, of(throughput))
+    ofSurface,
+    Mux(reflects, sum, of(at(directs))),
+    Mux(isEnd, behind, Mux(step === 2.U, sum, of(throughput)))
   )
   private val right = Mux(
-    isEnd,
-    Mux(step < reflects.U, passing, Mux(step === reflects.U, albedoNow, of(throughput))),
-    Mux(step === 0.U, tint, Mux(step === 1.U, share, background))
+    ofSurface,
+    Mux(reflects, reflectance, passing),
+    Mux(isEnd, of(throughput), Mux(step === 0.U, tint, Mux(step === 1.U, share, behind)))
   )
   private val product = Reg(UInt((sumBits + shareBits).W))
   product := left * right
@@ -182,21 +167,28 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
 
   // What it means
   private val leaves    = RegInit(false.B)
-  private val isWorking = isBusy && !arrives && !leaves
-  private val isDone    = isWorking && isThere && step === lastStep && channel === 2.U
+  private val divides   = ratios.map(_.isBusy).getOrElse(false.B)
+  private val isWorking = isBusy && !arrives && !leaves && !divides
+  private val isDone    = isWorking && isThere && !ofSurface && step === lastStep && channel === 2.U
   private val first     = of(io.ambient.channels).natural
   when(isWorking) {
     isThere := !isThere
     when(isThere) {
       step := step + 1.U
       when(step === lastStep) {
-        step    := Mux(isEnd && isBackground, passes.U, 0.U)
-        channel := channel + 1.U
+        step      := 0.U
+        ofSurface := !ofSurface && hasSurface
+        when(!ofSurface) { channel := channel + 1.U }
       }
-      when(isEnd) {
-        when(step < reflects.U) { sum := Mux(step === 0.U, first, sum) + part }
-        when(step === reflects.U) { sum := colour }
-        when(step === passes.U) { set(colours, total) }
+      when(ofSurface) {
+        when(reflects) { surface := colour }.otherwise { sum := Mux(step === 0.U, first, sum) + part }
+        ratios.foreach { ratio =>
+          when(reflects) { ratio.begin(sum, channel) }.otherwise {
+            ratio.whole := Mux(step === 0.U, first, ratio.whole) + of(at(directs))
+          }
+        }
+      }.elsewhen(isEnd) {
+        set(colours, total)
       }.otherwise {
         when(step === 0.U) { set(throughput, Rounding.narrow(part, shareBits)) }
         when(step === 1.U) {
@@ -214,6 +206,11 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   io.colour.valid        := leaves && isEnd
   io.colour.bits.context := context
   io.colour.bits.colour.channels.zip(colours).foreach { case (to, from) => to := from }
+  for (ratio <- ratios; to <- io.colour.bits.ratio) {
+    ratio.work()
+    when(takes) { ratio.isWanted := !turns && io.end.bits.isSeen.get }
+    to.channels.zip(ratio.found).foreach { case (channel, part) => channel := Fixed(channel.format, part) }
+  }
   paths.foreach { table =>
     when(leaves && !isEnd) {
       val path = Wire(new PathSoFar)

@@ -14,6 +14,10 @@ final class GeometryDatapathIO(config: ColonnadeConfig) extends Bundle {
   val control = Input(new GeometryControl(formats))
   val request = Input(new ShadeRequest(config))
 
+  /** Load this instead. */
+  val isRoom = Input(Bool())
+  val room   = if (config.hasRoom) Some(Input(new RoomSurface(config))) else None
+
   /** Shade with the geometric normal. */
   val isFlat    = Input(Bool())
   val light     = Input(new Light(numbers))
@@ -45,6 +49,8 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
 
   val io = IO(new GeometryDatapathIO(config))
 
+  private val pointBits = ShaderFormats.originBits(config)
+
   private val control = io.control
 
   private def vector(bits: Int): Vec[SInt] = Reg(Vec(3, SInt(bits.W)))
@@ -56,7 +62,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   }
 
   /** Of the ray's frame until it is turned. */
-  private val point = vector(formats.pointBits)
+  private val point = vector(pointBits)
 
   /** First each axis' three normals, of vertex 0 in the low bits; then the way to the light. */
   private val normalsOrToLight = vector(formats.vectorBits.max(3 * normalBits))
@@ -70,13 +76,14 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   private val backSide         = Reg(Bool())
   private val context          = Reg(chiselTypeOf(io.request.context))
   private val material         = Reg(chiselTypeOf(io.request.face.material))
+  private val isRoom           = if (config.hasRoom) Reg(Bool()) else WireInit(false.B)
 
   private val sum = Reg(SInt((formats.productBits + 1).W))
 
   /** What descended below the sum: the highest bit, and whether there was any other. */
   private val below        = Reg(Bool())
   private val belowThat    = Reg(Bool())
-  private val rounded      = Reg(SInt(formats.pointBits.W))
+  private val rounded      = Reg(SInt(pointBits.W))
   private val shifted      = Reg(SInt(formats.vectorBits.W))
   private val measured     = Reg(UInt((formats.vectorBits - 1).W))
   private val normalZeros  = Reg(UInt(Normalise.exponentBits(formats.vectorBits).W))
@@ -247,6 +254,21 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
     backSide   := request.hit.backSide
     context    := request.context
     material   := request.face.material
+    isRoom     := io.isRoom
+  }
+
+  // A point of the room is one that its ray has met at once, and with a normal of its own
+  for (room <- io.room) when(control.load && io.isRoom) {
+    for (axis <- 0 until 3) {
+      point(axis)           := room.point.axes(axis).integer
+      geometricNormal(axis) := room.normal.axes(axis)
+    }
+    slopes.foreach(_ := 0.S)
+    distance   := 0.S
+    axis       := 2.U
+    isNegative := false.B
+    backSide   := false.B
+    context    := room.context
   }
 
   io.angle.isAcute  := isAcute
@@ -264,6 +286,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
 
   io.surface.context  := context
   io.surface.material := material
+  io.surface.isRoom   := isRoom
   io.surface.origin   := Vec3.of(point(0), point(1), point(2))
   io.surface.normal   := Vec3.of[SInt](scaledNormal(0), scaledNormal(1), scaledNormal(2))
   io.surface.isSmooth := !io.isFlat

@@ -1,10 +1,10 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled}
+import chisel3.util.{log2Ceil, Decoupled, RegEnable}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Light, Material, MaterialKind, Rgb, Shading, Vec3}
-import colonnade.numbers.Fixed
+import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
 
 /** The ports of the shader; the registers are constant while it is busy. */
@@ -16,6 +16,9 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   val shading   = Input(new Shading(config))
   val materials = Input(Vec(config.frame.materials, new Material(config)))
   val request   = Flipped(Decoupled(new ShadeRequest(config)))
+
+  /** Points of the room; taken when there is no request. */
+  val room = if (config.hasRoom) Some(Flipped(Decoupled(new RoomSurface(config)))) else None
 
   /** `request` will be ready in the next cycle. */
   val takesNext = Output(Bool())
@@ -57,13 +60,21 @@ final class Shader(config: ColonnadeConfig) extends Module {
   private val surface  = point.bits.surface
   private val material = Wire(new Material(config))
   material := io.materials(surface.material(log2Ceil(config.frame.materials.max(2)) - 1, 0))
-  private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse).getOrElse(false.B)
+  private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse && !surface.isRoom).getOrElse(false.B)
   geometry.io.request <> io.request
   io.takesNext           := geometry.io.takesNext
   geometry.io.shading    := io.shading
   geometry.io.lights     := io.lights
   geometry.io.unitShift  := io.unitShift
   geometry.io.lightCount := Mux(isBounce, 1.U, io.shading.lights)
+
+  // What the room's maps say of the point in the geometry
+  private val room = geometry.io.room.zip(io.room).map { case (taker, offered) =>
+    taker <> offered
+    RegEnable(offered.bits, offered.fire)
+  }
+  private val albedo  = room.map(room => Mux(surface.isRoom, room.albedo, material.albedo)).getOrElse(material.albedo)
+  private val shadows = io.shading.shadows && room.map(room => !surface.isRoom || room.shadows).getOrElse(true.B)
 
   // A light goes to the cosine; what it gives is held with the surface until the last one is through
   private val isHeld = RegInit(false.B)
@@ -82,13 +93,13 @@ final class Shader(config: ColonnadeConfig) extends Module {
     light       := point.bits.light
     isLast      := point.bits.isLast
     lit.context := surface.context
-    lit.albedo  := material.albedo
+    lit.albedo  := albedo
     lit.origin  := Vec3.of(x, y, z)
     when(point.bits.light === 0.U) {
       lit.directs         := 0.U.asTypeOf(lit.directs)
       lit.needsShadowRays := 0.U.asTypeOf(lit.needsShadowRays)
     }
-    at(lit.needsShadowRays, point.bits.light) := io.shading.shadows && point.bits.angle.isAcute && shines
+    at(lit.needsShadowRays, point.bits.light) := shadows && point.bits.angle.isAcute && shines
   }
   direct.io.brightness <> cosine.io.brightness
   direct.io.colour       := at(io.lights, light).colour
@@ -106,10 +117,12 @@ final class Shader(config: ColonnadeConfig) extends Module {
     val unit     = Module(new BounceUnit(config))
     val albedo   = Reg(Rgb(FrameRegisters.colour))
     val isTinted = Reg(Bool())
-    unit.io.offset                   := io.shading.offset
-    unit.io.request.valid            := point.valid && isBounce
-    unit.io.request.bits.context     := surface.context
-    unit.io.request.bits.origin      := surface.origin
+    unit.io.offset               := io.shading.offset
+    unit.io.request.valid        := point.valid && isBounce
+    unit.io.request.bits.context := surface.context
+    unit.io.request.bits.origin.axes.zip(surface.origin.axes).foreach { case (to, from) =>
+      to := Rounding.narrow(from, to.getWidth)
+    }
     unit.io.request.bits.normal      := surface.normal
     unit.io.request.bits.isSmooth    := surface.isSmooth
     unit.io.request.bits.facing      := surface.facing
@@ -118,6 +131,10 @@ final class Shader(config: ColonnadeConfig) extends Module {
     unit.io.request.bits.isGlass     := material.kind.get === MaterialKind.glass
     unit.io.request.bits.eta         := Mux(surface.backSide, material.etaBack.get, material.etaFront.get)
     unit.io.request.bits.reflectance := material.reflectance.get
+    for (beside <- bounced.bits.beside) {
+      val origins = surface.origin.axes.map(RegEnable(_, unit.io.request.fire))
+      beside.axes.zip(origins).foreach { case (to, from) => to := Fixed(scene, from) }
+    }
     when(unit.io.request.fire) {
       albedo   := material.albedo
       isTinted := !surface.backSide || material.kind.get === MaterialKind.mirror

@@ -55,6 +55,15 @@ final class ShaderFormats(numbers: NumberFormats) {
 
 }
 
+object ShaderFormats {
+
+  /** Where shadow rays start, signed: off the object, or off the room. */
+  def originBits(config: ColonnadeConfig): Int = {
+    val ofObject = new ShaderFormats(config.numbers).pointBits
+    if (config.hasRoom) config.numbers.sceneBits.max(ofObject) else ofObject
+  }
+}
+
 /** Two numbers to multiply. */
 final class Factors(formats: ShaderFormats) extends Bundle {
   val wide   = SInt(formats.wideBits.W)
@@ -126,8 +135,11 @@ final class ShadedSurface(config: ColonnadeConfig) extends Bundle {
   val context  = Context(config)
   val material = UInt(RecordFormats.materialBits.W)
 
+  /** It is the room's. */
+  val isRoom = Bool()
+
   /** Where shadow rays and reflections start, off the surface: grid steps. */
-  val origin = Vec3(SInt(formats.pointBits.W))
+  val origin = Vec3(SInt(ShaderFormats.originBits(config).W))
 
   /** The shading normal against the ray, its largest component of `shadeBits` bits; and whether it is the vertices'. */
   val normal   = Vec3(SInt(formats.narrowBits.W))

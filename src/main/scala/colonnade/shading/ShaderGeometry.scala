@@ -11,6 +11,9 @@ final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
 
   val request = Flipped(Decoupled(new ShadeRequest(config)))
 
+  /** Points of the room; taken when there is no request. */
+  val room = if (config.hasRoom) Some(Flipped(Decoupled(new RoomSurface(config)))) else None
+
   /** `request` will be ready in the next cycle. */
   val takesNext = Output(Bool())
   val lights    = Input(Vec(config.frame.lights, new Light(numbers)))
@@ -48,14 +51,16 @@ final class ShaderGeometry(config: ColonnadeConfig) extends Module {
   private val isFlat    = Reg(Bool())
   private val light     = Reg(UInt(log2Ceil(config.frame.lights.max(2)).W))
   private val isLast    = light +& 1.U >= io.lightCount
-  private val control   = program.control(step, io.request.fire, isFirstLight = light === 0.U)
+  private val isRoom    = io.room.map(_.fire).getOrElse(false.B)
+  private val takes     = io.request.fire || isRoom
+  private val control   = program.control(step, takes, isFirstLight = light === 0.U)
   private val startOver = control.countNormal && datapath.io.normalIsZero && !isFlat
 
-  when(io.request.fire) {
+  when(takes) {
     isBusy := true.B
     step   := 0.U
     light  := 0.U
-    isFlat := io.shading.flat
+    isFlat := io.shading.flat || isRoom
   }.elsewhen(startOver) {
     step   := 0.U
     isFlat := true.B
@@ -69,11 +74,14 @@ final class ShaderGeometry(config: ColonnadeConfig) extends Module {
   }
 
   io.request.ready := !isBusy
-  io.takesNext     := (!isBusy && !io.request.valid) || (io.result.fire && isLast)
-  io.result.valid  := isBusy && isDone
+  io.room.foreach(_.ready := !isBusy && !io.request.valid)
+  io.takesNext    := (!isBusy && !io.request.valid && !isRoom) || (io.result.fire && isLast)
+  io.result.valid := isBusy && isDone
 
-  datapath.io.control   := control
-  datapath.io.request   := io.request.bits
+  datapath.io.control := control
+  datapath.io.request := io.request.bits
+  datapath.io.isRoom  := isRoom
+  datapath.io.room.zip(io.room).foreach { case (to, room) => to := room.bits }
   datapath.io.isFlat    := isFlat
   datapath.io.light     := io.lights(if (config.frame.lights == 1) 0.U else light)
   datapath.io.offset    := io.shading.offset

@@ -2,11 +2,12 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, RegEnable, Valid}
+import colonnade.background.{AttributePort, RoomStage, RoomStageIO}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats, Rgb}
+import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats}
 import colonnade.numbers.Rounding
 import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
-import colonnade.shading.{ColourUnit, Shader, ShadowRays}
+import colonnade.shading.{ColourUnit, PathColour, Shader, ShadowRays}
 import colonnade.traversal.{TriangleLanes, Visit}
 
 /** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
@@ -31,13 +32,17 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val shader       = Module(new Shader(config))
   private val shadowRays   = Module(new ShadowRays(config))
   private val colourUnit   = Module(new ColourUnit(config))
+  private val room         = if (config.hasRoom) Some(Module(new RoomStage(config)).io) else None
 
   // What each context remembers, in memories that are read a cycle before
   private val positions = ContextTable(config, new PixelPosition(config))
   private val rays      = ContextTable(config, new TracedRay(numbers))
   private val entries   = ContextTable(config, UInt(numbers.entryBits.W))
-  private val colours   = ContextTable(config, Rgb(FrameRegisters.colour))
+  private val colours   = ContextTable(config, new PathColour(config))
   private val isObject  = Reg(Vec(contexts, Bool()))
+
+  /** The pixel's own ray may meet the object. */
+  private val meetsObject = if (config.hasRoom) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(true.B)
 
   // A position takes a free context
   private val position = io.positions.bits
@@ -48,18 +53,17 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   io.positions.ready                    := rayGenerator.io.position.ready && controller.io.free.valid
   controller.io.allocate                := rayGenerator.io.position.fire
   when(rayGenerator.io.position.fire) {
-    positions.write(controller.io.free.bits, position)
+    positions.write(controller.io.free.bits, pixelOf(position.x, position.y))
     isObject(controller.io.free.bits) := false.B
+    position.meetsObject.foreach(meetsObject(controller.io.free.bits) := _)
   }
   rayGenerator.io.registers.camera    := io.registers.camera
   rayGenerator.io.registers.unitShift := io.registers.frame.unitShift
 
   // Rays: those first whose pixels are nearer to their end
-  private val requests    = Module(new Arbiter(new RayRequest(config), 3))
-  private val bouncedRays = Wire(Decoupled(new RayRequest(config)))
+  private val requests = Module(new Arbiter(new RayRequest(config), 3))
   requests.io.in(0) :<>= shadowRays.io.ray
-  requests.io.in(1) :<>= bouncedRays
-  requests.io.in(2) :<>= rayGenerator.io.ray
+  if (!config.hasRoom) requests.io.in(2) :<>= rayGenerator.io.ray
   raySetup.io.request :<>= requests.io.out
   raySetup.io.bounds := io.registers.bounds
 
@@ -166,38 +170,27 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   shadowRays.io.surface.bits                := lit.bits
   shadowRays.io.question :<>= controller.io.shadow
 
-  // A mirror or glass turns its path; the next ray is traced as long as there are bounces left
-  private val bounceCounts = Reg(Vec(contexts, chiselTypeOf(io.registers.shading.bounces.getOrElse(0.U(1.W)))))
-  bouncedRays.valid     := false.B
-  bouncedRays.bits      := DontCare
-  controller.io.bounced := 0.U.asTypeOf(controller.io.bounced)
-  events.raysReflection := false.B
-  events.raysRefraction := false.B
-  for ((bounced, turn) <- shader.io.bounced.zip(colourUnit.io.turn)) {
-    val bounce   = bounced.bits.bounce
-    val isTraced = bounceCounts(bounce.context) =/= io.registers.shading.bounces.get
-    bounced.ready := turn.ready && (!isTraced || bouncedRays.ready)
-
-    bouncedRays.valid         := bounced.valid && isTraced && turn.ready
-    bouncedRays.bits.context  := bounce.context
-    bouncedRays.bits.isShadow := false.B
-    bouncedRays.bits.origin   := bounce.origin
-    bouncedRays.bits.towards  := bounce.towards
-
-    turn.valid         := bounced.valid && (!isTraced || bouncedRays.ready)
-    turn.bits.context  := bounce.context
-    turn.bits.albedo   := bounced.bits.albedo
-    turn.bits.isTinted := bounced.bits.isTinted
-    turn.bits.share    := bounce.share
-
-    controller.io.bounced.valid         := bounced.fire
-    controller.io.bounced.bits.context  := bounce.context
-    controller.io.bounced.bits.isTraced := isTraced
-    when(bounced.fire && isTraced) { bounceCounts(bounce.context) := bounceCounts(bounce.context) + 1.U }
-    when(controller.io.allocate) { bounceCounts(controller.io.free.bits) := 0.U }
-    events.raysReflection := bouncedRays.fire && !bounce.isRefraction
-    events.raysRefraction := bouncedRays.fire && bounce.isRefraction
+  // A mirror or glass turns its path
+  requests.io.in(1).valid := false.B
+  requests.io.in(1).bits  := DontCare
+  controller.io.bounced   := 0.U.asTypeOf(controller.io.bounced)
+  events.raysReflection   := false.B
+  events.raysRefraction   := false.B
+  private val turns = shader.io.bounced.zip(colourUnit.io.turn).map { case (bounced, turn) =>
+    val turns = Module(new PathTurns(config)).io
+    turns.shading := io.registers.shading
+    connect(turns.begins, controller.io.allocate, controller.io.free.bits)
+    turns.bounced :<>= bounced
+    turn :<>= turns.turn
+    requests.io.in(1) :<>= turns.ray
+    controller.io.bounced := turns.turned
+    events.raysReflection := turns.ray.fire && !turns.isRefraction
+    events.raysRefraction := turns.ray.fire && turns.isRefraction
+    turns
   }
+
+  // Rays beyond the object
+  for (stage <- room; control <- controller.io.room; maps <- io.maps) meetRoom(stage, control, maps)
 
   // Colours
   colourUnit.io.ambient       := io.registers.ambient
@@ -210,7 +203,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   colourUnit.io.end :<>= controller.io.end
   private val coloured = colourUnit.io.colour
   connect(controller.io.coloured, coloured.valid, coloured.bits.context)
-  when(coloured.valid) { colours.write(coloured.bits.context, coloured.bits.colour) }
+  when(coloured.valid) { colours.write(coloured.bits.context, coloured.bits) }
 
   // Pixels: a context is free as soon as its tables are being read, when there is a place for what they hold
   private val complete = controller.io.complete
@@ -220,11 +213,15 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   controller.io.leave := leaves
   private val colour = colours.read(complete.bits, leaves)
   private val place  = positions.read(complete.bits, leaves)
-  finished.valid       := RegNext(leaves, false.B)
-  finished.bits.x      := place.x
-  finished.bits.y      := place.y
+  finished.valid  := RegNext(leaves, false.B)
+  finished.bits.x := place.x
+  finished.bits.y := place.y
+  private val isColoured = RegEnable(controller.io.isColoured(complete.bits), leaves)
   finished.bits.colour :=
-    Mux(RegEnable(controller.io.isColoured(complete.bits), leaves), colour, io.registers.background)
+    Mux(isColoured, colour.colour, io.registers.background)
+  for (ratio <- finished.bits.ratio; left <- colour.ratio; channel <- 0 until 3)
+    ratio.channels(channel) :=
+      Mux(isColoured && !finished.bits.isObject, left.channels(channel), FrameRegisters.whole)
   finished.bits.isObject := RegEnable(isObject(complete.bits), leaves)
   finished.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
   if (config.frame.hits) {
@@ -269,9 +266,14 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   events.contextsBox       := population(Seq(traversal.io.nodes.fire, traversal.io.resume.fire), next.fire)
   events.contextsTriangles := population(Seq(triangleUnit.io.candidate.fire), tested.fire && tested.bits.isLast)
   events.contextsShading   := population(
-    Seq(shader.io.request.fire),
+    shader.io.request.fire +: shader.io.room.map(_.fire).toSeq,
     PopCount(lit.fire +: shader.io.bounced.map(_.fire).toSeq)
   )
+
+  events.raysRoom.foreach(_ := controller.io.room.get.question.fire)
+  events.marchSteps.foreach(_ := room.get.events.step)
+  events.busyRoom.foreach(_ := room.get.events.busy)
+  events.contextsRoom.foreach(_ := controller.io.roomCount.get)
 
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
@@ -281,6 +283,49 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   // A record comes only to a unit that takes it
   for ((unit, index) <- Seq(traversal.io.nodes, triangleUnit.io.candidate, shader.io.request).zipWithIndex)
     assert(!unit.valid || unit.ready, s"unit $index has a record that it does not take")
+
+  /** What rays do that meet nothing of the object, in a frame with a room. */
+  private def meetRoom(stage: RoomStageIO, control: RoomControl, maps: AttributePort): Unit = {
+    val view = io.registers.room.get
+    control.isThere := view.isThere
+    stage.view      := view
+    maps <> stage.maps
+    stage.question :<>= control.question
+    control.nothing := stage.nothing
+    shader.io.room.get :<>= stage.surface
+    connect(control.met, stage.surface.fire, stage.surface.bits.context)
+
+    control.aside      := 0.U.asTypeOf(control.aside)
+    control.turn.ready := false.B
+    for (turning <- turns.flatMap(_.room)) {
+      turning.isThere := view.isThere
+      control.aside   := turning.aside
+      turning.resume :<>= control.turn
+    }
+
+    // Every ray that may meet the room is remembered; those of turning paths come first
+    val first     = rayGenerator.io.ray
+    val context   = first.bits.context
+    val turning   = turns.flatMap(_.room).map(_.ray)
+    val isTurning = turning.map(_.valid).getOrElse(false.B)
+    requests.io.in(2).valid := first.valid && !isTurning && meetsObject(context)
+    requests.io.in(2).bits  := first.bits
+    first.ready             := !isTurning && (requests.io.in(2).ready || !meetsObject(context))
+    connect(control.passes, first.fire && !meetsObject(context), context)
+    stage.ray.valid            := isTurning || first.fire
+    stage.ray.bits.context     := context
+    stage.ray.bits.ray.origin  := first.bits.origin
+    stage.ray.bits.ray.towards := first.bits.towards
+    for (ray <- turning) when(ray.valid) { stage.ray.bits := ray.bits }
+    stage.ray.bits.ray.pixel := pixelOf(rayGenerator.io.pixel.x, rayGenerator.io.pixel.y)
+  }
+
+  private def pixelOf(x: UInt, y: UInt): PixelPosition = {
+    val pixel = Wire(new PixelPosition(config))
+    pixel.x := x
+    pixel.y := y
+    pixel
+  }
 
   /** The record served is for this use. */
   private def isFor(use: RecordUse.Type): Bool = served.valid && served.bits.use === use

@@ -21,33 +21,23 @@ object Stage extends ChiselEnum {
   /** Its ray has ended; the outcome waits to be judged. */
   val ended = Value
 
-  /** Its hit waits for attributes, or is in the shader. */
+  /** Its hit waits for attributes, or is in the shader, as a point of the room may be. */
   val shading = Value
 
   /** Its surface is known; lights may be left to ask for. */
   val lit = Value
+
+  /** Its ray has met nothing of the object: it waits to meet the room, or looks for it. */
+  val beyond, room = Value
+
+  /** Its path turns, as soon as that can be coloured: there is nothing beside it. */
+  val turning = Value
 
   /** Its path's end is known; its colour waits to be made, or is being made. */
   val colouring, coloured = Value
 
   /** Its pixel's colour is known. */
   val complete = Value
-}
-
-/** A context whose hit has been shaded. */
-final class Shaded(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config)
-
-  /** By light, of a surface that ends the path. */
-  val needsShadowRays = Vec(config.frame.lights, Bool())
-}
-
-/** A context whose path goes on from a mirror or glass. */
-final class Bounced(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config)
-
-  /** The ray meets the object's records; otherwise the background only. */
-  val isTraced = Bool()
 }
 
 /** Decides which ray goes to which stage next; knows no arithmetic.
@@ -57,6 +47,10 @@ final class Bounced(config: ColonnadeConfig) extends Bundle {
   * ray that meets nothing is complete at once; a later ray goes to colouring. Contexts are tokens: no more than `contexts`
   * of them exist, so whatever they wait in never overflows. One ended ray is judged a cycle, one lit context goes on, one
   * pixel leaves; all else is without limit.
+  *
+  * In a room a ray that meets nothing goes on: beyond → room → shading, or without a point of the room to where it would
+  * have gone. What glass reflects is met beside the path: shading → beyond → room → shading → lit, then it turns; without
+  * a point it waits in turning.
   */
 final class RtController(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
@@ -82,6 +76,8 @@ final class RtController(config: ColonnadeConfig) extends Module {
     val shaded  = Flipped(Valid(new Shaded(config)))
     val bounced = Flipped(Valid(new Bounced(config)))
 
+    val room = if (config.hasRoom) Some(new RoomControl(config)) else None
+
     /** Attributes that cannot be had: the path ends in the background. */
     val dropped = Flipped(Valid(Context(config)))
 
@@ -104,6 +100,9 @@ final class RtController(config: ColonnadeConfig) extends Module {
     /** Contexts that hold no pixel, and whose ray is generated or set up. */
     val freeCount  = Output(UInt(log2Ceil(contexts + 1).W))
     val setUpCount = Output(UInt(log2Ceil(contexts + 1).W))
+
+    /** Those that wait for the room or look for it. */
+    val roomCount = if (config.hasRoom) Some(Output(UInt(log2Ceil(contexts + 1).W))) else None
   })
 
   private val stage        = RegInit(VecInit(Seq.fill(contexts)(Stage.free)))
@@ -111,6 +110,13 @@ final class RtController(config: ColonnadeConfig) extends Module {
   private val isPrimary    = Reg(Vec(contexts, Bool()))
   private val isColoured   = Reg(Vec(contexts, Bool()))
   private val isBackground = Reg(Vec(contexts, Bool()))
+
+  /** The pixel shows the room. */
+  private val isSeen = if (config.hasRoom) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+
+  /** The ray is beside the path. */
+  private val isAside = if (config.hasRoom) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val hasRoom = io.room.map(_.isThere).getOrElse(false.B)
 
   /** By light: a shadow ray is wanted; what those that were sent have met. */
   private val wanted     = Reg(Vec(contexts, Vec(lights, Bool())))
@@ -142,6 +148,10 @@ final class RtController(config: ColonnadeConfig) extends Module {
     isShadow(io.free.bits)   := false.B
     isPrimary(io.free.bits)  := true.B
     isColoured(io.free.bits) := false.B
+    if (config.hasRoom) {
+      isAside(io.free.bits) := false.B
+      isSeen(io.free.bits)  := false.B
+    }
   }
   when(io.entered.valid) { stage(io.entered.bits) := Stage.traversal }
   io.ended.foreach(ended => when(ended.valid) { stage(ended.bits) := Stage.ended })
@@ -156,7 +166,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
     }.elsewhen(io.hasHit(judged)) {
       stage(judged) := Stage.shading
     }.otherwise {
-      stage(judged) := Mux(isPrimary(judged), Stage.complete, Stage.colouring)
+      stage(judged) := Mux(hasRoom, Stage.beyond, Mux(isPrimary(judged), Stage.complete, Stage.colouring))
     }
     isBackground(judged) := !isShadow(judged) && !io.hasHit(judged)
   }
@@ -169,7 +179,8 @@ final class RtController(config: ColonnadeConfig) extends Module {
     isBackground(io.shaded.bits.context) := false.B
   }
   when(io.bounced.valid) {
-    stage(io.bounced.bits.context)        := Mux(io.bounced.bits.isTraced, Stage.setUp, Stage.colouring)
+    stage(io.bounced.bits.context) :=
+      Mux(io.bounced.bits.isTraced, Stage.setUp, Mux(hasRoom, Stage.beyond, Stage.colouring))
     isPrimary(io.bounced.bits.context)    := false.B
     isBackground(io.bounced.bits.context) := true.B
   }
@@ -193,18 +204,57 @@ final class RtController(config: ColonnadeConfig) extends Module {
   }
 
   // A lit context that wants no light any more, or a path into the background, ends
-  private val ends = stage.zip(wanted).map { case (at, lights) =>
-    at === Stage.colouring || (at === Stage.lit && !lights.reduce(_ || _))
+  private val isLit = stage.zip(wanted).map { case (at, lights) => at === Stage.lit && !lights.reduce(_ || _) }
+  private val ends  = stage.zip(isLit.zip(isAside)).map { case (at, (lit, aside)) =>
+    at === Stage.colouring || (lit && !aside)
   }
   private val ending = anyOf(ends)
   io.end.valid             := ending.valid
   io.end.bits.context      := ending.bits
   io.end.bits.isBackground := isBackground(ending.bits)
   io.end.bits.occlusions   := occlusions(ending.bits)
+  io.end.bits.isSeen.foreach(_ := isSeen(ending.bits))
   when(io.end.fire) { stage(ending.bits) := Stage.coloured }
   when(io.coloured.valid) {
     stage(io.coloured.bits)      := Stage.complete
     isColoured(io.coloured.bits) := true.B
   }
   when(io.leave) { stage(io.complete.bits) := Stage.free }
+
+  // Beyond the object
+  for (room <- io.room) {
+    when(room.passes.valid) { stage(room.passes.bits) := Stage.beyond }
+    when(room.aside.valid) {
+      stage(room.aside.bits)     := Stage.beyond
+      isAside(room.aside.bits)   := true.B
+      isPrimary(room.aside.bits) := false.B
+    }
+    val asks = anyOf(isAt(Stage.beyond))
+    io.roomCount.get           := PopCount(stage.map(at => at === Stage.beyond || at === Stage.room))
+    room.question.valid        := asks.valid
+    room.question.bits.context := asks.bits
+    room.question.bits.isSeen  := isPrimary(asks.bits)
+    room.question.bits.isAside := isAside(asks.bits)
+    when(room.question.fire) {
+      stage(asks.bits)    := Stage.room
+      isSeen(asks.bits)   := room.question.bits.isSeen
+      isShadow(asks.bits) := false.B
+    }
+    when(room.met.valid) { stage(room.met.bits) := Stage.shading }
+    val none = room.nothing.bits
+    when(room.nothing.valid) {
+      stage(none)        := Mux(isAside(none), Stage.turning, Mux(isPrimary(none), Stage.complete, Stage.colouring))
+      isBackground(none) := true.B
+    }
+    val turns = anyOf(isAt(Stage.turning).zip(isLit.zip(isAside)).map { case (turning, (lit, aside)) =>
+      turning || (lit && aside)
+    })
+    room.turn.valid             := turns.valid
+    room.turn.bits.context      := turns.bits
+    room.turn.bits.isBackground := isBackground(turns.bits)
+    when(room.turn.fire) {
+      stage(turns.bits)   := Stage.shading
+      isAside(turns.bits) := false.B
+    }
+  }
 }

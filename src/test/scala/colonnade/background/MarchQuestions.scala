@@ -1,6 +1,6 @@
 package colonnade.background
 
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
 
 import scala.util.Random
 
@@ -10,31 +10,54 @@ final case class ViewQuestion(
     offset:      Seq[BigInt],
     offsetShift: Int,
     exponent:    Int,
+    rotation:    Seq[BigInt],
+    steps:       Seq[BigInt],
     shellPlanes: Int
 ) {
-  def words: Seq[BigInt] = matrix ++ offset ++ Seq[BigInt](offsetShift, exponent, shellPlanes)
+  def words: Seq[BigInt] =
+    matrix ++ offset ++ Seq[BigInt](offsetShift, exponent) ++ rotation ++ steps :+ BigInt(shellPlanes)
 
   def fields: Map[String, BigInt] =
     matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}].${"xyz" (i % 3)}" -> value }.toMap ++
+      rotation.zipWithIndex.map { case (value, i) => s"rotation[${i / 3}].${"xyz" (i % 3)}" -> value } ++
       offset.zipWithIndex.map { case (value, i) => s"offset.${"xyz" (i)}" -> value } ++
+      Seq("stepX", "stepY").zip(steps) ++
       Map("offsetShift" -> BigInt(offsetShift), "exponent" -> BigInt(exponent), "shellPlanes" -> BigInt(shellPlanes))
 }
 
-/** A ray: grid steps, and a direction of any length. */
-final case class MarchQuestion(context: Int, origin: Seq[BigInt], towards: Seq[BigInt]) {
-  def words: Seq[BigInt] = origin ++ towards
+/** A ray: grid steps, and a direction of any length; from the camera, if it is seen in a pixel. */
+final case class MarchQuestion(
+    context: Int,
+    origin:  Seq[BigInt],
+    towards: Seq[BigInt],
+    pixel:   Seq[BigInt] = Seq(0, 0),
+    isSeen:  Boolean = false
+) {
+  def words: Seq[BigInt] = (BigInt(if (isSeen) 1 else 0) +: pixel) ++ origin ++ towards
+
+  def fields: Map[String, BigInt] = {
+    val axes = Seq("x", "y", "z")
+    axes.zip(origin).map { case (axis, value) => s"ray.origin.$axis" -> value }.toMap ++
+      axes.zip(towards).map { case (axis, value) => s"ray.towards.$axis" -> value } ++
+      axes.zip(pixel).map { case (axis, value) => s"ray.pixel.$axis" -> value } +
+      ("context" -> BigInt(context)) + ("isSeen" -> BigInt(if (isSeen) 1 else 0))
+  }
 }
 
 /** Views of a room, and rays in it. */
 final class MarchQuestions(config: ColonnadeConfig, random: Random) {
   private val numbers = config.numbers
   private val shells  = config.physicalAttributeMemory.get.shellPlanes
+  private val layout  = AttributeLayout.of(config)
 
   /** Steps in a metre. */
   private val metre = math.pow(2, numbers.sceneBits - 7.0)
 
+  /** A frame's size, not the map's. */
+  private val frame = Seq(97, 61).map(_.min(config.frame.maxWidth).min(config.frame.maxHeight))
+
   /** A camera somewhere, turned somehow; metres. */
-  final class Camera(focal: Double, middle: Seq[Double], isTurned: Boolean) {
+  final class Camera(val focal: Double, val middle: Seq[Double], isTurned: Boolean) {
     private val turn = if (isTurned) random.nextDouble() * 6.3 else 0.0
     val place: Seq[Double] = if (isTurned) Seq.fill(3)(random.nextDouble() * 4 - 2) else Seq(0.0, 0.0, 0.0)
 
@@ -58,7 +81,15 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
       val camera   = steps(Seq(0, 0, 0))
       val offset   = matrix.map(row => -row.zip(camera).map { case (m, c) => m * c }.sum)
       val shift    = (offset.map(_.bitLength).max - numbers.macBits + 1).max(0)
-      ViewQuestion(matrix.flatten, offset.map(_ >> shift), shift, exponent, shells.min(5))
+      ViewQuestion(
+        matrix.flatten,
+        offset.map(_ >> shift),
+        shift,
+        exponent,
+        Seq.tabulate(9)(i => BigDecimal(axes(i % 3)(i / 3) * 16384).toBigInt),
+        stepWidths(random.nextInt(2)),
+        shells.min(5)
+      )
     }
   }
 
@@ -70,12 +101,17 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
     MarchQuestion(context(), camera.steps(from), turned.map(t => BigDecimal(t * scale).toBigInt))
   }
 
+  private def spread(size: Double): Double = (random.nextDouble() * 2 - 1) * size
+
+  /** To the back wall where the box hides it. */
+  def behindBox(camera: Camera): MarchQuestion =
+    ray(camera, Seq(spread(0.3), 0.1, 3 + spread(0.2)), Seq(spread(0.1), 0.7 + spread(0.1), 1.0))
+
   /** Within the room, on its surfaces, just behind them, beyond the view, behind the camera; in any direction, along an
     * axis, to the camera or away from it.
     */
   def inRoom(camera: Camera): MarchQuestion = {
-    def spread(size: Double) = (random.nextDouble() * 2 - 1) * size
-    val from                 = random.nextInt(8) match {
+    val from = random.nextInt(8) match {
       case 0 => Seq(spread(1.9), 1.2 + spread(0.02), 0.5 + random.nextDouble() * 3)
       case 1 => Seq(spread(0.5), 0.4 + spread(0.02), 2.1 + random.nextDouble() * 0.5)
       case 2 => Seq(spread(2), spread(1), -random.nextDouble())
@@ -103,12 +139,38 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
       Seq.fill(3)(signed((length - shift).min(numbers.macBits) - 1)),
       shift,
       (length - random.nextInt(12)).min(500),
+      Seq.fill(9)(signed(16)),
+      stepWidths(0),
       random.nextInt(shells + 1)
     )
   }
 
-  def anyRay(): MarchQuestion =
-    MarchQuestion(context(), Seq.fill(3)(signed(numbers.sceneBits.min(60))), Seq.fill(3)(signed(numbers.shadeBits + 1)))
+  def anyRay(): MarchQuestion = {
+    val directionBits = if (random.nextBoolean()) numbers.shadeBits + 1 else numbers.directionBits
+    MarchQuestion(context(), Seq.fill(3)(signed(numbers.sceneBits.min(60))), Seq.fill(3)(signed(directionBits)))
+  }
+
+  /** That of a pixel of the frame, of any length. */
+  def fromCamera(camera: Camera): MarchQuestion = {
+    val pixel   = frame.map(random.nextInt(_))
+    val size    = Seq(layout.config.width, layout.config.height)
+    val towards = pixel.zip(frame).zip(size).zip(camera.middle).map { case (((p, f), s), m) =>
+      ((p + 0.5) * s / f - m) / camera.focal
+    }
+    val scaled = ray(camera, Seq(0.0, 0.0, 0.0), towards :+ 1.0)
+    val shift  = random.nextInt(numbers.directionBits - numbers.shadeBits)
+    scaled.copy(towards = scaled.towards.map(_ << shift), pixel = pixel.map(BigInt(_)), isSeen = true)
+  }
+
+  /** Along any direction, forth and back. */
+  def anyPixel(): MarchQuestion =
+    anyRay().copy(pixel = frame.map(BigInt(_)).map(BigInt(8, random).min(_)), isSeen = true)
+
+  /** Pixels of the map in one of the frame, doubled, in steps of the registers. */
+  private def stepWidths(less: Int): Seq[BigInt] =
+    Seq(layout.config.width, layout.config.height).zip(frame).map { case (map, pixels) =>
+      (BigInt(map) << (numbers.shadeBits + 12 - 11)) / pixels - less
+    }
 
   private def context(): Int = random.nextInt(config.array.contexts)
 

@@ -17,7 +17,8 @@ import scala.util.Random
 private class RoomMarchHarness(config: ColonnadeConfig)
     extends PackedUnit(new MarchRequest(config), new MarchResult(config)) {
   private val march = Module(new RoomMarch(config))
-  private val map   = Module(new PlaneMap(config, RoomMarch.tagBits))
+  private val maps  = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
+  private val known = maps.io.ports.head
 
   val load   = IO(Flipped(Valid(new Load(config))))
   val view   = IO(Input(UInt(march.io.view.getWidth.W)))
@@ -26,9 +27,11 @@ private class RoomMarchHarness(config: ColonnadeConfig)
 
   private val noise = LFSR(16)
   connect(march.io.request, march.io.result)
-  join(march.io.cells, map.io.cells, noise(0))
-  join(march.io.planes, map.io.planes, noise(5))
-  map.io.load   := load
+  join(march.io.maps.cells, known.cells, noise(0))
+  join(march.io.maps.planes, known.planes, noise(5))
+  join(march.io.maps.albedo, known.albedo, noise(9))
+  join(march.io.maps.normals, known.normals, noise(3))
+  maps.io.load  := load
   march.io.view := view.asTypeOf(march.io.view)
   events        := march.io.events
 
@@ -55,12 +58,14 @@ private class RoomMarchHarness(config: ColonnadeConfig)
 class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "RoomMarch"
 
-  private val names = Seq("kind", "x", "y", "entry", "isHidden", "travel", "travelExponent", "steps")
+  private val names = Seq("kind", "x", "y", "entry", "isHidden", "travel", "travelExponent", "steps") ++
+    Seq("x", "y", "z").map(axis => s"point.$axis") ++ Seq("r", "g", "b").map(channel => s"albedo.$channel") ++
+    Seq("x", "y", "z").map(axis => s"normal.$axis")
 
   private def load(unit: RoomMarchHarness, config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Unit = {
     unit.load.valid.poke(true)
     for {
-      memory          <- AttributeMemories(config) if memory.name.startsWith("planes")
+      memory          <- AttributeMemories(config)
       (word, address) <- words(memory.name).zipWithIndex
     } {
       unit.load.bits.target.poke(memory.target)
@@ -84,15 +89,8 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     val (request, result) = (new Packed(new MarchRequest(config)), new Packed(new MarchResult(config)))
     unit.view.poke(new Packed(new RoomView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
-    val inputs = rays.map { ray =>
-      val axes = Seq("x", "y", "z")
-      request.pack(
-        axes.zip(ray.origin).map { case (axis, value) => s"origin.$axis" -> value }.toMap ++
-          axes.zip(ray.towards).map { case (axis, value) => s"towards.$axis" -> value } +
-          ("context" -> BigInt(ray.context))
-      )
-    }
-    val found = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
+    val inputs = rays.map(ray => request.pack(ray.fields))
+    val found  = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),
       (port: UInt) => port.peekInt()
     )(random, if (isSlow) 0.5 else 0, 20000)
@@ -128,7 +126,8 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             scene.words,
             camera.view,
-            Seq.fill(60)(questions.inRoom(camera)),
+            Seq.fill(60)(questions.inRoom(camera)) ++ Seq.fill(20)(questions.behindBox(camera)) ++
+              Seq.fill(30)(questions.fromCamera(camera)),
             random,
             isSlow = round == 1
           )
@@ -146,7 +145,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             image.words,
             camera.view,
-            Seq.fill(30)(questions.inRoom(camera)),
+            Seq.fill(30)(questions.inRoom(camera)) ++ Seq.fill(20)(questions.fromCamera(camera)),
             random,
             isSlow = round == 1
           )
@@ -155,7 +154,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             image.words,
             questions.anyView(),
-            Seq.fill(20)(questions.anyRay()),
+            Seq.fill(20)(questions.anyRay()) ++ Seq.fill(20)(questions.anyPixel()),
             random,
             isSlow = round == 1
           )

@@ -47,8 +47,9 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
     all.map { case (name, value) => name -> field(value, exponent) }.toMap + ("exponent" -> BigInt(exponent))
   }
 
-  /** By the memory's name. */
+  /** By the memory's name; albedo and normals at random. */
   val words: Map[String, Seq[BigInt]] = {
+    val others      = new RoomImage(config, random).words
     val heap        = scala.collection.mutable.ArrayBuffer.empty[BigInt]
     val descriptors = for {
       row    <- 0 until layout.tileRows
@@ -77,7 +78,11 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
     }
     val table = surfaces.map(surface => new Packed(new Plane).pack(word(surface)))
     val shell = surfaces.take(5).map(surface =>
-      new Packed(new ShellEntry).pack(word(surface).map { case (name, value) => s"plane.$name" -> value })
+      new Packed(new ShellEntry).pack(
+        word(surface).map { case (name, value) => s"plane.$name" -> value } ++
+          Seq("r", "g", "b").map(channel => s"albedo.$channel" -> BigInt(12, random)) ++
+          Seq("x", "y", "z").map(axis => s"normal.$axis" -> (BigInt(12, random) - 2048))
+      )
     )
     val made = Map(
       "planes.descriptors" -> descriptors,
@@ -86,7 +91,10 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
       "planes.shell"       -> shell
     )
     AttributeMemories(config).map { memory =>
-      memory.name -> made.getOrElse(memory.name, Nil).take(memory.depth).padTo(memory.depth, BigInt(0))
+      memory.name -> made.get(memory.name).fold(others(memory.name))(_.take(memory.depth).padTo(
+        memory.depth,
+        BigInt(0)
+      ))
     }.toMap
   }
 

@@ -39,18 +39,20 @@ class FakeRenderUnit(config: ColonnadeConfig) extends Module {
   io.requests.valid        := state === asking && !isShown
   io.requests.bits.address := address
   io.pixels.valid          := state === leaving
-  io.pixels.bits           := 0.U.asTypeOf(new Pixel(config))
-  io.pixels.bits.x         := position.x
-  io.pixels.bits.y         := position.y
-  io.pixels.bits.colour.g  := colour
-  io.isIdle                := state === free
+  io.maps.foreach(_.asksNothing())
+  io.pixels.bits          := 0.U.asTypeOf(new Pixel(config))
+  io.pixels.bits.x        := position.x
+  io.pixels.bits.y        := position.y
+  io.pixels.bits.colour.g := colour
+  io.isIdle               := state === free
 
   when(io.positions.fire) {
-    state    := asking
-    position := io.positions.bits
-    address  := io.positions.bits.x * 7.U + io.positions.bits.y * 13.U
-    colour   := 0.U
-    left     := (reads - 1).U
+    state      := asking
+    position.x := io.positions.bits.x
+    position.y := io.positions.bits.y
+    address    := io.positions.bits.x * 7.U + io.positions.bits.y * 13.U
+    colour     := 0.U
+    left       := (reads - 1).U
   }
   when(io.requests.fire) { state := waiting }
   when(takes) {
