@@ -19,6 +19,7 @@ LABELS = {
     "array.columns": "columns",
     "array.contexts": "contexts of a render unit",
     "columnBvhMemory.banks": "banks of a column's memory",
+    "columnBvhMemory.recordBuffers": "records that a render unit holds",
     "columnBvhMemory.readLatency": "memory latency, cycles",
 }
 
