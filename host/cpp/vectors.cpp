@@ -9,6 +9,8 @@
 //   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat shadows
 //          count, count * (position[3] colour[3] reachMantissa reachExponent)
 //                                                         -> origin[3], count * (direct[3] needsShadowRay)
+//   lightroom point[3] normal[3] offset shadows count, count * (position[3] colour[3] reachMantissa reachExponent)
+//                                                         -> as shade, for a point of a room
 //   bounce axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat kind etaFront etaBack reflectance
 //                                                         -> isRefraction origin[3] direction[3] reflection[3] share
 //
@@ -107,12 +109,8 @@ Surface askSurface(Question& ask, const Numbers& n) {
     return surfaceOf(ray, hit, face, n);
 }
 
-void answerShade(Question& ask, const Numbers& n) {
-    const Surface surface = askSurface(ask, n);
-    const std::int64_t offset = ask.number();
-    const bool flat = ask.number() != 0, shadows = ask.number() != 0;
-    const WideVector origin = offSurface(surface.point, surface.facing, offset, n);
-    const WideVector normal = shadingNormal(surface, flat);
+/// What the lights give to a surface that a question goes on about.
+void answerLights(Question& ask, const WideVector& origin, const WideVector& normal, bool shadows, const Numbers& n) {
     Answer answer;
     answer.all(origin);
     for (std::int64_t left = ask.number(); left > 0; --left) {
@@ -124,6 +122,22 @@ void answerShade(Question& ask, const Numbers& n) {
         answer.all(illumination.direct) << illumination.needsShadowRay;
     }
     answer.print();
+}
+
+void answerShade(Question& ask, const Numbers& n) {
+    const Surface surface = askSurface(ask, n);
+    const std::int64_t offset = ask.number();
+    const bool flat = ask.number() != 0, shadows = ask.number() != 0;
+    const WideVector origin = offSurface(surface.point, surface.facing, offset, n);
+    answerLights(ask, origin, shadingNormal(surface, flat), shadows, n);
+}
+
+void answerLightRoom(Question& ask, const Numbers& n) {
+    const WideVector point = ask.wideVector();
+    const Vector normal = ask.vector();
+    const WideVector origin = offSurface(point, normal, ask.number(), n);
+    const bool shadows = ask.number() != 0;
+    answerLights(ask, origin, {normal[0], normal[1], normal[2]}, shadows, n);
 }
 
 void answerBounce(Question& ask, const Numbers& n) {
@@ -216,6 +230,7 @@ int main() try {
         else if (kind == "box") answerBox(ask, numbers);
         else if (kind == "triangle") answerTriangle(ask, numbers);
         else if (kind == "shade") answerShade(ask, numbers);
+        else if (kind == "lightroom") answerLightRoom(ask, numbers);
         else if (kind == "bounce") answerBounce(ask, numbers);
         else if (kind == "layout") scene.readLayout(words);
         else if (kind == "records") scene.readRecords(words);

@@ -19,6 +19,15 @@ final case class HitQuestion(
     material:        Int
 )
 
+/** A point of a room, as the model's "lightroom" asks for it. */
+final case class RoomPointQuestion(
+    context: Int,
+    point:   Seq[BigInt],
+    normal:  Seq[BigInt],
+    albedo:  Seq[BigInt],
+    shadows: Boolean
+)
+
 /** A light, in raw integers. */
 final case class LightSource(position: Seq[BigInt], colour: Seq[BigInt], reachMantissa: BigInt, reachExponent: Int)
 
@@ -43,11 +52,16 @@ object ShaderQuestions {
   def words(hit: HitQuestion, light: LightQuestion): Seq[BigInt] =
     (BigInt(hit.axis) +: hit.negative.map(bit)) ++ hit.origin ++ hit.shear ++ (hit.t +: hit.weights) ++
       (bit(hit.backSide) +: hit.normals.flatten) ++ hit.geometricNormal ++
-      Seq(light.offset, bit(light.isFlat), bit(light.shadows), BigInt(light.shining)) ++
-      light.sources.take(light.shining).flatMap(source =>
-        source.position.map(_ << light.unitShift) ++ source.colour ++
-          Seq(source.reachMantissa, BigInt(source.reachExponent))
-      )
+      Seq(light.offset, bit(light.isFlat), bit(light.shadows)) ++ words(light)
+
+  def words(room: RoomPointQuestion, light: LightQuestion): Seq[BigInt] =
+    room.point ++ room.normal ++ Seq(light.offset, bit(light.shadows && room.shadows)) ++ words(light)
+
+  private def words(light: LightQuestion): Seq[BigInt] =
+    BigInt(light.shining) +: light.sources.take(light.shining).flatMap(source =>
+      source.position.map(_ << light.unitShift) ++ source.colour ++
+        Seq(source.reachMantissa, BigInt(source.reachExponent))
+    )
 
   def bit(claim: Boolean): BigInt = if (claim) 1 else 0
 }
@@ -126,6 +140,15 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
       geometricNormal = if (chance(3)) average else nearly(average)
     )
   }
+
+  /** Anywhere in a room, at most half as far as the scene reaches; with any normal, or none. */
+  def roomPoint(): RoomPointQuestion = RoomPointQuestion(
+    context = random.nextInt(config.array.contexts),
+    point = three(signed(if (random.nextBoolean()) numbers.gridBits else numbers.sceneBits - 1)),
+    normal = if (chance(10)) three(signed(NumberFormats.normalBits)) else if (chance(20)) three(BigInt(0)) else anyUnit,
+    albedo = three(natural(NumberFormats.colourBits)),
+    shadows = random.nextBoolean()
+  )
 
   /** Smooth normals that cancel out, or weigh nothing. */
   def withoutSmoothNormal(): HitQuestion = {

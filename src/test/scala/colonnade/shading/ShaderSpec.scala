@@ -1,10 +1,8 @@
 package colonnade.shading
 
-import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Rgb, Vec3}
-import colonnade.numbers.{Fixed, StreamTester}
+import colonnade.numbers.StreamTester
 import colonnade.{Model, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -12,64 +10,19 @@ import scala.util.Random
 
 class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   import AnswerPacking._
+  import ShaderPorts._
 
   behavior of "Shader"
 
   /** Faster than the interpreter for so wide a unit. */
   private val verilator = Seq(VerilatorBackendAnnotation)
 
-  private def pokeFixed(port: Fixed, raw: BigInt): Unit = port.raw match {
-    case signed: SInt => signed.poke(raw)
-    case other        => other.asInstanceOf[UInt].poke(raw)
-  }
-
-  private def pokeVector(port: Vec3[Fixed], raw: Seq[BigInt]): Unit =
-    port.axes.zip(raw).foreach { case (to, value) => pokeFixed(to, value) }
-
-  private def pokeColour(port: Rgb[UInt], raw: Seq[BigInt]): Unit =
-    port.channels.zip(raw).foreach { case (to, value) => to.poke(value) }
-
-  private def pokeLight(io: ShaderIO, light: LightQuestion): Unit = {
-    for ((port, source) <- io.lights.zip(light.sources)) {
-      port.position.axes.zip(source.position).foreach { case (to, value) => to.poke(value) }
-      port.colour.channels.zip(source.colour).foreach { case (to, value) => pokeFixed(to, value) }
-      port.reachMantissa.poke(source.reachMantissa)
-      port.reachExponent.poke(source.reachExponent)
-    }
-    io.unitShift.poke(light.unitShift)
-    io.shading.offset.poke(light.offset)
-    io.shading.lights.poke(light.shining)
-    io.shading.flat.poke(light.isFlat)
-    io.shading.shadows.poke(light.shadows)
-    io.materials.zip(light.albedos).foreach { case (to, value) => pokeColour(to.albedo, value) }
-  }
-
-  private def pokeHit(port: ShadeRequest, hit: HitQuestion): Unit = {
-    port.context.poke(hit.context)
-    port.ray.heading.axis.poke(hit.axis)
-    port.ray.heading.negative.zip(hit.negative).foreach { case (to, value) => to.poke(value) }
-    port.ray.origin.zip(hit.origin).foreach { case (to, value) => pokeFixed(to, value) }
-    port.ray.shear.zip(hit.shear).foreach { case (to, value) => pokeFixed(to, value) }
-    pokeFixed(port.hit.t, hit.t)
-    port.hit.id.poke(0)
-    port.hit.weights.zip(hit.weights).foreach { case (to, value) => pokeFixed(to, value) }
-    port.hit.backSide.poke(hit.backSide)
-    port.face.normals.zip(hit.normals).foreach { case (to, value) => pokeVector(to, value) }
-    pokeVector(port.face.geometricNormal, hit.geometricNormal)
-    port.face.material.poke(hit.material)
-  }
-
-  private def peek(port: LitSurface): BigInt = pack(
-    port.origin.axes.map(_.integer.peekInt()) ++
-      port.directs.zip(port.needsShadowRays).flatMap { case (direct, needs) =>
-        direct.channels.map(_.natural.peekInt()) :+ needs.peekInt()
-      } ++ port.albedo.channels.map(_.peekInt()) :+ port.context.peekInt()
-  )
-
   /** The model's answer, of lights that do not shine as well, and what the hit says itself. */
   private def expected(answer: Seq[BigInt], hit: HitQuestion, light: LightQuestion): Seq[BigInt] =
-    answer ++ Seq.fill(4 * (light.sources.size - light.shining))(BigInt(0)) ++ light.albedos(hit.material) :+
-      BigInt(hit.context)
+    expected(answer, light, light.albedos(hit.material), hit.context)
+
+  private def expected(answer: Seq[BigInt], light: LightQuestion, albedo: Seq[BigInt], context: Int): Seq[BigInt] =
+    answer ++ Seq.fill(4 * (light.sources.size - light.shining))(BigInt(0)) ++ albedo :+ BigInt(context)
 
   /** Shades hits, a light after another, and compares with the model. */
   private def check(
@@ -199,4 +152,81 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
   }
+
+  /** Hits come when the shader has promised a cycle before to take one, points of a room as they like.
+    *
+    * @return what was taken, in order, and what left
+    */
+  private def mix(
+      shader: Shader,
+      hits:   Seq[HitQuestion],
+      points: Seq[RoomPointQuestion],
+      random: Random,
+      stalls: Double
+  ): (Seq[Either[HitQuestion, RoomPointQuestion]], Seq[BigInt]) = {
+    val io                     = shader.io
+    val room                   = io.room.get
+    var (hitsLeft, pointsLeft) = (hits, points)
+    var (isPromised, offers)   = (false, false)
+    var (taken, results)       = (Vector.empty[Either[HitQuestion, RoomPointQuestion]], Vector.empty[BigInt])
+    var idle                   = 0
+    def isWilling              = random.nextDouble() >= stalls
+    while (results.size < hits.size + points.size) {
+      val comes = isPromised && hitsLeft.nonEmpty && isWilling
+      offers = pointsLeft.nonEmpty && (offers || isWilling)
+      io.request.valid.poke(comes)
+      room.valid.poke(offers)
+      if (comes) pokeHit(io.request.bits, hitsLeft.head)
+      if (offers) pokePoint(room.bits, pointsLeft.head)
+      val accepts = isWilling
+      io.lit.ready.poke(accepts)
+
+      idle += 1
+      assert(idle < 400, s"nothing leaves after ${results.size} results")
+      if (comes) {
+        io.request.ready.expect(true, "a promised hit is taken")
+        taken :+= Left(hitsLeft.head)
+        hitsLeft = hitsLeft.tail
+      }
+      if (offers && room.ready.peekBoolean()) {
+        assert(!comes, "one at a time")
+        taken :+= Right(pointsLeft.head)
+        pointsLeft = pointsLeft.tail
+        offers = false
+      }
+      if (accepts && io.lit.valid.peekBoolean()) {
+        results :+= peek(io.lit.bits)
+        idle = 0
+      }
+      isPromised = io.takesNext.peekBoolean()
+      shader.clock.step()
+    }
+    (taken, results)
+  }
+
+  for (config <- TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.room))))
+    it should s"light points of a room between hits, with ${config.precision} and ${config.geometry.vertexBits}-bit vertices" in
+      test(new Shader(config)).withAnnotations(verilator) { shader =>
+        val random    = new Random(25)
+        val questions = new ShaderQuestions(config, random)
+        for (stalls <- Seq(0, 0.3, 0.6, 0.9, 0.5, 0.8)) {
+          val light = questions.light().copy(shadows = stalls != 0.5)
+          pokeLight(shader.io, light)
+          val hits             = Seq.fill(12)(questions.surfaceHit(light))
+          val points           = Seq.fill(12)(questions.roomPoint())
+          val (taken, results) = mix(shader, hits, points, random, stalls)
+          val ofHits           =
+            hits.zip(Model.answers(config, hits.map(ShaderQuestions.words(_, light)), "shade")).map {
+              case (hit, answer) =>
+                Left(hit) -> expected(answer, hit, light)
+            }
+          val ofPoints =
+            points.zip(Model.answers(config, points.map(ShaderQuestions.words(_, light)), "lightroom")).map {
+              case (point, answer) => Right(point) -> expected(answer, light, point.albedo, point.context)
+            }
+          val answers = (ofHits ++ ofPoints).toMap[Either[HitQuestion, RoomPointQuestion], Seq[BigInt]]
+          for ((question, result) <- taken.zip(results))
+            assert(unpack(result, answers(question).size) == answers(question), s"of $question under $light")
+        }
+      }
 }

@@ -1,0 +1,67 @@
+package colonnade.shading
+
+import chisel3._
+import chiseltest._
+import colonnade.formats.{Rgb, Vec3}
+import colonnade.numbers.Fixed
+
+/** Questions at the shader's ports, and its answers. */
+object ShaderPorts {
+  import AnswerPacking._
+
+  private def pokeFixed(port: Fixed, raw: BigInt): Unit = port.raw match {
+    case signed: SInt => signed.poke(raw)
+    case other        => other.asInstanceOf[UInt].poke(raw)
+  }
+
+  private def pokeVector(port: Vec3[Fixed], raw: Seq[BigInt]): Unit =
+    port.axes.zip(raw).foreach { case (to, value) => pokeFixed(to, value) }
+
+  private def pokeColour(port: Rgb[UInt], raw: Seq[BigInt]): Unit =
+    port.channels.zip(raw).foreach { case (to, value) => to.poke(value) }
+
+  def pokeLight(io: ShaderIO, light: LightQuestion): Unit = {
+    for ((port, source) <- io.lights.zip(light.sources)) {
+      port.position.axes.zip(source.position).foreach { case (to, value) => to.poke(value) }
+      port.colour.channels.zip(source.colour).foreach { case (to, value) => pokeFixed(to, value) }
+      port.reachMantissa.poke(source.reachMantissa)
+      port.reachExponent.poke(source.reachExponent)
+    }
+    io.unitShift.poke(light.unitShift)
+    io.shading.offset.poke(light.offset)
+    io.shading.lights.poke(light.shining)
+    io.shading.flat.poke(light.isFlat)
+    io.shading.shadows.poke(light.shadows)
+    io.materials.zip(light.albedos).foreach { case (to, value) => pokeColour(to.albedo, value) }
+  }
+
+  def pokeHit(port: ShadeRequest, hit: HitQuestion): Unit = {
+    port.context.poke(hit.context)
+    port.ray.heading.axis.poke(hit.axis)
+    port.ray.heading.negative.zip(hit.negative).foreach { case (to, value) => to.poke(value) }
+    port.ray.origin.zip(hit.origin).foreach { case (to, value) => pokeFixed(to, value) }
+    port.ray.shear.zip(hit.shear).foreach { case (to, value) => pokeFixed(to, value) }
+    pokeFixed(port.hit.t, hit.t)
+    port.hit.id.poke(0)
+    port.hit.weights.zip(hit.weights).foreach { case (to, value) => pokeFixed(to, value) }
+    port.hit.backSide.poke(hit.backSide)
+    port.face.normals.zip(hit.normals).foreach { case (to, value) => pokeVector(to, value) }
+    pokeVector(port.face.geometricNormal, hit.geometricNormal)
+    port.face.material.poke(hit.material)
+  }
+
+  def pokePoint(port: RoomSurface, point: RoomPointQuestion): Unit = {
+    port.context.poke(point.context)
+    pokeVector(port.point, point.point)
+    port.normal.axes.zip(point.normal).foreach { case (to, value) => to.poke(value) }
+    pokeColour(port.albedo, point.albedo)
+    port.shadows.poke(point.shadows)
+  }
+
+  def peek(port: LitSurface): BigInt = pack(
+    port.origin.axes.map(_.integer.peekInt()) ++
+      port.directs.zip(port.needsShadowRays).flatMap { case (direct, needs) =>
+        direct.channels.map(_.natural.peekInt()) :+ needs.peekInt()
+      } ++ port.albedo.channels.map(_.peekInt()) :+ port.context.peekInt()
+  )
+}
