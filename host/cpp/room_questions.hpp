@@ -42,6 +42,9 @@ public:
         image().load(memory, bytes.data(), count, stride);
     }
 
+    /// Once they are begun.
+    const std::optional<AttributeImage>& maps() const { return image_; }
+
     bool knows(const std::string& kind) const {
         return kind == "albedo" || kind == "normal" || kind == "tile" || kind == "cell" || kind == "plane" || kind == "shell" || kind == "march";
     }

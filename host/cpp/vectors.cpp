@@ -18,7 +18,8 @@
 //   layout record name=offset,width,signed ...              (once for each kind of record)
 //   records triangleBase attributeBase hexadecimal ...
 //   registers name=value ...
-//   pixel  x y                                            -> colour[3] isObject triangle distance
+//   pixel  x y                                            -> colour[3] isObject triangle distance ratio[3]
+//          in a room, if its lines stand before the registers
 //
 // Rooms: see room_questions.hpp.
 #include <optional>
@@ -209,7 +210,7 @@ void answerPixel(Question& ask, Device& device) {
     const Pixel pixel = device.render(x, y);
     Answer answer;
     answer.all(pixel.colour) << pixel.isObject << pixel.triangle << pixel.distance;
-    answer.print();
+    answer.all(pixel.ratio).print();
 }
 
 } // namespace
@@ -234,7 +235,10 @@ int main() try {
         else if (kind == "bounce") answerBounce(ask, numbers);
         else if (kind == "layout") scene.readLayout(words);
         else if (kind == "records") scene.readRecords(words);
-        else if (kind == "registers") scene.device().start(readNumbers(words));
+        else if (kind == "registers") {
+            if (room.maps()) scene.device().load(*room.maps());
+            scene.device().start(readNumbers(words));
+        }
         else if (kind == "pixel") answerPixel(ask, scene.device());
         else if (kind == "sizes") room.begin(readNumbers(words), scene.layouts());
         else if (kind == "words") room.load(words);

@@ -18,15 +18,17 @@ object Model {
   def answers(config: ColonnadeConfig, questions: Seq[Seq[BigInt]], kind: String): Seq[Seq[BigInt]] =
     answers(config, Nil, questions, kind)
 
-  /** Pixels of a scene: red, green, blue, isObject, triangle, distance.
+  /** Pixels of a scene: red, green, blue, isObject, triangle, distance, and what is left of the room's light, by channel.
     *
     * @param registers all that the host writes, by name
+    * @param room      words of each of the room's memories, if there is one
     */
   def pixels(
       config:    ColonnadeConfig,
       registers: Map[String, BigInt],
       records:   Seq[BigInt],
-      positions: Seq[(Int, Int)]
+      positions: Seq[(Int, Int)],
+      room:      Option[Map[String, Seq[BigInt]]] = None
   ): Seq[Seq[BigInt]] = {
     val formats = new RecordFormats(config)
     val kinds   = Seq("node" -> formats.node, "triangles" -> formats.triangles, "attributes" -> formats.attributes)
@@ -36,7 +38,13 @@ object Model {
     val scene   =
       s"records ${registers("scene.triangleBase")} ${registers("scene.attributeBase")} ${hex.mkString(" ")}"
     val written = registers.map { case (name, value) => s"$name=$value" }.mkString("registers ", " ", "")
-    answers(config, layouts ++ Seq(scene, written), positions.map { case (x, y) => Seq(BigInt(x), BigInt(y)) }, "pixel")
+    val maps    = room.toSeq.flatMap(roomOf(config, _))
+    answers(
+      config,
+      layouts ++ maps ++ Seq(scene, written),
+      positions.map { case (x, y) => Seq(BigInt(x), BigInt(y)) },
+      "pixel"
+    )
   }
 
   /** Answers to questions about a room's maps, in the form that room_questions.hpp documents.
@@ -48,13 +56,15 @@ object Model {
       words:     Map[String, Seq[BigInt]],
       questions: Seq[Seq[BigInt]],
       kind:      String
-  ): Seq[Seq[BigInt]] = {
+  ): Seq[Seq[BigInt]] = answers(config, roomOf(config, words), questions, kind)
+
+  private def roomOf(config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Seq[String] = {
     val layouts  = AttributeMemories.layouts.map { case (name, word) => layout(name, word()) }
     val sizes    = AttributeLayout.of(config).entries.map { case (key, value) => s"$key=$value" }
     val contents = AttributeMemories(config).map { memory =>
       s"words ${memory.name} ${(memory.bits + 7) / 8} ${words(memory.name).map(_.toString(16)).mkString(" ")}"
     }
-    answers(config, layouts ++ Seq(sizes.mkString("sizes ", " ", "")) ++ contents, questions, kind)
+    layouts ++ Seq(sizes.mkString("sizes ", " ", "")) ++ contents
   }
 
   private def layout(name: String, kind: Data): String = {

@@ -4,27 +4,6 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
 
 import scala.util.Random
 
-/** A view's registers. */
-final case class ViewQuestion(
-    matrix:      Seq[BigInt],
-    offset:      Seq[BigInt],
-    offsetShift: Int,
-    exponent:    Int,
-    rotation:    Seq[BigInt],
-    steps:       Seq[BigInt],
-    shellPlanes: Int
-) {
-  def words: Seq[BigInt] =
-    matrix ++ offset ++ Seq[BigInt](offsetShift, exponent) ++ rotation ++ steps :+ BigInt(shellPlanes)
-
-  def fields: Map[String, BigInt] =
-    matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}].${"xyz" (i % 3)}" -> value }.toMap ++
-      rotation.zipWithIndex.map { case (value, i) => s"rotation[${i / 3}].${"xyz" (i % 3)}" -> value } ++
-      offset.zipWithIndex.map { case (value, i) => s"offset.${"xyz" (i)}" -> value } ++
-      Seq("stepX", "stepY").zip(steps) ++
-      Map("offsetShift" -> BigInt(offsetShift), "exponent" -> BigInt(exponent), "shellPlanes" -> BigInt(shellPlanes))
-}
-
 /** A ray: grid steps, and a direction of any length; from the camera, if it is seen in a pixel. */
 final case class MarchQuestion(
     context: Int,
@@ -42,6 +21,14 @@ final case class MarchQuestion(
       axes.zip(pixel).map { case (axis, value) => s"ray.pixel.$axis" -> value } +
       ("context" -> BigInt(context)) + ("isSeen" -> BigInt(if (isSeen) 1 else 0))
   }
+}
+
+object MarchQuestion {
+
+  /** What the model's answer says, in its order. */
+  val answer: Seq[String] = Seq("kind", "x", "y", "entry", "isHidden", "travel", "travelExponent", "steps") ++
+    Seq("x", "y", "z").map(axis => s"point.$axis") ++ Seq("r", "g", "b").map(channel => s"albedo.$channel") ++
+    Seq("x", "y", "z").map(axis => s"normal.$axis")
 }
 
 /** Views of a room, and rays in it. */
@@ -69,27 +56,8 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
       turned(p).zip(place).map { case (a, b) => BigDecimal((a + b) * metre).toBigInt }
 
     val view: ViewQuestion = {
-      val axes                                      = Seq(Seq(1.0, 0, 0), Seq(0, 1.0, 0), Seq(0, 0, 1.0)).map(turned)
-      def row(a: Double, x: Seq[Double], b: Double) =
-        x.zip(axes(2)).map { case (p, q) => (a * p + b * q) / (metre * RoomScene.depthUnit) }
-      val seen     = Seq(0, 1).map(axis => row(focal / 1024, axes(axis), middle(axis) / 1024))
-      val rows     = seen :+ row(0, axes(0), 1)
-      val largest  = rows.flatten.map(_.abs).max
-      val bits     = numbers.macBits.min(50) - 2
-      val exponent = bits - math.getExponent(largest) - 1
-      val matrix   = rows.map(_.map(value => BigDecimal(value * math.pow(2, exponent)).toBigInt))
-      val camera   = steps(Seq(0, 0, 0))
-      val offset   = matrix.map(row => -row.zip(camera).map { case (m, c) => m * c }.sum)
-      val shift    = (offset.map(_.bitLength).max - numbers.macBits + 1).max(0)
-      ViewQuestion(
-        matrix.flatten,
-        offset.map(_ >> shift),
-        shift,
-        exponent,
-        Seq.tabulate(9)(i => BigDecimal(axes(i % 3)(i / 3) * 16384).toBigInt),
-        stepWidths(random.nextInt(2)),
-        shells.min(5)
-      )
+      val axes = Seq(Seq(1.0, 0, 0), Seq(0, 1.0, 0), Seq(0, 0, 1.0)).map(turned)
+      ViewQuestion.of(config, focal, middle, axes, steps(Seq(0, 0, 0)), metre, stepWidths(random.nextInt(2)))
     }
   }
 
@@ -158,13 +126,11 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
   }
 
   /** Along any direction, forth and back. */
-  def anyPixel(): MarchQuestion = anyRay().copy(pixel = frame.map(BigInt(_)).map(BigInt(8, random).min(_)), isSeen = true)
+  def anyPixel(): MarchQuestion =
+    anyRay().copy(pixel = frame.map(BigInt(_)).map(BigInt(8, random).min(_)), isSeen = true)
 
   /** Pixels of the map in one of the frame, doubled, in steps of the registers. */
-  private def stepWidths(less: Int): Seq[BigInt] =
-    Seq(layout.config.width, layout.config.height).zip(frame).map { case (map, pixels) =>
-      (BigInt(map) << (numbers.shadeBits + 12 - 11)) / pixels - less
-    }
+  private def stepWidths(less: Int): Seq[BigInt] = ViewQuestion.stepWidths(config, frame).map(_ - less)
 
   private def context(): Int = random.nextInt(config.array.contexts)
 

@@ -1,8 +1,11 @@
 package colonnade.background
 
+import chisel3.Clock
+import chisel3.util.Valid
+import chiseltest._
 import colonnade.Model
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.{AttributeMemories, MapDescriptor, PlaneDescriptor}
+import colonnade.formats.{AttributeMemories, Load, MapDescriptor, PlaneDescriptor}
 import colonnade.traversal.Packed
 
 import scala.util.Random
@@ -55,4 +58,19 @@ final class RoomImage(config: ColonnadeConfig, random: Random) {
   }
 
   private def randomPointer(): Int = random.nextInt(1 << AttributeLayout.pointerBits)
+}
+
+object RoomImage {
+
+  /** Fills all memories of a room. */
+  def load(port: Valid[Load], clock: Clock, config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Unit = {
+    port.valid.poke(true)
+    for (memory <- AttributeMemories(config); (word, address) <- words(memory.name).zipWithIndex) {
+      port.bits.target.poke(memory.target)
+      port.bits.address.poke(address)
+      port.bits.record.poke(word)
+      clock.step()
+    }
+    port.valid.poke(false)
+  }
 }

@@ -2,10 +2,9 @@ package colonnade.background
 
 import chisel3._
 import chisel3.util.Valid
-import chisel3.util.random.LFSR
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{AttributeMemories, Load, RoomView}
+import colonnade.formats.{Load, RoomView}
 import colonnade.numbers.StreamTester
 import colonnade.traversal.{Packed, PackedUnit}
 import colonnade.{Model, TestConfigs}
@@ -18,63 +17,23 @@ private class RoomMarchHarness(config: ColonnadeConfig)
     extends PackedUnit(new MarchRequest(config), new MarchResult(config)) {
   private val march = Module(new RoomMarch(config))
   private val maps  = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
-  private val known = maps.io.ports.head
 
   val load   = IO(Flipped(Valid(new Load(config))))
   val view   = IO(Input(UInt(march.io.view.getWidth.W)))
   val isSlow = IO(Input(Bool()))
   val events = IO(Output(new MarchEvents))
 
-  private val noise = LFSR(16)
   connect(march.io.request, march.io.result)
-  join(march.io.maps.cells, known.cells, noise(0))
-  join(march.io.maps.planes, known.planes, noise(5))
-  join(march.io.maps.albedo, known.albedo, noise(9))
-  join(march.io.maps.normals, known.normals, noise(3))
+  SlowMaps.connect(march.io.maps, maps.io.ports.head, isSlow)
   maps.io.load  := load
   march.io.view := view.asTypeOf(march.io.view)
   events        := march.io.events
-
-  private def join[Q <: Data, A <: Data](
-      asks:  AttributeChannel[Q, A],
-      knows: AttributeChannel[Q, A],
-      stall: Bool
-  ): Unit = {
-    val holds = isSlow && stall
-    knows.question.valid := asks.question.valid && !holds
-    knows.question.bits  := asks.question.bits
-    asks.question.ready  := knows.question.ready && !holds
-
-    // An answer waits, for there is one at most
-    val waiting = RegInit(false.B)
-    val kept    = Reg(chiselTypeOf(knows.answer.bits))
-    when(knows.answer.valid)(kept := knows.answer.bits)
-    asks.answer.valid := (knows.answer.valid || waiting) && !holds
-    asks.answer.bits := Mux(knows.answer.valid, knows.answer.bits, kept)
-    waiting := (knows.answer.valid || waiting) && holds
-  }
 }
 
 class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "RoomMarch"
 
-  private val names = Seq("kind", "x", "y", "entry", "isHidden", "travel", "travelExponent", "steps") ++
-    Seq("x", "y", "z").map(axis => s"point.$axis") ++ Seq("r", "g", "b").map(channel => s"albedo.$channel") ++
-    Seq("x", "y", "z").map(axis => s"normal.$axis")
-
-  private def load(unit: RoomMarchHarness, config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Unit = {
-    unit.load.valid.poke(true)
-    for {
-      memory          <- AttributeMemories(config)
-      (word, address) <- words(memory.name).zipWithIndex
-    } {
-      unit.load.bits.target.poke(memory.target)
-      unit.load.bits.address.poke(address)
-      unit.load.bits.record.poke(word)
-      unit.clock.step()
-    }
-    unit.load.valid.poke(false)
-  }
+  private val names = MarchQuestion.answer
 
   /** Compares with the model; returns its answers. */
   private def check(
@@ -90,7 +49,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     unit.view.poke(new Packed(new RoomView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
     val inputs = rays.map(ray => request.pack(ray.fields))
-    val found = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
+    val found  = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),
       (port: UInt) => port.peekInt()
     )(random, if (isSlow) 0.5 else 0, 20000)
@@ -117,7 +76,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
       test(new RoomMarchHarness(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { unit =>
         unit.clock.setTimeout(0)
         val scene = new RoomScene(config, random)
-        load(unit, config, scene.words)
+        RoomImage.load(unit.load, unit.clock, config, scene.words)
         val met = for (round <- 0 until 4) yield {
           val middle = if (round == 3) Seq(0.0, 0.0) else scene.middle
           val camera = new questions.Camera(scene.focal, middle, isTurned = round % 2 == 1)
@@ -136,7 +95,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
         assert(met.flatten.exists(_("isHidden") == 1) && met.flatten.exists(_("steps") > 5))
 
         val image = new RoomImage(config, random)
-        load(unit, config, image.words)
+        RoomImage.load(unit.load, unit.clock, config, image.words)
         for (round <- 0 until 6) {
           val camera = new questions.Camera(scene.focal, scene.middle, isTurned = true)
           check(

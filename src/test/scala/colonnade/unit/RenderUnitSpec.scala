@@ -1,10 +1,12 @@
 package colonnade.unit
 
 import chisel3._
+import chisel3.util.Valid
 import chiseltest._
 import colonnade.{Model, TestConfigs}
-import colonnade.config.{ColonnadeConfig, UnitsConfig}
-import colonnade.formats.{FrameRegisters, Pixel}
+import colonnade.background.{AttributePort, PhysicalAttributeMemory, RoomImage, SlowMaps}
+import colonnade.config.{ColonnadeConfig, MapEncoding, UnitsConfig}
+import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.traversal.Packed
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -16,28 +18,46 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "RenderUnit"
 
   private val (wide, high) = (12, 8)
+  private val names        = Seq("colour.r", "colour.g", "colour.b", "isObject", "hit.triangle", "hit.distance") ++
+    Seq("r", "g", "b").map(channel => s"ratio.$channel")
+
+  /** What ports take or offer, a seed, whether there are shadow rays, and a room. */
+  private val rounds = Seq((1.0, 1, true, true), (0.3, 2, true, true), (0.6, 3, false, true))
 
   private def render(config: ColonnadeConfig, name: String): Unit =
     it should s"give every position once, with the model's pixel: $name" in
       test(new RenderUnitHarness(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
-        for ((willing, seed, shadows) <- Seq((1.0, 1, true), (0.3, 2, true), (0.6, 3, false))) {
-          val scene     = new SmallScene(config, seed, wide, high, triangleCount = 15, shadows)
+        for ((willing, seed, shadows, hasRoom) <- if (config.hasRoom) rounds :+ ((0.6, 4, true, false)) else rounds) {
+          val scene = new SmallScene(config, seed, wide, high, triangleCount = 15, shadows)
+          val room  = Option.when(config.hasRoom)(
+            new SmallRoom(config, scene, new Random(seed), Seq(wide, high), isThere = hasRoom)
+          )
+          val registers = room.fold(scene.registers)(_.registers)
           val positions = new Random(seed).shuffle(for (x <- 0 until wide; y <- 0 until high) yield (x, y))
-          val column    = new UnitColumn(dut, config, scene, seed)
+          val column    = new UnitColumn(dut, config, registers, scene.records, room.map(_.words), seed)
           val pixels    = column.run(positions, willing)
-          val expected  = Model.pixels(config, scene.registers, scene.records, positions)
-          val hits      = expected.count(_(3) == 1)
+          val expected  =
+            Model.pixels(config, registers, scene.records, positions, room.map(_.words)).map(names.zip(_).toMap)
+          val hits = expected.count(_("isObject") == 1)
 
           assert(pixels.map(_._1).sorted == positions.sorted, "every position comes out once")
           val found = pixels.toMap
           for ((position, pixel) <- positions.zip(expected))
-            assert(found(position) == pixel.take(found(position).size), s"at $position, seed $seed")
+            assert(
+              found(position) == pixel.filter(value => found(position).contains(value._1)),
+              s"at $position, seed $seed"
+            )
           assert(column.hits == hits)
           assert(
             hits > positions.size / 6 && (if (shadows) column.shadowRays > hits / 8 else column.shadowRays == 0) &&
               (column.bouncedRays > 0) == config.frame.hasBounces,
             "there is something to see"
           )
+          if (config.hasRoom) {
+            val isDarker = expected.exists(pixel => Seq("r", "g", "b").exists(c => pixel(s"ratio.$c") < 4096))
+            assert(isDarker == (hasRoom && shadows), s"the object takes light from the room, seed $seed")
+            assert(if (hasRoom) column.roomRays >= positions.size - hits else column.roomRays == 0)
+          }
         }
       }
 
@@ -62,9 +82,18 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(lights = 1, maxBounces = 0)),
     "one light, nothing bounces"
   )
+  render(TestConfigs.withRoom(TestConfigs.room), "in a room")
+  render(
+    TestConfigs.withPrecision(16, 16, 32).copy(
+      array = TestConfigs.tiny.array.copy(contexts = 1),
+      frame = TestConfigs.tiny.frame.copy(lights = 1, maxBounces = 0, hits = false),
+      physicalAttributeMemory = Some(TestConfigs.room.copy(encoding = MapEncoding.Sliding))
+    ),
+    "in a room, one context, nothing bounces"
+  )
 }
 
-/** With the registers and each pixel in one port. */
+/** With the registers and each pixel in one port; with a room, with its maps, which take their time. */
 private class RenderUnitHarness(config: ColonnadeConfig) extends Module {
   private val unit = Module(new RenderUnit(config))
 
@@ -74,10 +103,25 @@ private class RenderUnitHarness(config: ColonnadeConfig) extends Module {
   io :<>= unit.io
   unit.io.registers := registers.asTypeOf(new FrameRegisters(config))
   pixel             := unit.io.pixels.bits.asUInt
+
+  /** To the maps. */
+  val load = Option.when(config.hasRoom)(IO(Flipped(Valid(new Load(config)))))
+  for (asks <- unit.io.maps) {
+    val maps = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
+    SlowMaps.connect(asks, maps.io.ports.head, isSlow = true.B)
+    maps.io.load := load.get
+  }
 }
 
 /** The column around one unit. */
-private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene: SmallScene, seed: Int) {
+private class UnitColumn(
+    dut:       RenderUnitHarness,
+    config:    ColonnadeConfig,
+    registers: Map[String, BigInt],
+    records:   Seq[BigInt],
+    maps:      Option[Map[String, Seq[BigInt]]],
+    seed:      Int
+) {
   private val random   = new Random(seed)
   private val banks    = config.columnBvhMemory.banks
   private val row      = 0
@@ -89,10 +133,12 @@ private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene:
   var shadowRays  = 0
   var bouncedRays = 0
   var hits        = 0
+  var roomRays    = 0
 
   dut.clock.setTimeout(0)
-  dut.registers.poke(new Packed(new FrameRegisters(config)).pack(scene.registers))
+  dut.registers.poke(new Packed(new FrameRegisters(config)).pack(registers))
   dut.io.row.poke(row)
+  for (words <- maps; port <- dut.load) RoomImage.load(port, dut.clock, config, words)
   dut.io.start.poke(true)
   dut.clock.step()
   dut.io.start.poke(false)
@@ -100,10 +146,10 @@ private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene:
   /** @param willing probability that a port takes or offers something in a cycle
     * @return position and values of the pixels in the order of time
     */
-  def run(positions: Seq[(Int, Int)], willing: Double): Seq[((Int, Int), Seq[BigInt])] = {
+  def run(positions: Seq[(Int, Int)], willing: Double): Seq[((Int, Int), Map[String, BigInt])] = {
     def isWilling = random.nextDouble() < willing
     var waiting   = positions
-    var pixels    = Vector.empty[((Int, Int), Seq[BigInt])]
+    var pixels    = Vector.empty[((Int, Int), Map[String, BigInt])]
     var offers    = false
     var idle      = 0
     while (pixels.size < positions.size) {
@@ -114,18 +160,20 @@ private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene:
       for ((x, y) <- waiting.headOption) {
         dut.io.positions.bits.x.poke(x)
         dut.io.positions.bits.y.poke(y)
+        dut.io.positions.bits.meetsObject.foreach(_.poke(maySeeObject(x, y)))
       }
       val accepts = isWilling
       dut.io.pixels.ready.poke(accepts)
 
       idle += 1
-      assert(idle < 5000, s"nothing happens after ${pixels.size} pixels")
+      assert(idle < (if (config.hasRoom) 30000 else 5000), s"nothing happens after ${pixels.size} pixels")
       dut.io.isIdle.expect(positions.size - waiting.size == pixels.size)
       dut.io.events.illegalRecord.expect(false)
       dut.io.events.stackOverflow.expect(false)
       if (dut.io.events.raysShadow.peekBoolean()) shadowRays += 1
       if (dut.io.events.raysReflection.peekBoolean() || dut.io.events.raysRefraction.peekBoolean()) bouncedRays += 1
       if (dut.io.events.hits.peekBoolean()) hits += 1
+      if (dut.io.events.raysRoom.exists(_.peekBoolean())) roomRays += 1
       if (accepts && dut.io.pixels.valid.peekBoolean()) {
         pixels :+= read(dut.pixel.peekInt())
         idle = 0
@@ -141,26 +189,29 @@ private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene:
     pixels
   }
 
-  private def read(bits: BigInt): ((Int, Int), Seq[BigInt]) = {
+  private def read(bits: BigInt): ((Int, Int), Map[String, BigInt]) = {
     val values = layout.unpack(bits)
-    val names  = Seq("colour.r", "colour.g", "colour.b", "isObject") ++
-      (if (config.frame.hits) Seq("hit.triangle", "hit.distance") else Nil)
-    (values("x").toInt, values("y").toInt) -> names.map(values)
+    (values("x").toInt, values("y").toInt) -> (values - "x" - "y")
   }
+
+  private def maySeeObject(x: Int, y: Int): Boolean =
+    Seq("x" -> x, "y" -> y).forall { case (axis, at) =>
+      registers(s"frame.objectRect.${axis}0") <= at && at < registers(s"frame.objectRect.${axis}1")
+    }
 
   /** What this row has asked for, and what others have: rows read the same scene. */
   private def broadcast(): Unit = for (bank <- 0 until banks) {
     val port = dut.io.broadcasts(bank)
     if (random.nextInt(5) == 0) {
-      val address = random.nextInt(scene.records.size) / banks * banks + bank
-      if (address < scene.records.size) inFlight(bank).enqueue((now + 1 + random.nextInt(5), address, row + 1))
+      val address = random.nextInt(records.size) / banks * banks + bank
+      if (address < records.size) inFlight(bank).enqueue((now + 1 + random.nextInt(5), address, row + 1))
     }
     val isDue = inFlight(bank).headOption.exists(_._1 <= now)
     port.valid.poke(isDue)
     if (isDue) {
       val (_, address, reader) = inFlight(bank).dequeue()
       port.bits.address.poke(address)
-      port.bits.record.poke(scene.records(address))
+      port.bits.record.poke(records(address))
       port.bits.row.poke(reader)
     }
   }
@@ -169,7 +220,7 @@ private class UnitColumn(dut: RenderUnitHarness, config: ColonnadeConfig, scene:
     dut.io.requests.ready.poke(takes)
     if (takes && dut.io.requests.valid.peekBoolean()) {
       val address = dut.io.requests.bits.address.peekInt().toInt
-      assert(address < scene.records.size)
+      assert(address < records.size)
       inFlight(address % banks).enqueue((now + 1 + random.nextInt(5), address, row))
     }
   }
