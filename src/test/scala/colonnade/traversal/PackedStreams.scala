@@ -11,6 +11,8 @@ import scala.util.Random
 final class Packed(payload: Data) {
   private val fields = Layout.of(payload)
 
+  val width: Int = payload.getWidth
+
   def pack(values: Map[String, BigInt]): BigInt = {
     val unknown = values.keySet -- fields.map(_.name)
     require(unknown.isEmpty, s"no fields ${unknown.mkString(", ")}")
