@@ -141,14 +141,19 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "deal every tile to the columns where units take all, whatever the object's rectangle meets" in {
+  it should "deal the tiles of the room's window to the columns, whatever the object's rectangle meets" in {
     test(new FrameController(config)) { dut =>
       dut.clock.setTimeout(0)
-      val bench = new Bench(dut)
-      for ((takesAll, tiles) <- Seq(true -> 48, false -> 1, true -> 48)) {
-        dut.io.takesAll.poke(takesAll)
+      val bench  = new Bench(dut)
+      val window = dut.io.window
+      for ((hasWindow, right, tiles) <- Seq((true, 64, 48), (false, 64, 1), (true, 17, 18))) {
+        window.isThere.poke(hasWindow)
+        window.rect.x0.poke(0)
+        window.rect.y0.poke(0)
+        window.rect.x1.poke(right)
+        window.rect.y1.poke(48)
         assert(bench.frame(64, 48, watchdog = 0, rect = Some((9, 9, 15, 15))).nonEmpty)
-        bench.expectTiles(64, 48, tile => takesAll || tile == (8, 8))
+        bench.expectTiles(64, 48, tile => (hasWindow && tile._1 < right) || tile == (8, 8))
         assert(bench.columns.map(_.tiles.size).sum == tiles)
       }
     }

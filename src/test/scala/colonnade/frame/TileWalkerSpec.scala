@@ -77,7 +77,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  for ((takesAll, claim) <- Seq(false -> "sort out the pixels", true -> "give units the pixels of a room, too,"))
+  for ((hasWindow, claim) <- Seq(false -> "sort out the pixels", true -> "give units the room's window, too,"))
     it should s"$claim outside the outline, whoever is ready" in {
       val random = new Random(3)
       test(new TileWalker(config(rows = 3, tileSize = 8, TestConfigs.withRoom(TestConfigs.room)))) { dut =>
@@ -85,7 +85,13 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
         edge.x.poke(3)
         edge.y.poke(-2)
         edge.offset.poke(-9)
-        dut.io.takesAll.poke(takesAll)
+        val window = dut.io.window
+        window.isThere.poke(hasWindow)
+        Seq(window.rect.x0, window.rect.y0, window.rect.x1, window.rect.y1).zip(Seq(2, 3, 12, 15)).foreach {
+          case (port, value) => port.poke(value)
+        }
+        val inWindow = (pixel: (Int, Int)) =>
+          hasWindow && pixel._1 >= 2 && pixel._2 >= 3 && pixel._1 < 12 && pixel._2 < 15
         var claims         = Map.empty[(Int, Int), Boolean]
         val (positions, _) =
           walk(
@@ -98,7 +104,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
         val (others, units)     = positions.partition(_._1 < 0)
         val expected            = Seq((0, 0), (8, 8)).flatMap(pixels((640, 480), _, 8))
         val sees                = (pixel: (Int, Int)) => 3 * pixel._1 - 2 * pixel._2 - 9 >= 0
-        val (isTaken, isOthers) = expected.partition(pixel => takesAll || sees(pixel))
+        val (isTaken, isOthers) = expected.partition(pixel => inWindow(pixel) || sees(pixel))
         assert(units.map(_._2).sorted == isTaken.sorted)
         assert(others.map(_._2) == isOthers)
         assert(claims == isTaken.map(pixel => pixel -> sees(pixel)).toMap)

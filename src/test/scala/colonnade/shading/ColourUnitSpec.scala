@@ -151,9 +151,12 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     )
   }
 
-  /** A surface of the context. */
+  /** A surface of the context; some lights are as bright as the ambient one, so that the rest is an exact half. */
   private def remember(context: Int): TestSurface = {
-    val surface = TestSurface(colour(), Seq.fill(config.frame.lights)(intensity()))
+    val surface = TestSurface(
+      colour(),
+      Seq.fill(config.frame.lights)(if (random.nextInt(3) == 0) ambient else intensity())
+    )
     dut.io.surface.valid.poke(true)
     dut.io.surface.bits.context.poke(context)
     pokeUInt(dut.io.surface.bits.albedo, surface.albedo)

@@ -164,13 +164,13 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       random: Random,
       stalls: Double
   ): (Seq[Either[HitQuestion, RoomPointQuestion]], Seq[BigInt]) = {
-    val io                          = shader.io
-    val room                        = io.room.get
-    var (hitsLeft, pointsLeft)      = (hits, points)
-    var (isPromised, offers)        = (false, false)
-    var (taken, results)            = (Vector.empty[Either[HitQuestion, RoomPointQuestion]], Vector.empty[BigInt])
-    var idle                        = 0
-    def isWilling                   = random.nextDouble() >= stalls
+    val io                     = shader.io
+    val room                   = io.room.get
+    var (hitsLeft, pointsLeft) = (hits, points)
+    var (isPromised, offers)   = (false, false)
+    var (taken, results)       = (Vector.empty[Either[HitQuestion, RoomPointQuestion]], Vector.empty[BigInt])
+    var idle                   = 0
+    def isWilling              = random.nextDouble() >= stalls
     while (results.size < hits.size + points.size) {
       val comes = isPromised && hitsLeft.nonEmpty && isWilling
       offers = pointsLeft.nonEmpty && (offers || isWilling)
@@ -216,8 +216,9 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
           val points           = Seq.fill(12)(questions.roomPoint())
           val (taken, results) = mix(shader, hits, points, random, stalls)
           val ofHits           =
-            hits.zip(Model.answers(config, hits.map(ShaderQuestions.words(_, light)), "shade")).map { case (hit, answer) =>
-              Left(hit) -> expected(answer, hit, light)
+            hits.zip(Model.answers(config, hits.map(ShaderQuestions.words(_, light)), "shade")).map {
+              case (hit, answer) =>
+                Left(hit) -> expected(answer, hit, light)
             }
           val ofPoints =
             points.zip(Model.answers(config, points.map(ShaderQuestions.words(_, light)), "lightroom")).map {
