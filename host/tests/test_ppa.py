@@ -194,10 +194,12 @@ def test_flip_flops_and_their_clock_gate_are_counted(small: Library) -> None:
 
 
 def test_what_enables_a_clock_must_be_set_up(small: Library) -> None:
-    netlist = Netlist({"top": module({"gate": cell("GATE", C=2, E=3, G=9)}, {})}, "top", small)
+    cells = {"gate": cell("GATE", C=2, E=3, G=5), "kept_register": cell("DFF", C=5, D=4, Q=9)}
+    netlist = Netlist({"top": module(cells, {"d": 4, "g": 5})}, "top", small)
     path = Analysis(netlist, small).timing().input_to_register
     assert path is not None
     assert path.ns == pytest.approx(7e-3)
+    assert path.end == "clock of kept"
 
 
 def test_a_dozen_words_cost_more_a_bit_than_a_macro() -> None:
