@@ -30,6 +30,11 @@ LIBERTY = """library (small) {
     pin (C) { direction : input; capacitance : 1; internal_power () { rise_power (scalar) { values ("1"); }
       fall_power (scalar) { values ("1"); } } }
     pin (D) { direction : input; capacitance : 1; } pin (Q) { direction : output; function : "IQN"; } }
+  cell (GATE) { area : 4; clock_gating_integrated_cell : "latch_posedge"; statetable ("C E", "M") { }
+    pin (C) { direction : input; capacitance : 1; clock_gate_clock_pin : true; }
+    pin (E) { direction : input; capacitance : 1; clock_gate_enable_pin : true; timing () { related_pin : "C";
+      timing_type : setup_rising; rise_constraint (scalar) { values ("7"); } } }
+    pin (G) { direction : output; clock_gate_out_pin : true; state_function : "C & M"; } }
 }
 """
 

@@ -18,6 +18,7 @@ from colonnade.ppa.guard import differences, gates_of_tiny
 from colonnade.ppa.hierarchy import BORDERS, Hierarchy, Memory
 from colonnade.ppa.netlist import Netlist
 from colonnade.ppa.page import page
+from colonnade.ppa.synthesis import Technology, count_gates
 from colonnade.ppa.timing import Analysis
 
 GUARD = Path(__file__).parent / "ppa_tiny.json"
@@ -51,6 +52,11 @@ LIBERTY = f"""/* small */ library (small) {{
       rise_constraint (s) {{ values ("3, 4", "3, 4"); }} fall_constraint (s) {{ values ("3, 4", "3, 4"); }} }} }}
     pin (Q) {{ direction : output; function : "I";
       {(ARC % ("C", "non_unate")).replace("timing_sense", "timing_type : rising_edge; timing_sense")} }} }}
+  cell (GATE) {{ area : 4; clock_gating_integrated_cell : latch_posedge; statetable ("C E", "M") {{ }}
+    pin (C) {{ direction : input; clock_gate_clock_pin : true; }}
+    pin (E) {{ direction : input; clock_gate_enable_pin : true; timing () {{ related_pin : "C";
+      timing_type : setup_rising; rise_constraint (s) {{ values ("7, 7", "7, 7"); }} }} }}
+    pin (G) {{ direction : output; clock_gate_out_pin : true; state_function : "C & M"; }} }}
 }}
 """
 
@@ -70,7 +76,7 @@ def test_tables_are_bilinear_and_go_straight_on() -> None:
 
 
 def test_a_liberty_is_read_in_ns_and_pf(small: Library) -> None:
-    assert set(small.cells) == {"NAND", "ANDB", "INV", "DFF"}
+    assert set(small.cells) == {"NAND", "ANDB", "INV", "DFF", "GATE"}
     assert small.nand2.name == "NAND"
     assert small.inverter.name == "INV"
     assert small.cells["DFF"].is_register
@@ -174,6 +180,26 @@ def test_units_are_where_synthesis_stops(tmp_path: Path) -> None:
     assert hierarchy.header("Queue") == "module Queue(\n  input clock\n);\nendmodule\n"
     (memory,) = hierarchy.memories()
     assert (memory.level, memory.unit, memory.count, memory.bits) == ("column", "rest of Column", 1, 32)
+
+
+def test_flip_flops_and_their_clock_gate_are_counted(small: Library) -> None:
+    gate = small.cells["GATE"].clock_gate
+    assert gate is not None
+    assert (gate.clock, gate.enable, gate.gated) == ("C", "E", "G")
+    assert small.has_clock_gates
+    assert small.cells["DFF"].clock_gate is None
+    cells = {"gate": cell("GATE", C=2, E=5, G=6), "kept": cell("DFF", C=6, D=4, Q=7), "not": cell("INV", A=7, Y=8)}
+    gates = count_gates({"cells": cells}, Technology(small, "", None))
+    assert (gates.registers, gates.combinational, gates.flops) == (13 / 2, 1 / 2, 1)
+
+
+def test_what_enables_a_clock_must_be_set_up(small: Library) -> None:
+    cells = {"gate": cell("GATE", C=2, E=3, G=5), "kept_register": cell("DFF", C=5, D=4, Q=9)}
+    netlist = Netlist({"top": module(cells, {"d": 4, "g": 5})}, "top", small)
+    path = Analysis(netlist, small).timing().input_to_register
+    assert path is not None
+    assert path.ns == pytest.approx(7e-3)
+    assert path.end == "clock of kept"
 
 
 def test_a_dozen_words_cost_more_a_bit_than_a_macro() -> None:

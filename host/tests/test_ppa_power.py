@@ -18,9 +18,9 @@ from colonnade.ppa import energies, opensta
 from colonnade.ppa.cells import Library
 from colonnade.ppa.delays import NetTiming
 from colonnade.ppa.netlist import Netlist
-from colonnade.ppa.power import power_of
+from colonnade.ppa.power import Power, power_of
 from colonnade.ppa.power_page import power_table, unit_power_table
-from colonnade.ppa.power_report import node_scale
+from colonnade.ppa.power_report import by_unit, node_scale
 from colonnade.ppa.recording import Stimulus, require_recordable
 from colonnade.ppa.replay import Activity
 from colonnade.ppa.tree_gain import reduced
@@ -63,6 +63,27 @@ def test_power_is_capacitance_and_tables_times_changes(library: Library, tmp_pat
     assert power[""].leakage == pytest.approx(5e-9)
     assert power["Unit"].dynamic == 0
     assert power["Unit"].leakage == pytest.approx(5e-9)
+
+
+def test_the_clock_pays_for_its_gates(library: Library, tmp_path: Path) -> None:
+    cells = {"gate": cell("GATE", C=2, E=4, G=5), "kept": cell("DFFN", C=5, D=4, Q=6)}
+    netlist = Netlist({"top": top(cells, {"e": [4]}, {"q": [6]})}, "top", library)
+    found = energies.load([tmp_path / "small.lib"], ["GATE", "DFFN"])
+    timing = NetTiming([1] * netlist.size, [0.0] * netlist.size, [0.0] * netlist.size)
+    changes = [0] * netlist.size
+    ((gated, _),) = netlist.clock_gates()
+    (clock,) = (bit for bit in netlist.inputs["clock"] if not isinstance(bit, bool))
+    changes[clock], changes[gated] = 20, 10
+    power = power_of(netlist, found, timing, changes, cycles=10, megahertz=1000)[""]
+    # The gate's clock pin, 2 fJ twice a cycle; the register's, 3 fJ twice in every other
+    assert power.clock == power.dynamic == pytest.approx(4e-3 + 3e-3)
+
+
+def test_power_belongs_to_the_innermost_unit() -> None:
+    flat = Power(1.0, 2.0, 3.0)
+    owners = ("", "Queue", "Shader", "Shader/CosineUnit", "Shader/BounceUnit", "Shader/BounceUnit/Divider")
+    found = by_unit(dict.fromkeys(owners, flat))
+    assert {unit: power.clock for unit, power in found.items()} == {"contexts": 2, "Shader": 2, "BounceUnit": 2}
 
 
 def test_meshes_are_reduced_to_whole_faces() -> None:

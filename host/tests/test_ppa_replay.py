@@ -78,6 +78,32 @@ def test_registers_begin_with_zero_behind_their_inverter(library: Library, hiera
         replay(netlist, hierarchy, [5] * netlist.size, wrong)
 
 
+def test_a_register_behind_a_clock_gate_keeps_its_value(library: Library, hierarchy: Hierarchy) -> None:
+    cells = {
+        "gate": cell("GATE", C=2, E=5, G=6),
+        "kept": cell("DFFN", C=6, D=4, Q=7),
+        "right": cell("INV", A=7, Y=8),
+    }
+    netlist = Netlist({"top": top(cells, {"a": [4], "e": [5]}, {"q": [8]})}, "top", library)
+    # Inputs are reset, a, e; q is the last a that came with e
+    steps = [(0b00, 0), (0b11, 0), (0b00, 1), (0b10, 1), (0b01, 1), (0b10, 0)]
+    seen = recording(netlist, steps)
+    activity = replay(netlist, hierarchy, [5] * netlist.size, seen)
+    ((gated, enable),) = netlist.clock_gates()
+    assert netlist.inputs["e"] == [enable]
+    assert (activity.changes[gated], activity.settled[gated]) == (4, 4)
+    wrong = replace(seen, cycles=(*steps[:3], (0b10, 0), *steps[4:]))
+    with pytest.raises(RuntimeError, match="cycle 3: q is 1, not 0"):
+        replay(netlist, hierarchy, [5] * netlist.size, wrong)
+
+
+def test_a_gate_of_another_clock_is_refused(library: Library, hierarchy: Hierarchy) -> None:
+    cells = {"gate": cell("GATE", C=4, E=5, G=6), "kept": cell("DFFN", C=6, D=4, Q=7)}
+    netlist = Netlist({"top": top(cells, {"a": [4], "e": [5]}, {"q": [7]})}, "top", library)
+    with pytest.raises(RuntimeError, match="another clock"):
+        replay(netlist, hierarchy, [5] * netlist.size, recording(netlist, [(0, 0)]))
+
+
 def test_data_counts_where_its_stream_is_valid(library: Library, hierarchy: Hierarchy) -> None:
     ports = {"s_valid": [4], "s_bits_x": [5]}
     netlist = Netlist({"top": top({}, {"v": [4], "x": [5]}, ports)}, "top", library)

@@ -76,14 +76,24 @@ class State:
 
 
 @dataclass(frozen=True)
+class ClockGate:
+    """An integrated clock gate: its pins of the clock, of what enables it, and of the gated clock."""
+
+    clock: str
+    enable: str
+    gated: str
+
+
+@dataclass(frozen=True)
 class Cell:
-    """A cell; area in µm²; `state` is of flip-flops alone."""
+    """A cell; area in µm²; `state` is of flip-flops alone, `clock_gate` of clock gates, which are registers, too."""
 
     name: str
     area: float
     is_register: bool
     pins: dict[str, Pin]
     state: State | None = None
+    clock_gate: ClockGate | None = None
 
     def is_gate(self, function: str) -> bool:
         """It computes `function`, a key of `_SPELLINGS`, and nothing else."""
@@ -118,6 +128,11 @@ class Library:
     def inverter(self) -> Cell:
         """The quickest of the smallest inverters."""
         return min(self._gates("inverter"), key=lambda cell: (cell.area, fan_out_of_four(cell)))
+
+    @property
+    def has_clock_gates(self) -> bool:
+        """Flip-flops with an enable may share a gated clock instead of a multiplexer each."""
+        return any(cell.clock_gate for cell in self.cells.values())
 
     @property
     def fo4(self) -> float:

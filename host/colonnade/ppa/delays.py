@@ -23,7 +23,8 @@ def net_timing(analysis: Analysis, size: int) -> NetTiming:
     for instance in (*analysis.registers, *analysis.order):
         for pin, arcs in analysis.outputs(instance.cell):
             net = instance.nets.get(pin.name)
-            if net is None or not arcs:
+            # A gated clock is as ideal as the clock
+            if net is None or not arcs or instance.cell.clock_gate:
                 continue
             load, found = analysis.loads[net], []
             for arc in arcs:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from colonnade.errors import UserError
 from colonnade.ppa.functions import truth_table
 from colonnade.ppa.hierarchy import Hierarchy
 from colonnade.ppa.netlist import Bit, Box, Instance, Netlist
 from colonnade.ppa.recording import CLOCK, Port
+
+#: What a register behind a clock gate also looks at: the gate's enable, and itself.
+_ENABLE, _HELD = "clock_gate_enables", "register_holds"
 
 
 def lines(
@@ -32,9 +36,13 @@ def lines(
         yield from (f"output {_text(bit)}" for bit in netlist.outputs[port.name])
     yield from (f"tie {net} {value:d}" for net, value in netlist.ties.items())
     tables: dict[tuple[str, ...], str] = {}
+    gates = dict(netlist.clock_gates())
     for net, instance, pin in netlist.drivers():
+        if instance.cell.clock_gate:
+            _require_clock(instance, instance.cell.clock_gate.clock, netlist)
+            continue
         if instance.cell.is_register:
-            yield _register(net, instance, pin, delays[net], netlist, tables)
+            yield _register(net, instance, pin, delays[net], netlist, gates, tables)
         else:
             table, nets = _function(instance, instance.cell.pins[pin].function, tables)
             yield f"gate {net} {delays[net]} {table} {nets}"
@@ -56,18 +64,40 @@ def require_all_driven(netlist: Netlist) -> None:
 
 
 def _register(
-    net: int, instance: Instance, pin: str, delay: int, netlist: Netlist, tables: dict[tuple[str, ...], str]
+    net: int,
+    instance: Instance,
+    pin: str,
+    delay: int,
+    netlist: Netlist,
+    gates: Mapping[int, Bit],
+    tables: dict[tuple[str, ...], str],
 ) -> str:
-    """One output of a flip-flop. It begins as if it had taken zero: so does a register of the simulated RTL."""
+    """One output of a flip-flop. It begins as if it had taken zero: so does a register of the simulated RTL.
+
+    Behind a clock gate, one of `gates`, it keeps its value where the gate is not enabled.
+    """
     cell, state = instance.cell, instance.cell.state
     if state is None or re.search(rf"\b({state.name}|{state.inverse})\b", state.following):
         raise UserError(f"{cell.name} of the liberty is no plain flip-flop: power knows no others")
-    if [instance.nets.get(state.clock)] != netlist.inputs[CLOCK]:
-        raise RuntimeError(f"the register {instance.name or cell.name} has another clock than the others")
+    clock = instance.nets.get(state.clock, -1)
+    if clock not in gates:
+        _require_clock(instance, state.clock, netlist)
     function = re.sub(rf"\b{state.inverse}\b", f"(!{state.name})", cell.pins[pin].function)
     following = re.sub(rf"\b{state.name}\b", f"({state.following})", function)
+    first = _function(instance, following, tables)[0][0]
+    if clock in gates:
+        enable = gates[clock]
+        wires = {_HELD: net} | ({} if isinstance(enable, bool) else {_ENABLE: enable})
+        ties = {_ENABLE: enable} if isinstance(enable, bool) else {}
+        instance = replace(instance, nets=instance.nets | wires, ties=instance.ties | ties)
+        following = f"({_ENABLE} & ({following})) | (!{_ENABLE} & {_HELD})"
     table, nets = _function(instance, following, tables)
-    return f"register {net} {delay} {table[0]} {table} {nets}"
+    return f"register {net} {delay} {first} {table} {nets}"
+
+
+def _require_clock(instance: Instance, pin: str, netlist: Netlist) -> None:
+    if [instance.nets.get(pin)] != netlist.inputs[CLOCK]:
+        raise RuntimeError(f"the register {instance.name or instance.cell.name} has another clock than the others")
 
 
 def _function(instance: Instance, function: str, tables: dict[tuple[str, ...], str]) -> tuple[str, str]:

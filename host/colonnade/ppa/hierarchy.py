@@ -11,10 +11,10 @@ from pathlib import Path
 
 #: Units of a level, in the order of the data; what is left of the level's module is a unit too, named last.
 RENDER_UNIT = (
-    *("RayGenerator", "RaySetup", "BoxUnit", "TraversalStack", "TriangleUnit", "Shader"),
-    *("ShadowRays", "ColourUnit", "RtController", "RecordFetch", "HitTable"),
+    *("RayGenerator", "RaySetup", "BoxUnit", "TraversalStack", "TriangleUnit", "Shader", "BounceUnit"),
+    *("ShadowRays", "ColourUnit", "RoomStage", "RtController", "RecordFetch", "HitTable"),
 )
-COLUMN = ("ColumnBvhController", "TileWalker", "BackgroundWalker", "PixelCollector")
+COLUMN = ("ColumnBvhController", "ColumnRoom", "TileWalker", "BackgroundWalker", "PixelCollector")
 DEVICE = ("FrameController", "RegisterFile", "CounterFile")
 
 #: Modules within a unit that are synthesised on their own and counted in it: what divides and takes roots.

@@ -14,12 +14,12 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from colonnade.errors import UserError
-from colonnade.ppa.cells import Arc, Cell, Library, Pin, State, Table
+from colonnade.ppa.cells import Arc, Cell, ClockGate, Library, Pin, State, Table
 
-#: Cells for scan, clock gating, power domains and probing; delay cells.
+#: Cells for scan, power domains and probing; delay cells.
 AVOIDED = (
-    *("*lpflow*", "*probe*", "*dlclk*", "*sparecell*", "*dlygate*", "*dlymetal*", "*clkdly*"),
-    *("*__sdf*", "*__sedf*", "*__edf*", "*__dfbb*", "ICG*", "SDF*"),
+    *("*lpflow*", "*probe*", "*sdlclk*", "*sparecell*", "*dlygate*", "*dlymetal*", "*clkdly*"),
+    *("*__sdf*", "*__sedf*", "*__edf*", "*__dfbb*", "SDF*"),
 )
 
 _DROPPED = re.compile(
@@ -177,7 +177,8 @@ class Reader:
                 continue
             pins = {pin.name: pin for part in group.of("pin") for pin in [self._pin(part)]}
             is_register = any(True for _ in group.of("ff", "latch", "statetable"))
-            yield name, Cell(name, float(group.text("area", "0")), is_register, pins, _state(group))
+            area = float(group.text("area", "0"))
+            yield name, Cell(name, area, is_register, pins, _state(group), _clock_gate(group))
 
     def _pin(self, group: Group) -> Pin:
         arcs = tuple(self._arc(timing) for timing in group.of("timing"))
@@ -219,6 +220,19 @@ def _state(cell: Group) -> State | None:
             names = [word.strip('"') for word in group.arguments]
             return State(names[0], names[1], group.text("clocked_on"), group.text("next_state"))
     return None
+
+
+def _clock_gate(cell: Group) -> ClockGate | None:
+    """Of an integrated clock gate for rising edges, with a latch; None for all other cells."""
+    if not cell.text("clock_gating_integrated_cell").startswith("latch_posedge"):
+        return None
+    roles = ("clock", "enable", "out")
+    found = [pin.arguments[0].strip('"') for role in roles for pin in cell.of("pin") if _is_gate_pin(pin, role)]
+    return ClockGate(*found) if len(found) == len(roles) else None
+
+
+def _is_gate_pin(pin: Group, role: str) -> bool:
+    return pin.text(f"clock_gate_{role}_pin") == "true"
 
 
 def _numbers(words: Sequence[str]) -> list[float]:

@@ -165,6 +165,14 @@ class Netlist:
                     self.ties[nets[outside]] = inside == "1"
         return ports
 
+    def clock_gates(self) -> Iterator[tuple[int, Bit]]:
+        """Each gated clock, and what enables it."""
+        for instance in self.instances:
+            gate = instance.cell.clock_gate
+            if gate is not None:
+                wires: dict[str, Bit] = {**instance.nets, **instance.ties}
+                yield instance.nets[gate.gated], wires[gate.enable]
+
     def drivers(self) -> Iterator[tuple[int, Instance, str]]:
         """Each net that a cell drives, the cell, and its pin."""
         for instance in self.instances:

@@ -15,6 +15,7 @@ from typing import Any
 
 from colonnade.files import replacing
 from colonnade.performance_page import markdown
+from colonnade.ppa.area_page import equal_area, gates
 from colonnade.ppa.hierarchy import LEVELS
 from colonnade.ppa.power_page import power_table, unit_power_table
 from colonnade.ppa.text import LIBRARIES, MOST_FO4, TITLES, second_opinion
@@ -36,7 +37,8 @@ def page(text: str, data: Path) -> str:
         if precision:
             reports = _reports(data, precision)
             of_precision = {"units": units, "totals": totals, "tables": tables, "paths": paths}
-            of_precision |= {"power": power_table, "unitpower": unit_power_table}
+            of_precision |= {"power": power_table, "unitpower": unit_power_table, "gates": gates}
+            of_precision |= {"equal": lambda reports: equal_area(reports, data)}
             body = of_precision[kind](reports) if reports else ""
         else:
             of_all = {"bvh": bvh, "nodes": nodes, "gain": gain, "ecp5": ecp5, "libraries": libraries}

@@ -57,7 +57,7 @@ def power_of(
     for instance in netlist.instances:
         energy, owner = energies.cells[instance.cell.name], instance.owner
         leakage[owner] += energy.leakage
-        state = instance.cell.state
+        clocked = _clock_pins(instance)
         for name, net in instance.nets.items():
             if changes[net] == 0:
                 continue
@@ -67,11 +67,17 @@ def power_of(
             else:
                 each = energy.of_transition(name, _slew(instance, timing), timing.loads[net])
             dynamic[owner] += each * changes[net]
-            if state is not None and name == state.clock:
+            if name in clocked:
                 clock[owner] += each * changes[net]
     # pJ a cycle times MHz are µW
     scale = megahertz / cycles / 1e3
     return {owner: Power(clock[owner] * scale, dynamic[owner] * scale, leakage[owner]) for owner in leakage}
+
+
+def _clock_pins(instance: Instance) -> tuple[str, ...]:
+    """Those whose power is the clock's: of a flip-flop one, of a clock gate the clock's way through it."""
+    state, gate = instance.cell.state, instance.cell.clock_gate
+    return (gate.clock, gate.gated) if gate else (state.clock,) if state else ()
 
 
 def _slew(instance: Instance, timing: NetTiming) -> float:

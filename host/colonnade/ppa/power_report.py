@@ -84,7 +84,7 @@ def measure_power(
         scale = node_scale(into.library.nand2.area, cells.voltage)
         totals, units = dict[str, dict[str, Any]](), dict[str, dict[str, float]]()
         for name, changes in (("zero_delay", activity.settled), ("glitch_aware", activity.changes)):
-            found = _by_unit(power_of(netlist, cells, timing, changes, activity.cycles, megahertz))
+            found = by_unit(power_of(netlist, cells, timing, changes, activity.cycles, megahertz))
             total = _total(found.values(), sum(kinds.values()))
             totals[name] = {
                 **total,
@@ -161,11 +161,12 @@ def _memories(
 
 
 def _unit(owner: str) -> str:
-    return owner.split("/")[0] or LEVEL.rest
+    """The innermost unit; a unit may hold another."""
+    return next((module for module in reversed(owner.split("/")) if module in LEVEL.units), LEVEL.rest)
 
 
-def _by_unit(powers: Mapping[str, Power]) -> dict[str, Power]:
-    """Parts belong to their units."""
+def by_unit(powers: Mapping[str, Power]) -> dict[str, Power]:
+    """The power of each unit from that of each owner of gates: parts belong to their units."""
     found: dict[str, Power] = {}
     for owner, power in powers.items():
         other = found.get(_unit(owner), Power(0.0, 0.0, 0.0))

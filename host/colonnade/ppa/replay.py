@@ -140,6 +140,10 @@ def _activity(counts: Sequence[str], cycles: int, netlist: Netlist) -> Activity:
     # The simulator has no clock: registers take their inputs between two cycles
     for net in netlist.inputs[CLOCK]:
         found[net] = (2 * cycles, 2 * cycles, 0.5)
+    for net, enable in netlist.clock_gates():
+        share = float(enable) if isinstance(enable, bool) else found[enable][2]
+        pulses = round(share * cycles)
+        found[net] = (2 * pulses, 2 * pulses, share / 2)
     changes, settled, high = zip(*found, strict=True)
     return Activity(cycles, changes, settled, high, accesses)
 

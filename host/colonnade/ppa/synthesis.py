@@ -30,6 +30,9 @@ from colonnade.toolchain import cache_directory, project_root
 #: Registers that dfflibmap would prefer to smaller ones, since their output is not inverted.
 LARGE_REGISTERS = ("DFFHQx4*", "DFFLQx4*")
 
+#: Flip-flops that share an enable and are as many get a gated clock: a gate takes as much as their multiplexers.
+LEAST_GATED = 4
+
 #: Transistors of Yosys's own gates in static CMOS, by its ``stat -tech cmos``; four are one gate equivalent.
 TRANSISTORS = {
     "$_BUF_": 4,
@@ -181,7 +184,10 @@ def _script(hierarchy: Hierarchy, top: str, own: list[str], ends: list[str], int
         target = f"-D {1000 * (into.delay or 0):.0f} -constr constraints"
         sizing = ";buffer,-c;topo;upsize,{D};dnsize,{D};stime,-p"
         # A register keeps its name though its output may vanish behind an inverter
-        script += ["splitnets", "rename -wire -suffix _register t:$_*DFF*", f"dfflibmap {large} {cells}", "opt"]
+        script += ["splitnets", "rename -wire -suffix _register t:$_*DFF*"]
+        if into.library.has_clock_gates:
+            script += [f"clockgate {cells} -min_net_size {LEAST_GATED}"]
+        script += [f"dfflibmap {large} {cells}", "opt"]
         script += [f"abc -script {recipe}{sizing} {cells} {target}"]
     return [*script, "setundef -zero", "splitnets", "opt_clean -purge"]
 
@@ -233,5 +239,9 @@ def count_gates(netlist: dict[str, Any], into: Technology) -> Gates:
             continue
         registers += gates * number if is_register else 0.0
         combinational += 0.0 if is_register else gates * number
-        flops += number if is_register else 0
+        flops += number if is_register and not _is_clock_gate(kind, into) else 0
     return Gates(registers, combinational, flops)
+
+
+def _is_clock_gate(kind: str, into: Technology) -> bool:
+    return into.library is not None and into.library.cells[kind].clock_gate is not None

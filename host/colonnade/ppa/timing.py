@@ -178,6 +178,10 @@ class Analysis:
         return self._netlist.names.get(net, "a net without a name")
 
     def _register_name(self, register: Instance) -> str:
+        gate = register.cell.clock_gate
+        if gate is not None:
+            gated = [each for each in self.registers if register.nets[gate.gated] in each.nets.values()]
+            return f"clock of {next((self._register_name(each) for each in gated if each is not register), 'nothing')}"
         nets = [register.nets[pin.name] for pin, _ in self.outputs(register.cell) if pin.name in register.nets]
         named = [self._netlist.names[net] for net in nets if net in self._netlist.names]
         return register.name or (named[0] if named else self._name(nets[0]) if nets else "a register")
