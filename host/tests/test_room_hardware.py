@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,10 +43,12 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
     image = with_room(pack(mesh, design.manifest, made_of(mesh.materials, material)), held, design.manifest)
     scene = replace(TABLE, material=material, more_lights=(SECOND,))
     views = [(scene, True), (scene, False), (replace(scene, more_lights=(), paths=Paths(bounces=0)), False)]
-    registers: list[Mapping[str, int]] = [
+    registers: list[dict[str, int]] = [
         placement(view, image.header, design.manifest, 80, 60, held, relit) for view, relit in views
     ]
-    simulated = render_rtl(design, image, registers, Stalls(20, 5))
+    # Far off the surface it shows on which side of it a ray starts
+    registers.append(registers[1] | {"shading.offset": 64 * registers[1]["shading.offset"]})
+    simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
     for frame, settings in zip(simulated.frames, registers, strict=True):
         model = render_model(design.manifest, image, settings)
         assert frame.errors == model.errors == []
