@@ -17,7 +17,6 @@ from colonnade.ppa.cells import Library, Table
 from colonnade.ppa.guard import differences, gates_of_tiny
 from colonnade.ppa.hierarchy import BORDERS, Hierarchy, Memory
 from colonnade.ppa.netlist import Netlist
-from colonnade.ppa.page import page
 from colonnade.ppa.synthesis import Technology, count_gates
 from colonnade.ppa.timing import Analysis
 
@@ -229,15 +228,6 @@ def test_wrong_input_is_one_line(monkeypatch: pytest.MonkeyPatch, arguments: tup
     assert result.exit_code == 2
     assert message in result.stderr
     assert len(result.stderr.splitlines()) == 1
-
-
-def test_the_page_keeps_its_text_and_names_what_is_missing(tmp_path: Path) -> None:
-    text = "# Cost\n<!-- units_32b32s64d -->\nold\n<!-- end -->\nprose\n<!-- ecp5 -->\n<!-- end -->\n"
-    missing = "Not measured: run `tools/ppa`."
-    written = (
-        f"# Cost\n<!-- units_32b32s64d -->\n{missing}\n<!-- end -->\nprose\n<!-- ecp5 -->\n{missing}\n<!-- end -->\n"
-    )
-    assert page(text, tmp_path) == written
 
 
 def test_a_changed_area_is_told() -> None:

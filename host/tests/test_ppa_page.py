@@ -1,4 +1,4 @@
-"""The page's tables of where a render unit's gates are, and of rays at equal area."""
+"""The page: its text stays, tables say what is missing; where the gates are, and rays at equal area."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from colonnade.ppa.area_page import equal_area, gates
+from colonnade.ppa.page import page
 
 
 def report() -> dict[str, Any]:
@@ -51,3 +52,12 @@ def test_rays_at_equal_area_are_fewer_by_the_area(tmp_path: Path) -> None:
     rows = [line.split("|")[3:6] for line in equal_area({"yosys": report()}, tmp_path).splitlines()[2:]]
     figures = [[float(cell) for cell in row] for row in rows]
     assert figures == [pytest.approx(row) for row in ([4.0, 2.0, 6.0], [4.6, 2.3, 5.2], [8.0, 4.0, 3.0])]
+
+
+def test_the_page_keeps_its_text_and_names_what_is_missing(tmp_path: Path) -> None:
+    text = "# Cost\n<!-- units_32b32s64d -->\nold\n<!-- end -->\nprose\n<!-- ecp5 -->\n<!-- end -->\n"
+    missing = "Not measured: run `tools/ppa`."
+    written = (
+        f"# Cost\n<!-- units_32b32s64d -->\n{missing}\n<!-- end -->\nprose\n<!-- ecp5 -->\n{missing}\n<!-- end -->\n"
+    )
+    assert page(text, tmp_path) == written
