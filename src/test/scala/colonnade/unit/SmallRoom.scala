@@ -50,6 +50,10 @@ final class SmallRoom(
     }
     scene.registers ++ light ++ view.fields.map { case (name, value) => s"room.$name" -> value } ++ Map[String, BigInt](
       "room.isThere"        -> (if (isThere) 1 else 0),
+      "room.window.x0"      -> 0,
+      "room.window.y0"      -> 0,
+      "room.window.x1"      -> frame(0),
+      "room.window.y1"      -> frame(1),
       "camera.direction.x"  -> (scaled(corner(0)) >> stepShift),
       "camera.direction.y"  -> (scaled(-corner(1)) >> stepShift),
       "camera.stepX.x"      -> scaled(steps(0)),
