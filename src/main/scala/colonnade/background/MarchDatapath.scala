@@ -130,15 +130,20 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
     program.set(drop, measured.zext.pad(exponentBits))
   }
 
-  /** Two steps: quotient = ⌊numerator · 2^f / denominator⌋. */
-  def divide(numerator: => UInt, denominator: => UInt): Unit = {
+  /** Two steps: quotient = ⌊numerator · 2^f / denominator⌋. They go on at a label, if there is one.
+    *
+    * @param beside
+    *   more for the first step
+    */
+  def divide(numerator: => UInt, denominator: => UInt, next: Option[String] = None)(beside: => Unit = ()): Unit = {
     program.step {
+      beside
       division(0).choose(numerator.zext)
       division(1).choose(denominator.zext)
     }
     program.step {
       program.set(quotient, divider.io.quotient.bits)
-      program.await(divider.io.quotient.valid)
+      program.awaitOr(divider.io.quotient.valid, next.map(divider.io.quotient.valid -> _).toSeq: _*)
     }
   }
 

@@ -9,6 +9,7 @@ final class MarchEnds(
     walk:   MarchWalk,
     planes: MarchPlanes,
     pixels: MarchPixels,
+    texel:  MarchTexel,
     met:    UInt,
     view:   RoomView
 ) {
@@ -53,11 +54,16 @@ final class MarchEnds(
     to.steps          := walk.steps
   }
 
-  /** Steps after the label "meets": the way there is s / w, in the direction's own length. */
+  /** Steps after the label "meets": which pixel is it, and the way there, s / w in the direction's own length. */
   def describeMet(): Unit = {
     step("met") {
+      pixels.forResult()
+      goto("pixel")
+    }
+    step("distance") {
       m.multiply(met.zext, m.way(2))
       set(kind, RoomKind.map.U)
+      texel.ask()
     }
     step(set(walk.there, m.combine(m.place(2), m.share)))
     step(m.load(Mux(walk.there < 1.S, 1.S, walk.there)))
@@ -72,11 +78,8 @@ final class MarchEnds(
       set(m.numerator, m.shifted.asUInt(f - 1, 0))
       set(exponent, m.length.zext +& (f.S +& view.exponent) - m.lengths(0).zext - m.towardsTop.zext)
     }
-    m.divide(m.numerator, m.mantissa)
-    step {
+    m.divide(m.numerator, m.mantissa, next = Some("point")) {
       set(exponent, exponent - m.wayTop.zext)
-      pixels.forResult()
-      goto("pixel")
     }
   }
 
@@ -105,7 +108,7 @@ final class MarchEnds(
     }
     step(m.measure())
     step(set(m.mantissa, m.shifted.asUInt(f - 1, 0)))
-    m.divide(m.numerator, m.mantissa)
+    m.divide(m.numerator, m.mantissa)()
     step {
       val mantissa = Mux(m.quotient(f), m.quotient, (m.quotient << 1)(f, 0))
       val length   = m.lengths(0).zext - m.length.zext +& Mux(m.quotient(f), (f + 1).S, f.S)
@@ -120,11 +123,13 @@ final class MarchEnds(
       set(index, index + 1.U)
       goto("shell plane")
     }
-    step("shell passed")(branch((kind === RoomKind.nothing.U) -> "finish"))
-    m.divide(m.depthMantissa, (bestMantissa >> 1)(f - 1, 0))
-    step {
+    step("shell passed") {
+      val isNothing = kind === RoomKind.nothing.U
+      texel.askShell(entry, !isNothing)
+      awaitOr(isNothing || texel.isShellAsked, isNothing -> "finish")
+    }
+    m.divide(m.depthMantissa, (bestMantissa >> 1)(f - 1, 0), next = Some("point")) {
       set(exponent, m.depthLength.zext +& m.placeTop.zext - bestLength - m.towardsTop.zext)
-      goto("point")
     }
   }
 

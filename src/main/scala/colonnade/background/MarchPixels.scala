@@ -18,7 +18,7 @@ final class MarchPixels(m: MarchDatapath, walk: MarchWalk, met: UInt) {
   private val at   = Mux(purpose === cell, walk.from, Mux(purpose === hidden, walk.keptAt, met))
   private val edge = (1.U << Mux(purpose === cell, layout.tileLog.U, walk.keptLog)) - 1.U
 
-  /** In the step before a jump to "pixel", which goes on at "first cell" or "point": the pixel where the ray comes into
+  /** In the step before a jump to "pixel", which goes on at "first cell" or "distance": the pixel where the ray comes into
     * the tile, or where it meets the room.
     */
   def forCell(): Unit = set(purpose, cell)
@@ -39,7 +39,7 @@ final class MarchPixels(m: MarchDatapath, walk: MarchWalk, met: UInt) {
     step(set(coordinate, m.combine(coordinate, m.constant(centre(1)))))
     step {
       set(y, within(walk.tileCorner.y, walk.keptCorner.y, sizes(1)))
-      branch((purpose === cell) -> "first cell", true.B -> "point")
+      branch((purpose === cell) -> "first cell", true.B -> "distance")
     }
   }
 

@@ -41,7 +41,7 @@ final class MarchPlanes(
   def forget(): Unit = isKnown.foreach(set(_, false.B))
 
   /** In a step: asks for an entry of the shell as a whole. */
-  def askShell(index: UInt): Unit = when(now) {
+  def askShell(index: UInt, condition: Bool): Unit = when(now && condition) {
     question.valid                := true.B
     question.bits.content.isShell := true.B
     question.bits.content.index   := index

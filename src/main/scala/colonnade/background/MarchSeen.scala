@@ -10,6 +10,7 @@ final class MarchSeen(
     projection: MarchProjection,
     planes:     MarchPlanes,
     pixels:     MarchPixels,
+    texel:      MarchTexel,
     ends:       MarchEnds,
     channel:    AttributeChannel[CellQuestion, CellAnswer],
     view:       RoomView,
@@ -19,18 +20,27 @@ final class MarchSeen(
   import m.program._
 
   private val fallLength = Reg(UInt(lengthBits.W))
+  private val isFalling  = Reg(Bool())
+  private val cellPlane  = Reg(chiselTypeOf(planes.id))
+  private val hasCell    = Reg(Bool())
+
+  when(channel.answer.valid) {
+    cellPlane := channel.answer.bits.content.ids(0)
+    hasCell   := true.B
+  }
 
   /** Steps from the label "seen" on; they go on at "point", or at "finish" where the maps show nothing. */
   def describe(): Unit = {
     label("seen")
-    coordinate(0, request.ray.pixel.x, view.stepX, pixels.x)
-    coordinate(1, request.ray.pixel.y, view.stepY, pixels.y)
+    overlap { at =>
+      coordinate(at, 0, request.ray.pixel.x, view.stepX, pixels.x)
+      coordinate(at, 1, request.ray.pixel.y, view.stepY, pixels.y)
+    }
     step {
       set(m.place(2), 0.S)
-      set(m.way(0), 0.S)
-      set(m.way(1), 0.S)
-      set(m.way(2), 0.S)
+      set(m.axis, 2.U)
       set(planes.purpose, planes.forPixel)
+      set(hasCell, false.B)
       when(now) {
         channel.question.valid                := true.B
         channel.question.bits.content.pixel.x := pixels.x
@@ -38,10 +48,20 @@ final class MarchSeen(
       }
       await(channel.question.ready)
     }
+
+    // How fast the ray's depth grows, while the cell's plane is looked up
+    projection.describeTowards()
     step {
-      set(planes.id, channel.answer.bits.content.ids(0))
-      awaitOr(channel.answer.valid, channel.answer.valid -> "plane")
+      m.measure()
+      set(isFalling, m.sum > 0.S)
     }
+    step {
+      set(fallLength, m.length)
+      set(m.mantissa, m.shifted.asUInt(f - 1, 0))
+      set(planes.id, cellPlane)
+      awaitOr(hasCell, (hasCell && !isFalling) -> "finish", hasCell -> "plane")
+    }
+
     step("seen depth") {
       m.load(planes.depth.value)
       set(m.drop, planeFraction.S - planes.depth.exponent.zext)
@@ -57,40 +77,33 @@ final class MarchSeen(
     }
     step(set(m.way(0), m.saturated(alongBits)))
 
-    // How fast the ray's depth grows, times w
-    projection.describeDepth()
-    step {
-      m.measure()
-      branch((m.sum <= 0.S) -> "finish")
-    }
-    step {
-      set(fallLength, m.length)
-      m.multiply(m.way(0), m.shifted.asUInt(f - 1, 0).zext)
-    }
+    // The way there: one by w times that
+    step(m.multiply(m.way(0), m.mantissa.zext))
     step(m.load(m.product))
     step(m.measure())
     step {
       set(m.mantissa, m.shifted.asUInt(f - 1, 0))
       set(ends.exponent, (f + 1).S +& view.exponent - m.length.zext - fallLength.zext)
       set(ends.kind, RoomKind.map.U)
+      texel.ask()
     }
-    m.divide(m.one, m.mantissa)
-    step(goto("point"))
+    m.divide(m.one, m.mantissa, next = Some("point"))()
   }
 
-  /** (2 · pixel + 1) · step, in two digits: a place in the map, from its middle, and the map's pixel. */
-  private def coordinate(axis: Int, pixel: UInt, stepWidth: UInt, to: UInt): Unit = {
+  /** (2 · pixel + 1) · step, in two digits: a place in the map, from its middle, and the map's pixel. Four cycles. */
+  private def coordinate(at: Overlap, axis: Int, pixel: UInt, stepWidth: UInt, to: UInt): Unit = {
+    val begin        = 2 * axis
     val halves       = ((pixel << 1) | 1.U).zext
     val digits       = projection.digitsOf(stepWidth.zext)
     val place        = Rounding.floor(m.sum, RoomView.stepGuard)
     val Seq(low, up) = if (digits.size == 1) Seq(digits.head, 0.S) else digits
-    step(m.multiply(halves, up))
-    step {
+    at(begin)(m.multiply(halves, up))
+    at(begin + 1) {
       m.multiply(halves, low)
       m.load(m.product)
     }
-    step(m.descend())
-    step {
+    at(begin + 2)(m.descend())
+    at(begin + 3) {
       val inMap = (place >> toPixel).asUInt
       set(to, Mux(inMap >= sizes(axis).U, (sizes(axis) - 1).U, inMap))
       set(m.place(axis), m.combine(place, m.constant(centre(axis)), subtract = true))

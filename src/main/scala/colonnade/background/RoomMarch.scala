@@ -23,10 +23,11 @@ final class RoomMarch(config: ColonnadeConfig) extends Module {
   private val pass       = new MarchPass(datapath, walk, planes)
   private val pixels     = new MarchPixels(datapath, walk, pass.met)
   private val cells      = new MarchCells(datapath, walk, planes, axes, pixels, io.maps.cells)
-  private val ends       = new MarchEnds(datapath, walk, planes, pixels, pass.met, io.view)
-  private val seen       = new MarchSeen(datapath, projection, planes, pixels, ends, io.maps.cells, io.view, asked)
-  private val surface    = new MarchSurface(datapath, planes, pixels, ends, io.maps, io.view, asked)
-  private val isBusy     = WireInit(true.B)
+  private val texel      = new MarchTexel(datapath, planes, pixels, io.maps)
+  private val ends       = new MarchEnds(datapath, walk, planes, pixels, texel, pass.met, io.view)
+  private val seen    = new MarchSeen(datapath, projection, planes, pixels, texel, ends, io.maps.cells, io.view, asked)
+  private val surface = new MarchSurface(datapath, texel, ends, io.view, asked)
+  private val isBusy  = WireInit(true.B)
 
   io.request.ready                              := false.B
   io.result.valid                               := false.B

@@ -52,21 +52,21 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
     val field = status(r.name)
     r -> io.device.asUInt(field.end - 1, field.offset)
   }
-  private val words = for {
+  private val words = (for {
     (r, value) <- settings ++ observed
     word       <- 0 until r.words
-  } yield (r.address + word).U -> wordOf(value, word)
+  } yield r.address + word -> wordOf(value, word)).toMap
 
+  // By the address's bits, one after the other: of an OR over all words synthesis may make a chain
   private val readData = Reg(UInt(RegisterMap.dataBits.W))
-  private val found    = words.map { case (address, word) =>
-    Mux(io.register.address === address, word.pad(readData.getWidth), 0.U)
-  }
-  when(io.register.read) { readData := VecInit(found).reduceTree(_ | _) }
+  private val shown    =
+    VecInit(Seq.tabulate(1 << io.register.address.getWidth)(words.getOrElse(_, 0.U(readData.getWidth.W))))
+  when(io.register.read)(readData := shown(io.register.address))
   io.register.readData := readData
 
   private def wordOf(value: UInt, word: Int): UInt = {
     val low = word * RegisterMap.dataBits
-    value((low + RegisterMap.dataBits).min(value.getWidth) - 1, low)
+    value((low + RegisterMap.dataBits).min(value.getWidth) - 1, low).pad(RegisterMap.dataBits)
   }
 
   private def storage(register: Register): UInt = Cat((0 until register.words).reverse.map { word =>

@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Arbiter, Decoupled, PopCount, Queue, RegEnable, Valid}
+import chisel3.util.{log2Ceil, Arbiter, Decoupled, Pipe, PopCount, Queue, RegEnable, Valid}
 import colonnade.background.{AttributePort, RoomStage, RoomStageIO}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats}
@@ -113,9 +113,9 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   hitTable.io.result.valid := tested.fire
   hitTable.io.result.bits  := tested.bits
   hitTable.io.isShadow     := isShadow
-  connect(controller.io.ended(2), tested.fire && tested.bits.isLast && isOccluded, tested.bits.context)
-  resumes.io.in(1).valid := isThrough && !isOccluded
-  resumes.io.in(1).bits  := tested.bits.context
+  controller.io.ended(2)   := Pipe(tested.fire && tested.bits.isLast && isOccluded, tested.bits.context)
+  resumes.io.in(1).valid   := isThrough && !isOccluded
+  resumes.io.in(1).bits    := tested.bits.context
   traversal.io.resume :<>= resumes.io.out
 
   // A record that does not exist is passed over; a pixel without attributes stays as it is
