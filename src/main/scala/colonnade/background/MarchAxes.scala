@@ -51,7 +51,7 @@ final class MarchAxes(m: MarchDatapath) {
       set(m.mantissa, m.shifted.asUInt(f - 1, 0))
       set(m.lengths(0), m.length)
     }
-    m.divide(m.one, m.mantissa)()
+    m.divide(m.one, m.mantissa)
     step(m.multiply(m.quotient.zext, rest.zext))
     step {
       m.load(m.product)

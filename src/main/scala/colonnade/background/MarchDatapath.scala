@@ -64,6 +64,7 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
   private val division         = Seq.fill(2)(new Operand(program, f + 1))
   private val combined         = Wire(SInt(combineBits.W))
   private val divider          = Module(new Divider(f, f))
+  divider.io.quotient.ready := false.B
 
   /** The product without its fraction. */
   val share: SInt = Rounding.floor(product, f)
@@ -130,21 +131,23 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
     program.set(drop, measured.zext.pad(exponentBits))
   }
 
-  /** Two steps: quotient = ⌊numerator · 2^f / denominator⌋. They go on at a label, if there is one.
-    *
-    * @param beside
-    *   more for the first step
-    */
-  def divide(numerator: => UInt, denominator: => UInt, next: Option[String] = None)(beside: => Unit = ()): Unit = {
-    program.step {
-      beside
-      division(0).choose(numerator.zext)
-      division(1).choose(denominator.zext)
-    }
-    program.step {
-      program.set(quotient, divider.io.quotient.bits)
-      program.awaitOr(divider.io.quotient.valid, next.map(divider.io.quotient.valid -> _).toSeq: _*)
-    }
+  /** In a step: begins ⌊numerator · 2^f / denominator⌋. One division at a time. */
+  def startDivision(numerator: UInt, denominator: UInt): Unit = {
+    division(0).choose(numerator.zext)
+    division(1).choose(denominator.zext)
+  }
+
+  /** A step: the quotient is there after it. */
+  def awaitDivision(): Unit = program.step {
+    program.set(quotient, divider.io.quotient.bits)
+    when(program.now)(divider.io.quotient.ready := true.B)
+    program.await(divider.io.quotient.valid)
+  }
+
+  /** Two steps. */
+  def divide(numerator: => UInt, denominator: => UInt): Unit = {
+    program.step(startDivision(numerator, denominator))
+    awaitDivision()
   }
 
   /** The value whose reciprocal is to be found is a mantissa: ⌊2^(2f − 1) / mantissa⌋. */
@@ -164,7 +167,6 @@ final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
     divider.io.division.valid            := division(0).isChosen
     divider.io.division.bits.numerator   := division(0).value.asUInt(f - 1, 0)
     divider.io.division.bits.denominator := division(1).value.asUInt(f - 1, 0)
-    divider.io.quotient.ready            := true.B
     assert(!divider.io.division.valid || divider.io.division.ready, "a division during another one")
   }
 }

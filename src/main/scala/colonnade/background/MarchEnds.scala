@@ -78,8 +78,10 @@ final class MarchEnds(
       set(m.numerator, m.shifted.asUInt(f - 1, 0))
       set(exponent, m.length.zext +& (f.S +& view.exponent) - m.lengths(0).zext - m.towardsTop.zext)
     }
-    m.divide(m.numerator, m.mantissa, next = Some("point")) {
+    step {
+      m.startDivision(m.numerator, m.mantissa)
       set(exponent, exponent - m.wayTop.zext)
+      goto("point")
     }
   }
 
@@ -108,7 +110,7 @@ final class MarchEnds(
     }
     step(m.measure())
     step(set(m.mantissa, m.shifted.asUInt(f - 1, 0)))
-    m.divide(m.numerator, m.mantissa)()
+    m.divide(m.numerator, m.mantissa)
     step {
       val mantissa = Mux(m.quotient(f), m.quotient, (m.quotient << 1)(f, 0))
       val length   = m.lengths(0).zext - m.length.zext +& Mux(m.quotient(f), (f + 1).S, f.S)
@@ -128,8 +130,10 @@ final class MarchEnds(
       texel.askShell(entry, !isNothing)
       awaitOr(isNothing || texel.isShellAsked, isNothing -> "finish")
     }
-    m.divide(m.depthMantissa, (bestMantissa >> 1)(f - 1, 0), next = Some("point")) {
+    step {
+      m.startDivision(m.depthMantissa, (bestMantissa >> 1)(f - 1, 0))
       set(exponent, m.depthLength.zext +& m.placeTop.zext - bestLength - m.towardsTop.zext)
+      goto("point")
     }
   }
 

@@ -93,7 +93,7 @@ final class MarchPass(m: MarchDatapath, walk: MarchWalk, planes: MarchPlanes) {
     step(m.flip(true.B))
     step(m.measure())
     step(set(m.mantissa, m.shifted.asUInt(f - 1, 0)))
-    m.divide(m.numerator, m.mantissa)()
+    m.divide(m.numerator, m.mantissa)
     step(m.load(m.quotient.zext))
     step {
       set(m.drop, m.length.zext +& f.S - m.lengths(0).zext)

@@ -52,7 +52,7 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
       set(m.depthMantissa, m.shifted.asUInt(f - 1, 0))
       set(m.depthLength, m.length)
     }
-    m.divide(m.one, m.mantissa)()
+    m.divide(m.one, m.mantissa)
     overlap { at =>
       position(at)
       for (axis <- 0 until 3) direction(at, axis, begin = 6 + 3 * axis)

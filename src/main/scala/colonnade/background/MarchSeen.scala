@@ -70,7 +70,10 @@ final class MarchSeen(
       m.load(m.shifted)
       branch((m.sum >= 0.S) -> "finish")
     }
-    step(m.flip(true.B))
+    step {
+      m.flip(true.B)
+      texel.ask()
+    }
     step {
       set(m.length, m.measured)
       set(m.drop, f.S)
@@ -85,9 +88,11 @@ final class MarchSeen(
       set(m.mantissa, m.shifted.asUInt(f - 1, 0))
       set(ends.exponent, (f + 1).S +& view.exponent - m.length.zext - fallLength.zext)
       set(ends.kind, RoomKind.map.U)
-      texel.ask()
     }
-    m.divide(m.one, m.mantissa, next = Some("point"))()
+    step {
+      m.startDivision(m.one, m.mantissa)
+      goto("point")
+    }
   }
 
   /** (2 · pixel + 1) · step, in two digits: a place in the map, from its middle, and the map's pixel. Four cycles. */

@@ -42,14 +42,15 @@ final class MarchSurface(m: MarchDatapath, texel: MarchTexel, ends: MarchEnds, v
     }
   }
 
-  /** Steps from the label "point" on; they end at "finish". The normal is turned while the point is still on its way. */
+  /** Steps from the label "point" on; they end at "finish". The normal is turned while the way to the point is divided. */
   def describe(): Unit = {
     label("point")
     overlap { at =>
       at(0)(await(texel.isThere))
-      for (axis <- 0 until 3) reach(at, axis, begin = 2 * axis)
-      for (axis <- 0 until 3) turn(at, axis, begin = 6 + 3 * axis)
+      for (axis <- 0 until 3) turn(at, axis, begin = 3 * axis)
     }
+    m.awaitDivision()
+    overlap(at => for (axis <- 0 until 3) reach(at, axis, begin = 2 * axis))
   }
 
   /** Six cycles. */
