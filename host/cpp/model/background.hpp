@@ -1,16 +1,15 @@
 // Background: which point of the room does a ray meet? docs/background.md.
 #pragma once
-#include "attributes.hpp"
-#include "room_view.hpp"
+#include "map_geometry.hpp"
 
 namespace colonnade {
 
-class Background {
+class Background : private MapGeometry {
 public:
     /// Steps of a march at most: then the ray meets the shell.
     static constexpr int mostSteps = 128;
 
-    Background(const Numbers& numbers, const AttributeImage& image) : n_(numbers), f_(numbers.shadeBits), image_(image), sizes_(image.sizes()) {}
+    Background(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers.shadeBits, image.sizes()), n_(numbers), image_(image) {}
 
     /// The point of the room that a ray from `origin` (grid steps) along `direction` (components of shadeBits bits and a sign) meets.
     RoomPoint meet(const WideVector& origin, const Vector& direction, const RoomView& view) const {
@@ -69,71 +68,10 @@ public:
 
 private:
     static constexpr int stepGuard = 12, rotationFraction = 14;
-
-    /// A plane along a ray: how far the ray is in front of it, value + slope · s, in steps of 2^(exponent − 22).
-    struct Depth {
-        int id;
-        std::int64_t value, slope;
-        int exponent;
-    };
-    static constexpr int planeFraction = 22;
     /// More bits of a distance along the ray while it is summed up.
     static constexpr int guardBits = 8;
     /// A ray that is less than this share of w behind a surface is on it, log2.
     static constexpr int nearLog = 5;
-    /// Log2 of the map's unit in pixels.
-    static constexpr int mapLog = 10;
-
-    std::int64_t most() const { return (std::int64_t(1) << (f_ + 3)) - 1; }
-
-    Wide times(const Vector& row, const WideVector& v) const { return Wide(row[0]) * v[0] + Wide(row[1]) * v[1] + Wide(row[2]) * v[2]; }
-
-    MapRay project(const WideVector& origin, const Vector& direction, const RoomView& view) const {
-        MapRay ray{};
-        WideVector from, towards;
-        for (int i = 0; i < 3; ++i) {
-            from[i] = times(view.matrix[i], origin) + floorShift<Wide>(view.offset[i], -view.offsetShift);
-            towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
-        }
-        ray.fromShift = blockScale(from, f_, ray.from);
-        ray.towardsShift = blockScale(towards, f_, ray.towards);
-        ray.isInFront = ray.from[2] > 0;
-        if (!ray.isInFront) return ray;
-
-        // 1 / p2 = inverse · 2^(1 - f - length)
-        const Normalised depth = normalise(UnsignedWide(ray.from[2]), f_);
-        const auto inverse = reciprocal(depth.mantissa);
-        const auto inMap = [&](Wide value) { return static_cast<std::int64_t>(clamp<Wide>(value, -most() - 1, most())); };
-        for (int i = 0; i < 2; ++i) ray.position[i] = inMap(floorShift<Wide>(Wide(ray.from[i]) * inverse, depth.exponent - 1));
-        ray.position[2] = inMap(floorShift<Wide>(inverse, depth.exponent - 1 + ray.fromShift - view.exponent));
-
-        WideVector way;
-        for (int i = 0; i < 2; ++i) way[i] = (Wide(ray.towards[i]) << f_) - Wide(ray.position[i]) * ray.towards[2];
-        way[2] = -Wide(ray.position[2]) * ray.towards[2];
-        ray.directionShift = blockScale(way, f_, ray.direction);
-        return ray;
-    }
-
-    /// 2^(2f - 1) / mantissa, of f bits with the top one set: f + 1 bits.
-    std::int64_t reciprocal(std::uint64_t mantissa) const { return static_cast<std::int64_t>(divide(std::uint64_t(1) << (f_ - 1), mantissa, f_)); }
-
-    std::int64_t along(const MapRay& ray, int axis, std::int64_t s) const {
-        return ray.position[axis] + static_cast<std::int64_t>(floorShift<Wide>(Wide(ray.direction[axis]) * s, f_));
-    }
-
-    Depth depthOf(const MapRay& ray, const PlaneWord& plane, int id) const {
-        const std::int64_t du = ray.position[0] - (std::int64_t(sizes_.width) << (f_ - mapLog - 1)), dv = ray.position[1] - (std::int64_t(sizes_.height) << (f_ - mapLog - 1));
-        Depth depth{id, 0, 0, plane.e};
-        const int up = planeFraction - f_ - plane.e;
-        depth.value = floorShift<std::int64_t>(ray.position[2], -up) - floorShift<std::int64_t>(plane.a * du + plane.b * dv, f_) - plane.c;
-        depth.slope = floorShift<std::int64_t>(ray.direction[2], -up) - floorShift<std::int64_t>(plane.a * ray.direction[0] + plane.b * ray.direction[1], f_);
-        return depth;
-    }
-
-    std::int64_t at(const Depth& depth, std::int64_t s) const { return depth.value + static_cast<std::int64_t>(floorShift<Wide>(Wide(depth.slope) * s, f_)); }
-
-    /// In w's own steps.
-    std::int64_t inW(std::int64_t value, const Depth& depth) const { return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent); }
 
     /// A march so far. The ray is in front of what the camera sees, or behind it.
     struct March {
@@ -348,9 +286,7 @@ private:
     }
 
     const Numbers& n_;
-    int f_;
     const AttributeImage& image_;
-    const AttributeSizes& sizes_;
 };
 
 } // namespace colonnade

@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 
+#include "background.hpp"
 #include "registers.hpp"
 
 namespace colonnade {

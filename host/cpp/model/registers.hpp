@@ -1,6 +1,6 @@
 // The frame registers, decoded: what the host writes before a frame.
 #pragma once
-#include "background.hpp"
+#include "room_view.hpp"
 #include "bounce.hpp"
 
 namespace colonnade {

@@ -48,11 +48,13 @@ final class Microprogram {
   }
 
   /** The first of these whose condition holds; if none does, the program goes on. At most once in a step. */
-  def branch(cases: (Bool, String)*): Unit =
+  def branch(cases: (Bool, String)*): Unit = {
+    require(goesOn eq active, s"two branches in step $number")
     goesOn = Some(cases.foldLeft(now) { case (left, (condition, target)) =>
       jumps += (left && condition) -> target
       left && !condition
     })
+  }
 
   def goto(target: String): Unit = branch(true.B -> target)
 
@@ -113,7 +115,7 @@ final class Operand(program: Microprogram, width: Int) {
   def choose(value: SInt): Unit = {
     require(
       choices.forall { case (other, steps) => (other eq value) || !steps(program.index) },
-      "two operands in a step"
+      s"two operands in step ${program.index}"
     )
     choices(value) = choices.getOrElse(value, Set.empty) + program.index
   }

@@ -1,0 +1,83 @@
+// Rays and planes in the map of a room, where both are straight. docs/background.md.
+#pragma once
+#include "attributes.hpp"
+#include "room_view.hpp"
+
+namespace colonnade {
+
+/// What the march knows of lengths in a map of these sizes, where a position has shadeBits bits.
+class MapGeometry {
+protected:
+    /// A plane along a ray: how far the ray is in front of it, value + slope · s, in steps of 2^(exponent − 22).
+    struct Depth {
+        int id;
+        std::int64_t value, slope;
+        int exponent;
+    };
+
+    static constexpr int planeFraction = 22;
+    /// Log2 of the map's unit in pixels.
+    static constexpr int mapLog = 10;
+
+    MapGeometry(int shadeBits, const AttributeSizes& sizes) : f_(shadeBits), sizes_(sizes) {}
+
+    /// The largest position, and the largest distance along a ray.
+    std::int64_t most() const { return (std::int64_t(1) << (f_ + 3)) - 1; }
+
+    static Wide times(const Vector& row, const WideVector& v) { return Wide(row[0]) * v[0] + Wide(row[1]) * v[1] + Wide(row[2]) * v[2]; }
+
+    /// Of a ray whose origin is behind the camera only the projections are known.
+    MapRay project(const WideVector& origin, const Vector& direction, const RoomView& view) const {
+        MapRay ray{};
+        WideVector from, towards;
+        for (int i = 0; i < 3; ++i) {
+            from[i] = times(view.matrix[i], origin) + floorShift<Wide>(view.offset[i], -view.offsetShift);
+            towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
+        }
+        ray.fromShift = blockScale(from, f_, ray.from);
+        ray.towardsShift = blockScale(towards, f_, ray.towards);
+        ray.isInFront = ray.from[2] > 0;
+        if (!ray.isInFront) return ray;
+
+        // 1 / p2 = inverse · 2^(1 - f - length)
+        const Normalised depth = normalise(UnsignedWide(ray.from[2]), f_);
+        const auto inverse = reciprocal(depth.mantissa);
+        const auto inMap = [&](Wide value) { return static_cast<std::int64_t>(clamp<Wide>(value, -most() - 1, most())); };
+        for (int i = 0; i < 2; ++i) ray.position[i] = inMap(floorShift<Wide>(Wide(ray.from[i]) * inverse, depth.exponent - 1));
+        ray.position[2] = inMap(floorShift<Wide>(inverse, depth.exponent - 1 + ray.fromShift - view.exponent));
+
+        WideVector way;
+        for (int i = 0; i < 2; ++i) way[i] = (Wide(ray.towards[i]) << f_) - Wide(ray.position[i]) * ray.towards[2];
+        way[2] = -Wide(ray.position[2]) * ray.towards[2];
+        ray.directionShift = blockScale(way, f_, ray.direction);
+        return ray;
+    }
+
+    /// 2^(2f - 1) / mantissa, of f bits with the top one set: f + 1 bits.
+    std::int64_t reciprocal(std::uint64_t mantissa) const { return static_cast<std::int64_t>(divide(std::uint64_t(1) << (f_ - 1), mantissa, f_)); }
+
+    /// A component of the place that is s along the ray.
+    std::int64_t along(const MapRay& ray, int axis, std::int64_t s) const {
+        return ray.position[axis] + static_cast<std::int64_t>(floorShift<Wide>(Wide(ray.direction[axis]) * s, f_));
+    }
+
+    Depth depthOf(const MapRay& ray, const PlaneWord& plane, int id) const {
+        const std::int64_t du = ray.position[0] - (std::int64_t(sizes_.width) << (f_ - mapLog - 1)), dv = ray.position[1] - (std::int64_t(sizes_.height) << (f_ - mapLog - 1));
+        Depth depth{id, 0, 0, plane.e};
+        const int up = planeFraction - f_ - plane.e;
+        depth.value = floorShift<std::int64_t>(ray.position[2], -up) - floorShift<std::int64_t>(plane.a * du + plane.b * dv, f_) - plane.c;
+        depth.slope = floorShift<std::int64_t>(ray.direction[2], -up) - floorShift<std::int64_t>(plane.a * ray.direction[0] + plane.b * ray.direction[1], f_);
+        return depth;
+    }
+
+    /// How far the ray is in front of a plane at s.
+    std::int64_t at(const Depth& depth, std::int64_t s) const { return depth.value + static_cast<std::int64_t>(floorShift<Wide>(Wide(depth.slope) * s, f_)); }
+
+    /// In w's own steps.
+    std::int64_t inW(std::int64_t value, const Depth& depth) const { return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent); }
+
+    int f_;
+    const AttributeSizes& sizes_;
+};
+
+} // namespace colonnade
