@@ -17,7 +17,7 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
 
   private val matrixRow   = VecInit(view.matrix.map(row => VecInit(row.axes)))(m.axis)
   private val offset      = VecInit(view.offset.axes)(m.axis)
-  private val offsetPower = 1.U(1.W) << view.offsetShift
+  private val offsetPower = (1.U(1.W) << view.offsetShift)(sceneBits, 0)
   private val origin      = request.ray.origin.axes.map(_.integer)
   private val inverse     = m.quotient.zext
 
@@ -41,7 +41,6 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
   def describe(behind: String): Unit = {
     val offsetTerm = (offset, digitsOf(offsetPower.zext))
     block("origin", m.place, m.placeTop)(terms(origin) :+ offsetTerm)
-    block("direction", m.towards, m.towardsTop)(terms(m.heading))
     step {
       m.load(m.place(2))
       branch((m.place(2) <= 0.S) -> behind)
@@ -52,7 +51,9 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
       set(m.depthMantissa, m.shifted.asUInt(f - 1, 0))
       set(m.depthLength, m.length)
     }
-    m.divide(m.one, m.mantissa)
+    step(m.startDivision(m.one, m.mantissa))
+    block("direction", m.towards, m.towardsTop)(terms(m.heading))
+    m.awaitDivision()
     overlap { at =>
       position(at)
       for (axis <- 0 until 3) direction(at, axis, begin = 6 + 3 * axis)

@@ -10,8 +10,10 @@ import colonnade.numbers.{Fixed, FixedPointFormat}
   * seen at the map's pixel 1024 · (p.x, p.y) / p.z, and its w, the plane map's unit over its depth, is 1 / p.z.
   */
 final class RoomView(numbers: NumberFormats) extends Bundle {
-  val matrix      = Vec(3, Vec3(SInt(numbers.macBits.W)))
-  val offset      = Vec3(SInt(numbers.macBits.W))
+  val matrix = Vec(3, Vec3(SInt(numbers.macBits.W)))
+  val offset = Vec3(SInt(numbers.macBits.W))
+
+  /** At most `sceneBits`. */
   val offsetShift = UInt(NumberFormats.bitLength(numbers.sceneBits).W)
   val exponent    = SInt((NumberFormats.bitLength(2 * numbers.sceneBits) + 1).W)
 
