@@ -105,9 +105,9 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
   /** The sum of products, digit by digit. */
   private def row(factors: Seq[(SInt, Seq[SInt])]): Unit = {
     val products = for {
-      ((entry, vectorDigits), _) <- factors.zipWithIndex
-      (entryDigit, i)            <- digitsOf(entry).zipWithIndex
-      (vectorDigit, j)           <- vectorDigits.zipWithIndex
+      (entry, vectorDigits) <- factors
+      (entryDigit, i)       <- digitsOf(entry).zipWithIndex
+      (vectorDigit, j)      <- vectorDigits.zipWithIndex
     } yield (i + j, vectorDigit, entryDigit)
     val ordered = products.sortBy(-_._1)
     for (((weight, wide, narrow), index) <- ordered.zipWithIndex)
