@@ -100,8 +100,9 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
   /** Any registers that the model's widest number has room for. */
   def anyView(): ViewQuestion = {
     val bits   = numbers.macBits.min(45)
-    val shift  = random.nextInt(numbers.sceneBits.min(60) - 2)
-    val length = bits + numbers.sceneBits.min(60)
+    val most   = numbers.sceneBits.min(60)
+    val shift  = if (random.nextBoolean()) most else random.nextInt(most)
+    val length = bits + most
     ViewQuestion(
       Seq.fill(9)(signed(bits)),
       Seq.fill(3)(signed((length - shift).min(numbers.macBits) - 1)),
