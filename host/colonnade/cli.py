@@ -20,6 +20,7 @@ from colonnade.commands.study import study
 from colonnade.commands.sweep import sweep
 from colonnade.commands.verify import verify
 from colonnade.errors import UserError
+from colonnade.processes import guarded
 
 #: Exit status for wrong input.
 WRONG_INPUT = 2
@@ -70,4 +71,4 @@ for command in (generate, pack, inspect, render, compare, study, verify, bench, 
 
 def main() -> NoReturn:
     """Entry point of the console script."""
-    cli.main(prog_name="colonnade")
+    guarded(lambda: cli.main(prog_name="colonnade"))

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from colonnade.processes import Group
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -19,12 +21,18 @@ def processors() -> int:
 def in_order(work: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Iterator[Result]:
     """Results of `work` in the order of `items`, up to `jobs` of them at a time.
 
-    Threads: the work is meant to wait for other programs. After an exception nothing new is begun.
+    Threads: the work is meant to wait for other programs, which it starts with `colonnade.processes`. After an
+    exception, or when no more results are wanted, nothing new is begun and these programs end.
     """
-    with ThreadPoolExecutor(max_workers=max(1, min(jobs, len(items)))) as pool:
-        futures = [pool.submit(work, item) for item in items]
-        try:
-            for future in futures:
-                yield future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    group = Group()
+    pool = ThreadPoolExecutor(max(1, min(jobs, len(items))), thread_name_prefix="job", initializer=group.join)
+    futures = [pool.submit(work, item) for item in items]
+    try:
+        for future in futures:
+            yield future.result()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        group.end()
+        raise
+    # All results are there
+    pool.shutdown()

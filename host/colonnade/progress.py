@@ -1,19 +1,35 @@
-"""Long work shows itself on a terminal and stays quiet in a pipe."""
+"""Long work shows itself: as bars on a terminal, as lines in a pipe; both on standard error."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from colonnade import processes
+from colonnade.errors import UserError
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
 #: Reports the share of a step that is done, 0.0 to 1.0.
 Report = Callable[[float], None]
+
+#: Seconds until the first line in a pipe; the time to the next doubles, up to a limit.
+FIRST_LINE = 10.0
+LONGEST_SILENCE = 60.0
+
+#: Seconds for which a step runs at least before a line names it.
+SETTLING = 1.0
+
+#: Steps at a time that a line has room for.
+MOST_STEPS = 4
 
 
 class Progress:
@@ -29,10 +45,15 @@ class Progress:
 
     def of(self, name: str) -> Progress:
         """The same, with `name` before each title: one of several pieces of work at a time."""
-        return self
+        return _Named(self, name)
+
+    def note(self, text: str) -> None:
+        """Print a line on standard error that is no error: what the user did not ask for and should know."""
+        with self.paused():
+            print(f"colonnade: {text}", file=sys.stderr, flush=True)
 
 
-#: Shows nothing.
+#: Shows nothing but notes.
 QUIET = Progress()
 
 
@@ -75,9 +96,79 @@ class TerminalProgress(Progress):
                 if display is not None:
                     display.start()
 
-    def of(self, name: str) -> Progress:
-        """The same bars, with `name` before each title."""
-        return _Named(self, name)
+    def close(self) -> None:
+        """The terminal as it was, though steps may still run."""
+        display = self._display
+        if display is not None:
+            display.stop()
+
+
+@dataclass
+class _Step:
+    title: str
+    begun: float
+    share: float | None = None
+
+    def text(self, now: float) -> str:
+        share = "" if self.share is None else f"{100 * self.share:.0f} %, "
+        return f"{self.title}: {share}{now - self.begun:.0f} s"
+
+
+class LineProgress(Progress):
+    """A line on standard error once steps have run for `FIRST_LINE` seconds, and then at growing intervals."""
+
+    def __init__(self, first: float = FIRST_LINE) -> None:
+        self._changed = threading.Condition()
+        self._steps: list[_Step] = []
+        self._watcher: threading.Thread | None = None
+        self._interval = first
+        self._due = 0.0
+
+    @contextlib.contextmanager
+    def step(self, title: str) -> Iterator[Report]:
+        """Say so in the lines while the step runs, with its share and its seconds."""
+        step = _Step(title, time.monotonic())
+
+        def report(share: float) -> None:
+            step.share = share
+
+        with self._changed:
+            self._steps.append(step)
+            if self._watcher is None:
+                self._due = max(self._due or step.begun + self._interval, step.begun + SETTLING)
+                self._watcher = threading.Thread(target=self._watch, name="progress", daemon=True)
+                self._watcher.start()
+        try:
+            yield report
+        finally:
+            with self._changed:
+                self._steps.remove(step)
+
+    @contextlib.contextmanager
+    def paused(self) -> Iterator[None]:
+        """No line is printed meanwhile."""
+        with self._changed:
+            yield
+
+    def _watch(self) -> None:
+        """Print what is due; end when nothing runs then, until the next step begins."""
+        with self._changed:
+            while (now := time.monotonic()) < self._due or self._steps:
+                if now < self._due:
+                    self._changed.wait(self._due - now)
+                    continue
+                self._print(now)
+                self._interval = min(2 * self._interval, LONGEST_SILENCE)
+                self._due = now + self._interval
+            self._watcher = None
+
+    def _print(self, now: float) -> None:
+        texts = [step.text(now) for step in self._steps[:MOST_STEPS]]
+        if len(self._steps) > MOST_STEPS:
+            texts.append(f"{len(self._steps) - MOST_STEPS} more")
+        # A reader that has gone is no reason to stop the work
+        with contextlib.suppress(OSError, ValueError):
+            print(f"colonnade: {'; '.join(texts)}", file=sys.stderr, flush=True)
 
 
 class _Named(Progress):
@@ -108,5 +199,14 @@ def _display() -> RichProgress:
 
 
 def for_terminal() -> Progress:
-    """Bars where standard error is a terminal, nothing elsewhere."""
-    return TerminalProgress() if sys.stderr.isatty() else QUIET
+    """Bars where standard error is a terminal, lines elsewhere; nothing with ``COLONNADE_PROGRESS=off``."""
+    chosen = os.environ.get("COLONNADE_PROGRESS", "on")
+    if chosen not in ("on", "off"):
+        raise UserError(f"COLONNADE_PROGRESS={chosen} is neither on nor off")
+    if chosen == "off":
+        return QUIET
+    if not sys.stderr.isatty():
+        return LineProgress()
+    bars = TerminalProgress()
+    processes.when_leaving(bars.close)
+    return bars

@@ -141,6 +141,12 @@ _SHINY = (("kind", 2), ("etaFront", 16), ("etaBack", 16), ("reflectance", 13))
 _SCENE = ("recordCount", "triangleBase", "triangleRecords", "attributeBase")
 
 
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No lines of progress between the lines that a test looks at, however slow the machine is."""
+    monkeypatch.setenv("COLONNADE_PROGRESS", "off")
+
+
 @pytest.fixture(scope="session")
 def make_manifest() -> MakeManifest:
     """Builds a manifest; keywords as of `manifest_data`."""
