@@ -53,7 +53,13 @@ def digests(folder: Path) -> dict[str, str] | None:
     return _verified.get(folder)
 
 
-def entry(folder: Path, make: Callable[[Path], None], what: str, progress: Progress = QUIET) -> Path:
+def entry(
+    folder: Path,
+    make: Callable[[Path], None],
+    what: str,
+    progress: Progress = QUIET,
+    is_usable: Callable[[Path], bool] = lambda folder: True,
+) -> Path:
     """The entry `folder`, intact: as it is kept, or made once by whichever process comes first.
 
     Args:
@@ -61,15 +67,16 @@ def entry(folder: Path, make: Callable[[Path], None], what: str, progress: Progr
         make: fills an empty folder, which becomes the entry when it is complete.
         what: for messages, e.g. ``"simulator"``.
         progress: shows that another process is waited for.
+        is_usable: what else must hold of an entry that is kept, e.g. that files outside it are still there.
 
     Raises:
         UserError: the cache cannot be written.
     """
-    if _is_known(folder):
+    if _is_known(folder) and is_usable(folder):
         return folder
     try:
         with turn(folder.parent / f"{folder.name}.lock", what, progress):
-            if not _is_known(folder):
+            if not (_is_known(folder) and is_usable(folder)):
                 if os.path.lexists(folder):
                     progress.note(f"the cached {what} was damaged and is built again")
                 with temporary.temporary_folder(f".{folder.name}.", folder.parent) as place:

@@ -1,13 +1,14 @@
 """Runs the Chisel generator and keeps what it made, by content.
 
 The generator is compiled once per state of its sources, with sbt; every configuration after that is one run of plain
-Java. Results live in ``generator/SOURCES/KEY`` of the cache, where SOURCES stands for the generator's sources and KEY
-for the configuration, its overrides and the kind of output.
+Java. Results are entries ``generator/SOURCES/KEY`` of the cache, where SOURCES stands for the generator's sources and
+KEY for the configuration, its overrides and the kind of output; the classes are ``generator/SOURCES/classes``.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -17,15 +18,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from colonnade import cache, processes
 from colonnade.configuration import ConfigurationSource, find_configuration
 from colonnade.errors import UserError
-from colonnade.files import locked
 from colonnade.manifest import Manifest
 from colonnade.progress import QUIET, Progress
 from colonnade.toolchain import cache_directory, find_java, project_root
 
 #: States of the sources whose results are kept; older ones go once they have not been used for a day.
 KEPT_STATES = 4
+
+#: The folders of an entry: what the generator wrote; and the file that tells the class path.
+DESIGN = "design"
+CLASSPATH = "classpath.json"
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
@@ -49,11 +54,12 @@ class GeneratedDesign:
 
     def digest(self) -> str:
         """A SHA-256 of the SystemVerilog: two designs with the same one behave alike."""
-        digest = hashlib.sha256()
+        known = cache.digests(self.dir.parent) or {}
+        lines = []
         for path in self.sources:
-            content = path.read_bytes()
-            digest.update(f"{path.name} {len(content)}\n".encode() + content)
-        return digest.hexdigest()
+            content = known.get(f"{DESIGN}/{path.name}") or hashlib.sha256(path.read_bytes()).hexdigest()
+            lines.append(f"{path.name} {content}\n")
+        return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def manifest_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
@@ -112,14 +118,14 @@ def _cached(config: str, overrides: Sequence[str], options: tuple[str, ...], pro
     root = project_root()
     source = find_configuration(config, overrides, root)
     state = cache_directory(root) / "generator" / source_hash(root)
-    design = state / _key(source, options)
-    if not (design / "manifest.json").is_file():
+
+    def make(place: Path) -> None:
         java = find_java()
-        with locked(state.parent / "lock"):
-            if not (design / "manifest.json").is_file():
-                classpath = _compiled(root, state, progress)
-                _run(root, java, classpath, source, options, design, progress)
-    return GeneratedDesign(design, Manifest.load(design / "manifest.json"))
+        _run(root, java, _compiled(root, state, progress), source, options, place / DESIGN, state, progress)
+
+    entry = cache.entry(state / _key(source, options), make, "design", progress)
+    cache.touch(state)
+    return GeneratedDesign(entry / DESIGN, Manifest.load(entry / DESIGN / "manifest.json"))
 
 
 def _key(source: ConfigurationSource, options: Sequence[str]) -> str:
@@ -129,40 +135,41 @@ def _key(source: ConfigurationSource, options: Sequence[str]) -> str:
 
 def _compiled(root: Path, state: Path, progress: Progress) -> str:
     """Compile the generator unless this state of it is compiled, and return its class path."""
-    recorded = state / "classpath"
-    if recorded.is_file():
-        os.utime(state)
-        return recorded.read_text()
-    log = state.parent / "sbt.log"
+
+    def make(place: Path) -> None:
+        entries = _compile(root, state.parent / "sbt.log", progress)
+        # A later compile overwrites sbt's own folder of classes: keep those of this state
+        for index, folder in enumerate(entries):
+            if Path(folder).is_dir():
+                entries[index] = f"classes{index}"
+                shutil.copytree(folder, place / entries[index])
+        (place / CLASSPATH).write_text(json.dumps(entries))
+
+    def path(folder: Path) -> list[Path]:
+        return [folder / entry for entry in json.loads((folder / CLASSPATH).read_text())]
+
+    def has_libraries(folder: Path) -> bool:
+        return all(entry.exists() for entry in path(folder))
+
+    folder = cache.entry(state / "classes", make, "generator", progress, has_libraries)
+    _forget_old_states(state.parent)
+    return os.pathsep.join(map(str, path(folder)))
+
+
+def _compile(root: Path, log: Path, progress: Progress) -> list[str]:
+    """Compile with sbt; the class path, its folders being sbt's own."""
     with progress.step("compiling the generator"), log.open("w") as stream:
-        status = subprocess.run(
-            [root / "tools" / "sbt", "compile", "export Runtime/fullClasspath"],
-            stdin=subprocess.DEVNULL,
-            stdout=stream,
-            stderr=subprocess.STDOUT,
-            check=False,
-        ).returncode
+        command = [str(root / "tools" / "sbt"), "compile", "export Runtime/fullClasspath"]
+        status = processes.run(command, stdout=stream, stderr=subprocess.STDOUT).returncode
     lines = _ANSI.sub("", log.read_text(errors="replace")).splitlines()
     if status != 0:
         errors = [line.removeprefix("[error]").strip() for line in lines if line.startswith("[error]")]
         first = errors[0] if errors else (lines[-1] if lines else f"sbt ended with status {status}")
         raise UserError(f"the generator does not compile: {first} (all of it: {log})")
     entries = next((line for line in reversed(lines) if ".jar" in line and os.pathsep in line), "").split(os.pathsep)
-    built = [entry for entry in entries if Path(entry).is_dir()]
-    if not built:
+    if not any(Path(entry).is_dir() for entry in entries):
         raise RuntimeError(f"sbt printed no class path: see {log}")
-    # A later compile overwrites sbt's own folder of classes: keep those of this state.
-    incoming = state.with_name(f".{state.name}.{os.getpid()}")
-    shutil.rmtree(incoming, ignore_errors=True)
-    incoming.mkdir(parents=True)
-    for index, folder in enumerate(built):
-        shutil.copytree(folder, incoming / f"classes{index}")
-        entries[entries.index(folder)] = str(state / f"classes{index}")
-    (incoming / "classpath").write_text(os.pathsep.join(entries))
-    shutil.rmtree(state, ignore_errors=True)
-    incoming.rename(state)
-    _forget_old_states(state.parent)
-    return os.pathsep.join(entries)
+    return entries
 
 
 def _run(
@@ -172,6 +179,7 @@ def _run(
     source: ConfigurationSource,
     options: Sequence[str],
     design: Path,
+    state: Path,
     progress: Progress,
 ) -> None:
     """One run of the generator; its error line becomes ours."""
@@ -179,12 +187,12 @@ def _run(
     command = [str(java), *_java_options(root), "-cp", classpath, "colonnade.Generate"]
     command += ["--config", str(source.path), "--output", str(design), *sets, *options]
     with progress.step("generating the manifest" if "--manifest-only" in options else "generating the hardware"):
-        done = subprocess.run(command, cwd=root, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        done = processes.run(command, cwd=root)
     if done.returncode == 2:
         lines = [line for line in done.stderr.splitlines() if line.strip()] or ["the generator refused its input"]
         raise UserError(re.sub(r"^(colonnade(\.Generate)?: )?error: ", "", lines[-1].strip()))
     if done.returncode != 0 or not (design / "manifest.json").is_file():
-        log = design.parent / "generate.log"
+        log = state / "generate.log"
         log.write_text(done.stdout + done.stderr)
         raise RuntimeError(f"the generator failed with status {done.returncode}: see {log}")
 

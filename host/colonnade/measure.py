@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from colonnade import cache
 from colonnade.errors import UserError
-from colonnade.files import write_json
 from colonnade.generator import GeneratedDesign, design_for
 from colonnade.image import SceneImage
 from colonnade.meshes import Mesh, load_mesh
@@ -108,9 +108,10 @@ def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
     except UserError as error:
         raise UserError(": ".join((*run.overrides, str(error)))) from error
     seconds = {"pack": time.perf_counter() - begun}
-    kept = cache_directory(project_root()) / "measurements" / f"{_digest(design, image, registers)}.json"
-    if conditions.reuse and kept.is_file():
-        known: dict[str, Any] = json.loads(kept.read_text())
+    key = _key(design, image, registers)
+    name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
+    kept = cache_directory(project_root()) / "measurements" / f"{name}.json"
+    if conditions.reuse and (known := cache.stored(kept, key, progress)) is not None:
         return known | {
             "config": design.manifest.config,
             "config_hash": design.manifest.config_hash,
@@ -129,15 +130,14 @@ def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
         "cycles_per_second": simulated.cycles_per_second,
         "seconds": seconds,
     }
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    write_json(kept, report)
+    cache.store(kept, key, report, progress)
     return report
 
 
-def _digest(design: GeneratedDesign, image: SceneImage, registers: Mapping[str, int]) -> str:
-    """Of all that a frame's counters follow from."""
-    digest = hashlib.sha256(design.digest().encode())
+def _key(design: GeneratedDesign, image: SceneImage, registers: Mapping[str, int]) -> dict[str, Any]:
+    """All that a frame's counters follow from."""
+    digest = hashlib.sha256()
     for words in (image.records, *(section.words for section in image.attributes)):
-        digest.update(words.tobytes())
-    digest.update(json.dumps(dict(registers), sort_keys=True, default=int).encode())
-    return digest.hexdigest()[:24]
+        digest.update(f"{words.shape} {words.dtype}\n".encode() + words.tobytes())
+    plain = {name: int(value) for name, value in registers.items()}
+    return {"design": design.digest(), "image": digest.hexdigest(), "registers": plain}

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
+from colonnade import processes
 from colonnade.errors import UserError
 
 #: The oldest Java that Chisel's compiler runs on.
@@ -64,7 +64,7 @@ def find_java() -> Path:
 def _java_version(java: str) -> int | None:
     try:
         command = [java, "-version"]
-        answer = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+        answer = processes.run(command)
     except OSError as error:
         raise UserError(f"{java} cannot be run ({error.strerror}): mend JAVA_HOME or PATH") from error
     match = re.search(r'version "(\d+)', answer.stderr + answer.stdout)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from colonnade import generator, toolchain
+from colonnade import cache, generator, toolchain
 from colonnade.configuration import find_configuration
 from colonnade.errors import UserError
 
@@ -44,14 +45,18 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (root / "configs" / f"{preset}.json").write_text("{}")
     classes = root / "target" / "classes"
     classes.mkdir(parents=True)
-    script(root / "tools" / "sbt", f'echo sbt >>"{root}/runs"\necho "[info] done"\necho "{classes}:/lib/chisel.jar"\n')
+    (classes / "A.class").write_bytes(b"\xca\xfe\xba\xbe")
+    library = root / "lib" / "chisel.jar"
+    library.parent.mkdir()
+    library.write_bytes(b"PK")
+    script(root / "tools" / "sbt", f'echo sbt >>"{root}/runs"\ntouch "{library}"\necho "{classes}:{library}"\n')
     (root / "manifest").write_text(json.dumps(MANIFEST))
     script(
         root / "jdk" / "bin" / "java",
         f'if [ "$1" = -version ]; then echo \'openjdk version "17.0.1"\' >&2; exit; fi\n'
         f'echo "java $*" >>"{root}/runs"\n'
         'while [ $# -gt 0 ]; do if [ "$1" = --output ]; then output="$2"; fi; shift; done\n'
-        f'mkdir -p "$output"; cp "{root}/manifest" "$output/manifest.json"\n',
+        f'mkdir -p "$output"; cp "{root}/manifest" "$output/manifest.json"; echo "module top;" >"$output/Top.sv"\n',
     )
     monkeypatch.setenv("COLONNADE_HOME", str(root))
     monkeypatch.setenv("JAVA_HOME", str(root / "jdk"))
@@ -96,12 +101,74 @@ def test_two_at_a_time_compile_once(checkout: Path) -> None:
     assert runs(checkout) == ["sbt", "java"]
 
 
+def entry_of(design: generator.GeneratedDesign) -> Path:
+    return design.dir.parent
+
+
+def halve(path: Path) -> None:
+    os.truncate(path, path.stat().st_size // 2)
+
+
+DAMAGES: dict[str, tuple[str, Callable[[Path], object]]] = {
+    "manifest": ("design", lambda entry: halve(entry / "design" / "manifest.json")),
+    "altered manifest": (
+        "design",
+        lambda entry: (entry / "design" / "manifest.json").write_text(
+            json.dumps({**MANIFEST, "config": {"array": {"rows": 7}}})
+        ),
+    ),
+    "Verilog": ("design", lambda entry: halve(entry / "design" / "Top.sv")),
+    "seal": ("design", lambda entry: halve(entry / "contents.json")),
+    "class path": ("generator", lambda entry: halve(entry.parent / "classes" / "classpath.json")),
+    "class": ("generator", lambda entry: halve(entry.parent / "classes" / "classes0" / "A.class")),
+    "library": ("generator", lambda entry: (entry.parents[3] / "lib" / "chisel.jar").unlink()),
+}
+
+
+@pytest.mark.parametrize(("what", "damage"), DAMAGES.values(), ids=DAMAGES.keys())
+def test_a_damaged_cache_is_made_again_with_one_line(
+    what: str, damage: Callable[[Path], object], checkout: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = generator.design_for("tiny")
+    manifest, digest = first.manifest, first.digest()
+    damage(entry_of(first))
+    # The classes are asked for when something is generated
+    wanted = ["array.rows=2"] if what == "generator" else []
+    for _ in range(2):
+        cache._verified.clear()
+        again = generator.design_for("tiny", wanted)
+        assert (again.manifest, again.digest()) == (manifest, digest)
+    assert capsys.readouterr().err == f"colonnade: the cached {what} was damaged and is built again\n"
+    assert runs(checkout) == ["sbt", "java", *(["sbt"] * (what == "generator")), "java"]
+
+
+def test_an_interrupted_generator_leaves_nothing(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    state = entry_of(generator.design_for("tiny")).parent
+    before = {path.name for path in state.iterdir()}
+    monkeypatch.setattr(generator.processes, "run", interrupt)
+    monkeypatch.setattr(generator, "find_java", lambda: Path("java"))
+    with pytest.raises(KeyboardInterrupt):
+        generator.design_for("tiny", ["array.rows=2"])
+    assert {path.name for path in state.iterdir() if path.suffix != ".lock"} <= before
+
+
+def test_the_digest_of_a_kept_design_is_that_of_a_copy(checkout: Path, tmp_path: Path) -> None:
+    design = generator.design_for("tiny")
+    assert cache.digests(entry_of(design)) is not None
+    copy = generator.generate("tiny", [], tmp_path / "copy")
+    assert cache.digests(copy.dir.parent) is None
+    assert copy.digest() == design.digest()
+
+
 def test_generate_replaces_only_a_design(checkout: Path, tmp_path: Path) -> None:
     output = tmp_path / "design"
     generator.generate("tiny", [], output)
     (output / "old.sv").write_text("")
     generator.generate("tiny", [], output)
-    assert sorted(path.name for path in output.iterdir()) == ["manifest.json"]
+    assert sorted(path.name for path in output.iterdir()) == ["Top.sv", "manifest.json"]
     precious = tmp_path / "precious"
     precious.mkdir()
     (precious / "thesis.txt").write_text("")
