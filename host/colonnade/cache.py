@@ -95,6 +95,12 @@ def entry(
     return folder
 
 
+def discard(folder: Path) -> None:
+    """Keep an entry no longer: what came of it is wrong. The next one who asks for it makes it again."""
+    with contextlib.suppress(OSError):
+        (folder / CONTENTS).unlink()
+
+
 def touch(path: Path) -> None:
     """Say that an entry was used; a cache that cannot be written is as good."""
     with contextlib.suppress(OSError):

@@ -49,7 +49,9 @@ def require_verilator(purpose: str) -> tuple[Path, str]:
     match = re.match(r"Verilator (\d+)\.(\d+)", version)
     if match is None or (int(match[1]), int(match[2])) < MINIMUM_VERILATOR:
         oldest = f"{MINIMUM_VERILATOR[0]}.{MINIMUM_VERILATOR[1]:03}"
-        raise UserError(f"{program} is '{version[:60]}': {purpose} needs Verilator {oldest} or newer (Debian 12 has it)")
+        raise UserError(
+            f"{program} is '{version[:60]}': {purpose} needs Verilator {oldest} or newer (Debian 12 has it)"
+        )
     return program, version
 
 
@@ -67,7 +69,7 @@ def require_right_compiler(compiler: Path, flags: Sequence[str]) -> None:
     """
     with temporary_folder() as place:
         program = place / "canary"
-        command = [compiler, "-std=c++17", *flags, "-o", program, _CANARY]
+        command: list[str | Path] = [compiler, "-std=c++17", *flags, "-o", program, _CANARY]
         built = processes.run(command, cwd=place, env=clean_environment())
         if built.returncode != 0:
             said = (built.stderr.splitlines() or ["no message"])[0]

@@ -153,7 +153,8 @@ def _rtl_frames(
     design: GeneratedDesign, image: SceneImage, registers: list[dict[str, int]], progress: Progress
 ) -> Iterator[Rendered]:
     """All frames of one run; each has its part of the seconds."""
-    from colonnade.simulate import build_simulator, render_rtl
+    from colonnade.simulate import render_rtl
+    from colonnade.simulator_build import build_simulator
 
     begun = time.perf_counter()
     build_simulator(design, progress)

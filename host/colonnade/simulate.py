@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colonnade import processes
+from colonnade import cache, processes
 from colonnade.errors import UserError
 from colonnade.frame import Frame
 from colonnade.generator import GeneratedDesign
@@ -32,6 +32,7 @@ PIXEL = np.dtype(
     ]
 )
 
+
 @dataclass(frozen=True)
 class Stalls:
     """Disturbances of the harness that must not change a frame.
@@ -41,22 +42,26 @@ class Stalls:
         seed: Of the choice of those cycles.
         memory_percent: Share of the cycles in which each bank is held, 0 to 99; for designs that are holdable.
         memory_burst: Longest hold of a bank, cycles; lengths from 1 on are equally frequent.
+        check_interval: The coupling of the simulator's models is checked in each of so many cycles.
     """
 
     percent: int = 0
     seed: int = 1
     memory_percent: int = 0
     memory_burst: int = 32
+    check_interval: int = 64
 
     def __post_init__(self) -> None:
-        if not (0 <= self.percent < 100 and 0 <= self.memory_percent < 100 and self.memory_burst >= 1):
+        bursts = self.memory_burst >= 1 and self.check_interval >= 1
+        if not (0 <= self.percent < 100 and 0 <= self.memory_percent < 100 and bursts):
             raise ValueError(f"stalls of 0 to 99 percent, in bursts of at least a cycle: not {self}")
 
     @property
     def options(self) -> list[str]:
         """What the harness is told."""
         memory = ["--memory", str(self.memory_percent), "--burst", str(self.memory_burst)]
-        return ["--stall", str(self.percent), "--seed", str(self.seed), *(memory if self.memory_percent else [])]
+        sink = ["--stall", str(self.percent), "--seed", str(self.seed), "--check", str(self.check_interval)]
+        return [*sink, *(memory if self.memory_percent else [])]
 
 
 @dataclass(frozen=True)
@@ -100,9 +105,13 @@ def render_rtl(
     program = build_simulator(design, progress)
     with temporary_folder() as place:
         job, outputs = write_job(place, design.manifest, image, registers, through_port)
-        with progress.step("rendering in the simulator") as report:
-            lines = run_program([str(program), *stalls.options, job.name], place, report)
-        return _collect(design.manifest, registers, outputs, lines)
+        try:
+            with progress.step("rendering in the simulator") as report:
+                lines = run_program([str(program), *stalls.options, job.name], place, report)
+            return _collect(design.manifest, registers, outputs, lines)
+        except RuntimeError:
+            cache.discard(program.parent)
+            raise
 
 
 def write_job(

@@ -182,7 +182,9 @@ def coupling(opened: Opened, inner: str) -> str:
         for kind in ("OUTPUTS", "DIRECT", "INPUTS", "REGISTERS")
     ]
     lines += [f"struct {inner}Variables {{", *(f"    {port.cpp_type}* {port.name};" for port in opened.ports), "};"]
-    lines.append(f"inline std::vector<{inner}Variables> bind{inner}(V{opened.module}___024root& root) {{\n    return {{")
+    lines.append(
+        f"inline std::vector<{inner}Variables> bind{inner}(V{opened.module}___024root& root) {{\n    return {{"
+    )
     for number in range(opened.count):
         variables = (f"&root.{opened.module}__DOT__{opened.variable(number, port)}" for port in opened.ports)
         lines.append("        {" + ", ".join(variables) + "},")

@@ -29,8 +29,8 @@ SKY = Background(colour=(0.2, 0.3, 0.5))
 
 #: Name, configuration, overrides, mesh, stalls of the pixel sink.
 CASES = [
-    ("tiny", "tiny", (), "teapot:4", Stalls()),
-    ("small, stalled sink", "small", (), "teapot:4", Stalls(40, 7)),
+    ("tiny", "tiny", (), "teapot:4", Stalls(check_interval=1)),
+    ("small, stalled sink", "small", (), "teapot:4", Stalls(40, 7, check_interval=1)),
     ("binary tree, one bank", "tiny", ("geometry.arity=2", "columnBvhMemory.banks=1"), "torus", Stalls(10, 3)),
     ("no tree, slow memory", "tiny", ("geometry.bvh=false", "columnBvhMemory.readLatency=5"), "cube", Stalls()),
     ("narrow", "16b16s32d", ("array.rows=1", "array.columns=1"), "sphere:2", Stalls()),
@@ -62,6 +62,21 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     for frame, settings in zip(simulated.frames, registers, strict=True):
         assert_equal(frame, render_model(design.manifest, image, settings))
     assert simulated.frames[0].is_object.any()
+
+
+@pytest.mark.parametrize("mesh", ["teapot:4", "torus"])
+def test_records_loaded_past_the_port_are_those_that_the_port_loads(mesh: str) -> None:
+    """In every counter, cycles among them: what runs freely in the hardware stands as after the load."""
+    design = design_for("tiny")
+    image = pack(load_mesh(mesh), design.manifest)
+    registers = placement(replace(TEAPOT, mesh=MeshSource(name=mesh)), image.header, design.manifest, 24, 17)
+    frames = [
+        render_rtl(design, image, [registers, registers], through_port=through_port).frames
+        for through_port in (False, True)
+    ]
+    for past, through in zip(*frames, strict=True):
+        np.testing.assert_array_equal(past.colour, through.colour)
+        assert past.counters == through.counters
 
 
 #: Name, configuration, what the surface is made of, lights.
