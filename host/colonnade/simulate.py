@@ -148,7 +148,7 @@ def write_job(
 
 
 def run_program(command: list[str], place: Path, report: Report) -> list[str]:
-    """Lines that the harness writes to standard output; it runs in the folder `place`. Its progress goes to `report`."""
+    """What the harness prints when it runs in the folder `place`, as lines; its progress goes to `report`."""
     said: deque[str] = deque(maxlen=5)
     with (place / "results").open("w") as output:
         with processes.started(command, cwd=place, stdout=output, stderr=subprocess.PIPE) as process:

@@ -1,4 +1,4 @@
-"""Builds the simulator of a design: compiled once, kept by the content of the Verilog, of the harness, and by the tools."""
+"""Builds the simulator of a design: compiled once, kept by the content of Verilog and harness, and by the tools."""
 
 from __future__ import annotations
 
