@@ -100,7 +100,7 @@ def test_an_altered_measurement_is_made_again(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     reusing = replace(conditions, reuse=True)
-    (first,) = measure(RUNS[:1], reusing)
+    assert [report["cycles"] for report in measure(RUNS[:1], reusing)] == [1234]
     (kept,) = (tmp_path / "measurements").iterdir()
     damage(kept)
     for _ in range(2):
@@ -108,7 +108,6 @@ def test_an_altered_measurement_is_made_again(
         assert again["cycles"] == 1234
     assert len(rendered) == 2
     assert capsys.readouterr().err == (f"colonnade: the cached measurement {kept.name} was damaged and is made again\n")
-    assert first["mesh"] == again["mesh"]
 
 
 def test_a_missing_mesh_is_named_before_any_frame(conditions: Conditions, monkeypatch: pytest.MonkeyPatch) -> None:
