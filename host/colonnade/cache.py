@@ -225,6 +225,7 @@ def _unwritable(folder: Path, error: OSError) -> UserError | None:
     """What to say of a cache that is full or cannot be written; None if the error is about something else."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return _full(folder)
-    if error.filename is None or not Path(os.fsdecode(error.filename)).is_relative_to(folder):
+    place = Path(os.fsdecode(error.filename or ""))
+    if not error.filename or not (place.is_relative_to(folder) or folder.is_relative_to(place)):
         return None
     return UserError(f"the cache {folder} cannot be written: {error.strerror}")

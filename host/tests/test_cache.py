@@ -121,6 +121,8 @@ def test_names_a_full_and_an_unwritable_cache(tmp_path: Path, made: list[Path]) 
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written: "):
         get(tmp_path / "file" / "k0", made)
+    with pytest.raises(UserError, match="cannot be written: "):
+        get(tmp_path / "file" / "deep" / "deeper" / "k0", made)
 
 
 def test_says_that_work_failed_for_want_of_space(
