@@ -1,13 +1,16 @@
 // Runs the generated hardware under Verilator: carries out the commands of a job file, one a line.
 //
-//   load FILE BYTES TARGET   words of BYTES bytes each, through the load port, to consecutive addresses of a target
+//   load FILE BYTES TARGET   words of BYTES bytes each, to consecutive addresses of a target from 0; records (target 0) go
+//                            straight into the column memories
+//   stream FILE BYTES TARGET the same, all of it through the load port and cycle by cycle
 //   write ADDRESS VALUE      one register word
-//   frame FILE WIDTH HEIGHT START  starts a frame by a write to register START, waits for its end, writes its pixels
-//                            (struct PixelBytes, row by row)
+//   frame FILE WIDTH HEIGHT START WATCHDOG  starts a frame by a write to register START, waits for its end, writes its
+//                            pixels (struct PixelBytes, row by row); WATCHDOG is the frame's, cycles, 0 for none
 //   read NAME ADDRESS WORDS  prints "value NAME VALUE"
 //
 // Options: --stall PERCENT (of the cycles in which the pixel sink does not take pixels), --seed N; where the memory can
-// be held: --memory PERCENT (of a frame's cycles in which each bank is held), --burst N (longest hold, cycles).
+// be held: --memory PERCENT (of a frame's cycles in which each bank is held), --burst N (longest hold, cycles);
+// --check N: checks the coupling of the models (array.hpp) in each Nth cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 when the hardware misbehaves.
 #include <algorithm>
 #include <chrono>
@@ -23,10 +26,9 @@
 #include <utility>
 #include <vector>
 
-#include "VColonnade.h"
-#include "columns.hpp" // EACH_COLUMN(DO): DO(column) for each column; HIT_DISTANCE(column) where the stream carries hits,
+#include "array.hpp"
+#include "ports.hpp" // EACH_COLUMN(DO): DO(column) for each column; HIT_DISTANCE(column) where the stream carries hits,
                        // RATIO(column, channel) where it carries the light left to a room; MEMORY_BANKS, of all columns, where they can be held
-#include "verilated.h"
 
 namespace {
 
@@ -46,8 +48,14 @@ template <class Port> double numberOf(const Port& port) {
     return static_cast<double>(value);
 }
 
+/// Cycles that the hardware may take to end a frame once its watchdog has fired.
+constexpr std::uint64_t watchdogMargin = 100'000;
+
+/// A multiple of the periods of whatever runs freely in the hardware, such as the beats of shared arithmetic units.
+constexpr std::uint64_t freePeriods = 840;
+
 struct Options {
-    unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32;
+    unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32, checkInterval = 64;
 };
 
 #ifdef MEMORY_BANKS
@@ -85,7 +93,7 @@ private:
 class Harness {
 public:
     explicit Harness(const Options& options)
-        : random_(options.seed), stallPercent_(options.stallPercent)
+        : random_(options.seed), stallPercent_(options.stallPercent), checkInterval_(std::max(1u, options.checkInterval))
 #ifdef MEMORY_BANKS
         , holds_(options)
 #endif
@@ -98,27 +106,39 @@ public:
         top_.reset = 0;
         cycle();
     }
-    ~Harness() { top_.final(); }
 
-    /// Words for a memory other than that of the columns (target 0) may be narrower than the port.
-    void load(const std::string& file, std::size_t bytes, std::uint64_t target) {
+    /// Words of a file to consecutive addresses of a target from 0. Words for a memory other than that of the columns
+    /// (target 0) may be narrower than the port.
+    ///
+    /// While words are loaded the render units are idle, so either the load costs no cycles (records) or the device
+    /// moves alone. What runs freely in the hardware then stands as after a load through the port.
+    void load(const std::string& file, std::size_t bytes, std::uint64_t target, bool throughPort) {
+        const std::size_t port = sizeof top_.io_load_bits_record;
+        if (target == 0 ? bytes != port : bytes > port) throw std::runtime_error("records of another width than the load port's");
+        if (!top_.io_load_ready) throw std::runtime_error("the load port takes no records");
         std::ifstream stream(file, std::ios::binary);
-        std::vector<char> record(bytes);
-        for (std::uint64_t address = 0; stream.read(record.data(), static_cast<std::streamsize>(bytes)); ++address) {
-            const std::size_t port = sizeof top_.io_load_bits_record;
-            if (target == 0 ? bytes != port : bytes > port) throw std::runtime_error("records of another width than the load port's");
+        if (!stream) throw std::runtime_error("no file " + file);
+        std::vector<char> word(bytes);
+        std::uint64_t address = 0;
+        for (; stream.read(word.data(), static_cast<std::streamsize>(bytes)); ++address) {
+            if (target == 0 && !throughPort) {
+                array_.store(address, word.data(), bytes);
+                continue;
+            }
             top_.io_load_valid = 1;
             top_.io_load_bits_target = static_cast<std::uint8_t>(target);
             top_.io_load_bits_address = static_cast<std::uint32_t>(address);
             std::memset(&top_.io_load_bits_record, 0, port);
-            std::memcpy(&top_.io_load_bits_record, record.data(), bytes);
-            for (int wait = 0; !ready(top_.io_load_ready); ++wait) {
-                if (wait > 1000) throw std::runtime_error("the load port takes no records");
-                cycle();
-            }
-            cycle();
+            std::memcpy(&top_.io_load_bits_record, word.data(), bytes);
+            if (throughPort) cycle();
+            else array_.outerEdge(true);
         }
         top_.io_load_valid = 0;
+        if (throughPort) return;
+        for (std::uint64_t left = address % freePeriods; left != 0; --left) {
+            if (target == 0) cycle();
+            else array_.unitsEdge(true);
+        }
     }
 
     void write(std::uint64_t address, std::uint32_t value) {
@@ -136,13 +156,12 @@ public:
             top_.io_register_address = static_cast<std::uint32_t>(address + word);
             cycle();
             top_.io_register_read = 0;
-            top_.eval();
             value |= static_cast<unsigned __int128>(top_.io_register_readData) << (32 * word);
         }
         return value;
     }
 
-    void frame(const std::string& file, std::size_t width, std::size_t height, std::uint64_t startAddress) {
+    void frame(const std::string& file, std::size_t width, std::size_t height, std::uint64_t startAddress, std::uint64_t watchdog) {
         pixels_.assign(width * height, {});
         width_ = width;
         received_ = 0;
@@ -150,14 +169,14 @@ public:
         const auto begun = std::chrono::steady_clock::now();
         const std::uint64_t first = cycles_;
         auto shown = begun;
-        std::uint64_t quiet = 0;
-        for (std::size_t before = 0; !ready(top_.io_done); before = received_) {
+        quiet_ = 0;
+        mayChangeRegisters_ = false;
+        while (!top_.io_done) {
 #ifdef MEMORY_BANKS
             holds_.next(top_.io_memoryHolds);
 #endif
             cycle();
-            quiet = received_ == before ? quiet + 1 : 0;
-            if (quiet > 2'000'000'000) throw std::runtime_error("no pixel in two thousand million cycles");
+            if (watchdog != 0 && quiet_ > watchdog + watchdogMargin) throw std::runtime_error("no pixel for longer than the watchdog waits");
             if ((cycles_ & 0xff) == 0 && std::chrono::steady_clock::now() - shown > std::chrono::milliseconds(250)) {
                 shown = std::chrono::steady_clock::now();
                 std::cerr << "progress " << static_cast<double>(received_) / static_cast<double>(pixels_.size()) << std::endl;
@@ -166,25 +185,21 @@ public:
 #ifdef MEMORY_BANKS
         std::memset(&top_.io_memoryHolds, 0, sizeof top_.io_memoryHolds);
 #endif
+        mayChangeRegisters_ = true;
         const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
         std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(pixels_.data()), static_cast<std::streamsize>(pixels_.size() * sizeof(PixelBytes)));
         std::cout << "simulated " << cycles_ - first << ' ' << seconds.count() << '\n';
     }
 
 private:
-    template <class Signal> bool ready(const Signal& signal) {
-        top_.eval();
-        return signal != 0;
-    }
-
     /// One clock cycle; takes the pixels that are offered in it.
     void cycle() {
         const bool takes = stallPercent_ == 0 || random_() % 100 >= stallPercent_;
 #define OFFER(column) top_.io_pixels_##column##_ready = takes;
         EACH_COLUMN(OFFER)
 #undef OFFER
-        top_.clock = 0;
-        top_.eval();
+        array_.settle();
+        quiet_ += takes;
 #define TAKE(column)                                                                                                                      \
     if (takes && top_.io_pixels_##column##_valid) {                                                                                       \
         PixelBytes& pixel = at(top_.io_pixels_##column##_bits_x, top_.io_pixels_##column##_bits_y);                                       \
@@ -212,8 +227,8 @@ private:
 #endif
         EACH_COLUMN(TAKE)
 #undef TAKE
-        top_.clock = 1;
-        top_.eval();
+        if (cycles_ % checkInterval_ == 0) array_.check();
+        array_.edge(mayChangeRegisters_);
         ++cycles_;
     }
 
@@ -223,16 +238,21 @@ private:
         if (pixel.isSeen) throw std::runtime_error("a pixel came twice");
         pixel.isSeen = 1;
         ++received_;
+        quiet_ = 0;
         return pixel;
     }
 
-    VColonnade top_;
+    Array array_;
+    VColonnade& top_ = array_.device;
     std::mt19937 random_;
-    unsigned stallPercent_;
+    unsigned stallPercent_, checkInterval_;
+    bool mayChangeRegisters_ = true;
 #ifdef MEMORY_BANKS
     BankHolds holds_;
 #endif
     std::uint64_t cycles_ = 0;
+    /// Since the last pixel, without those in which the sink took none.
+    std::uint64_t quiet_ = 0;
     std::vector<PixelBytes> pixels_;
     std::size_t width_ = 0, received_ = 0;
 };
@@ -250,11 +270,11 @@ void run(const std::string& job, const Options& options) {
     for (std::string line; std::getline(commands, line);) {
         std::istringstream words(line);
         std::string command, name;
-        std::uint64_t a = 0, b = 0, c = 0;
+        std::uint64_t a = 0, b = 0, c = 0, d = 0;
         words >> command;
-        if (command == "load" && words >> name >> a) harness.load(name, a, words >> b ? b : 0);
+        if ((command == "load" || command == "stream") && words >> name >> a >> b) harness.load(name, a, b, command == "stream");
         else if (command == "write" && words >> a >> b) harness.write(a, static_cast<std::uint32_t>(b));
-        else if (command == "frame" && words >> name >> a >> b >> c) harness.frame(name, a, b, c);
+        else if (command == "frame" && words >> name >> a >> b >> c >> d) harness.frame(name, a, b, c, d);
         else if (command == "read" && words >> name >> a >> b) std::cout << "value " << name << ' ' << decimal(harness.read(a, static_cast<unsigned>(b))) << '\n';
         else throw std::runtime_error("not a command: " + line);
     }
@@ -266,7 +286,7 @@ int main(int argc, char** argv) try {
     std::string job;
     Options options;
     const std::pair<const char*, unsigned*> named[] = {
-        {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}};
+        {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}, {"--check", &options.checkInterval}};
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });

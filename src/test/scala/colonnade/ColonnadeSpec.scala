@@ -33,7 +33,7 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
     it should s"render several frames with $rows rows, $columns columns, $banks banks of latency $latency" in {
       val configuration = config(rows, columns, banks, latency)
       val random        = new Random(rows)
-      test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Seq(VerilatorBackendAnnotation)) {
+      test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) {
         dut =>
           val device = new Device(dut, configuration)
           for (((wide, high), seed) <- Seq((13, 6), (4, 4), (0, 5), (1, 7)).zipWithIndex) {
@@ -65,7 +65,7 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "end a frame that hangs with an error, and render the next one" in {
     val configuration = config(rows = 2, columns = 2, banks = 2, latency = 2)
-    test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+    test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) { dut =>
       val device = new Device(dut, configuration)
       val scene  = records(configuration, 1)
       device.load(scene)
@@ -88,7 +88,7 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "not count a sink that stalls as a frame that hangs, nor load while a frame runs" in {
     val configuration = config(rows = 2, columns = 1, banks = 1, latency = 1)
-    test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+    test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) { dut =>
       val device = new Device(dut, configuration)
       var cycle  = 0
       device.load(records(configuration, 1))

@@ -3,7 +3,7 @@ package colonnade.background
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{AlbedoEntry, Load, NormalEntry}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -34,7 +34,7 @@ class AttributeMapSpec extends AnyFlatSpec with ChiselScalatestTester {
       val count  = 600
       val random = new Random(seed)
       val room   = new RoomDialogue(config, random)
-      test(new MapHarness(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { maps =>
+      test(new MapHarness(config)).withAnnotations(Simulation.verilator) { maps =>
         room.load(maps.load, maps.clock)
         for (offered <- Seq(1.0, 0.3)) {
           def tester(name: String, channel: FlatChannel, exchanges: Seq[Exchange]) =

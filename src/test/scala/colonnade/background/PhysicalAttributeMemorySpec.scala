@@ -3,7 +3,7 @@ package colonnade.background
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import colonnade.config.{ColonnadeConfig, MapEncoding}
 import colonnade.formats.Load
 import org.scalatest.flatspec.AnyFlatSpec
@@ -51,7 +51,7 @@ class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester
     val random = new Random(rows)
     val shape  = config(encoding, rows, columns)
     val room   = new RoomDialogue(shape, random)
-    test(new RoomHarness(shape)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+    test(new RoomHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
       room.load(dut.load, dut.clock)
       val testers = dut.channels.zipWithIndex.map { case (channels, unit) =>
         val dialogues = Seq(room.albedo(count), room.normals(count), room.cells(count), room.planes(count))

@@ -3,7 +3,7 @@ package colonnade.background
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Load
 import org.scalatest.flatspec.AnyFlatSpec
@@ -31,7 +31,7 @@ class PlaneMapSpec extends AnyFlatSpec with ChiselScalatestTester {
     it should s"name tiles, cells and planes as the model does: ${size.width}x${size.height}, tiles of ${size.tileSize}" in {
       val random = new Random(seed)
       val room   = new RoomDialogue(config, random)
-      test(new PlaneMapHarness(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { map =>
+      test(new PlaneMapHarness(config)).withAnnotations(Simulation.verilator) { map =>
         room.load(map.load, map.clock)
         for (offered <- Seq(1.0, 0.3)) {
           def tester(name: String, channel: FlatChannel, exchanges: Seq[Exchange]) =

@@ -7,7 +7,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, RoomView}
 import colonnade.numbers.StreamTester
 import colonnade.traversal.{Packed, PackedUnit}
-import colonnade.{Model, TestConfigs}
+import colonnade.{Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -73,7 +73,7 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     it should s"meet what the model meets with $name" in {
       val random    = new Random(seed)
       val questions = new MarchQuestions(config, random)
-      test(new RoomMarchHarness(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { unit =>
+      test(new RoomMarchHarness(config)).withAnnotations(Simulation.verilator) { unit =>
         unit.clock.setTimeout(0)
         val scene = new RoomScene(config, random)
         RoomImage.load(unit.load, unit.clock, config, scene.words)

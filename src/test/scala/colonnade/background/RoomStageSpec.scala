@@ -7,7 +7,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, RoomView}
 import colonnade.shading.RoomSurface
 import colonnade.traversal.Packed
-import colonnade.{Model, TestConfigs}
+import colonnade.{Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -39,7 +39,7 @@ class RoomStageSpec extends AnyFlatSpec with ChiselScalatestTester {
   private case class Asked(ray: MarchQuestion, isAside: Boolean)
 
   it should "answer one question at a time, of the context's last ray, and hold a surface until it is taken" in
-    test(new RoomStageHarness(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+    test(new RoomStageHarness(config)).withAnnotations(Simulation.verilator) { dut =>
       val random    = new Random(6)
       val questions = new MarchQuestions(config, random)
       val scene     = new RoomScene(config, random)

@@ -4,7 +4,7 @@ import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.{Fixed, StreamTester}
-import colonnade.{Model, TestConfigs}
+import colonnade.{Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -14,7 +14,7 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   behavior of "BounceUnit"
 
-  private val simulation = Seq(VerilatorBackendAnnotation)
+  private val simulation = Simulation.verilator
 
   private def poke(config: ColonnadeConfig, offset: BigInt)(port: BounceRequest, question: BounceQuestion): Unit = {
     val numbers                                         = config.numbers

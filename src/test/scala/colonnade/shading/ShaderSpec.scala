@@ -3,7 +3,7 @@ package colonnade.shading
 import chiseltest._
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.StreamTester
-import colonnade.{Model, TestConfigs}
+import colonnade.{Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -15,7 +15,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "Shader"
 
   /** Faster than the interpreter for so wide a unit. */
-  private val verilator = Seq(VerilatorBackendAnnotation)
+  private val verilator = Simulation.verilator
 
   /** The model's answer, of lights that do not shine as well, and what the hit says itself. */
   private def expected(answer: Seq[BigInt], hit: HitQuestion, light: LightQuestion): Seq[BigInt] =

@@ -1,7 +1,7 @@
 package colonnade.traversal
 
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
@@ -10,7 +10,7 @@ import org.scalatest.matchers.should.Matchers
 class TriangleUnitSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "TriangleUnit"
 
-  private val simulation = Seq(VerilatorBackendAnnotation)
+  private val simulation = Simulation.verilator
 
   private def name(config: ColonnadeConfig): String =
     s"${config.precision} with ${config.geometry.vertexBits} vertex bits"

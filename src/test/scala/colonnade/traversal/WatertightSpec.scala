@@ -1,7 +1,7 @@
 package colonnade.traversal
 
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -20,7 +20,7 @@ class WatertightSpec extends AnyFlatSpec with ChiselScalatestTester with Matcher
 
   it should "hit them in hardware as in the model" in {
     val config = TestConfigs.withPrecision(16, 16, 16)
-    test(new TriangleUnit(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { unit =>
+    test(new TriangleUnit(config)).withAnnotations(Simulation.verilator) { unit =>
       val questions = new TriangleQuestions(config, seed = 30)
       val harness   = new TriangleHarness(config, questions)
       val fans      = Seq.fill(60)(questions.fan)

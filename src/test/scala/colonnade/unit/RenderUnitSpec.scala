@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.{Model, TestConfigs}
+import colonnade.{Model, Simulation, TestConfigs}
 import colonnade.background.{AttributePort, PhysicalAttributeMemory, RoomImage, SlowMaps}
 import colonnade.config.{ColonnadeConfig, MapEncoding, UnitsConfig}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
@@ -26,7 +26,7 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private def render(config: ColonnadeConfig, name: String): Unit =
     it should s"give every position once, with the model's pixel: $name" in
-      test(new RenderUnitHarness(config)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+      test(new RenderUnitHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         for ((willing, seed, shadows, hasRoom) <- if (config.hasRoom) rounds :+ ((0.6, 4, true, false)) else rounds) {
           val scene = new SmallScene(config, seed, wide, high, triangleCount = 15, shadows)
           val room  = Option.when(config.hasRoom)(

@@ -2,7 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{NodeRecord, RecordFormats}
 import colonnade.numbers.FixedPorts._
@@ -25,7 +25,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
   for ((contexts, arity) <- Seq((5, 4), (2, 2)))
     it should s"walk trees of arity $arity with $contexts contexts like the reference" in {
       val shape = config(contexts, arity)
-      test(new TraversalHarness(shape)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+      test(new TraversalHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
         for ((accepted, shrinks, seed) <- Seq((1.0, false, 1), (0.4, true, 2), (0.8, true, 3)))
           new TreeWalkers(dut, shape, seed).run(rays = 40, accepted, shrinks)
       }
