@@ -28,8 +28,8 @@ CONTENTS = "contents.json"
 #: Changes with the meaning of what is kept: part of each seal.
 VERSION = 1
 
-#: Bytes on the disk below which a program that failed is taken to have failed for want of them.
-LEAST_SPACE = 1 << 20
+#: Bytes on the disk below which work that fails is taken to fail for want of them.
+LEAST_SPACE = 16 << 20
 
 _BLOCK = 1 << 20
 
@@ -80,18 +80,13 @@ def entry(
                 if os.path.lexists(folder):
                     progress.note(f"the cached {what} was damaged and is built again")
                 with temporary.temporary_folder(f".{folder.name}.", folder.parent) as place:
-                    make(place)
-                    seal(place, folder.name)
+                    _fill(place, make, folder)
                     temporary.replace(place, folder)
                 _verified[folder] = _known(folder)
     except OSError as error:
         if (refusal := _unwritable(folder.parent, error)) is None:
             raise
         raise refusal from None
-    except RuntimeError:
-        if _is_full(folder.parent):
-            raise UserError(f"no space left on the disk of the cache {folder.parent}: free some there") from None
-        raise
     return folder
 
 
@@ -151,6 +146,21 @@ def turn(lock: Path, what: str, progress: Progress = QUIET) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def _fill(place: Path, make: Callable[[Path], None], folder: Path) -> None:
+    try:
+        make(place)
+        seal(place, folder.name)
+    except (OSError, RuntimeError):
+        # Programs do not say in one way that the disk is full, nor does `shutil`; and soon the half-made entry is gone
+        if shutil.disk_usage(place).free < LEAST_SPACE:
+            raise _full(folder.parent) from None
+        raise
+
+
+def _full(folder: Path) -> UserError:
+    return UserError(f"no space left on the disk of the cache {folder}: free some there")
 
 
 def _is_known(folder: Path) -> bool:
@@ -220,14 +230,8 @@ def _plain(value: Any) -> Any:
 def _unwritable(folder: Path, error: OSError) -> UserError | None:
     """What to say of a cache that is full or cannot be written; None if the error is about something else."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return UserError(f"no space left on the disk of the cache {folder}: free some there")
-    if error.filename is None or not Path(os.fsdecode(error.filename)).is_relative_to(folder):
+        return _full(folder)
+    place = Path(os.fsdecode(error.filename or ""))
+    if not error.filename or not (place.is_relative_to(folder) or folder.is_relative_to(place)):
         return None
     return UserError(f"the cache {folder} cannot be written: {error.strerror}")
-
-
-def _is_full(folder: Path) -> bool:
-    try:
-        return shutil.disk_usage(folder).free < LEAST_SPACE
-    except OSError:
-        return False

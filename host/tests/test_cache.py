@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shutil
 import threading
 import time
 from collections.abc import Callable
@@ -120,17 +121,22 @@ def test_names_a_full_and_an_unwritable_cache(tmp_path: Path, made: list[Path]) 
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written: "):
         get(tmp_path / "file" / "k0", made)
+    with pytest.raises(UserError, match="cannot be written: "):
+        get(tmp_path / "file" / "deep" / "deeper" / "k0", made)
 
 
-def test_says_that_a_program_failed_for_want_of_space(
+def test_says_that_work_failed_for_want_of_space(
     tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(place: Path) -> None:
-        raise RuntimeError("g++ failed")
+        raise errors.pop()
 
     monkeypatch.setattr(cache, "LEAST_SPACE", 1 << 80)
-    with pytest.raises(UserError, match="no space left"):
-        cache.entry(tmp_path / "k0", fail, "simulator")
+    errors = [RuntimeError("g++ failed"), shutil.Error([("from", "to", "No space left")])]
+    while errors:
+        with pytest.raises(UserError, match="no space left on the disk of the cache"):
+            cache.entry(tmp_path / "k0", fail, "simulator")
+    assert names(tmp_path) == {"k0.lock"}
 
 
 def test_threads_share_what_one_of_them_makes(tmp_path: Path, made: list[Path]) -> None:

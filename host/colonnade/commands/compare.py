@@ -36,9 +36,11 @@ def compare(a: Path, b: Path, hits_a: Path | None, hits_b: Path | None, no_dists
     """
     require_outputs(json_file)
 
+    from colonnade import progress
     from colonnade.compare import compare as compare_frames
 
-    report = compare_frames(a, b, hits_a, hits_b, with_dists=not no_dists)
+    with progress.for_terminal().step("comparing"):
+        report = compare_frames(a, b, hits_a, hits_b, with_dists=not no_dists)
     for key, label in LABELS.items():
         value = report[key]
         if value is not None:

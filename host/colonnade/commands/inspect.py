@@ -79,6 +79,7 @@ def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ..
 def _inspect_room(
     background: Path, encoding: str, plane_cells: int, output: Path | None, with_dists: bool, json_file: Path | None
 ) -> None:
+    from colonnade import progress
     from colonnade.attributes import AttributeLayout, encoded_room
     from colonnade.attributes.measure import measure, report_lines
     from colonnade.attributes.pictures import map_pictures, write_pictures
@@ -87,8 +88,9 @@ def _inspect_room(
     room = load_room(background)
     for note in room.notes:
         click.echo(f"colonnade: note: {room.name}: {note}", err=True)
-    image = encoded_room(room, AttributeLayout(room.width, room.height, encoding, plane_cells=plane_cells))
-    report = measure(room, image, with_dists)
+    with progress.for_terminal().step("measuring the room"):
+        image = encoded_room(room, AttributeLayout(room.width, room.height, encoding, plane_cells=plane_cells))
+        report = measure(room, image, with_dists)
     for line in report_lines(report):
         click.echo(line)
     if output is not None:

@@ -64,6 +64,7 @@ def render(
     from colonnade.pictures import encode_srgb, write_png, write_webp
     from colonnade.render import render_frames
 
+    shown = progress.for_terminal()
     results = render_frames(
         scene,
         config,
@@ -74,7 +75,7 @@ def render(
         mesh=mesh,
         background=background,
         hits=hits_file is not None,
-        progress=progress.for_terminal(),
+        progress=shown,
         relit=relit,
     )
     is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"
@@ -88,7 +89,8 @@ def render(
             write_hits(hits_files[index], Hits(result.hit_triangles, result.t))
         reports.append(result.report)
     if is_film:
-        write_webp(pictures[0], film)
+        with shown.step(f"writing {pictures[0].name}"):
+            write_webp(pictures[0], film)
     report = reports[0] if frames is None else frames_report(reports)
     click.echo(summary(report))
     finish(report, json_file)

@@ -38,7 +38,9 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
     if frames:
         from colonnade import ar_study
 
-        by_frame = ar_study.study_frames(rooms, not no_dists, progress.for_terminal(), output)
+        shown = progress.for_terminal()
+        with shown.step("measuring frames"):
+            by_frame = ar_study.study_frames(rooms, not no_dists, shown, output)
         click.echo(ar_study.table(by_frame))
         report = {
             frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
@@ -47,7 +49,8 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
     else:
         from colonnade import rebuild_study
 
-        reports = rebuild_study.study_rooms(rooms)
+        with progress.for_terminal().step("measuring the rooms"):
+            reports = rebuild_study.study_rooms(rooms)
         click.echo(rebuild_study.table(reports))
         report = {name: asdict(value) for name, value in reports.items()}
     finish(report, json_file)

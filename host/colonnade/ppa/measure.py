@@ -56,7 +56,7 @@ def measure(
             name = level.rest if module == level.top else module
             with progress.step(f"synthesising {name}"):
                 for each in (*hierarchy.parts(module), module):
-                    netlists[each] = synthesise(hierarchy, each, into)
+                    netlists[each] = synthesise(hierarchy, each, into, progress)
                 units[name] = _unit(level, module, netlists, hierarchy.parts(module), into)
             finished(level.name, name, units[name])
     with progress.step("timing a render unit as a whole"):

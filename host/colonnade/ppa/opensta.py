@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from colonnade import processes
 from colonnade.ppa.cells import Library
 from colonnade.ppa.netlist import Bit, Netlist
 from colonnade.ppa.replay import Activity
+from colonnade.temporary import temporary_folder
 
 #: The clock's port in every unit.
 CLOCK = "clock"
@@ -89,14 +89,10 @@ def _linked(liberties: Sequence[Path]) -> list[str]:
 
 def _run(script: Sequence[str], verilog: Sequence[str], saif: Sequence[str] = ()) -> str:
     """What OpenSTA prints."""
-    with tempfile.TemporaryDirectory(prefix="colonnade-") as place:
-        folder = Path(place)
+    with temporary_folder() as folder:
         for name, lines in (("script.tcl", [*script, "exit"]), ("unit.v", verilog), ("unit.saif", saif)):
             (folder / name).write_text("\n".join(lines) + "\n")
-        command = ["sta", "-no_splash", "-exit", "script.tcl"]
-        done = subprocess.run(
-            command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
-        )
+        done = processes.run(["sta", "-no_splash", "-exit", "script.tcl"], cwd=folder)
     return done.stdout
 
 

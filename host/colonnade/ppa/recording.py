@@ -6,16 +6,13 @@ edge, from the cycle in which ``io_start`` begins the frame.
 
 from __future__ import annotations
 
+import contextlib
 import re
-import shutil
-import subprocess
-import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from colonnade.files import locked
+from colonnade import processes
 from colonnade.generator import GeneratedDesign, design_for
 from colonnade.manifest import Manifest
 from colonnade.meshes import Mesh, load_mesh
@@ -26,7 +23,8 @@ from colonnade.scene import Scene, load_scene
 from colonnade.simulate import write_job
 from colonnade.simulator_build import build_simulator
 from colonnade.sizes import check_size
-from colonnade.toolchain import cache_directory, project_root, require_program
+from colonnade.temporary import temporary_folder
+from colonnade.toolchain import project_root, require_program
 
 #: Ports that the replay drives by itself, or that a recording begins with.
 CLOCK, RESET, START, ROW = "clock", "reset", "io_start", "io_row"
@@ -171,20 +169,13 @@ def record(
         )
         for direction in ("input", "output")
     }
-    program = build_simulator(_with_recorder(design, module, joined["input"], joined["output"]), progress)
-    with tempfile.TemporaryDirectory(prefix="colonnade-") as place:
-        folder = Path(place)
+    with _with_recorder(design, module, joined["input"], joined["output"]) as recorded:
+        program = build_simulator(recorded, progress)
+    with temporary_folder() as folder:
         (folder / "limit").write_text(f"{stimulus.cycles}\n")
         job, _ = write_job(folder, design.manifest, image, [registers])
         with progress.step("recording a frame"):
-            done = subprocess.run(
-                [str(program), str(job)],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                check=False,
-            )
+            done = processes.run([program, job], cwd=folder)
         if done.returncode != 0:
             raise RuntimeError(f"the simulated hardware failed (status {done.returncode}): {done.stderr[-300:]}")
         lines = (folder / "recording").read_text().split("\n")
@@ -196,10 +187,11 @@ def record(
     return Recording(joined["input"], joined["output"], cycles, int(lines[0]), facts, counters)
 
 
+@contextlib.contextmanager
 def _with_recorder(
     design: GeneratedDesign, module: str, inputs: Sequence[Port], outputs: Sequence[Port]
-) -> GeneratedDesign:
-    """The design with the recorder beside it, in a folder of its own."""
+) -> Iterator[GeneratedDesign]:
+    """The design with the recorder beside it, in a temporary folder."""
     names = {port.name for port in inputs}
     text = _RECORDER.format(
         module=module,
@@ -212,13 +204,9 @@ def _with_recorder(
         input_names=", ".join(port.name for port in inputs),
         output_names=", ".join(port.name for port in outputs),
     )
-    folder = cache_directory(project_root()) / "recorder" / f"{design.dir.parent.name}-{design.dir.name}-{module}"
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with locked(folder.with_suffix(".lock")):
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir()
+    with temporary_folder() as folder:
         for file in design.sources:
             (folder / file.name).symlink_to(file.resolve())
         # Before the design, which binds it: files are read in the order of their names
         (folder / "ColonnadeRecorder.sv").write_text(re.sub(r"^\n", "", text))
-    return GeneratedDesign(folder, design.manifest)
+        yield GeneratedDesign(folder, design.manifest)

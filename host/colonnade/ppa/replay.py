@@ -12,20 +12,19 @@ from __future__ import annotations
 
 import hashlib
 import os
-import subprocess
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from colonnade.files import locked
+from colonnade import cache, processes
 from colonnade.ppa import gate_netlist
 from colonnade.ppa.hierarchy import Hierarchy
 from colonnade.ppa.netlist import Netlist
 from colonnade.ppa.recording import CLOCK, RESET, START, Port, Recording
 from colonnade.progress import QUIET, Progress
 from colonnade.simulate import run_program
-from colonnade.toolchain import cache_directory, project_root, require_program
+from colonnade.temporary import temporary_folder
+from colonnade.toolchain import cache_directory, project_root, require_program, version_of
 
 #: Cycles of reset before the recorded ones.
 RESET_CYCLES = 8
@@ -33,6 +32,13 @@ RESET_CYCLES = 8
 #: Of the rest between reset and a frame as many cycles are replayed as leave this remainder, and this once more:
 #: counters that run freely, with a period that divides it, are then where they were.
 REST_PERIOD = 240
+
+
+#: Of the compiler. g++ 12.2 sums comparisons wrongly with its vectorizer of straight-line code.
+OPTIONS = ("-std=c++17", "-O2", "-fno-tree-slp-vectorize")
+
+#: Variables that change what g++ reads.
+SEARCHED = ("CPATH", "C_INCLUDE_PATH", "CPLUS_INCLUDE_PATH", "LIBRARY_PATH", "GCC_EXEC_PREFIX", "COMPILER_PATH")
 
 
 @dataclass(frozen=True)
@@ -79,8 +85,7 @@ def replay(
     prelude = _prelude(recording)
     stimulus = [*prelude, *(inputs for inputs, _ in recording.cycles)]
     sizes = [(sum(port.bits for port in ports) + 7) // 8 for ports in (recording.inputs, recording.outputs)]
-    with tempfile.TemporaryDirectory(prefix="colonnade-") as place:
-        folder = Path(place)
+    with temporary_folder() as folder:
         text = gate_netlist.lines(netlist, hierarchy, delays, recording.inputs, recording.outputs)
         (folder / "netlist").write_text("\n".join(text) + "\n")
         (folder / "stimulus").write_bytes(b"".join(inputs.to_bytes(sizes[0], "little") for inputs in stimulus))
@@ -96,21 +101,27 @@ def replay(
 
 
 def build(progress: Progress = QUIET) -> Path:
-    """The simulator of gates, compiled once per state of its source."""
+    """The simulator of gates, compiled once per state of its source, compiler and options."""
     source = Path(__file__).parents[1] / "harness" / "gates.cpp"
-    digest = hashlib.sha256(source.read_bytes()).hexdigest()[:20]
-    program = cache_directory(project_root()) / "gates" / digest
-    with locked(program.with_suffix(".lock")):
-        if not program.is_file():
-            compiler = require_program("g++", "power")
-            incoming = program.with_suffix(f".{os.getpid()}")
-            with progress.step("building the simulator of gates"):
-                command = [str(compiler), "-std=c++17", "-O2", "-o", str(incoming), str(source)]
-                done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-            if done.returncode != 0:
-                raise RuntimeError(f"the simulator of gates does not build: {done.stderr[:300]}")
-            incoming.replace(program)
-    return program
+    compiler = require_program("g++", "power")
+    parts = (source.read_bytes(), version_of(compiler).encode(), " ".join(OPTIONS).encode())
+    digest = hashlib.sha256(b"".join(f"{len(part)}:".encode() + part for part in parts)).hexdigest()[:20]
+
+    def make(place: Path) -> None:
+        with progress.step("building the simulator of gates"):
+            _compile(compiler, source, place / "gates")
+
+    return (
+        cache.entry(cache_directory(project_root()) / "gates" / digest, make, "simulator of gates", progress) / "gates"
+    )
+
+
+def _compile(compiler: Path, source: Path, program: Path) -> None:
+    # g++ takes no options from variables; these add folders to those it searches
+    environment = {name: value for name, value in os.environ.items() if name not in SEARCHED}
+    done = processes.run([compiler, *OPTIONS, "-o", program, source], env=environment)
+    if done.returncode != 0:
+        raise RuntimeError(f"the simulator of gates does not build: {done.stderr[:300]}")
 
 
 def require_same(recording: Recording, found: Sequence[int]) -> None:

@@ -9,22 +9,25 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import importlib.metadata
 import importlib.util
 import json
-import os
 import subprocess
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from colonnade import cache, processes
 from colonnade.errors import UserError
+from colonnade.files import replacing
 from colonnade.ppa import liberty
 from colonnade.ppa.cells import Library
 from colonnade.ppa.hierarchy import Hierarchy
+from colonnade.progress import QUIET, Progress
+from colonnade.temporary import temporary_folder
 from colonnade.toolchain import cache_directory, project_root
 
 #: Registers that dfflibmap would prefer to smaller ones, since their output is not inverted.
@@ -49,6 +52,9 @@ TRANSISTORS = {
     "$_OAI4_": 8,
     "$_DFF_P_": 16,
 }
+
+#: The file of an entry of the cache.
+NETLIST = "netlist.json.gz"
 
 #: Default of ``--delay``, in FO4 of the library.
 TARGET_FO4 = 60
@@ -123,17 +129,16 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
     for path in sources:
         text = liberty.pruned(path).encode("latin-1")
         copy = folder / f"{path.name.split('.')[0]}-{hashlib.sha256(text).hexdigest()[:20]}.lib"
-        if not copy.is_file():
-            incoming = copy.with_suffix(f".{os.getpid()}")
-            incoming.write_bytes(text)
-            incoming.replace(copy)
+        if not copy.is_file() or copy.read_bytes() != text:
+            with replacing(copy) as stream:
+                stream.write(text)
         kept.append(copy)
     library = liberty.load(kept)
     digest = " ".join(copy.name for copy in kept)
     return Technology(library, digest, delay or round(TARGET_FO4 * library.fo4, 4), sources)
 
 
-def synthesise(hierarchy: Hierarchy, top: str, into: Technology) -> dict[str, Any]:
+def synthesise(hierarchy: Hierarchy, top: str, into: Technology, progress: Progress = QUIET) -> dict[str, Any]:
     """The netlist of one unit, as Yosys's JSON has it: ``modules[top]``. Taken from the cache when it is there."""
     own, ends = hierarchy.closure(top)
     script = _script(hierarchy, top, own, ends, into)
@@ -141,20 +146,20 @@ def synthesise(hierarchy: Hierarchy, top: str, into: Technology) -> dict[str, An
     for module in own:
         digest.update(hierarchy.files[module].read_bytes())
     boxes = "".join(hierarchy.header(module) for module in ends)
-    digest.update(f"{into.digest} {_constraints(into)} {boxes}".encode())
-    file = cache_directory(project_root()) / "ppa" / f"{top}-{digest.hexdigest()[:20]}.json.gz"
-    if not file.is_file():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=file.parent, prefix=f".{top}.") as place:
+    digest.update(f"{into.digest} {_constraints(into)} {boxes} {importlib.metadata.version('pyosys')}".encode())
+    folder = cache_directory(project_root()) / "ppa" / f"{top}-{digest.hexdigest()[:20]}"
+
+    def make(place: Path) -> None:
+        with temporary_folder() as work:
             links = {hierarchy.files[module].name: hierarchy.files[module] for module in own}
             links |= {file.name: file for file in (into.library.files if into.library else ())}
-            (Path(place) / "constraints").write_text(_constraints(into))
-            (Path(place) / "boxes.sv").write_text(boxes)
-            run_yosys([*script, "write_json netlist.json"], Path(place), links, file.with_suffix(".log"))
-            written = json.loads((Path(place) / "netlist.json").read_text())["modules"][top]
-            (Path(place) / "kept").write_bytes(gzip.compress(json.dumps(_kept(written)).encode(), 3))
-            (Path(place) / "kept").replace(file)
-    os.utime(file)
+            (work / "constraints").write_text(_constraints(into))
+            (work / "boxes.sv").write_text(boxes)
+            run_yosys([*script, "write_json netlist.json"], work, links, folder.with_suffix(".log"))
+            written = json.loads((work / "netlist.json").read_text())["modules"][top]
+        (place / NETLIST).write_bytes(gzip.compress(json.dumps(_kept(written)).encode(), 3))
+
+    file = cache.entry(folder, make, f"netlist of {top}", progress) / NETLIST
     netlist: dict[str, Any] = json.loads(gzip.decompress(file.read_bytes()))
     return netlist
 
@@ -207,14 +212,8 @@ def run_yosys(script: list[str], place: Path, links: Mapping[str, Path], log: Pa
         (place / name).symlink_to(file.resolve())
     (place / "script.ys").write_text("\n".join(script) + "\n")
     with log.open("w") as stream:
-        done = subprocess.run(
-            [sys.executable, "-c", _RUN, "script.ys"],
-            cwd=place,
-            stdin=subprocess.DEVNULL,
-            stdout=stream,
-            stderr=subprocess.STDOUT,
-            check=False,
-        )
+        command = [sys.executable, "-c", _RUN, "script.ys"]
+        done = processes.run(command, cwd=place, stdout=stream, stderr=subprocess.STDOUT)
     if done.returncode != 0:
         errors = [line for line in log.read_text(errors="replace").splitlines() if "ERROR" in line or "error:" in line]
         raise RuntimeError(f"Yosys failed: {(errors or ['see there'])[0]} (all of it: {log})")
