@@ -1,5 +1,5 @@
 # What the checkout needs of the machine; sourced by the scripts of this folder.
-# Sets `root` (the checkout) and defines: die, python_program, java_program, missing_packages.
+# Sets `root` (the checkout) and defines: die, python_program, java_program, missing_packages, install_locked.
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 sbt_version=1.12.14
@@ -72,4 +72,19 @@ missing_packages() {
   python="$(python_program)"
   if [ -z "$python" ] || ! python_is_complete "$python"; then missing+=(python3 python3-venv python3-dev); fi
   echo "${missing[*]}"
+}
+
+# Installs a lock of host/locks into an environment; pip refuses every file whose hash the lock does not name.
+# Usage: install_locked ENVIRONMENT LOCK [OPTION OF PIP]…
+install_locked() {
+  local environment="$1" lock="$2" log="$root/.cache/pip-$2.log" different
+  shift 2
+  mkdir -p "$root/.cache"
+  PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 "$environment/bin/python" -m pip install --no-deps --require-hashes "$@" \
+    -r "$root/host/locks/$lock.txt" >"$log" 2>&1 </dev/null && return
+  # pip names the package in the line below its warning, then the hash that it got.
+  different="$(awk '/DO NOT MATCH THE HASHES/ { getline; sub(/^ */, ""); sub(/ from .*/, ""); print; exit }' "$log")"
+  [ -z "$different" ] || die "$different is not the file that host/locks/$lock.txt holds by its SHA-256; nothing was installed of it: see $log"
+  tail -n 20 "$log" >&2
+  die "installing the packages of host/locks/$lock.txt failed: see $log"
 }
