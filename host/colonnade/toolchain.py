@@ -93,7 +93,9 @@ def require_simulator() -> Path:
     require_program("g++", "the rtl backend")
     require_program("make", "the rtl backend")
     verilator = require_program("verilator", "the rtl backend (--backend model needs no simulator)")
-    answer = subprocess.run([verilator, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+    answer = subprocess.run(
+        [verilator, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False
+    )
     version = re.match(r"Verilator (\d+)\.(\d+)", answer.stdout)
     if version and tuple(map(int, version.groups())) < tuple(map(int, MINIMUM_VERILATOR.split("."))):
         advice = "use Debian 12, Ubuntu 24.04 or newer, or put a Verilator built from source first on PATH"

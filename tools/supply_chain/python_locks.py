@@ -48,9 +48,14 @@ class Lock:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
+def project_tables() -> dict[str, Any]:
+    """What host/pyproject.toml says."""
+    return tomllib.loads(PROJECT.read_text(encoding="utf-8"))
+
+
 def wanted_locks() -> list[Lock]:
     """The locks that pyproject.toml asks for: build requirements, .venv, and each further extra and group."""
-    data: dict[str, Any] = tomllib.loads(PROJECT.read_text(encoding="utf-8"))
+    data = project_tables()
     project = data["project"]
     extras: dict[str, list[str]] = dict(project.get("optional-dependencies", {}))
     groups: dict[str, list[str]] = dict(data.get("dependency-groups", {}))

@@ -58,7 +58,7 @@ def _read() -> dict[str, Any]:
 
 
 def _document(components: list[Component]) -> dict[str, Any]:
-    project = python_locks.tomllib.loads(python_locks.PROJECT.read_text(encoding="utf-8"))["project"]
+    project = python_locks.project_tables()["project"]
     product = {
         "type": "application",
         "bom-ref": project["name"],
