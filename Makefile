@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup render test test-hardware test-host verify bench check format clean
+.PHONY: help setup render test test-hardware test-host verify bench check lock format clean
 
 venv := .venv/bin
 SCENE ?= scenes/room.toml
@@ -36,13 +36,17 @@ bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where
 	@mkdir -p out
 	@$(venv)/colonnade bench --config $(BENCH_CONFIG) --json out/bench.json --plot out/bench.png
 
-check: setup ## formatters, linters, types, golden manifests
+check: setup ## formatters, linters, types, locks, golden manifests
 	@tools/check
+
+lock: setup ## make host/locks, project/dependencies.sha256 and sbom.json again
+	@tools/lock
 
 format: setup ## let the formatters rewrite the sources
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host
 	@$(venv)/ruff format host
+	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain
 
 clean: ## remove everything that was built, fetched or cached
 	@rm -rf .venv .tools .cache out target project/target project/project test_run_dir build host/build

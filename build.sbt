@@ -4,6 +4,8 @@ ThisBuild / scalaVersion := "2.13.15"
 ThisBuild / licenses     := Seq("Apache-2.0" -> url("https://www.apache.org/licenses/LICENSE-2.0"))
 
 val chiselVersion = "6.7.0"
+// The one that this Chisel asks for. On the class path its hash is checked; else Chisel would download it unchecked.
+val firtoolVersion = "1.62.1"
 
 lazy val colonnade = (project in file("."))
   .settings(
@@ -11,8 +13,9 @@ lazy val colonnade = (project in file("."))
     libraryDependencies ++= Seq(
       "org.chipsalliance" %% "chisel"          % chiselVersion,
       "com.lihaoyi"       %% "upickle"         % "3.1.0",
-      "edu.berkeley.cs"   %% "chiseltest"      % "6.0.0"    % Test,
-      "org.scalatestplus" %% "scalacheck-1-17" % "3.2.17.0" % Test // for chiseltest's scalatest
+      "org.chipsalliance"  % "llvm-firtool"    % firtoolVersion % Runtime,
+      "edu.berkeley.cs"   %% "chiseltest"      % "6.0.0"        % Test,
+      "org.scalatestplus" %% "scalacheck-1-17" % "3.2.17.0"     % Test // for chiseltest's scalatest
     ),
     addCompilerPlugin("org.chipsalliance" % "chisel-plugin" % chiselVersion cross CrossVersion.full),
     scalacOptions ++= Seq(

@@ -1,10 +1,18 @@
 # What the checkout needs of the machine; sourced by the scripts of this folder.
-# Sets `root` (the checkout) and defines: die, python_program, java_program, missing_packages.
+# Sets `root` (the checkout) and defines: die, python_program, java_program, missing_packages, install_locked.
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 sbt_version=1.12.14
 sbt_launcher="$root/.tools/sbt-launch-$sbt_version.jar"
 sbt_launcher_sha256=1750c8fb61c2d2f82da40b2cd9014f4d8a1bd49a361402ea5b1cec061ed66578
+sbt_boot="$root/.cache/sbt-boot-$sbt_version" # sbt itself, as the launcher fetches it
+
+# The oldest versions. Verilator: the oldest that the tests have run with. host/colonnade/toolchain.py has its twin.
+minimum_verilator=5.006
+minimum_gxx=10
+minimum_make=4.0
+minimum_java=17
+minimum_python=3.10
 
 # An unset or unusable HOME must not send caches to the file system's root. Java asks the system, not HOME.
 java_home_option=()
@@ -25,7 +33,10 @@ die() {
 
 has() { command -v "$1" >/dev/null 2>&1; }
 
-python_is_new_enough() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 10))' >/dev/null 2>&1; }
+# Whether version $1 is $2 or newer.
+at_least() { [ "$(printf '%s\n%s\n' "$2" "$1" | sort -V | head -n 1)" = "$2" ]; }
+
+python_is_new_enough() { at_least "$(python_version "$1")" "$minimum_python"; }
 
 # The interpreter for .venv: the first of these that is Python 3.10 or newer.
 python_program() {
@@ -53,8 +64,35 @@ java_is_new_enough() {
   local java version
   java="$(java_program)"
   [ -n "$java" ] || return 1
-  version="$("$java" -version 2>&1 | sed -nE 's/.*version "([0-9]+).*/\1/p' | head -n 1)"
-  [ -n "$version" ] && [ "$version" -ge 17 ]
+  version="$(java_version "$java")"
+  [ -n "$version" ] && at_least "$version" "$minimum_java"
+}
+
+# Versions as the programs say them; empty where they say none.
+verilator_version() { verilator --version 2>/dev/null | sed -nE 's/^Verilator ([0-9.]+).*/\1/p' | head -n 1; }
+gxx_version() { g++ -dumpfullversion -dumpversion 2>/dev/null | head -n 1; }
+make_version() { make --version 2>/dev/null | sed -nE 's/^GNU Make ([0-9.]+).*/\1/p' | head -n 1; }
+java_version() { "$1" -version 2>&1 | sed -nE 's/.*version "([0-9]+).*/\1/p' | head -n 1; }
+python_version() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || echo 0; }
+
+# A line for each program that is there but too old, with what to do.
+too_old() {
+  local found java
+  found="$(verilator_version)"
+  [ -z "$found" ] || at_least "$found" "$minimum_verilator" ||
+    echo "Verilator $found is too old, $minimum_verilator or newer is needed: use Debian 12, Ubuntu 24.04 or newer, or put a Verilator built from source first on PATH"
+  found="$(gxx_version)"
+  [ -z "$found" ] || at_least "$found" "$minimum_gxx" ||
+    echo "g++ $found is too old, $minimum_gxx or newer is needed (C++17): install g++-$minimum_gxx or newer and put it first on PATH as g++"
+  found="$(make_version)"
+  [ -z "$found" ] || at_least "$found" "$minimum_make" || echo "GNU Make $found is too old, $minimum_make or newer is needed: put a newer make first on PATH"
+  java="$(java_program)"
+  if [ -n "$java" ] && ! java_is_new_enough; then
+    echo "$java is Java $(java_version "$java"), too old, $minimum_java or newer is needed: unset JAVA_HOME or set it to a JDK $minimum_java"
+  fi
+  if [ -z "$(python_program)" ] && has python3; then
+    echo "Python $(python_version python3) is too old, $minimum_python or newer is needed: set PYTHON to a newer one"
+  fi
 }
 
 sha256_matches() { [ -f "$1" ] && [ "$(sha256sum "$1" | cut -d' ' -f1)" = "$2" ]; }
@@ -67,9 +105,24 @@ missing_packages() {
   has g++ || missing+=(g++)
   has make || missing+=(make)
   has z3 || missing+=(z3)
-  # Maven only fetches the sbt launcher: not needed where sbt or the launcher is there already.
-  has sbt || has mvn || sha256_matches "$sbt_launcher" "$sbt_launcher_sha256" || missing+=(maven)
+  # Maven only fetches the sbt launcher: not needed where that is there already, or another sbt is asked for.
+  [ -n "${COLONNADE_SBT:-}" ] || has mvn || sha256_matches "$sbt_launcher" "$sbt_launcher_sha256" || missing+=(maven)
   python="$(python_program)"
   if [ -z "$python" ] || ! python_is_complete "$python"; then missing+=(python3 python3-venv python3-dev); fi
   echo "${missing[*]}"
+}
+
+# Installs a lock of host/locks into an environment; pip refuses every file whose hash the lock does not name.
+# Usage: install_locked ENVIRONMENT LOCK [OPTION OF PIP]…
+install_locked() {
+  local environment="$1" lock="$2" log="$root/.cache/pip-$2.log" different
+  shift 2
+  mkdir -p "$root/.cache"
+  PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 "$environment/bin/python" -m pip install --no-deps --require-hashes "$@" \
+    -r "$root/host/locks/$lock.txt" >"$log" 2>&1 </dev/null && return
+  # pip names the package in the line below its warning, then the hash that it got.
+  different="$(awk '/DO NOT MATCH THE HASHES/ { getline; sub(/^ */, ""); sub(/ from .*/, ""); print; exit }' "$log")"
+  [ -z "$different" ] || die "$different is not the file that host/locks/$lock.txt holds by its SHA-256; nothing was installed of it: see $log"
+  tail -n 20 "$log" >&2
+  die "installing the packages of host/locks/$lock.txt failed: see $log"
 }

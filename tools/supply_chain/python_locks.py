@@ -1,0 +1,140 @@
+"""Makes the files of host/locks from host/pyproject.toml, and checks offline that they are up to date.
+
+A lock names every package that pip may install, with its version for each Python and the SHA-256 of its files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = ROOT / "host" / "pyproject.toml"
+LOCKS = ROOT / "host" / "locks"
+REMADE_BY = "run: tools/lock"
+
+_MARK = "# dependencies-sha256: "
+
+
+@dataclass(frozen=True)
+class Lock:
+    """One file of host/locks and the requirements that it resolves."""
+
+    name: str
+    requirements: tuple[str, ...]
+    requires_python: str
+
+    @property
+    def path(self) -> Path:
+        """Where the lock is kept."""
+        return LOCKS / f"{self.name}.txt"
+
+    @property
+    def digest(self) -> str:
+        """Identifies the tables of pyproject.toml that the lock was made from."""
+        text = json.dumps([self.requires_python, sorted(self.requirements)])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def project_tables() -> dict[str, Any]:
+    """What host/pyproject.toml says."""
+    return tomllib.loads(PROJECT.read_text(encoding="utf-8"))
+
+
+def wanted_locks() -> list[Lock]:
+    """The locks that pyproject.toml asks for: build requirements, .venv, and each further extra and group."""
+    data = project_tables()
+    project = data["project"]
+    extras: dict[str, list[str]] = dict(project.get("optional-dependencies", {}))
+    groups: dict[str, list[str]] = dict(data.get("dependency-groups", {}))
+    build = [*data["build-system"]["requires"], *groups.pop("build", [])]
+    host = [*project["dependencies"], *extras.pop("test", [])]
+    tables = {"build": build, "host": host, **extras, **groups}
+    return [Lock(name, tuple(table), project["requires-python"]) for name, table in tables.items()]
+
+
+def write(uv: str, upgrade: bool) -> None:
+    """Make every lock again with ``uv``; versions stay as they are unless ``upgrade`` or pyproject.toml asks."""
+    LOCKS.mkdir(exist_ok=True)
+    locks = wanted_locks()
+    for lock in locks:
+        _compile(uv, lock, upgrade)
+    for stale in set(LOCKS.glob("*.txt")) - {lock.path for lock in locks}:
+        stale.unlink()
+
+
+def _compile(uv: str, lock: Lock, upgrade: bool) -> None:
+    oldest = re.sub(r"[^0-9.]", "", lock.requires_python)
+    command = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", oldest, "--generate-hashes"]
+    command += ["--no-python-downloads", "--no-header", "--no-annotate", "--no-emit-index-url"]
+    with tempfile.TemporaryDirectory() as folder:
+        wishes, result = Path(folder) / "requirements.in", Path(folder) / "lock.txt"
+        wishes.write_text("\n".join(lock.requirements) + "\n", encoding="utf-8")
+        if lock.path.is_file() and not upgrade:
+            result.write_text(lock.path.read_text(encoding="utf-8"), encoding="utf-8")
+        # What lives in the same .venv has the same versions.
+        for earlier in ("build", "host"):
+            if earlier == lock.name:
+                break
+            command += ["--constraints", str(LOCKS / f"{earlier}.txt")]
+        done = subprocess.run([*command, "--output-file", str(result), str(wishes)], cwd=ROOT / "host", check=False)
+        if done.returncode != 0:
+            sys.exit(2)
+        text = result.read_text(encoding="utf-8")
+    header = f"# Made by tools/lock from host/pyproject.toml. Do not edit.\n{_MARK}{lock.digest}\n"
+    lock.path.write_text(header + text, encoding="utf-8")
+
+
+def check() -> list[str]:
+    """What is wrong with the locks, one line each; needs no network."""
+    locks = wanted_locks()
+    faults = [fault for lock in locks for fault in _faults(lock)]
+    for stale in sorted(set(LOCKS.glob("*.txt")) - {lock.path for lock in locks}):
+        faults.append(f"host/locks/{stale.name} belongs to no table of host/pyproject.toml; {REMADE_BY}")
+    return faults
+
+
+def _faults(lock: Lock) -> list[str]:
+    name = f"host/locks/{lock.path.name}"
+    if not lock.path.is_file():
+        return [f"{name} is missing; {REMADE_BY}"]
+    text = lock.path.read_text(encoding="utf-8")
+    if _MARK + lock.digest not in text.splitlines():
+        return [f"{name} is older than the dependencies in host/pyproject.toml; {REMADE_BY}"]
+    faults = [f"{name}: {pin.name} {pin.version} has no hash; {REMADE_BY}" for pin in read(text) if not pin.hashes]
+    if "://" in text:
+        faults.append(f"{name} names a host; {REMADE_BY}")
+    return faults
+
+
+@dataclass(frozen=True)
+class Pin:
+    """One package of a lock: its version where ``marker`` holds, and the SHA-256 of the files that pip accepts."""
+
+    name: str
+    version: str
+    marker: str
+    hashes: tuple[str, ...]
+
+
+def read(text: str) -> list[Pin]:
+    """The packages of a lock's text."""
+    pins = []
+    for entry in re.sub(r"\\\n", " ", text).splitlines():
+        found = re.match(r"([A-Za-z0-9._-]+)==([^ ;]+)(?: ; (.*?))?(?=\s+--hash|\s*$)", entry)
+        if found:
+            hashes = tuple(re.findall(r"--hash=sha256:([0-9a-f]{64})", entry))
+            pins.append(Pin(found[1], found[2], (found[3] or "").strip(), hashes))
+    return pins
