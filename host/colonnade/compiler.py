@@ -14,7 +14,7 @@ from pathlib import Path
 from colonnade import processes
 from colonnade.errors import UserError
 from colonnade.temporary import temporary_folder
-from colonnade.toolchain import require_program
+from colonnade.toolchain import require_program, version_of
 
 #: Part of each compilation of C++ that Verilator or this package wrote.
 SAFE = ("-fno-tree-slp-vectorize",)
@@ -33,15 +33,6 @@ def clean_environment() -> dict[str, str]:
     return {name: os.environ[name] for name in KEPT_VARIABLES if name in os.environ}
 
 
-def version_of(program: Path) -> str:
-    """The first line of what ``program --version`` prints."""
-    answer = processes.run([program, "--version"], env=clean_environment())
-    lines = answer.stdout.splitlines()
-    if answer.returncode != 0 or not lines:
-        raise UserError(f"{program} --version fails: install it again")
-    return lines[0].strip()
-
-
 def require_verilator(purpose: str) -> tuple[Path, str]:
     """Verilator and its version; refuses one that is too old."""
     program = require_program("verilator", purpose)
@@ -49,14 +40,13 @@ def require_verilator(purpose: str) -> tuple[Path, str]:
     match = re.match(r"Verilator (\d+)\.(\d+)", version)
     if match is None or (int(match[1]), int(match[2])) < MINIMUM_VERILATOR:
         oldest = f"{MINIMUM_VERILATOR[0]}.{MINIMUM_VERILATOR[1]:03}"
-        raise UserError(
-            f"{program} is '{version[:60]}': {purpose} needs Verilator {oldest} or newer (Debian 12 has it)"
-        )
+        advice = "use Debian 12, Ubuntu 24.04 or newer, or put a newer Verilator first on PATH"
+        raise UserError(f"{program} is '{version[:60]}': {purpose} needs {oldest} or newer; {advice}")
     return program, version
 
 
 def require_compiler(purpose: str) -> tuple[Path, str]:
-    """The C++ compiler and its version."""
+    """The C++ compiler and its version, a part of the key of all that is built with it."""
     program = require_program("g++", purpose)
     return program, version_of(program)
 

@@ -15,9 +15,6 @@ from colonnade.errors import UserError
 #: The oldest Java that Chisel's compiler runs on.
 MINIMUM_JAVA = 17
 
-#: The oldest Verilator that the tests have run with; tools/programs.sh has the same.
-MINIMUM_VERILATOR = "5.006"
-
 
 def project_root() -> Path:
     """Find the checkout: the hardware's sources and the generator are not part of the Python package.
@@ -97,18 +94,3 @@ def require_program(name: str, purpose: str, package: str | None = None) -> Path
     if found is None:
         raise UserError(f"no {name} found, which {purpose} needs: sudo apt-get install {package or name}")
     return Path(found)
-
-
-def require_simulator() -> Path:
-    """Check for all that building a simulation takes and return the path of Verilator."""
-    require_program("g++", "the rtl backend")
-    require_program("make", "the rtl backend")
-    verilator = require_program("verilator", "the rtl backend (--backend model needs no simulator)")
-    answer = subprocess.run(
-        [verilator, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False
-    )
-    version = re.match(r"Verilator (\d+)\.(\d+)", answer.stdout)
-    if version and tuple(map(int, version.groups())) < tuple(map(int, MINIMUM_VERILATOR.split("."))):
-        advice = "use Debian 12, Ubuntu 24.04 or newer, or put a Verilator built from source first on PATH"
-        raise UserError(f"{verilator} is {version.group(0)}, older than {MINIMUM_VERILATOR}: {advice}")
-    return verilator

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from colonnade import cache, generator, toolchain
+from colonnade import cache, compiler, generator, toolchain
 from colonnade.configuration import find_configuration
 from colonnade.errors import UserError
 
@@ -217,7 +217,7 @@ def test_no_verilator_names_the_package(tmp_path: Path, monkeypatch: pytest.Monk
         script(tmp_path / program, "")
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(UserError, match=r"no verilator found.*apt-get install verilator"):
-        toolchain.require_simulator()
+        compiler.require_verilator("the rtl backend")
 
 
 def test_configurations_by_name_path_and_precision(checkout: Path, tmp_path: Path) -> None:

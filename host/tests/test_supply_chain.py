@@ -14,7 +14,7 @@ from types import ModuleType
 
 import pytest
 
-from colonnade import toolchain
+from colonnade import compiler
 from colonnade.errors import UserError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -123,7 +123,7 @@ def test_host_and_setup_agree_on_the_oldest_verilator(
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     assert (bash("too_old", tmp_path).stdout == "") is fits
     if fits:
-        assert toolchain.require_simulator() == tmp_path / "verilator"
+        assert compiler.require_verilator("rendering")[0] == tmp_path / "verilator"
     else:
-        with pytest.raises(UserError, match=f"Verilator {version}, older than 5.006"):
-            toolchain.require_simulator()
+        with pytest.raises(UserError, match=f"Verilator {version} .*: rendering needs 5.006 or newer"):
+            compiler.require_verilator("rendering")
