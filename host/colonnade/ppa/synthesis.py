@@ -12,6 +12,7 @@ import hashlib
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -122,7 +123,9 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
     sources = liberty.find_liberties(liberties)
     for path in sources:
         text = liberty.pruned(path).encode("latin-1")
-        copy = folder / f"{path.name.split('.')[0]}-{hashlib.sha256(text).hexdigest()[:20]}.lib"
+        # Yosys and OpenSTA take the name as a part of their scripts
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", path.name.split(".")[0])[:100]
+        copy = folder / f"{stem}-{hashlib.sha256(text).hexdigest()[:20]}.lib"
         if not copy.is_file():
             incoming = copy.with_suffix(f".{os.getpid()}")
             incoming.write_bytes(text)
@@ -130,7 +133,9 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
         kept.append(copy)
     library = liberty.load(kept)
     digest = " ".join(copy.name for copy in kept)
-    return Technology(library, digest, delay or round(TARGET_FO4 * library.fo4, 4), sources)
+    with liberty.understood(sources[0]):
+        aim = delay or round(TARGET_FO4 * library.fo4, 4)
+    return Technology(library, digest, aim, sources)
 
 
 def synthesise(hierarchy: Hierarchy, top: str, into: Technology) -> dict[str, Any]:
