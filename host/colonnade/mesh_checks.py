@@ -33,6 +33,16 @@ def check_obj(data: bytes, path: Path) -> None:
             raise UserError(f"mesh {path}: a face names vertex {worst}, which does not exist: it has {vertices:,}")
 
 
+def check_ply(data: bytes, path: Path) -> None:
+    """Refuse a PLY file that holds less than its header says."""
+    header, mark, body = data.partition(b"end_header")
+    counts = [int(count) for count in re.findall(rb"(?m)^element[ \t]+\S+[ \t]+(\d{1,18})[ \t]*\r?$", header)]
+    # Elements take a line each, or at least a byte
+    held = len(body.split(b"\n")) if re.search(rb"(?m)^format[ \t]+ascii", header) else len(body)
+    if not mark or sum(counts) > held:
+        raise UserError(f"mesh {path} is truncated: its header names {sum(counts):,} elements")
+
+
 def check_gltf(document: Any, path: Path) -> None:
     """Refuse a glTF document whose nodes are no trees, or whose accessors cannot be."""
 
@@ -49,7 +59,24 @@ def check_gltf(document: Any, path: Path) -> None:
         count = accessor.get("count")
         if not isinstance(count, int) or isinstance(count, bool) or not 0 < count <= _MOST_ELEMENTS:
             raise fail(f"accessor {number} has no sensible count")
+    for number, material in enumerate(document.get("materials", [])):
+        if not _is_sensible(material):
+            raise fail(f"material {number} has factors that are no numbers from 0")
     _check_nodes(document.get("nodes", []), fail)
+
+
+def _is_sensible(material: Mapping[str, Any]) -> bool:
+    """The numbers that are used are numbers from 0."""
+    surface, extensions = material.get("pbrMetallicRoughness", {}), material.get("extensions", {})
+    if not isinstance(surface, Mapping) or not isinstance(extensions, Mapping):
+        return False
+    values = [surface.get("metallicFactor", 1.0)]
+    colour = surface.get("baseColorFactor", [])
+    values += colour if isinstance(colour, list) else [None]
+    for name, key in (("transmission", "transmissionFactor"), ("ior", "ior")):
+        extension = extensions.get(f"KHR_materials_{name}", {})
+        values.append(extension.get(key, 0.0) if isinstance(extension, Mapping) else None)
+    return all(isinstance(value, int | float) and not isinstance(value, bool) and value >= 0 for value in values)
 
 
 def _check_nodes(nodes: list[Mapping[str, Any]], fail: Any) -> None:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from colonnade.errors import UserError
 from colonnade.inputs import parse_json, read_input
 from colonnade.limits import MOST_MESH_BYTES
-from colonnade.mesh_checks import check_gltf, check_obj
+from colonnade.mesh_checks import check_gltf, check_obj, check_ply
 from colonnade.mesh_materials import PLAIN, MeshMaterial, from_gltf, from_mtl
 
 #: As many as a face's material index can tell apart.
@@ -58,6 +58,8 @@ def read_surface(path: Path) -> RawSurface:
         content, materials = _marked_gltf(content, path)
     elif kind == "obj":
         check_obj(content, path)
+    elif kind == "ply":
+        check_ply(content, path)
     resolver = MeshResolver(path)
     try:
         loaded: Any = trimesh.load_scene(io.BytesIO(content), file_type=kind, process=False, resolver=resolver)

@@ -55,8 +55,12 @@ class MeshResolver(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
                 path = (parent / candidate).resolve()
             except (OSError, ValueError, RuntimeError):
                 continue
-            if path.is_relative_to(parent) and exists(path):
+            if not exists(path):
+                continue
+            if path.is_relative_to(parent):
                 return path
+            outside = UserError(f"{name}, which a mesh names, is outside of its folder {parent}: copy it there")
+            self.refused = self.refused or outside
         raise FileNotFoundError(name)
 
 

@@ -25,7 +25,7 @@ from colonnade import toolchain
 from colonnade.cli import cli
 
 #: Seconds after which a command line counts as hung.
-PATIENCE = 10
+PATIENCE = 20
 
 #: Makes a file of a case: its bytes, its text, or what makes it.
 Content = bytes | str | Callable[[Path], None]
@@ -34,6 +34,10 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 SCENE = '[mesh]\nname = "cube"\n'
 #: Renders a scene, or packs it, without hardware.
 RENDER = "render s.toml --config tiny --backend model --size 8x8"
+COMPARE = "compare x.png a.png --no-dists"
+HITS = "compare x.npz h.npz"
+ROOM = "inspect --background room --no-dists"
+PPA = "ppa --liberty x.lib --no-power"
 PACK = "pack s.toml --config tiny"
 
 
@@ -175,7 +179,7 @@ def snapshot(folder: Path) -> dict[str, Any]:
         if stat.S_ISREG(status.st_mode):
             content = path.read_bytes()
         elif stat.S_ISLNK(status.st_mode):
-            content = os.readlink(path)
+            content = str(path.readlink())
         found[path.relative_to(folder).as_posix()] = (oct(status.st_mode), content)
     return found
 
