@@ -39,7 +39,9 @@ def check_ply(data: bytes, path: Path) -> None:
     counts = [int(count) for count in re.findall(rb"(?m)^element[ \t]+\S+[ \t]+(\d{1,18})[ \t]*\r?$", header)]
     # Elements take a line each, or at least a byte
     held = len(body.split(b"\n")) if re.search(rb"(?m)^format[ \t]+ascii", header) else len(body)
-    if not mark or sum(counts) > held:
+    if not mark:
+        raise UserError(f"{path} cannot be read as a mesh: its PLY header does not end")
+    if sum(counts) > held:
         raise UserError(f"mesh {path} is truncated: its header names {sum(counts):,} elements")
 
 

@@ -101,7 +101,9 @@ def _marked_gltf(data: bytes, path: Path) -> tuple[bytes, list[MeshMaterial]]:
     binary = data[:4] == b"glTF"
     length = struct.unpack_from("<I", data, 12)[0] if binary else len(data)
     first = 20 if binary else 0
-    document = parse_json(data[first : first + length], f"the glTF document of {path}", len(data))
+    document = parse_json(
+        data[first : first + length], f"{path} cannot be read as a mesh: its glTF document", len(data)
+    )
     check_gltf(document, path)
     materials = document.get("materials", [])
     if materials:
