@@ -180,7 +180,6 @@ class SceneImage:
         parts += [self.records.tobytes(), self.source_faces.astype("<i4").tobytes()]
         parts += [section.words.tobytes() for section in self.attributes]
         digest = hashlib.sha256()
-        check_image_file(file)
         with made_folder(file.parent), replacing(file) as stream:
             for part in parts:
                 digest.update(part)

@@ -54,7 +54,7 @@ def require_regular(path: Path, what: str, missing: str | None = None) -> UserEr
         raise UserError(f"cannot read {what} {path}: {reason_of(error)}") from None
     except ValueError:
         raise UserError(f"{what} {str(path)!r} does not exist: this is no file name") from None
-    refused = UserError(f"{what} {path} is {kind_of(status)}: name a file")
+    refused = UserError(f"cannot read {what} {path}: it is {kind_of(status)}, name a file")
     if not stat.S_ISREG(status.st_mode):
         raise refused
     return refused
