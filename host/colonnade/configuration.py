@@ -8,11 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from colonnade.errors import UserError
+from colonnade.inputs import is_file, parse_json, read_json
+from colonnade.limits import MOST_DIGITS, MOST_TEXT
 
 #: The preset that a bare precision such as ``32b32s64d`` changes.
 PRECISION_PRESET = "small"
 
-_PRECISION = re.compile(r"\d+b\d+s\d+d")
+_PRECISION = re.compile(r"\d+b\d+s\d+d", re.ASCII)
+#: Digits of one of its numbers.
+_PRECISION_DIGITS = 6
 
 
 @dataclass(frozen=True)
@@ -37,16 +41,30 @@ def find_configuration(name: str, overrides: Sequence[str], root: Path) -> Confi
         root: the checkout, whose ``configs`` folder holds the presets.
     """
     for override in overrides:
-        key, equals, _ = override.partition("=")
+        key, equals, value = override.partition("=")
         if not equals or not key.strip():
             raise UserError(f"--set {override} is not of the form key.path=value, e.g. --set array.rows=4")
+        _check_value(override, value)
     presets = root / "configs"
     if _PRECISION.fullmatch(name):
+        if max(map(len, re.findall(r"\d+", name))) > _PRECISION_DIGITS:
+            raise UserError(f"the precision {name} has a number of more than {_PRECISION_DIGITS} digits")
         return ConfigurationSource(presets / f"{PRECISION_PRESET}.json", (f"precision={name}", *overrides))
-    if re.fullmatch(r"[\w-]+", name) and (presets / f"{name}.json").is_file():
+    if re.fullmatch(r"[\w-]+", name) and is_file(presets / f"{name}.json"):
         return ConfigurationSource(presets / f"{name}.json", tuple(overrides))
     path = Path(name)
-    if path.is_file():
-        return ConfigurationSource(path.resolve(), tuple(overrides))
     known = ", ".join(sorted(preset.stem for preset in presets.glob("*.json")))
-    raise UserError(f"no configuration {name}: name a preset ({known}), a JSON file, or a precision such as 32b32s64d")
+    missing = f"no configuration {name}: name a preset ({known}), a JSON file, or a precision such as 32b32s64d"
+    # The generator reads the file itself; what it makes of hostile JSON takes seconds, this takes none
+    read_json(path, "the configuration", missing=missing)
+    return ConfigurationSource(path.resolve(), tuple(overrides))
+
+
+def _check_value(override: str, value: str) -> None:
+    """Refuse values that no field takes: too long, too deep, or with a key twice."""
+    if len(override) > MOST_TEXT:
+        raise UserError(f"--set {override} has {len(override):,} characters: {MOST_TEXT:,} at most")
+    if value.lstrip()[:1] in ("{", "["):
+        parse_json(value, f"--set {override}: the value")
+    elif len(value) > MOST_DIGITS and re.fullmatch(r"[-+\d.eE]+", value):
+        raise UserError(f"--set {override} has a number of more than {MOST_DIGITS} digits")

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from colonnade import cache, processes
 from colonnade.configuration import ConfigurationSource, find_configuration
+from colonnade.design_folder import check_replaceable, replace_folder
 from colonnade.errors import UserError
 from colonnade.manifest import Manifest
 from colonnade.progress import QUIET, Progress
@@ -85,19 +86,11 @@ def generate(
     black_box_memories: bool = False,
     progress: Progress = QUIET,
 ) -> GeneratedDesign:
-    """Generate into ``output``, a folder of the user's, which is replaced only by a complete result."""
-    if output.exists() and not output.is_dir():
-        raise UserError(f"{output} is a file: --output names a folder")
-    if output.is_dir() and any(output.iterdir()) and not (output / "manifest.json").is_file():
-        raise UserError(f"{output} is not empty and holds no generated design: name another --output")
+    """Generate into ``output``, a folder of the user's: see `design_folder` for what it may replace."""
+    check_replaceable(output)
     options = ("--manifest-only",) * manifest_only + ("--black-box-memories",) * black_box_memories
     design = _cached(config, overrides, options, progress)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    incoming = output.with_name(f".{output.name}.{os.getpid()}")
-    shutil.copytree(design.dir, incoming)
-    if output.exists():
-        shutil.rmtree(output)
-    incoming.rename(output)
+    replace_folder(design.dir, output)
     return GeneratedDesign(output, design.manifest)
 
 

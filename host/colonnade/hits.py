@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from colonnade.arrays import arrays_in
 from colonnade.errors import UserError
 from colonnade.files import replacing
+from colonnade.inputs import read_input
+from colonnade.limits import MOST_PICTURE_BYTES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,13 +42,11 @@ def read_hits(path: Path) -> Hits:
     """Read the hits of a frame, or say what is wrong with the file."""
     import numpy as np
 
-    if not path.is_file():
-        raise UserError(f"no hits file {path}: check the path")
+    data = read_input(path, "the hits", MOST_PICTURE_BYTES, f"no hits file {path}: check the path")
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            triangle, t = np.asarray(arrays["triangle"]), np.asarray(arrays["t"])
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
-        raise UserError(f"{path} is no hits file: write one with colonnade render --hits") from error
-    if triangle.ndim != 2 or t.shape != triangle.shape or triangle.dtype.kind not in "iu":
+        triangle, t = arrays_in(data, ("triangle", "t"))
+    except ValueError as error:
+        raise UserError(f"{path} is no hits file: write one with colonnade render --hits ({error})") from None
+    if triangle.ndim != 2 or t.shape != triangle.shape or triangle.dtype.kind not in "iu" or t.dtype.kind != "f":
         raise UserError(f"{path} is no hits file: triangle and t are not two equal [height, width] arrays")
     return Hits(triangle.astype(np.int64), t.astype(np.float64))

@@ -19,7 +19,10 @@ import numpy.typing as npt
 
 from colonnade.bvh import TreeStatistics
 from colonnade.errors import UserError
-from colonnade.files import make_folder, replacing
+from colonnade.files import check_folder, check_writable, made_folder, replacing
+from colonnade.image_header import check_header
+from colonnade.inputs import exists, is_folder, parse_json, read_input
+from colonnade.limits import MOST_HEADER_BYTES, MOST_IMAGE_BYTES
 from colonnade.manifest import Manifest
 from colonnade.mesh_materials import MeshMaterial
 from colonnade.meshes import Extent
@@ -171,16 +174,13 @@ class SceneImage:
 
     def save(self, path: str | Path) -> Path:
         """Writes the file, or ``scene.image`` in a folder, which is made; returns its path. Whole or not at all."""
-        file = Path(path)
-        if file.is_dir() or not file.suffix:
-            make_folder(file)
-            file = file / FILE_NAME
+        file = image_file(Path(path))
         header = json.dumps(self.header.to_json(), separators=(",", ":"), sort_keys=True).encode()
         parts = [MAGIC, struct.pack("<I", len(header)), header]
         parts += [self.records.tobytes(), self.source_faces.astype("<i4").tobytes()]
         parts += [section.words.tobytes() for section in self.attributes]
         digest = hashlib.sha256()
-        with replacing(file) as stream:
+        with made_folder(file.parent), replacing(file) as stream:
             for part in parts:
                 digest.update(part)
                 stream.write(part)
@@ -191,14 +191,10 @@ class SceneImage:
     def load(path: str | Path, manifest: Manifest | None = None) -> SceneImage:
         """Reads a scene image; with a manifest, one that was packed for another format is refused."""
         file = Path(path)
-        if file.is_dir():
+        if is_folder(file):
             file = file / FILE_NAME
-        try:
-            data = file.read_bytes()
-        except FileNotFoundError:
-            raise UserError(f"there is no scene image {file}: run colonnade pack first") from None
-        except OSError as error:
-            raise UserError(f"cannot read the scene image {file}: {error.strerror}") from None
+        missing = f"there is no scene image {file}: run colonnade pack first"
+        data = read_input(file, "the scene image", MOST_IMAGE_BYTES, missing)
         if data[: len(MAGIC)] != MAGIC:
             if data[: len(MAGIC) - 1] == MAGIC[:-1]:
                 raise UserError(f"{file} is a scene image of another version: {_ADVICE}")
@@ -232,6 +228,9 @@ def _check_fits(header: ImageHeader, manifest: Manifest, file: Path) -> None:
             f"{file} was packed for another format ({header.format_hash[:12]}, the hardware has"
             f" {manifest.format_hash[:12]}): pack the scene again for this configuration"
         )
+    memories = header.room.memories if header.room else ()
+    if header.record_bits != manifest.record_bits or any(held.memory not in manifest.memories for held in memories):
+        raise UserError(f"{file} is corrupt (its header does not match the hardware's format): {_ADVICE}")
     depth = int(manifest.memories["columnBvh"]["depth"])
     if header.record_count > depth:
         raise UserError(f"{file} holds {header.record_count:,} records, columnBvhMemory.depth is {depth:,}: raise it")
@@ -251,7 +250,30 @@ def _header(data: bytes, file: Path) -> tuple[ImageHeader, int]:
     (length,) = struct.unpack_from("<I", data, len(MAGIC))
     if len(data) < start + length + _DIGEST_BYTES:
         raise UserError(f"{file} is truncated ({len(data):,} bytes): {_ADVICE}")
+    corrupt = UserError(f"{file} is corrupt (its header cannot be read): {_ADVICE}")
+    if length > MOST_HEADER_BYTES:
+        raise corrupt
     try:
-        return ImageHeader.from_json(json.loads(data[start : start + length])), start + length
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise UserError(f"{file} is corrupt (its header cannot be read): {_ADVICE}") from None
+        header = parse_json(data[start : start + length], "the header")
+        check_header(header)
+        return ImageHeader.from_json(header), start + length
+    except (UserError, ValueError, KeyError, TypeError, AttributeError, OverflowError):
+        raise corrupt from None
+
+
+def image_file(path: Path) -> Path:
+    """The file that a folder or a file's name stands for: names without a suffix are folders."""
+    return path / FILE_NAME if is_folder(path) or not path.suffix else path
+
+
+def check_image_file(file: Path) -> None:
+    """Refuse an output that would replace anything but a scene image."""
+    if exists(file.parent):
+        check_folder(file.parent)
+    if not exists(file):
+        return
+    check_writable(file)
+    with file.open("rb") as stream:
+        begin = stream.read(len(MAGIC) - 1)
+    if begin and begin != MAGIC[:-1]:
+        raise UserError(f"{file} is no scene image, and would be replaced: name another output")

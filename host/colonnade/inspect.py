@@ -8,6 +8,7 @@ from typing import Any
 
 from colonnade.image import ImageHeader, SceneImage
 from colonnade.manifest import Manifest
+from colonnade.text import one_line
 
 
 def describe(image: SceneImage) -> dict[str, Any]:
@@ -52,7 +53,8 @@ def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[
     """The description as lines of text; with a manifest also how full its memories are."""
     dropped = header.source_triangles - header.triangles
     lines = [
-        f"mesh        {header.mesh}: {header.triangles:,} triangles" + (f" ({dropped:,} dropped)" if dropped else "")
+        f"mesh        {one_line(header.mesh)}: {header.triangles:,} triangles"
+        + (f" ({dropped:,} dropped)" if dropped else "")
     ]
     lines.append(
         f"box         {header.bounds_low} to {header.bounds_high} units, {header.frame.scale:.6g} units a mesh unit"
@@ -85,7 +87,8 @@ def _tree_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
 def _room_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
     if header.room is None:
         return []
-    lines = [f"room        {header.room.name}: {sum(memory.bytes for memory in header.room.memories):,} bytes to load"]
+    size = sum(memory.bytes for memory in header.room.memories)
+    lines = [f"room        {one_line(header.room.name)}: {size:,} bytes to load"]
     if manifest is not None:
         from colonnade.room_image import room_use
 
@@ -96,7 +99,7 @@ def _room_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
             )
     for memory in header.room.memories:
         target = "" if manifest is None else f", load target {manifest.memories[memory.memory]['target']}"
-        lines.append(f"  {memory.memory:<19}{memory.words:>6,} words of {memory.word_bytes} bytes{target}")
+        lines.append(f"  {one_line(memory.memory):<19}{memory.words:>6,} words of {memory.word_bytes} bytes{target}")
     return lines
 
 

@@ -13,6 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.errors import UserError
+from colonnade.inputs import parse_json, read_input
+from colonnade.limits import MOST_MESH_BYTES
+from colonnade.mesh_checks import check_gltf, check_obj, check_ply
 from colonnade.mesh_materials import PLAIN, MeshMaterial, from_gltf, from_mtl
 
 #: As many as a face's material index can tell apart.
@@ -45,15 +48,24 @@ def read_surface(path: Path) -> RawSurface:
 
     import trimesh
 
+    from colonnade.mesh_resolver import MeshResolver
+
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     materials: list[MeshMaterial] = []
-    loaded: Any
-    if path.suffix.lower() in (".glb", ".gltf"):
-        content, materials = _marked_gltf(path)
-        resolver = trimesh.resolvers.FilePathResolver(path)
-        loaded = trimesh.load_scene(content, file_type=path.suffix.lower()[1:], process=False, resolver=resolver)
-    else:
-        loaded = trimesh.load_scene(path, process=False)
+    content = read_input(path, "the mesh", MOST_MESH_BYTES)
+    kind = path.suffix.lower()[1:]
+    if kind in ("glb", "gltf"):
+        content, materials = _marked_gltf(content, path)
+    elif kind == "obj":
+        check_obj(content, path)
+    elif kind == "ply":
+        check_ply(content, path)
+    resolver = MeshResolver(path)
+    try:
+        loaded: Any = trimesh.load_scene(io.BytesIO(content), file_type=kind, process=False, resolver=resolver)
+    finally:
+        if resolver.refused is not None:
+            raise resolver.refused
     parts = [part for part in loaded.dump() if isinstance(part, trimesh.Trimesh)]
     if not parts:
         raise UserError(f"mesh {path} has no faces")
@@ -84,19 +96,23 @@ def _material_of(part: Any, materials: list[MeshMaterial]) -> MeshMaterial:
     return from_mtl(entries) if entries else PLAIN
 
 
-def _marked_gltf(path: Path) -> tuple[io.BytesIO, list[MeshMaterial]]:
-    """A glTF file whose materials are named by number, and its materials."""
-    data = path.read_bytes()
+def _marked_gltf(data: bytes, path: Path) -> tuple[bytes, list[MeshMaterial]]:
+    """A glTF file whose materials are numbers and which has no textures, and its materials."""
     binary = data[:4] == b"glTF"
     length = struct.unpack_from("<I", data, 12)[0] if binary else len(data)
     first = 20 if binary else 0
-    document = json.loads(data[first : first + length])
+    document = parse_json(
+        data[first : first + length], f"{path} cannot be read as a mesh: its glTF document", len(data)
+    )
+    check_gltf(document, path)
     materials = document.get("materials", [])
-    for number, material in enumerate(materials):
-        material["name"] = f"{_MARK}{number}"
+    if materials:
+        document["materials"] = [{"name": f"{_MARK}{number}"} for number in range(len(materials))]
+    for unused in ("images", "textures", "samplers"):
+        document.pop(unused, None)
     text = json.dumps(document).encode()
     if binary:
         text += b" " * (-len(text) % 4)
         rest = data[first + length :]
         text = data[:8] + struct.pack("<II", 20 + len(text) + len(rest), len(text)) + b"JSON" + text + rest
-    return io.BytesIO(text), [from_gltf(material) for material in materials]
+    return text, [from_gltf(material) for material in materials]

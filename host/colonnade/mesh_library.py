@@ -6,15 +6,19 @@ the pages of their makers for what may be done with them.
 
 from __future__ import annotations
 
+import errno
 import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from colonnade.errors import UserError
+from colonnade.errors import UserError, reason_of
 from colonnade.meshes import SUFFIXES
 
 VARIABLE = "COLONNADE_MESHES"
+
+#: Bytes of a file's name.
+_MOST_NAME = 255
 
 
 @dataclass(frozen=True)
@@ -101,13 +105,24 @@ def find(name: str) -> Found:
     for folder in folders:
         for stem in stems:
             for suffix in SUFFIXES:
-                if (path := folder / f"{stem}{suffix}").is_file():
+                if _is_file(path := folder / f"{stem}{suffix}"):
                     return Found(path, known.subdivisions if known else 0)
     if known is None:
         raise UserError(f"there is no mesh {name!r}: give a file that exists, or one of {', '.join(names())}")
     if known.download is None:
         raise UserError(f"mesh {name} is in no folder of {VARIABLE}: {_advice(stems[0])}")
     return Found(_fetch(name, known.download), known.subdivisions)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG and len(os.fsencode(path.name)) > _MOST_NAME:
+            return False  # a name that no file has
+        raise UserError(f"cannot search {path.parent}, a folder of {VARIABLE}: {reason_of(error)}") from None
+    except ValueError:
+        return False
 
 
 def _advice(stem: str) -> str:

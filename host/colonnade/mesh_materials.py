@@ -19,6 +19,9 @@ from typing import Any
 
 Vector = tuple[float, float, float]
 
+#: The device's kinds of surfaces.
+KINDS = ("diffuse", "mirror", "glass")
+
 #: Index of refraction of glass that does not say; also glTF's.
 GLASS_IOR = 1.5
 

@@ -7,6 +7,7 @@ vertex unused. Normals of the file are not used: smooth ones are made anew from 
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from colonnade import solids, teapot
 from colonnade.errors import UserError
+from colonnade.inputs import is_file, require_regular
 from colonnade.mesh_files import read_surface
 from colonnade.mesh_materials import PLAIN, MeshMaterial
 from colonnade.surfaces import Faces, Floats, drop_faces, merge_rows, subdivide, vertex_normals
@@ -101,7 +103,7 @@ def load_mesh(name_or_path: str | Path) -> Mesh:
     from colonnade import mesh_library
 
     looks_like_path = os.sep in text or Path(text).suffix.lower() in SUFFIXES
-    if isinstance(name_or_path, str) and not looks_like_path and not Path(text).is_file():
+    if isinstance(name_or_path, str) and not looks_like_path and not is_file(Path(text)):
         found = mesh_library.find(text)
         mesh = _read(found.path, found.subdivisions)
         return replace(mesh, name=text)
@@ -124,25 +126,24 @@ def _built_in(name: str) -> tuple[Floats, Faces] | None:
 def _size(name: str, argument: str, default: int, least: int, most: int, given: bool) -> int:
     if not given:
         return default
-    if not argument.isascii() or not argument.isdigit() or not least <= int(argument) <= most:
+    if not re.fullmatch("[0-9]{1,9}", argument) or not least <= int(argument) <= most:
         raise UserError(f"mesh {name}: the number after the colon must be from {least} to {most:,}")
     return int(argument)
 
 
 def _read(path: Path, subdivisions: int) -> Mesh:
     """A mesh file, with each triangle cut into four at its midpoints ``subdivisions`` times."""
-    if not path.exists():
-        raise UserError(f"mesh file {path} does not exist")
-    if path.is_dir():
-        raise UserError(f"{path} is a folder: name a mesh file")
+    require_regular(path, "mesh file")
     if path.suffix.lower() not in SUFFIXES:
         raise UserError(f"{path}: a mesh file ends with one of {', '.join(SUFFIXES)}")
     if path.stat().st_size == 0:
         raise UserError(f"mesh file {path} is empty")
     try:
         surface = read_surface(path)
-    except (UserError, ImportError):
+    except (UserError, ImportError, MemoryError):
         raise
+    except IndexError:
+        raise UserError(f"mesh {path}: a face names a vertex, or a part another, that does not exist") from None
     except Exception as error:  # whatever a reader makes of noise
         raise UserError(f"{path} cannot be read as a mesh: {type(error).__name__}: {error}") from None
     vertices, faces = surface.vertices, surface.faces

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import contextlib
+import io
+import warnings
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from colonnade.errors import UserError
 from colonnade.files import replacing
+from colonnade.inputs import read_input
+from colonnade.limits import MOST_PICTURE_BYTES, MOST_PIXELS
 from colonnade.srgb import curved, straightened
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+    from PIL.Image import Image as PillowImage
 
+#: What is read: no format that Pillow needs another program for.
+FORMATS = ("PNG", "JPEG", "WEBP")
 #: How long a frame of an animation is shown.
 FRAME_MILLISECONDS = 50
 
@@ -59,18 +67,40 @@ def write_webp(path: Path, frames: Iterable[NDArray[np.uint8]]) -> None:
         )
 
 
+@contextlib.contextmanager
+def opened_picture(path: Path, missing: str | None = None) -> Iterator[PillowImage]:
+    """A PNG, JPEG or WebP picture by its content, whatever its name says, within the limit of pixels.
+
+    Raises:
+        UserError: It is anything else, too large, or fails while it is decoded.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    data = read_input(path, "the picture", MOST_PICTURE_BYTES, missing)
+    too_large = UserError(f"{path} has too many pixels: a picture may have {MOST_PIXELS:,}")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(data), formats=FORMATS) as picture:
+                if picture.width * picture.height > MOST_PIXELS:
+                    raise too_large
+                yield picture
+    except (UserError, MemoryError):
+        raise
+    except Image.DecompressionBombError:
+        raise too_large from None
+    except UnidentifiedImageError:
+        raise UserError(f"{path} is no readable picture: give a PNG, JPEG or WebP file") from None
+    except Exception as error:  # whatever a decoder makes of noise
+        raise UserError(f"{path} is no readable picture: {type(error).__name__}: {error}") from None
+
+
 def read_picture(path: Path) -> NDArray[np.uint8]:
     """Read a picture of 8 or 16 bits as 8-bit sRGB, uint8 [height, width, 3]; transparency is dropped."""
     import numpy as np
-    from PIL import Image, UnidentifiedImageError
 
-    if not path.is_file():
-        raise UserError(f"no picture {path}: check the path")
-    try:
-        with Image.open(path) as picture:
-            if picture.mode.startswith("I"):  # grey of 16 bits, which Pillow would cut off at 255
-                grey = np.rint(np.clip(np.asarray(picture, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
-                return np.repeat(grey[..., np.newaxis], 3, axis=2)
-            return np.asarray(picture.convert("RGB"))
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
-        raise UserError(f"{path} is no readable picture: {error}") from error
+    with opened_picture(path, f"no picture {path}: check the path") as picture:
+        if picture.mode.startswith("I"):  # grey of 16 bits, which Pillow would cut off at 255
+            grey = np.rint(np.clip(np.asarray(picture, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
+            return np.repeat(grey[..., np.newaxis], 3, axis=2)
+        return np.asarray(picture.convert("RGB"))

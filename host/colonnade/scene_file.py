@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from colonnade.errors import UserError
+from colonnade.inputs import check_values, read_input
+from colonnade.limits import MOST_COORDINATE, MOST_DEPTH
+from colonnade.mesh_materials import KINDS
 from colonnade.scene import (
     Background,
     Camera,
@@ -30,22 +33,22 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-#: Kinds of materials.
-KINDS = ("diffuse", "mirror", "glass")
+#: The largest edge of a room's maps, pixels.
+MOST_EDGE = 4096
 #: More would be refused by any configuration.
 MOST_BOUNCES = 15
 
 
 def read_scene(file: Path) -> Scene:
     """The scene in a TOML file."""
+    content = read_input(file, "the scene", missing=f"scene file {file} does not exist")
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UserError(f"scene file {file} does not exist") from None
-    except OSError as error:
-        raise UserError(f"cannot read the scene {file}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        data = tomllib.loads(content.decode("utf-8"))
+    except RecursionError:
+        raise UserError(f"scene {file} is nested too deeply: {MOST_DEPTH} levels at most") from None
+    except ValueError as error:  # of TOML, UTF-8, and whole numbers with too many digits
         raise UserError(f"scene {file} is not TOML: {error}") from None
+    check_values(data, f"scene {file}")
     return _Reader(file).scene(data)
 
 
@@ -223,7 +226,9 @@ class _Reader:
         if pixel is None:
             return None
         numbers = isinstance(pixel, list) and len(pixel) == 2
-        if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) or not v >= 0 for v in pixel):
+        if not numbers or any(
+            isinstance(v, bool) or not isinstance(v, int | float) or not 0 <= v <= MOST_EDGE for v in pixel
+        ):
             raise self.fail(f"{key} must be two numbers: a pixel of the room's maps, across and down")
         return float(pixel[0]), float(pixel[1])
 
@@ -245,6 +250,8 @@ class _Reader:
             raise self.fail(f"{key} must be three numbers")
         if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in value):
             raise self.fail(f"{key} must be three finite numbers")
+        if max(map(abs, value)) > MOST_COORDINATE:
+            raise self.fail(f"{key} has a number beyond {MOST_COORDINATE:g}")
         return float(value[0]), float(value[1]), float(value[2])
 
     def colour(self, table: Mapping[str, Any], key: str, default: Any, most: float) -> Vector:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from colonnade.bench import design_result
 from colonnade.errors import UserError
 from colonnade.generator import manifest_for
+from colonnade.limits import MOST_DESIGNS
 from colonnade.manifest import Manifest
 from colonnade.measure import Conditions, Run, measure
 from colonnade.progress import QUIET, Progress
@@ -55,6 +57,8 @@ def parse_variations(texts: Sequence[str]) -> list[Variation]:
         if any(key == other.key for other in variations):
             raise UserError(f"--vary {key} is given twice: name all its values in one")
         variations.append(Variation(key, values))
+    if math.prod(len(variation.values) for variation in variations) > MOST_DESIGNS:
+        raise UserError(f"--vary has more than {MOST_DESIGNS:,} combinations: vary fewer fields or values at a time")
     return variations
 
 

@@ -3,7 +3,9 @@ report of a frame."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -216,3 +218,19 @@ def frame_report(in_box: float) -> dict[str, Any]:
 def rtl_report() -> Callable[[float], dict[str, Any]]:
     """Makes the report of a frame from its in-box rays per cycle."""
     return frame_report
+
+
+@pytest.fixture(scope="session")
+def innocent_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files of `hostile.world`, made once."""
+    import hostile
+
+    folder = tmp_path_factory.mktemp("innocent")
+    hostile.world(folder)
+    return folder
+
+
+@pytest.fixture
+def folder(innocent_files: Path, tmp_path: Path) -> Path:
+    """A copy of them for one test."""
+    return Path(shutil.copytree(innocent_files, tmp_path / "work"))

@@ -12,6 +12,7 @@ import click
 from colonnade.commands.options import (
     FILE,
     configuration_options,
+    echo,
     finish,
     json_option,
     measurement_options,
@@ -62,7 +63,7 @@ def bench(
         in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
         means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])
         table.print("geometric mean", None, None, *means, None, None, None, "")
-        click.echo(
+        echo(
             f"{in_box:.3f} in-box rays per cycle: "
             f"{report['ratio_to_paper']:.1f} times the paper's {benchmark.PAPER_RAYS_PER_CYCLE}"
         )
@@ -75,7 +76,7 @@ def bench(
         plot_stages(report, plot)
     report["mirror"] = None
     if mirror and int(manifest_for(config, overrides, shown).manifest.config["frame"]["maxBounces"]) > 0:
-        click.echo("\nAs mirrors, one reflection traced:")
+        echo("\nAs mirrors, one reflection traced:")
         report["mirror"] = measured(mirror=True)
     finish(report, json_file)
 
@@ -97,7 +98,7 @@ def _table() -> Table:
             Column("busy", 4, ".0%"),
             Column("busiest", 14, is_text=True),
         ),
-        click.echo,
+        echo,
     )
 
 

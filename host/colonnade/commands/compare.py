@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from colonnade.commands.options import FILE, finish, json_option, require_outputs
+from colonnade.commands.options import FILE, echo, finish, json_option, require_outputs
 
 #: What each number is called for people, in the order they are printed.
 LABELS = {
@@ -45,5 +45,5 @@ def compare(a: Path, b: Path, hits_a: Path | None, hits_b: Path | None, no_dists
         value = report[key]
         if value is not None:
             shown = ("no", "yes")[value] if isinstance(value, bool) else f"{value:.6g}"
-            click.echo(f"{label:<20} {shown}")
+            echo(f"{label:<20} {shown}")
     finish(report, json_file)

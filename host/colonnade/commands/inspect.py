@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from colonnade.commands.options import FILE, finish, json_option, require_outputs
+from colonnade.commands.options import FILE, echo, finish, json_option, require_outputs
 
 
 @click.command(short_help="Show what a scene image holds, or what clustering does to a room.")
@@ -57,7 +57,7 @@ def inspect(
         raise click.UsageError("name the folder of a scene image, or --background ROOM, one of the two", context)
     if output is not None and background is None:
         raise click.UsageError("--output is for the maps of --background", context)
-    require_outputs(json_file)
+    require_outputs(json_file, folders=[output])
     if background is not None:
         _inspect_room(background, encoding, int(plane_cells), output, not no_dists, json_file)
     elif directory is not None:
@@ -72,7 +72,7 @@ def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ..
 
     manifest = None if config is None else manifest_for(config, overrides, progress.for_terminal()).manifest
     image = SceneImage.load(directory, manifest)
-    print_report(image.header, manifest, click.echo)
+    print_report(image.header, manifest, echo)
     finish(describe(image), json_file)
 
 
@@ -87,12 +87,12 @@ def _inspect_room(
 
     room = load_room(background)
     for note in room.notes:
-        click.echo(f"colonnade: note: {room.name}: {note}", err=True)
+        echo(f"colonnade: note: {room.name}: {note}", err=True)
     with progress.for_terminal().step("measuring the room"):
         image = encoded_room(room, AttributeLayout(room.width, room.height, encoding, plane_cells=plane_cells))
         report = measure(room, image, with_dists)
     for line in report_lines(report):
-        click.echo(line)
+        echo(line)
     if output is not None:
         write_pictures(output, map_pictures(room, image))
     finish(report, json_file)

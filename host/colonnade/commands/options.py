@@ -3,14 +3,40 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from colonnade.text import plain
+
 if TYPE_CHECKING:
     from colonnade.measure import Conditions
+
+
+if TYPE_CHECKING:
+    _NumberType = click.ParamType[float]
+else:
+    _NumberType = click.ParamType
+
+
+class PositiveNumber(_NumberType):
+    """A finite number above zero: click's own range takes ``nan`` and ``inf``."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number of a text."""
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not (math.isfinite(number) and number > 0):
+            self.fail(f"{value!r} is no finite number above 0", param, ctx)
+        return number
+
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -75,13 +101,23 @@ def json_option(command: Command) -> Command:
     return click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the report as JSON.")(command)
 
 
-def require_outputs(*paths: Path | None) -> None:
-    """Refuse output files that cannot be written, before the work starts."""
-    from colonnade.files import check_writable
+def require_outputs(*paths: Path | None, folders: Sequence[Path | None] = ()) -> None:
+    """Refuse outputs that cannot be written, before the work starts; no file read later may be one of them."""
+    from colonnade.files import check_folder, check_writable
+    from colonnade.ledger import declare_output
 
     for path in paths:
         if path is not None:
             check_writable(path)
+            declare_output(path)
+    for folder in folders:
+        if folder is not None:
+            check_folder(folder)
+
+
+def echo(text: str, err: bool = False) -> None:
+    """Print a line; control characters, which files and arguments may hold, are escaped."""
+    click.echo(plain(text), err=err)
 
 
 def finish(report: Mapping[str, Any], json_file: Path | None) -> None:

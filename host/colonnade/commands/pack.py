@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from colonnade.commands.options import FILE, configuration_options, finish, json_option, require_outputs
+from colonnade.commands.options import FILE, configuration_options, echo, finish, json_option, require_outputs
 
 
 @click.command(short_help="Pack a scene into the image that the hardware loads.")
@@ -26,16 +26,20 @@ def pack(
     json_file: Path | None,
 ) -> None:
     """Pack SCENE, a TOML file, for one configuration, and print what it uses of each memory."""
-    require_outputs(json_file)
-
     from colonnade import progress
     from colonnade.generator import manifest_for
+    from colonnade.image import check_image_file, image_file
     from colonnade.inspect import describe, print_report
+    from colonnade.ledger import declare_output
     from colonnade.pack import memory_use
     from colonnade.render import pack_scene
     from colonnade.room_registers import HeldRoom
     from colonnade.scene import load_scene
 
+    file = image_file(output)
+    check_image_file(file)
+    require_outputs(json_file, folders=[file.parent])
+    declare_output(file)
     shown = progress.for_terminal()
     described = load_scene(scene)
     if mesh is not None:
@@ -47,8 +51,8 @@ def pack(
     with shown.step("packing"):
         room = None if folder is None else HeldRoom.load(folder, manifest)
         image = pack_scene(described, manifest, room)
-    file = image.save(output)
+    image.save(output)
 
-    click.echo(f"packed      {file}")
-    print_report(image.header, manifest, click.echo)
+    echo(f"packed      {file}")
+    print_report(image.header, manifest, echo)
     finish({"file": str(file), **describe(image), "use": memory_use(image.header, manifest)}, json_file)

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from colonnade.commands.options import configuration_options, finish, json_option, require_outputs
+from colonnade.commands.options import PositiveNumber, configuration_options, echo, finish, json_option, require_outputs
 
 
 @click.command(short_help="Measure gates, memories and the slowest paths of a configuration.")
@@ -20,7 +20,7 @@ from colonnade.commands.options import configuration_options, finish, json_optio
     metavar="F",
     help="Standard cells: a .lib or .lib.gz, or a folder of them. May be repeated: all are one library.",
 )
-@click.option("--delay", type=click.FloatRange(min=0, min_open=True), metavar="NS", help="Delay to aim at.  [60 FO4]")
+@click.option("--delay", type=PositiveNumber(), metavar="NS", help="Delay to aim at.  [60 FO4]")
 @click.option(
     "--target",
     type=click.Choice(("asic", "ecp5")),
@@ -32,7 +32,7 @@ from colonnade.commands.options import configuration_options, finish, json_optio
 @click.option(
     "--clock",
     "megahertz",
-    type=click.FloatRange(min=0, min_open=True),
+    type=PositiveNumber(),
     default=200,
     show_default=True,
     metavar="MHZ",
@@ -86,13 +86,13 @@ def ppa(
     from colonnade.ppa.recording import Stimulus
     from colonnade.ppa.text import UnitTable, summary
 
-    table = UnitTable(click.echo)
+    table = UnitTable(echo)
     operation = Operation(megahertz, Stimulus(mesh, pixels, cycles)) if power else None
     report: Mapping[str, Any] = measure(
         config, overrides, liberties, delay, operation, progress.for_terminal(), finished=table.print
     )
     for line in summary(report):
-        click.echo(line)
+        echo(line)
     finish(report, json_file)
 
 
@@ -102,5 +102,5 @@ def _fpga(config: str, overrides: tuple[str, ...]) -> Mapping[str, Any]:
 
     report = place(config, overrides, progress.for_terminal())
     for line in summary(report):
-        click.echo(line)
+        echo(line)
     return report

@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from colonnade.commands.options import FILE, configuration_options, finish, json_option, require_outputs
+from colonnade.commands.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.limits import MOST_FRAMES
 
 
 @click.command(short_help="Render frames through the hardware, its model, or Embree.")
@@ -26,7 +27,7 @@ from colonnade.commands.options import FILE, configuration_options, finish, json
 @click.option("--relit", is_flag=True, help="Show a room in the scene's lights, not the camera's photo of it.")
 @click.option(
     "--frames",
-    type=click.IntRange(min=1),
+    type=click.IntRange(min=1, max=MOST_FRAMES),
     metavar="N",
     help="Render N frames of the scene's [motion]; a full turn of the object without one. Files are numbered.",
 )
@@ -92,7 +93,7 @@ def render(
         with shown.step(f"writing {pictures[0].name}"):
             write_webp(pictures[0], film)
     report = reports[0] if frames is None else frames_report(reports)
-    click.echo(summary(report))
+    echo(summary(report))
     finish(report, json_file)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from colonnade.commands.options import FILE, finish, json_option, require_outputs
+from colonnade.commands.options import FILE, echo, finish, json_option, require_outputs
 
 
 @click.command(short_help="Measure a rebuilt room, or what AR frames lose in it.")
@@ -26,7 +26,7 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
     """
     if output is not None and not frames:
         raise click.UsageError("--output is for the pictures of --frames", click.get_current_context())
-    require_outputs(json_file)
+    require_outputs(json_file, folders=[output])
 
     from colonnade import progress
     from colonnade.files import make_folder
@@ -41,7 +41,7 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
         shown = progress.for_terminal()
         with shown.step("measuring frames"):
             by_frame = ar_study.study_frames(rooms, not no_dists, shown, output)
-        click.echo(ar_study.table(by_frame))
+        echo(ar_study.table(by_frame))
         report = {
             frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
             for frame, by_loss in by_frame.items()
@@ -51,6 +51,6 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
 
         with progress.for_terminal().step("measuring the rooms"):
             reports = rebuild_study.study_rooms(rooms)
-        click.echo(rebuild_study.table(reports))
+        echo(rebuild_study.table(reports))
         report = {name: asdict(value) for name, value in reports.items()}
     finish(report, json_file)

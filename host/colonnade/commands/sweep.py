@@ -12,6 +12,7 @@ import click
 from colonnade.commands.options import (
     FILE,
     configuration_options,
+    echo,
     finish,
     json_option,
     measurement_options,
@@ -68,7 +69,7 @@ def sweep(
             Column("to base", 7, ".3f"),
             Column("busiest", 14, is_text=True),
         ),
-        click.echo,
+        echo,
     )
 
     def show(point: Mapping[str, Any]) -> None:

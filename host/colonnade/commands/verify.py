@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from colonnade.commands.options import FILE, configuration_options, finish, json_option, require_outputs
+from colonnade.commands.options import FILE, configuration_options, echo, finish, json_option, require_outputs
 
 
 @click.command(short_help="Compare the hardware with its model, and the model with Embree.")
@@ -56,7 +56,7 @@ def verify(
             Column("triangle", 8, ".4%", group="model against float scene"),
             Column("PSNR dB", 7, ".2f", group="model against float scene"),
         ),
-        click.echo,
+        echo,
     )
     keys = {
         "rtl": ("pixels", "triangles", "counters"),

@@ -49,13 +49,16 @@ def load(paths: Sequence[Path], wanted: Iterable[str]) -> Energies:
     """Read the cells `wanted` from the original, not the pruned, files of a library."""
     names, cells, voltages = set(wanted), dict[str, CellEnergy](), set[float]()
     for path in paths:
-        library = next(liberty.groups(liberty.tokens(liberty.pruned(path, liberty.FOR_POWER))))
-        voltages.add(float(library.text("nom_voltage", "0")) * liberty.unit(library, "voltage_unit", "1V", {"v": 1.0}))
-        reader = liberty.Reader(library)
-        for group in library.of("cell"):
-            name = group.arguments[0].strip('"')
-            if name in names:
-                cells[name] = _cell(group, library, reader)
+        text = liberty.pruned(path, liberty.FOR_POWER)
+        with liberty.understood(path):
+            library = next(liberty.groups(liberty.tokens(text)))
+            voltage = float(library.text("nom_voltage", "0"))
+            voltages.add(voltage * liberty.unit(library, "voltage_unit", "1V", {"v": 1.0}))
+            reader = liberty.Reader(library)
+            for group in library.of("cell"):
+                name = group.arguments[0].strip('"')
+                if name in names:
+                    cells[name] = _cell(group, library, reader)
     if len(voltages) != 1 or 0.0 in voltages:
         raise UserError(f"the liberties have no common nom_voltage ({', '.join(map(str, sorted(voltages)))} V)")
     return Energies(voltages.pop(), cells)

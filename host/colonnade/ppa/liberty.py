@@ -6,14 +6,20 @@ and noise go, and so do cells that ordinary logic should not be mapped to.
 
 from __future__ import annotations
 
+import contextlib
 import gzip
+import io
+import math
 import re
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 
-from colonnade.errors import UserError
+from colonnade.errors import UserError, reason_of
+from colonnade.inputs import is_folder, read_input, require_regular
+from colonnade.limits import MOST_LIBERTY_BYTES
 from colonnade.ppa.cells import Arc, Cell, ClockGate, Library, Pin, State, Table
 
 #: Cells for scan, power domains and probing; delay cells.
@@ -42,23 +48,41 @@ def find_liberties(names: Sequence[str]) -> tuple[Path, ...]:
     found: list[Path] = []
     for name in names:
         path = Path(name)
-        inside = sorted(p for p in path.iterdir() if re.search(r"\.lib(\.gz)?$", p.name)) if path.is_dir() else [path]
-        if not path.exists():
-            raise UserError(f"no liberty {name}: name a .lib or .lib.gz file, or a folder of them")
-        if not inside:
-            raise UserError(f"{name} holds no .lib and no .lib.gz file: name another folder for --liberty")
-        found += inside
+        if is_folder(path):
+            try:
+                inside = sorted(p for p in path.iterdir() if re.search(r"\.lib(\.gz)?$", p.name))
+            except OSError as error:
+                raise UserError(f"cannot search {path}: {reason_of(error)}") from None
+            if not inside:
+                raise UserError(f"{name} holds no .lib and no .lib.gz file: name another folder for --liberty")
+            found += inside
+        else:
+            require_regular(path, "the liberty", f"no liberty {name}: name a .lib or .lib.gz file, or a folder of them")
+            found.append(path)
     return tuple(found)
+
+
+def _text(path: Path) -> str:
+    """The text of a file, unpacked if it is compressed."""
+    data = read_input(path, "the liberty", MOST_LIBERTY_BYTES)
+    if path.suffix == ".gz":
+        try:
+            with gzip.open(io.BytesIO(data)) as stream:
+                data = stream.read(MOST_LIBERTY_BYTES + 1)
+        except (OSError, EOFError, zlib.error) as error:
+            raise UserError(f"{path} cannot be unpacked: {error}") from None
+        if len(data) > MOST_LIBERTY_BYTES:
+            raise UserError(f"{path} is too large: unpacked it may have {MOST_LIBERTY_BYTES:,} bytes")
+    return data.decode("latin-1")
 
 
 def pruned(path: Path, dropped: re.Pattern[str] = FOR_TIMING) -> str:
     """The text of a liberty without the groups and the cells that are of no use here."""
-    try:
-        text = (gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()).decode("latin-1")
-    except (OSError, EOFError) as error:
-        raise UserError(f"{path} cannot be read: {error}") from error
+    text = _text(path)
     if not re.search(r"\blibrary\s*\(", text):
         raise UserError(f"{path} is no liberty: it holds no library group")
+    if text.rfind("/*") > text.rfind("*/"):
+        raise UserError(f"{path} is cut off or no liberty: a comment does not end")
     kept: list[str] = []
     begin = depth = dropped_from = 0
     for token in _DROPPED.finditer(text):
@@ -92,9 +116,20 @@ def load(paths: Sequence[Path]) -> Library:
     """Read pruned files."""
     cells: dict[str, Cell] = {}
     for path in paths:
-        top = next(groups(tokens(path.read_text("latin-1"))))
-        cells.update(Reader(top).cells())
+        with understood(path):
+            top = next(groups(tokens(path.read_text("latin-1"))))
+            cells.update(Reader(top).cells())
     return Library(tuple(paths), cells)
+
+
+@contextlib.contextmanager
+def understood(path: Path) -> Iterator[None]:
+    """One line for values that are missing, or no numbers, in a file that looks like a liberty."""
+    try:
+        yield
+    except (ValueError, KeyError, IndexError, TypeError, StopIteration, ZeroDivisionError, RuntimeError) as error:
+        reason = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise UserError(f"{path.name} is no liberty that can be used: {reason}") from None
 
 
 @dataclass
@@ -165,7 +200,7 @@ class Reader:
         self._library = library
         self.time = unit(library, "time_unit", "1ns", {"ps": 1e-3, "ns": 1.0})
         amount, farads = (*library.values.get("capacitive_load_unit", []), "1", "pf")[:2]
-        self.load = float(amount) * {"ff": 1e-3, "pf": 1.0}[farads.strip('"').lower()]
+        self.load = _finite(amount) * {"ff": 1e-3, "pf": 1.0}[farads.strip('"').lower()]
         kinds = ("lu_table_template", "power_lut_template")
         self._templates = {template.arguments[0]: template for template in library.of(*kinds)}
 
@@ -177,12 +212,12 @@ class Reader:
                 continue
             pins = {pin.name: pin for part in group.of("pin") for pin in [self._pin(part)]}
             is_register = any(True for _ in group.of("ff", "latch", "statetable"))
-            area = float(group.text("area", "0"))
+            area = _finite(group.text("area", "0"))
             yield name, Cell(name, area, is_register, pins, _state(group), _clock_gate(group))
 
     def _pin(self, group: Group) -> Pin:
         arcs = tuple(self._arc(timing) for timing in group.of("timing"))
-        capacitance = float(group.text("capacitance", "0")) * self.load
+        capacitance = _finite(group.text("capacitance", "0")) * self.load
         return Pin(group.arguments[0].strip('"'), group.text("direction"), capacitance, group.text("function"), arcs)
 
     def _arc(self, group: Group) -> Arc:
@@ -206,6 +241,8 @@ class Reader:
                 axes[name] = tuple(unit_of_axis * value for value in _numbers(words))
         slews, loads = axes.get("slews", (0.0,)), axes.get("loads", (0.0,))
         flat = [scale * value for value in _numbers(group.values["values"])]
+        if len(flat) != len(slews) * len(loads):
+            raise ValueError(f"a table has {len(flat)} values for {len(slews)} by {len(loads)} points")
         if next(iter(axes), "slews") == "slews":
             values = tuple(tuple(flat[i * len(loads) : (i + 1) * len(loads)]) for i in range(len(slews)))
         else:
@@ -236,7 +273,14 @@ def _is_gate_pin(pin: Group, role: str) -> bool:
 
 
 def _numbers(words: Sequence[str]) -> list[float]:
-    return [float(number) for word in words for number in re.split(r"[\s,\\]+", word.strip('"').strip()) if number]
+    return [_finite(number) for word in words for number in re.split(r"[\s,\\]+", word.strip('"').strip()) if number]
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is no finite number")
+    return number
 
 
 def unit(library: Group, name: str, default: str, units: dict[str, float]) -> float:

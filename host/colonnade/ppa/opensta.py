@@ -27,7 +27,7 @@ def is_there() -> bool:
 
 def reads_activities() -> bool:
     """There is one that reads SAIF."""
-    return is_there() and "read_saif" in _run(["puts [info commands read_saif]"], ())
+    return is_there() and "read_saif" in _run(["puts [info commands read_saif]"], (), ())
 
 
 def register_to_register(netlist: Netlist, library: Library, slew: float, load: float) -> float | None:
@@ -48,6 +48,7 @@ def register_to_register(netlist: Netlist, library: Library, slew: float, load: 
             f"set_load {load:.6f} [all_outputs]",
             "report_checks -path_delay max -from [all_registers -clock_pins] -to [all_registers -data_pins] -digits 6",
         ],
+        library.files,
         list(_verilog(netlist)),
     )
     arrival = re.search(r"([\d.]+)\s+data arrival time", said)
@@ -76,6 +77,7 @@ def power(
             "read_saif -scope unit unit.saif",
             "report_power -digits 6",
         ],
+        liberties,
         list(_verilog(netlist)),
         list(_saif(netlist, activity, 1e6 / megahertz)),
     )
@@ -84,12 +86,20 @@ def power(
 
 
 def _linked(liberties: Sequence[Path]) -> list[str]:
-    return [*(f"read_liberty {{{file.resolve()}}}" for file in liberties), "read_verilog unit.v", "link_design unit"]
+    reads = [f"read_liberty {_link(number, file)}" for number, file in enumerate(liberties)]
+    return [*reads, "read_verilog unit.v", "link_design unit"]
 
 
-def _run(script: Sequence[str], verilog: Sequence[str], saif: Sequence[str] = ()) -> str:
+def _link(number: int, file: Path) -> str:
+    """The file's name in the script's folder: its own may hold what Tcl would take for a command."""
+    return f"library{number}{'.lib.gz' if file.suffix == '.gz' else '.lib'}"
+
+
+def _run(script: Sequence[str], liberties: Sequence[Path], verilog: Sequence[str], saif: Sequence[str] = ()) -> str:
     """What OpenSTA prints."""
     with temporary_folder() as folder:
+        for number, file in enumerate(liberties):
+            (folder / _link(number, file)).symlink_to(file.resolve())
         for name, lines in (("script.tcl", [*script, "exit"]), ("unit.v", verilog), ("unit.saif", saif)):
             (folder / name).write_text("\n".join(lines) + "\n")
         done = processes.run(["sta", "-no_splash", "-exit", "script.tcl"], cwd=folder)

@@ -12,6 +12,7 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -128,14 +129,18 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
     sources = liberty.find_liberties(liberties)
     for path in sources:
         text = liberty.pruned(path).encode("latin-1")
-        copy = folder / f"{path.name.split('.')[0]}-{hashlib.sha256(text).hexdigest()[:20]}.lib"
+        # Yosys and OpenSTA take the name as a part of their scripts
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", path.name.split(".")[0])[:100]
+        copy = folder / f"{stem}-{hashlib.sha256(text).hexdigest()[:20]}.lib"
         if not copy.is_file() or copy.read_bytes() != text:
             with replacing(copy) as stream:
                 stream.write(text)
         kept.append(copy)
     library = liberty.load(kept)
     digest = " ".join(copy.name for copy in kept)
-    return Technology(library, digest, delay or round(TARGET_FO4 * library.fo4, 4), sources)
+    with liberty.understood(sources[0]):
+        aim = delay or round(TARGET_FO4 * library.fo4, 4)
+    return Technology(library, digest, aim, sources)
 
 
 def synthesise(hierarchy: Hierarchy, top: str, into: Technology, progress: Progress = QUIET) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,11 @@ from numpy.typing import NDArray
 from colonnade.errors import UserError
 from colonnade.room.room import RoomCamera
 
+#: Pixels that a principal point or a focal length may have, and a focal length must have.
+_MOST_PIXELS = 1e6
+_LEAST_FOCAL = 1.0
+#: Metres that the camera may be away from the world's origin.
+_MOST_METRES = 1e6
 #: How far the axes of a pose may be from unit and at right angles.
 _AXES_TOLERANCE = 1e-3
 
@@ -26,6 +30,8 @@ def read_camera(data: dict[str, Any], file: Path) -> RoomCamera:
     for key in ("fx", "fy"):
         if values[key] <= 0:
             raise UserError(f"{file}: {key} is {values[key]:g}, a focal length must be more than 0 pixels")
+        if values[key] < _LEAST_FOCAL:
+            raise UserError(f"{file}: {key} is {values[key]:g}, a focal length must be at least {_LEAST_FOCAL:g}")
     pose = _pose(data, file)
     to_world = pose[:3] * np.array([-1.0, -1.0, 1.0, 1.0])
     return RoomCamera(values["fx"], values["fy"], values["cx"], values["cy"], to_world)
@@ -45,8 +51,8 @@ def _number(data: dict[str, Any], key: str, file: Path) -> float:
     if key not in data:
         raise UserError(f"{file} lacks {key}: a room's camera needs fx, fy, cx, cy (pixels) and cam_to_world")
     value = data[key]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise UserError(f"{file}: {key} must be a finite number")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _MOST_PIXELS:
+        raise UserError(f"{file}: {key} must be a finite number of pixels up to {_MOST_PIXELS:g}")
     return float(value)
 
 
@@ -56,10 +62,12 @@ def _pose(data: dict[str, Any], file: Path) -> NDArray[np.float64]:
         raise UserError(f"{file} lacks cam_to_world: the camera's 4x4 pose, x left, y up, z forward")
     try:
         pose = np.array(data["cam_to_world"], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         pose = np.empty(0)
     if pose.shape not in ((3, 4), (4, 4)) or not np.isfinite(pose).all():
         raise UserError(f"{file}: cam_to_world must be 4 rows of 4 finite numbers")
+    if np.abs(pose[:3, 3]).max() > _MOST_METRES:
+        raise UserError(f"{file}: cam_to_world has the camera more than {_MOST_METRES:g} metres away")
     axes = pose[:3, :3]
     if np.abs(axes.T @ axes - np.eye(3)).max() > _AXES_TOLERANCE or np.linalg.det(axes) < 0:
         raise UserError(f"{file}: the axes of cam_to_world must be unit, at right angles and right-handed")

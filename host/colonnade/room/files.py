@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
 
+from colonnade.arrays import array_in
 from colonnade.errors import UserError
+from colonnade.inputs import exists, read_input, read_json
+from colonnade.limits import MOST_PICTURE_BYTES
+from colonnade.pictures import opened_picture
 
 
 def find(folder: Path, names: Sequence[str]) -> Path | None:
-    """The first of ``names`` that is a file in ``folder``."""
-    return next((folder / name for name in names if (folder / name).is_file()), None)
+    """The first of ``names`` that is there in ``folder``."""
+    return next((folder / name for name in names if exists(folder / name)), None)
 
 
-def read_json(file: Path) -> dict[str, Any]:
+def read_object(file: Path) -> dict[str, Any]:
     """The JSON object in ``file``."""
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UserError(f"there is no {file}: a room needs its camera there") from None
-    except OSError as error:
-        raise UserError(f"cannot read {file}: {error.strerror}") from None
-    except ValueError as error:
-        raise UserError(f"{file} is not JSON: {error}") from None
+    data = read_json(file, "the camera", missing=f"there is no {file}: a room needs its camera there")
     if not isinstance(data, dict):
         raise UserError(f"{file} must hold a JSON object")
     return data
@@ -58,13 +53,11 @@ def read_grey(file: Path) -> NDArray[np.float64]:
 
 
 def read_array(file: Path) -> NDArray[np.float64]:
-    """The numbers in a .npy file, two-dimensional: float64 [height, width]."""
+    """The numbers of a ``.npy`` file: float64 [height, width]."""
     try:
-        array = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        array = array_in(read_input(file, "the array", MOST_PICTURE_BYTES))
+    except ValueError as error:
         raise UserError(f"{file} is no readable array: {error}") from None
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
-        raise UserError(f"{file} must hold an array of numbers")
     if array.ndim == 3 and array.shape[2] == 1:
         array = array[..., 0]
     if array.ndim != 2:
@@ -76,20 +69,13 @@ def read_array(file: Path) -> NDArray[np.float64]:
 def _samples(file: Path) -> NDArray[Any]:
     """uint8 or uint16 [height, width, 1 or 3] of a picture."""
     samples: NDArray[Any]
-    try:
-        with Image.open(file) as picture:
-            if picture.mode.startswith("I;16"):
-                samples = np.asarray(picture).astype(np.uint16)
-                return samples[..., np.newaxis]
-            if picture.mode == "F":
-                raise UserError(f"{file} holds real numbers: give 8 or 16 bits a sample")
-            if picture.mode == "I":
-                samples = np.clip(np.asarray(picture, dtype=np.float64), 0, 65535).astype(np.uint16)
-                return samples[..., np.newaxis]
-            grey = picture.mode in ("1", "L", "LA", "La")
-            samples = np.asarray(picture.convert("L" if grey else "RGB"))
-            return samples[..., np.newaxis] if grey else samples
-    except FileNotFoundError:
-        raise UserError(f"there is no {file}") from None
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
-        raise UserError(f"{file} is no readable picture: {error}") from None
+    with opened_picture(file, f"there is no {file}") as picture:
+        if picture.mode.startswith("I;16"):
+            samples = np.asarray(picture).astype(np.uint16)
+            return samples[..., np.newaxis]
+        if picture.mode == "I":
+            samples = np.clip(np.asarray(picture, dtype=np.float64), 0, 65535).astype(np.uint16)
+            return samples[..., np.newaxis]
+        grey = picture.mode in ("1", "L", "LA", "La")
+        samples = np.asarray(picture.convert("L" if grey else "RGB"))
+        return samples[..., np.newaxis] if grey else samples

@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.errors import UserError
+from colonnade.inputs import exists, is_folder
 from colonnade.pictures import read_picture
 from colonnade.room import files
 from colonnade.room.albedo import judged_encoding, linear_albedo
@@ -29,6 +29,8 @@ from colonnade.room.room import Room
 
 #: Metres a step of a 16-bit depth picture stands for unless ``depth_step`` says otherwise, as depth cameras have it.
 DEFAULT_DEPTH_STEP = 0.001
+#: A step of a kilometre is no depth.
+LARGEST_DEPTH_STEP = 1e3
 #: The largest edge of a map, pixels: beyond it u and v would not fit the planes' fields.
 LARGEST_EDGE = 4096
 
@@ -40,10 +42,10 @@ def load_room(path: Path, camera_height: float | None = None) -> Room:
     camera: by default the height that the camera's pose has, or 1.5 m if that is not above the floor.
     """
     folder = Path(path)
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise UserError(f"there is no room {folder}: name a folder with meta.json, albedo.png and normal.png")
     meta_file = folder / "meta.json"
-    meta = files.read_json(meta_file)
+    meta = files.read_object(meta_file)
     camera = read_camera(meta, meta_file)
     albedo_file, normal_file = _needed(folder, "albedo.png"), _needed(folder, "normal.png")
     depth_file = files.find(folder, ("depth.npy", "depth.png"))
@@ -95,7 +97,7 @@ def load_room(path: Path, camera_height: float | None = None) -> Room:
 
 def _needed(folder: Path, name: str) -> Path:
     file = folder / name
-    if not file.is_file():
+    if not exists(file):
         raise UserError(f"the room {folder} lacks {name}: it needs meta.json, albedo.png and normal.png")
     return file
 
@@ -105,6 +107,6 @@ def _depth(file: Path, meta: dict[str, Any], meta_file: Path) -> NDArray[np.floa
     if file.suffix == ".npy":
         return files.read_array(file)
     step = meta.get("depth_step", DEFAULT_DEPTH_STEP)
-    if isinstance(step, bool) or not isinstance(step, int | float) or not math.isfinite(step) or step <= 0:
+    if isinstance(step, bool) or not isinstance(step, int | float) or not 0 < step <= LARGEST_DEPTH_STEP:
         raise UserError(f"{meta_file}: depth_step must be the metres that a step of {file.name} stands for")
     return files.read_grey(file) * float(step)

@@ -16,7 +16,7 @@ object Generate {
       |
       |  --config CONFIG       tiny, small, edge, a JSON file, or a precision like 32b32s64d
       |  --set KEY=VALUE       overrides one field, as in array.rows=4; may be repeated
-      |  --output DIR          takes the place of an earlier output; nothing is left half-written
+      |  --output DIR          takes the place of an earlier output that nobody changed; never half-written
       |  --manifest-only       writes no Verilog
       |  --black-box-memories  leaves memories to be filled in; memories.json lists their shapes
       |  --formats-page FILE   writes the formats as a Markdown page
@@ -105,8 +105,12 @@ object Generate {
     case other                             => s"the output: ${other.getMessage}"
   }
 
+  /** Control characters of files and arguments must not reach the terminal. */
+  private def plain(text: String): String =
+    text.flatMap(char => if (Character.isISOControl(char)) f"\\u${char.toInt}%04x" else char.toString).take(1000)
+
   private def refuse(reason: String): Int = {
-    Console.err.println(s"colonnade.Generate: error: ${reason.linesIterator.mkString(" ")}")
+    Console.err.println(s"colonnade.Generate: error: ${plain(reason.linesIterator.mkString(" "))}")
     2
   }
 }

@@ -3,18 +3,26 @@ package colonnade
 import colonnade.config.ConfigError
 
 import java.nio.charset.StandardCharsets.UTF_8
+import java.nio.file.LinkOption.NOFOLLOW_LINKS
 import java.nio.file.StandardCopyOption.{ATOMIC_MOVE, REPLACE_EXISTING}
-import java.nio.file.{Files, Path}
+import java.nio.file.{Files, Path, Paths}
 import java.util.Comparator
 import scala.util.Using
 
 /** Files and directories that appear complete or not at all: written under another name beside, then moved. */
 object OutputFiles {
 
+  /** Replaces a regular file, or nothing: no link, directory, pipe or device, and no file that is read-only. */
   def writeFile(file: Path, text: String): Unit = {
     if (Files.isDirectory(file)) throw new ConfigError(s"$file is a directory; name a file")
+    if (Files.isSymbolicLink(file)) throw new ConfigError(s"$file is a symbolic link; name the file itself")
+    if (Files.exists(file, NOFOLLOW_LINKS)) {
+      if (!Files.isRegularFile(file, NOFOLLOW_LINKS)) throw new ConfigError(s"$file is no regular file; name another")
+      if (!Files.isWritable(file) || !isWritableByAnybody(file))
+        throw new ConfigError(s"$file is read-only; name another file")
+    }
     Files.createDirectories(file.getParent)
-    val fresh = Files.createTempFile(file.getParent, s".${file.getFileName}.", ".partial")
+    val fresh = Files.createTempFile(file.getParent, ".colonnade.", ".partial")
     try {
       Files.writeString(fresh, text, UTF_8)
       fresh.toFile.setReadable(true, false)
@@ -22,19 +30,18 @@ object OutputFiles {
     } finally Files.deleteIfExists(fresh)
   }
 
-  /** Fills a new directory and puts it in the place of `directory`, which may hold an earlier output but nothing else. */
+  /** Fills a new directory and puts it in the place of `directory`, which may be an earlier output, unchanged, or empty. */
   def replaceDirectory(directory: Path)(fill: Path => Unit): Unit = {
-    if (Files.exists(directory) && !Files.isDirectory(directory))
-      throw new ConfigError(s"$directory is a file; name a directory for the output")
-    if (!isReplaceable(directory))
-      throw new ConfigError(s"$directory holds other files and no manifest.json; name another directory for the output")
+    checkReplaceable(directory)
     val parent = Option(directory.getParent).getOrElse(throw new ConfigError(s"$directory cannot be an output"))
     Files.createDirectories(parent)
 
-    val fresh = Files.createTempDirectory(parent, s".${directory.getFileName}.partial-")
+    val fresh = Files.createTempDirectory(parent, ".colonnade.partial-")
     try {
       fill(fresh)
+      DesignMarker.write(fresh)
       open(fresh)
+      checkReplaceable(directory)
       val old = fresh.resolveSibling(s"${fresh.getFileName}.old")
       if (Files.exists(directory)) Files.move(directory, old, ATOMIC_MOVE)
       Files.move(fresh, directory, ATOMIC_MOVE)
@@ -42,11 +49,26 @@ object OutputFiles {
     } finally delete(fresh)
   }
 
-  private def isReplaceable(directory: Path): Boolean =
-    !Files.exists(directory) || Files.exists(directory.resolve("manifest.json")) || entries(directory).isEmpty
+  private def checkReplaceable(directory: Path): Unit = {
+    if (Files.isSymbolicLink(directory))
+      throw new ConfigError(s"$directory is a symbolic link; name the directory itself")
+    if (Files.exists(directory) && !Files.isDirectory(directory))
+      throw new ConfigError(s"$directory is a file; name a directory for the output")
+    if (Files.isDirectory(directory)) {
+      if (Files.isSameFile(directory, Paths.get("").toAbsolutePath))
+        throw new ConfigError(s"$directory is the working directory, which cannot be replaced; name a directory in it")
+      DesignMarker
+        .foreign(directory)
+        .foreach(reason =>
+          throw new ConfigError(s"$directory $reason, so it is not replaced; name another, or delete it first")
+        )
+    }
+  }
 
-  private def entries(directory: Path): Seq[Path] =
-    Using.resource(Files.list(directory))(_.toArray.toSeq.map(_.asInstanceOf[Path]))
+  /** Also for the superuser, who may write everything. */
+  private def isWritableByAnybody(file: Path): Boolean =
+    !Files.getFileStore(file).supportsFileAttributeView("posix") ||
+      Files.getPosixFilePermissions(file).toString.contains("WRITE")
 
   /** A temporary directory is its owner's alone; an output is for everybody. */
   private def open(directory: Path): Unit = {

@@ -14,7 +14,7 @@ object ArbitraryConfig {
 
   private val array = for {
     rows     <- Gen.chooseNum(1, 100)
-    columns  <- Gen.chooseNum(1, 100)
+    columns  <- Gen.chooseNum(1, 100.min(ArrayConfig.mostUnits / rows))
     contexts <- Gen.chooseNum(1, 16)
   } yield ArrayConfig(rows, columns, contexts)
 

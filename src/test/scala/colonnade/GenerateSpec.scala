@@ -46,17 +46,18 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     run("--config", "tiny", "--set", "array.rows=3", s"--output=$output", "--manifest-only") shouldBe ((0, ""))
     ujson.read(Files.readString(output.resolve("manifest.json"))) shouldBe
       Manifest(ConfigIO.load("tiny", Seq("array.rows=3")))
-    names(output) shouldBe Seq("manifest.json")
+    names(output) shouldBe Seq(DesignMarker.name, "manifest.json")
     names(output.getParent) shouldBe Seq("b")
   }
 
   it should "replace an earlier output, but no other directory" in inScratch { scratch =>
     val output = scratch.resolve("out")
     for (_ <- 0 until 2) run("--config", "tiny", "--output", output.toString, "--manifest-only")._1 shouldBe 0
-    Files.delete(output.resolve("manifest.json"))
     Files.writeString(output.resolve("thesis.txt"), "irreplaceable")
-    refused("--config", "tiny", "--output", output.toString, "--manifest-only")("holds other files")
-    names(output) shouldBe Seq("thesis.txt")
+    refused("--config", "tiny", "--output", output.toString, "--manifest-only")("holds thesis.txt")
+    names(output) shouldBe Seq(DesignMarker.name, "manifest.json", "thesis.txt")
+    Files.delete(output.resolve(DesignMarker.name))
+    refused("--config", "tiny", "--output", output.toString, "--manifest-only")(s"no ${DesignMarker.name}")
     refused("--config", "tiny", "--output", output.resolve("thesis.txt").toString, "--manifest-only")("is a file")
     refused(
       "--config",
@@ -67,6 +68,40 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     )("thesis.txt: there is a file")
   }
 
+  it should "know its own directories by the list of their files" in inScratch { scratch =>
+    val output = scratch.resolve("out")
+    def write(): Unit = OutputFiles.replaceDirectory(output) { fresh =>
+      OutputFiles.writeFile(fresh.resolve("a"), "a\n")
+      OutputFiles.writeFile(fresh.resolve("sub/b"), "b\n")
+    }
+    def foreign(change: => Unit): String = {
+      write()
+      change
+      val refusal = the[ConfigError] thrownBy write()
+      Process(Seq("rm", "-r", output.toString)).!
+      refusal.getMessage
+    }
+    write()
+    // As the host's design_folder.py writes it
+    Files.readString(output.resolve(DesignMarker.name)).linesIterator.toSeq shouldBe Seq(
+      DesignMarker.title,
+      "87428fc522803d31065e7bce3cf03fe475096631e5e07bbd7a0fde60c4cf25c7  a",
+      "0263829989b6fd954f72baaf2fc64bc2e2f01d692d4de72986ea808f6e99813f  sub/b"
+    )
+    foreign(Files.writeString(output.resolve("a"), "A\n")) should include("changed")
+    foreign(Files.delete(output.resolve("a"))) should include("lacks a")
+    foreign(Files.writeString(output.resolve("sub/c"), "")) should include("holds sub/c")
+    foreign(Files.createDirectory(output.resolve("empty"))) should include("holds empty")
+    foreign(Files.createSymbolicLink(output.resolve("link"), scratch)) should include("holds link")
+    foreign(Files.writeString(output.resolve(DesignMarker.name), "")) should include("cannot be read")
+    foreign(Files.delete(output.resolve(DesignMarker.name))) should include("holds files")
+
+    Files.createSymbolicLink(output, Files.createDirectory(scratch.resolve("real")))
+    the[ConfigError] thrownBy write() should have message
+      s"$output is a symbolic link; name the directory itself"
+    refused("--config", "tiny", "--output", ".", "--manifest-only")("working directory")
+  }
+
   it should "leave an earlier output as it was when the new one fails" in inScratch { scratch =>
     val output = scratch.resolve("out")
     run("--config", "tiny", "--output", output.toString, "--manifest-only")
@@ -74,7 +109,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
       OutputFiles.writeFile(fresh.resolve("half"), "")
       throw new ArithmeticException
     }
-    names(output) shouldBe Seq("manifest.json")
+    names(output) shouldBe Seq(DesignMarker.name, "manifest.json")
     names(scratch) shouldBe Seq("out")
   }
 

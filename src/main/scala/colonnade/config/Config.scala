@@ -7,9 +7,18 @@ package colonnade.config
   * @param contexts rays in flight in each render unit
   */
 final case class ArrayConfig(rows: Int, columns: Int, contexts: Int) {
-  Require.atLeast("array.rows", rows, 1)
-  Require.atLeast("array.columns", columns, 1)
+  Require.within("array.rows", rows, 1, ArrayConfig.mostRows)
+  Require.within("array.columns", columns, 1, ArrayConfig.mostColumns)
+  Require.product("array.rows", rows, "array.columns", columns, ArrayConfig.mostUnits)
   Require.within("array.contexts", contexts, 1, 16)
+}
+
+object ArrayConfig {
+  val mostRows:    Int = 256
+  val mostColumns: Int = 256
+
+  /** Render units of a device: twelve times `edge`. */
+  val mostUnits: Int = 1024
 }
 
 /** Operand widths, the paper's mixed precision: `32b32s64d` is mac 32, sqrt 32, div 64.

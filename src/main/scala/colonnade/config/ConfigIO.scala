@@ -12,6 +12,9 @@ object ConfigIO {
   /** Configurations that are always there, by name. */
   val presets: Seq[String] = Seq("tiny", "small", "edge")
 
+  /** Of a configuration's file. */
+  private val mostBytes = 1 << 20
+
   private val notation = """(\d{1,6})b(\d{1,6})s(\d{1,6})d""".r
 
   /** The configuration of a preset's name, of a file, or of a precision such as `16b16s32d` (then otherwise `small`).
@@ -208,11 +211,11 @@ object ConfigIO {
   }
 
   private def valueOf(text: String): ujson.Value =
-    try ujson.read(text)
+    try StrictJson.read(text, s"the value '${text.take(40)}'")
     catch { case _: ujson.ParsingFailedException => ujson.Str(text) }
 
   private def parse(text: String, source: String): ujson.Value =
-    try ujson.read(text)
+    try StrictJson.read(text, source)
     catch {
       case failure: ujson.ParsingFailedException =>
         val reason = Option(failure.getMessage).getOrElse("").linesIterator.nextOption().getOrElse("")
@@ -226,6 +229,7 @@ object ConfigIO {
       try Paths.get(name)
       catch { case _: InvalidPathException => throw missing(s"'$name' is no configuration") }
     if (!Files.isRegularFile(path)) throw missing(s"there is no configuration '$name'")
+    if (Files.size(path) > mostBytes) throw new ConfigError(s"$name is too large: a configuration may have $mostBytes bytes")
     try text(path)
     catch { case failure: IOException => throw new ConfigError(s"cannot read $name as text: ${failure.getMessage}") }
   }

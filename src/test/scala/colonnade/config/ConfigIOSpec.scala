@@ -32,6 +32,19 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     }
   }
 
+  it should "refuse JSON with traps" in {
+    def read(text: String): String =
+      the[ConfigError] thrownBy StrictJson.read(text, "x.json") match { case error => error.getMessage }
+    read("""{"a": {"b": 1, "b": 2}}""") shouldBe "x.json has the key b twice in an object"
+    read("[" * 100000) should include("nested too deeply")
+    read("""{"a":""" * 100 + "1" + "}" * 100) should include("nested too deeply")
+    read("9" * 1000) should include("1000 characters")
+    read("1e999") should include("too large")
+    StrictJson.read("""{"a": "[[\"{{", "b": [1, -2.5e3, null, true, false, {}]}""", "x.json") shouldBe
+      ujson.Obj("a" -> "[[\"{{", "b" -> ujson.Arr(1, -2500, ujson.Null, true, false, ujson.Obj()))
+    refusal("tiny", s"array=${"[" * 100000}") should include("nested too deeply")
+  }
+
   it should "refuse any number outside its range, by name" in holds(cases = 100) {
     val ranges = Seq(
       "array.contexts"              -> (1, 16),
@@ -100,7 +113,11 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     refusal("tiny", "precision.mac=8") shouldBe "precision.mac is 8; it must be from 16 to 64"
     refusal("tiny", "precision=32b65s64d") shouldBe "precision.sqrt is 65; it must be from 16 to 64"
     refusal("32b32s8d") shouldBe "precision.div is 8; it must be from 16 to 64"
-    refusal("tiny", "array.rows=0") shouldBe "array.rows is 0; it must be at least 1"
+    refusal("tiny", "array.rows=0") shouldBe "array.rows is 0; it must be from 1 to 256"
+    refusal("tiny", "array.rows=3000") shouldBe "array.rows is 3000; it must be from 1 to 256"
+    refusal("tiny", "array.columns=257") shouldBe "array.columns is 257; it must be from 1 to 256"
+    refusal("tiny", "array.rows=256", "array.columns=5") shouldBe
+      "array.rows times array.columns is 1280; it must be at most 1024"
     refusal("tiny", "geometry.arity=3") shouldBe "geometry.arity is 3; it must be one of 2, 4"
     refusal("tiny", "frame.tileSize=5") shouldBe "frame.tileSize is 5; it must be one of 4, 8, 16, 32"
   }
