@@ -193,7 +193,14 @@ private:
         ++counters.raysRoom;
         counters.marchSteps += static_cast<std::uint64_t>(point.steps);
         counters.albedoReads += point.kind == RoomPoint::Kind::map;
+        errors.illegalRecord = errors.illegalRecord || point.isIllegal;
         return point;
+    }
+
+    RoomTexel texelOf(const RoomPoint& point) {
+        const RoomTexel texel = background_->texelOf(point, frame_.room);
+        errors.illegalRecord = errors.illegalRecord || texel.isIllegal;
+        return texel;
     }
 
     /// The colour of what a ray meets that meets nothing of the object.
@@ -203,7 +210,7 @@ private:
         blockScale(ray.direction, numbers_.shadeBits, direction);
         const RoomPoint point = count(background_->meet(ray.origin, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return frame_.lighting.background;
-        const RoomTexel texel = background_->texelOf(point, frame_.room);
+        const RoomTexel texel = texelOf(point);
         return reflectedBy(texel.albedo, roomLight(background_->reached(ray.origin, direction, point), texel.normal, shadows).visible);
     }
 
@@ -214,7 +221,7 @@ private:
         blockScale(ray.direction, numbers_.shadeBits, direction);
         const RoomPoint point = count(background_->seen(x, y, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return pixel;
-        const RoomTexel texel = background_->texelOf(point, frame_.room);
+        const RoomTexel texel = texelOf(point);
         const Incoming light = roomLight(background_->reached(ray.origin, direction, point), texel.normal, true);
         pixel.colour = reflectedBy(texel.albedo, light.visible);
         for (int channel = 0; channel < 3; ++channel) pixel.ratio[channel] = ratioOf(light.visible[channel], light.all[channel]);

@@ -17,7 +17,10 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
 
   private val matrixRow   = VecInit(view.matrix.map(row => VecInit(row.axes)))(m.axis)
   private val offset      = VecInit(view.offset.axes)(m.axis)
-  private val offsetPower = (1.U(1.W) << view.offsetShift)(sceneBits, 0)
+  private val offsetPower = {
+    val isMost = view.offsetShift >= sceneBits.U // and above it counts as that
+    isMost ## (1.U(1.W) << view.offsetShift)(sceneBits - 1, 0)
+  }
   private val origin      = request.ray.origin.axes.map(_.integer)
   private val inverse     = m.quotient.zext
 

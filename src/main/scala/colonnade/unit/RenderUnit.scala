@@ -277,7 +277,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
-  events.illegalRecord := refused.valid
+  events.illegalRecord := refused.valid || room.map(_.events.illegal).getOrElse(false.B)
   io.isIdle            := controller.io.freeCount === contexts.U && !finished.valid && !io.pixels.valid
 
   // A record comes only to a unit that takes it
