@@ -242,7 +242,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   // The record port
   recordFetch.io.start       := io.start
   recordFetch.io.row         := io.row
-  recordFetch.io.recordCount := io.registers.scene.recordCount
+  recordFetch.io.scene       := io.registers.scene
   recordFetch.io.broadcasts  := io.broadcasts
   io.requests :<>= recordFetch.io.requests
 
@@ -277,7 +277,9 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
-  events.illegalRecord := refused.valid || room.map(_.events.illegal).getOrElse(false.B)
+  events.illegalRecord := refused.valid || traversal.io.illegal ||
+    (triangleUnit.io.candidate.fire && !triangleUnit.io.candidate.bits.record.isLegal) ||
+    room.map(_.events.illegal).getOrElse(false.B)
   io.isIdle            := controller.io.freeCount === contexts.U && !finished.valid && !io.pixels.valid
 
   // A record comes only to a unit that takes it
