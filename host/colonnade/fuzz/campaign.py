@@ -12,6 +12,7 @@ from colonnade.frame import Frame
 from colonnade.fuzz.cases import Case, legal_cases
 from colonnade.fuzz.compare import differences
 from colonnade.fuzz.corruption import KINDS, Kind, corrupt_case
+from colonnade.fuzz.rooms import room_cases
 from colonnade.fuzz.simulator import Delivered, run_cases
 from colonnade.generator import GeneratedDesign
 from colonnade.manifest import Manifest
@@ -56,7 +57,7 @@ class _Campaign:
     def __init__(self, design: GeneratedDesign, progress: Progress) -> None:
         self.manifest: Manifest = design.manifest
         self.program = build_simulator(design, progress)
-        self.cases = legal_cases(self.manifest)
+        self.cases = legal_cases(self.manifest) + room_cases(self.manifest)
         self.rows = max(len(case.image.records) for case in self.cases)
         self._expected: dict[str, Frame] = {}
         self.legal_failures = 0

@@ -10,6 +10,7 @@ import numpy as np
 from colonnade.fuzz.cases import Case
 from colonnade.fuzz.records import corrupt_records
 from colonnade.fuzz.registers import corrupt_registers
+from colonnade.fuzz.rooms import corrupt_maps
 from colonnade.manifest import Manifest
 
 #: Gives the corrupt case and says in a few words what was changed.
@@ -36,6 +37,7 @@ KINDS = {
     for kind in (
         Kind("records", corrupt_records),
         Kind("registers", corrupt_registers),
+        Kind("maps", corrupt_maps, lambda case: bool(case.image.attributes)),
     )
 }
 

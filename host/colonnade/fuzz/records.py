@@ -43,7 +43,7 @@ def _set_field(random: np.random.Generator, records: Records, header: ImageHeade
     choice = deciding if deciding and random.random() < 0.5 else fields
     field = choice[int(random.integers(len(choice)))]
     value = random_value(random, *field.range)
-    _write(records[address], field, value)
+    write_field(records[address], field, value)
     return f"{kind} {address}: {field.name} = {value}"
 
 
@@ -58,7 +58,7 @@ def _redirect(random: np.random.Generator, records: Records, header: ImageHeader
     borders = (address, 0, header.triangle_base, header.attribute_base, header.record_count, field.range[1] + 1)
     value = borders[int(random.integers(len(borders)))] + int(random.integers(-4, 3))
     value = min(max(value, 0), field.range[1])
-    _write(records[address], field, value)
+    write_field(records[address], field, value)
     return f"node {address}: {name} = {value}"
 
 
@@ -91,7 +91,8 @@ def _kind(address: int, header: ImageHeader) -> str:
     return "triangles" if address < header.attribute_base else "attributes"
 
 
-def _write(record: Records, field: Field, value: int) -> None:
+def write_field(record: Records, field: Field, value: int) -> None:
+    """Sets a field of a little-endian record; a value that does not fit keeps its low bits."""
     whole = int.from_bytes(record.tobytes(), "little")
     mask = ((1 << field.width) - 1) << field.offset
     whole = (whole & ~mask) | ((value << field.offset) & mask)

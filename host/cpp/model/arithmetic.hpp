@@ -34,7 +34,7 @@ template <class Integer> Integer floorShift(Integer x, int bits) {
 /// Drops `bits` low bits to nearest, ties to even; shifts left where `bits` is not positive.
 template <class Integer> Integer nearestEven(Integer x, int bits) {
     if (bits <= 0) return floorShift(x, bits);
-    const Integer quotient = x >> bits, rest = x - (quotient << bits), half = Integer(1) << (bits - 1);
+    const Integer quotient = x >> bits, rest = x - shiftLeft(quotient, bits), half = Integer(1) << (bits - 1);
     return quotient + ((rest > half || (rest == half && (quotient & 1))) ? 1 : 0);
 }
 
