@@ -38,7 +38,7 @@ final class AttributeArbiter[Q <: Data, A <: Data](question: Q, answer: A, count
   private val shown = Pipe(io.served.answer)
   for ((requester, number) <- io.requesters.zipWithIndex) {
     requester.answer.valid := shown.valid && shown.bits.tag >> tagBits === number.U
-    requester.answer.bits := shown.bits
+    requester.answer.bits  := shown.bits
   }
 }
 

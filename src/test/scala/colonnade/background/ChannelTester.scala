@@ -18,7 +18,8 @@ object FlatChannel {
   /** Ports for a channel of the unit under test. */
   def apply[Q <: Data, A <: Data](channel: AttributeChannel[Q, A]): FlatChannel = {
     val (question, answer) = (channel.question.bits, channel.answer.bits)
-    val flat = IO(new FlatChannel(question.content.getWidth, answer.getWidth - answer.tag.getWidth, question.tag.getWidth))
+    val flat               =
+      IO(new FlatChannel(question.content.getWidth, answer.getWidth - answer.tag.getWidth, question.tag.getWidth))
     channel.question.valid := flat.question.valid
     channel.question.bits  := flat.question.bits.asTypeOf(question)
     flat.question.ready    := channel.question.ready

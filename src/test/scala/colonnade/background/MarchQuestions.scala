@@ -118,10 +118,10 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
 
   /** Any bits in all registers. */
   def wildView(): ViewQuestion = {
-    val view                       = new RoomView(numbers)
-    def natural(field: Data): Int  = BigInt(field.getWidth, random).toInt
-    def number(bits: Int): BigInt  = BigInt(bits, random) - (BigInt(1) << (bits - 1))
-    def steps(field: Data): BigInt = BigInt(random.nextInt(field.getWidth + 1), random)
+    val view                         = new RoomView(numbers)
+    def natural(field: Data): Int    = BigInt(field.getWidth, random).toInt
+    def number(bits:   Int): BigInt  = BigInt(bits, random) - (BigInt(1) << (bits - 1))
+    def steps(field:   Data): BigInt = BigInt(random.nextInt(field.getWidth + 1), random)
     ViewQuestion(
       Seq.fill(9)(number(numbers.macBits)),
       Seq.fill(3)(number(numbers.macBits)),

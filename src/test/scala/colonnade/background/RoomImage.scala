@@ -42,7 +42,7 @@ final class RoomImage(config: ColonnadeConfig, random: Random, illegal: Double =
     val mode      = random.nextInt(8)
     val cells     = 4 << (2 * (mode % 4))
     val maskWords = if (mode < 4) (cells + 15) / 16 else 1 + (2 * cells + 15) / 16
-    val pointer   = if (mode == 0 || isIllegal()) randomPointer() else random.nextInt(layout.mapHeapWords - maskWords + 1)
+    val pointer = if (mode == 0 || isIllegal()) randomPointer() else random.nextInt(layout.mapHeapWords - maskWords + 1)
     new Packed(new MapDescriptor).pack(
       Map(
         "mode"       -> mode,
