@@ -253,8 +253,8 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
   // New wishes
   for {
-    port            <- io.wishes
-    isLegal          = isInSection(port.bits.address, port.bits.use)
+    port <- io.wishes
+    isLegal = isInSection(port.bits.address, port.bits.use)
     (wish, context) <- wishes.zipWithIndex
   } {
     when(port.valid && port.bits.context === context.U) {
