@@ -40,8 +40,9 @@ def fuzz(
 ) -> None:
     """Corrupt records and registers of small legal frames, and render them through the RTL and the model.
 
-    Pixels, hits, error bits and counters must be equal, and so must the legal frame after each. Prints the frames by kind
-    and outcome: the legal picture, a changed one, an error bit, the watchdog. Exit status 1 when a frame disagrees.
+    Pixels, hits, error bits and counters must be equal, and so must the legal frame after each. Prints the frames by
+    kind and outcome: the legal picture, a changed one, an error bit, the watchdog. Exit status 1 when a frame
+    disagrees.
     """
     from colonnade import progress
     from colonnade.errors import UserError

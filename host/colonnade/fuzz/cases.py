@@ -49,8 +49,7 @@ def _scenes(manifest: Manifest) -> Iterator[tuple[str, Scene]]:
     yield "sphere", replace(sphere, light=Light(falloff=2.0))
     yield "inside", replace(sphere, camera=Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0)))
     if int(frame["lights"]) > 1:
-        lights = {"light": Light(falloff=3.0), "more_lights": (Light(offset=(-1.0, 0.5, 2.0)),)}
-        yield "two lights", replace(sphere, **lights)
+        yield "two lights", replace(sphere, light=Light(falloff=3.0), more_lights=(Light(offset=(-1.0, 0.5, 2.0)),))
     if int(frame["maxBounces"]) > 0:
         mirror, glass = Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Material(kind="glass", ior=1.45)
         yield "mirror", replace(cube, material=mirror, paths=Paths(bounces=3))

@@ -18,7 +18,11 @@ def corrupt_registers(random: np.random.Generator, case: Case, manifest: Manifes
     """Set one to three registers of any group to any value that fits."""
     groups: dict[str, list[Register]] = {}
     for register in manifest.registers.values():
-        if register.access == "rw" and register.name != "frame.watchdogCycles" and not register.name.startswith("room."):
+        if (
+            register.access == "rw"
+            and register.name != "frame.watchdogCycles"
+            and not register.name.startswith("room.")
+        ):
             groups.setdefault(register.name.split("[")[0].rsplit(".", 1)[0], []).append(register)
     values = dict(case.registers)
     changes = []

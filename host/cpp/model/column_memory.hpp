@@ -17,7 +17,8 @@ public:
         isDecoded_ = false;
     }
 
-    /// Where the sections lie: nodes from 0, triangles from `triangleBase`, attributes from `attributeBase`, nothing from `recordCount` on.
+    /// Where the sections lie: nodes from 0, triangles from `triangleBase`, attributes from `attributeBase`, nothing from `recordCount` on. Each base
+    /// is at most the next one.
     void divide(std::size_t recordCount, std::size_t triangleBase, std::size_t attributeBase) {
         if (isDecoded_ && recordCount == recordCount_ && triangleBase == triangleBase_ && attributeBase == attributeBase_) return;
         recordCount_ = recordCount;
@@ -37,13 +38,13 @@ public:
     std::uint32_t addressMask() const { return decoder_.addressMask(); }
 
     const Node* nodeAt(std::size_t address) const {
-        if (address >= triangleBase_ || address >= recordCount_) return nullptr;
+        if (address >= triangleBase_) return nullptr;
         return address < nodes_.size() ? &nodes_[address] : &unwritten_.node;
     }
 
     const Triangles* trianglesAt(std::size_t address) const {
         address &= addressMask();
-        if (address < triangleBase_ || address >= attributeBase_ || address >= recordCount_) return nullptr;
+        if (address < triangleBase_ || address >= attributeBase_) return nullptr;
         const std::size_t index = address - triangleBase_;
         return index < triangles_.size() ? &triangles_[index] : &unwritten_.triangles;
     }
@@ -53,8 +54,8 @@ public:
 
     const Face* faceOf(std::uint64_t id) const {
         const auto perRecord = static_cast<std::uint64_t>(decoder_.facesPerRecord());
-        const std::size_t address = (attributeBase_ + id / perRecord) & decoder_.idMask();
-        if (address < attributeBase_ || address >= recordCount_) return nullptr;
+        const std::size_t address = attributeBase_ + id / perRecord;
+        if (address >= recordCount_) return nullptr;
         const std::size_t index = (address - attributeBase_) * perRecord + id % perRecord;
         return index < faces_.size() ? &faces_[index] : &unwritten_.face;
     }

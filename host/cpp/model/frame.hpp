@@ -278,7 +278,7 @@ private:
             ++counters.triangleTests;
             Hit hit = search.best;
             if (!testTriangle(search.ray, record.vertices[i], memory_.idOf(record, i), numbers_, hit)) continue;
-            if (search.isShadow) search.occlusion = std::max(search.occlusion, record.isClear[i] ? Occlusion::clear : Occlusion::opaque);
+            if (search.isShadow) search.occlusion = std::max(search.occlusion, record.isClear[i] && frame_.lighting.hasClear ? Occlusion::clear : Occlusion::opaque);
             else search.best = hit;
         }
     }

@@ -68,6 +68,7 @@ struct Frame {
         lighting.background = vector("background", "rgb");
         lighting.offset = take("shading.offset");
         lighting.clearness = takeIfThere("shading.clearness");
+        lighting.hasClear = registers.count("shading.clearness") != 0;
         lighting.flat = take("shading.flat") != 0;
         lighting.shadows = take("shading.shadows") != 0;
         lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
@@ -77,9 +78,10 @@ struct Frame {
                                           {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")}, takeIfThere(name + "reflectance")});
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));
-        triangleBase = static_cast<std::size_t>(take("scene.triangleBase"));
         triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));
-        attributeBase = static_cast<std::size_t>(take("scene.attributeBase"));
+        // Sections end where the next one begins, at the latest
+        attributeBase = std::min(recordCount, static_cast<std::size_t>(take("scene.attributeBase")));
+        triangleBase = std::min(attributeBase, static_cast<std::size_t>(take("scene.triangleBase")));
         watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
         hasRoom = takeIfThere("room.isThere") != 0;
         if (!hasRoom) return;

@@ -31,6 +31,8 @@ struct Lighting {
     std::vector<Light> lights;
     Colour ambient, background;
     std::int64_t offset, clearness;
+    /// Clear triangles let light through; otherwise they are opaque like all others.
+    bool hasClear;
     bool flat, shadows;
     int bounces;
     std::vector<Material> materials;

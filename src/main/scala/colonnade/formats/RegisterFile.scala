@@ -43,6 +43,12 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   private val legal    = settings.map { case (r, value) => r.name -> RegisterLimits.clamp(value, r.limit) }.toMap
   io.frame := Cat(Layout.of(io.frame).sortBy(-_.offset).map(field => legal(field.name))).asTypeOf(io.frame)
 
+  // Sections end where the next one begins, at the latest
+  private val scene         = io.frame.scene
+  private val attributeBase = least(legal("scene.attributeBase"), legal("scene.recordCount"))
+  scene.attributeBase := attributeBase
+  scene.triangleBase  := least(legal("scene.triangleBase"), attributeBase)
+
   // Control: a pulse in the cycle of the write.
   private val start = registers.filter(_.access == Access.WriteOnly).head
   io.start := writes && io.register.address === start.address.U && io.register.writeData(0)
@@ -64,6 +70,8 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
     VecInit(Seq.tabulate(1 << io.register.address.getWidth)(words.getOrElse(_, 0.U(readData.getWidth.W))))
   when(io.register.read)(readData := shown(io.register.address))
   io.register.readData := readData
+
+  private def least(a: UInt, b: UInt): UInt = Mux(a < b, a, b)
 
   private def wordOf(value: UInt, word: Int): UInt = {
     val low = word * RegisterMap.dataBits

@@ -95,6 +95,9 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   }
   private final class ContextWish {
     val isWaiting = RegInit(false.B)
+
+    /** Outside its section: it waits to be refused, and takes no record, whatever the buffers hold. */
+    val isIllegal = RegInit(false.B)
     val hasRecord = RegInit(false.B)
     val isAsked   = Reg(Bool())
     val use       = Reg(RecordUse())
@@ -104,16 +107,12 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   private val buffers = Seq.fill(config.columnBvhMemory.recordBuffers)(new RecordBuffer)
   private val wishes  = Seq.fill(contexts)(new ContextWish)
 
-  private def useOf(chosen: Seq[Bool]): RecordUse.Type = RecordUse.safe(Mux1H(chosen, wishes.map(_.use.asUInt)))._1
-
-  /** Nodes, triangles and attributes follow one another; nothing lies beyond the scene. */
+  /** Sections follow one another, and a face's address is never below theirs. */
   private def isInSection(address: UInt, use: RecordUse.Type): Bool = {
-    val isNode    = address < io.scene.triangleBase
-    val isNotFace = address < io.scene.attributeBase
-    val fits      = MuxLookup(use, !isNotFace)(
-      Seq(RecordUse.node -> isNode, RecordUse.triangles -> (!isNode && isNotFace))
+    val isNode = address < io.scene.triangleBase
+    MuxLookup(use, address < io.scene.recordCount)(
+      Seq(RecordUse.node -> isNode, RecordUse.triangles -> (!isNode && address < io.scene.attributeBase))
     )
-    fits && address < io.scene.recordCount
   }
 
   /** The answer to a context's own read is, or comes, into buffer `index`. */
@@ -193,12 +192,11 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   })
   private val isSeeking = seekers.reduce(_ || _)
   private val address   = Mux1H(seekers, wishes.map(_.address))
-  private val isLegal   = isInSection(address, useOf(seekers))
   private val places    = PriorityEncoderOH(afterBroadcasts)
 
   // What is just arriving need not be asked for
   private val isArriving = io.broadcasts.map(broadcast => broadcast.valid && broadcast.bits.address === address)
-  io.requests.valid        := isSeeking && isLegal && places.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
+  io.requests.valid        := isSeeking && places.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
   io.requests.bits.address := address
   when(io.requests.fire) {
     buffers.zip(places).foreach { case (buffer, place) =>
@@ -216,12 +214,11 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   }
 
   // Refuse what lies outside its section
-  io.refused.valid        := isSeeking && !isLegal
-  io.refused.bits.context := OHToUInt(seekers)
-  io.refused.bits.use     := useOf(seekers)
-  when(io.refused.valid) {
-    wishes.zip(seekers).foreach { case (wish, seeks) => when(seeks) { wish.isWaiting := false.B } }
-  }
+  private val illegal = PriorityEncoderOH(wishes.map(_.isIllegal))
+  io.refused.valid        := illegal.reduce(_ || _)
+  io.refused.bits.context := OHToUInt(illegal)
+  io.refused.bits.use     := RecordUse.safe(Mux1H(illegal, wishes.map(_.use.asUInt)))._1
+  wishes.zip(illegal).foreach { case (wish, isRefused) => when(isRefused) { wish.isIllegal := false.B } }
 
   // Choose a context for each use, and of these one whose unit will be ready. Its record may be replaced while it is
   // served, for it leaves its buffer in that cycle
@@ -255,9 +252,14 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   io.served.bits.record  := Mux1H(place, buffers.map(_.record))
 
   // New wishes
-  for (port <- io.wishes; (wish, context) <- wishes.zipWithIndex) {
+  for {
+    port <- io.wishes
+    isLegal = isInSection(port.bits.address, port.bits.use)
+    (wish, context) <- wishes.zipWithIndex
+  } {
     when(port.valid && port.bits.context === context.U) {
-      wish.isWaiting := true.B
+      wish.isWaiting := isLegal
+      wish.isIllegal := !isLegal
       wish.isAsked   := false.B
       wish.use       := port.bits.use
       wish.address   := port.bits.address

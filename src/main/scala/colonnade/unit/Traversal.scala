@@ -56,10 +56,10 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     boxUnit.io.in.bits.context := io.nodes.bits.context
     boxUnit.io.in.bits.node    := node
     when(!isLegal)(boxUnit.io.in.bits.node.kinds.foreach(_ := ChildKind.empty))
-    boxUnit.io.in.bits.ray     := io.ray
-    boxUnit.io.in.bits.limit   := io.limits(io.nodes.bits.context)
-    io.nodes.ready             := boxUnit.io.in.ready
-    io.takesNext               := boxUnit.io.takesNext
+    boxUnit.io.in.bits.ray   := io.ray
+    boxUnit.io.in.bits.limit := io.limits(io.nodes.bits.context)
+    io.nodes.ready           := boxUnit.io.in.ready
+    io.takesNext             := boxUnit.io.takesNext
 
     stack.io.clear := io.clear
     stack.io.start := io.start

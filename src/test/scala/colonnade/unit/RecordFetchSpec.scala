@@ -51,6 +51,8 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       for {
         (use, section) <- RecordUse.all.zip(sections)
         address        <- Seq(0, 7, 8, 15, 16, 23, 24, 40)
+        // A face lies behind the base of its section
+        if use != RecordUse.attributes || address >= section.start
       } withClue(s"$use at $address: ") {
         dut.reset.asBool.poke(true)
         dut.clock.step()
