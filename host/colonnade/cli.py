@@ -13,6 +13,7 @@ import click
 from colonnade import __version__, ledger
 from colonnade.commands.bench import bench
 from colonnade.commands.compare import compare
+from colonnade.commands.fuzz import fuzz
 from colonnade.commands.generate import generate
 from colonnade.commands.inspect import inspect
 from colonnade.commands.pack import pack
@@ -100,7 +101,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, render, compare, study, verify, bench, sweep, ppa):
+for command in (generate, pack, inspect, render, compare, study, verify, fuzz, bench, sweep, ppa):
     cli.add_command(command)
 
 

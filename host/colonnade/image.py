@@ -240,6 +240,22 @@ def _check_fits(header: ImageHeader, manifest: Manifest, file: Path) -> None:
             f"{file} needs a stack of {header.tree.stack_bound} entries, columnBvhMemory.stackDepth is {stack_depth}:"
             " raise it"
         )
+    if header.room is not None:
+        _check_room_fits(header.room, manifest, file)
+
+
+def _check_room_fits(room: RoomHeader, manifest: Manifest, file: Path) -> None:
+    """Refuse maps that do not fill the hardware's memories: words beyond a memory would be lost, others undefined."""
+    held = {memory.memory: (memory.words, memory.word_bytes) for memory in room.memories}
+    places = {name: place for name, place in manifest.memories.items() if name != "columnBvh"}
+    needed = {name: (int(place["depth"]), -(-int(place["bits"]) // 8)) for name, place in places.items()}
+    for name in sorted(held.keys() | needed.keys()):
+        (words, size), (depth, most) = held.get(name, (0, 0)), needed.get(name, (0, 0))
+        if (words, size) != (depth, most):
+            raise UserError(
+                f"{file} holds {words:,} words of {size} bytes for the memory {name!r}, the hardware has {depth:,} of"
+                f" {most}: {_ADVICE}"
+            )
 
 
 def _header(data: bytes, file: Path) -> tuple[ImageHeader, int]:

@@ -35,9 +35,27 @@ def describe(image: SceneImage) -> dict[str, Any]:
             "sections": {name: {"first": first, "records": count} for name, first, count in sections(header)},
         },
         "tree": asdict(header.tree) if header.tree is not None else None,
-        "room": asdict(header.room) if header.room is not None else None,
+        "room": _room(image),
         "format_hash": header.format_hash,
     }
+
+
+def _room(image: SceneImage) -> dict[str, Any] | None:
+    if image.header.room is None:
+        return None
+    from colonnade.room_image import tiles_beyond_heap
+
+    return {**asdict(image.header.room), "tiles_beyond_heap": tiles_beyond_heap(image)}
+
+
+def illegal_lines(image: SceneImage) -> list[str]:
+    """One line that says so if the room's maps have illegal tiles."""
+    from colonnade.room_image import tiles_beyond_heap
+
+    counts = [f"{count:,} of {name}" for name, count in tiles_beyond_heap(image).items() if count]
+    if not counts:
+        return []
+    return [f"warning     tiles point beyond their heap, {', '.join(counts)}: frames that show them have an error"]
 
 
 def sections(header: ImageHeader) -> list[tuple[str, int, int]]:

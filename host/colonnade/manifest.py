@@ -102,7 +102,10 @@ class RecordLayout:
 
 @dataclass(frozen=True)
 class Register:
-    """A register: ``words`` consecutive 32-bit words from word ``address``, low word first."""
+    """A register: ``words`` consecutive 32-bit words from word ``address``, low word first.
+
+    The device takes values above ``limit`` as ``limit``; None: it takes all that fit.
+    """
 
     name: str
     address: int
@@ -110,6 +113,7 @@ class Register:
     width: int
     signed: bool
     access: str
+    limit: int | None = None
 
     def encode(self, value: int) -> list[tuple[int, int]]:
         """The (address, word) writes that set it."""
@@ -208,6 +212,13 @@ def _attributes(data: Mapping[str, Any] | None) -> AttributeFormats | None:
 
 
 def _register(data: Mapping[str, Any]) -> Register:
+    limit = data.get("limit")
     return Register(
-        data["name"], int(data["address"]), int(data["words"]), int(data["width"]), bool(data["signed"]), data["access"]
+        data["name"],
+        int(data["address"]),
+        int(data["words"]),
+        int(data["width"]),
+        bool(data["signed"]),
+        data["access"],
+        None if limit is None else int(limit),
     )

@@ -26,7 +26,8 @@ def new_model(manifest: Manifest) -> Any:
         "stackDepth": config["columnBvhMemory"]["stackDepth"],
         "bvh": int(config["geometry"]["bvh"]),
     }
-    return _core.Model(numbers, field_places(manifest.layouts))
+    limits = {name: register.limit for name, register in manifest.registers.items() if register.limit is not None}
+    return _core.Model(numbers, field_places(manifest.layouts), limits)
 
 
 def field_places(layouts: Mapping[str, RecordLayout]) -> dict[str, dict[str, tuple[int, int, bool]]]:
@@ -39,7 +40,7 @@ def field_places(layouts: Mapping[str, RecordLayout]) -> dict[str, dict[str, tup
 
 def load_scene(model: Any, image: SceneImage) -> None:
     """Fills the model's column memory."""
-    model.load(image.records, image.header.triangle_base, image.header.attribute_base)
+    model.load(image.records)
 
 
 def load_room(model: Any, image: SceneImage, manifest: Manifest) -> None:

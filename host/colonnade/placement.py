@@ -18,14 +18,12 @@ from colonnade.room_registers import HeldRoom
 from colonnade.scene import Scene
 from colonnade.surface_registers import check_surfaces, surface_registers
 from colonnade.viewpoint import FloatPlacement, float_placement
+from colonnade.watchdog import watchdog_cycles
 
 __all__ = ["FloatPlacement", "float_placement", "placement", "registers_of"]
 
 Floats = npt.NDArray[np.float64]
 AXES = "xyz"
-
-#: More cycles than a ray spends on a record, whatever the memory's latency.
-WATCHDOG_CYCLES_PER_RECORD = 32
 
 
 def placement(
@@ -79,10 +77,7 @@ def registers_of(view: FloatPlacement, header: ImageHeader, manifest: Manifest) 
     registers |= _bounds(header)
     registers |= _where_the_object_is(view, registers, manifest)
     registers |= surface_registers(view, header, manifest)
-    # No frame that makes progress takes longer: every ray, and its shadow ray, reads every record.
-    cycles = 1_000_000 + 2 * view.width * view.height * WATCHDOG_CYCLES_PER_RECORD * header.record_count
-    registers["frame.watchdogCycles"] = min(cycles, (1 << 32) - 1)
-    return registers
+    return registers | {"frame.watchdogCycles": watchdog_cycles(registers, header, manifest)}
 
 
 def _positions(view: FloatPlacement, header: ImageHeader, manifest: Manifest) -> dict[str, int]:

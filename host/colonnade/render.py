@@ -198,8 +198,8 @@ def require_no_errors(frame: Frame) -> None:
     """A frame with an error bit is never shown as a good one."""
     advice = {
         "stackOverflow": "the traversal stack overflowed: raise columnBvhMemory.stackDepth",
-        "illegalRecord": "a record beyond the scene was asked for: pack the scene again",
-        "watchdog": "no pixel came for too long: the scene image may be corrupt, pack it again",
+        "illegalRecord": "a record was illegal, or pointed outside its section: pack the scene again",
+        "watchdog": "no pixel came for longer than any legal frame takes: the image may be corrupt, pack it again",
     }
     if frame.errors:
         raise UserError("the frame failed: " + "; ".join(advice.get(error, error) for error in frame.errors))

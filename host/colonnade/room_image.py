@@ -7,6 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from colonnade.attributes.image import SOURCE_BYTES_A_PIXEL
+from colonnade.attributes.layout import POINTER_BITS
+from colonnade.attributes.plane_map import PLANE_MODES
+from colonnade.attributes.two_level import MODES
 from colonnade.image import HeldMemory, ImageHeader, LoadSection, RoomHeader, SceneImage
 from colonnade.manifest import Manifest
 from colonnade.room_march import memory_words
@@ -29,6 +32,24 @@ def with_room(image: SceneImage, room: HeldRoom, manifest: Manifest) -> SceneIma
     memories = tuple(HeldMemory(section.memory, *section.words.shape) for section in sections)
     header = RoomHeader(room.room.name, room.image.depth_unit, memories)
     return replace(image, header=replace(image.header, room=header), attributes=tuple(sections))
+
+
+def tiles_beyond_heap(image: SceneImage) -> dict[str, int]:
+    """Tiles of each map whose words do not all lie in its heap: the device reads those as 0, and reports an error if a
+    ray asks for one. None of a map without a heap.
+    """
+    words = {section.memory: section.words for section in image.attributes}
+    counts = {}
+    for name, modes in (("albedo", MODES), ("normals", MODES), ("planes", PLANE_MODES[:5])):
+        descriptors, heap = words.get(f"{name}.descriptors"), words.get(f"{name}.heap")
+        if descriptors is None or heap is None:
+            continue
+        low = descriptors[:, :2].astype(np.int64) @ np.array([1, 256])
+        lengths = np.zeros(8, dtype=np.int64)
+        lengths[: len(modes)] = [mode.words for mode in modes]
+        length, pointer = lengths[low & 7], (low >> 3) & ((1 << POINTER_BITS) - 1)
+        counts[name] = int(((length > 0) & (pointer + length > len(heap))).sum())
+    return counts
 
 
 def room_use(header: ImageHeader, manifest: Manifest) -> dict[str, dict[str, float]]:

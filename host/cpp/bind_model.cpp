@@ -13,11 +13,9 @@ namespace {
 
 class Model {
 public:
-    Model(const Values& numbers, const FieldTuples& layouts) : numbers_(numbers), device_(numbers_, layoutsOf(layouts)) {}
+    Model(const Values& numbers, const FieldTuples& layouts, const Values& limits) : numbers_(numbers), device_(numbers_, layoutsOf(layouts), limits) {}
 
-    void load(const Records& records, std::size_t triangleBase, std::size_t attributeBase) {
-        device_.load(records.data(), records.shape(0), records.shape(1), triangleBase, attributeBase);
-    }
+    void load(const Records& records) { device_.load(records.data(), records.shape(0), records.shape(1)); }
 
     /// Gives the device a physical-attribute memory.
     void addRoom(const Values& sizes, const FieldTuples& layouts) { room_ = std::make_unique<AttributeImage>(AttributeSizes(sizes), layoutsOf(layouts)); }
@@ -146,9 +144,9 @@ private:
 
 void bind_model(nb::module_& module) {
     nb::class_<Model>(module, "Model", "The device without time: memories and registers are loaded, pixels come out.")
-        .def(nb::init<const Values&, const FieldTuples&>(), "numbers"_a, "layouts"_a,
-             "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh) and its record layouts: record -> field -> (offset, width, signed).")
-        .def("load", &Model::load, "records"_a, "triangle_base"_a, "attribute_base"_a, "Loads the column memory: uint8 [records, bytes].")
+        .def(nb::init<const Values&, const FieldTuples&, const Values&>(), "numbers"_a, "layouts"_a, "limits"_a,
+             "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh), its record layouts: record -> field -> (offset, width, signed), and its registers' limits.")
+        .def("load", &Model::load, "records"_a, "Loads the column memory: uint8 [records, bytes].")
         .def("add_room", &Model::addRoom, "sizes"_a, "layouts"_a, "Gives the device a physical-attribute memory, of the manifest's attributes.")
         .def("load_room", &Model::loadRoom, "memory"_a, "words"_a, "Fills one of its memories by name: uint8 [words, bytes], low byte first.")
         .def("start", &Model::start, "registers"_a, "Takes registers over (name -> value); clears counters and errors.")

@@ -3,14 +3,14 @@
 //   layout word name=offset,width,signed ...                (once for each of the manifest's `attributes.layouts`)
 //   sizes  name=value ...                                   (`attributes.sizes`)
 //   words  memory bytes hexadecimal ...                     (once for each memory: bytes of a word, and the words)
-//   albedo x y                                            -> r g b
-//   normal x y                                            -> x y z
-//   tile   x y                                            -> cellLog count ids[4]
-//   cell   x y                                            -> id
+//   albedo x y                                            -> r g b isIllegal
+//   normal x y                                            -> x y z isIllegal
+//   tile   x y                                            -> cellLog count ids[4] isIllegal
+//   cell   x y                                            -> id isIllegal
 //   plane  id                                             -> a b c exponent
 //   shell  index                                          -> a b c exponent albedo[3] normal[3]
 //   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY shellPlanes isSeen pixel[2] origin[3] direction[3]
-//                                                         -> kind x y entry isHidden travel travelExponent steps point[3] albedo[3] normal[3]
+//                                                         -> kind x y entry isHidden travel travelExponent steps point[3] albedo[3] normal[3] isIllegal
 //          the point that the ray meets, or else (isSeen) that the pixel shows; all 0 of a point that there is not
 #pragma once
 #include <map>
@@ -63,15 +63,18 @@ public:
         if (!image().sizes().covers(x, y)) throw std::invalid_argument("a pixel outside the map");
         if (kind == "albedo") {
             const Rgb12 albedo = image().albedoAt(x, y);
-            return answer << albedo.r << albedo.g << albedo.b;
+            return answer << albedo.r << albedo.g << albedo.b << albedo.isIllegal;
         }
         if (kind == "normal") {
             const Normal12 normal = image().normalAt(x, y);
-            return answer << normal.x << normal.y << normal.z;
+            return answer << normal.x << normal.y << normal.z << normal.isIllegal;
         }
-        if (kind == "cell") return answer << image().cellAt(x, y);
+        if (kind == "cell") {
+            const CellPlane cell = image().cellAt(x, y);
+            return answer << cell.id << cell.isIllegal;
+        }
         const TileInfo tile = image().tileAt(x, y);
-        return (answer << tile.cellLog2 << tile.count).all(tile.ids);
+        return (answer << tile.cellLog2 << tile.count).all(tile.ids) << tile.isIllegal;
     }
 
 private:
@@ -96,9 +99,9 @@ private:
         Answer answer;
         answer << static_cast<int>(point.kind) << point.x << point.y << point.entry << point.isHidden;
         answer << point.travel << point.travelExponent << point.steps;
-        if (point.kind == RoomPoint::Kind::nothing) return answer.all(std::array<int, 9>{});
+        if (point.kind == RoomPoint::Kind::nothing) return answer.all(std::array<int, 9>{}) << point.isIllegal;
         const RoomTexel texel = background.texelOf(point, view);
-        return answer.all(background.reached(origin, direction, point)).all(texel.albedo).all(texel.normal);
+        return answer.all(background.reached(origin, direction, point)).all(texel.albedo).all(texel.normal) << (point.isIllegal || texel.isIllegal);
     }
 
     AttributeImage& image() {

@@ -191,7 +191,7 @@ public:
             for (std::size_t end = digits.size(); end > 0; end -= 2) bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
         if (count == 0) throw std::invalid_argument("a scene without records");
         device_.emplace(numbers_, layouts_);
-        device_->load(bytes.data(), count, bytes.size() / count, triangleBase, attributeBase);
+        device_->load(bytes.data(), count, bytes.size() / count);
     }
 
     Device& device() {

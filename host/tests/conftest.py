@@ -53,6 +53,7 @@ def manifest_data(
     return {
         "version": 1,
         "config": {
+            "array": {"rows": 1, "columns": 1, "contexts": 8},
             "geometry": {
                 "vertexBits": vertex_bits,
                 "boxBits": box_bits,
@@ -60,7 +61,7 @@ def manifest_data(
                 "trianglesPerRecord": per_record,
                 "bvh": bvh,
             },
-            "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth},
+            "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth, "readLatency": 1},
             "physicalAttributeMemory": None,
             "frame": {"maxWidth": max_width, "maxHeight": max_height, "materials": 2, "lights": 2, "maxBounces": 4},
         },

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from colonnade.errors import UserError
 from colonnade.frame import Frame
 from colonnade.generator import GeneratedDesign, design_for, manifest_for
+from colonnade.manifest import Manifest
 from colonnade.meshes import load_mesh
-from colonnade.model import load_scene, new_model, render_model
+from colonnade.model import render_model
 from colonnade.pack import pack
 from colonnade.placement import placement
 from colonnade.render import frame_report
@@ -26,6 +28,8 @@ pytestmark = pytest.mark.skipif(shutil.which("verilator") is None, reason="Veril
 
 TEAPOT = Scene(MeshSource(name="teapot:4"))
 SKY = Background(colour=(0.2, 0.3, 0.5))
+
+SECTIONS = ("scene.recordCount", "scene.triangleBase", "scene.attributeBase")
 
 #: Name, configuration, overrides, mesh, stalls of the pixel sink.
 CASES = [
@@ -204,23 +208,42 @@ def test_a_distant_camera_sees_the_object() -> None:
         assert frame.is_object[8, 8]
 
 
-def test_a_tree_that_bites_its_tail_ends_with_an_error() -> None:
-    """A root whose children are itself: the watchdog ends the frame, in the hardware and in the model."""
+def nodes_of(manifest: Manifest, pointers: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
+    """Nodes whose boxes are the cube: of each, its firstChild and how many children of kind node it has."""
+    layout = manifest.layouts["node"]
+    fields = {name: np.zeros(len(pointers), dtype=np.int64) for name in layout.fields}
+    fields["firstChild"][:] = [first for first, _ in pointers]
+    for slot in range(layout.count_of("kinds[{}]")):
+        fields[f"kinds[{slot}]"][:] = [int(slot < count) for _, count in pointers]
+        for axis in "xyz":
+            fields[f"high[{slot}].{axis}"][:] = layout.fields[f"high[{slot}].{axis}"].range[1]
+    for axis in "xyz":
+        fields[f"exponent.{axis}"][:] = manifest.numbers["mostExponent"]
+    return layout.pack(fields)
+
+
+@pytest.mark.parametrize(
+    ("pointers", "errors"),
+    [
+        ([(0, 1)], ["illegalRecord"]),
+        ([(1, 2), (1, 1), (0, 1)], ["illegalRecord"]),
+        ([*((node + 1, 2) for node in range(40)), (0, 0), (0, 0)], ["watchdog"]),
+    ],
+    ids=["a root that is its own child", "cycles below the root", "children shared by all nodes"],
+)
+def test_a_walk_without_an_end_is_an_error(pointers: list[tuple[int, int]], errors: list[str]) -> None:
+    """A cycle ends at the first node that is not below its parent. Shared children make no cycle, but many ways."""
     design = design_for("tiny")
     image = pack(load_mesh("cube"), design.manifest)
-    layout = design.manifest.layouts["node"]
-    records = image.records.copy()
-    root = layout.unpack(records[:1])
-    for slot in range(layout.count_of("kinds[{}]")):
-        root[f"kinds[{slot}]"][:] = int(slot == 0)
-    root["firstChild"][:] = 0
-    records[:1] = layout.pack(root)
-    looped = replace(image, records=records)
     registers = placement(replace(TEAPOT, mesh=MeshSource(name="cube")), image.header, design.manifest, 16, 16)
-    registers["frame.watchdogCycles"] = 5000
-    assert render_rtl(design, looped, [registers]).frames[0].errors == ["watchdog"]
-    model = new_model(design.manifest)
-    load_scene(model, looped)
-    model.start(registers)
-    model.rows(0, 16)
-    assert model.errors()["watchdog"]
+    nodes = nodes_of(design.manifest, pointers)
+    others = image.records[image.header.triangle_base :]
+    walk = replace(image, records=np.concatenate([nodes, others]))
+    moved = {name: registers[name] + len(nodes) - image.header.triangle_base for name in SECTIONS}
+    registers |= moved | {"frame.watchdogCycles": 20_000}
+    frame = render_rtl(design, walk, [registers]).frames[0]
+    model = render_model(design.manifest, walk, registers)
+    assert frame.errors == model.errors == errors
+    if errors == ["illegalRecord"]:
+        np.testing.assert_array_equal(frame.colour, model.colour)
+        assert {name: frame.counters[name] for name in model.counters} == model.counters

@@ -17,7 +17,8 @@ from colonnade.manifest import Manifest
 from colonnade.meshes import load_mesh
 from colonnade.pack import pack
 from colonnade.placement import float_placement, placement
-from colonnade.scene import Camera, Light, MeshSource, Scene, Transform
+from colonnade.scene import Camera, Light, Material, MeshSource, Scene, Transform
+from colonnade.viewpoint import made_of
 
 MakeManifest = Callable[..., Manifest]
 
@@ -187,3 +188,21 @@ def test_frames_that_cannot_be_are_refused(manifest: Manifest, image: SceneImage
 def test_looking_straight_down_works(manifest: Manifest, image: SceneImage) -> None:
     scene = dataclasses.replace(SCENE, camera=Camera(direction=(0.0, 1.0, 0.0)))
     assert rectangle(placement(scene, image.header, manifest, 64, 48)) != (0, 0, 64, 48)
+
+
+def test_the_watchdog_outlasts_every_legal_frame_and_ends_in_minutes(make_manifest: MakeManifest) -> None:
+    """Every context may test every triangle for each of its rays; `small` simulates some 60,000 cycles a second."""
+    manifest, mesh = make_manifest(), load_mesh("teapot")
+    header = pack(mesh, manifest).header
+    scene = Scene(MeshSource(name="teapot"))
+    contexts, cycles_a_triangle = int(manifest.config["array"]["contexts"]), 8
+    lit = placement(scene, header, manifest, 640, 480)["frame.watchdogCycles"]
+    unlit = placement(dataclasses.replace(scene, light=Light(shadows=False)), header, manifest, 640, 480)[
+        "frame.watchdogCycles"
+    ]
+    assert 2 * contexts * header.triangles * cycles_a_triangle < lit < 300 * 60_000
+    assert contexts * header.triangles * cycles_a_triangle < unlit < lit
+    mirror = dataclasses.replace(scene, material=Material(kind="mirror"))
+    shiny = pack(mesh, manifest, made_of(mesh.materials, mirror.material)).header
+    assert placement(mirror, shiny, manifest, 640, 480)["frame.watchdogCycles"] > 2 * lit
+    assert placement(scene, header, manifest, 8, 8)["frame.watchdogCycles"] == lit

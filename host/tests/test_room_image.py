@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from colonnade.attributes import AttributeImage
 from colonnade.cli import cli
 from colonnade.errors import UserError
-from colonnade.image import SceneImage
+from colonnade.image import HeldMemory, SceneImage
 from colonnade.inspect import describe, report_lines
 from colonnade.manifest import Manifest
 from colonnade.meshes import load_mesh
@@ -85,6 +85,50 @@ def test_a_file_that_lacks_words_or_has_others_is_refused(tmp_path: Path, image:
     file.write_bytes(b"CLNDIMG1" + data[8:])
     with pytest.raises(UserError, match="of another version: pack the scene again"):
         SceneImage.load(file)
+
+
+def test_maps_that_do_not_fill_the_memories_are_refused(tmp_path: Path, hardware: Manifest, image: SceneImage) -> None:
+    """Though the checksum is right: the words beyond a memory would be lost, those that lack undefined."""
+    room, first = image.header.room, image.attributes[0]
+    assert room is not None
+    place = f"for the memory '{first.memory}'"
+    for words in (first.words[:-1], np.vstack((first.words, first.words[:1])), first.words[:, :-1], None):
+        others = (image.attributes[1:], room.memories[1:])
+        sections, memories = others
+        if words is not None:
+            words = np.ascontiguousarray(words)
+            sections = (replace(first, words=words), *sections)
+            memories = (HeldMemory(first.memory, *words.shape), *memories)
+        header = replace(image.header, room=replace(room, memories=memories))
+        file = replace(image, header=header, attributes=sections).save(tmp_path)
+        with pytest.raises(UserError, match=place):
+            SceneImage.load(file, hardware)
+        SceneImage.load(file)
+
+
+def test_inspect_tells_of_tiles_beyond_their_heap(tmp_path: Path, image: SceneImage) -> None:
+    """In one line; without any there is none."""
+    legal = tuple(
+        replace(section, words=np.zeros_like(section.words)) if "descriptors" in section.memory else section
+        for section in image.attributes
+    )
+    # Mode 7, four entries, at the last word but 32: one of its 33 words lies beyond. One word before, none does
+    sections = []
+    for section in legal:
+        words = section.words.copy()
+        if section.memory == "albedo.descriptors":
+            depth = next(len(s.words) for s in legal if s.memory == "albedo.heap")
+            for tile, pointer in enumerate((depth - 32, depth - 33, 8191)):
+                words[tile] = np.frombuffer((pointer << 3 | 7).to_bytes(4, "little"), dtype=np.uint8)
+        sections.append(replace(section, words=words))
+    for attributes, line in ((legal, ""), (tuple(sections), "tiles point beyond their heap, 2 of albedo:")):
+        json_file = tmp_path / "report.json"
+        replace(image, attributes=attributes).save(tmp_path)
+        result = CliRunner().invoke(cli, ["inspect", str(tmp_path), "--json", str(json_file)])
+        assert result.exit_code == 0, result.output
+        assert line in result.output and ("warning" in result.output) == bool(line)
+        counts = json.loads(json_file.read_text())["room"]["tiles_beyond_heap"]
+        assert counts == {"albedo": 2 if line else 0, "normals": 0, "planes": 0}
 
 
 def test_words_that_no_memory_holds_are_a_bug(hardware: Manifest, held: HeldRoom) -> None:

@@ -68,11 +68,13 @@ def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ..
     from colonnade import progress
     from colonnade.generator import manifest_for
     from colonnade.image import SceneImage
-    from colonnade.inspect import describe, print_report
+    from colonnade.inspect import describe, illegal_lines, print_report
 
     manifest = None if config is None else manifest_for(config, overrides, progress.for_terminal()).manifest
     image = SceneImage.load(directory, manifest)
     print_report(image.header, manifest, echo)
+    for line in illegal_lines(image):
+        echo(line)
     finish(describe(image), json_file)
 
 

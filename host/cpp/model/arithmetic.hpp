@@ -1,6 +1,7 @@
 // Exact integer arithmetic of the datapaths: the rules of docs/numbers.md, "Rounding".
 #pragma once
 #include <cstdint>
+#include <type_traits>
 
 namespace colonnade {
 
@@ -15,16 +16,25 @@ inline int bitLength(UnsignedWide x) {
 
 inline UnsignedWide magnitude(Wide x) { return x < 0 ? -static_cast<UnsignedWide>(x) : static_cast<UnsignedWide>(x); }
 
+/// x · 2^bits, modulo the integer's size.
+template <class Integer> Integer shiftLeft(Integer x, int bits) {
+    using Unsigned = std::conditional_t<sizeof(Integer) == sizeof(Wide), UnsignedWide, std::uint64_t>;
+    return bits >= static_cast<int>(8 * sizeof(Integer)) ? Integer(0) : static_cast<Integer>(static_cast<Unsigned>(x) << bits);
+}
+
+/// The low `bits` bits of x as a signed number: what a register of that width makes of it.
+inline Wide wrapped(Wide x, int bits) { return shiftLeft<Wide>(x, 128 - bits) >> (128 - bits); }
+
 /// Drops `bits` low bits towards minus infinity; shifts left where `bits` is negative.
 template <class Integer> Integer floorShift(Integer x, int bits) {
-    if (bits <= 0) return x * (Integer(1) << -bits);
+    if (bits <= 0) return shiftLeft(x, -bits);
     return bits >= static_cast<int>(8 * sizeof(Integer)) ? (x < 0 ? Integer(-1) : Integer(0)) : x >> bits;
 }
 
 /// Drops `bits` low bits to nearest, ties to even; shifts left where `bits` is not positive.
 template <class Integer> Integer nearestEven(Integer x, int bits) {
     if (bits <= 0) return floorShift(x, bits);
-    const Integer quotient = x >> bits, rest = x - (quotient << bits), half = Integer(1) << (bits - 1);
+    const Integer quotient = x >> bits, rest = x - shiftLeft(quotient, bits), half = Integer(1) << (bits - 1);
     return quotient + ((rest > half || (rest == half && (quotient & 1))) ? 1 : 0);
 }
 

@@ -1,5 +1,7 @@
 // The words of the physical-attribute memory and how large its maps are, by the manifest (docs/attributes.md).
 #pragma once
+#include <algorithm>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,8 @@ struct PlaneWord {
 /// The manifest's `attributes.sizes`.
 struct AttributeSizes {
     int width, height, tileLog, tileColumns, tileRows, blockLog, blockColumns, blockRows, paletteSize, planes, shellPlanes;
+    /// Words of the memories that tiles or blocks point into.
+    int mapHeapWords, planeHeapWords, labelWords;
     /// Labels and seeds (`slic`), not descriptors, palette and heap (`twoLevel`).
     bool sliding;
 
@@ -32,9 +36,13 @@ struct AttributeSizes {
         paletteSize = take("paletteSize");
         planes = take("planes");
         shellPlanes = take("shellPlanes");
+        mapHeapWords = take("mapHeapWords");
+        planeHeapWords = take("planeHeapWords");
+        labelWords = take("labelWords");
         sliding = take("sliding") != 0;
     }
 
+    int tiles() const { return tileColumns * tileRows; }
     bool covers(int x, int y) const { return x >= 0 && y >= 0 && x < width && y < height; }
     int tileOf(int x, int y) const { return (y >> tileLog) * tileColumns + (x >> tileLog); }
 
@@ -45,23 +53,30 @@ struct AttributeSizes {
     }
 };
 
-/// 16-bit words that tiles point into. A legal image never reads beyond the end; here such a word is 0.
+/// 16-bit words that tiles point into. A word beyond the end is 0, and to read it is illegal; a load beyond the end is dropped.
 class AttributeHeap {
 public:
+    static constexpr int wordBytes = 2;
+
+    explicit AttributeHeap(int depth) : words_(depth) {}
+
     void load(const std::uint8_t* words, std::size_t count, std::size_t stride) {
-        words_.resize(count);
-        for (std::size_t i = 0; i < count; ++i) words_[i] = static_cast<std::uint16_t>(words[i * stride] | words[i * stride + 1] << 8);
+        if (stride < wordBytes) throw std::invalid_argument("words of a heap have 16 bits");
+        for (std::size_t i = 0; i < std::min(count, words_.size()); ++i)
+            words_[i] = static_cast<std::uint16_t>(words[i * stride] | words[i * stride + 1] << 8);
     }
-    std::size_t size() const { return words_.size(); }
-    int word(int address) const { return static_cast<std::size_t>(address) < words_.size() ? words_[address] : 0; }
+    bool covers(int address) const { return static_cast<std::size_t>(address) < words_.size(); }
+    int word(int address) const { return covers(address) ? words_[address] : 0; }
     int low(int address) const { return word(address) & 255; }
     int high(int address) const { return word(address) >> 8; }
 
     /// Element `index` of a mask of `bits` (1, 2 or 4) bits each that begins at `address`.
     int select(int address, int index, int bits) const {
-        const int bit = index * bits;
-        return (word(address + bit / 16) >> (bit % 16)) & ((1 << bits) - 1);
+        return (word(wordOf(address, index, bits)) >> (index * bits % 16)) & ((1 << bits) - 1);
     }
+
+    /// Address of the word that holds it.
+    static int wordOf(int address, int index, int bits) { return address + index * bits / 16; }
 
 private:
     std::vector<std::uint16_t> words_;
@@ -71,7 +86,10 @@ private:
 class AttributeWords {
 public:
     AttributeWords(const Layout& layout, const std::uint8_t* words, std::size_t count, std::size_t stride)
-        : layout_(layout), words_(words), count_(count), stride_(stride) {}
+        : layout_(layout), words_(words), count_(count), stride_(stride) {
+        for (const auto& [name, field] : layout)
+            if (field.offset + field.width > static_cast<int>(8 * stride)) throw std::invalid_argument("words are too short for their field " + name);
+    }
     std::size_t count() const { return count_; }
     std::int64_t field(std::size_t index, const std::string& name) const { return layout_.at(name).read(words_ + index * stride_); }
     std::array<int, 3> three(std::size_t index, const std::string& prefix, const char* axes) const {

@@ -7,11 +7,14 @@ namespace colonnade {
 /// Linear; 4095 is 1.0.
 struct Rgb12 {
     int r, g, b;
+    /// A word was read beyond the heap.
+    bool isIllegal;
 };
 
 /// In view space (x right, y down, z forward); 11 fraction bits.
 struct Normal12 {
     int x, y, z;
+    bool isIllegal;
 };
 
 /// Which planes the pixels of a tile lie in.
@@ -21,6 +24,20 @@ struct TileInfo {
     /// 1, 2 or 4; the other ids are 0.
     int count;
     std::array<int, 4> ids;
+    /// A word was read beyond the heap.
+    bool isIllegal;
+};
+
+/// The plane of a pixel's cell.
+struct CellPlane {
+    int id;
+    bool isIllegal;
+};
+
+/// The entry of a pixel in a map.
+struct MapEntry {
+    int index;
+    bool isIllegal;
 };
 
 /// A plane beyond the view, with the one colour and normal it has.
@@ -35,35 +52,37 @@ class ComponentMap {
 public:
     using Components = std::array<int, 3>;
 
-    explicit ComponentMap(const AttributeSizes& sizes) : sizes_(sizes) {}
+    explicit ComponentMap(const AttributeSizes& sizes)
+        : sizes_(sizes), descriptors_(sizes.tiles()), entries_(sizes.sliding ? sizes.tiles() : sizes.paletteSize),
+          heap_(sizes.sliding ? sizes.labelWords : sizes.mapHeapWords) {}
 
     void loadDescriptors(const AttributeWords& words) {
-        descriptors_.clear();
-        for (std::size_t i = 0; i < words.count(); ++i)
-            descriptors_.push_back({static_cast<int>(words.field(i, "mode")), static_cast<int>(words.field(i, "pointer")),
-                                    {static_cast<int>(words.field(i, "entries[0]")), static_cast<int>(words.field(i, "entries[1]"))}});
+        for (std::size_t i = 0; i < std::min(words.count(), descriptors_.size()); ++i)
+            descriptors_[i] = {static_cast<int>(words.field(i, "mode")), static_cast<int>(words.field(i, "pointer")),
+                               {static_cast<int>(words.field(i, "entries[0]")), static_cast<int>(words.field(i, "entries[1]"))}};
     }
     void loadEntries(const AttributeWords& words, const char* axes) {
-        entries_.clear();
-        for (std::size_t i = 0; i < words.count(); ++i) entries_.push_back(words.three(i, "", axes));
+        for (std::size_t i = 0; i < std::min(words.count(), entries_.size()); ++i) entries_[i] = words.three(i, "", axes);
     }
     AttributeHeap& heap() { return heap_; }
     const AttributeHeap& heap() const { return heap_; }
 
-    Components at(int x, int y) const { return entries_.at(sizes_.sliding ? seedAt(x, y) : entryAt(x, y)); }
+    /// A pixel's entry: of the palette, or its seed.
+    MapEntry entryAt(int x, int y) const { return sizes_.sliding ? MapEntry{seedAt(x, y), false} : paletteEntryAt(x, y); }
 
-    /// Index of a pixel's palette entry.
-    int entryAt(int x, int y) const {
+    const Components& components(const MapEntry& entry) const { return entries_[entry.index]; }
+
+    /// The mask's word lies behind all others that a pixel reads: where that one is legal, they are.
+    MapEntry paletteEntryAt(int x, int y) const {
         const Descriptor& tile = descriptors_.at(sizes_.tileOf(x, y));
         const int cell = sizes_.cellOf(x, y, sizes_.tileLog - 1 - (tile.mode & 3));
-        int entry;
-        if (tile.mode == 0) entry = tile.entries[(tile.pointer >> cell) & 1];
-        else if (tile.mode < 4) entry = tile.entries[heap_.select(tile.pointer, cell, 1)];
-        else {
-            const int choice = heap_.select(tile.pointer + 1, cell, 2);
-            entry = choice < 2 ? tile.entries[choice] : choice == 2 ? heap_.low(tile.pointer) : heap_.high(tile.pointer);
-        }
-        return entry & (sizes_.paletteSize - 1);
+        const int known = sizes_.paletteSize - 1;
+        if (tile.mode == 0) return {tile.entries[(tile.pointer >> cell) & 1] & known, false};
+        const bool hasFour = tile.mode >= 4;
+        const int mask = tile.pointer + hasFour, bits = hasFour ? 2 : 1;
+        const int choice = heap_.select(mask, cell, bits);
+        const int entry = choice < 2 ? tile.entries[choice] : choice == 2 ? heap_.low(tile.pointer) : heap_.high(tile.pointer);
+        return {entry & known, !heap_.covers(AttributeHeap::wordOf(mask, cell, bits))};
     }
 
     /// Index of a pixel's seed. A label that names no neighbour names the tile itself; a neighbour outside is the nearest inside.
@@ -82,7 +101,7 @@ private:
     };
 
     AttributeSizes sizes_;
-    std::vector<Descriptor> descriptors_;
+    std::vector<Descriptor> descriptors_; // of a two-level map
     std::vector<Components> entries_;
     AttributeHeap heap_; // of labels, where they slide
 };
@@ -90,12 +109,11 @@ private:
 /// Which plane a pixel lies in.
 class PlaneIds {
 public:
-    explicit PlaneIds(const AttributeSizes& sizes) : sizes_(sizes) {}
+    explicit PlaneIds(const AttributeSizes& sizes) : sizes_(sizes), descriptors_(sizes.tiles()), heap_(sizes.planeHeapWords) {}
 
     void loadDescriptors(const AttributeWords& words) {
-        descriptors_.clear();
-        for (std::size_t i = 0; i < words.count(); ++i)
-            descriptors_.push_back({static_cast<int>(words.field(i, "mode")), static_cast<int>(words.field(i, "pointer"))});
+        for (std::size_t i = 0; i < std::min(words.count(), descriptors_.size()); ++i)
+            descriptors_[i] = {static_cast<int>(words.field(i, "mode")), static_cast<int>(words.field(i, "pointer"))};
     }
     AttributeHeap& heap() { return heap_; }
     const AttributeHeap& heap() const { return heap_; }
@@ -103,18 +121,18 @@ public:
     TileInfo tileAt(int x, int y) const {
         const Descriptor& tile = descriptors_.at(sizes_.tileOf(x, y));
         const int count = tile.count(), known = sizes_.planes - 1;
-        if (count == 1) return {sizes_.tileLog, 1, {tile.pointer & known, 0, 0, 0}};
-        TileInfo info{cellLog(tile), count, {}};
+        if (count == 1) return {sizes_.tileLog, 1, {tile.pointer & known, 0, 0, 0}, false};
+        TileInfo info{cellLog(tile), count, {}, !heap_.covers(tile.pointer + count / 2 - 1)};
         for (int i = 0; i < count; ++i)
             info.ids[i] = (i % 2 ? heap_.high(tile.pointer + i / 2) : heap_.low(tile.pointer + i / 2)) & known;
         return info;
     }
 
-    int idAt(int x, int y) const {
+    CellPlane planeAt(int x, int y) const {
         const TileInfo info = tileAt(x, y);
-        if (info.count == 1) return info.ids[0];
-        const Descriptor& tile = descriptors_[sizes_.tileOf(x, y)];
-        return info.ids[heap_.select(tile.pointer + info.count / 2, sizes_.cellOf(x, y, info.cellLog2), info.count / 2)];
+        if (info.count == 1) return {info.ids[0], false};
+        const int bits = info.count / 2, mask = descriptors_[sizes_.tileOf(x, y)].pointer + bits, cell = sizes_.cellOf(x, y, info.cellLog2);
+        return {info.ids[heap_.select(mask, cell, bits)], !heap_.covers(AttributeHeap::wordOf(mask, cell, bits))};
     }
 
 private:
@@ -137,9 +155,9 @@ class AttributeImage {
 public:
     /// @param layouts the manifest's `attributes.layouts`
     AttributeImage(const AttributeSizes& sizes, const std::map<std::string, Layout>& layouts)
-        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes) {}
+        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes), planes_(sizes.planes), shell_(sizes.shellPlanes) {}
 
-    /// Fills a memory, by its name in the manifest, with words of `stride` bytes, low byte first.
+    /// Fills a memory from address 0, by its name in the manifest, with words of `stride` bytes, low byte first. Words beyond its depth are dropped.
     void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
         const auto by = [&](const char* layout) { return AttributeWords(layouts_.at(layout), words, count, stride); };
         if (memory == "albedo.descriptors") albedo_.loadDescriptors(by("mapDescriptor"));
@@ -158,30 +176,29 @@ public:
     const AttributeSizes& sizes() const { return sizes_; }
 
     Rgb12 albedoAt(int x, int y) const {
-        const auto [r, g, b] = albedo_.at(x, y);
-        return {r, g, b};
+        const MapEntry entry = albedo_.entryAt(x, y);
+        const auto [r, g, b] = albedo_.components(entry);
+        return {r, g, b, entry.isIllegal};
     }
     Normal12 normalAt(int x, int y) const {
-        const auto [nx, ny, nz] = normals_.at(x, y);
-        return {nx, ny, nz};
+        const MapEntry entry = normals_.entryAt(x, y);
+        const auto [nx, ny, nz] = normals_.components(entry);
+        return {nx, ny, nz, entry.isIllegal};
     }
     TileInfo tileAt(int x, int y) const { return ids_.tileAt(x, y); }
-    /// Id of the plane that a pixel's cell lies in.
-    int cellAt(int x, int y) const { return ids_.idAt(x, y); }
+    CellPlane cellAt(int x, int y) const { return ids_.planeAt(x, y); }
     const PlaneWord& planeOf(int id) const { return planes_.at(id); }
     const ShellEntry& shell(int index) const { return shell_.at(index); }
 
 private:
     void loadPlanes(const AttributeWords& words) {
-        planes_.clear();
-        for (std::size_t i = 0; i < words.count(); ++i) planes_.push_back(words.plane(i, ""));
+        for (std::size_t i = 0; i < std::min(words.count(), planes_.size()); ++i) planes_[i] = words.plane(i, "");
     }
     void loadShell(const AttributeWords& words) {
-        shell_.clear();
-        for (std::size_t i = 0; i < words.count(); ++i) {
+        for (std::size_t i = 0; i < std::min(words.count(), shell_.size()); ++i) {
             const auto [r, g, b] = words.three(i, "albedo.", "rgb");
             const auto [x, y, z] = words.three(i, "normal.", "xyz");
-            shell_.push_back({words.plane(i, "plane."), {r, g, b}, {x, y, z}});
+            shell_[i] = {words.plane(i, "plane."), {r, g, b, false}, {x, y, z, false}};
         }
     }
 

@@ -9,7 +9,7 @@ public:
     /// Steps of a march at most: then the ray meets the shell.
     static constexpr int mostSteps = 128;
 
-    Background(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers.shadeBits, image.sizes()), n_(numbers), image_(image) {}
+    Background(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers, image.sizes()), n_(numbers), image_(image) {}
 
     /// The point of the room that a ray from `origin` (grid steps) along `direction` (components of shadeBits bits and a sign) meets.
     RoomPoint meet(const WideVector& origin, const Vector& direction, const RoomView& view) const {
@@ -28,11 +28,22 @@ public:
         point.x = static_cast<int>(clamp<std::int64_t>(place[0] >> (f_ - mapLog), 0, sizes_.width - 1));
         point.y = static_cast<int>(clamp<std::int64_t>(place[1] >> (f_ - mapLog), 0, sizes_.height - 1));
         MapRay ray{};
-        ray.position = place;
-        const Depth depth = depthOf(ray, image_.planeOf(image_.cellAt(point.x, point.y)), 0);
+        const std::array<int, 2> size = {sizes_.width, sizes_.height};
+        for (int a = 0; a < 2; ++a) {
+            // Beyond the map its place from the middle is kept modulo what a register holds
+            const std::int64_t middle = std::int64_t(size[a]) << (f_ - mapLog - 1);
+            ray.position[a] = middle + static_cast<std::int64_t>(wrapped(place[a] - middle, f_ + placeGuard));
+        }
+        const CellPlane cell = image_.cellAt(point.x, point.y);
+        point.isIllegal = cell.isIllegal;
+        const Depth depth = depthOf(ray, image_.planeOf(cell.id), 0);
         const std::int64_t w = std::min(most(), -inW(depth.value, depth));
         const Wide towards = times(view.matrix[2], {direction[0], direction[1], direction[2]});
-        if (w <= 0 || towards <= 0) return {};
+        if (w <= 0 || towards <= 0) {
+            RoomPoint nothing{};
+            nothing.isIllegal = cell.isIllegal;
+            return nothing;
+        }
         point.kind = RoomPoint::Kind::map;
         const Normalised fall = normalise(UnsignedWide(towards), f_), speed = normalise(UnsignedWide(w) * fall.mantissa, f_);
         point.travel = reciprocal(speed.mantissa);
@@ -45,7 +56,7 @@ public:
         const bool isShell = point.kind == RoomPoint::Kind::shell;
         const Rgb12 albedo = isShell ? image_.shell(point.entry).albedo : image_.albedoAt(point.x, point.y);
         const Normal12 normal = isShell ? image_.shell(point.entry).normal : image_.normalAt(point.x, point.y);
-        RoomTexel texel{{albedo.r, albedo.g, albedo.b}, {}};
+        RoomTexel texel{{albedo.r, albedo.g, albedo.b}, {}, albedo.isIllegal || normal.isIllegal};
         const std::int64_t one = std::int64_t(1) << n_.normalFraction;
         for (int a = 0; a < 3; ++a) {
             const std::int64_t turned = view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z;
@@ -59,8 +70,8 @@ public:
         WideVector result;
         const Wide most = largest(n_.sceneBits);
         for (int a = 0; a < 3; ++a) {
-            const Wide way = point.travelExponent > f_ ? (direction[a] < 0 ? -most - 1 : direction[a] > 0 ? most : 0)
-                                                       : floorShift<Wide>(Wide(point.travel) * direction[a], -point.travelExponent);
+            const Wide step = Wide(point.travel) * direction[a];
+            const Wide way = point.travelExponent > f_ ? (step < 0 ? -most - 1 : step > 0 ? most : 0) : floorShift<Wide>(step, -point.travelExponent);
             result[a] = clamp<Wide>(origin[a] + clamp<Wide>(way, -most - 1, most), -(most / 2) - 1, most / 2);
         }
         return result;
@@ -68,6 +79,8 @@ public:
 
 private:
     static constexpr int stepGuard = 12, rotationFraction = 14;
+    /// Bits of a place from the map's middle beyond its fraction.
+    static constexpr int placeGuard = 5;
     /// More bits of a distance along the ray while it is summed up.
     static constexpr int guardBits = 8;
     /// A ray that is less than this share of w behind a surface is on it, log2.
@@ -154,6 +167,7 @@ private:
             const std::int64_t end = std::min({axes[0].next, axes[1].next, farthest()});
             const std::int64_t s0 = begin >> guardBits, s1 = end >> guardBits;
             const TileInfo info = image_.tileAt(tile[0] << sizes_.tileLog, tile[1] << sizes_.tileLog);
+            point.isIllegal = point.isIllegal || info.isIllegal;
             std::array<Depth, 4> depths;
             for (int i = 0; i < info.count; ++i) depths[i] = depthOf(ray, image_.planeOf(info.ids[i]), info.ids[i]);
 
@@ -208,9 +222,10 @@ private:
             const std::array<int, 2> size = {sizes_.width, sizes_.height};
             std::array<int, 2> corner;
             for (int a = 0; a < 2; ++a) corner[a] = std::min(size[a] - 1, (tile[a] << sizes_.tileLog) + (cell[a] << cellLog));
-            const int id = image_.cellAt(corner[0], corner[1]);
+            const CellPlane plane = image_.cellAt(corner[0], corner[1]);
+            point.isIllegal = point.isIllegal || plane.isIllegal;
             int which = 0;
-            while (which < 3 && info.ids[which] != id) ++which;
+            while (which < 3 && info.ids[which] != plane.id) ++which;
             const auto [x, y] = pixelIn(ray, corner, cellLog, begin >> guardBits);
             ++point.steps;
             if (pass(ray, depths[which], begin >> guardBits, stop >> guardBits, x, y, state)) return true;
@@ -258,7 +273,7 @@ private:
     void meetShell(const MapRay& ray, const RoomView& view, RoomPoint& point) const {
         std::uint64_t bestQuotient = 0;
         int bestExponent = 0;
-        for (int i = 0; i < view.shellPlanes; ++i) {
+        for (int i = 0; i < std::min(view.shellPlanes, sizes_.shellPlanes); ++i) {
             const PlaneWord& plane = image_.shell(i).plane;
             const std::int64_t front = depthOf(ray, plane, i).value;
             const std::int64_t centreU = std::int64_t(sizes_.width) << (f_ - mapLog - 1), centreV = std::int64_t(sizes_.height) << (f_ - mapLog - 1);

@@ -24,7 +24,7 @@ inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, co
 struct Numbers {
     int vertexBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
         entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits,
-        boxPadLog, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits;
+        boxPadLog, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, mostExponent;
     int arity, trianglesPerRecord, stackDepth;
     bool bvh;
 
@@ -55,6 +55,7 @@ struct Numbers {
         lightFraction = take("lightFraction");
         etaFraction = take("etaFraction");
         rootBits = take("rootBits");
+        mostExponent = take("mostExponent");
         arity = take("arity");
         trianglesPerRecord = take("trianglesPerRecord");
         stackDepth = take("stackDepth");
@@ -89,7 +90,9 @@ using Layout = std::map<std::string, Field>;
 
 enum class Child : std::uint8_t { empty = 0, node = 1, leaf = 2, illegal = 3 };
 
+/// `isLegal`: docs/errors.md. An illegal record counts as empty.
 struct Node {
+    bool isLegal;
     Vector origin;
     std::array<int, 3> exponent;
     std::array<Child, 4> kinds;
@@ -98,6 +101,7 @@ struct Node {
 };
 
 struct Triangles {
+    bool isLegal;
     std::uint32_t firstTriangle;
     int count;
     std::array<bool, 2> isClear;
@@ -114,7 +118,7 @@ struct Face {
 class RecordDecoder {
 public:
     RecordDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers)
-        : arity_(numbers.arity), trianglesPerRecord_(numbers.trianglesPerRecord) {
+        : arity_(numbers.arity), trianglesPerRecord_(numbers.trianglesPerRecord), mostExponent_(numbers.mostExponent) {
         const Layout& node = layouts.at("node");
         origin_ = vectorOf(node, "origin");
         exponent_ = vectorOf(node, "exponent");
@@ -146,7 +150,12 @@ public:
 
     int facesPerRecord() const { return static_cast<int>(faces_.size()); }
 
-    Node node(const std::uint8_t* record) const {
+    /// All ones in the bits of a record's address, and in those of a packed triangle id.
+    std::uint32_t addressMask() const { return maskOf(firstChild_); }
+    std::uint32_t idMask() const { return maskOf(firstTriangle_); }
+
+    /// The node at an address.
+    Node node(const std::uint8_t* record, std::size_t at) const {
         Node result{};
         result.origin = read(origin_, record);
         const Vector exponent = read(exponent_, record);
@@ -161,6 +170,14 @@ public:
                 result.high[child][axis] = static_cast<std::int32_t>(high[axis]);
             }
         }
+        bool hasNodes = false, isKnown = true, isSmall = true;
+        for (int child = 0; child < arity_; ++child) {
+            hasNodes = hasNodes || result.kinds[child] == Child::node;
+            isKnown = isKnown && result.kinds[child] != Child::illegal;
+        }
+        for (int axis = 0; axis < 3; ++axis) isSmall = isSmall && result.exponent[axis] <= mostExponent_;
+        const bool isBelow = result.firstChild > at && result.firstChild <= addressMask() - static_cast<std::uint32_t>(arity_);
+        result.isLegal = isKnown && isSmall && (isBelow || !hasNodes);
         return result;
     }
 
@@ -168,7 +185,7 @@ public:
         Triangles result{};
         result.firstTriangle = static_cast<std::uint32_t>(firstTriangle_.read(record));
         result.count = static_cast<int>(count_.read(record));
-        if (result.count > trianglesPerRecord_) result.count = trianglesPerRecord_;
+        result.isLegal = result.count > 0 && result.count <= trianglesPerRecord_;
         for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
             result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
         for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) result.isClear[triangle] = isClear_[triangle].read(record) != 0;
@@ -192,6 +209,7 @@ private:
         Field material;
     };
 
+    static std::uint32_t maskOf(const Field& field) { return static_cast<std::uint32_t>((std::uint64_t(1) << field.width) - 1); }
     static VectorFields vectorOf(const Layout& layout, const std::string& name) {
         return {layout.at(name + ".x"), layout.at(name + ".y"), layout.at(name + ".z")};
     }
@@ -199,7 +217,7 @@ private:
         return {fields[0].read(record), fields[1].read(record), fields[2].read(record)};
     }
 
-    int arity_, trianglesPerRecord_;
+    int arity_, trianglesPerRecord_, mostExponent_;
     VectorFields origin_, exponent_;
     Field firstChild_, firstTriangles_, firstTriangle_, count_;
     std::vector<Field> kinds_, isClear_;

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "background.hpp"
+#include "column_memory.hpp"
 #include "registers.hpp"
 
 namespace colonnade {
@@ -38,28 +39,23 @@ struct Path {
 
 class Device {
 public:
-    Device(const Numbers& numbers, const std::map<std::string, Layout>& layouts) : numbers_(numbers), decoder_(layouts, numbers) {}
+    /// `limits`: the greatest value that the device takes of a register, by its name.
+    Device(const Numbers& numbers, const std::map<std::string, Layout>& layouts, Registers limits = {})
+        : numbers_(numbers), memory_(layouts, numbers), limits_(std::move(limits)) {}
 
-    /// Loads the column memory: `count` records of `bytes` bytes, whose sections begin where the header says.
-    void load(const std::uint8_t* records, std::size_t count, std::size_t bytes, std::size_t triangleBase, std::size_t attributeBase) {
-        nodes_.clear();
-        triangles_.clear();
-        faces_.clear();
-        for (std::size_t i = 0; i < count; ++i) {
-            const std::uint8_t* record = records + i * bytes;
-            if (i < triangleBase) nodes_.push_back(decoder_.node(record));
-            else if (i < attributeBase) triangles_.push_back(decoder_.triangles(record));
-            else
-                for (int slot = 0; slot < decoder_.facesPerRecord(); ++slot) faces_.push_back(decoder_.face(record, slot));
-        }
-    }
+    /// Loads the column memory: `count` records of `bytes` bytes.
+    void load(const std::uint8_t* records, std::size_t count, std::size_t bytes) { memory_.load(records, count, bytes); }
 
     /// What the physical-attribute memory holds; it outlives the device.
     void load(const AttributeImage& image) { background_.emplace(numbers_, image); }
 
     /// Takes the registers over and clears counters and errors, as a start of a frame does.
     void start(const Registers& registers) {
-        frame_ = Frame(registers);
+        Registers legal = registers;
+        for (const auto& [name, limit] : limits_)
+            if (const auto found = legal.find(name); found != legal.end()) found->second = std::min(found->second, limit);
+        frame_ = Frame(legal, numbers_);
+        memory_.divide(frame_.recordCount, frame_.triangleBase, frame_.attributeBase);
         counters = {};
         errors = {};
     }
@@ -91,11 +87,13 @@ public:
                 pixel.triangle = static_cast<std::uint32_t>(hit.id);
                 pixel.distance = floorShift<Wide>(ray.entry, -numbers_.gridFraction) + hit.t;
             }
-            Face face{};
-            if (hit.id < faces_.size()) face = faces_[hit.id];
-            else errors.illegalRecord = true;
-            const Surface surface = surfaceOf(ray, hit, face, numbers_);
-            const Material& material = frame_.lighting.materialOf(face);
+            const Face* const face = memory_.faceOf(hit.id);
+            if (!face) {
+                errors.illegalRecord = true;
+                return finish(pixel, path, frame_.lighting.background);
+            }
+            const Surface surface = surfaceOf(ray, hit, *face, numbers_);
+            const Material& material = frame_.lighting.materialOf(*face);
             if (material.kind == MaterialKind::diffuse) return finish(pixel, path, light(surface, material));
             if (!goOn(surface, material, path, request)) return finish(pixel, path, met(request));
         }
@@ -193,7 +191,14 @@ private:
         ++counters.raysRoom;
         counters.marchSteps += static_cast<std::uint64_t>(point.steps);
         counters.albedoReads += point.kind == RoomPoint::Kind::map;
+        errors.illegalRecord = errors.illegalRecord || point.isIllegal;
         return point;
+    }
+
+    RoomTexel texelOf(const RoomPoint& point) {
+        const RoomTexel texel = background_->texelOf(point, frame_.room);
+        errors.illegalRecord = errors.illegalRecord || texel.isIllegal;
+        return texel;
     }
 
     /// The colour of what a ray meets that meets nothing of the object.
@@ -203,7 +208,7 @@ private:
         blockScale(ray.direction, numbers_.shadeBits, direction);
         const RoomPoint point = count(background_->meet(ray.origin, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return frame_.lighting.background;
-        const RoomTexel texel = background_->texelOf(point, frame_.room);
+        const RoomTexel texel = texelOf(point);
         return reflectedBy(texel.albedo, roomLight(background_->reached(ray.origin, direction, point), texel.normal, shadows).visible);
     }
 
@@ -214,7 +219,7 @@ private:
         blockScale(ray.direction, numbers_.shadeBits, direction);
         const RoomPoint point = count(background_->seen(x, y, direction, frame_.room));
         if (point.kind == RoomPoint::Kind::nothing) return pixel;
-        const RoomTexel texel = background_->texelOf(point, frame_.room);
+        const RoomTexel texel = texelOf(point);
         const Incoming light = roomLight(background_->reached(ray.origin, direction, point), texel.normal, true);
         pixel.colour = reflectedBy(texel.albedo, light.visible);
         for (int channel = 0; channel < 3; ++channel) pixel.ratio[channel] = ratioOf(light.visible[channel], light.all[channel]);
@@ -254,21 +259,26 @@ private:
     void run(Search& search) {
         if (numbers_.bvh) descend(search);
         else
-            for (std::size_t i = 0; i < frame_.triangleRecords && !search.isOver(); ++i) testRecord(search, frame_.triangleBase + i);
+            for (std::size_t i = 0; (i == 0 || i < frame_.triangleRecords) && !search.isOver(); ++i) testRecord(search, frame_.triangleBase + i);
     }
 
     void testRecord(Search& search, std::size_t address) {
-        const std::size_t index = address - nodes_.size();
-        if (address < nodes_.size() || index >= triangles_.size() || address >= frame_.recordCount) {
+        const Triangles* const found = memory_.trianglesAt(address);
+        if (!found) {
             errors.illegalRecord = true;
             return;
         }
-        const Triangles& record = triangles_[index];
+        const Triangles& record = *found;
+        if (!record.isLegal) {
+            errors.illegalRecord = true;
+            ++counters.triangleTests; // an empty record takes as long as one triangle
+            return;
+        }
         for (int i = 0; i < record.count; ++i) {
             ++counters.triangleTests;
             Hit hit = search.best;
-            if (!testTriangle(search.ray, record.vertices[i], record.firstTriangle + i, numbers_, hit)) continue;
-            if (search.isShadow) search.occlusion = std::max(search.occlusion, record.isClear[i] ? Occlusion::clear : Occlusion::opaque);
+            if (!testTriangle(search.ray, record.vertices[i], memory_.idOf(record, i), numbers_, hit)) continue;
+            if (search.isShadow) search.occlusion = std::max(search.occlusion, record.isClear[i] && frame_.lighting.hasClear ? Occlusion::clear : Occlusion::opaque);
             else search.best = hit;
         }
     }
@@ -277,24 +287,27 @@ private:
         const Hit& best = search.best;
         std::array<Entry, 256> stack;
         std::size_t depth = 0;
-        std::size_t visits = 0;
+        std::uint64_t visits = 0;
         Entry next{false, 0, 0};
-        for (bool busy = true; busy;) {
+        for (bool busy = !errors.watchdog; busy;) {
             busy = false;
             if (next.isLeaf) {
                 testRecord(search, next.address);
                 if (search.isOver()) return;
-            } else if (next.address >= nodes_.size() || next.address >= frame_.recordCount) {
+            } else if (const Node* const found = memory_.nodeAt(next.address); !found) {
                 errors.illegalRecord = true;
             } else {
-                if (++visits > 4 * nodes_.size() + 4) {
-                    errors.watchdog = true; // a tree that bites its tail
+                // A visit takes a cycle or more
+                if (frame_.watchdogCycles != 0 && ++visits > frame_.watchdogCycles) {
+                    errors.watchdog = true;
                     return;
                 }
                 ++counters.nodeReads;
-                const Node& node = nodes_[next.address];
+                const Node& node = *found;
                 std::array<Entered, 4> entered;
-                const int count = testBoxes(search.ray, node, best.t, numbers_, entered, counters.boxTests);
+                int count = 0;
+                if (node.isLegal) count = testBoxes(search.ray, node, best.t, numbers_, entered, counters.boxTests);
+                else errors.illegalRecord = true;
                 for (int i = count - 1; i > 0; --i) {
                     if (depth < static_cast<std::size_t>(numbers_.stackDepth)) stack[depth++] = entryOf(node, entered[i]);
                     else errors.stackOverflow = true;
@@ -313,18 +326,16 @@ private:
     }
 
     /// Where a child lies: nodes and leaves are each consecutive, in slot order.
-    static Entry entryOf(const Node& node, const Entered& child) {
+    Entry entryOf(const Node& node, const Entered& child) const {
         std::uint32_t before = 0;
         for (int slot = 0; slot < child.slot; ++slot) before += node.kinds[slot] == node.kinds[child.slot];
         const bool isLeaf = node.kinds[child.slot] == Child::leaf;
-        return {isLeaf, (isLeaf ? node.firstTriangles : node.firstChild) + before, child.near};
+        return {isLeaf, ((isLeaf ? node.firstTriangles : node.firstChild) + before) & memory_.addressMask(), child.near};
     }
 
     Numbers numbers_;
-    RecordDecoder decoder_;
-    std::vector<Node> nodes_;
-    std::vector<Triangles> triangles_;
-    std::vector<Face> faces_;
+    ColumnMemory memory_;
+    Registers limits_;
     std::optional<Background> background_;
     Frame frame_;
 };

@@ -19,19 +19,25 @@ protected:
     /// Log2 of the map's unit in pixels.
     static constexpr int mapLog = 10;
 
-    MapGeometry(int shadeBits, const AttributeSizes& sizes) : f_(shadeBits), sizes_(sizes) {}
+    MapGeometry(const Numbers& numbers, const AttributeSizes& sizes) : f_(numbers.shadeBits), sceneBits_(numbers.sceneBits), sizes_(sizes) {}
 
     /// The largest position, and the largest distance along a ray.
     std::int64_t most() const { return (std::int64_t(1) << (f_ + 3)) - 1; }
 
-    static Wide times(const Vector& row, const WideVector& v) { return Wide(row[0]) * v[0] + Wide(row[1]) * v[1] + Wide(row[2]) * v[2]; }
+    /// Modulo 2^128, which only the widest formats exceed.
+    static Wide times(const Vector& row, const WideVector& v) {
+        UnsignedWide sum = 0;
+        for (int i = 0; i < 3; ++i) sum += UnsignedWide(Wide(row[i])) * UnsignedWide(v[i]);
+        return Wide(sum);
+    }
 
     /// Of a ray whose origin is behind the camera only the projections are known.
     MapRay project(const WideVector& origin, const Vector& direction, const RoomView& view) const {
         MapRay ray{};
         WideVector from, towards;
         for (int i = 0; i < 3; ++i) {
-            from[i] = times(view.matrix[i], origin) + floorShift<Wide>(view.offset[i], -view.offsetShift);
+            const Wide offset = shiftLeft<Wide>(view.offset[i], std::min(view.offsetShift, sceneBits_));
+            from[i] = Wide(UnsignedWide(times(view.matrix[i], origin)) + UnsignedWide(offset));
             towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
         }
         ray.fromShift = blockScale(from, f_, ray.from);
@@ -42,15 +48,20 @@ protected:
         // 1 / p2 = inverse · 2^(1 - f - length)
         const Normalised depth = normalise(UnsignedWide(ray.from[2]), f_);
         const auto inverse = reciprocal(depth.mantissa);
-        const auto inMap = [&](Wide value) { return static_cast<std::int64_t>(clamp<Wide>(value, -most() - 1, most())); };
-        for (int i = 0; i < 2; ++i) ray.position[i] = inMap(floorShift<Wide>(Wide(ray.from[i]) * inverse, depth.exponent - 1));
-        ray.position[2] = inMap(floorShift<Wide>(inverse, depth.exponent - 1 + ray.fromShift - view.exponent));
+        for (int i = 0; i < 2; ++i) ray.position[i] = inMap(Wide(ray.from[i]) * inverse, depth.exponent - 1);
+        ray.position[2] = inMap(inverse, depth.exponent - 1 + ray.fromShift - view.exponent);
 
         WideVector way;
-        for (int i = 0; i < 2; ++i) way[i] = (Wide(ray.towards[i]) << f_) - Wide(ray.position[i]) * ray.towards[2];
+        for (int i = 0; i < 2; ++i) way[i] = shiftLeft<Wide>(ray.towards[i], f_) - Wide(ray.position[i]) * ray.towards[2];
         way[2] = -Wide(ray.position[2]) * ray.towards[2];
         ray.directionShift = blockScale(way, f_, ray.direction);
         return ray;
+    }
+
+    /// A coordinate of the map: what is left without `drop` bits, or the nearest one that there is. Both are below 2^64.
+    std::int64_t inMap(Wide value, int drop) const {
+        const Wide nearest = value < 0 ? -most() - 1 : most();
+        return static_cast<std::int64_t>(drop < -32 && value != 0 ? nearest : clamp<Wide>(floorShift<Wide>(value, drop), -most() - 1, most()));
     }
 
     /// 2^(2f - 1) / mantissa, of f bits with the top one set: f + 1 bits.
@@ -76,7 +87,7 @@ protected:
     /// In w's own steps.
     std::int64_t inW(std::int64_t value, const Depth& depth) const { return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent); }
 
-    int f_;
+    int f_, sceneBits_;
     const AttributeSizes& sizes_;
 };
 

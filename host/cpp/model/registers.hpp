@@ -24,11 +24,12 @@ struct Frame {
     Bounds bounds;
     Lighting lighting;
     std::size_t recordCount, triangleBase, triangleRecords, attributeBase;
+    std::uint64_t watchdogCycles;
     bool hasRoom;
     RoomView room;
 
     Frame() = default;
-    explicit Frame(const Registers& registers) {
+    Frame(const Registers& registers, const Numbers& n) {
         const auto take = [&](const std::string& name) { return lookUp(registers, name); };
         // What a design without bounces does not have is zero
         const auto takeIfThere = [&](const std::string& name) { return registers.count(name) ? take(name) : 0; };
@@ -40,7 +41,9 @@ struct Frame {
         const int unitShift = static_cast<int>(take("frame.unitShift"));
         const auto position = [&](const std::string& name) {
             const Vector raw = vector(name);
-            return WideVector{floorShift<Wide>(raw[0], -unitShift), floorShift<Wide>(raw[1], -unitShift), floorShift<Wide>(raw[2], -unitShift)};
+            WideVector steps;
+            for (int a = 0; a < 3; ++a) steps[a] = wrapped(shiftLeft<Wide>(raw[a], unitShift), n.sceneBits);
+            return steps;
         };
         width = take("frame.width");
         height = take("frame.height");
@@ -65,6 +68,7 @@ struct Frame {
         lighting.background = vector("background", "rgb");
         lighting.offset = take("shading.offset");
         lighting.clearness = takeIfThere("shading.clearness");
+        lighting.hasClear = registers.count("shading.clearness") != 0;
         lighting.flat = take("shading.flat") != 0;
         lighting.shadows = take("shading.shadows") != 0;
         lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
@@ -74,9 +78,11 @@ struct Frame {
                                           {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")}, takeIfThere(name + "reflectance")});
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));
-        triangleBase = static_cast<std::size_t>(take("scene.triangleBase"));
         triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));
-        attributeBase = static_cast<std::size_t>(take("scene.attributeBase"));
+        // Sections end where the next one begins, at the latest
+        attributeBase = std::min(recordCount, static_cast<std::size_t>(take("scene.attributeBase")));
+        triangleBase = std::min(attributeBase, static_cast<std::size_t>(take("scene.triangleBase")));
+        watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
         hasRoom = takeIfThere("room.isThere") != 0;
         if (!hasRoom) return;
         for (int row = 0; row < 3; ++row) {

@@ -9,7 +9,10 @@ namespace colonnade {
 struct RoomView {
     std::array<Vector, 3> matrix, rotation;
     Vector offset;
-    int offsetShift, exponent;
+    /// Counts as sceneBits above that.
+    int offsetShift;
+    int exponent;
+    /// Count as all that there are above that.
     int shellPlanes;
     std::array<std::int64_t, 2> step;
     /// Pixels that show the room itself: x0, y0, x1, y1, the latter exclusive.
@@ -22,6 +25,8 @@ struct RoomView {
 struct RoomTexel {
     Colour albedo;
     Vector normal;
+    /// A word was read beyond a heap.
+    bool isIllegal;
 };
 
 /// Where a ray meets the room: it has the albedo and the normal of pixel (x, y), or of a shell's entry. The way there is travel · 2^travelExponent
@@ -33,6 +38,8 @@ struct RoomPoint {
     std::int64_t travel;
     int travelExponent;
     int steps;
+    /// A word was read beyond the heap of the planes, on the way or at its end.
+    bool isIllegal;
 };
 
 /// A ray as the map sees it: straight in (u, v, w), shadeBits fraction bits each, u and v in units of 1024 pixels. `from` and `towards` are the

@@ -31,11 +31,17 @@ struct Lighting {
     std::vector<Light> lights;
     Colour ambient, background;
     std::int64_t offset, clearness;
+    /// Clear triangles let light through; otherwise they are opaque like all others.
+    bool hasClear;
     bool flat, shadows;
     int bounces;
     std::vector<Material> materials;
 
-    const Material& materialOf(const Face& face) const { return materials[static_cast<std::size_t>(face.material) % materials.size()]; }
+    /// As many low bits of the index as the table needs; entry 0 beyond it.
+    const Material& materialOf(const Face& face) const {
+        const std::size_t index = static_cast<std::size_t>(face.material) & ((std::size_t(1) << bitLength(materials.size() - 1)) - 1);
+        return materials[index < materials.size() ? index : 0];
+    }
 };
 
 /// Where a ray has met the object. `facing` and `smooth` are turned against the ray; `towards` is the ray's direction, its dominant component

@@ -37,9 +37,8 @@ final class AttributeArbiter[Q <: Data, A <: Data](question: Q, answer: A, count
   // Show the answer to everybody
   private val shown = Pipe(io.served.answer)
   for ((requester, number) <- io.requesters.zipWithIndex) {
-    requester.answer.valid        := shown.valid && shown.bits.tag >> tagBits === number.U
-    requester.answer.bits.content := shown.bits.content
-    requester.answer.bits.tag     := shown.bits.tag
+    requester.answer.valid := shown.valid && shown.bits.tag >> tagBits === number.U
+    requester.answer.bits  := shown.bits
   }
 }
 

@@ -17,7 +17,7 @@ final class CellLookupIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   *
   * A tile's words follow each other: its ids, two a word, and for a cell the mask's. Latency five cycles and one tile a
   * cycle where there is at most one word; each further one takes a cycle more: at most three words, for a cell of four
-  * planes.
+  * planes. Words beyond the heap are 0 and make the answer illegal; the last one that is read tells for all.
   */
 final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   val io = IO(new CellLookupIO(config, tagBits))
@@ -30,7 +30,7 @@ final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
 
   private val layout   = AttributeLayout.of(config)
   private val tiles    = Module(new TileLookup(config, "planes.descriptors", new PlaneDescriptor, new Rider))
-  private val heap     = AttributeStore(config, "planes.heap", io.load)
+  private val heap     = new AttributeHeap(config, "planes.heap", io.load)
   private val question = io.cells.question
 
   // The tile
@@ -53,8 +53,7 @@ final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   private val maskWord = Mux(kind.hasFour, cell >> 3, cell >> 4)
   when(isThere) { step := Mux(isLast, 0.U, step + 1.U) }
   tiles.io.tile.ready := isLast
-  heap.read.valid     := isThere && !kind.isFlat
-  heap.read.bits      := tile.descriptor.pointer + Mux(isMask, idWords +& maskWord, step)
+  heap.read(isThere && !kind.isFlat, tile.descriptor.pointer +& Mux(isMask, idWords +& maskWord, step))
 
   // The ids so far
   private val read    = Pipe(isThere, tile)
@@ -73,8 +72,9 @@ final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   private val choice = Mux(from.hasFour, (heap.word >> Cat(place(2, 0), 0.U(1.W)))(1, 0), (heap.word >> place)(0))
   private val isOne  = from.isFlat || !read.bits.rider.wholeTile
   private val count  = Mux(isOne, 1.U, Mux(from.hasFour, 4.U, 2.U))
-  private val answer = Wire(new Tagged(new CellAnswer(layout), tagBits))
+  private val answer = Wire(new Answered(new CellAnswer(layout), tagBits))
   answer.tag             := read.bits.rider.tag
+  answer.isIllegal       := heap.isIllegal
   answer.content.count   := count
   answer.content.cellLog := layout.tileLog.U - Mux(from.isFlat, 0.U, Mux(from.isFine, 3.U, 2.U))
   answer.content.ids     := VecInit(ids.zipWithIndex.map { case (id, i) => Mux(count > i.U, id, 0.U) })

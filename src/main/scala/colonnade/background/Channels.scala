@@ -5,10 +5,19 @@ import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{AlbedoEntry, NormalEntry, ShellEntry}
 
-/** A question or an answer, and the word by which its requester knows it. */
+/** A question, and the word by which its requester knows the answer. */
 final class Tagged[T <: Data](private val kind: T, tagBits: Int) extends Bundle {
   val content = kind.cloneType
   val tag     = UInt(tagBits.W)
+}
+
+/** An answer, and the word by which its requester knows it. */
+final class Answered[T <: Data](private val kind: T, tagBits: Int) extends Bundle {
+
+  /** A word was read beyond the map's heap; the answer is what words of 0 make of it. */
+  val isIllegal = Bool()
+  val content   = kind.cloneType
+  val tag       = UInt(tagBits.W)
 }
 
 /** Questions to a map and its answers, seen by who asks. Answers come in the order of questions, at any time after them,
@@ -17,7 +26,7 @@ final class Tagged[T <: Data](private val kind: T, tagBits: Int) extends Bundle 
 final class AttributeChannel[Q <: Data, A <: Data](private val asked: Q, private val found: A, tagBits: Int)
     extends Bundle {
   val question = Decoupled(new Tagged(asked, tagBits))
-  val answer   = Flipped(Valid(new Tagged(found, tagBits)))
+  val answer   = Flipped(Valid(new Answered(found, tagBits)))
 }
 
 /** A pixel of the maps; whoever asks keeps it inside them. */

@@ -97,7 +97,8 @@ final class MarchEnds(
     step(set(m.way(1), m.combine(m.towards(1), fromMiddle, subtract = true)))
     step("shell plane") {
       set(planes.id, index)
-      branch((index === view.shellPlanes) -> "shell passed", true.B -> "plane")
+      val isOver = index === view.shellPlanes || index === layout.config.shellPlanes.U
+      branch(isOver -> "shell passed", true.B -> "plane")
     }
     step("shell depth") {
       branch((planes.depth.value <= 0.S || m.sum <= 0.S) -> "shell next")

@@ -73,6 +73,9 @@ final class MarchResult(config: ColonnadeConfig) extends Bundle {
   /** What the maps say of it; the normal in the object's space. */
   val albedo = new AlbedoEntry
   val normal = Vec3(SInt(NumberFormats.normalBits.W))
+
+  /** An answer of the maps was. */
+  val isIllegal = Bool()
 }
 
 /** For the counters, in this cycle. */
@@ -81,6 +84,9 @@ final class MarchEvents extends Bundle {
   /** A tile or a cell is passed. */
   val step = Bool()
   val busy = Bool()
+
+  /** An answer to the ray of now was. */
+  val illegal = Bool()
 }
 
 /** Ports of [[RoomMarch]]. */

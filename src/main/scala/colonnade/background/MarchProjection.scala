@@ -17,9 +17,12 @@ final class MarchProjection(config: ColonnadeConfig, m: MarchDatapath, view: Roo
 
   private val matrixRow   = VecInit(view.matrix.map(row => VecInit(row.axes)))(m.axis)
   private val offset      = VecInit(view.offset.axes)(m.axis)
-  private val offsetPower = (1.U(1.W) << view.offsetShift)(sceneBits, 0)
-  private val origin      = request.ray.origin.axes.map(_.integer)
-  private val inverse     = m.quotient.zext
+  private val offsetPower = {
+    val isMost = view.offsetShift >= sceneBits.U // and above it counts as that
+    isMost ## (1.U(1.W) << view.offsetShift)(sceneBits - 1, 0)
+  }
+  private val origin  = request.ray.origin.axes.map(_.integer)
+  private val inverse = m.quotient.zext
 
   /** Steps that scale the direction, the first ones for every ray; they jump to "seen" for one from the camera. */
   def describeHeading(): Unit = overlap { at =>

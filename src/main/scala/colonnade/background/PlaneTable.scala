@@ -29,6 +29,7 @@ final class PlaneTable(config: ColonnadeConfig, tagBits: Int) extends Module {
   private val entry   = shell.word.asTypeOf(new ShellEntry)
   io.planes.answer.valid              := RegNext(question.valid, false.B)
   io.planes.answer.bits.tag           := RegEnable(question.bits.tag, question.valid)
+  io.planes.answer.bits.isIllegal     := false.B
   io.planes.answer.bits.content       := entry
   io.planes.answer.bits.content.plane := Mux(isShell, entry.plane, table.word.asTypeOf(new Plane))
 }

@@ -36,7 +36,13 @@ final class RoomMarch(config: ColonnadeConfig) extends Module {
   io.maps.cells.question.bits.content.pixel     := walk.cellCorner
   io.maps.cells.question.bits.content.wholeTile := false.B
 
+  // What the maps have answered to this ray
+  private val isIllegal = RegInit(false.B)
+  private val answers   = Seq(io.maps.cells.answer, io.maps.albedo.answer, io.maps.normals.answer)
+  when(answers.map(answer => answer.valid && answer.bits.isIllegal).reduce(_ || _)) { isIllegal := true.B }
+
   program.step("start") {
+    program.set(isIllegal, false.B)
     ends.clear()
     planes.forget()
     when(program.now)(isBusy := io.request.valid)
@@ -67,7 +73,9 @@ final class RoomMarch(config: ColonnadeConfig) extends Module {
 
   ends.result(io.result.bits)
   surface.result(io.result.bits)
-  io.result.bits.context := asked.context
-  io.events.step         := RegNext(walk.steps, 0.U) =/= walk.steps && walk.steps =/= 0.U
-  io.events.busy         := isBusy
+  io.result.bits.context   := asked.context
+  io.result.bits.isIllegal := isIllegal
+  io.events.step           := RegNext(walk.steps, 0.U) =/= walk.steps && walk.steps =/= 0.U
+  io.events.busy           := isBusy
+  io.events.illegal        := isIllegal
 }

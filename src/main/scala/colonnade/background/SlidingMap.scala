@@ -42,9 +42,10 @@ final class SlidingMap[T <: Data](config: ColonnadeConfig, name: String, entry: 
   seeds.read.valid := found.valid
   seeds.read.bits  := RegEnable(seed(layout.tileBits - 1, 0), named.valid)
 
-  io.pixels.answer.valid        := RegNext(found.valid, false.B)
-  io.pixels.answer.bits.content := seeds.word.asTypeOf(entry)
-  io.pixels.answer.bits.tag     := RegEnable(found.bits.tag, found.valid)
+  io.pixels.answer.valid          := RegNext(found.valid, false.B)
+  io.pixels.answer.bits.content   := seeds.word.asTypeOf(entry)
+  io.pixels.answer.bits.tag       := RegEnable(found.bits.tag, found.valid)
+  io.pixels.answer.bits.isIllegal := false.B
 
   /** Which way a label leads along an axis: back and forth. The labels of the x axis differ by 1, those of the y axis by
     * 3.

@@ -10,12 +10,13 @@ import colonnade.formats.MapDescriptor
   *
   * Three reads follow each other: descriptor, mask, palette. Latency six cycles, one pixel a cycle. A tile of four
   * entries has a word with two of them, read just before the mask: its pixels take two cycles and a latency of seven.
+  * Words beyond the heap are 0 and make the answer illegal; the mask's lies behind all others that a pixel needs.
   */
 final class TwoLevelMap[T <: Data](config: ColonnadeConfig, name: String, entry: T, tagBits: Int)
     extends AttributeMap(config, entry, tagBits) {
   private val layout  = AttributeLayout.of(config)
   private val tiles   = Module(new TileLookup(config, s"$name.descriptors", new MapDescriptor, UInt(tagBits.W)))
-  private val heap    = AttributeStore(config, s"$name.heap", io.load)
+  private val heap    = new AttributeHeap(config, s"$name.heap", io.load)
   private val palette = AttributeStore(config, s"$name.palette", io.load)
 
   // The tile
@@ -36,8 +37,7 @@ final class TwoLevelMap[T <: Data](config: ColonnadeConfig, name: String, entry:
   private val maskWord   = Mux(hasFour, (cell >> 3) +& 1.U, cell >> 4)
   when(isThere) { hasEntries := !isMask }
   tiles.io.tile.ready := isMask
-  heap.read.valid     := isThere && tile.descriptor.mode =/= 0.U
-  heap.read.bits      := tile.descriptor.pointer + Mux(isMask, maskWord, 0.U)
+  heap.read(isThere && tile.descriptor.mode =/= 0.U, tile.descriptor.pointer +& Mux(isMask, maskWord, 0.U))
 
   // Choose the cell's entry
   private val read    = Pipe(isThere, tile)
@@ -54,8 +54,10 @@ final class TwoLevelMap[T <: Data](config: ColonnadeConfig, name: String, entry:
 
   // Look it up
   palette.read := chosen
-  private val tag = RegEnable(read.bits.rider, read.valid)
-  io.pixels.answer.valid        := RegNext(chosen.valid, false.B)
-  io.pixels.answer.bits.content := palette.word.asTypeOf(entry)
-  io.pixels.answer.bits.tag     := RegEnable(tag, chosen.valid)
+  private val tag       = RegEnable(read.bits.rider, read.valid)
+  private val isIllegal = RegEnable(heap.isIllegal, read.valid)
+  io.pixels.answer.valid          := RegNext(chosen.valid, false.B)
+  io.pixels.answer.bits.content   := palette.word.asTypeOf(entry)
+  io.pixels.answer.bits.tag       := RegEnable(tag, chosen.valid)
+  io.pixels.answer.bits.isIllegal := RegEnable(isIllegal, chosen.valid)
 }

@@ -40,6 +40,9 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   /** Of the squared cosine behind a refraction, unsigned: what the shader's multiplier takes, and no more than there is. */
   val rootBits: Int = (2 * shadeBits + 1).min(gridBits.max(shadeBits + 1).max(lightBits + 2) - 1)
 
+  /** Largest exponent of a node: a child's planes are less than two cubes from its node's corner. */
+  val mostExponent: Int = (vertexBits - boxBits + 1).max(1)
+
   /** Signed distances of the box test, in units. */
   val boxDistanceBits: Int = vertexBits + 3
 
@@ -81,6 +84,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
     "shadeBits"          -> shadeBits,
     "radicandBits"       -> radicandBits,
     "cosineFraction"     -> cosineFraction,
+    "mostExponent"       -> mostExponent,
     "boxDistanceBits"    -> boxDistanceBits,
     "boxPadLog"          -> boxPadLog,
     "normalBits"         -> normalBits,

@@ -68,7 +68,8 @@ object FormatsPage {
       table(new Load(config)),
       "## Registers",
       s"""Words of ${RegisterMap.dataBits} bits. A number starts at a word of its own, low word first; `rw` registers hold still while a frame
-         |runs. A write of 1 to `control.start` starts a frame, and clears the errors and counters of the last one.""".stripMargin,
+         |runs. A write of 1 to `control.start` starts a frame, and clears the errors and counters of the last one. The device takes
+         |a value above its register's limit as the limit; without one, any value that fits is legal ([errors](errors.md)).""".stripMargin,
       registers(RegisterMap(config))
     )
     page.mkString("\n\n") + "\n"
@@ -97,9 +98,10 @@ object FormatsPage {
 
   private def registers(all: Seq[Register]): String = {
     val rows = all.map { r =>
-      s"| ${r.address} | `${r.name}` | ${r.width} | ${number(r.signed, fraction = 0)} | ${r.access.label} |"
+      val limit = r.limit.fold("")(_.toString)
+      s"| ${r.address} | `${r.name}` | ${r.width} | ${number(r.signed, fraction = 0)} | $limit | ${r.access.label} |"
     }
-    ("| address | register | width | number | access |" +: "|---|---|---|---|---|" +: rows).mkString("\n")
+    ("| address | register | width | number | limit | access |" +: "|---|---|---|---|---|---|" +: rows).mkString("\n")
   }
 
   private def bits(field: Field): String =

@@ -86,7 +86,9 @@ final class Bounds(numbers: NumberFormats) extends Bundle {
   val high = Vec3(UInt(numbers.vertexBits.W))
 }
 
-/** Where the sections of the column BVH memory lie: nodes, then triangles, then attributes. */
+/** Where the sections of the column BVH memory lie: nodes, then triangles, then attributes. A base beyond the next one,
+  * or beyond `recordCount`, counts as that.
+  */
 final class SceneMap(countBits: Int) extends Bundle {
 
   /** Records in all. */

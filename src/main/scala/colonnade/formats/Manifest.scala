@@ -89,6 +89,7 @@ object Manifest {
     "words"   -> register.words,
     "width"   -> register.width,
     "signed"  -> register.signed,
-    "access"  -> register.access.label
+    "access"  -> register.access.label,
+    "limit"   -> register.limit.fold[ujson.Value](ujson.Null)(limit => ujson.Num(limit.toDouble))
   )
 }

@@ -14,6 +14,8 @@ object ChildKind {
   def node: UInt = 1.U(bits.W)
 
   def leaf: UInt = 2.U(bits.W)
+
+  def illegal: UInt = 3.U(bits.W)
 }
 
 /** A node: up to `arity` child boxes relative to the node's corner.
@@ -35,6 +37,19 @@ final class NodeRecord(config: ColonnadeConfig) extends Bundle {
   val kinds = Vec(geometry.arity, UInt(ChildKind.bits.W))
   val low   = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
   val high  = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
+
+  /** What every reader relies on: known kinds, boxes within two cubes, and nodes below this one, so that no walk comes
+    * back to a node. A child that would lie beyond the addresses is refused by its section otherwise.
+    *
+    * @param at the node's own address
+    */
+  def isLegal(at: UInt): Bool = {
+    val isKnown  = !kinds.map(_ === ChildKind.illegal).reduce(_ || _)
+    val isSmall  = exponent.axes.map(_ <= config.numbers.mostExponent.U).reduce(_ && _)
+    val isBelow  = firstChild > at && !firstChild.head(address - log2Ceil(geometry.arity)).andR
+    val hasNodes = kinds.map(_ === ChildKind.node).reduce(_ || _)
+    isKnown && isSmall && (isBelow || !hasNodes)
+  }
 }
 
 /** The triangles of a leaf; the k-th has the packed id `firstTriangle + k`. */
@@ -52,6 +67,9 @@ final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
 
   /** Three for each triangle, in vertex units. */
   val vertices = Vec(3 * geometry.trianglesPerRecord, Vec3(UInt(geometry.vertexBits.W)))
+
+  /** It has triangles, and no more than there is space for. */
+  def isLegal: Bool = count =/= 0.U && count <= geometry.trianglesPerRecord.U
 }
 
 /** What shading needs of one face. Normals have unit length. */
@@ -117,6 +135,5 @@ object RecordFormats {
   def idBits(config: ColonnadeConfig): Int = addressBits(config) + 1
 
   /** A box coordinate shifted by the largest exponent still reaches across the cube. */
-  def exponentBits(config: ColonnadeConfig): Int =
-    NumberFormats.bitLength((config.geometry.vertexBits - config.geometry.boxBits + 1).max(1))
+  def exponentBits(config: ColonnadeConfig): Int = NumberFormats.bitLength(config.numbers.mostExponent)
 }

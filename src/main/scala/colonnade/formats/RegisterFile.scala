@@ -26,7 +26,8 @@ final class RegisterFileIO(config: ColonnadeConfig) extends Bundle {
   val start = Output(Bool())
 }
 
-/** Holds what the host writes and shows what it reads, at the addresses of [[RegisterMap]].
+/** Holds what the host writes and shows what it reads, at the addresses of [[RegisterMap]]. The device gets no setting
+  * above its limit.
   *
   * While the device is busy every write is ignored, so that the frame's settings hold still. A read takes one cycle; the
   * words of a wide number are read one by one, so wide ones are consistent only when the device is not busy.
@@ -39,8 +40,14 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
 
   // Settings: a hardware register for each number, put together to the bundle by its layout.
   private val settings = registers.filter(_.access == Access.ReadWrite).map(r => r -> storage(r))
-  private val stored   = settings.map { case (r, value) => r.name -> value }.toMap
-  io.frame := Cat(Layout.of(io.frame).sortBy(-_.offset).map(field => stored(field.name))).asTypeOf(io.frame)
+  private val legal    = settings.map { case (r, value) => r.name -> RegisterLimits.clamp(value, r.limit) }.toMap
+  io.frame := Cat(Layout.of(io.frame).sortBy(-_.offset).map(field => legal(field.name))).asTypeOf(io.frame)
+
+  // Sections end where the next one begins, at the latest
+  private val scene         = io.frame.scene
+  private val attributeBase = least(legal("scene.attributeBase"), legal("scene.recordCount"))
+  scene.attributeBase := attributeBase
+  scene.triangleBase  := least(legal("scene.triangleBase"), attributeBase)
 
   // Control: a pulse in the cycle of the write.
   private val start = registers.filter(_.access == Access.WriteOnly).head
@@ -63,6 +70,8 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
     VecInit(Seq.tabulate(1 << io.register.address.getWidth)(words.getOrElse(_, 0.U(readData.getWidth.W))))
   when(io.register.read)(readData := shown(io.register.address))
   io.register.readData := readData
+
+  private def least(a: UInt, b: UInt): UInt = Mux(a < b, a, b)
 
   private def wordOf(value: UInt, word: Int): UInt = {
     val low = word * RegisterMap.dataBits

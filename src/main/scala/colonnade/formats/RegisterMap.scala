@@ -15,8 +15,17 @@ object Access {
   *
   * @param address of its lowest 32 bits, in words
   * @param words   consecutive addresses it takes, low word first
+  * @param limit   the greatest value that the device takes, see [[RegisterLimits]]; None: all that fit
   */
-final case class Register(name: String, address: Int, words: Int, width: Int, signed: Boolean, access: Access)
+final case class Register(
+    name:    String,
+    address: Int,
+    words:   Int,
+    width:   Int,
+    signed:  Boolean,
+    access:  Access,
+    limit:   Option[BigInt]
+)
 
 /** Addresses of all registers, in the order of their declaration: control, status, errors, counters, then
   * [[FrameRegisters]]. Each number starts at a word of its own.
@@ -33,10 +42,11 @@ object RegisterMap {
       (new FrameRegisters(config), Access.ReadWrite)
     ).flatMap { case (bundle, access) => Layout.of(bundle).map(_ -> access) }
 
+    val limits    = RegisterLimits(config)
     val words     = numbers.map { case (number, _) => (number.width + dataBits - 1) / dataBits }
     val addresses = words.scanLeft(0)(_ + _)
     numbers.zip(words).zip(addresses).map { case (((number, access), count), address) =>
-      Register(number.name, address, count, number.width, number.signed, access)
+      Register(number.name, address, count, number.width, number.signed, access, limits.get(number.name))
     }
   }
 

@@ -13,7 +13,7 @@ final class RoomView(numbers: NumberFormats) extends Bundle {
   val matrix = Vec(3, Vec3(SInt(numbers.macBits.W)))
   val offset = Vec3(SInt(numbers.macBits.W))
 
-  /** At most `sceneBits`. */
+  /** At most `sceneBits`, and counts as that if it is more. */
   val offsetShift = UInt(NumberFormats.bitLength(numbers.sceneBits).W)
   val exponent    = SInt((NumberFormats.bitLength(2 * numbers.sceneBits) + 1).W)
 
@@ -24,7 +24,7 @@ final class RoomView(numbers: NumberFormats) extends Bundle {
   val stepX = UInt((numbers.shadeBits + RoomView.stepGuard).W)
   val stepY = UInt((numbers.shadeBits + RoomView.stepGuard).W)
 
-  /** Entries of the shell. */
+  /** Entries of the shell; all of them if it is more. */
   val shellPlanes = UInt(8.W)
 
   /** Rays that meet nothing of the object meet the room; otherwise the background's colour. */

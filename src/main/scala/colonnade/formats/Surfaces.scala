@@ -54,7 +54,10 @@ object MaterialKind {
   def mirror: UInt = 1.U(bits.W)
 
   /** Refracts, and reflects Schlick's part. */
-  def glass: UInt = 2.U(bits.W)
+  def glass: UInt = most.U(bits.W)
+
+  /** The greatest kind. */
+  val most: BigInt = 2
 }
 
 /** A record, not a bundle: without bounces all that there is of a material is its albedo. */

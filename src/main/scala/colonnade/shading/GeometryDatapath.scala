@@ -183,7 +183,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   // Shifter
   private val toShift = Mux1H(
     control.placeLight.zip(io.light.position.axes).map { case (when, axis) =>
-      when -> Rounding.narrow(axis, formats.vectorBits).pad(formats.vectorBits)
+      when -> Rounding.narrow(axis, numbers.sceneBits).pad(formats.vectorBits)
     } ++ Seq(
       control.scaleNormal -> normal(0).pad(formats.vectorBits),
       control.scaleLight  -> Rounding.narrow(normalsOrToLight(0), formats.vectorBits)

@@ -41,8 +41,7 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   * where the smooth normal is zero) and leaves some 85 cycles later; a light more takes 20 to 40 cycles. A surface that
   * faces away from a light needs neither root nor quotient.
   *
-  * A material's index beyond the table takes any of its entries; the packer writes none. Where the table's size is a
-  * power of two, it counts modulo the size, as in the model.
+  * Of a material's index the low bits count, as many as the table needs; beyond the table it takes entry 0.
   */
 final class Shader(config: ColonnadeConfig) extends Module {
   private val formats = new ShaderFormats(config.numbers)
@@ -59,7 +58,11 @@ final class Shader(config: ColonnadeConfig) extends Module {
   private val point    = geometry.io.result
   private val surface  = point.bits.surface
   private val material = Wire(new Material(config))
-  material := io.materials(surface.material(log2Ceil(config.frame.materials.max(2)) - 1, 0))
+  material := {
+    val indexBits = log2Ceil(config.frame.materials)
+    val entries   = io.materials.padTo(1 << indexBits, io.materials.head)
+    if (indexBits == 0) entries.head else VecInit(entries)(surface.material(indexBits - 1, 0))
+  }
   private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse && !surface.isRoom).getOrElse(false.B)
   geometry.io.request <> io.request
   io.takesNext           := geometry.io.takesNext

@@ -25,8 +25,8 @@ final class TriangleSequencerIO(config: ColonnadeConfig) extends Bundle {
 
 /** Holds a record and hands out its triangles, one each round of the schedule, a vertex a phase.
   *
-  * A candidate is taken in phase 3 and starts in the next cycle: no round is lost between records. A record whose
-  * `count` is 0 gives one absent triangle; a `count` beyond the record's room counts as full.
+  * A candidate is taken in phase 3 and starts in the next cycle: no round is lost between records. A record with an
+  * illegal `count` gives one absent triangle.
   */
 final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   val io = IO(new TriangleSequencerIO(config))
@@ -39,7 +39,7 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   private val index      = Reg(UInt(indexBits.W))
 
   private val record = candidate.record
-  private val isLast = index === (perRecord - 1).U || index +& 1.U >= record.count
+  private val isLast = index === (perRecord - 1).U || index +& 1.U >= record.count || !record.isLegal
   private val isEnd  = io.schedule.is(3)
 
   private val isFree = !isOccupied || isLast
@@ -70,6 +70,6 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   io.tag.bits.isClear := triangles.indices.tail.foldLeft(record.isClear(0)) { case (other, k) =>
     Mux(index === k.U, record.isClear(k), other)
   }
-  io.tag.bits.isAbsent   := record.count === 0.U
+  io.tag.bits.isAbsent   := !record.isLegal
   io.tag.bits.isNegative := candidate.ray.heading.negative(2)
 }

@@ -40,7 +40,7 @@ final private class TriangleTurn(config: ColonnadeConfig) extends Bundle {
   * known and nobody can take them; the shear's multipliers are then lent in every second cycle, so those ahead always
   * move on.
   *
-  * A record with `count` 0 gives one miss, its last. A triangle in a plane through the ray misses.
+  * A record with an illegal `count` gives one miss, its last. A triangle in a plane through the ray misses.
   *
   * @param distanceLanes divisions under way at the same time
   * @param turns         results that may wait for one that divides

@@ -5,6 +5,7 @@ import chisel3.util.{
   log2Ceil,
   Decoupled,
   Mux1H,
+  MuxLookup,
   OHToUInt,
   PopCount,
   PriorityEncoder,
@@ -13,7 +14,7 @@ import chisel3.util.{
   Valid
 }
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordFormats
+import colonnade.formats.{RecordFormats, SceneMap}
 import colonnade.ray.Context
 
 /** What a context wants a record for: the unit that takes it. */
@@ -32,10 +33,11 @@ final class RecordWish(config: ColonnadeConfig) extends Bundle {
 final class ServedRecord(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val use     = RecordUse()
+  val address = UInt(RecordFormats.addressBits(config).W)
   val record  = new RecordFormats(config).record
 }
 
-/** An address beyond the scene's records; the context gets nothing. */
+/** An address outside the section of its use; the context gets nothing. */
 final class RefusedWish(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val use     = RecordUse()
@@ -62,12 +64,12 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   val io = IO(new Bundle {
 
     /** Forget what the buffers hold: the memory may have changed. */
-    val start       = Input(Bool())
-    val row         = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
-    val recordCount = Input(UInt(RecordFormats.idBits(config).W))
-    val wishes      = Flipped(Vec(3, Valid(new RecordWish(config))))
-    val requests    = Decoupled(new RecordRequest(config))
-    val broadcasts  = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+    val start      = Input(Bool())
+    val row        = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
+    val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
+    val wishes     = Flipped(Vec(3, Valid(new RecordWish(config))))
+    val requests   = Decoupled(new RecordRequest(config))
+    val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
 
     /** Units that take a record in the next cycle if there is one, one for each [[RecordUse]]. */
     val takesNext = Input(Vec(RecordUse.all.size, Bool()))
@@ -93,6 +95,9 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   }
   private final class ContextWish {
     val isWaiting = RegInit(false.B)
+
+    /** Outside its section: it waits to be refused, and takes no record, whatever the buffers hold. */
+    val isIllegal = RegInit(false.B)
     val hasRecord = RegInit(false.B)
     val isAsked   = Reg(Bool())
     val use       = Reg(RecordUse())
@@ -101,6 +106,14 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   }
   private val buffers = Seq.fill(config.columnBvhMemory.recordBuffers)(new RecordBuffer)
   private val wishes  = Seq.fill(contexts)(new ContextWish)
+
+  /** Sections follow one another, and a face's address is never below theirs. */
+  private def isInSection(address: UInt, use: RecordUse.Type): Bool = {
+    val isNode = address < io.scene.triangleBase
+    MuxLookup(use, address < io.scene.recordCount)(
+      Seq(RecordUse.node -> isNode, RecordUse.triangles -> (!isNode && address < io.scene.attributeBase))
+    )
+  }
 
   /** The answer to a context's own read is, or comes, into buffer `index`. */
   private def isOwn(wish: ContextWish, index: Int): Bool = wish.isAsked && wish.buffer === index.U
@@ -179,12 +192,11 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   })
   private val isSeeking = seekers.reduce(_ || _)
   private val address   = Mux1H(seekers, wishes.map(_.address))
-  private val isLegal   = address < io.recordCount
   private val places    = PriorityEncoderOH(afterBroadcasts)
 
   // What is just arriving need not be asked for
   private val isArriving = io.broadcasts.map(broadcast => broadcast.valid && broadcast.bits.address === address)
-  io.requests.valid        := isSeeking && isLegal && places.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
+  io.requests.valid        := isSeeking && places.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
   io.requests.bits.address := address
   when(io.requests.fire) {
     buffers.zip(places).foreach { case (buffer, place) =>
@@ -201,15 +213,12 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     }
   }
 
-  private def useOf(chosen: Seq[Bool]): RecordUse.Type = RecordUse.safe(Mux1H(chosen, wishes.map(_.use.asUInt)))._1
-
-  // Refuse what lies beyond the scene
-  io.refused.valid        := isSeeking && !isLegal
-  io.refused.bits.context := OHToUInt(seekers)
-  io.refused.bits.use     := useOf(seekers)
-  when(io.refused.valid) {
-    wishes.zip(seekers).foreach { case (wish, seeks) => when(seeks) { wish.isWaiting := false.B } }
-  }
+  // Refuse what lies outside its section
+  private val illegal = PriorityEncoderOH(wishes.map(_.isIllegal))
+  io.refused.valid        := illegal.reduce(_ || _)
+  io.refused.bits.context := OHToUInt(illegal)
+  io.refused.bits.use     := RecordUse.safe(Mux1H(illegal, wishes.map(_.use.asUInt)))._1
+  wishes.zip(illegal).foreach { case (wish, isRefused) => when(isRefused) { wish.isIllegal := false.B } }
 
   // Choose a context for each use, and of these one whose unit will be ready. Its record may be replaced while it is
   // served, for it leaves its buffer in that cycle
@@ -239,12 +248,18 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   io.served.valid        := RegNext(io.chosen.valid, false.B)
   io.served.bits.context := RegEnable(io.chosen.bits, io.chosen.valid)
   io.served.bits.use     := RecordUse.safe(RegEnable(OHToUInt(chosenUse), io.chosen.valid))._1
+  io.served.bits.address := Mux1H(place, buffers.map(_.address))
   io.served.bits.record  := Mux1H(place, buffers.map(_.record))
 
   // New wishes
-  for (port <- io.wishes; (wish, context) <- wishes.zipWithIndex) {
+  for {
+    port <- io.wishes
+    isLegal = isInSection(port.bits.address, port.bits.use)
+    (wish, context) <- wishes.zipWithIndex
+  } {
     when(port.valid && port.bits.context === context.U) {
-      wish.isWaiting := true.B
+      wish.isWaiting := isLegal
+      wish.isIllegal := !isLegal
       wish.isAsked   := false.B
       wish.use       := port.bits.use
       wish.address   := port.bits.address

@@ -240,10 +240,10 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   io.pixels :<>= outgoing.io.deq
 
   // The record port
-  recordFetch.io.start       := io.start
-  recordFetch.io.row         := io.row
-  recordFetch.io.recordCount := io.registers.scene.recordCount
-  recordFetch.io.broadcasts  := io.broadcasts
+  recordFetch.io.start      := io.start
+  recordFetch.io.row        := io.row
+  recordFetch.io.scene      := io.registers.scene
+  recordFetch.io.broadcasts := io.broadcasts
   io.requests :<>= recordFetch.io.requests
 
   // Counters
@@ -277,8 +277,10 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
-  events.illegalRecord := refused.valid
-  io.isIdle            := controller.io.freeCount === contexts.U && !finished.valid && !io.pixels.valid
+  events.illegalRecord := refused.valid || traversal.io.illegal ||
+    (triangleUnit.io.candidate.fire && !triangleUnit.io.candidate.bits.record.isLegal) ||
+    room.map(_.events.illegal).getOrElse(false.B)
+  io.isIdle := controller.io.freeCount === contexts.U && !finished.valid && !io.pixels.valid
 
   // A record comes only to a unit that takes it
   for ((unit, index) <- Seq(traversal.io.nodes, triangleUnit.io.candidate, shader.io.request).zipWithIndex)

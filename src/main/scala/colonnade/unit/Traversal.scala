@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordFormats, SceneMap}
+import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
 import colonnade.numbers.Fixed
 import colonnade.ray.{BoxRay, Context, RayFormats}
 import colonnade.traversal.{BoxUnit, ExhaustiveWalk, NextVisit, TraversalStack, Visit}
@@ -38,6 +38,9 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     val busy     = Output(Bool())
     val deepest  = Output(UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W))
     val overflow = Output(Bool())
+
+    /** A node was illegal and counted as empty. */
+    val illegal = Output(Bool())
   })
 
   /** Contexts are tokens: a queue of as many places never fills. */
@@ -46,14 +49,17 @@ final class Traversal(config: ColonnadeConfig) extends Module {
   if (config.geometry.bvh) {
     val boxUnit = Module(new BoxUnit(config))
     val stack   = Module(new TraversalStack(config))
+    val node    = new RecordFormats(config).asNode(io.nodes.bits.record)
+    val isLegal = node.isLegal(io.nodes.bits.address)
 
     boxUnit.io.in.valid        := io.nodes.valid
     boxUnit.io.in.bits.context := io.nodes.bits.context
-    boxUnit.io.in.bits.node    := new RecordFormats(config).asNode(io.nodes.bits.record)
-    boxUnit.io.in.bits.ray     := io.ray
-    boxUnit.io.in.bits.limit   := io.limits(io.nodes.bits.context)
-    io.nodes.ready             := boxUnit.io.in.ready
-    io.takesNext               := boxUnit.io.takesNext
+    boxUnit.io.in.bits.node    := node
+    when(!isLegal)(boxUnit.io.in.bits.node.kinds.foreach(_ := ChildKind.empty))
+    boxUnit.io.in.bits.ray   := io.ray
+    boxUnit.io.in.bits.limit := io.limits(io.nodes.bits.context)
+    io.nodes.ready           := boxUnit.io.in.ready
+    io.takesNext             := boxUnit.io.takesNext
 
     stack.io.clear := io.clear
     stack.io.start := io.start
@@ -66,6 +72,7 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     io.busy     := boxUnit.io.busy
     io.deepest  := stack.io.deepest
     io.overflow := stack.io.overflow
+    io.illegal  := io.nodes.fire && !isLegal
   } else {
     val walk = Module(new ExhaustiveWalk(config))
     walk.io.scene := io.scene
@@ -79,6 +86,7 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     io.busy        := false.B
     io.deepest     := 0.U
     io.overflow    := false.B
+    io.illegal     := false.B
   }
 }
 

@@ -7,7 +7,7 @@ import chiseltest._
 import scala.collection.mutable
 import scala.util.Random
 
-/** A channel as one integer each way: the tag is in the low bits. */
+/** A channel as one integer each way: the tag is in the low bits, an answer's `isIllegal` in the highest one. */
 final class FlatChannel(questionBits: Int, answerBits: Int, tagBits: Int) extends Bundle {
   val question = Flipped(Decoupled(UInt((questionBits + tagBits).W)))
   val answer   = Valid(UInt((answerBits + tagBits).W))
@@ -18,7 +18,8 @@ object FlatChannel {
   /** Ports for a channel of the unit under test. */
   def apply[Q <: Data, A <: Data](channel: AttributeChannel[Q, A]): FlatChannel = {
     val (question, answer) = (channel.question.bits, channel.answer.bits)
-    val flat = IO(new FlatChannel(question.content.getWidth, answer.content.getWidth, question.tag.getWidth))
+    val flat               =
+      IO(new FlatChannel(question.content.getWidth, answer.getWidth - answer.tag.getWidth, question.tag.getWidth))
     channel.question.valid := flat.question.valid
     channel.question.bits  := flat.question.bits.asTypeOf(question)
     flat.question.ready    := channel.question.ready

@@ -1,6 +1,8 @@
 package colonnade.background
 
+import chisel3.Data
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.RoomView
 
 import scala.util.Random
 
@@ -28,7 +30,7 @@ object MarchQuestion {
   /** What the model's answer says, in its order. */
   val answer: Seq[String] = Seq("kind", "x", "y", "entry", "isHidden", "travel", "travelExponent", "steps") ++
     Seq("x", "y", "z").map(axis => s"point.$axis") ++ Seq("r", "g", "b").map(channel => s"albedo.$channel") ++
-    Seq("x", "y", "z").map(axis => s"normal.$axis")
+    Seq("x", "y", "z").map(axis => s"normal.$axis") :+ "isIllegal"
 }
 
 /** Views of a room, and rays in it. */
@@ -113,6 +115,27 @@ final class MarchQuestions(config: ColonnadeConfig, random: Random) {
       random.nextInt(shells + 1)
     )
   }
+
+  /** Any bits in all registers. */
+  def wildView(): ViewQuestion = {
+    val view                         = new RoomView(numbers)
+    def natural(field: Data): Int    = BigInt(field.getWidth, random).toInt
+    def number(bits:   Int): BigInt  = BigInt(bits, random) - (BigInt(1) << (bits - 1))
+    def steps(field:   Data): BigInt = BigInt(random.nextInt(field.getWidth + 1), random)
+    ViewQuestion(
+      Seq.fill(9)(number(numbers.macBits)),
+      Seq.fill(3)(number(numbers.macBits)),
+      natural(view.offsetShift),
+      number(view.exponent.getWidth).toInt,
+      Seq.fill(9)(number(RoomView.rotationBits)),
+      Seq(steps(view.stepX), steps(view.stepY)),
+      natural(view.shellPlanes)
+    )
+  }
+
+  /** Any pixel that a frame could have, or more. */
+  def wildPixel(): MarchQuestion =
+    anyRay().copy(pixel = Seq.fill(2)(BigInt(numbers.coordinateBits, random)), isSeen = true)
 
   def anyRay(): MarchQuestion = {
     val directionBits = if (random.nextBoolean()) numbers.shadeBits + 1 else numbers.directionBits

@@ -9,12 +9,12 @@ import colonnade.traversal.Packed
 
 import scala.util.Random
 
-/** Questions about a room's maps, and what the model answers. */
+/** Questions about a room's maps, some of whose tiles point beyond their heap, and what the model answers. */
 final class RoomDialogue(config: ColonnadeConfig, random: Random) {
   private val layout = AttributeLayout.of(config)
-  private val image  = new RoomImage(config, random)
+  private val image  = new RoomImage(config, random, illegal = 0.3)
 
-  /** Fills all memories, and loads for others. */
+  /** Fills all memories; loads for others and beyond the depths, too, which change nothing. */
   def load(port: Valid[Load], clock: Clock): Unit = {
     def put(target: Int, address: Int, word: BigInt): Unit = {
       port.bits.target.poke(target)
@@ -29,6 +29,10 @@ final class RoomDialogue(config: ColonnadeConfig, random: Random) {
       put(memory.target, address, word)
     for (target <- others if AttributeMemories(config).forall(_.target != target); address <- 0 until 16)
       put(target, address, BigInt(port.bits.record.getWidth, random))
+    val addresses = 1 << port.bits.address.getWidth
+    for (memory <- AttributeMemories(config); beyond <- Seq.fill(24)(random.nextInt(addresses)) :+ memory.depth)
+      if (beyond >= memory.depth && beyond < addresses)
+        put(memory.target, beyond, BigInt(port.bits.record.getWidth, random))
     port.valid.poke(false)
   }
 
@@ -40,15 +44,17 @@ final class RoomDialogue(config: ColonnadeConfig, random: Random) {
   def cells(count: Int): Seq[Exchange] = {
     val asked    = pixels(count)
     val tiles    = ask("tile", asked)
-    val cells    = ask("cell", asked).zip(tiles).map { case (id, tile) => Seq(tile.head, BigInt(1), id.head) }
+    val cells    = ask("cell", asked).zip(tiles).map { case (cell, tile) => Seq(tile.head, BigInt(1), cell.head) }
+    val beyond   = Seq("tile", "cell").map(kind => kind -> ask(kind, asked).map(_.last)).toMap
     val names    = Seq("cellLog", "count", "ids[0]", "ids[1]", "ids[2]", "ids[3]")
     val question = new Packed(new CellQuestion(layout))
     val answer   = new Packed(new CellAnswer(layout))
-    asked.zip(tiles.zip(cells)).map { case ((x, y), (tile, cell)) =>
+    for (((x, y), index) <- asked.zipWithIndex) yield {
       val wholeTile = random.nextBoolean()
+      val isIllegal = beyond(if (wholeTile) "tile" else "cell")(index)
       Exchange(
         question.pack(Map("pixel.x" -> x, "pixel.y" -> y, "wholeTile" -> (if (wholeTile) 1 else 0))),
-        answer.pack(names.zip(if (wholeTile) tile else cell).toMap)
+        answer.pack(names.zip(if (wholeTile) tiles(index) else cells(index)).toMap) | (isIllegal << answer.width)
       )
     }
   }
@@ -85,7 +91,8 @@ final class RoomDialogue(config: ColonnadeConfig, random: Random) {
     val question = new Packed(new MapPixel(layout))
     val answer   = new Packed(entry)
     asked.zip(ask(kind, asked)).map { case ((x, y), values) =>
-      Exchange(question.pack(Map("x" -> x, "y" -> y)), answer.pack(components.zip(values).toMap))
+      val found = answer.pack(components.zip(values).toMap) | (values.last << answer.width)
+      Exchange(question.pack(Map("x" -> x, "y" -> y)), found)
     }
   }
 }

@@ -10,8 +10,11 @@ import colonnade.traversal.Packed
 
 import scala.util.Random
 
-/** Random contents of a room's memories: every mode, with pointers that stay inside the heap. */
-final class RoomImage(config: ColonnadeConfig, random: Random) {
+/** Random contents of a room's memories: every mode, with pointers that stay inside the heap.
+  *
+  * @param illegal share of the tiles whose pointers are anything
+  */
+final class RoomImage(config: ColonnadeConfig, random: Random, illegal: Double = 0) {
   private val layout = AttributeLayout.of(config)
 
   /** By the memory's name. */
@@ -39,7 +42,7 @@ final class RoomImage(config: ColonnadeConfig, random: Random) {
     val mode      = random.nextInt(8)
     val cells     = 4 << (2 * (mode % 4))
     val maskWords = if (mode < 4) (cells + 15) / 16 else 1 + (2 * cells + 15) / 16
-    val pointer   = if (mode == 0) randomPointer() else random.nextInt(layout.mapHeapWords - maskWords + 1)
+    val pointer = if (mode == 0 || isIllegal()) randomPointer() else random.nextInt(layout.mapHeapWords - maskWords + 1)
     new Packed(new MapDescriptor).pack(
       Map(
         "mode"       -> mode,
@@ -53,9 +56,13 @@ final class RoomImage(config: ColonnadeConfig, random: Random) {
   private def planeDescriptor(): BigInt = {
     val mode    = random.nextInt(8)
     val words   = Map(1 -> 2, 2 -> 5, 3 -> 4, 4 -> 10).get(mode)
-    val pointer = words.fold(randomPointer())(count => random.nextInt(layout.planeHeapWords - count + 1))
+    val pointer = words.filterNot(_ => isIllegal()).fold(randomPointer())(count =>
+      random.nextInt(layout.planeHeapWords - count + 1)
+    )
     new Packed(new PlaneDescriptor).pack(Map("mode" -> mode, "pointer" -> pointer))
   }
+
+  private def isIllegal(): Boolean = random.nextDouble() < illegal
 
   private def randomPointer(): Int = random.nextInt(1 << AttributeLayout.pointerBits)
 }

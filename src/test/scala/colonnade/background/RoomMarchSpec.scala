@@ -118,6 +118,24 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             isSlow = round == 1
           )
         }
+
+        // Illegal maps and registers, each with legal ones and together
+        val illegal = new RoomImage(config, random, illegal = 0.3)
+        RoomImage.load(unit.load, unit.clock, config, illegal.words)
+        val answers = for (round <- 0 until 12) yield {
+          val camera = new questions.Camera(scene.focal, scene.middle, isTurned = true)
+          check(
+            unit,
+            config,
+            illegal.words,
+            if (round < 4) camera.view else questions.wildView(),
+            Seq.fill(20)(questions.inRoom(camera)) ++ Seq.fill(10)(questions.fromCamera(camera)) ++
+              Seq.fill(20)(questions.anyRay()) ++ Seq.fill(20)(questions.wildPixel()),
+            random,
+            isSlow = round == 1
+          )
+        }
+        assert(answers.flatten.map(_("isIllegal").toInt).distinct.size == 2, "legal and illegal tiles")
       }
     }
   }

@@ -10,7 +10,7 @@ import scala.util.Random
 class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "RegisterFile"
 
-  private val config: ColonnadeConfig = ConfigIO.load("tiny", Seq("precision=40b32s64d", "frame.materials=2"))
+  private val config: ColonnadeConfig = ConfigIO.load("tiny", Seq("precision=40b32s64d", "frame.materials=2", "frame.lights=2", "frame.maxBounces=4"))
   private val registers = RegisterMap(config)
   private val settings  = registers.filter(_.access == Access.ReadWrite)
 
@@ -38,14 +38,56 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
 
   private def ones(register: Register): BigInt = (BigInt(1) << register.width) - 1
 
-  it should "hold every setting, show it to the hardware, and read it back" in {
+  private def shown(unit: RegisterFile, register: Register): BigInt =
+    LayoutSpec.number(unit.io.frame, register.name).peek().litValue & ones(register)
+
+  it should "hold every setting, show the hardware what is legal of it, and read it back" in {
     test(new RegisterFile(config)) { unit =>
       val random = new Random(8)
       val values = settings.map(r => r -> BigInt(r.width, random))
       values.foreach { case (register, bits) => writeWhole(unit, register, bits) }
       for ((register, bits) <- values) withClue(s"${register.name}: ") {
         readWhole(unit, register) shouldBe bits
-        (LayoutSpec.number(unit.io.frame, register.name).peek().litValue & ones(register)) shouldBe bits
+        if (!register.name.endsWith("Base")) shown(unit, register) shouldBe register.limit.fold(bits)(bits.min)
+      }
+    }
+  }
+
+  it should "show the hardware no register above its limit, and all up to it" in {
+    val limited = settings.filter(_.limit.nonEmpty)
+    limited.map(_.name) should contain allOf (
+      "shading.lights",
+      "frame.unitShift",
+      "camera.stepShift",
+      "scene.recordCount"
+    )
+    test(new RegisterFile(config)) { unit =>
+      for (register <- limited.sortBy(_.name != "scene.recordCount"); limit <- register.limit)
+        withClue(s"${register.name}: ") {
+          for (value <- Seq(limit - 1, limit + 1, ones(register), limit)) {
+            writeWhole(unit, register, value)
+            if (!register.name.endsWith("Base")) shown(unit, register) shouldBe value.min(limit)
+            readWhole(unit, register) shouldBe value
+          }
+        }
+    }
+  }
+
+  it should "end a section where the next one begins" in {
+    val Seq(count, triangles, attributes) =
+      Seq("recordCount", "triangleBase", "attributeBase").map(name => settings.find(_.name == s"scene.$name").get)
+    test(new RegisterFile(config)) { unit =>
+      for {
+        (written, legal) <- Seq(
+          Seq(30, 10, 20) -> Seq(30, 10, 20),
+          Seq(30, 25, 20) -> Seq(30, 20, 20),
+          Seq(30, 10, 40) -> Seq(30, 10, 30),
+          Seq(5, 10, 20)  -> Seq(5, 5, 5),
+          Seq(0, 1, 1)    -> Seq(0, 0, 0)
+        )
+      } {
+        Seq(count, triangles, attributes).zip(written).foreach { case (r, value) => writeWhole(unit, r, value) }
+        Seq(count, triangles, attributes).map(shown(unit, _).toInt) shouldBe legal
       }
     }
   }

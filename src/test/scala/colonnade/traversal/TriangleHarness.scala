@@ -6,7 +6,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
 import org.scalatest.matchers.should.Matchers
 
-/** A record's triangles with their ray; none stands for a record whose count is 0. */
+/** A record's triangles with their ray; none stands for a record with an illegal count. */
 final case class TestCandidate(context: Int, firstTriangle: Int, ray: TestRay, triangles: Seq[TestTriangle])
 
 /** One result: of which candidate, whether it is its last, and the hit. */
@@ -98,7 +98,9 @@ final class TriangleHarness(config: ColonnadeConfig, questions: TriangleQuestion
     val (bits, ray) = (unit.io.candidate.bits, unit.io.candidate.bits.ray)
     bits.context.poke(candidate.context.U)
     bits.record.firstTriangle.poke(candidate.firstTriangle.U)
-    bits.record.count.poke(candidate.triangles.size.U)
+    val largest = (1 << bits.record.count.getWidth) - 1
+    val illegal = if (candidate.context % 2 == 0 && 3 * largest > bits.record.vertices.size) largest else 0
+    bits.record.count.poke((if (candidate.triangles.isEmpty) illegal else candidate.triangles.size).U)
     for ((triangle, k) <- candidate.triangles.zipWithIndex; (vertex, j) <- triangle.vertices.zipWithIndex)
       bits.record.vertices(3 * k + j).axes.zip(vertex).foreach { case (port, value) => port.poke(value.U) }
     ray.heading.axis.poke(candidate.ray.axis.U)

@@ -24,6 +24,11 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   private val row         = 1
   private val recordCount = 24
 
+  /** Nodes, triangles and attributes. */
+  private val sections = Seq(0 until 8, 8 until 16, 16 until recordCount)
+
+  private def useOf(address: Int): RecordUse.Type = RecordUse.all(sections.indexWhere(_.contains(address)))
+
   private def contentOf(address: Int): BigInt = BigInt(address) * 1000003 + 7
 
   for {
@@ -39,19 +44,27 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     }
   }
 
-  it should "refuse an address beyond the scene and serve the others" in {
-    val config = variant(contexts = 2, banks = 1, snooping = true)
+  it should "refuse an address outside the section of its use and ask for every other one" in {
+    val config = variant(contexts = 1, banks = 1, snooping = true)
     test(new RecordFetch(config)) { dut =>
       val column = new Column(dut, config, new Random(1))
-      column.wish(0, recordCount, RecordUse.triangles)
-      var refused = false
-      for (_ <- 0 until 10) {
-        refused ||= dut.io.refused.valid.peekBoolean() && dut.io.refused.bits.context.peekInt() == 0
-        dut.io.requests.valid.expect(false.B)
+      for {
+        (use, section) <- RecordUse.all.zip(sections)
+        address        <- Seq(0, 7, 8, 15, 16, 23, 24, 40)
+        // A face lies behind the base of its section
+        if use != RecordUse.attributes || address >= section.start
+      } withClue(s"$use at $address: ") {
+        dut.reset.asBool.poke(true)
+        dut.clock.step()
+        dut.reset.asBool.poke(false)
+        column.wish(0, address, use)
         dut.clock.step()
         dut.io.wishes(0).valid.poke(false.B)
+        dut.io.refused.valid.peekBoolean() shouldBe !section.contains(address)
+        dut.io.requests.valid.peekBoolean() shouldBe section.contains(address)
+        dut.clock.step()
+        dut.io.refused.valid.expect(false.B)
       }
-      refused shouldBe true
     }
   }
 
@@ -68,7 +81,9 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     private var chosen   = Option.empty[Int]
 
     dut.io.row.poke(row.U)
-    dut.io.recordCount.poke(recordCount.U)
+    dut.io.scene.recordCount.poke(recordCount.U)
+    dut.io.scene.triangleBase.poke(sections(1).start.U)
+    dut.io.scene.attributeBase.poke(sections(2).start.U)
     dut.io.wishes.foreach(_.valid.poke(false.B))
     dut.io.broadcasts.foreach(_.valid.poke(false.B))
 
@@ -89,7 +104,8 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
         val idle = (0 until contexts).filterNot(wanted.contains)
         dut.io.wishes(0).valid.poke(false.B)
         if (made < wishes && idle.nonEmpty && random.nextInt(3) > 0) {
-          wish(idle(random.nextInt(idle.size)), random.nextInt(recordCount), RecordUse.all(random.nextInt(3)))
+          val address = random.nextInt(recordCount)
+          wish(idle(random.nextInt(idle.size)), address, useOf(address))
           made += 1
         }
         dut.clock.step()
@@ -130,6 +146,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
         val use = port.bits.use.peek()
         takers.map(_.litValue) should contain(use.litValue)
         withClue(s"context $context: ") { wanted.get(context).map(_._2.litValue) shouldBe Some(use.litValue) }
+        port.bits.address.expect(wanted(context)._1)
         port.bits.record.peekInt() shouldBe contentOf(wanted(context)._1)
         wanted -= context
         served += 1

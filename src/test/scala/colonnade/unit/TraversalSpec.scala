@@ -31,6 +31,57 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
 
+  it should "count an illegal node as empty and say so" in {
+    val shape = config(contexts = 1, arity = 4)
+    val most  = (BigInt(1) << RecordFormats.addressBits(shape)) - 1
+    val tree  = new SmallTree(shape, rayCount = 1, seed = 4)
+    val root  = tree.fields(tree.nodes.head, "node.")
+    val ray   = new Packed(new BoxRay(shape.numbers)).pack(tree.fields(tree.rays.head, "ray."))
+
+    def changed(fields: (String, Int)*): Map[String, BigInt] =
+      root ++ fields.map { case (name, value) => name -> BigInt(value) }
+    val last   = most.toInt - shape.geometry.arity
+    val leaves = (0 until 4).map(slot => s"kinds[$slot]" -> 2)
+    val cases  = Seq(
+      (changed(), 0, true),
+      (changed("firstChild" -> 6), 5, true),
+      (changed("firstChild" -> 5), 5, false),
+      (changed("firstChild" -> 4), 5, false),
+      (changed("firstChild" -> last), 5, true),
+      (changed("firstChild" -> (last + 1)), 5, false),
+      (changed("firstChild" -> most.toInt), 5, false),
+      (changed(("firstChild" -> 0) +: leaves: _*), 5, true),
+      (changed("kinds[3]" -> 3), 0, false),
+      (changed("exponent.y" -> (shape.numbers.mostExponent + 1)), 0, false)
+    )
+    test(new TraversalHarness(shape)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+      dut.io.visits.ready.poke(true)
+      dut.io.limits(0).pokeRaw((BigInt(1) << (shape.numbers.boxDistanceBits - 1)) - 1)
+      for (((fields, address, isLegal), index) <- cases.zipWithIndex) withClue(s"case $index: ") {
+        dut.io.start.valid.poke(true)
+        dut.io.start.bits.poke(0)
+        dut.clock.step()
+        dut.io.start.valid.poke(false)
+        dut.io.nodes.valid.poke(true)
+        dut.io.nodes.bits.context.poke(0)
+        dut.io.nodes.bits.address.poke(address)
+        dut.io.nodes.bits.record.poke(
+          new Packed(new NodeRecord(shape)).pack(fields).U(new RecordFormats(shape).recordBits.W)
+        )
+        dut.ray.poke(ray)
+        dut.io.nodes.ready.expect(true)
+        dut.io.illegal.expect(!isLegal)
+        dut.clock.step()
+        dut.io.nodes.valid.poke(false)
+        dut.io.illegal.expect(false)
+        for (_ <- 0 until 20 if !dut.io.visits.valid.peekBoolean()) dut.clock.step()
+        dut.io.visits.valid.expect(true)
+        dut.io.visits.bits.isDone.expect(!isLegal)
+        dut.clock.step()
+      }
+    }
+  }
+
   it should "visit every triangles record without a tree" in
     test(new TraversalHarness(config(contexts = 2, arity = 4, bvh = false))) { dut =>
       dut.io.scene.triangleBase.poke(5)
@@ -105,6 +156,7 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
       dut.io.start.valid.poke(starts.nonEmpty)
       starts.foreach(begin)
       offer()
+      dut.io.illegal.expect(false)
       val accepts = random.nextDouble() < accepted
       dut.io.visits.ready.poke(accepts)
 
@@ -136,6 +188,7 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
     dut.io.nodes.valid.poke(nodes.nonEmpty)
     for ((context, address) <- nodes.headOption) {
       dut.io.nodes.bits.context.poke(context)
+      dut.io.nodes.bits.address.poke(address)
       dut.io.nodes.bits.record.poke(recordBits(address).U(new RecordFormats(config).recordBits.W))
       dut.ray.poke(rayBits(walks(context).ray))
     }

@@ -1,0 +1,1 @@
+"""Corrupt frames: hardware and model must agree on them, and recover; docs/errors.md."""

@@ -1,0 +1,35 @@
+package colonnade.formats
+
+import chisel3._
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+
+/** The greatest legal value of each register that can hold more. The host reads back what it wrote; the device takes
+  * the limit for anything above it. Every other register may have any value that fits. docs/errors.md.
+  */
+object RegisterLimits {
+
+  /** By the register's name; all of them are unsigned. */
+  def apply(config: ColonnadeConfig): Map[String, BigInt] = {
+    val numbers   = config.numbers
+    val whole     = BigInt(1) << NumberFormats.lightFraction
+    val materials = (0 until config.frame.materials).flatMap { index =>
+      Seq(s"materials[$index].kind" -> MaterialKind.most, s"materials[$index].reflectance" -> whole)
+    }
+    val records = Seq("recordCount", "triangleBase", "triangleRecords", "attributeBase").map(name =>
+      s"scene.$name" -> BigInt(config.columnBvhMemory.depth)
+    )
+    val limits = Seq(
+      "frame.unitShift"   -> BigInt((numbers.sceneBits - numbers.macBits).max(0)),
+      "camera.stepShift"  -> BigInt(numbers.coordinateBits),
+      "shading.lights"    -> BigInt(config.frame.lights),
+      "shading.bounces"   -> BigInt(config.frame.maxBounces),
+      "shading.clearness" -> whole
+    ) ++ materials ++ records
+    val most = Layout.of(new FrameRegisters(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
+    limits.filter { case (name, limit) => most.get(name).exists(limit < _) }.toMap
+  }
+
+  /** The value, or its register's limit. */
+  def clamp(value: UInt, limit: Option[BigInt]): UInt =
+    limit.fold(value)(most => Mux(value > most.U, most.U(value.getWidth.W), value))
+}
