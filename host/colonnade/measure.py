@@ -22,7 +22,8 @@ from colonnade.placement import placement
 from colonnade.progress import QUIET, Progress
 from colonnade.render import frame_report, mesh_report, require_no_errors
 from colonnade.scene import Scene, load_scene
-from colonnade.simulate import build_simulator, render_rtl
+from colonnade.simulate import render_rtl
+from colonnade.simulator_build import build_simulator
 from colonnade.sizes import check_size
 from colonnade.toolchain import cache_directory, project_root
 from colonnade.viewpoint import made_of

@@ -20,7 +20,8 @@ from colonnade.pack import pack
 from colonnade.placement import placement
 from colonnade.progress import QUIET, Progress
 from colonnade.scene import Scene, load_scene
-from colonnade.simulate import build_simulator, write_job
+from colonnade.simulate import write_job
+from colonnade.simulator_build import build_simulator
 from colonnade.sizes import check_size
 from colonnade.temporary import temporary_folder
 from colonnade.toolchain import project_root, require_program

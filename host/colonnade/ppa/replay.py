@@ -11,12 +11,12 @@ and with a gigabyte, it was still elaborating the 150,000 gates of a render unit
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from colonnade import cache, processes
+from colonnade.compiler import SAFE, clean_environment, require_compiler, require_right_compiler
 from colonnade.ppa import gate_netlist
 from colonnade.ppa.hierarchy import Hierarchy
 from colonnade.ppa.netlist import Netlist
@@ -24,7 +24,7 @@ from colonnade.ppa.recording import CLOCK, RESET, START, Port, Recording
 from colonnade.progress import QUIET, Progress
 from colonnade.simulate import run_program
 from colonnade.temporary import temporary_folder
-from colonnade.toolchain import cache_directory, project_root, require_program, version_of
+from colonnade.toolchain import cache_directory, project_root
 
 #: Cycles of reset before the recorded ones.
 RESET_CYCLES = 8
@@ -34,11 +34,8 @@ RESET_CYCLES = 8
 REST_PERIOD = 240
 
 
-#: Of the compiler. g++ 12.2 sums comparisons wrongly with its vectorizer of straight-line code.
-OPTIONS = ("-std=c++17", "-O2", "-fno-tree-slp-vectorize")
-
-#: Variables that change what g++ reads.
-SEARCHED = ("CPATH", "C_INCLUDE_PATH", "CPLUS_INCLUDE_PATH", "LIBRARY_PATH", "GCC_EXEC_PREFIX", "COMPILER_PATH")
+#: Of the compiler.
+OPTIONS = ("-std=c++17", "-O2", *SAFE)
 
 
 @dataclass(frozen=True)
@@ -92,7 +89,7 @@ def replay(
         files = [str(folder / name) for name in ("netlist", "stimulus", "outputs", "counts")]
         command = [str(program), *files[:2], str(len(stimulus)), str(len(prelude) + begin), *files[2:]]
         with progress.step("replaying on the gates") as report:
-            run_program(command, folder / "results", report)
+            run_program(command, folder, report)
         written = (folder / "outputs").read_bytes()
         counts = (folder / "counts").read_text().splitlines()
     found = [written[at : at + sizes[1]] for at in range(len(prelude) * sizes[1], len(written), sizes[1])]
@@ -103,25 +100,20 @@ def replay(
 def build(progress: Progress = QUIET) -> Path:
     """The simulator of gates, compiled once per state of its source, compiler and options."""
     source = Path(__file__).parents[1] / "harness" / "gates.cpp"
-    compiler = require_program("g++", "power")
-    parts = (source.read_bytes(), version_of(compiler).encode(), " ".join(OPTIONS).encode())
-    digest = hashlib.sha256(b"".join(f"{len(part)}:".encode() + part for part in parts)).hexdigest()[:20]
+    compiler, version = require_compiler("power")
+    parts = (source.read_text(), version, " ".join(OPTIONS))
+    digest = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
 
     def make(place: Path) -> None:
         with progress.step("building the simulator of gates"):
-            _compile(compiler, source, place / "gates")
+            require_right_compiler(compiler, OPTIONS[1:])
+            command = [compiler, *OPTIONS, "-o", place / "gates", source]
+            done = processes.run(command, env=clean_environment())
+        if done.returncode != 0:
+            raise RuntimeError(f"the simulator of gates does not build: {done.stderr[:300]}")
 
-    return (
-        cache.entry(cache_directory(project_root()) / "gates" / digest, make, "simulator of gates", progress) / "gates"
-    )
-
-
-def _compile(compiler: Path, source: Path, program: Path) -> None:
-    # g++ takes no options from variables; these add folders to those it searches
-    environment = {name: value for name, value in os.environ.items() if name not in SEARCHED}
-    done = processes.run([compiler, *OPTIONS, "-o", program, source], env=environment)
-    if done.returncode != 0:
-        raise RuntimeError(f"the simulator of gates does not build: {done.stderr[:300]}")
+    entry = cache_directory(project_root()) / "gates" / digest
+    return cache.entry(entry, make, "simulator of gates", progress) / "gates"
 
 
 def require_same(recording: Recording, found: Sequence[int]) -> None:
