@@ -6,6 +6,7 @@ straight-line code. `SAFE` switches that off, and `require_right_compiler` runs 
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from pathlib import Path
 from colonnade import processes
 from colonnade.errors import UserError
 from colonnade.temporary import temporary_folder
-from colonnade.toolchain import require_program, version_of
+from colonnade.toolchain import require_program
 
 #: Part of each compilation of C++ that Verilator or this package wrote.
 SAFE = ("-fno-tree-slp-vectorize",)
@@ -31,6 +32,16 @@ _CANARY = Path(__file__).parent / "harness" / "canary.cpp"
 def clean_environment() -> dict[str, str]:
     """The environment for compilers and make: CXXFLAGS, MAKEFLAGS and their like do not reach them."""
     return {name: os.environ[name] for name in KEPT_VARIABLES if name in os.environ}
+
+
+@functools.cache
+def version_of(program: Path) -> str:
+    """The first line that a program answers to ``--version``: a part of the key of all that it builds."""
+    try:
+        answer = processes.run([program, "--version"], env=clean_environment())
+    except OSError as error:
+        raise UserError(f"{program} cannot be run: {error.strerror}") from error
+    return (answer.stdout + answer.stderr).strip().partition("\n")[0]
 
 
 def require_verilator(purpose: str) -> tuple[Path, str]:

@@ -80,7 +80,7 @@ _is_leaving = False
 
 @contextlib.contextmanager
 def started(
-    command: Sequence[str | Path],
+    command: Sequence[object],
     *,
     cwd: Path | None = None,
     env: Mapping[str, str] | None = None,
@@ -88,6 +88,10 @@ def started(
     stderr: _Stream = None,
 ) -> Iterator[subprocess.Popen[str]]:
     """Start a program, without standard input, and wait for it after the block; it ends if the block fails.
+
+    Args:
+        command: the program and its arguments, strings or paths.
+        cwd, env, stdout, stderr: as of `subprocess.Popen`.
 
     Raises:
         Ended: the group of this thread has ended, before or meanwhile.
@@ -114,7 +118,7 @@ def started(
 
 
 def run(
-    command: Sequence[str | Path],
+    command: Sequence[object],
     *,
     cwd: Path | None = None,
     env: Mapping[str, str] | None = None,
@@ -124,12 +128,12 @@ def run(
     """Run a program to its end, as `subprocess.run` does; its output as text, unless it goes elsewhere."""
     with started(command, cwd=cwd, env=env, stdout=stdout, stderr=stderr) as process:
         output, errors = process.communicate()
-    return subprocess.CompletedProcess(command, process.returncode, output, errors)
+    return subprocess.CompletedProcess(list(map(str, command)), process.returncode, output, errors)
 
 
 def _start(
     group: Group | None,
-    command: Sequence[str | Path],
+    command: Sequence[object],
     cwd: Path | None,
     env: Mapping[str, str] | None,
     stdout: _Stream,

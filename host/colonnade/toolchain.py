@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import re
 import shutil
@@ -70,16 +69,6 @@ def _java_version(java: str) -> int | None:
         raise UserError(f"{java} cannot be run ({error.strerror}): mend JAVA_HOME or PATH") from error
     match = re.search(r'version "(\d+)', answer.stderr + answer.stdout)
     return int(match.group(1)) if match else None
-
-
-@functools.cache
-def version_of(program: Path) -> str:
-    """The first line that a program answers to ``--version``: a part of the key of all that it builds."""
-    try:
-        answer = processes.run([program, "--version"])
-    except OSError as error:
-        raise UserError(f"{program} cannot be run: {error.strerror}") from error
-    return (answer.stdout + answer.stderr).strip().partition("\n")[0]
 
 
 def require_program(name: str, purpose: str, package: str | None = None) -> Path:

@@ -18,7 +18,7 @@ from colonnade.generator import GeneratedDesign
 from colonnade.manifest import Manifest
 from colonnade.model import loaded_model, model_frame
 from colonnade.progress import QUIET, Progress
-from colonnade.simulate import build_simulator
+from colonnade.simulator_build import build_simulator
 
 #: Corrupt frames of one run of the simulator.
 BATCH = 100

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from colonnade.fuzz.cases import Case
 from colonnade.image import SceneImage
 from colonnade.manifest import Manifest
 from colonnade.simulate import PIXEL, run_program
+from colonnade.temporary import temporary_folder
 
 
 @dataclass(frozen=True)
@@ -43,15 +43,14 @@ def run_cases(
     Returns:
         The frames, and None; or those before the one at which the harness gave up, and what it said.
     """
-    with tempfile.TemporaryDirectory(prefix="colonnade-") as folder:
-        place = Path(folder)
+    with temporary_folder() as place:
         job, outputs = _write_job(place, manifest, cases, rows)
-        results, failure = place / "results", None
+        failure = None
         try:
-            run_program([str(program), str(job)], results, lambda share: None)
+            run_program([str(program), job.name], place, lambda share: None)
         except RuntimeError as error:
             failure = str(error)
-        values = _values(results)
+        values = _values(place / "results")
         return [
             _delivered(manifest, case, output, value)
             for case, output, value in zip(cases, outputs, values, strict=False)
@@ -62,7 +61,7 @@ def _write_job(place: Path, manifest: Manifest, cases: Sequence[Case], rows: int
     empty = place / "empty"
     depth, record_bytes = int(manifest.memories["columnBvh"]["depth"]), manifest.record_bits // 8
     empty.write_bytes(bytes(depth * record_bytes))
-    lines = [f"load {empty} {record_bytes}"]
+    lines = [f"load {empty.name} {record_bytes} 0"]
     readable = [register for register in manifest.registers.values() if register.access == "ro"]
     start = manifest.registers["control.start"].address
     loaded: dict[str, object] = {}
@@ -72,7 +71,8 @@ def _write_job(place: Path, manifest: Manifest, cases: Sequence[Case], rows: int
         for name, value in case.registers.items():
             lines += [f"write {address} {word}" for address, word in manifest.registers[name].encode(value)]
         outputs.append(place / f"pixels{number}")
-        lines.append(f"frame {outputs[-1]} {case.registers['frame.width']} {case.registers['frame.height']} {start}")
+        size = f"{case.registers['frame.width']} {case.registers['frame.height']}"
+        lines.append(f"frame {outputs[-1].name} {size} {start} {case.registers['frame.watchdogCycles']}")
         lines += [f"read {register.name} {register.address} {register.words}" for register in readable]
     job = place / "job"
     job.write_text("\n".join(lines) + "\n")
@@ -89,14 +89,14 @@ def _loads(
         records = place / f"records{name}"
         record_bytes = image.records.shape[1]
         records.write_bytes(image.records.tobytes() + bytes((rows - len(image.records)) * record_bytes))
-        lines.append(f"load {records} {record_bytes}")
+        lines.append(f"load {records.name} {record_bytes} 0")
     for section in image.attributes:
         if loaded.get(section.memory) is section.words:
             continue
         loaded[section.memory] = section.words
         words = place / f"{section.memory}{name}"
         words.write_bytes(section.words.tobytes())
-        lines.append(f"load {words} {section.words.shape[1]} {manifest.memories[section.memory]['target']}")
+        lines.append(f"load {words.name} {section.words.shape[1]} {manifest.memories[section.memory]['target']}")
     return lines
 
 

@@ -35,7 +35,7 @@ REST_PERIOD = 240
 
 
 #: Of the compiler.
-OPTIONS = ("-O2", *SAFE)
+OPTIONS = ("-std=c++17", "-O2", *SAFE)
 
 
 @dataclass(frozen=True)
@@ -101,23 +101,19 @@ def build(progress: Progress = QUIET) -> Path:
     """The simulator of gates, compiled once per state of its source, compiler and options."""
     source = Path(__file__).parents[1] / "harness" / "gates.cpp"
     compiler, version = require_compiler("power")
-    parts = (source.read_bytes(), version.encode(), " ".join(OPTIONS).encode())
-    digest = hashlib.sha256(b"".join(f"{len(part)}:".encode() + part for part in parts)).hexdigest()[:20]
+    parts = (source.read_text(), version, " ".join(OPTIONS))
+    digest = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
 
     def make(place: Path) -> None:
         with progress.step("building the simulator of gates"):
-            _compile(compiler, source, place / "gates")
+            require_right_compiler(compiler, OPTIONS[1:])
+            command = [compiler, *OPTIONS, "-o", place / "gates", source]
+            done = processes.run(command, env=clean_environment())
+        if done.returncode != 0:
+            raise RuntimeError(f"the simulator of gates does not build: {done.stderr[:300]}")
 
-    return (
-        cache.entry(cache_directory(project_root()) / "gates" / digest, make, "simulator of gates", progress) / "gates"
-    )
-
-
-def _compile(compiler: Path, source: Path, program: Path) -> None:
-    require_right_compiler(compiler, OPTIONS)
-    done = processes.run([compiler, "-std=c++17", *OPTIONS, "-o", program, source], env=clean_environment())
-    if done.returncode != 0:
-        raise RuntimeError(f"the simulator of gates does not build: {done.stderr[:300]}")
+    entry = cache_directory(project_root()) / "gates" / digest
+    return cache.entry(entry, make, "simulator of gates", progress) / "gates"
 
 
 def require_same(recording: Recording, found: Sequence[int]) -> None:
