@@ -16,6 +16,7 @@ from colonnade.errors import UserError
 from colonnade.generator import GeneratedDesign, design_for
 from colonnade.image import SceneImage
 from colonnade.meshes import Mesh, load_mesh
+from colonnade.model import loaded_model, model_frame
 from colonnade.pack import pack
 from colonnade.parallel import in_order
 from colonnade.placement import placement
@@ -89,49 +90,85 @@ def measure(runs: Sequence[Run], conditions: Conditions, progress: Progress = QU
         for name in dict.fromkeys(run.mesh for run in runs):
             meshes[name] = load_mesh(scene.with_mesh(name).mesh_source)
 
-    def one(run: Run) -> dict[str, Any]:
-        return _measured(run, scene, meshes[run.mesh], conditions, progress.of(run.title))
+    def prepare(run: Run) -> _Prepared:
+        return _prepared(run, scene, meshes[run.mesh], conditions, progress.of(run.title))
 
-    return in_order(one, runs, conditions.jobs)
+    def one(frame: _Prepared) -> dict[str, Any]:
+        return frame.known or _measured(frame, progress.of(frame.run.title))
+
+    prepared = list(in_order(prepare, runs, conditions.jobs))
+    return in_order(one, prepared, conditions.jobs, length=lambda frame: frame.visits)
 
 
-def _measured(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progress: Progress) -> dict[str, Any]:
+@dataclass(frozen=True)
+class _Prepared:
+    """A frame that is ready to be rendered.
+
+    Attributes:
+        run: what it belongs to.
+        design, image, registers: what it is rendered with.
+        key, kept: of its measurement in the cache.
+        known: the report of an earlier run, if there is one and it may be used.
+        visits: records that its rays visit, by the model of a small frame: the time it takes goes with them.
+        seconds: that packing took.
+    """
+
+    run: Run
+    design: GeneratedDesign
+    image: SceneImage
+    registers: dict[str, int]
+    key: dict[str, Any]
+    kept: Path
+    known: dict[str, Any] | None
+    visits: int
+    seconds: float
+
+
+def _prepared(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progress: Progress) -> _Prepared:
     scene = run.scene(scene)
     with _BUILDING:
         design = design_for(run.config, run.overrides, progress)
+    manifest = design.manifest
     width, height = conditions.size or (scene.frame.width, scene.frame.height)
-    check_size((width, height), design.manifest)
+    check_size((width, height), manifest)
     begun = time.perf_counter()
     try:
         with progress.step("packing the scene"):
-            image = pack(mesh, design.manifest, made_of(mesh.materials, scene.material))
-            registers = placement(scene, image.header, design.manifest, width, height)
+            image = pack(mesh, manifest, made_of(mesh.materials, scene.material))
+            registers = placement(scene, image.header, manifest, width, height)
     except UserError as error:
         raise UserError(": ".join((*run.overrides, str(error)))) from error
-    seconds = {"pack": time.perf_counter() - begun}
+    seconds = time.perf_counter() - begun
     key = _key(design, image, registers)
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
     kept = cache_directory(project_root()) / "measurements" / f"{name}.json"
-    if conditions.reuse and (known := cache.stored(kept, key, progress)) is not None:
-        return known | {
-            "config": design.manifest.config,
-            "config_hash": design.manifest.config_hash,
-            "mesh": mesh_report(image.header),
-        }
+    known = cache.stored(kept, key, progress) if conditions.reuse else None
+    visits = 0
+    if known is not None:
+        known |= {"config": manifest.config, "config_hash": manifest.config_hash, "mesh": mesh_report(image.header)}
+    elif conditions.jobs > 1:
+        small = placement(scene, image.header, manifest, max(1, width // 8), max(1, height // 8))
+        counters = model_frame(loaded_model(manifest, image), small).counters
+        visits = counters["nodeReads"] + counters["triangleTests"]
+    return _Prepared(run, design, image, registers, key, kept, known, visits, seconds)
+
+
+def _measured(frame: _Prepared, progress: Progress) -> dict[str, Any]:
+    design, image = frame.design, frame.image
     with _BUILDING:
         build_simulator(design, progress)
     begun = time.perf_counter()
-    simulated = render_rtl(design, image, [registers], progress=progress)
-    seconds["run"] = time.perf_counter() - begun
-    frame = simulated.frames[0]
-    require_no_errors(frame)
+    simulated = render_rtl(design, image, [frame.registers], progress=progress)
+    run_seconds = time.perf_counter() - begun
+    rendered = simulated.frames[0]
+    require_no_errors(rendered)
     report = {
-        **frame_report("rtl", design.manifest, image.header, frame),
+        **frame_report("rtl", design.manifest, image.header, rendered),
         "config_hash": design.manifest.config_hash,
         "cycles_per_second": simulated.cycles_per_second,
-        "seconds": seconds,
+        "seconds": {"pack": frame.seconds, "run": run_seconds},
     }
-    cache.store(kept, key, report, progress)
+    cache.store(frame.kept, frame.key, report, progress)
     return report
 
 

@@ -47,6 +47,12 @@ def test_results_come_in_order() -> None:
     assert list(in_order(work, [], 2)) == []
 
 
+def test_the_longest_work_begins_first() -> None:
+    begun: list[int] = []
+    assert list(in_order(lambda item: begun.append(item) or item, [1, 7, 3, 7, 5], 1, length=float)) == [1, 7, 3, 7, 5]
+    assert begun == [7, 7, 5, 3, 1]
+
+
 def test_nothing_new_is_begun_after_a_failure() -> None:
     begun: list[int] = []
 
