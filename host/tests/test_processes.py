@@ -153,6 +153,7 @@ def test_an_error_in_one_piece_of_work_ends_the_others() -> None:
     with pytest.raises(ValueError, match="wrong"):
         list(in_order(work, [0, 61, 61], 2))
     assert time.monotonic() - at < 4.0
+    wait_for(lambda: not processes._running, 3.0)
 
 
 def test_runs_programs_as_subprocess_does(tmp_path: Path) -> None:
