@@ -99,13 +99,15 @@ def test_two_at_a_time_compile_once(checkout: Path) -> None:
 def test_generate_replaces_only_a_design(checkout: Path, tmp_path: Path) -> None:
     output = tmp_path / "design"
     generator.generate("tiny", [], output)
-    (output / "old.sv").write_text("")
     generator.generate("tiny", [], output)
-    assert sorted(path.name for path in output.iterdir()) == ["manifest.json"]
+    assert sorted(path.name for path in output.iterdir()) == [".colonnade.sha256", "manifest.json"]
+    (output / "notes.txt").write_text("")
+    with pytest.raises(UserError, match=r"holds notes\.txt, which colonnade generate did not write"):
+        generator.generate("tiny", [], output)
     precious = tmp_path / "precious"
     precious.mkdir()
     (precious / "thesis.txt").write_text("")
-    with pytest.raises(UserError, match="not empty"):
+    with pytest.raises(UserError, match=r"no \.colonnade\.sha256"):
         generator.generate("tiny", [], precious)
     assert (precious / "thesis.txt").exists()
 
