@@ -68,8 +68,11 @@ def arrays_in(data: bytes, names: Sequence[str]) -> list[NDArray[Any]]:
 def _member(archive: zipfile.ZipFile, name: str) -> bytes:
     """Unpacked; no more than the largest picture may take, whatever the archive says."""
     most = MOST_PIXELS * _MOST_BYTES
+    too_large = ValueError(f"{name} is too large")
+    if archive.getinfo(name).file_size > most:
+        raise too_large
     with archive.open(name) as stream:
         content = stream.read(most + 1)
     if len(content) > most:
-        raise ValueError(f"{name} is too large")
+        raise too_large
     return content

@@ -166,13 +166,15 @@ def test_the_digest_of_a_kept_design_is_that_of_a_copy(checkout: Path, tmp_path:
 def test_generate_replaces_only_a_design(checkout: Path, tmp_path: Path) -> None:
     output = tmp_path / "design"
     generator.generate("tiny", [], output)
-    (output / "old.sv").write_text("")
     generator.generate("tiny", [], output)
-    assert sorted(path.name for path in output.iterdir()) == ["Top.sv", "manifest.json"]
+    assert sorted(path.name for path in output.iterdir()) == [".colonnade.sha256", "Top.sv", "manifest.json"]
+    (output / "notes.txt").write_text("")
+    with pytest.raises(UserError, match=r"holds notes\.txt, which colonnade generate did not write"):
+        generator.generate("tiny", [], output)
     precious = tmp_path / "precious"
     precious.mkdir()
     (precious / "thesis.txt").write_text("")
-    with pytest.raises(UserError, match="not empty"):
+    with pytest.raises(UserError, match=r"no \.colonnade\.sha256"):
         generator.generate("tiny", [], precious)
     assert (precious / "thesis.txt").exists()
 

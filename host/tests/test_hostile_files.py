@@ -95,6 +95,16 @@ def encrypted() -> bytes:
     return bytes(data)
 
 
+def bomb() -> bytes:
+    """Members that say they unpack to 4 GB."""
+    data = bytearray(npz(triangle=np.zeros((8, 8), np.int64), t=np.ones((8, 8))))
+    at = data.find(b"PK\x01\x02")
+    while at >= 0:
+        data[at + 24 : at + 28] = b"\xf0\xff\xff\xff"
+        at = data.find(b"PK\x01\x02", at + 4)
+    return bytes(data)
+
+
 HUGE = "{'descr': '<i8', 'fortran_order': False, 'shape': (1000000000, 1000000000)}"
 NUMBERS = np.zeros((8, 8), np.int64)
 CASES |= {
@@ -109,7 +119,7 @@ CASES |= {
     "npz-other-names": Case(HITS, "no hits file", {"x.npz": npz(a=NUMBERS)}),
     "npz-huge-shape": Case(HITS, "shape", {"x.npz": npz_of({"triangle.npy": npy(HUGE), "t.npy": npy(HUGE)})}),
     "npz-header-noise": Case(HITS, "header", {"x.npz": npz_of({"triangle.npy": npy("(" * 900), "t.npy": npy("1")})}),
-    "npz-bomb": Case(HITS, "too large", {"x.npz": npz_of({"triangle.npy": b"\0" * (2 * 4096 * 4096 * 16 + 9)})}),
+    "npz-bomb": Case(HITS, "too large", {"x.npz": bomb()}),
     "npz-noise": Case(HITS, "no hits file", {"x.npz": np.random.default_rng(2).bytes(2000)}),
     "npz-empty": Case(HITS, "no hits file", {"x.npz": b""}),
     "npz-cut": Case(HITS, "no hits file", {"x.npz": npz(triangle=NUMBERS, t=np.ones((8, 8)))[:-30]}),
@@ -224,6 +234,7 @@ CASES |= {
     "liberty-spaces": Case(
         "ppa --liberty 'a b;c.lib' --no-power", "a_b_c", {"a b;c.lib": LIBRARY.format("cell () { }")}
     ),
+    "liberty-is-output": Case(f"{PPA} --json x.lib", "would replace", {"x.lib": LIBRARY.format("")}),
     "liberty-none": Case("ppa --liberty none.lib", "no liberty none.lib"),
     "liberty-empty-folder": Case("ppa --liberty room", "holds no .lib"),
     "liberty-named-300": Case(f"ppa --liberty {'l' * 300}", "File name too long"),

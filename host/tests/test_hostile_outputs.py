@@ -13,7 +13,8 @@ from click.testing import CliRunner
 from hostile import PACK, RENDER, Case, fifo, hard_link_to, link_to, read_only
 
 from colonnade.cli import cli
-from colonnade.design_folder import MARKER, write_marker
+from colonnade.design_folder import MARKER, TITLE, check_replaceable, write_marker
+from colonnade.generator import manifest_for
 
 GENERATE = "generate --config tiny --manifest-only"
 LONG = "n" * 300
@@ -96,6 +97,9 @@ CASES |= {
     "albedo": Case("inspect --background room --no-dists --json room/albedo.png", "would replace room/albedo.png"),
     "depth": Case("inspect --background room --no-dists --json room/depth.npy", "would replace room/depth.npy"),
     "room-of-a-study": Case("study room --json room/normal.png", "would replace room/normal.png"),
+    "scene-of-verify": Case(
+        "verify --config tiny --mesh cube --no-rtl --no-reference --scene s.toml --json s.toml", "would replace s.toml"
+    ),
     # Another output of the same command
     "json-is-output": Case(f"{RENDER} --output f --json f", "two outputs"),
     "hits-is-output": Case(f"{RENDER} --output f --hits f", "two outputs"),
@@ -199,16 +203,24 @@ def test_generate_fills_an_empty_folder_but_not_the_working_directory(tmp_path: 
     hostile.one_error_line(done.stderr, "working directory")
 
 
-def test_marker_of_subfolders(tmp_path: Path) -> None:
-    """The Scala side lists names below the folder the same way (`GenerateSpec`)."""
-    output = generated(tmp_path)
-    (output / "sub").mkdir()
-    shutil.copy(output / "manifest.json", output / "sub" / "b.json")
-    write_marker(output)
-    lines = (output / MARKER).read_text().splitlines()
-    assert [line.split("  ")[1] for line in lines[1:]] == ["manifest.json", "sub/b.json"]
-    generated(tmp_path)
-    assert not (output / "sub").exists()
+def test_python_and_scala_know_each_others_folders(tmp_path: Path) -> None:
+    """`GenerateSpec` has the same two files and the same list."""
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "a").write_text("a\n")
+    (tmp_path / "sub" / "b").write_text("b\n")
+    write_marker(tmp_path)
+    assert (tmp_path / MARKER).read_text().splitlines() == [
+        TITLE,
+        "87428fc522803d31065e7bce3cf03fe475096631e5e07bbd7a0fde60c4cf25c7  a",
+        "0263829989b6fd954f72baaf2fc64bc2e2f01d692d4de72986ea808f6e99813f  sub/b",
+    ]
+    check_replaceable(tmp_path)
+    # What the generator itself wrote into the cache
+    written, copy = manifest_for("tiny").dir, tmp_path / "copy"
+    copy.mkdir()
+    for name in ("manifest.json", MARKER):
+        shutil.copy(written / name, copy / name)
+    check_replaceable(copy)
 
 
 def test_an_output_keeps_the_permissions_of_the_file_it_replaces(folder: Path, innocent_files: Path) -> None:

@@ -211,7 +211,7 @@ def test_depth_pictures_that_say_nothing(room: Path, picture: NDArray[np.generic
 def test_real_numbers_are_no_samples(room: Path) -> None:
     """A picture of floats, which says nothing of what white is."""
     Image.fromarray(np.full((48, 64), 0.4, np.float32)).save(room / "albedo.png", format="TIFF")
-    with pytest.raises(UserError, match=r"albedo\.png holds real numbers: give 8 or 16 bits"):
+    with pytest.raises(UserError, match=r"albedo\.png is no readable picture: give a PNG"):
         load_room(room)
 
 

@@ -46,9 +46,9 @@ object DesignMarker {
     val (folders, files) = found.partition(Files.isDirectory(_, NOFOLLOW_LINKS))
     val present          = files.map(relative(directory, _)).filter(_ != name).toSet
     val needed           = expected.keySet.flatMap(file => parents(file))
-    val extra = (present -- expected.keySet) ++ folders.map(relative(directory, _)).filterNot(needed)
-    val missing = expected.keySet -- present
-    val changed = (expected.keySet & present).filter(file => digest(directory.resolve(file)) != expected(file))
+    val extra            = (present -- expected.keySet) ++ folders.map(relative(directory, _)).filterNot(needed)
+    val missing          = expected.keySet -- present
+    val changed          = (expected.keySet & present).filter(file => digest(directory.resolve(file)) != expected(file))
     if (extra.nonEmpty) Some(unknown(extra.min))
     else if (missing.nonEmpty) Some(s"lacks ${missing.min}, which colonnade generate wrote")
     else if (changed.nonEmpty) Some(s"holds ${changed.min}, which was changed after colonnade generate wrote it")

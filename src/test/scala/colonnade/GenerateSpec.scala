@@ -1,7 +1,7 @@
 package colonnade
 
 import chisel3._
-import colonnade.config.ConfigIO
+import colonnade.config.{ConfigError, ConfigIO}
 import colonnade.formats.{Manifest, RegisterFile}
 import colonnade.numbers.Divider
 import org.scalatest.flatspec.AnyFlatSpec
@@ -69,7 +69,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
   }
 
   it should "know its own directories by the list of their files" in inScratch { scratch =>
-    val output = scratch.resolve("out")
+    val output        = scratch.resolve("out")
     def write(): Unit = OutputFiles.replaceDirectory(output) { fresh =>
       OutputFiles.writeFile(fresh.resolve("a"), "a\n")
       OutputFiles.writeFile(fresh.resolve("sub/b"), "b\n")

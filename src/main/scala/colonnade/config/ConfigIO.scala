@@ -229,7 +229,8 @@ object ConfigIO {
       try Paths.get(name)
       catch { case _: InvalidPathException => throw missing(s"'$name' is no configuration") }
     if (!Files.isRegularFile(path)) throw missing(s"there is no configuration '$name'")
-    if (Files.size(path) > mostBytes) throw new ConfigError(s"$name is too large: a configuration may have $mostBytes bytes")
+    if (Files.size(path) > mostBytes)
+      throw new ConfigError(s"$name is too large: a configuration may have $mostBytes bytes")
     try text(path)
     catch { case failure: IOException => throw new ConfigError(s"cannot read $name as text: ${failure.getMessage}") }
   }

@@ -27,8 +27,8 @@ private[config] object StrictJson {
     var at       = 0
     while (at < text.length) {
       text(at) match {
-        case '\\' if isString => at += 1
-        case '"'              => isString = !isString
+        case '\\' if isString       => at += 1
+        case '"'                    => isString = !isString
         case '[' | '{' if !isString =>
           depth += 1
           if (depth > mostDepth) throw new ConfigError(s"$source is nested too deeply: $mostDepth levels at most")
@@ -50,19 +50,19 @@ private[config] object StrictJson {
         private val fields = mutable.LinkedHashMap.empty[String, ujson.Value]
         private var key    = ""
 
-        def subVisitor: Visitor[_, _] = Values.this
+        def subVisitor: Visitor[_, _]           = Values.this
         def visitKey(index: Int): Visitor[_, _] = upickle.core.StringVisitor
-        def visitKeyValue(value: Any): Unit = {
+        def visitKeyValue(value: Any): Unit     = {
           key = value.toString
           if (fields.contains(key)) throw new ConfigError(s"$source has the key $key twice in an object")
         }
         def visitValue(value: ujson.Value, index: Int): Unit = fields(key) = value
-        def visitEnd(index: Int): ujson.Value = ujson.Obj.from(fields)
+        def visitEnd(index:   Int): ujson.Value              = ujson.Obj.from(fields)
       }
 
-    def visitNull(index: Int):  ujson.Value = ujson.Null
+    def visitNull(index:  Int): ujson.Value = ujson.Null
     def visitFalse(index: Int): ujson.Value = ujson.False
-    def visitTrue(index: Int):  ujson.Value = ujson.True
+    def visitTrue(index:  Int): ujson.Value = ujson.True
 
     def visitFloat64StringParts(number: CharSequence, point: Int, exponent: Int, index: Int): ujson.Value = {
       if (number.length > mostDigits) throw new ConfigError(s"$source has a number of ${number.length} characters")
