@@ -12,11 +12,11 @@ import hashlib
 import os
 import shutil
 import stat
-import tempfile
 from pathlib import Path
 
 from colonnade.errors import UserError, reason_of
 from colonnade.files import kind_of, make_folder
+from colonnade.temporary import replace, temporary_folder
 
 #: The list of a folder's files.
 MARKER = ".colonnade.sha256"
@@ -83,30 +83,15 @@ def replace_folder(source: Path, output: Path) -> None:
     """
     check_replaceable(output)
     make_folder(output.parent)
-    incoming: Path | None = None
     try:
-        incoming = Path(tempfile.mkdtemp(prefix=".colonnade.", dir=output.parent))
-        fresh = incoming / "fresh"
-        _copy(source, fresh)
-        write_marker(fresh)
-        if output.exists():
-            old = incoming / "old"
-            output.rename(old)
-            try:
-                fresh.rename(output)
-            except OSError:
-                old.rename(output)
-                raise
-            _remove_listed(old)
-        else:
-            fresh.rename(output)
+        with temporary_folder(".colonnade.", output.parent) as fresh:
+            _copy(source, fresh)
+            write_marker(fresh)
+            # Once more: copying took its time
+            check_replaceable(output)
+            replace(fresh, output)
     except OSError as error:
         raise UserError(f"cannot write {output}: {reason_of(error)}") from None
-    finally:
-        if incoming is not None:
-            shutil.rmtree(incoming / "fresh", ignore_errors=True)
-            with contextlib.suppress(OSError):
-                incoming.rmdir()
 
 
 def _check_place(output: Path) -> None:
@@ -180,21 +165,8 @@ def _digest(file: Path) -> str:
 
 
 def _copy(source: Path, target: Path) -> None:
-    """The files of the generator's list; all of them where there is none."""
+    """The files of the generator's list, into an empty folder; all of them where there is none."""
     marker = _read_marker(source / MARKER) if (source / MARKER).is_file() else None
-    target.mkdir()
     for name in sorted(marker) if marker is not None else listed(source):
         (target / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source / name, target / name)
-
-
-def _remove_listed(folder: Path) -> None:
-    """Remove what was checked; a file that came since then stays."""
-    names = _read_marker(folder / MARKER) if (folder / MARKER).is_file() else None
-    for name in [*(names or {}), MARKER]:
-        (folder / name).unlink(missing_ok=True)
-    for place, _, _ in os.walk(folder, topdown=False):
-        try:
-            Path(place).rmdir()
-        except OSError:
-            raise UserError(f"files came into the folder while it was replaced: they are in {folder}") from None

@@ -96,7 +96,7 @@ def generate(
 
 def source_hash(root: Path) -> str:
     """A short hash of everything the generator is compiled from."""
-    sources = [root / "build.sbt", root / "project" / "build.properties"]
+    sources = [*root.glob("*.sbt"), root / "project" / "build.properties", root / "project" / "dependencies.sha256"]
     sources += [*(root / "project").glob("*.sbt"), *(root / "project").glob("*.scala")]
     sources += [path for path in (root / "src" / "main").rglob("*") if path.is_file()]
     digest = hashlib.sha256()
