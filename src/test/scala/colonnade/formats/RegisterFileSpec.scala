@@ -10,7 +10,8 @@ import scala.util.Random
 class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "RegisterFile"
 
-  private val config: ColonnadeConfig = ConfigIO.load("tiny", Seq("precision=40b32s64d", "frame.materials=2", "frame.lights=2", "frame.maxBounces=4"))
+  private val config: ColonnadeConfig =
+    ConfigIO.load("tiny", Seq("precision=40b32s64d", "frame.materials=2", "frame.lights=2", "frame.maxBounces=4"))
   private val registers = RegisterMap(config)
   private val settings  = registers.filter(_.access == Access.ReadWrite)
 
