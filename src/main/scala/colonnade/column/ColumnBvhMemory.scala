@@ -19,12 +19,14 @@ final class ColumnBvhMemoryIO(config: ColonnadeConfig) extends Bundle {
 /** The records that the render units of a column share. Each bank answers one read a cycle, `readLatency` cycles later.
   *
   * A bank has a single port, for reads and loads exclude each other; cycles of latency beyond the first are spent before
-  * it, where a register holds an address and not a record. A bank that can be held has a queue for its answers.
+  * it, where a register holds an address and not a record. A bank that can be held has a queue for its answers. A load
+  * beyond the depth is dropped.
   */
 final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnBvhMemoryIO(config))
 
-  private val isForUs = io.load.valid && io.load.bits.target === LoadTarget.columnBvh(config)
+  private val isForUs = io.load.valid && io.load.bits.target === LoadTarget.columnBvh(config) &&
+    io.load.bits.address < config.columnBvhMemory.depth.U
   private val place   = io.load.bits.address(RecordFormats.addressBits(config) - 1, 0)
 
   for ((port, bank) <- io.banks.zipWithIndex) {
