@@ -27,7 +27,7 @@ final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
 
   private val isForUs = io.load.valid && io.load.bits.target === LoadTarget.columnBvh(config) &&
     io.load.bits.address < config.columnBvhMemory.depth.U
-  private val place   = io.load.bits.address(RecordFormats.addressBits(config) - 1, 0)
+  private val place = io.load.bits.address(RecordFormats.addressBits(config) - 1, 0)
 
   for ((port, bank) <- io.banks.zipWithIndex) {
     val records = SyncReadMem(Banks.depth(config), new RecordFormats(config).record)
