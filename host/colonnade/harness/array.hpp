@@ -59,12 +59,7 @@ public:
             Column_OUTPUTS(OUTWARD)
         }
         device.eval();
-        for (std::size_t i = 0; i < columns_.size(); ++i) {
-            const ColumnVariables& variables = columnVariables_[i];
-            VColumn& inner = *columns_[i];
-            Column_DIRECT(INWARD)
-            Column_INPUTS(INWARD)
-        }
+        intoColumns();
         for (std::size_t i = 0; i < units_.size(); ++i) {
             const RenderUnitVariables& variables = unitVariables_[i];
             VRenderUnitModel& inner = *units_[i];
@@ -78,18 +73,14 @@ public:
         unitsEdge(mayChangeRegisters);
     }
 
-    /// The edge of device and columns, without the units.
-    void outerEdge(bool mayChangeRegisters) {
-        flip(device);
-        for (std::size_t i = 0; i < columns_.size(); ++i) {
-            const ColumnVariables& variables = columnVariables_[i];
-            VColumn& inner = *columns_[i];
-            // Before the edge: the column hands them on to its units
-            if (mayChangeRegisters) { Column_REGISTERS(INWARD) }
-            flip(inner);
-        }
+    /// A cycle of device and columns while the units stand still: for loads, of which idle units see nothing.
+    void outerCycle() {
+        device.eval();
+        intoColumns();
+        outerEdge(true);
     }
 
+    /// Cycles of the units alone, as often as device and columns have moved without them.
     void unitsEdge(bool mayChangeRegisters) {
         for (std::size_t i = 0; i < units_.size(); ++i) {
             const RenderUnitVariables& variables = unitVariables_[i];
@@ -100,7 +91,7 @@ public:
         }
     }
 
-    /// Writes a record into the memory of each column, as the load port does.
+    /// Writes a record into the memory of each column, as the load port does; beyond the depth it is dropped.
     void store(std::uint64_t address, const void* record, std::size_t bytes) {
         for (auto& column : columns_) {
             unsigned bank = 0;
@@ -135,6 +126,26 @@ public:
     }
 
 private:
+    void intoColumns() {
+        for (std::size_t i = 0; i < columns_.size(); ++i) {
+            const ColumnVariables& variables = columnVariables_[i];
+            VColumn& inner = *columns_[i];
+            Column_DIRECT(INWARD)
+            Column_INPUTS(INWARD)
+        }
+    }
+
+    void outerEdge(bool mayChangeRegisters) {
+        flip(device);
+        for (std::size_t i = 0; i < columns_.size(); ++i) {
+            const ColumnVariables& variables = columnVariables_[i];
+            VColumn& inner = *columns_[i];
+            // Before the edge: the column hands them on to its units
+            if (mayChangeRegisters) { Column_REGISTERS(INWARD) }
+            flip(inner);
+        }
+    }
+
     template <class Model> static void flip(Model& model) {
         model.clock = !model.clock;
         model.eval();
@@ -149,8 +160,7 @@ private:
     static void storeInBank(Memory& memory, unsigned bank, std::uint64_t address, const void* record, std::size_t bytes) {
         if (address % banksOfColumn != bank) return;
         const std::uint64_t place = address / banksOfColumn;
-        if (place >= sizeof memory / sizeof memory[0]) throw std::runtime_error("a record beyond the column memory");
-        std::memcpy(&memory[place], record, bytes);
+        if (place < sizeof memory / sizeof memory[0]) std::memcpy(&memory[place], record, bytes);
     }
 
     std::vector<std::unique_ptr<VColumn>> columns_;

@@ -131,7 +131,7 @@ public:
             std::memset(&top_.io_load_bits_record, 0, port);
             std::memcpy(&top_.io_load_bits_record, word.data(), bytes);
             if (throughPort) cycle();
-            else array_.outerEdge(true);
+            else array_.outerCycle();
         }
         top_.io_load_valid = 0;
         if (throughPort) return;
