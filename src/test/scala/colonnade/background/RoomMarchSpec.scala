@@ -3,7 +3,7 @@ package colonnade.background
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{Load, RoomView}
 import colonnade.numbers.StreamTester
 import colonnade.traversal.{Packed, PackedUnit}
@@ -135,7 +135,11 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             isSlow = round == 1
           )
         }
-        assert(answers.flatten.map(_("isIllegal").toInt).distinct.size == 2, "legal and illegal tiles")
+        val found = answers.flatten.map(_("isIllegal").toInt).toSet
+        // Of the largest heaps, too few pointers lead out
+        val words  = size.layout.mapHeapWords.min(size.layout.planeHeapWords)
+        val isFull = words > (1 << AttributeLayout.pointerBits) - 64
+        assert(found(0) && (isFull || found(1)), "legal and illegal tiles")
       }
     }
   }
