@@ -67,7 +67,7 @@ def test_full_disk_is_one_line_and_leaves_nothing(folder: Path, arguments: str) 
         before = hostile.snapshot(folder)
         done = colonnade(folder, arguments)
         assert done.returncode == 2
-        hostile.one_error_line(done.stderr, "No space left")
+        hostile.one_error_line(done.stderr, "o space left on ")
         assert hostile.snapshot(folder) == before
 
 
