@@ -31,6 +31,9 @@ die() {
   exit 2
 }
 
+# A class path and PATH are lists whose parts a colon separates.
+case "$root" in *:*) die "the checkout's path $root holds a colon, which Java and Python's venv take for a separator; move it" ;; esac
+
 has() { command -v "$1" >/dev/null 2>&1; }
 
 # Whether version $1 is $2 or newer.

@@ -11,10 +11,12 @@ from pathlib import Path
 
 from colonnade import cache, processes
 from colonnade.compiler import SAFE, clean_environment, require_compiler, require_right_compiler, require_verilator
+from colonnade.errors import UserError
 from colonnade.generator import GeneratedDesign
 from colonnade.manifest import Manifest
 from colonnade.progress import QUIET, Progress
 from colonnade.simulator_sources import DEVICE, write_sources
+from colonnade.temporary import temporary_folder
 from colonnade.toolchain import cache_directory, project_root, require_program
 
 PROGRAM = "simulator"
@@ -29,6 +31,10 @@ VERILATOR_OPTIONS = (
 OPTIMISATION = ("-O2",)
 
 _HARNESS = ("harness.cpp", "array.hpp")
+
+#: What make and the shell take for one word.
+_PLAIN_PATH = re.compile(r"[\w/.+@%,-]+", re.ASCII)
+
 _PURPOSE = "the rtl backend (--backend model needs no simulator)"
 
 
@@ -73,24 +79,24 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path
 
 
 def _build(tools: Tools, design: GeneratedDesign, harness: Path, place: Path, log: Path) -> None:
-    """Leaves nothing but the program in `place`. All paths are relative to it: it may have any name."""
-    work = place / "build"
-    work.mkdir()
-    models = write_sources(design.sources, work)
-    (work / "ports.hpp").write_text(_ports_header(design.manifest, design.sources))
-    for name in _HARNESS:
-        shutil.copy(harness / name, work / name)
-    commands = [_verilate(tools, top, [path.relative_to(work) for path in paths]) for top, paths in models.items()]
-    inner = [top for top in models if top != DEVICE]
-    commands[-1] += ["--exe", "-o", PROGRAM, "harness.cpp", "-CFLAGS", " ".join(f"-I../obj_{top}" for top in inner)]
-    commands[-1] += ["-CFLAGS", "-I..", "-LDFLAGS", " ".join(f"../obj_{top}/V{top}__ALL.a" for top in inner)]
-    with log.open("w") as stream:
-        for command in commands:
-            status = processes.run(command, cwd=work, env=clean_environment(), stdout=stream, stderr=stream).returncode
-            if status != 0:
-                raise RuntimeError(f"the simulator does not build (status {status}): see {log}")
-    (work / f"obj_{DEVICE}" / PROGRAM).rename(place / PROGRAM)
-    shutil.rmtree(work)
+    """Put the program into the folder `place`. It is built elsewhere: make cannot work in a path with spaces."""
+    with temporary_folder() as work:
+        if not _PLAIN_PATH.fullmatch(str(work)):
+            raise UserError(f"a simulator cannot be built in {work.parent.parent}: name a plain path with TMPDIR")
+        models = write_sources(design.sources, work)
+        (work / "ports.hpp").write_text(_ports_header(design.manifest, design.sources))
+        for name in _HARNESS:
+            shutil.copy(harness / name, work / name)
+        commands = [_verilate(tools, top, [path.relative_to(work) for path in paths]) for top, paths in models.items()]
+        inner = [top for top in models if top != DEVICE]
+        commands[-1] += ["--exe", "-o", PROGRAM, "harness.cpp", "-CFLAGS", " ".join(f"-I../obj_{top}" for top in inner)]
+        commands[-1] += ["-CFLAGS", "-I..", "-LDFLAGS", " ".join(f"../obj_{top}/V{top}__ALL.a" for top in inner)]
+        with log.open("w") as stream:
+            for command in commands:
+                done = processes.run(command, cwd=work, env=clean_environment(), stdout=stream, stderr=stream)
+                if done.returncode != 0:
+                    raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
+        shutil.move(work / f"obj_{DEVICE}" / PROGRAM, place / PROGRAM)
     log.unlink()
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -10,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from colonnade import cache, simulator_build
-from colonnade.generator import GeneratedDesign
+from colonnade.errors import UserError
+from colonnade.generator import GeneratedDesign, design_for
 from colonnade.progress import Progress, Report
 from colonnade.simulator_build import PROGRAM, Tools, build_simulator
 
@@ -114,3 +117,27 @@ def test_a_failed_build_leaves_nothing_but_its_log(builder: Builder, tmp_path: P
     assert not [path for path in (tmp_path / "simulator").iterdir() if path.suffix not in (".lock", ".log")]
     builder.fails = False
     assert build_simulator(Design()).read_text() == "build 2"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["a b", "it's", "x;y", "a`b`", "c#d", "e:f", 'g"h', "i\\j", "k$l"])
+def test_a_place_that_make_cannot_work_in_is_refused(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / name
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    tools = Tools(Path("verilator"), Path("g++"), ("", ""))
+    with pytest.raises(UserError, match=r"^a simulator cannot be built in .*: name a plain path with TMPDIR$"):
+        simulator_build._build(tools, Design(), tmp_path, tmp_path, tmp_path / "log")  # type: ignore[arg-type]
+    assert not any(folder.iterdir())
+
+
+@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.matrix
+def test_a_checkout_may_have_any_name(tmp_path: Path) -> None:
+    place = tmp_path / "o'd d`touch pwn`;\"#:x\\y"
+    place.mkdir()
+    harness = Path(simulator_build.__file__).parent / "harness"
+    simulator_build._build(simulator_build.simulator_tools(), design_for("tiny"), harness, place, place / "log")
+    assert [path.name for path in place.iterdir()] == [PROGRAM]
+    assert [path for folder in (tmp_path, place, Path.cwd()) for path in folder.glob("pwn*")] == []
