@@ -31,8 +31,10 @@ die() {
   exit 2
 }
 
-# A class path and PATH are lists whose parts a colon separates.
-case "$root" in *:*) die "the checkout's path $root holds a colon, which Java and Python's venv take for a separator; move it" ;; esac
+# Java, CMake and make take these characters of a path for separators, quotes or commands.
+case "$root" in
+  *[:\;\"\'\`\#\$\\\&\|\<\>\(\)\*\?]*) die "the checkout's path $root holds a character that Java or CMake cannot work with; move it" ;;
+esac
 
 has() { command -v "$1" >/dev/null 2>&1; }
 
