@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from collections import deque
 from collections.abc import Mapping
@@ -19,6 +20,9 @@ from colonnade.manifest import Manifest
 from colonnade.progress import QUIET, Progress, Report
 from colonnade.simulator_build import build_simulator
 from colonnade.temporary import temporary_folder
+
+#: The state of an array is megabytes that each cycle passes over: with small pages it misses the TLB.
+HUGE_PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 
 #: One pixel as the harness writes it (``struct PixelBytes``).
 PIXEL = np.dtype(
@@ -151,7 +155,8 @@ def run_program(command: list[str], place: Path, report: Report) -> list[str]:
     """What the harness prints when it runs in the folder `place`, as lines; its progress goes to `report`."""
     said: deque[str] = deque(maxlen=5)
     with (place / "results").open("w") as output:
-        with processes.started(command, cwd=place, stdout=output, stderr=subprocess.PIPE) as process:
+        environment = os.environ | HUGE_PAGES
+        with processes.started(command, cwd=place, env=environment, stdout=output, stderr=subprocess.PIPE) as process:
             assert process.stderr is not None
             for line in process.stderr:
                 if line.startswith("progress "):
