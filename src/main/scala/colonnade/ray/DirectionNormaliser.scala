@@ -2,6 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable}
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
 

@@ -2,6 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.{Counter, Decoupled, RegEnable}
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{Camera, Vec3}
 import colonnade.numbers.{Fixed, Rounding}

@@ -1,7 +1,7 @@
 package colonnade.ray
 
 import chisel3._
-import chisel3.util.log2Ceil
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.Vec3
 import colonnade.numbers.{Fixed, FixedPointFormat, Rounding}
@@ -32,11 +32,6 @@ final class RayFormats(numbers: NumberFormats) {
   val weight: FixedPointFormat = FixedPointFormat.unsigned(numbers.barycentricBits, numbers.barycentricBits)
 
   val exponentBits: Int = NumberFormats.bitLength(numbers.reciprocalFraction)
-}
-
-/** Names a ray in flight in its render unit. */
-object Context {
-  def apply(config: ColonnadeConfig): UInt = UInt(log2Ceil(config.array.contexts.max(2)).W)
 }
 
 /** A ray as it is asked for. `towards` is its direction, of any scale. A shadow ray ends at origin + towards, the light. */

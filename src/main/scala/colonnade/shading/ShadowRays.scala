@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{Light, Vec3}
 import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.{Context, RayFormats, RayRequest}
-import colonnade.unit.ContextTable
+import colonnade.ray.{RayFormats, RayRequest}
 
 /** A light that a surface wants to know about. */
 final class ShadowQuestion(config: ColonnadeConfig) extends Bundle {

@@ -2,10 +2,11 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Mux1H, PopCount, Queue, RegEnable, ShiftRegister}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{ChildKind, RecordFormats}
 import colonnade.numbers.Fixed
-import colonnade.ray.{Context, RayFormats}
+import colonnade.ray.RayFormats
 
 /** Ports of [[BoxUnit]]. */
 final class BoxUnitIO(config: ColonnadeConfig) extends Bundle {

@@ -2,9 +2,9 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordFormats, SceneMap}
-import colonnade.ray.Context
 
 /** The baseline without acceleration structure: every ray visits every triangles record, in the order of the memory.
   *

@@ -2,8 +2,8 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{isPow2, log2Ceil, Cat}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.ray.Context
 
 /** A sibling that waits. */
 private[traversal] final class StackEntry(config: ColonnadeConfig) extends Bundle {

@@ -2,9 +2,10 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.{Context, RayFormats}
+import colonnade.ray.RayFormats
 
 /** What a ray does next. */
 final class NextVisit(config: ColonnadeConfig) extends Bundle {

@@ -1,10 +1,11 @@
 package colonnade.traversal
 
 import chisel3._
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.RecordFormats
 import colonnade.numbers.{Fixed, FixedPointFormat, Normalise}
-import colonnade.ray.{Context, RayFormats}
+import colonnade.ray.RayFormats
 
 /** Widths between the steps of the triangle test; docs/numbers.md, section 4. A depth is a vertex's z in the ray's
   * frame, a rise is a depth less that of vertex 0.

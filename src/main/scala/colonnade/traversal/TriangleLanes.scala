@@ -2,8 +2,8 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, PopCount, RRArbiter}
+import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
-import colonnade.frame.Dispatcher
 
 /** Ports of [[TriangleLanes]]. */
 final class TriangleLanesIO(config: ColonnadeConfig) extends Bundle {

@@ -2,8 +2,8 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.ray.Context
 
 final class TriangleUnitIO(config: ColonnadeConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))

@@ -2,10 +2,11 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.Valid
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
-import colonnade.ray.{Context, RayFormats}
+import colonnade.ray.RayFormats
 import colonnade.shading.Occlusion
 import colonnade.traversal.{LimitUnits, TriangleHit, TriangleResult}
 

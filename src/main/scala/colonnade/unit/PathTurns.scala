@@ -2,11 +2,12 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
-import colonnade.background.RememberedRay
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
+import colonnade.environment.RememberedRay
 import colonnade.formats.Shading
-import colonnade.ray.{Context, RayRequest}
-import colonnade.shading.{BounceResult, BouncedRay, PathTurn}
+import colonnade.ray.RayRequest
+import colonnade.shading.{BouncedRay, BounceResult, PathTurn}
 
 /** What a room adds to [[PathTurns]]. */
 final class RoomTurns(config: ColonnadeConfig) extends Bundle {

@@ -13,9 +13,9 @@ import chisel3.util.{
   RegEnable,
   Valid
 }
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordFormats, SceneMap}
-import colonnade.ray.Context
+import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 
 /** What a context wants a record for: the unit that takes it. */
 object RecordUse extends ChiselEnum {

@@ -2,11 +2,12 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, Arbiter, Decoupled, Pipe, PopCount, Queue, RegEnable, Valid}
-import colonnade.background.{AttributePort, RoomStage, RoomStageIO}
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats}
+import colonnade.environment.{AttributePort, RoomStage, RoomStageIO}
+import colonnade.formats.{FrameRegisters, Pixel, PixelHit, PixelPosition, RecordFormats}
 import colonnade.numbers.Rounding
-import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
+import colonnade.ray.{RayGenerator, RayRequest, RaySetup, TracedRay}
 import colonnade.shading.{ColourUnit, PathColour, Shader, ShadowRays}
 import colonnade.traversal.{TriangleLanes, Visit}
 

@@ -2,10 +2,11 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
 import colonnade.numbers.Fixed
-import colonnade.ray.{BoxRay, Context, RayFormats}
+import colonnade.ray.{BoxRay, RayFormats}
 import colonnade.traversal.{BoxUnit, ExhaustiveWalk, NextVisit, TraversalStack, Visit}
 
 /** Which record each ray visits next: BoxUnit and TraversalStack, or without a BVH the exhaustive walk. */

@@ -1,7 +1,7 @@
 package colonnade.traversal
 
-import colonnade.config.ColonnadeConfig
 import colonnade.Model
+import colonnade.config.ColonnadeConfig
 
 import scala.util.Random
 

@@ -1,8 +1,8 @@
 package colonnade.traversal
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
+import colonnade.{Packed, PackedStreams, PackedUnit, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random

@@ -2,10 +2,10 @@ package colonnade.traversal
 
 import chisel3._
 import chiseltest._
-import colonnade.{Model, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
+import colonnade.{Model, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random

@@ -1,8 +1,8 @@
 package colonnade.traversal
 
 import chiseltest._
-import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 

@@ -2,10 +2,10 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
-import colonnade.{Model, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.FixedPorts._
 import colonnade.shading.Occlusion
+import colonnade.{Model, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random

@@ -2,12 +2,12 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
-import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{NodeRecord, RecordFormats}
 import colonnade.numbers.FixedPorts._
 import colonnade.ray.BoxRay
-import colonnade.traversal.{Packed, SmallTree, StackReference}
+import colonnade.traversal.{SmallTree, StackReference}
+import colonnade.{Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.collection.mutable
