@@ -5,7 +5,7 @@ import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.RoomView
-import colonnade.shading.RoomSurface
+import colonnade.shading.EnvironmentSurface
 
 /** The ray of a context that may meet the room. */
 final class RememberedRay(config: ColonnadeConfig) extends Bundle {
@@ -26,7 +26,7 @@ final class RoomStageIO(config: ColonnadeConfig) extends Bundle {
   val question = Flipped(Decoupled(new RoomQuestion(config)))
 
   /** The answer: a point to be lit, or a context whose ray meets nothing. */
-  val surface = Decoupled(new RoomSurface(config))
+  val surface = Decoupled(new EnvironmentSurface(config))
   val nothing = Valid(Context(config))
   val maps    = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
   val events  = Output(new MarchEvents)

@@ -2,86 +2,134 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.log2Ceil
+import colonnade.config.ColonnadeConfig
 
-/** What is multiplied in a step: at most one of these. A product takes as many cycles as a factor has digits. */
-final class BounceFactors extends Bundle {
-  val squareNormal = Bool()
-  val project      = Bool()
-  val squareRay    = Bool()
-  val parallel     = Bool()
-  val acrossTwice  = Bool()
-  val across       = Bool()
-  val whole        = Bool()
-  val upright      = Bool()
-  val squareEta    = Bool()
-  val bend         = Bool()
-  val etaAlong     = Bool()
-  val etaSquare    = Bool()
-  val side         = Bool()
-  val offset       = Bool()
-  val lengths      = Bool()
-  val power        = Bool()
-  val powerSquare  = Bool()
-  val powerRest    = Bool()
+/** The product of a step: at most one of these. n is the normal, d the ray's direction, c = −n·d the cosine up to a
+  * factor. A product takes as many cycles as a factor has digits.
+  */
+final class BounceProducts extends Bundle {
+
+  /** n·n, −n·d, d·d; a component at a time. */
+  val squareNormal     = Bool()
+  val dotNormalRay     = Bool()
+  val squareRay        = Bool()
+  val directionScale   = Bool()
+  val twiceNormalScale = Bool()
+  val normalScale      = Bool()
+
+  /** |n|²·|d|², c², η², η²·sin². */
+  val squaredLengths = Bool()
+  val squaredCosine  = Bool()
+  val etaSquared     = Bool()
+  val etaTerm        = Bool()
+
+  /** η·c, η·|n|². */
+  val etaCosine       = Bool()
+  val etaNormal       = Bool()
+  val hemisphereCheck = Bool()
+  val scaleOffset     = Bool()
+  val normProduct     = Bool()
+
+  /** Schlick's power of x = 1 − cosine: the sum times x, the sum squared, the sum times 1 − reflectance. */
+  val timesOneMinusCosine      = Bool()
+  val squarePower              = Bool()
+  val timesOneMinusReflectance = Bool()
 
   def any: Bool = asUInt.orR
 
   /** A factor has more than two digits. */
-  def isLong: Bool = bend || offset
+  def isLong: Bool = etaTerm || scaleOffset
+
+  def all: Seq[Bool] = elements.values.toSeq.map(_.asInstanceOf[Bool])
 }
 
-/** What else happens in a step, in the first of its cycles. */
-final class BounceWork extends Bundle {
+/** The other actions of a step; they happen in its first cycle. */
+final class BounceActions extends Bundle {
 
   /** Double the normal while its largest component is too short. */
-  val normalise = Bool()
+  val normaliseNormal = Bool()
 
-  // The adder: at most one of these
-  val accumulate     = Bool()
-  val takeProduct    = Bool()
-  val lengthen       = Vec(3, Bool())
-  val lengthenAgain  = Vec(3, Bool())
-  val lessUpright    = Bool()
-  val lessBent       = Bool()
-  val takeRoot       = Bool()
-  val pushOrigin     = Bool()
-  val away           = Bool()
-  val addReflectance = Bool()
+  // The adder: at most one of these. The two scalings double the sum, depending on the exponent
+  val accumulate        = Bool()
+  val loadProduct       = Bool()
+  val scaleCosine       = Vec(3, Bool())
+  val scaleDiscriminant = Vec(3, Bool())
+  val squaredSine       = Bool()
+  val discriminant      = Bool()
+  val subtractRoot      = Bool()
+  val shiftInOrigin     = Bool()
+  val oneMinusCosine    = Bool()
+  val addReflectance    = Bool()
 
-  /** Accumulate from the first product on; subtract what is accumulated. */
-  val first    = Bool()
+  /** With `accumulate`: the product is the first one of a sum; subtract it. */
+  val startSum = Bool()
   val subtract = Bool()
 
   // Registers that take the sum or the product
-  val keepSquare     = Bool()
-  val keepAlong      = Bool()
-  val keepRay        = Bool()
-  val keepWhole      = Bool()
-  val keepSquareEta  = Bool()
-  val keepParallel   = Bool()
-  val keepAcross     = Bool()
-  val pushReflection = Bool()
-  val pushRefraction = Bool()
+  val latchNormalSquared  = Bool()
+  val latchCosine         = Bool()
+  val latchRaySquared     = Bool()
+  val latchSquaredLengths = Bool()
+  val latchEtaSquared     = Bool()
+  val latchDirectionScale = Bool()
+  val latchNormalScale    = Bool()
+  val shiftInReflection   = Bool()
+  val shiftInRefraction   = Bool()
 
   // Root and quotient; the program waits for them
-  val root         = Bool()
-  val cosineRoot   = Bool()
-  val divide       = Bool()
-  val takeQuotient = Bool()
-  val lower        = Bool()
+  val startRoot       = Bool()
+  val startCosineRoot = Bool()
+  val divide          = Bool()
+  val latchQuotient   = Bool()
+  val shiftQuotient   = Bool()
+
+  /** Signals that choose the adder's operands. */
+  def additions: Seq[Bool] = Seq(accumulate, loadProduct) ++ scaleCosine ++ scaleDiscriminant ++
+    Seq(squaredSine, discriminant, subtractRoot, shiftInOrigin, oneMinusCosine, addReflectance)
 }
 
-/** What the bounce datapath does in one cycle. Registers that nothing here names keep their values. */
+/** Control signals of the bounce datapath for one cycle. A register that no signal names keeps its value. */
 final class BounceControl(formats: BounceFormats) extends Bundle {
   val load = Bool()
 
   /** Take the geometric normal. */
   val startOver = Bool()
 
-  val factors = new BounceFactors
+  val products = new BounceProducts
 
-  /** Which digit is multiplied: the step begins with the first one, and ends with number 0. */
+  /** The digit to multiply. A step begins with the highest digit and ends with digit 0. */
   val isFirst = Bool()
   val digit   = UInt(log2Ceil(formats.longDigits).W)
-  val work    = new BounceWork
+  val actions = new BounceActions
+}
+
+/** What the program needs to know about the datapath. */
+final class BounceStatus extends Bundle {
+
+  /** Of the sum. */
+  val isPositive = Bool()
+  val isNegative = Bool()
+
+  /** The root or quotient that was started is ready. */
+  val rootIsReady = Bool()
+
+  /** The dot product's top bit is set. */
+  val dotIsNormalised = Bool()
+
+  /** The quotient is in its place. */
+  val quotientIsShifted = Bool()
+}
+
+/** Ports of [[BounceDatapath]]. */
+final class BounceDatapathIO(config: ColonnadeConfig) extends Bundle {
+  val control = Input(new BounceControl(new BounceFormats(config.numbers)))
+  val request = Input(new BounceRequest(config))
+  val offset  = Input(UInt((config.numbers.gridBits - 2).W))
+
+  /** The ray enters the material that it hits. */
+  val isRefraction = Input(Bool())
+  val status       = Output(new BounceStatus)
+
+  /** Constant from the program's last step on. */
+  val result = Output(new BounceResult(config))
 }

@@ -7,7 +7,7 @@ import colonnade.formats.{FrameRegisters, Vec3}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 import colonnade.ray.RayFormats
 
-/** Widths of reflection and refraction, by the bounds that docs/bounce.md gives for what they hold. */
+/** Widths of reflection and refraction, from the bounds in docs/bounce.md. */
 final class BounceFormats(numbers: NumberFormats) {
   val shadeBits: Int = numbers.shadeBits
 
@@ -15,35 +15,35 @@ final class BounceFormats(numbers: NumberFormats) {
   val componentBits: Int = shadeBits + 1
 
   /** A component of a normal that is turned against the ray, signed. */
-  val facingBits: Int = NumberFormats.normalBits + 1
+  val faceForwardBits: Int = NumberFormats.normalBits + 1
 
-  /** A component of the ray that goes on, signed. */
+  /** A component of the outgoing ray's direction, signed. */
   val bounceBits: Int = shadeBits + 5
 
-  /** The factors of the ray's direction (unsigned) and of the normal (signed) whose sum goes on: in a refraction with
-    * three bits more than in a reflection, the index's integer part.
+  /** Factors of the ray's direction (unsigned) and of the normal (signed) in the outgoing direction. A refraction needs
+    * three bits more than a reflection, for the integer part of the index.
     */
-  val parallelBits: Int = shadeBits + 3
-  val acrossBits:   Int = shadeBits + 5
+  val directionScaleBits: Int = shadeBits + 3
+  val normalScaleBits:    Int = shadeBits + 5
 
   /** The cosine's factor in a reflection, and the direction's squared length; unsigned. */
-  val alongBits:  Int = shadeBits + 1
+  val cosineBits: Int = shadeBits + 1
   val squareBits: Int = shadeBits + 1
 
-  /** A squared index, unsigned. */
+  /** A squared relative index of refraction, unsigned. */
   val etaSquareBits: Int = 2 * NumberFormats.etaBits - NumberFormats.etaFraction
 
-  /** Low bits that squared lengths lose so that they fit the multiplier, and how long they are before: unsigned. */
+  /** The product of two squared lengths, unsigned; and the low bits that it drops to fit the multiplier. */
   val lengthBits: Int = 2 * shadeBits + 1
   val low:        Int = (lengthBits - numbers.rootBits).max(0)
 
-  /** How many times a squared length is quartered, at most, to fit the square root. */
+  /** The most times that a discriminant is divided by four to fit the square root. */
   val quarters: Int = ((lengthBits - numbers.radicandBits + 1) / 2).max(0)
 
-  /** Factors, signed: one at once, the other one digit by digit, most significant first. Most need two digits, long ones
-    * (a squared length, an offset) more.
+  /** Factors, signed. The wide one is multiplied as a whole, the long one digit by digit, most significant first. Most
+    * need two digits; a squared length and an offset need more.
     */
-  val wideBits:   Int = acrossBits.max(etaSquareBits + 1)
+  val wideBits:   Int = normalScaleBits.max(etaSquareBits + 1)
   val digitBits:  Int = 11
   val digits:     Int = 2
   val longBits:   Int = (numbers.gridBits - 1).max(numbers.rootBits + 1).max(digits * digitBits)
@@ -52,8 +52,7 @@ final class BounceFormats(numbers: NumberFormats) {
 
   val productBits: Int = wideBits + longBits
 
-  /** Signed: a dot product and a bit to tell its length by; what is left of a squared length after an index's square;
-    * an offset's product.
+  /** The widest of: a dot product with one bit to measure its length, the discriminant, and the offset's product; signed.
     */
   val sumBits: Int = (2 * shadeBits + 3).max(numbers.rootBits + 8).max(numbers.gridBits + 10)
 }
@@ -65,33 +64,35 @@ final class BounceRequest(config: ColonnadeConfig) extends Bundle {
 
   val context = Context(config)
 
-  /** Where a reflection starts, off the surface: the hit point plus nearestEven(offset · facing); grid steps. */
+  /** A reflection's origin: the hit point plus nearestEven(offset · faceForwardNormal); grid steps. */
   val origin = Vec3(SInt(new ShaderFormats(numbers).pointBits.W))
 
-  /** The shading normal, turned against the ray; its largest component takes `shadeBits` bits, or it is zero. */
+  /** The shading normal, turned against the ray; its largest component has `shadeBits` bits, or it is zero. */
   val normal = Vec3(SInt(formats.componentBits.W))
 
-  /** `normal` is the vertices', and not yet the geometric one. */
+  /** `normal` is interpolated from the vertices' normals; otherwise it is the geometric one. */
   val isSmooth = Bool()
 
   /** The geometric normal, turned against the ray. */
-  val facing = Vec3(SInt(formats.facingBits.W))
+  val faceForwardNormal = Vec3(SInt(formats.faceForwardBits.W))
 
   /** The ray's direction, its dominant component ±2^(shadeBits − 1). */
-  val towards  = Vec3(SInt(formats.componentBits.W))
+  val dir = Vec3(SInt(formats.componentBits.W))
+
+  /** The ray hits the back of the triangle. */
   val backSide = Bool()
 
-  /** Otherwise it is a mirror; then nothing below matters. */
+  /** Glass, or a mirror, which ignores the fields below. */
   val isGlass = Bool()
 
-  /** Of the side that the ray comes from. */
+  /** The relative index of refraction, for a ray from this side. */
   val eta = new Fixed(FixedPointFormat.unsigned(NumberFormats.etaBits, NumberFormats.etaFraction))
 
-  /** Head-on. */
+  /** At normal incidence. */
   val reflectance = FrameRegisters.share
 }
 
-/** Where a ray goes on. */
+/** The ray that leaves a mirror or glass. */
 final class BounceResult(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
 
@@ -100,9 +101,9 @@ final class BounceResult(config: ColonnadeConfig) extends Bundle {
   val origin       = Vec3(new Fixed(new RayFormats(numbers).scene))
 
   /** The direction, of any scale. */
-  val towards = Vec3(SInt(numbers.directionBits.W))
+  val dir = Vec3(SInt(numbers.directionBits.W))
 
-  /** Where a refracted ray's reflected share comes from; 0 is none. */
+  /** The direction of a refracted ray's reflection, and its Fresnel term; a term of 0: there is no reflection. */
   val reflection = Vec3(SInt(new BounceFormats(numbers).bounceBits.W))
-  val share      = FrameRegisters.share
+  val fresnel    = FrameRegisters.share
 }

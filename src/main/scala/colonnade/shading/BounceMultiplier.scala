@@ -4,21 +4,22 @@ import chisel3._
 import chisel3.util.{log2Ceil, Cat, Mux1H}
 import colonnade.numbers.Rounding
 
+/** Ports of [[BounceMultiplier]]. */
 final class BounceMultiplierIO(formats: BounceFormats) extends Bundle {
   val enable = Input(Bool())
 
-  /** Of `long`: from the most significant one that is not just sign, with `isFirst`, down to number 0. */
+  /** The digit of `long`: from the most significant one that holds more than sign bits, with `isFirst`, down to 0. */
   val digit   = Input(UInt(log2Ceil(formats.longDigits).W))
   val isFirst = Input(Bool())
 
   val wide = Input(SInt(formats.wideBits.W))
   val long = Input(SInt((formats.longDigits * formats.digitBits).W))
 
-  /** In the cycle after digit 0 and until the next product begins. */
+  /** Valid from the cycle after digit 0 until the next product begins. */
   val product = Output(SInt(formats.productBits.W))
 }
 
-/** Multiplies by a digit a cycle, exact: one product in `digits` or more cycles. */
+/** Multiplies by one digit a cycle; exact products, each in `digits` or more cycles. */
 final class BounceMultiplier(formats: BounceFormats) extends Module {
   private val digitBits = formats.digitBits
 
@@ -28,7 +29,7 @@ final class BounceMultiplier(formats: BounceFormats) extends Module {
   private val digits  = Seq.tabulate(formats.longDigits)(i => io.long.asUInt(digitBits * (i + 1) - 1, digitBits * i))
   private val digit   = Mux1H(digits.zipWithIndex.map { case (digit, i) => (io.digit === i.U) -> digit })
 
-  // Only the first digit has a sign
+  // Only the first digit is signed
   private val factor  = Cat(io.isFirst && digit.head(1).asBool, digit).asSInt
   private val partial = io.wide * factor
   private val before  = Mux(io.isFirst, 0.S, product)

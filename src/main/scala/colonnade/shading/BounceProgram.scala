@@ -1,179 +1,312 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.log2Ceil
 import colonnade.config.NumberFormats
+import colonnade.microcode.{Label, Microprogram, Overlap, Repeat, StepEncoding}
 
-/** The bounces' microprogram: which step does what. A step takes one cycle, or one a digit if it multiplies.
+/** Labels of [[BounceProgram]]. */
+sealed trait BounceLabel extends Label
+
+object BounceLabel {
+
+  /** Waits for a hit. */
+  case object Idle extends BounceLabel
+
+  /** Normalises the geometric normal, which takes the place of the smooth one. */
+  case object GeometricNormal extends BounceLabel
+
+  /** Computes the lengths of normal and ray, and their angle. */
+  case object DotProducts extends BounceLabel
+
+  /** Computes the reflected direction. */
+  case object Reflect extends BounceLabel
+
+  /** Computes Snell's discriminant. */
+  case object Discriminant extends BounceLabel
+
+  /** Takes the discriminant's root. */
+  case object Root extends BounceLabel
+
+  /** Computes the refracted direction. */
+  case object Refract extends BounceLabel
+
+  /** Checks on which side of the surface the ray goes on. */
+  case object HemisphereCheck extends BounceLabel
+
+  /** Moves the origin to the other side of the surface. */
+  case object Offset extends BounceLabel
+
+  /** Computes the cosine for Schlick's approximation. */
+  case object Cosine extends BounceLabel
+
+  /** Computes Schlick's approximation of the Fresnel term. */
+  case object Fresnel extends BounceLabel
+
+  /** Offers the result. */
+  case object Done extends BounceLabel
+}
+
+/** State of the current bounce, written by [[BounceProgram]] and its unit. */
+final class BounceState {
+  val isGlass:  Bool = Reg(Bool())
+  val isSmooth: Bool = Reg(Bool())
+  val backSide: Bool = Reg(Bool())
+
+  /** The ray is refracted, not reflected. */
+  val isRefraction: Bool = Reg(Bool())
+
+  /** The result has a Fresnel term. */
+  val hasFresnel: Bool = Reg(Bool())
+}
+
+/** The bounce unit's microprogram. A step takes one cycle, or one per digit if it multiplies.
   *
-  * {{{
-  * measure | n·n | −n·d | d·d                              | n may turn away: start over
-  * reflect | |n|²·d + 2(n·d)·n                             | a mirror goes on at `side`
-  * glass   | |n|²|d|², (n·d)², η² | root, η(n·d), η|n|²   | total reflection goes on at `side`
-  * refract | η|n|²·d + (η(n·d) − root)·n                   |
-  * side    | direction · facing                            | the wrong side: start over; a reflection ends
-  * offset  | origin − 2 · offset · facing                  | on the back side a refraction ends
-  * share   | n·n | −n·d | |n|²|d|² | cosine | (1 − cosine)⁵ |
-  * }}}
-  * To start over is to take the geometric normal, which the first steps normalise. Products of step s reach the sum in
-  * s + 1; the sum is there to use in s + 2.
+  * The product of a step is accumulated in the next one; the sum is ready two steps after its last product. To start over
+  * is to take the geometric normal instead of the smooth one.
+  *
+  * @param takes      a hit is taken
+  * @param isTaken    the result is taken
+  * @param moreDigits the step's product is incomplete: repeat the step
   */
-final class BounceProgram {
-  private val toSum = 2
+final class BounceProgram(
+    control:    BounceControl,
+    state:      BounceState,
+    status:     BounceStatus,
+    takes:      Bool,
+    isTaken:    Bool,
+    moreDigits: Bool
+) {
+  import BounceLabel._
 
-  private def three(first: Int): Range = first until first + 3
+  private val sumLatency = 2
+  private val products   = control.products
+  private val actions    = control.actions
 
-  private val normalise = 0 until NumberFormats.normalBits - 1
+  val program = new Microprogram[BounceLabel](StepEncoding.Binary(stall = moreDigits))
+  import program.{branch, raise, set}
 
-  // Lengths and angle. The normal and the direction have turned all the way when the angle is known
-  val measure: Int = normalise.last + 1
-  private val squareNormal = three(measure)
-  private val keepSquare   = squareNormal.last + toSum
-  private val project      = three(squareNormal.last + 1)
-  private val keepAlong    = project.last + toSum
-  private val squareRay    = three(keepAlong + 1)
-  private val keepRay      = squareRay.last + toSum
-  require(keepSquare < keepAlong, "the angle is scaled by the normal's length")
-
-  /** The sum is the angle's cosine, up to a factor. */
-  val checkFacing: Int = keepAlong
+  private def xyz(first: Int): Range = first until first + 3
 
   private def directions(first: Int): Seq[(Int, Int)] =
     Seq(0, 1, 2).map(axis => (first + 2 * axis, first + 2 * axis + 1))
-  private val reflect        = directions(squareRay.last + 1)
-  private val pushReflection = reflect.map(_._2 + toSum)
 
-  /** The reflection is known. */
-  val checkGlass: Int = pushReflection.last
+  // The schedule, in cycles of the overlapped part: lengths and angle
+  private val squareNormal       = xyz(0)
+  private val latchNormalSquared = squareNormal.last + sumLatency
+  private val dotNormalRay       = xyz(squareNormal.last + 1)
+  private val latchCosine        = dotNormalRay.last + sumLatency
+  private val squareRay          = xyz(latchCosine + 1)
+  private val latchRaySquared    = squareRay.last + sumLatency
+  require(latchNormalSquared < latchCosine, "the angle is scaled by the normal's length")
 
-  // What is left of the direction along the normal, squared
-  private val whole         = reflect.last._2 + 1
-  private val keepWhole     = whole + toSum
-  private val upright       = whole + 1
-  private val squareEta     = upright + 1
-  private val keepSquareEta = squareEta + 1
-  private val lengthen      = three(upright + toSum)
-  private val lessUpright   = lengthen.last + 1
-  private val bend          = lessUpright + 1
-  private val lessBent      = bend + 1
+  private val reflect           = directions(squareRay.last + 1)
+  private val shiftInReflection = reflect.map(_._2 + sumLatency)
 
-  /** The sum is negative: total reflection. */
-  val checkRest: Int = bend + toSum
+  // Snell's discriminant, |n|²·|d|² − η²·sin²
+  private val squaredLengths    = reflect.last._2 + 1
+  private val squaredCosine     = squaredLengths + 1
+  private val etaSquared        = squaredCosine + 1
+  private val scaleCosine       = xyz(squaredCosine + sumLatency)
+  private val squaredSine       = scaleCosine.last + 1
+  private val etaTerm           = squaredSine + 1
+  private val discriminant      = etaTerm + 1
+  private val checkTotal        = etaTerm + sumLatency
+  private val scaleDiscriminant = xyz(checkTotal)
 
-  // Its root; meanwhile the factors' other parts
-  private val lengthenAgain = three(checkRest)
-  private val root          = lengthenAgain.last + 1
-  private val etaAlong      = root + 1
-  private val etaSquare     = etaAlong + 1
-  private val keepParallel  = etaSquare + 1
-  private val takeRoot      = keepParallel + 1
-  private val keepAcross    = takeRoot + 1
+  // Its root; meanwhile the factors of direction and normal
+  private val startRoot           = scaleDiscriminant.last + 1
+  private val etaCosine           = startRoot + 1
+  private val etaNormal           = etaCosine + 1
+  private val latchDirectionScale = etaNormal + 1
+  private val subtractRoot        = latchDirectionScale + 1
+  private val latchNormalScale    = subtractRoot + 1
 
-  private val refract        = directions(keepAcross + 1)
-  private val pushRefraction = refract.map(_._2 + toSum)
-  private val products       = reflect ++ refract
+  private val refract           = directions(latchNormalScale + 1)
+  private val shiftInRefraction = refract.map(_._2 + sumLatency)
+  private val hemisphereCheck   = xyz(shiftInRefraction.last + 1)
+  private val checkHemisphere   = hemisphereCheck.last + sumLatency
 
-  val side: Int = pushRefraction.last + 1
-  private val sideProducts = three(side)
+  // Sum and origin share the adder
+  private val scaleOffset   = Seq(0, 1, 2).map(checkHemisphere + 1 + 2 * _)
+  private val shiftInOrigin = scaleOffset.map(_ + sumLatency)
 
-  /** The sum tells on which side of the surface the ray goes on. */
-  val checkSide: Int = sideProducts.last + toSum
+  private val squareAgain = xyz(shiftInOrigin.last + 1)
+  private val latchAgain  = squareAgain.last + sumLatency
+  private val dotAgain    = xyz(squareAgain.last + 1)
+  private val normProduct = dotAgain.last + 1
+  private val cosineRoot  = normProduct + 1
+  private val divide      = cosineRoot + 1
+  private val quotient    = divide + 1
+  private val shift       = quotient + 1
+  private val oneMinus    = shift + 1
+  private val powers      = Seq(0, 1, 2, 3).map(oneMinus + 1 + 2 * _)
+  require(normProduct > latchAgain, "the normal's length comes before its product")
 
-  // The other side of the surface; sum and origin take turns at the adder
-  private val offset     = Seq(0, 1, 2).map(checkSide + 1 + 2 * _)
-  private val pushOrigin = offset.map(_ + toSum)
+  program.exclusive("multiplier", products.all)
+  program.exclusive("adder", actions.additions)
 
-  /** The refraction is known. */
-  val checkShare: Int = pushOrigin.last
+  program.step(Idle) {
+    raise(control.load, takes)
+    branch(Repeat.until(takes, "request"), DotProducts.otherwise)
+  }
+  program.label(GeometricNormal)
+  for (_ <- 1 until NumberFormats.normalBits) program.step(raise(actions.normaliseNormal))
+  program.overlap { at =>
+    at.label(0, DotProducts)
+    at.label(reflect.head._1, Reflect)
+    at.label(squaredCosine + 1, Discriminant)
+    at.label(startRoot, Root)
+    at.label(refract.head._1, Refract)
+    at.label(hemisphereCheck.head, HemisphereCheck)
+    at.label(scaleOffset.head, Offset)
+    at.label(squareAgain.head, Cosine)
+    at.label(oneMinus, Fresnel)
+    dotProducts(at)
+    reflection(at)
+    snell(at)
+    root(at)
+    refraction(at)
+    hemisphere(at)
+    offset(at)
+    cosine(at)
+    fresnel(at)
+  }
+  program.step(Done)(branch(Repeat.until(isTaken, "the result is taken"), Idle.otherwise))
 
-  // The cosine
-  private val squareAgain     = three(checkShare + 1)
-  private val keepSquareAgain = squareAgain.last + toSum
-  private val projectAgain    = three(squareAgain.last + 1)
-  private val lengths         = projectAgain.last + 1
-  require(lengths > keepSquareAgain, "the normal's length comes before its product")
-
-  /** The product is that of both lengths, the sum that of the vectors: if it is not positive, the cosine is 0. */
-  val cosineRoot: Int = lengths + 1
-  private val divide       = cosineRoot + 1
-  private val takeQuotient = divide + 1
-  private val lower        = takeQuotient + 1
-  val away: Int = lower + 1
-
-  // Schlick's share
-  private val powers      = Seq(0, 1, 2, 3).map(away + 1 + 2 * _)
-  private val takeProduct = (etaAlong +: powers.take(3)).map(_ + 1)
-
-  /** All is done: nothing happens in this step. */
-  val last:     Int = powers.last + toSum
-  val stepBits: Int = log2Ceil(last + 1)
-
-  private def in(step: UInt)(steps: Seq[Int]): Bool = steps.map(step === _.U).reduce(_ || _)
-
-  /** Decodes a step. */
-  def factors(step: UInt): BounceFactors = {
-    def at(steps: Int*): Bool = in(step)(steps)
-
-    val factors = Wire(new BounceFactors)
-    factors.squareNormal := in(step)(squareNormal ++ squareAgain)
-    factors.project      := in(step)(project ++ projectAgain)
-    factors.squareRay    := in(step)(squareRay)
-    factors.parallel     := in(step)(products.map(_._1))
-    factors.acrossTwice  := in(step)(reflect.map(_._2))
-    factors.across       := in(step)(refract.map(_._2))
-    factors.whole        := at(whole)
-    factors.upright      := at(upright)
-    factors.squareEta    := at(squareEta)
-    factors.bend         := at(bend)
-    factors.etaAlong     := at(etaAlong)
-    factors.etaSquare    := at(etaSquare)
-    factors.side         := in(step)(sideProducts)
-    factors.offset       := in(step)(offset)
-    factors.lengths      := at(lengths)
-    factors.power        := at(powers(0), powers(2))
-    factors.powerSquare  := at(powers(1))
-    factors.powerRest    := at(powers(3))
-    factors
+  private def dotProducts(at: Overlap[BounceLabel]): Unit = {
+    dot(at, squareNormal, products.squareNormal)
+    at(latchNormalSquared)(raise(actions.latchNormalSquared))
+    dot(at, dotNormalRay, products.dotNormalRay, subtract = true)
+    at(latchCosine) {
+      raise(actions.latchCosine)
+      branch(startOver(!status.isPositive, "the smooth normal turns away"))
+    }
+    dot(at, squareRay, products.squareRay)
+    at(latchRaySquared)(raise(actions.latchRaySquared))
   }
 
-  /** Decodes a step. */
-  def work(step: UInt): BounceWork = {
-    def at(steps: Int*): Bool = in(step)(steps)
+  /** |n|²·d + 2c·n. */
+  private def reflection(at: Overlap[BounceLabel]): Unit = {
+    blend(at, reflect, products.twiceNormalScale)
+    shiftInReflection.foreach(at(_)(raise(actions.shiftInReflection)))
+    at(shiftInReflection.last)(branch(HemisphereCheck.when(!state.isGlass, "mirror")))
+  }
 
-    val sums =
-      Seq(squareNormal, project, squareRay, Seq(whole), Seq(upright), sideProducts, squareAgain, projectAgain) ++
-        products.map { case (parallel, across) => Seq(parallel, across) } ++ offset.map(Seq(_))
-    val work = Wire(new BounceWork)
-    work.normalise := in(step)(normalise)
+  private def snell(at: Overlap[BounceLabel]): Unit = {
+    dot(at, Seq(squaredLengths), products.squaredLengths)
+    at(squaredLengths + sumLatency)(raise(actions.latchSquaredLengths))
+    dot(at, Seq(squaredCosine), products.squaredCosine)
+    for ((cycle, bit) <- scaleCosine.zipWithIndex) at(cycle)(raise(actions.scaleCosine(bit)))
+    at(etaSquared)(program.raiseEarly(products.etaSquared))
+    at(etaSquared + 1)(raise(actions.latchEtaSquared))
+    at(squaredSine)(raise(actions.squaredSine))
+    at(etaTerm)(program.raiseEarly(products.etaTerm))
+    at(discriminant)(raise(actions.discriminant))
+    at(checkTotal) {
+      set(state.isRefraction, true.B, !status.isNegative)
+      branch(HemisphereCheck.when(status.isNegative, "total internal reflection"))
+    }
+    for ((cycle, bit) <- scaleDiscriminant.zipWithIndex) at(cycle)(raise(actions.scaleDiscriminant(bit)))
+  }
 
-    work.accumulate     := in(step)(sums.flatten.map(_ + 1))
-    work.first          := in(step)(sums.map(_.head + 1))
-    work.subtract       := in(step)((project ++ projectAgain ++ offset).map(_ + 1))
-    work.takeProduct    := in(step)(takeProduct)
-    work.lengthen       := VecInit(lengthen.map(at(_)))
-    work.lengthenAgain  := VecInit(lengthenAgain.map(at(_)))
-    work.lessUpright    := at(lessUpright)
-    work.lessBent       := at(lessBent)
-    work.takeRoot       := at(takeRoot)
-    work.pushOrigin     := in(step)(pushOrigin)
-    work.away           := at(away)
-    work.addReflectance := at(powers.last + 1)
+  private def root(at: Overlap[BounceLabel]): Unit = {
+    at(startRoot)(raise(actions.startRoot))
+    at(etaCosine)(program.raiseEarly(products.etaCosine))
+    at(etaCosine + 1)(raise(actions.loadProduct))
+    at(etaNormal)(program.raiseEarly(products.etaNormal))
+    at(latchDirectionScale)(raise(actions.latchDirectionScale))
+    at(subtractRoot) {
+      raise(actions.subtractRoot)
+      program.await(status.rootIsReady, "root")
+    }
+    at(latchNormalScale)(raise(actions.latchNormalScale))
+  }
 
-    work.keepSquare     := at(keepSquare, keepSquareAgain)
-    work.keepAlong      := at(keepAlong)
-    work.keepRay        := at(keepRay)
-    work.keepWhole      := at(keepWhole)
-    work.keepSquareEta  := at(keepSquareEta)
-    work.keepParallel   := at(keepParallel)
-    work.keepAcross     := at(keepAcross)
-    work.pushReflection := in(step)(pushReflection)
-    work.pushRefraction := in(step)(pushRefraction)
+  /** η|n|²·d + (ηc − root)·n. */
+  private def refraction(at: Overlap[BounceLabel]): Unit = {
+    blend(at, refract, products.normalScale)
+    shiftInRefraction.foreach(at(_)(raise(actions.shiftInRefraction)))
+  }
 
-    work.root         := at(root)
-    work.cosineRoot   := at(cosineRoot)
-    work.divide       := at(divide)
-    work.takeQuotient := at(takeQuotient)
-    work.lower        := at(lower)
-    work
+  private def hemisphere(at: Overlap[BounceLabel]): Unit = {
+    dot(at, hemisphereCheck, products.hemisphereCheck)
+    val isWrong = Mux(state.isRefraction, !status.isNegative, !status.isPositive)
+    at(checkHemisphere)(branch(
+      startOver(isWrong, "wrong side of the surface"),
+      Done.when(!state.isRefraction, "reflection")
+    ))
+  }
+
+  private def offset(at: Overlap[BounceLabel]): Unit = {
+    scaleOffset.foreach(cycle => dot(at, Seq(cycle), products.scaleOffset, subtract = true))
+    shiftInOrigin.foreach(at(_)(raise(actions.shiftInOrigin)))
+    at(shiftInOrigin.last) {
+      set(state.hasFresnel, true.B, !state.backSide)
+      branch(Done.when(state.backSide, "back side"))
+    }
+  }
+
+  private def cosine(at: Overlap[BounceLabel]): Unit = {
+    dot(at, squareAgain, products.squareNormal)
+    at(latchAgain)(raise(actions.latchNormalSquared))
+    dot(at, dotAgain, products.dotNormalRay, subtract = true)
+    at(normProduct)(program.raiseEarly(products.normProduct))
+    at(cosineRoot) {
+      raise(actions.startCosineRoot)
+      branch(Fresnel.when(!status.isPositive, "the cosine is 0"))
+    }
+    at(divide) {
+      raise(actions.divide)
+      program.await(status.dotIsNormalised && status.rootIsReady, "root")
+    }
+    at(quotient) {
+      raise(actions.latchQuotient)
+      program.await(status.rootIsReady, "quotient")
+    }
+    at(shift) {
+      raise(actions.shiftQuotient)
+      program.await(status.quotientIsShifted, "the quotient is shifted")
+    }
+  }
+
+  /** With x = 1 − cosine: x², x⁴, x⁵, and that times 1 − reflectance. */
+  private def fresnel(at: Overlap[BounceLabel]): Unit = {
+    at(oneMinus)(raise(actions.oneMinusCosine))
+    val factors = Seq(
+      products.timesOneMinusCosine,
+      products.squarePower,
+      products.timesOneMinusCosine,
+      products.timesOneMinusReflectance
+    )
+    for ((cycle, product) <- powers.zip(factors)) at(cycle)(program.raiseEarly(product))
+    powers.init.foreach(cycle => at(cycle + 1)(raise(actions.loadProduct)))
+    at(powers.last + 1)(raise(actions.addReflectance))
+  }
+
+  /** Multiplies in these cycles, and sums up one cycle later. */
+  private def dot(at: Overlap[BounceLabel], cycles: Seq[Int], product: Bool, subtract: Boolean = false): Unit = {
+    cycles.foreach { cycle =>
+      at(cycle)(program.raiseEarly(product))
+      at(cycle + 1)(raise(actions.accumulate))
+      if (subtract) at(cycle + 1)(raise(actions.subtract))
+    }
+    at(cycles.head + 1)(raise(actions.startSum))
+  }
+
+  /** A multiple of the direction plus a multiple of the normal, for each axis. */
+  private def blend(at: Overlap[BounceLabel], cycles: Seq[(Int, Int)], ofNormal: Bool): Unit =
+    for ((first, second) <- cycles) {
+      at(first)(program.raiseEarly(products.directionScale))
+      at(second)(program.raiseEarly(ofNormal))
+      Seq(first, second).foreach(cycle => at(cycle + 1)(raise(actions.accumulate)))
+      at(first + 1)(raise(actions.startSum))
+    }
+
+  private def startOver(condition: Bool, reason: String) = {
+    val isWrong = state.isSmooth && condition
+    raise(control.startOver, isWrong)
+    set(state.isSmooth, false.B, isWrong)
+    set(state.isRefraction, false.B, isWrong)
+    GeometricNormal.when(isWrong, reason)
   }
 }

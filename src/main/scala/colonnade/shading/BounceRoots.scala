@@ -5,36 +5,39 @@ import chisel3.util.Cat
 import colonnade.config.NumberFormats
 import colonnade.numbers.{RootDivider, Rounding, SquareRoot}
 
+/** Ports of [[BounceRoots]]. */
 final class BounceRootsIO(numbers: NumberFormats) extends Bundle {
   private val formats = new BounceFormats(numbers)
 
-  // What begins: the root of `rest`, or the cosine's root; its quotient, when that root is there
+  // Starts the discriminant's root, the cosine's root, or, once that root is ready, the cosine's quotient
   val startRoot   = Input(Bool())
   val startCosine = Input(Bool())
   val divide      = Input(Bool())
 
-  /** What was begun is there, to take or to divide by. */
+  /** The root or quotient is ready. */
   val isReady = Output(Bool())
-  val take    = Input(Bool())
 
-  val rest = Input(UInt(formats.lengthBits.W))
-  val root = Output(UInt(formats.alongBits.W))
+  /** Takes the result. */
+  val take = Input(Bool())
 
-  /** Of both vectors, as in [[Angle]]. */
+  val discriminant = Input(UInt(formats.lengthBits.W))
+  val root         = Output(UInt(formats.cosineBits.W))
+
+  /** Product and exponent of the vectors' squared lengths, as in [[Angle]]. */
   val lengths  = Input(UInt((2 * numbers.shadeBits).W))
   val exponent = Input(UInt(3.W))
 
-  /** n·d, its top bit set. */
+  /** n·d, with its top bit set. */
   val dot      = Input(UInt((2 * numbers.shadeBits + 2).W))
   val quotient = Output(UInt((numbers.cosineFraction + 1).W))
 
-  /** Three more than the bits by which the quotient has to move down, less those by which `dot` moved up. */
-  val drop = Output(UInt(2.W))
+  /** Three more than the bits by which the quotient has to move down, without those by which `dot` moved up. */
+  val shiftRight = Output(UInt(2.W))
 }
 
-/** The roots of reflection and refraction and the cosine's quotient, from one [[RootDivider]]: docs/bounce.md.
+/** The root of Snell's discriminant and the cosine's root and quotient, from one [[RootDivider]]: docs/bounce.md.
   *
-  * A rest too long for the square root is quartered until it is short enough, and its root doubled as often.
+  * A discriminant that is too long for the square root is divided by four until it fits, and its root is doubled as often.
   */
 final class BounceRoots(numbers: NumberFormats) extends Module {
   private val formats      = new BounceFormats(numbers)
@@ -46,14 +49,15 @@ final class BounceRoots(numbers: NumberFormats) extends Module {
   private val unit     = Module(new RootDivider(radicandBits, numbers.mantissaBits, numbers.cosineFraction))
   private val quarters = Seq.fill(formats.quarters)(Reg(Bool()))
 
-  // The rest, no longer than a radicand
-  private val isLonger  = Seq.tabulate(formats.quarters)(i => io.rest(formats.lengthBits - 1, radicandBits + 2 * i).orR)
-  private val quartered = isLonger.foldLeft(io.rest.pad(radicandBits)) { (rest, isLonger) =>
-    Mux(isLonger, Rounding.floor(rest, 2), rest)
+  // The discriminant, no longer than a radicand
+  private val isLonger =
+    Seq.tabulate(formats.quarters)(i => io.discriminant(formats.lengthBits - 1, radicandBits + 2 * i).orR)
+  private val quartered = isLonger.foldLeft(io.discriminant.pad(radicandBits)) { (radicand, isLonger) =>
+    Mux(isLonger, Rounding.floor(radicand, 2), radicand)
   }
   when(io.startRoot)(quarters.zip(isLonger).foreach { case (quarter, isLonger) => quarter := isLonger })
 
-  // The lengths' product: its top bit or the next one is set, and its exponent made even
+  // The lengths' product: one of its two top bits is set. Its exponent is made even
   private val isLong   = io.lengths.head(1).asBool
   private val aligned  = Mux(isLong, io.lengths, Cat(io.lengths.tail(1), 0.U(1.W)))
   private val mantissa = Rounding.floor(aligned, aligned.getWidth - radicandBits)
@@ -74,9 +78,9 @@ final class BounceRoots(numbers: NumberFormats) extends Module {
   unit.io.result.ready     := io.take || io.divide
 
   io.isReady := unit.io.result.valid
-  io.root    := quarters.foldLeft(root.pad(formats.alongBits))((root, quarter) =>
-    Mux(quarter, (root << 1)(formats.alongBits - 1, 0), root)
+  io.root    := quarters.foldLeft(root.pad(formats.cosineBits))((root, quarter) =>
+    Mux(quarter, (root << 1)(formats.cosineBits - 1, 0), root)
   )
-  io.quotient := unit.io.result.bits
-  io.drop     := Rounding.floor(exponent, 1)
+  io.quotient   := unit.io.result.bits
+  io.shiftRight := Rounding.floor(exponent, 1)
 }

@@ -7,29 +7,30 @@ import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
 import colonnade.numbers.{Fixed, Rounding}
 
+/** Ports of [[ColourUnit]]. */
 final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   val ambient    = Input(Rgb(FrameRegisters.intensity))
   val background = Input(Rgb(FrameRegisters.colour))
   val shading    = Input(new Shading(config))
 
-  /** A context takes a new pixel: its path begins. */
-  val begins = Flipped(Valid(Context(config)))
+  /** A context takes a new pixel: its path starts. */
+  val start = Flipped(Valid(Context(config)))
 
-  /** The surface that a context's path will end at; remembered. */
+  /** The surface at which a context's path ends; remembered. */
   val surface = Flipped(Valid(new LitSurface(config)))
-  val turn    = if (config.frame.hasBounces) Some(Flipped(Decoupled(new PathTurn(config)))) else None
-  val end     = Flipped(Decoupled(new PathEnd(config)))
+  val bounce  = if (config.frame.hasBounces) Some(Flipped(Decoupled(new BounceUpdate(config)))) else None
+  val end     = Flipped(Decoupled(new PathTermination(config)))
   val colour  = Valid(new PathColour(config))
 }
 
-/** Colours of paths: docs/numbers.md, 5.9 and 6. What a path has passed weighs what it still meets (its throughput), and
-  * what is certain is gathered.
+/** Colours of paths: docs/numbers.md, 5.9 and 6. A path has a radiance so far, and a throughput that weights what it still
+  * hits.
   *
-  * One path at a time, two cycles a product and channel: an end takes 2 + 6 · (lights + 2) cycles, one in the background
-  * 8, a turn 20, and 6 · (lights + 1) more before a surface. Turns go first. A ratio takes 12 cycles a channel, if some
-  * light is missing.
+  * One path at a time, two cycles per product and channel. A path's end takes 2 + 6 · (lights + 2) cycles, or 8 in the
+  * background. A bounce takes 20 cycles, and 6 · (lights + 1) more if its reflection shows a surface. Bounces have
+  * priority. A shadow ratio takes 12 cycles per channel that lacks some light.
   *
-  * @note colour = gathered + throughput · albedo · (ambient + the sum of all lights, less what is in their way)
+  * @note colour = radiance + throughput · albedo · (ambient + the direct light of all lights · transmittance)
   */
 final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val lights     = config.frame.lights
@@ -37,99 +38,104 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val fraction   = NumberFormats.lightFraction
   private val colourBits = NumberFormats.colourBits
   private val sumBits    = NumberFormats.lightBits + log2Ceil(lights + 1)
-  private val shareBits  = fraction + 1
+  private val weightBits = fraction + 1
 
   val io = IO(new ColourUnitIO(config))
 
-  // What each context remembers
-  private val surfaces = ContextTable(config, new EndSurface(config))
-  private val paths    = if (hasBounces) Some(ContextTable(config, new PathSoFar)) else None
+  // Tables, by context
+  private val surfaces = ContextTable(config, new TerminalSurface(config))
+  private val paths    = if (hasBounces) Some(ContextTable(config, new PathState)) else None
 
-  /** The path has met neither mirror nor glass yet: its entry means nothing. */
+  /** The path has hit neither mirror nor glass yet: its entry in `paths` is meaningless. */
   private val isStraight = Reg(Vec(config.array.contexts, Bool()))
   when(io.surface.valid) {
-    val surface = Wire(new EndSurface(config))
-    surface.albedo  := io.surface.bits.albedo
-    surface.directs := io.surface.bits.directs
+    val surface = Wire(new TerminalSurface(config))
+    surface.albedo      := io.surface.bits.albedo
+    surface.directLight := io.surface.bits.directLight
     surfaces.write(io.surface.bits.context, surface)
   }
 
-  // The path in work
+  // The current path
   private val isBusy  = RegInit(false.B)
   private val isEnd   = Reg(Bool())
   private val context = Reg(Context(config))
 
-  /** The tables' entries come. */
-  private val arrives = RegInit(false.B)
+  /** The tables' entries are read. */
+  private val isRead = RegInit(false.B)
 
-  /** Which product, of which channel; and whether it is there. */
+  /** The product's number and channel; and whether it is ready. */
   private val step    = Reg(UInt(log2Ceil(lights + 1).max(2).W))
   private val channel = Reg(UInt(2.W))
-  private val isThere = Reg(Bool())
+  private val isReady = Reg(Bool())
 
-  /** Products of the surface, before those of the path. */
+  /** The current product is the surface's, not the path's. */
   private val ofSurface  = Reg(Bool())
   private val hasSurface = Reg(Bool())
 
-  private val occlusions = Reg(Vec(lights, Occlusion()))
-  private val albedo     = Reg(Vec(3, UInt(colourBits.W)))
-  private val directs    = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
-  private val share      = Reg(UInt(shareBits.W))
-  private val isTinted   = Reg(Bool())
-  private val throughput = Reg(Vec(3, UInt(shareBits.W)))
-  private val gathered   = Reg(Vec(3, UInt(colourBits.W)))
-  private val sum        = Reg(UInt(sumBits.W))
-  private val surface    = Reg(UInt(colourBits.W))
+  private val occlusions  = Reg(Vec(lights, Occlusion()))
+  private val albedo      = Reg(Vec(3, UInt(colourBits.W)))
+  private val directLight = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
+  private val fresnel     = Reg(UInt(weightBits.W))
+  private val isTinted    = Reg(Bool())
+  private val throughput  = Reg(Vec(3, UInt(weightBits.W)))
+  private val radiance    = Reg(Vec(3, UInt(colourBits.W)))
+  private val sum         = Reg(UInt(sumBits.W))
+  private val surface     = Reg(UInt(colourBits.W))
 
-  /** Beside that of the turn where a turn may have a surface. */
+  /** Where a bounce may have a surface, it has another albedo than the bounce. */
   private val surfaceAlbedo = if (hasBounces && config.hasRoom) Reg(Vec(3, UInt(colourBits.W))) else albedo
   private val colours       = Reg(Vec(3, UInt(colourBits.W)))
-  private val ratios        = if (config.hasRoom) Some(new Ratios(sumBits)) else None
+  private val ratios        = if (config.hasRoom) Some(Module(new ShadowRatioDivider(sumBits)).io) else None
+
+  /** The shadow ratio is needed, and the light without shadows. */
+  private val isDirectView = Reg(Bool())
+  private val unshadowed   = Reg(UInt(sumBits.W))
 
   private val reflects = step === lights.U
   private val lastStep = Mux(ofSurface, lights.U, Mux(isEnd, 0.U, 2.U))
 
-  // Take one
-  private val turns = io.turn.map(_.fire).getOrElse(false.B)
-  io.turn.foreach(_.ready := !isBusy)
-  io.end.ready := !isBusy && !io.turn.map(_.valid).getOrElse(false.B)
-  private val takes = turns || io.end.fire
+  // Take a bounce or an end
+  private val bounces = io.bounce.map(_.fire).getOrElse(false.B)
+  io.bounce.foreach(_.ready := !isBusy)
+  io.end.ready := !isBusy && !io.bounce.map(_.valid).getOrElse(false.B)
+  private val takes = bounces || io.end.fire
   private val taken =
-    io.turn.map(turn => Mux(turn.valid, turn.bits.context, io.end.bits.context)).getOrElse(io.end.bits.context)
+    io.bounce.map(bounce => Mux(bounce.valid, bounce.bits.context, io.end.bits.context)).getOrElse(io.end.bits.context)
   private val surfaceRead = surfaces.read(taken, takes)
   private val pathRead    = paths.map(_.read(taken, takes))
-  arrives := takes
+  isRead := takes
   when(takes) {
     isBusy  := true.B
-    isEnd   := !turns
+    isEnd   := !bounces
     context := taken
     channel := 0.U
-    isThere := false.B
+    isReady := false.B
     step    := 0.U
-    val before = Mux(turns, io.turn.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
-    ofSurface  := before
-    hasSurface := before
+    val meetsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
+    ofSurface  := meetsSurface
+    hasSurface := meetsSurface
     occlusions := io.end.bits.occlusions
-    when(turns) { occlusions.foreach(_ := Occlusion.none) }
-    io.turn.foreach { turn =>
-      albedo   := VecInit(turn.bits.albedo.channels)
-      share    := turn.bits.share.natural
-      isTinted := turn.bits.isTinted
+    when(bounces) { occlusions.foreach(_ := Occlusion.none) }
+    io.bounce.foreach { bounce =>
+      albedo   := VecInit(bounce.bits.albedo.channels)
+      fresnel  := bounce.bits.fresnel.natural
+      isTinted := bounce.bits.isTinted
     }
+    isDirectView := !bounces && io.end.bits.isDirectView.getOrElse(false.B)
   }
-  when(arrives) {
-    val begun = isStraight(context)
+  when(isRead) {
+    val isStart = isStraight(context)
     throughput := VecInit.fill(3)((1 << fraction).U)
-    gathered   := VecInit.fill(3)(0.U)
+    radiance   := VecInit.fill(3)(0.U)
     pathRead.foreach { path =>
-      when(!begun) {
+      when(!isStart) {
         throughput := VecInit(path.throughput.map(_.natural))
-        gathered   := VecInit(path.gathered.channels)
+        radiance   := VecInit(path.radiance.channels)
       }
     }
     when(hasSurface) {
       surfaceAlbedo := VecInit(surfaceRead.albedo.channels)
-      directs       := VecInit(surfaceRead.directs.map(direct => VecInit(direct.channels.map(_.natural))))
+      directLight   := VecInit(surfaceRead.directLight.map(light => VecInit(light.channels.map(_.natural))))
     }
   }
 
@@ -137,42 +143,43 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     MuxLookup(channel, channels(2))(Seq(0.U -> channels(0), 1.U -> channels(1)))
 
   // One product
-  private val whole                             = (1 << fraction).U(shareBits.W)
-  private val clearness                         = io.shading.clearness.map(_.natural).getOrElse(whole)
+  private val one                               = (1 << fraction).U(weightBits.W)
+  private val shadowTransmittance               = io.shading.clearness.map(_.natural).getOrElse(one)
   private val light                             = step(log2Ceil(lights.max(2)) - 1, 0)
   private val reflectance                       = of(surfaceAlbedo)
   private def at[T <: Data](entries: Vec[T]): T = if (lights == 1) entries.head else entries(light)
-  private val passing   = MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> whole, Occlusion.clear -> clearness))
-  private val behind    = Mux(hasSurface, surface, of(io.background.channels))
+  private val transmittance                     =
+    MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> one, Occlusion.transmissive -> shadowTransmittance))
+  private val hitColour = Mux(hasSurface, surface, of(io.background.channels))
   private val albedoNow = of(albedo)
 
   /** All ones is 1.0. */
-  private val tint = Mux(isTinted, albedoNow +& albedoNow(colourBits - 1), whole)
+  private val tint = Mux(isTinted, albedoNow +& albedoNow(colourBits - 1), one)
   private val left = Mux(
     ofSurface,
-    Mux(reflects, sum, of(at(directs))),
-    Mux(isEnd, behind, Mux(step === 2.U, sum, of(throughput)))
+    Mux(reflects, sum, of(at(directLight))),
+    Mux(isEnd, hitColour, Mux(step === 2.U, sum, of(throughput)))
   )
   private val right = Mux(
     ofSurface,
-    Mux(reflects, reflectance, passing),
-    Mux(isEnd, of(throughput), Mux(step === 0.U, tint, Mux(step === 1.U, share, behind)))
+    Mux(reflects, reflectance, transmittance),
+    Mux(isEnd, of(throughput), Mux(step === 0.U, tint, Mux(step === 1.U, fresnel, hitColour)))
   )
-  private val product = Reg(UInt((sumBits + shareBits).W))
+  private val product = Reg(UInt((sumBits + weightBits).W))
   product := left * right
   private val part   = Rounding.floor(product, fraction)
   private val colour = Rounding.saturate(part, colourBits)
-  private val total  = Rounding.saturate(of(gathered) +& part, colourBits)
+  private val total  = Rounding.saturate(of(radiance) +& part, colourBits)
 
-  // What it means
-  private val leaves    = RegInit(false.B)
-  private val divides   = ratios.map(_.isBusy).getOrElse(false.B)
-  private val isWorking = isBusy && !arrives && !leaves && !divides
-  private val isDone    = isWorking && isThere && !ofSurface && step === lastStep && channel === 2.U
+  // Use the product
+  private val retires   = RegInit(false.B)
+  private val divides   = ratios.map(_.busy).getOrElse(false.B)
+  private val isWorking = isBusy && !isRead && !retires && !divides
+  private val isDone    = isWorking && isReady && !ofSurface && step === lastStep && channel === 2.U
   private val first     = of(io.ambient.channels).natural
   when(isWorking) {
-    isThere := !isThere
-    when(isThere) {
+    isReady := !isReady
+    when(isReady) {
       step := step + 1.U
       when(step === lastStep) {
         step      := 0.U
@@ -181,62 +188,60 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
       }
       when(ofSurface) {
         when(reflects) { surface := colour }.otherwise { sum := Mux(step === 0.U, first, sum) + part }
-        ratios.foreach { ratio =>
-          when(reflects) { ratio.begin(sum, channel) }.otherwise {
-            ratio.whole := Mux(step === 0.U, first, ratio.whole) + of(at(directs))
-          }
-        }
+        when(!reflects) { unshadowed := Mux(step === 0.U, first, unshadowed) + of(at(directLight)) }
       }.elsewhen(isEnd) {
         set(colours, total)
       }.otherwise {
-        when(step === 0.U) { set(throughput, Rounding.narrow(part, shareBits)) }
+        when(step === 0.U) { set(throughput, Rounding.narrow(part, weightBits)) }
         when(step === 1.U) {
           sum := part
-          set(throughput, of(throughput) - Rounding.narrow(part, shareBits))
+          set(throughput, of(throughput) - Rounding.narrow(part, weightBits))
         }
-        when(step === 2.U) { set(gathered, total) }
+        when(step === 2.U) { set(radiance, total) }
       }
     }
   }
 
-  // A turned path is remembered, an end's colour leaves, in the cycle after the last product
-  leaves := isDone
-  when(leaves) { isBusy := false.B }
-  io.colour.valid        := leaves && isEnd
+  // In the cycle after the last product, a bounce's path is remembered, and an end's colour retires
+  retires := isDone
+  when(retires) { isBusy := false.B }
+  io.colour.valid        := retires && isEnd
   io.colour.bits.context := context
   io.colour.bits.colour.channels.zip(colours).foreach { case (to, from) => to := from }
-  for (ratio <- ratios; to <- io.colour.bits.ratio) {
-    ratio.work()
-    when(takes) { ratio.isWanted := !turns && io.end.bits.isSeen.get }
-    to.channels.zip(ratio.found).foreach { case (channel, part) => channel := Fixed(channel.format, part) }
+  for (divider <- ratios; to <- io.colour.bits.ratio) {
+    divider.start.valid        := isWorking && isReady && ofSurface && reflects && isDirectView
+    divider.start.bits.part    := sum
+    divider.start.bits.channel := channel
+    divider.whole              := unshadowed
+    to.channels.zip(divider.ratios).foreach { case (channel, part) => channel := Fixed(channel.format, part) }
   }
   paths.foreach { table =>
-    when(leaves && !isEnd) {
-      val path = Wire(new PathSoFar)
+    when(retires && !isEnd) {
+      val path = Wire(new PathState)
       path.throughput.zip(throughput).foreach { case (to, from) => to := Fixed(to.format, from) }
-      path.gathered.channels.zip(gathered).foreach { case (to, from) => to := from }
+      path.radiance.channels.zip(radiance).foreach { case (to, from) => to := from }
       table.write(context, path)
       isStraight(context) := false.B
     }
   }
-  when(io.begins.valid) { isStraight(io.begins.bits) := true.B }
+  when(io.start.valid) { isStraight(io.start.bits) := true.B }
 
   private def set(channels: Vec[UInt], value: UInt): Unit =
     for (index <- 0 until 3) when(channel === index.U) { channels(index) := value }
 }
 
-/** What an end needs of its surface. */
-final private class EndSurface(config: ColonnadeConfig) extends Bundle {
-  val albedo  = Rgb(FrameRegisters.colour)
-  val directs = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
+/** The surface at which a path ends. */
+final private class TerminalSurface(config: ColonnadeConfig) extends Bundle {
+  val albedo      = Rgb(FrameRegisters.colour)
+  val directLight = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
 }
 
-/** What a path has passed. */
-final private class PathSoFar extends Bundle {
+/** A path after its bounces so far. */
+final private class PathState extends Bundle {
 
-  /** What part of what comes now counts, by channel. */
+  /** The weight of what the path still hits, by channel. */
   val throughput = Vec(3, FrameRegisters.share)
 
-  /** What is certain already. */
-  val gathered = Rgb(FrameRegisters.colour)
+  /** The colour so far. */
+  val radiance = Rgb(FrameRegisters.colour)
 }

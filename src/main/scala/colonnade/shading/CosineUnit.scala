@@ -5,35 +5,36 @@ import chisel3.util.{is, log2Ceil, switch, Cat, Decoupled}
 import colonnade.config.NumberFormats
 import colonnade.numbers.{Divider, Rounding, SquareRoot}
 
-/** How bright a light is on a surface. */
+/** The brightness of a light on a surface. */
 final class Brightness(numbers: NumberFormats) extends Bundle {
 
   /** `cosineFraction` fraction bits, from 0 to 1. */
   val cosine = UInt(new ShaderFormats(numbers).cosineBits.W)
 
-  /** See [[Falloff]]; meaningless where the cosine is 0. */
+  /** See [[Falloff]]; meaningless if the cosine is 0. */
   val falloff = Falloff()
 }
 
+/** Ports of [[CosineUnit]]. */
 final class CosineUnitIO(numbers: NumberFormats) extends Bundle {
   private val formats = new ShaderFormats(numbers)
 
-  /** Both are taken with `angle`. */
-  val angle      = Flipped(Decoupled(new Angle(formats)))
-  val falloff    = Input(new FalloffQuestion(numbers))
+  val angle = Flipped(Decoupled(new Angle(formats)))
+
+  /** Taken together with `angle`. */
+  val falloff    = Input(new FalloffRequest(numbers))
   val brightness = Decoupled(new Brightness(numbers))
 }
 
 private object CosineStep extends ChiselEnum {
-  val idle, root, quotient, scale, fall, fallen, scaleFalloff, done = Value
+  val idle, root, quotient, shiftCosine, divideFalloff, falloffQuotient, shiftFalloff, done = Value
 }
 
-/** The cosine of an angle: its dot product by the root of the product of both lengths' squares; and the falloff of the
-  * light that comes from there; docs/numbers.md, 5.7 and 5.8.
+/** The cosine of an angle, and the light's falloff: docs/numbers.md, 5.7 and 5.8. The cosine is the dot product divided by
+  * the root of the product of both squared lengths.
   *
-  * One angle at a time, the divider's and the square root's latencies one after the other and four cycles more, and as
-  * many as the quotient's shift by steps of four and one takes; a second division for a light with a falloff. An angle
-  * that is not acute has the cosine 0, at once.
+  * One angle at a time. Latency: square root, division, four cycles, and the quotient's shift in steps of four bits and one
+  * bit; a second division for a light with a falloff. The cosine of an angle that is not acute is 0 at once.
   */
 final class CosineUnit(numbers: NumberFormats) extends Module {
   private val formats  = new ShaderFormats(numbers)
@@ -51,79 +52,79 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
   private val cosine = Reg(UInt((numbers.cosineFraction + 2).W))
 
   /** Two more than the bits by which [[cosine]] has to move down. */
-  private val drop = Reg(UInt(log2Ceil(formats.dotBits + 4).W))
+  private val shiftRight = Reg(UInt(log2Ceil(formats.dotBits + 4).W))
 
-  // The falloff's quotient, moved up so that what is left is to move it down by `fall`
-  private val room    = (NumberFormats.lightFraction + 3 - numbers.cosineFraction).max(0)
-  private val reach   = Reg(chiselTypeOf(io.falloff.reach))
-  private val square  = Reg(chiselTypeOf(io.falloff.mantissa))
-  private val falloff = Reg(UInt((numbers.cosineFraction + 1 + room).max(Falloff.bits).W))
-  private val fall    = Reg(SInt((formats.falloffExponentBits + 1).W))
-  private val isNear  = fall < 0.S
+  // The falloff's quotient has guard bits below, so that it only has to move down, by `falloffShift`
+  private val guardBits    = (NumberFormats.lightFraction + 3 - numbers.cosineFraction).max(0)
+  private val reference    = Reg(chiselTypeOf(io.falloff.reference))
+  private val square       = Reg(chiselTypeOf(io.falloff.mantissa))
+  private val falloff      = Reg(UInt((numbers.cosineFraction + 1 + guardBits).max(Falloff.bits).W))
+  private val falloffShift = Reg(SInt((formats.falloffExponentBits + 1).W))
+  private val isNear       = falloffShift < 0.S
 
-  // The radicand: the product's top bit or the next one is set, and the exponent is made even
+  // The radicand: one of the product's two top bits is set, and the exponent is made even
   private val angle    = io.angle.bits
   private val isLong   = angle.lengths(formats.lengthsBits - 1)
   private val aligned  = Mux(isLong, angle.lengths, Cat(angle.lengths(formats.lengthsBits - 2, 0), 0.U(1.W)))
   private val mantissa = Rounding.floor(aligned, formats.lengthsBits - numbers.radicandBits)
   private val exponent = angle.exponent +& isLong
 
-  // The dot product moves up until its top bit is set, while the root is on its way
+  // While the root is computed, the dot product moves up until its top bit is set
   private val isHigh = dot(formats.dotBits - 1)
   private val isLow  = !dot(formats.dotBits - 1, formats.dotBits - 4).orR
 
   switch(step) {
     is(CosineStep.idle) {
-      dot    := angle.dot
-      drop   := exponent(3, 1)
-      cosine := 0.U
-      reach  := io.falloff.reach
-      square := io.falloff.mantissa
-      fall   := (numbers.cosineFraction - NumberFormats.lightFraction + room).S -& io.falloff.exponent
+      dot          := angle.dot
+      shiftRight   := exponent(3, 1)
+      cosine       := 0.U
+      reference    := io.falloff.reference
+      square       := io.falloff.mantissa
+      falloffShift := (numbers.cosineFraction - NumberFormats.lightFraction + guardBits).S -& io.falloff.exponent
       when(io.angle.fire)(step := Mux(angle.isAcute, CosineStep.root, CosineStep.done))
     }
     is(CosineStep.root) {
       when(!isHigh) {
-        dot  := Mux(isLow, (dot << 4)(formats.dotBits - 1, 0), (dot << 1)(formats.dotBits - 1, 0))
-        drop := drop + Mux(isLow, 4.U, 1.U)
+        dot        := Mux(isLow, (dot << 4)(formats.dotBits - 1, 0), (dot << 1)(formats.dotBits - 1, 0))
+        shiftRight := shiftRight + Mux(isLow, 4.U, 1.U)
       }
       when(divider.io.division.fire)(step := CosineStep.quotient)
     }
     is(CosineStep.quotient) {
       cosine := Cat(divider.io.quotient.bits, 0.U(1.W))
-      when(divider.io.quotient.fire)(step := CosineStep.scale)
+      when(divider.io.quotient.fire)(step := CosineStep.shiftCosine)
     }
-    is(CosineStep.scale) {
+    is(CosineStep.shiftCosine) {
       falloff := Falloff.one
-      when(drop >= 6.U) {
-        drop   := drop - 4.U
-        cosine := cosine >> 4
-      }.elsewhen(drop > 2.U) {
-        drop   := drop - 1.U
-        cosine := cosine >> 1
+      when(shiftRight >= 6.U) {
+        shiftRight := shiftRight - 4.U
+        cosine     := cosine >> 4
+      }.elsewhen(shiftRight > 2.U) {
+        shiftRight := shiftRight - 1.U
+        cosine     := cosine >> 1
       }.otherwise {
-        step := Mux(reach === 0.U || cosine === 0.U, CosineStep.done, CosineStep.fall)
+        step := Mux(reference === 0.U || cosine === 0.U, CosineStep.done, CosineStep.divideFalloff)
       }
     }
-    is(CosineStep.fall) {
-      when(divider.io.division.fire)(step := CosineStep.fallen)
+    is(CosineStep.divideFalloff) {
+      when(divider.io.division.fire)(step := CosineStep.falloffQuotient)
     }
-    is(CosineStep.fallen) {
-      falloff := divider.io.quotient.bits << room
-      when(divider.io.quotient.fire)(step := CosineStep.scaleFalloff)
+    is(CosineStep.falloffQuotient) {
+      falloff := divider.io.quotient.bits << guardBits
+      when(divider.io.quotient.fire)(step := CosineStep.shiftFalloff)
     }
-    is(CosineStep.scaleFalloff) {
+    is(CosineStep.shiftFalloff) {
       when(isNear) {
-        falloff := Falloff.most
+        falloff := Falloff.max
         step    := CosineStep.done
-      }.elsewhen(fall >= 4.S && falloff =/= 0.U) {
-        fall    := fall - 4.S
-        falloff := falloff >> 4
-      }.elsewhen(fall > 0.S && falloff =/= 0.U) {
-        fall    := fall - 1.S
-        falloff := falloff >> 1
+      }.elsewhen(falloffShift >= 4.S && falloff =/= 0.U) {
+        falloffShift := falloffShift - 4.S
+        falloff      := falloff >> 4
+      }.elsewhen(falloffShift > 0.S && falloff =/= 0.U) {
+        falloffShift := falloffShift - 1.S
+        falloff      := falloff >> 1
       }.otherwise {
-        falloff := Mux(falloff > Falloff.most, Falloff.most, falloff)
+        falloff := Mux(falloff > Falloff.max, Falloff.max, falloff)
         step    := CosineStep.done
       }
     }
@@ -138,16 +139,16 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
 
   private val divides = step === CosineStep.root && isHigh
   squareRoot.io.root.ready := divides && divider.io.division.ready
-  private val isFalloff = step === CosineStep.fall
+  private val isFalloff = step === CosineStep.divideFalloff
   divider.io.division.valid          := isFalloff || (divides && squareRoot.io.root.valid)
   divider.io.division.bits.numerator :=
-    Mux(isFalloff, reach, Rounding.floor(dot, formats.dotBits - numbers.mantissaBits))
+    Mux(isFalloff, reference, Rounding.floor(dot, formats.dotBits - numbers.mantissaBits))
   divider.io.division.bits.denominator := Mux(
     isFalloff,
     Rounding.floor(square, formats.shadeBits - numbers.mantissaBits),
     Rounding.floor(squareRoot.io.root.bits, rootBits - numbers.mantissaBits)
   )
-  divider.io.quotient.ready := step === CosineStep.quotient || step === CosineStep.fallen
+  divider.io.quotient.ready := step === CosineStep.quotient || step === CosineStep.falloffQuotient
 
   private val one = 1.U << numbers.cosineFraction
   io.brightness.valid       := step === CosineStep.done

@@ -6,30 +6,31 @@ import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.{Fixed, Rounding}
 
+/** Ports of [[DirectUnit]]. */
 final class DirectUnitIO(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
   val brightness = Flipped(Decoupled(new Brightness(numbers)))
 
-  /** The light's, constant while it is in work. */
+  /** The light's intensity, constant while the unit works on it. */
   val colour = Input(Rgb(FrameRegisters.intensity))
 
-  /** To the multiplier, which answers in the cycle after it took them. */
-  val factors = Decoupled(new Factors(formats))
-  val product = Input(SInt(formats.productBits.W))
-  val direct  = Decoupled(Rgb(FrameRegisters.intensity))
+  /** To the multiplier, whose product comes in the cycle after it took them. */
+  val operands = Decoupled(new MultiplierOperands(formats))
+  val product  = Input(SInt(formats.productBits.W))
+  val direct   = Decoupled(Rgb(FrameRegisters.intensity))
 }
 
 private object DirectStep extends ChiselEnum {
 
-  /** Cosine · falloff; wait for it; light · that, for each channel; wait for the last one. */
-  val idle, fall, fallen, shine, shone, done = Value
+  /** `applyFalloff` multiplies cosine and falloff, `scaleColour` the result and each channel of the light. */
+  val idle, applyFalloff, awaitFalloff, scaleColour, awaitColour, done = Value
 }
 
-/** What a light gives to a surface, unless something is in its way: docs/numbers.md, 5.8.
+/** The direct light of a point light on a surface, without shadows: docs/numbers.md, 5.8.
   *
-  * One light at a time: four products and three cycles, more while the multiplier is taken.
+  * One light at a time: four products and three cycles, more while the multiplier is busy.
   */
 final class DirectUnit(config: ColonnadeConfig) extends Module {
   private val formats = new ShaderFormats(config.numbers)
@@ -42,45 +43,45 @@ final class DirectUnit(config: ColonnadeConfig) extends Module {
   private val brightness = Reg(UInt(formats.brightnessBits.W))
   private val direct     = Reg(Vec(3, UInt(NumberFormats.lightBits.W)))
 
-  // Factors
+  // Multiplier operands
   private val light         = io.colour.channels.map(_.natural)
-  private val falls         = step === DirectStep.fall
+  private val isFalloff     = step === DirectStep.applyFalloff
   private val channelColour = MuxLookup(channel, light(2))(Seq(0.U -> light(0), 1.U -> light(1)))
-  io.factors.valid       := falls || step === DirectStep.shine
-  io.factors.bits.wide   := brightness.zext.pad(formats.wideBits)
-  io.factors.bits.narrow := Mux(falls, falloff, channelColour).zext.pad(formats.narrowBits)
+  io.operands.valid       := isFalloff || step === DirectStep.scaleColour
+  io.operands.bits.wide   := brightness.zext.pad(formats.wideBits)
+  io.operands.bits.narrow := Mux(isFalloff, falloff, channelColour).zext.pad(formats.narrowBits)
 
-  // A channel's product comes in the cycle after it was taken
-  private val isArriving      = RegNext(io.factors.fire && step === DirectStep.shine, false.B)
+  // A channel's product comes in the cycle after its operands
+  private val isArriving      = RegNext(io.operands.fire && step === DirectStep.scaleColour, false.B)
   private val arrivingChannel = RegNext(channel)
-  private val shining         =
+  private val scaledChannel   =
     Rounding.saturate(Rounding.floor(io.product.asUInt, config.numbers.cosineFraction), NumberFormats.lightBits)
-  when(isArriving)(direct(arrivingChannel) := shining)
+  when(isArriving)(direct(arrivingChannel) := scaledChannel)
 
   switch(step) {
     is(DirectStep.idle) {
       channel    := 0.U
       falloff    := io.brightness.bits.falloff
       brightness := io.brightness.bits.cosine
-      when(io.brightness.fire)(step := DirectStep.fall)
+      when(io.brightness.fire)(step := DirectStep.applyFalloff)
     }
-    is(DirectStep.fall) {
-      when(io.factors.fire)(step := DirectStep.fallen)
+    is(DirectStep.applyFalloff) {
+      when(io.operands.fire)(step := DirectStep.awaitFalloff)
     }
-    is(DirectStep.fallen) {
+    is(DirectStep.awaitFalloff) {
       brightness := Rounding.narrow(
         Rounding.floor(io.product.asUInt, NumberFormats.lightFraction),
         formats.brightnessBits
       )
-      step := DirectStep.shine
+      step := DirectStep.scaleColour
     }
-    is(DirectStep.shine) {
-      when(io.factors.fire) {
+    is(DirectStep.scaleColour) {
+      when(io.operands.fire) {
         channel := channel + 1.U
-        when(channel === 2.U)(step := DirectStep.shone)
+        when(channel === 2.U)(step := DirectStep.awaitColour)
       }
     }
-    is(DirectStep.shone)(step := DirectStep.done)
+    is(DirectStep.awaitColour)(step := DirectStep.done)
     is(DirectStep.done) {
       when(io.direct.fire)(step := DirectStep.idle)
     }

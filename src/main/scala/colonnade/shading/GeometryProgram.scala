@@ -1,151 +1,186 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.log2Ceil
+import colonnade.microcode.{Label, Microprogram, Overlap, Repeat, StepEncoding}
 
-/** What the geometry datapath does in one cycle. Registers that nothing here names keep their values. */
-final class GeometryControl(formats: ShaderFormats) extends Bundle {
-  val load = Bool()
+/** Labels of [[GeometryProgram]]. */
+sealed trait GeometryLabel extends Label
 
-  // Factors of a product: at most one of these
-  val weighted = Vec(3, Bool())
-  val slope    = Vec(2 * formats.slopeDigits, Bool())
-  val raise    = Bool()
-  val square   = Bool()
-  val project  = Bool()
-  val lengths  = Bool()
+object GeometryLabel {
 
-  // The sum: of products, from the first one; with `descend` the sum so far moves down by a digit
-  val accumulate = Bool()
-  val first      = Bool()
-  val descend    = Bool()
+  /** Waits for a hit. */
+  case object Idle extends GeometryLabel
 
-  /** The sum to round is of a slope's digits, otherwise of a normal's component. */
-  val roundSlope = Bool()
+  /** Interpolates the shading normal. */
+  case object Normal extends GeometryLabel
 
-  // The adder: at most one of these
-  val addSlope     = Bool()
-  val addDistance  = Bool()
-  val addOffset    = Bool()
-  val pushNormal   = Bool()
-  val pushLight    = Bool()
-  val measureLight = Bool()
+  /** Computes the hit point and the shadow rays' origin. */
+  case object Point extends GeometryLabel
 
-  /** Turn the point from the ray's frame towards the object's, if its axis needs that: always, or for axis 0 only. */
-  val turn = Vec(2, Bool())
+  /** Computes the direction to a light, and its angle to the normal. */
+  case object LightAngle extends GeometryLabel
 
-  // The shifter: at most one of these
-  val placeLight  = Vec(3, Bool())
-  val scaleNormal = Bool()
-  val scaleLight  = Bool()
-
-  // The largest magnitude
-  val startMeasure = Bool()
-  val countNormal  = Bool()
-  val countLight   = Bool()
-
-  // Results
-  val keepNormalLength = Bool()
-  val keepDot          = Bool()
+  /** Offers the result. */
+  case object Done extends GeometryLabel
 }
 
-/** The geometry's microprogram: which step does what, one step a cycle.
+/** Inputs of [[GeometryProgram]]. */
+final class GeometryConditions {
+
+  /** A hit is taken. */
+  val takes: Bool = Wire(Bool())
+
+  /** The smooth normal is zero: start over with the geometric one. */
+  val startsOver: Bool = Wire(Bool())
+
+  /** The first light of the hit is in work; further lights find the normal scaled and measured. */
+  val isFirstLight: Bool = Wire(Bool())
+
+  /** The result is taken, and whether it is that of the hit's last light. */
+  val isTaken: Bool = Wire(Bool())
+  val isLast:  Bool = Wire(Bool())
+}
+
+/** The shader geometry's microprogram.
   *
   * {{{
-  * multiplier | weights × normals | slopes × t | offset × normal |     | n·n |     | n·l | l·l |     | lengths |
-  * adder      |       n and |n|   |            P +=       P +=   |  l = light - P   |l| |
+  * multiplier | weights × normals | shear × t | offset × normal |    | n·n |     | n·l | l·l |     | norms |
+  * adder      |       n and |n|   |           P +=       P +=   |  l = light - P   |l| |
   * shifter    |                                               | light <<  |n <<|   | l << | l << |
   * }}}
-  * Products of step s reach the sum in s + 1; the sum is there to use in s + 2, its rounded value in s + 3.
+  * The product of a step is accumulated in the next one. The sum is ready two steps after its last product, and its
+  * rounded value three steps after.
   */
-final class GeometryProgram(formats: ShaderFormats) {
-  private val toSum     = 2
-  private val toRounded = 3
-  private val digits    = formats.slopeDigits
+final class GeometryProgram(formats: ShaderFormats, control: GeometryControl, conditions: GeometryConditions) {
+  import GeometryLabel._
+  import conditions._
 
-  private def three(first: Int): Range = first until first + 3
+  private val sumLatency   = 2
+  private val roundLatency = 3
+  private val digits       = formats.shearDigits
 
-  // The shading normal: for each axis three products, then the sum is pushed and measured
-  private val weighted    = 0 until 9
-  private val pushNormal  = Seq(2, 5, 8).map(_ + toSum)
-  private val countNormal = pushNormal.last + 1
+  val program = new Microprogram[GeometryLabel](StepEncoding.Binary())
+  import program.{branch, raise}
 
-  // The hit point. Nothing is added to it before the normal is counted: then the program may still start over
-  private val slopes      = Seq(0, 1).map(side => (0 until digits).map(weighted.length + side * digits + _))
-  private val addSlope    = slopes.map(_.last + toRounded)
-  private val addDistance = addSlope.last + 1
-  private val turn        = Seq(addDistance + 1, addDistance + 2)
-  require(addSlope.head > countNormal, "the hit point changes while the program may start over")
+  private def xyz(first: Int): Range = first until first + 3
 
-  // The shadow ray's origin
-  private val addOffset = three(turn.last + 1)
-  private val raise     = addOffset.map(_ - toRounded)
+  // The schedule, in cycles of the overlapped part. Three products make a component of the normal
+  private val weighted         = 0 until 9
+  private val shiftInNormal    = Seq(2, 5, 8).map(_ + sumLatency)
+  private val latchNormalZeros = shiftInNormal.last + 1
 
-  // The way to the light, and its measure
-  private val pushLight    = three(addOffset.last + 1)
-  private val placeLight   = pushLight.map(_ - 1)
-  private val measureLight = three(pushLight.last + 1)
-  private val countLight   = measureLight.last + 1
+  // The hit point. Nothing is added to it before the normal is measured: until then the program may start over
+  private val shear       = Seq(0, 1).map(side => (0 until digits).map(weighted.length + side * digits + _))
+  private val addShear    = shear.map(_.last + roundLatency)
+  private val addDistance = addShear.last + 1
+  private val unpermute   = Seq(addDistance + 1, addDistance + 2)
+  private val addOffset   = xyz(unpermute.last + 1)
+  private val scaleOffset = addOffset.map(_ - roundLatency)
+  require(addShear.head > latchNormalZeros, "the hit point changes while the program may start over")
 
-  // Dot products of the scaled vectors: the shifter is a step ahead of the multiplier
-  private val scaleNormal   = three(placeLight.last + 1)
-  private val squareNormal  = scaleNormal.map(_ + 1)
-  private val normalSquared = squareNormal.last + toSum
-  private val scaleLight    = three(countLight + 1) ++ three(countLight + 4)
-  private val project       = scaleLight.take(3).map(_ + 1)
-  private val projected     = project.last + toSum
-  private val squareLight   = scaleLight.drop(3).map(_ + 1)
-  private val lengths       = squareLight.last + toSum
+  // The vector to the light, and its largest component
+  private val shiftInLight    = xyz(addOffset.last + 1)
+  private val alignLight      = shiftInLight.map(_ - 1)
+  private val measureLight    = xyz(shiftInLight.last + 1)
+  private val latchLightZeros = measureLight.last + 1
 
-  /** All is done: nothing happens in this step. */
-  val last: Int = lengths + toSum
+  // Dot products of the scaled vectors. The shifter is a step ahead of the multiplier
+  private val scaleNormal = xyz(alignLight.last + 1)
+  private val scaleLight  = Seq(xyz(latchLightZeros + 1), xyz(latchLightZeros + 4))
+  private val normProduct = scaleLight.last.last + 1 + sumLatency
+  require(
+    shiftInLight.head > addOffset.last && scaleNormal.head > alignLight.head,
+    "a light begins within the hit's part"
+  )
 
-  /** Where the next light of the same hit begins. */
-  val nextLight: Int = placeLight.head
-  require(pushLight.head > addOffset.last && scaleNormal.head > placeLight.head, "a light begins within the hit's part")
+  program.exclusive("multiplier", control.products)
+  program.exclusive("adder", control.additions)
+  program.exclusive("shifter", control.shifts)
 
-  val stepBits: Int = log2Ceil(last + 1)
+  program.step(Idle) {
+    raise(control.load, takes)
+    program.await(takes, "request")
+  }
+  program.overlap { at =>
+    at.label(0, Normal)
+    at.label(latchNormalZeros + 1, Point)
+    at.label(alignLight.head, LightAngle)
+    normal(at)
+    point(at)
+    light(at)
+    angle(at)
+  }
+  program.step(Done) {
+    branch(
+      Repeat.until(isTaken, "the result is taken"),
+      Idle.when(isLast, "last light"),
+      LightAngle.otherwise
+    )
+  }
 
-  /** Decodes a step; a later light of the same hit finds its normal scaled and measured. */
-  def control(step: UInt, load: Bool, isFirstLight: Bool): GeometryControl = {
-    def in(steps: Seq[Int]): Bool = steps.map(step === _.U).reduce(_ || _)
-    def at(steps: Int*): Bool     = in(steps)
+  private def normal(at: Overlap[GeometryLabel]): Unit = {
+    for (cycle <- weighted) at(cycle)(raise(control.weightNormal(cycle % 3)))
+    weighted.grouped(3).foreach(sum(at, _))
+    shiftInNormal.foreach(at(_)(raise(control.shiftInNormal)))
+    at(shiftInNormal.head)(raise(control.startMeasure))
+    at(latchNormalZeros) {
+      raise(control.latchNormalZeros)
+      branch(Normal.when(startsOver, "the smooth normal is zero"))
+    }
+  }
 
-    val sums = Seq(three(0), three(3), three(6)) ++ slopes ++ raise.map(Seq(_)) :+ squareNormal :+ project :+
-      squareLight :+ Seq(lengths)
-    val control = Wire(new GeometryControl(formats))
-    control.load := load
+  private def point(at: Overlap[GeometryLabel]): Unit = {
+    for ((cycle, digit) <- shear.flatten.zipWithIndex) at(cycle)(raise(control.scaleShear(digit)))
+    for (cycles <- shear) {
+      sum(at, cycles)
+      cycles.tail.foreach(cycle => at(cycle + 1)(raise(control.shiftAccumulator)))
+    }
+    for (cycle <- addShear) {
+      at(cycle - 1)(raise(control.roundShear))
+      at(cycle)(raise(control.addShear))
+    }
+    at(addDistance)(raise(control.addDistance))
+    for ((cycle, rotation) <- unpermute.zipWithIndex) at(cycle)(raise(control.unpermute(rotation)))
+    for (cycle <- scaleOffset) {
+      at(cycle)(raise(control.scaleOffset))
+      sum(at, Seq(cycle))
+    }
+    addOffset.foreach(at(_)(raise(control.addOffset, isFirstLight)))
+  }
 
-    control.weighted := VecInit(Seq(0, 1, 2).map(corner => in(weighted.filter(_ % 3 == corner))))
-    control.slope    := VecInit(slopes.flatten.map(at(_)))
-    control.raise    := in(raise)
-    control.square   := (in(squareNormal) && isFirstLight) || in(squareLight)
-    control.project  := in(project)
-    control.lengths  := at(lengths)
+  private def light(at: Overlap[GeometryLabel]): Unit = {
+    for ((cycle, axis) <- alignLight.zipWithIndex) at(cycle)(raise(control.alignLight(axis)))
+    shiftInLight.foreach(at(_)(raise(control.shiftInLight)))
+    measureLight.foreach(at(_)(raise(control.measureLight)))
+    at(measureLight.head)(raise(control.startMeasure))
+    at(latchLightZeros)(raise(control.latchLightZeros))
+  }
 
-    control.accumulate := in(sums.flatten.map(_ + 1))
-    control.first      := in(sums.map(_.head + 1))
-    control.descend    := (if (digits == 1) false.B else in(slopes.flatMap(_.tail).map(_ + 1)))
-    control.roundSlope := in(addSlope.map(_ - 1))
+  private def angle(at: Overlap[GeometryLabel]): Unit = {
+    // n·n
+    scaleNormal.foreach { cycle =>
+      at(cycle)(raise(control.scaleNormal, isFirstLight))
+      at(cycle + 1)(raise(control.square, isFirstLight))
+    }
+    sum(at, scaleNormal.map(_ + 1))
+    at(scaleNormal.last + 1 + sumLatency)(raise(control.latchNormalLength, isFirstLight))
 
-    control.addSlope     := in(addSlope)
-    control.addDistance  := at(addDistance)
-    control.addOffset    := in(addOffset) && isFirstLight
-    control.pushNormal   := in(pushNormal)
-    control.pushLight    := in(pushLight)
-    control.measureLight := in(measureLight)
-    control.turn         := VecInit(turn.map(at(_)))
+    // n·l and l·l
+    for ((cycles, product) <- scaleLight.zip(Seq(control.projectNormal, control.square))) {
+      cycles.foreach { cycle =>
+        at(cycle)(raise(control.scaleLight))
+        at(cycle + 1)(raise(product))
+      }
+      sum(at, cycles.map(_ + 1))
+    }
+    at(scaleLight.head.last + 1 + sumLatency)(raise(control.latchDot))
+    at(normProduct)(raise(control.normProduct))
+    sum(at, Seq(normProduct))
+  }
 
-    control.placeLight  := VecInit(placeLight.map(at(_)))
-    control.scaleNormal := in(scaleNormal) && isFirstLight
-    control.scaleLight  := in(scaleLight)
-
-    control.startMeasure := at(pushNormal.head, measureLight.head)
-    control.countNormal  := at(countNormal)
-    control.countLight   := at(countLight)
-
-    control.keepNormalLength := at(normalSquared) && isFirstLight
-    control.keepDot          := at(projected)
-    control
+  /** Sums up the products of these cycles, each one cycle later. */
+  private def sum(at: Overlap[GeometryLabel], products: Seq[Int]): Unit = {
+    products.foreach(cycle => at(cycle + 1)(raise(control.accumulate)))
+    at(products.head + 1)(raise(control.startSum))
   }
 }

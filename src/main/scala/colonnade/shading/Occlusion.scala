@@ -2,13 +2,13 @@ package colonnade.shading
 
 import chisel3._
 
-/** What lies between a surface and a light. */
+/** The outcome of a shadow ray. */
 object Occlusion extends ChiselEnum {
 
-  /** Nothing, or no shadow ray was sent. */
+  /** The ray hits nothing, or no ray was sent. */
   val none = Value
 
-  /** Only triangles that let some light through. */
-  val clear  = Value
-  val opaque = Value
+  /** The ray hits transmissive triangles only. */
+  val transmissive = Value
+  val opaque       = Value
 }

@@ -5,30 +5,32 @@ import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Rgb}
 
-/** A path that meets its last surface. */
-final class PathEnd(config: ColonnadeConfig) extends Bundle {
+/** The last surface of a path. */
+final class PathTermination(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
 
-  /** It meets no surface of the object: the background's colour counts. */
+  /** There is no surface: the path ends with the background's colour. */
   val isBackground = Bool()
 
-  /** By light: what the shadow rays have met. */
+  /** By light: the shadow rays' outcomes. */
   val occlusions = Vec(config.frame.lights, Occlusion())
 
-  /** The surface is the room's, seen directly: what part of the light is left counts as well. */
-  val isSeen = if (config.hasRoom) Some(Bool()) else None
+  /** The camera sees the environment's surface directly: the shadow ratio is needed as well. */
+  val isDirectView = if (config.hasRoom) Some(Bool()) else None
 }
 
-/** What a mirror or glass does to a path. */
-final class PathTurn(config: ColonnadeConfig) extends Bundle {
-  val context  = Context(config)
-  val albedo   = Rgb(FrameRegisters.colour)
+/** The change of a path's throughput at a mirror or glass. */
+final class BounceUpdate(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val albedo  = Rgb(FrameRegisters.colour)
+
+  /** The path is tinted by the albedo. */
   val isTinted = Bool()
 
-  /** The share of what lies behind, by Schlick's reflection. */
-  val share = FrameRegisters.share
+  /** The Fresnel term: the weight of the deferred reflection. */
+  val fresnel = FrameRegisters.share
 
-  /** That is the remembered surface, in all its light; otherwise the background's colour. */
+  /** The reflection shows the remembered surface, lit by all lights; otherwise the background's colour. */
   val hasSurface = if (config.hasRoom) Some(Bool()) else None
 }
 
@@ -37,6 +39,6 @@ final class PathColour(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val colour  = Rgb(FrameRegisters.colour)
 
-  /** Of a surface that is seen: the light left. */
+  /** Of a directly visible surface of the environment: its shadow ratio. */
   val ratio = if (config.hasRoom) Some(Rgb(FrameRegisters.share)) else None
 }

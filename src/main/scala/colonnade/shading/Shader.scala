@@ -7,7 +7,7 @@ import colonnade.formats.{FrameRegisters, Light, Material, MaterialKind, Rgb, Sh
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
 
-/** The ports of the shader; the registers are constant while it is busy. */
+/** Ports of [[Shader]]; the registers are constant while it is busy. */
 final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
 
@@ -17,31 +17,31 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   val materials = Input(Vec(config.frame.materials, new Material(config)))
   val request   = Flipped(Decoupled(new ShadeRequest(config)))
 
-  /** Points of the room; taken when there is no request. */
-  val room = if (config.hasRoom) Some(Flipped(Decoupled(new RoomSurface(config)))) else None
+  /** Points of the environment; taken when there is no request. */
+  val environment = if (config.hasRoom) Some(Flipped(Decoupled(new EnvironmentSurface(config)))) else None
 
-  /** `request` will be ready in the next cycle. */
-  val takesNext = Output(Bool())
+  /** `request` is ready in the next cycle. */
+  val readyNext = Output(Bool())
 
   /** Hits on diffuse surfaces. */
   val lit = Decoupled(new LitSurface(config))
 
-  /** Hits on the others. */
+  /** Hits on mirrors and glass. */
   val bounced = if (config.frame.hasBounces) Some(Decoupled(new BouncedRay(config))) else None
 
   /** Holds a hit. */
   val busy = Output(Bool())
 }
 
-/** What becomes of hits: on a diffuse surface, what each light gives to it (Lambert's cosine, the light's falloff); on a
-  * mirror or glass, the ray that goes on. docs/numbers.md, 5 and 6.
+/** Shades hits: docs/numbers.md, 5 and 6. A hit on a diffuse surface gives the direct light of each light, with Lambert's
+  * cosine and the light's falloff. A hit on a mirror or glass gives the outgoing ray.
   *
-  * Hits of one kind leave in order. One hit is in the geometry, one light in the cosine and its colour, one hit in the
-  * bounce unit; the first two share a multiplier. At 32b32s64d a hit with one light enters every 41 to 45 cycles (12 more
-  * where the smooth normal is zero) and leaves some 85 cycles later; a light more takes 20 to 40 cycles. A surface that
-  * faces away from a light needs neither root nor quotient.
+  * Hits of one kind leave in order. The geometry holds one hit, the cosine and direct units one light, and the bounce unit
+  * one hit; geometry and direct unit share a multiplier. At 32b32s64d a hit with one light enters every 41 to 45 cycles (12
+  * more if the smooth normal is zero) and leaves about 85 cycles later. Each further light takes 20 to 40 cycles. A surface
+  * that faces away from a light needs neither root nor quotient.
   *
-  * Of a material's index the low bits count, as many as the table needs; beyond the table it takes entry 0.
+  * A material's number is truncated to the bits that the table needs; beyond the table it means entry 0.
   */
 final class Shader(config: ColonnadeConfig) extends Module {
   private val formats = new ShaderFormats(config.numbers)
@@ -63,32 +63,34 @@ final class Shader(config: ColonnadeConfig) extends Module {
     val entries   = io.materials.padTo(1 << indexBits, io.materials.head)
     if (indexBits == 0) entries.head else VecInit(entries)(surface.material(indexBits - 1, 0))
   }
-  private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse && !surface.isRoom).getOrElse(false.B)
+  private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse && !surface.isEnvironment).getOrElse(false.B)
   geometry.io.request <> io.request
-  io.takesNext           := geometry.io.takesNext
+  io.readyNext           := geometry.io.readyNext
   geometry.io.shading    := io.shading
   geometry.io.lights     := io.lights
   geometry.io.unitShift  := io.unitShift
   geometry.io.lightCount := Mux(isBounce, 1.U, io.shading.lights)
 
-  // What the room's maps say of the point in the geometry
-  private val room = geometry.io.room.zip(io.room).map { case (taker, offered) =>
+  // Albedo and shadows of an environment's point in the geometry
+  private val environment = geometry.io.environment.zip(io.environment).map { case (taker, offered) =>
     taker <> offered
     RegEnable(offered.bits, offered.fire)
   }
-  private val albedo  = room.map(room => Mux(surface.isRoom, room.albedo, material.albedo)).getOrElse(material.albedo)
-  private val shadows = io.shading.shadows && room.map(room => !surface.isRoom || room.shadows).getOrElse(true.B)
+  private val albedo =
+    environment.map(point => Mux(surface.isEnvironment, point.albedo, material.albedo)).getOrElse(material.albedo)
+  private val shadows =
+    io.shading.shadows && environment.map(point => !surface.isEnvironment || point.shadows).getOrElse(true.B)
 
-  // A light goes to the cosine; what it gives is held with the surface until the last one is through
+  // A light goes to the cosine unit. Its direct light is held with the surface until the last light is done
   private val isHeld = RegInit(false.B)
   private val light  = Reg(chiselTypeOf(point.bits.light))
   private val isLast = Reg(Bool())
   private val lit    = Reg(new LitSurface(config))
-  private val shines = point.bits.light < io.shading.lights
+  private val isOn   = point.bits.light < io.shading.lights
   private val isFree = !isHeld && cosine.io.angle.ready
   cosine.io.angle.valid        := point.valid && !isBounce && isFree
   cosine.io.angle.bits         := point.bits.angle
-  cosine.io.angle.bits.isAcute := point.bits.angle.isAcute && shines
+  cosine.io.angle.bits.isAcute := point.bits.angle.isAcute && isOn
   cosine.io.falloff            := point.bits.falloff
   when(cosine.io.angle.fire) {
     val Seq(x, y, z) = surface.origin.axes.map(Fixed(scene, _))
@@ -99,21 +101,21 @@ final class Shader(config: ColonnadeConfig) extends Module {
     lit.albedo  := albedo
     lit.origin  := Vec3.of(x, y, z)
     when(point.bits.light === 0.U) {
-      lit.directs         := 0.U.asTypeOf(lit.directs)
+      lit.directLight     := 0.U.asTypeOf(lit.directLight)
       lit.needsShadowRays := 0.U.asTypeOf(lit.needsShadowRays)
     }
-    at(lit.needsShadowRays, point.bits.light) := shadows && point.bits.angle.isAcute && shines
+    at(lit.needsShadowRays, point.bits.light) := shadows && point.bits.angle.isAcute && isOn
   }
   direct.io.brightness <> cosine.io.brightness
   direct.io.colour       := at(io.lights, light).colour
   direct.io.direct.ready := isHeld && (!isLast || io.lit.ready)
   when(direct.io.direct.fire) {
-    isHeld                 := false.B
-    at(lit.directs, light) := direct.io.direct.bits
+    isHeld                     := false.B
+    at(lit.directLight, light) := direct.io.direct.bits
   }
-  io.lit.valid                   := isHeld && isLast && direct.io.direct.valid
-  io.lit.bits                    := lit
-  at(io.lit.bits.directs, light) := direct.io.direct.bits
+  io.lit.valid                       := isHeld && isLast && direct.io.direct.valid
+  io.lit.bits                        := lit
+  at(io.lit.bits.directLight, light) := direct.io.direct.bits
 
   // Mirrors and glass
   private val bounces = io.bounced.map { bounced =>
@@ -126,17 +128,17 @@ final class Shader(config: ColonnadeConfig) extends Module {
     unit.io.request.bits.origin.axes.zip(surface.origin.axes).foreach { case (to, from) =>
       to := Rounding.narrow(from, to.getWidth)
     }
-    unit.io.request.bits.normal      := surface.normal
-    unit.io.request.bits.isSmooth    := surface.isSmooth
-    unit.io.request.bits.facing      := surface.facing
-    unit.io.request.bits.towards     := surface.towards
-    unit.io.request.bits.backSide    := surface.backSide
-    unit.io.request.bits.isGlass     := material.kind.get === MaterialKind.glass
-    unit.io.request.bits.eta         := Mux(surface.backSide, material.etaBack.get, material.etaFront.get)
-    unit.io.request.bits.reflectance := material.reflectance.get
-    for (beside <- bounced.bits.beside) {
+    unit.io.request.bits.normal            := surface.normal
+    unit.io.request.bits.isSmooth          := surface.isSmooth
+    unit.io.request.bits.faceForwardNormal := surface.faceForwardNormal
+    unit.io.request.bits.dir               := surface.dir
+    unit.io.request.bits.backSide          := surface.backSide
+    unit.io.request.bits.isGlass           := material.kind.get === MaterialKind.glass
+    unit.io.request.bits.eta               := Mux(surface.backSide, material.etaBack.get, material.etaFront.get)
+    unit.io.request.bits.reflectance       := material.reflectance.get
+    for (origin <- bounced.bits.fresnelOrigin) {
       val origins = surface.origin.axes.map(RegEnable(_, unit.io.request.fire))
-      beside.axes.zip(origins).foreach { case (to, from) => to := Fixed(scene, from) }
+      origin.axes.zip(origins).foreach { case (to, from) => to := Fixed(scene, from) }
     }
     when(unit.io.request.fire) {
       albedo   := material.albedo
@@ -152,14 +154,14 @@ final class Shader(config: ColonnadeConfig) extends Module {
   point.ready := Mux(isBounce, bounces.map(_.io.request.ready).getOrElse(false.B), isFree)
 
   // Multiplier
-  multiplier.io.geometry := geometry.io.factors
-  multiplier.io.colour <> direct.io.factors
+  multiplier.io.geometry := geometry.io.operands
+  multiplier.io.colour <> direct.io.operands
   geometry.io.product := multiplier.io.product
   direct.io.product   := multiplier.io.product
 
   io.busy := !geometry.io.request.ready
 
-  /** A light's entry; there may be only one. */
+  /** A light's entry; a single light needs no index. */
   private def at[T <: Data](entries: Vec[T], index: UInt): T =
     if (config.frame.lights == 1) entries.head else entries(index)
 }

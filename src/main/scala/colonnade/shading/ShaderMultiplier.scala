@@ -3,28 +3,29 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
 
+/** Ports of [[ShaderMultiplier]]. */
 final class ShaderMultiplierIO(formats: ShaderFormats) extends Bundle {
 
-  /** Never waits. */
-  val geometry = Flipped(Valid(new Factors(formats)))
+  /** Has priority; never waits. */
+  val geometry = Flipped(Valid(new MultiplierOperands(formats)))
 
-  /** Takes the cycles that the geometry leaves. */
-  val colour = Flipped(Decoupled(new Factors(formats)))
+  /** Uses the cycles that the geometry leaves free. */
+  val colour = Flipped(Decoupled(new MultiplierOperands(formats)))
 
-  /** Of the factors taken in the cycle before; whoever gave them takes it now. */
+  /** Of the operands of the cycle before; valid for one cycle. */
   val product = Output(SInt(formats.productBits.W))
 }
 
-/** The shader's only multiplier, exact.
+/** The shader's only multiplier; exact products.
   *
-  * Latency one cycle, a product a cycle. The geometry's schedule leaves a third of its cycles free, and all cycles in
-  * which it waits for the cosine: colours cannot starve.
+  * Latency one cycle, one product per cycle. The geometry's program leaves a third of its cycles free, and all cycles in
+  * which it waits for the cosine unit. So colours cannot starve.
   */
 final class ShaderMultiplier(formats: ShaderFormats) extends Module {
   val io = IO(new ShaderMultiplierIO(formats))
 
-  private val factors = Mux(io.geometry.valid, io.geometry.bits, io.colour.bits)
+  private val operands = Mux(io.geometry.valid, io.geometry.bits, io.colour.bits)
 
   io.colour.ready := !io.geometry.valid
-  io.product      := RegNext(factors.wide * factors.narrow)
+  io.product      := RegNext(operands.wide * operands.narrow)
 }

@@ -16,38 +16,36 @@ final class ShadeRequest(config: ColonnadeConfig) extends Bundle {
   val face    = new Face
 }
 
-/** A point of the room, to be lit like any diffuse surface. */
-final class RoomSurface(config: ColonnadeConfig) extends Bundle {
+/** A point of the environment, to be lit like a diffuse surface. */
+final class EnvironmentSurface(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val point   = Vec3(new Fixed(new RayFormats(config.numbers).scene))
   val normal  = Vec3(SInt(NumberFormats.normalBits.W))
   val albedo  = Rgb(FrameRegisters.colour)
 
-  /** Ask what is in the lights' way. */
+  /** Send shadow rays. */
   val shadows = Bool()
 }
 
-/** A diffuse surface and what each light gives to it, unless something is in its way; shadow rays, from `origin`, say
-  * what.
-  */
+/** A diffuse surface and its direct light, before shadow rays from `origin` have been traced. */
 final class LitSurface(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val albedo  = Rgb(FrameRegisters.colour)
   val origin  = Vec3(new Fixed(new RayFormats(config.numbers).scene))
 
-  /** By light; 0 from one that does not shine. */
-  val directs         = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
+  /** By light; 0 from a light that is off. */
+  val directLight     = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
   val needsShadowRays = Vec(config.frame.lights, Bool())
 }
 
-/** A ray that goes on from a mirror or from glass. */
+/** A ray that leaves a mirror or glass. */
 final class BouncedRay(config: ColonnadeConfig) extends Bundle {
   val bounce = new BounceResult(config)
   val albedo = Rgb(FrameRegisters.colour)
 
-  /** The path takes the material's colour. */
+  /** The path is tinted by the albedo. */
   val isTinted = Bool()
 
-  /** Where what glass reflects comes from, if that may be a room: its ray starts off the surface, on the ray's side. */
-  val beside = if (config.hasRoom) Some(Vec3(new Fixed(new RayFormats(config.numbers).scene))) else None
+  /** Where there may be an environment: the origin of the Fresnel reflection, off the surface on the ray's side. */
+  val fresnelOrigin = if (config.hasRoom) Some(Vec3(new Fixed(new RayFormats(config.numbers).scene))) else None
 }

@@ -91,7 +91,7 @@ final class HitTable(config: ColonnadeConfig) extends Module {
   io.limits     := limits
   io.hasHit     := hasHit
   io.occlusions := VecInit(hasHit.zip(hasPassed).map { case (hit, passed) =>
-    Mux(hit, Occlusion.opaque, Mux(passed, Occlusion.clear, Occlusion.none))
+    Mux(hit, Occlusion.opaque, Mux(passed, Occlusion.transmissive, Occlusion.none))
   })
   io.nearest.t  := bests(io.nearest.context)
   io.nearest.id := ids(io.nearest.context)

@@ -7,7 +7,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.environment.RememberedRay
 import colonnade.formats.Shading
 import colonnade.ray.RayRequest
-import colonnade.shading.{BouncedRay, BounceResult, PathTurn}
+import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay}
 
 /** What a room adds to [[PathTurns]]. */
 final class RoomTurns(config: ColonnadeConfig) extends Bundle {
@@ -32,7 +32,7 @@ final class PathTurnsIO(config: ColonnadeConfig) extends Bundle {
 
   /** From the shader, to the colour unit and to ray set-up. */
   val bounced = Flipped(Decoupled(new BouncedRay(config)))
-  val turn    = Decoupled(new PathTurn(config))
+  val turn    = Decoupled(new BounceUpdate(config))
   val ray     = Decoupled(new RayRequest(config))
 
   /** A path has turned. */
@@ -55,11 +55,11 @@ final class PathTurns(config: ColonnadeConfig) extends Module {
   direct.turn.context  := bounce.context
   direct.turn.albedo   := io.bounced.bits.albedo
   direct.turn.isTinted := io.bounced.bits.isTinted
-  direct.turn.share    := bounce.share
+  direct.turn.fresnel  := bounce.fresnel
   direct.turn.hasSurface.foreach(_ := false.B)
   direct.isRefraction := bounce.isRefraction
   direct.origin       := bounce.origin
-  direct.towards      := bounce.towards
+  direct.towards      := bounce.dir
 
   // The path that turns
   private val path = Wire(Decoupled(new TurnedPath(config)))
@@ -90,7 +90,7 @@ final class PathTurns(config: ColonnadeConfig) extends Module {
 
   private def waitBeside(room: RoomTurns): Unit = {
     val waiting   = ContextTable(config, new TurnedPath(config))
-    val hasBeside = room.isThere && bounce.share.natural =/= 0.U
+    val hasBeside = room.isThere && bounce.fresnel.natural =/= 0.U
 
     // Out of the table: read, kept, and on its way
     val isRead  = RegNext(room.resume.fire, false.B)
@@ -116,7 +116,7 @@ final class PathTurns(config: ColonnadeConfig) extends Module {
     room.ray.bits.context := Mux(path.fire, path.bits.turn.context, bounce.context)
     val ray = room.ray.bits.ray
     ray.pixel   := DontCare
-    ray.origin  := Mux(path.fire, path.bits.origin, io.bounced.bits.beside.get)
+    ray.origin  := Mux(path.fire, path.bits.origin, io.bounced.bits.fresnelOrigin.get)
     ray.towards := path.bits.towards
     when(!path.fire) {
       ray.towards.axes.zip(bounce.reflection.axes).foreach { case (to, from) => to := from }
@@ -126,8 +126,8 @@ final class PathTurns(config: ColonnadeConfig) extends Module {
 
 /** A path that turns, and the ray that goes on. */
 final private class TurnedPath(config: ColonnadeConfig) extends Bundle {
-  val turn         = new PathTurn(config)
+  val turn         = new BounceUpdate(config)
   val isRefraction = Bool()
   val origin       = new BounceResult(config).origin.cloneType
-  val towards      = new BounceResult(config).towards.cloneType
+  val towards      = new BounceResult(config).dir.cloneType
 }

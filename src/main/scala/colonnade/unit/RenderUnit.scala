@@ -87,7 +87,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   connect(traversal.io.start, enters, setUpRay.bits.context)
   private val (chosen, served) = (recordFetch.io.chosen, recordFetch.io.served)
   private val ray              = rays.read(chosen.bits, chosen.valid)
-  recordFetch.io.takesNext  := VecInit(traversal.io.takesNext, triangleUnit.io.takesNext, shader.io.takesNext)
+  recordFetch.io.takesNext  := VecInit(traversal.io.takesNext, triangleUnit.io.takesNext, shader.io.readyNext)
   traversal.io.nodes.valid  := isFor(RecordUse.node)
   traversal.io.nodes.bits   := served.bits
   traversal.io.ray          := ray.forBoxes
@@ -169,7 +169,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   shadowRays.io.unitShift                   := io.registers.frame.unitShift
   shadowRays.io.surface.valid               := lit.valid
   shadowRays.io.surface.bits                := lit.bits
-  shadowRays.io.question :<>= controller.io.shadow
+  shadowRays.io.req :<>= controller.io.shadow
 
   // A mirror or glass turns its path
   requests.io.in(1).valid := false.B
@@ -177,7 +177,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   controller.io.bounced   := 0.U.asTypeOf(controller.io.bounced)
   events.raysReflection   := false.B
   events.raysRefraction   := false.B
-  private val turns = shader.io.bounced.zip(colourUnit.io.turn).map { case (bounced, turn) =>
+  private val turns = shader.io.bounced.zip(colourUnit.io.bounce).map { case (bounced, turn) =>
     val turns = Module(new PathTurns(config)).io
     turns.shading := io.registers.shading
     connect(turns.begins, controller.io.allocate, controller.io.free.bits)
@@ -197,8 +197,8 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   colourUnit.io.ambient       := io.registers.ambient
   colourUnit.io.background    := io.registers.background
   colourUnit.io.shading       := io.registers.shading
-  colourUnit.io.begins.valid  := controller.io.allocate
-  colourUnit.io.begins.bits   := controller.io.free.bits
+  colourUnit.io.start.valid   := controller.io.allocate
+  colourUnit.io.start.bits    := controller.io.free.bits
   colourUnit.io.surface.valid := lit.valid
   colourUnit.io.surface.bits  := lit.bits
   colourUnit.io.end :<>= controller.io.end
@@ -267,7 +267,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   events.contextsBox       := population(Seq(traversal.io.nodes.fire, traversal.io.resume.fire), next.fire)
   events.contextsTriangles := population(Seq(triangleUnit.io.candidate.fire), tested.fire && tested.bits.isLast)
   events.contextsShading   := population(
-    shader.io.request.fire +: shader.io.room.map(_.fire).toSeq,
+    shader.io.request.fire +: shader.io.environment.map(_.fire).toSeq,
     PopCount(lit.fire +: shader.io.bounced.map(_.fire).toSeq)
   )
 
@@ -295,7 +295,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     maps <> stage.maps
     stage.question :<>= control.question
     control.nothing := stage.nothing
-    shader.io.room.get :<>= stage.surface
+    shader.io.environment.get :<>= stage.surface
     connect(control.met, stage.surface.fire, stage.surface.bits.context)
 
     control.aside      := 0.U.asTypeOf(control.aside)

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, PopCount, PriorityEncoder, Valid}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.shading.{Occlusion, PathEnd, ShadowQuestion}
+import colonnade.shading.{Occlusion, PathTermination, ShadowRequest}
 
 /** What a context is at. */
 object Stage extends ChiselEnum {
@@ -82,10 +82,10 @@ final class RtController(config: ColonnadeConfig) extends Module {
     val dropped = Flipped(Valid(Context(config)))
 
     /** A light that a lit context has not asked for yet. */
-    val shadow = Decoupled(new ShadowQuestion(config))
+    val shadow = Decoupled(new ShadowRequest(config))
 
     /** A path whose end is known, and the context whose colour is. */
-    val end      = Decoupled(new PathEnd(config))
+    val end      = Decoupled(new PathTermination(config))
     val coloured = Flipped(Valid(Context(config)))
 
     /** A complete pixel, and whether it leaves. */
@@ -213,7 +213,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.end.bits.context      := ending.bits
   io.end.bits.isBackground := isBackground(ending.bits)
   io.end.bits.occlusions   := occlusions(ending.bits)
-  io.end.bits.isSeen.foreach(_ := isSeen(ending.bits))
+  io.end.bits.isDirectView.foreach(_ := isSeen(ending.bits))
   when(io.end.fire) { stage(ending.bits) := Stage.coloured }
   when(io.coloured.valid) {
     stage(io.coloured.bits)      := Stage.complete

@@ -5,7 +5,7 @@ import chisel3.util.Valid
 import chiseltest._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, RoomView}
-import colonnade.shading.RoomSurface
+import colonnade.shading.EnvironmentSurface
 import colonnade.{Model, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -44,7 +44,7 @@ class RoomStageSpec extends AnyFlatSpec with ChiselScalatestTester {
       val scene     = new RoomScene(config, random)
       val camera    = new questions.Camera(scene.focal, scene.middle, isTurned = true)
       val packed    = new Packed(new RememberedRay(config))
-      val answer    = new Packed(new RoomSurface(config))
+      val answer    = new Packed(new EnvironmentSurface(config))
       val contexts  = config.array.contexts
       dut.clock.setTimeout(0)
       RoomImage.load(dut.load, dut.clock, config, scene.words)

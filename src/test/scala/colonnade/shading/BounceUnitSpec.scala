@@ -10,66 +10,66 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
-  import AnswerPacking._
+  import ResultPacking._
 
   behavior of "BounceUnit"
 
   private val simulation = Simulation.verilator
 
-  private def poke(config: ColonnadeConfig, offset: BigInt)(port: BounceRequest, question: BounceQuestion): Unit = {
+  private def poke(config: ColonnadeConfig, offset: BigInt)(port: BounceRequest, hit: BounceCase): Unit = {
     val numbers                                         = config.numbers
     def set(to:   Seq[SInt], values: Seq[BigInt]): Unit = to.zip(values).foreach { case (to, value) => to.poke(value) }
     def fixed(to: Fixed, value:      BigInt): Unit      = to.raw.asInstanceOf[UInt].poke(value)
-    port.context.poke(question.context)
-    set(port.origin.axes, question.origin(offset))
-    set(port.normal.axes, question.normal(numbers))
-    port.isSmooth.poke(question.isSmooth)
-    set(port.facing.axes, question.facing)
-    set(port.towards.axes, question.towards(numbers))
-    port.backSide.poke(question.backSide)
-    port.isGlass.poke(question.isGlass)
-    fixed(port.eta, question.eta)
-    fixed(port.reflectance, question.reflectance)
+    port.context.poke(hit.context)
+    set(port.origin.axes, hit.origin(offset))
+    set(port.normal.axes, hit.normal(numbers))
+    port.isSmooth.poke(hit.isSmooth)
+    set(port.faceForwardNormal.axes, hit.faceForwardNormal)
+    set(port.dir.axes, hit.dir(numbers))
+    port.backSide.poke(hit.backSide)
+    port.isGlass.poke(hit.isGlass)
+    fixed(port.eta, hit.eta)
+    fixed(port.reflectance, hit.reflectance)
   }
 
   private def peek(result: BounceResult): BigInt = pack(
     (result.isRefraction.peekInt() +: result.origin.axes.map(_.integer.peekInt())) ++
-      (result.towards.axes ++ result.reflection.axes).map(_.peekInt()) ++
-      Seq(result.share.natural.peekInt(), result.context.peekInt())
+      (result.dir.axes ++ result.reflection.axes).map(_.peekInt()) ++
+      Seq(result.fresnel.natural.peekInt(), result.context.peekInt())
   )
 
-  /** How many of each outcome there were. */
-  private def outcomes(answers: Seq[(BounceQuestion, Seq[BigInt])]): Map[String, Int] = answers.map {
-    case (question, answer) =>
-      if (!question.isGlass) "mirror" else if (answer.head == 0) "total" else if (answer.last == 0) "back" else "front"
+  /** Counts of outcomes. */
+  private def outcomes(answers: Seq[(BounceCase, Seq[BigInt])]): Map[String, Int] = answers.map {
+    case (hit, answer) =>
+      if (!hit.isGlass) "mirror" else if (answer.head == 0) "total" else if (answer.last == 0) "back" else "front"
   }.groupBy(identity).map { case (name, all) => name -> all.size }
 
-  /** Has rays bounced, an offset after another, and compares with the model. */
+  /** Compares bounces with the model, one offset after another. */
   private def check(
       config: ColonnadeConfig,
-      rounds: Seq[(BigInt, Seq[BounceQuestion])],
+      rounds: Seq[(BigInt, Seq[BounceCase])],
       random: Random,
       stalls: Int => Double
   )(unit: BounceUnit): Unit = {
-    val asked   = rounds.flatMap { case (offset, questions) => questions.map(_.words(offset)) }
+    val asked   = rounds.flatMap { case (offset, stimulus) => stimulus.map(_.words(offset)) }
     val answers = Model.answers(config, asked, "bounce")
     val left    = answers.iterator
     info(s"${outcomes(rounds.flatMap(_._2).zip(answers))}")
-    for (((offset, questions), round) <- rounds.zipWithIndex) {
+    for (((offset, stimulus), round) <- rounds.zipWithIndex) {
       unit.io.offset.poke(offset)
-      var poked   = Option.empty[BounceQuestion]
+      var poked   = Option.empty[BounceCase]
       val results =
-        StreamTester.exchange(unit.clock, unit.io.request, unit.io.result, questions)(
-          (port: BounceRequest, question: BounceQuestion) =>
-            if (!poked.exists(_ eq question)) {
-              poke(config, offset)(port, question)
-              poked = Some(question)
+        StreamTester.exchange(unit.clock, unit.io.request, unit.io.result, stimulus)(
+          (port: BounceRequest, hit: BounceCase) =>
+            if (!poked.exists(_ eq hit)) {
+              poke(config, offset)(port, hit)
+              poked = Some(hit)
             },
           peek
         )(random, stalls(round), 400)
-      results.zip(questions).foreach { case (result, question) =>
-        val answer = left.next() :+ BigInt(question.context)
-        assert(unpack(result, answer.size) == answer, s"of $question with the offset $offset in ${config.precision}")
+      results.zip(stimulus).foreach { case (result, hit) =>
+        val answer = left.next() :+ BigInt(hit.context)
+        assert(unpack(result, answer.size) == answer, s"of $hit with the offset $offset in ${config.precision}")
       }
     }
   }
@@ -78,25 +78,25 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     val name = s"${config.precision} and ${config.geometry.vertexBits}-bit vertices"
 
     it should s"equal the model with $name" in test(new BounceUnit(config)).withAnnotations(simulation) { unit =>
-      val random    = new Random(31)
-      val questions = new BounceQuestions(config, random)
-      val rounds    = Seq.fill(5) {
+      val random   = new Random(31)
+      val stimulus = new BounceStimulus(config, random)
+      val rounds   = Seq.fill(5) {
         val all =
-          Seq.fill(6)(questions.surface()) ++ Seq.fill(4)(questions.any()) ++ Seq.fill(4)(questions.grazing()) ++
-            Seq.fill(4)(questions.critical()) ++ Seq.fill(2)(questions.extreme()) ++
-            Seq(questions.straight(), questions.withoutNormal(), questions.surface(spread = 1500))
-        questions.offset() -> random.shuffle(all)
+          Seq.fill(6)(stimulus.surface()) ++ Seq.fill(4)(stimulus.any()) ++ Seq.fill(4)(stimulus.grazing()) ++
+            Seq.fill(4)(stimulus.critical()) ++ Seq.fill(2)(stimulus.extreme()) ++
+            Seq(stimulus.straight(), stimulus.withoutNormal(), stimulus.surface(spread = 1500))
+        stimulus.offset() -> random.shuffle(all)
       }
       check(config, rounds, random, _ % 2 * 0.7)(unit)
     }
   }
 
   /** Cycles from taking each request to offering its result; the unit is idle before. */
-  private def latencies(config: ColonnadeConfig, questions: Seq[BounceQuestion])(unit: BounceUnit): Seq[Int] = {
+  private def latencies(config: ColonnadeConfig, stimulus: Seq[BounceCase])(unit: BounceUnit): Seq[Int] = {
     unit.io.offset.poke(100)
     unit.io.result.ready.poke(true)
-    for (question <- questions) yield {
-      poke(config, 100)(unit.io.request.bits, question)
+    for (hit <- stimulus) yield {
+      poke(config, 100)(unit.io.request.bits, hit)
       unit.io.request.valid.poke(true)
       unit.clock.step()
       unit.io.request.valid.poke(false)
@@ -113,18 +113,18 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "hold its latencies at 32b32s64d" in test(new BounceUnit(TestConfigs.tiny)).withAnnotations(simulation) {
     unit =>
-      val questions = new BounceQuestions(TestConfigs.tiny, new Random(37))
+      val stimulus = new BounceStimulus(TestConfigs.tiny, new Random(37))
 
-      def held(name: String, most: Int)(question: => BounceQuestion): Unit = {
-        val cycles = latencies(TestConfigs.tiny, Seq.fill(12)(question))(unit)
+      def held(name: String, most: Int)(hit: => BounceCase): Unit = {
+        val cycles = latencies(TestConfigs.tiny, Seq.fill(12)(hit))(unit)
         info(s"$name: ${cycles.min} to ${cycles.max} cycles")
         assert(cycles.max <= most, s"$name: $cycles")
       }
       // With the geometric normal, so that nothing starts over
       def surface(eta: Int, backSide: Boolean, isGlass: Boolean = true) = {
-        val question = questions.surface().copy(isFlat = true, isGlass = isGlass, etas = Seq.fill(2)(BigInt(eta)))
-        val facing   = question.facing
-        question.copy(backSide = backSide, geometricNormal = facing.map(x => if (backSide) -x else x))
+        val hit = stimulus.surface().copy(isFlat = true, isGlass = isGlass, etas = Seq.fill(2)(BigInt(eta)))
+        val faceForwardNormal = hit.faceForwardNormal
+        hit.copy(backSide = backSide, geometricNormal = faceForwardNormal.map(x => if (backSide) -x else x))
       }
       held("mirror", 44)(surface(8192, backSide = false, isGlass = false))
       held("total reflection", 56)(surface(65535, backSide = true))

@@ -11,12 +11,12 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** A path's colour is that of its end, weighed by what it has passed, whatever other paths do meanwhile. */
+/** A path's colour is that of its last surface, weighted by its throughput, whatever other paths do meanwhile. */
 class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ColourUnit"
 
   for {
-    (base, where)        <- Seq(TestConfigs.tiny -> "", TestConfigs.withRoom(TestConfigs.room) -> " in a room")
+    (base, where)        <- Seq(TestConfigs.tiny -> "", TestConfigs.withRoom(TestConfigs.room) -> " in an environment")
     (lights, maxBounces) <- Seq((1, 0), (2, 0), (1, 2), (3, 15))
   } {
     val config = base.copy(frame = base.frame.copy(lights = lights, maxBounces = maxBounces))
@@ -25,61 +25,61 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 }
 
-/** Paths of all contexts at a time, in integers as docs/numbers.md has them, sections 5.9 and 6.7. */
+/** Paths of all contexts at a time, in the integers of docs/numbers.md, sections 5.9 and 6.7. */
 private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int) {
   private val random   = new Random(seed)
   private val contexts = config.array.contexts
   private val one      = 4096
   private val white    = 4095
 
-  private def three(value: => Int): Seq[Int] = Seq.fill(3)(value)
+  private def xyz(value: => Int): Seq[Int] = Seq.fill(3)(value)
 
   private def colour(): Seq[Int] =
-    three(if (random.nextInt(4) == 0) random.nextInt(2) * white else random.nextInt(4096))
+    xyz(if (random.nextInt(4) == 0) random.nextInt(2) * white else random.nextInt(4096))
 
   private def intensity(): Seq[Int] =
-    three(if (random.nextInt(6) == 0) 65535 else random.nextInt(6) * random.nextInt(1800))
+    xyz(if (random.nextInt(6) == 0) 65535 else random.nextInt(6) * random.nextInt(1800))
 
   private val ambient    = intensity()
   private val background = colour()
   private val clearness  = random.nextInt(one + 1)
 
   private var throughput = Seq.fill(contexts)(Seq.fill(3)(one))
-  private var gathered   = Seq.fill(contexts)(Seq.fill(3)(0))
+  private var radiance   = Seq.fill(contexts)(Seq.fill(3)(0))
 
   def run(paths: Int): Unit = {
     poke(dut.io.ambient, ambient)
     pokeUInt(dut.io.background, background)
     dut.io.shading.clearness.foreach(_.pokeRaw(clearness))
     for (_ <- 0 until paths) {
-      // Some contexts pass mirrors and glass by turns, then all of them end, in any order
+      // Some contexts hit mirrors and glass, then all paths end, in any order
       (0 until contexts).foreach(begin)
-      for (_ <- 0 until random.nextInt(8); turn <- dut.io.turn) pass(turn, random.nextInt(contexts))
+      for (_ <- 0 until random.nextInt(8); bounce <- dut.io.bounce) pass(bounce, random.nextInt(contexts))
       random.shuffle((0 until contexts).toList).foreach(end)
     }
   }
 
   private def begin(context: Int): Unit = {
-    dut.io.begins.valid.poke(true)
-    dut.io.begins.bits.poke(context)
+    dut.io.start.valid.poke(true)
+    dut.io.start.bits.poke(context)
     dut.clock.step()
-    dut.io.begins.valid.poke(false)
+    dut.io.start.valid.poke(false)
     throughput = throughput.updated(context, Seq.fill(3)(one))
-    gathered = gathered.updated(context, Seq.fill(3)(0))
+    radiance = radiance.updated(context, Seq.fill(3)(0))
   }
 
-  /** Where there is a room, some paths have a surface of it beside them, in all its light. */
-  private def pass(port: chisel3.util.DecoupledIO[PathTurn], context: Int): Unit = {
-    val (albedo, isTinted, share) = (colour(), random.nextBoolean(), random.nextInt(3) * random.nextInt(one / 2))
-    val surface                   = Option.when(config.hasRoom && random.nextBoolean())(remember(context))
-    val behind                    = surface.fold(background)(surface => reflected(surface.albedo, surface.all))
+  /** Bounces a path. Where there is an environment, some reflections show a surface, lit by all lights. */
+  private def pass(port: chisel3.util.DecoupledIO[BounceUpdate], context: Int): Unit = {
+    val (albedo, isTinted, fresnel) = (colour(), random.nextBoolean(), random.nextInt(3) * random.nextInt(one / 2))
+    val surface                     = Option.when(config.hasRoom && random.nextBoolean())(remember(context))
+    val behind                      = surface.fold(background)(surface => reflected(surface.albedo, surface.all))
     port.bits.context.poke(context)
     pokeUInt(port.bits.albedo, albedo)
     port.bits.isTinted.poke(isTinted)
-    port.bits.share.pokeRaw(share)
+    port.bits.fresnel.pokeRaw(fresnel)
     port.bits.hasSurface.foreach(_.poke(surface.nonEmpty))
     offer(port)
-    // What the ports say later does not matter any more
+    // Later changes of the ports have no effect
     dut.io.end.bits.occlusions.foreach(_.poke(Occlusion.opaque))
     if (random.nextBoolean()) {
       var cycles = 0
@@ -87,17 +87,17 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
         dut.clock.step()
         cycles += 1
       }
-      assert(cycles == 20 + surface.fold(0)(_ => 6 * (config.frame.lights + 1)), "cycles of a turn")
+      assert(cycles == 20 + surface.fold(0)(_ => 6 * (config.frame.lights + 1)), "cycles of a bounce")
     }
 
     val tinted = throughput(context).zip(albedo).map { case (weight, tint) =>
       if (isTinted) weight * (tint + (tint >> 11)) >> 12 else weight
     }
-    val parts = tinted.map(_ * share >> 12)
-    gathered = gathered.updated(
+    val parts = tinted.map(_ * fresnel >> 12)
+    radiance = radiance.updated(
       context,
-      gathered(context).zip(parts.zip(behind)).map { case (sure, (part, beside)) =>
-        white.min(sure + (part * beside >> 12))
+      radiance(context).zip(parts.zip(behind)).map { case (sure, (part, reflection)) =>
+        white.min(sure + (part * reflection >> 12))
       }
     )
     throughput = throughput.updated(context, tinted.zip(parts).map { case (weight, part) => weight - part })
@@ -106,13 +106,13 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   private def end(context: Int): Unit = {
     val surface      = remember(context)
     val isBackground = random.nextInt(4) == 0
-    val isSeen       = random.nextBoolean()
+    val isDirectView = random.nextBoolean()
     val kinds        = if (config.frame.hasBounces) Occlusion.all.toList else List(Occlusion.none, Occlusion.opaque)
-    val met = surface.directs.map(_ => if (random.nextInt(3) == 0) Occlusion.none else random.shuffle(kinds).head)
+    val met = surface.directLight.map(_ => if (random.nextInt(3) == 0) Occlusion.none else random.shuffle(kinds).head)
 
     dut.io.end.bits.context.poke(context)
     dut.io.end.bits.isBackground.poke(isBackground)
-    dut.io.end.bits.isSeen.foreach(_.poke(isSeen))
+    dut.io.end.bits.isDirectView.foreach(_.poke(isDirectView))
     dut.io.end.bits.occlusions.zip(met).foreach { case (port, what) => port.poke(what) }
     offer(dut.io.end)
     var cycles = 1
@@ -122,22 +122,22 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     }
 
     val visible = ambient.zipWithIndex.map { case (light, channel) =>
-      light + surface.directs.zip(met).map {
-        case (direct, Occlusion.none)  => direct(channel)
-        case (direct, Occlusion.clear) => (direct(channel).toLong * clearness >> 12).toInt
-        case _                         => 0
+      light + surface.directLight.zip(met).map {
+        case (direct, Occlusion.none)         => direct(channel)
+        case (direct, Occlusion.transmissive) => (direct(channel).toLong * clearness >> 12).toInt
+        case _                                => 0
       }.sum
     }
     val last  = if (isBackground) background else reflected(surface.albedo, visible)
-    val whole = gathered(context).zip(throughput(context).zip(last)).map { case (sure, (weight, seen)) =>
+    val whole = radiance(context).zip(throughput(context).zip(last)).map { case (sure, (weight, seen)) =>
       white.min(sure + (weight * seen >> 12))
     }
     dut.io.colour.bits.context.expect(context)
     assert(dut.io.colour.bits.colour.channels.map(_.peekInt().toInt) == whole)
 
-    // The light left, of what is seen of the room
+    // The shadow ratio of a directly visible point of the environment
     val parts   = visible.zip(surface.all)
-    val hasPart = config.hasRoom && isSeen && !isBackground
+    val hasPart = config.hasRoom && isDirectView && !isBackground
     for (ratio <- dut.io.colour.bits.ratio if hasPart)
       assert(
         ratio.channels.map(_.raw.asUInt.peekInt().toInt) ==
@@ -151,7 +151,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     )
   }
 
-  /** A surface of the context; some lights are as bright as the ambient one, so that the rest is an exact half. */
+  /** A surface of the context. Some lights are as bright as the ambient light, which gives a ratio of exactly one half. */
   private def remember(context: Int): TestSurface = {
     val surface = TestSurface(
       colour(),
@@ -160,7 +160,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     dut.io.surface.valid.poke(true)
     dut.io.surface.bits.context.poke(context)
     pokeUInt(dut.io.surface.bits.albedo, surface.albedo)
-    dut.io.surface.bits.directs.zip(surface.directs).foreach { case (port, direct) => poke(port, direct) }
+    dut.io.surface.bits.directLight.zip(surface.directLight).foreach { case (port, direct) => poke(port, direct) }
     dut.clock.step()
     dut.io.surface.valid.poke(false)
     surface
@@ -176,10 +176,10 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   private def reflected(albedo: Seq[Int], light: Seq[Int]): Seq[Int] =
     albedo.zip(light).map { case (a, light) => (a.toLong * light >> 12).min(white).toInt }
 
-  private case class TestSurface(albedo: Seq[Int], directs: Seq[Seq[Int]]) {
+  private case class TestSurface(albedo: Seq[Int], directLight: Seq[Seq[Int]]) {
 
-    /** The light that falls onto it without anything in its way. */
-    def all: Seq[Int] = ambient.indices.map(channel => ambient(channel) + directs.map(_(channel)).sum)
+    /** The incoming light without shadows. */
+    def all: Seq[Int] = ambient.indices.map(channel => ambient(channel) + directLight.map(_(channel)).sum)
   }
 
   private def poke(port: Rgb[Fixed], values: Seq[Int]): Unit =

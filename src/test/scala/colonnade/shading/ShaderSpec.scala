@@ -9,34 +9,34 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
-  import AnswerPacking._
-  import ShaderPorts._
+  import ResultPacking._
+  import ShaderDriver._
 
   behavior of "Shader"
 
-  /** Faster than the interpreter for so wide a unit. */
+  /** Faster than the interpreter for wide units. */
   private val verilator = Simulation.verilator
 
-  /** The model's answer, of lights that do not shine as well, and what the hit says itself. */
-  private def expected(answer: Seq[BigInt], hit: HitQuestion, light: LightQuestion): Seq[BigInt] =
+  /** The expected result: the model's answer, zeros for lights that are off, albedo and context. */
+  private def expected(answer: Seq[BigInt], hit: HitCase, light: LightCase): Seq[BigInt] =
     expected(answer, light, light.albedos(hit.material), hit.context)
 
-  private def expected(answer: Seq[BigInt], light: LightQuestion, albedo: Seq[BigInt], context: Int): Seq[BigInt] =
+  private def expected(answer: Seq[BigInt], light: LightCase, albedo: Seq[BigInt], context: Int): Seq[BigInt] =
     answer ++ Seq.fill(4 * (light.sources.size - light.shining))(BigInt(0)) ++ albedo :+ BigInt(context)
 
-  /** Shades hits, a light after another, and compares with the model. */
+  /** Compares shaded hits with the model, one light after another. */
   private def check(
       shader: Shader,
       config: ColonnadeConfig,
-      rounds: Seq[(LightQuestion, Seq[HitQuestion])],
+      rounds: Seq[(LightCase, Seq[HitCase])],
       random: Random,
       stalls: Int => Double = _ => 0
   ): Unit = {
-    val questions = rounds.flatMap { case (light, hits) => hits.map(ShaderQuestions.words(_, light)) }
-    val answers   = Model.answers(config, questions, "shade").iterator
+    val stimulus = rounds.flatMap { case (light, hits) => hits.map(ShaderStimulus.words(_, light)) }
+    val answers  = Model.answers(config, stimulus, "shade").iterator
     for (((light, hits), round) <- rounds.zipWithIndex) {
-      var poked                                            = Option.empty[HitQuestion]
-      def poke(port: ShadeRequest, hit: HitQuestion): Unit = if (!poked.exists(_ eq hit)) {
+      var poked                                        = Option.empty[HitCase]
+      def poke(port: ShadeRequest, hit: HitCase): Unit = if (!poked.exists(_ eq hit)) {
         pokeHit(port, hit)
         poked = Some(hit)
       }
@@ -57,32 +57,32 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     val name = s"${config.precision} and ${config.geometry.vertexBits}-bit vertices"
 
     it should s"equal the model with $name" in test(new Shader(config)).withAnnotations(verilator) { shader =>
-      val random    = new Random(20)
-      val questions = new ShaderQuestions(config, random)
-      val rounds    = Seq.fill(8) {
-        val light = questions.light()
-        val hits  = Seq.fill(3)(questions.surfaceHit(light)) :+ questions.anyHit() :+ questions.withoutSmoothNormal()
+      val random   = new Random(20)
+      val stimulus = new ShaderStimulus(config, random)
+      val rounds   = Seq.fill(8) {
+        val light = stimulus.light()
+        val hits  = Seq.fill(3)(stimulus.surfaceHit(light)) :+ stimulus.anyHit() :+ stimulus.withoutSmoothNormal()
         light -> random.shuffle(hits)
       }
-      val ties = Seq.fill(2)(questions.light().copy(offset = random.nextInt(64)) -> Seq.fill(5)(questions.halfway()))
-      check(shader, config, rounds ++ ties ++ extremes(config, questions) ++ atTheLight(questions), random, _ % 2 * 0.7)
+      val ties = Seq.fill(2)(stimulus.light().copy(offset = random.nextInt(64)) -> Seq.fill(5)(stimulus.halfway()))
+      check(shader, config, rounds ++ ties ++ extremes(config, stimulus) ++ atTheLight(stimulus), random, _ % 2 * 0.7)
     }
   }
 
-  /** Every number at an end of its range. */
-  private def extremes(config: ColonnadeConfig, questions: ShaderQuestions): Seq[(LightQuestion, Seq[HitQuestion])] = {
+  /** Every number at a limit of its range. */
+  private def extremes(config: ColonnadeConfig, stimulus: ShaderStimulus): Seq[(LightCase, Seq[HitCase])] = {
     val most     = (BigInt(1) << (config.numbers.gridBits - 1)) - 1
     val farLight = (BigInt(1) << (config.numbers.macBits.min(config.numbers.sceneBits) - 1)) - 1
     val lowest   = Seq.fill(3)(BigInt(-2048))
     val full     = Seq.fill(3)((BigInt(1) << config.numbers.barycentricBits) - 1)
     for (sign <- Seq(1, -1); isFlat <- Seq(false, true)) yield {
-      val light = questions.light().at(Seq.fill(3)(farLight * sign)).copy(
+      val light = stimulus.light().at(Seq.fill(3)(farLight * sign)).copy(
         unitShift = 0,
         offset = (BigInt(1) << (config.numbers.gridBits - 2)) - 1,
         isFlat = isFlat,
         shadows = true
       )
-      val corner = questions.anyHit().copy(
+      val corner = stimulus.anyHit().copy(
         origin = Seq.fill(3)(most * -sign),
         t = most,
         shear = Seq.fill(2)((BigInt(1) << config.numbers.shearFraction) * -sign),
@@ -91,30 +91,30 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
         normals = Seq.fill(3)(lowest),
         weights = full
       )
-      light -> (Seq(false, true).map(side => corner.copy(backSide = side)) :+ questions.withoutNormal())
+      light -> (Seq(false, true).map(side => corner.copy(backSide = side)) :+ stimulus.withoutNormal())
     }
   }
 
-  /** A surface with the light on it, or right above: there the cosine is one. */
-  private def atTheLight(questions: ShaderQuestions): Seq[(LightQuestion, Seq[HitQuestion])] =
+  /** A light on the surface, or right above it, where the cosine is one. */
+  private def atTheLight(stimulus: ShaderStimulus): Seq[(LightCase, Seq[HitCase])] =
     for ((axis, distance) <- Seq(0 -> 77, 1 -> 1, 2 -> 0)) yield {
       val normal = Seq.tabulate(3)(i => BigInt(if (i == axis) 2047 else 0))
-      val hit    = questions.anyHit().copy(
+      val hit    = stimulus.anyHit().copy(
         origin = Seq.fill(3)(BigInt(0)),
         t = 0,
         normals = Seq.fill(3)(normal),
         geometricNormal = normal,
         weights = Seq(BigInt(1), BigInt(3), BigInt(0))
       )
-      val light = questions.light().at(normal.map(_.signum * distance)).copy(unitShift = 0, offset = 0)
+      val light = stimulus.light().at(normal.map(_.signum * distance)).copy(unitShift = 0, offset = 0)
       light -> Seq(hit.copy(backSide = false), hit.copy(backSide = true))
     }
 
   it should "take a hit with a light at least every 50 cycles at 32b32s64d" in test(new Shader(TestConfigs.tiny)) {
     shader =>
-      val random    = new Random(23)
-      val questions = new ShaderQuestions(TestConfigs.tiny, random)
-      val light     = questions.light().at(Seq(3000, 5000, 9000)).copy(
+      val random   = new Random(23)
+      val stimulus = new ShaderStimulus(TestConfigs.tiny, random)
+      val light    = stimulus.light().at(Seq(3000, 5000, 9000)).copy(
         shining = 1,
         unitShift = 12,
         isFlat = false,
@@ -126,7 +126,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       val taken = for (_ <- 0 until 20) yield {
         pokeHit(
           shader.io.request.bits,
-          questions.surfaceHit(light).copy(weights = Seq(BigInt(1), BigInt(1), BigInt(2)))
+          stimulus.surfaceHit(light).copy(weights = Seq(BigInt(1), BigInt(1), BigInt(2)))
         )
         var cycles = 1
         while (!shader.io.request.ready.peekBoolean()) {
@@ -144,40 +144,40 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     for (materials <- Seq(1, 5, 8)) {
       val config = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(materials = materials, maxBounces = 0))
       test(new Shader(config)) { shader =>
-        val random    = new Random(24)
-        val questions = new ShaderQuestions(config, random)
-        val light     = questions.light()
-        val hits      = Seq.tabulate(materials)(i => questions.surfaceHit(light).copy(material = i))
+        val random   = new Random(24)
+        val stimulus = new ShaderStimulus(config, random)
+        val light    = stimulus.light()
+        val hits     = Seq.tabulate(materials)(i => stimulus.surfaceHit(light).copy(material = i))
         check(shader, config, Seq(light -> hits), random)
       }
     }
   }
 
-  /** Hits come when the shader has promised a cycle before to take one, points of a room as they like.
+  /** Offers hits after cycles with `readyNext`, and points of an environment at any time.
     *
-    * @return what was taken, in order, and what left
+    * @return what was taken, in order, and the results
     */
   private def mix(
       shader: Shader,
-      hits:   Seq[HitQuestion],
-      points: Seq[RoomPointQuestion],
+      hits:   Seq[HitCase],
+      points: Seq[EnvironmentPointCase],
       random: Random,
       stalls: Double
-  ): (Seq[Either[HitQuestion, RoomPointQuestion]], Seq[BigInt]) = {
+  ): (Seq[Either[HitCase, EnvironmentPointCase]], Seq[BigInt]) = {
     val io                     = shader.io
-    val room                   = io.room.get
+    val environment            = io.environment.get
     var (hitsLeft, pointsLeft) = (hits, points)
     var (isPromised, offers)   = (false, false)
-    var (taken, results)       = (Vector.empty[Either[HitQuestion, RoomPointQuestion]], Vector.empty[BigInt])
+    var (taken, results)       = (Vector.empty[Either[HitCase, EnvironmentPointCase]], Vector.empty[BigInt])
     var idle                   = 0
     def isWilling              = random.nextDouble() >= stalls
     while (results.size < hits.size + points.size) {
       val comes = isPromised && hitsLeft.nonEmpty && isWilling
       offers = pointsLeft.nonEmpty && (offers || isWilling)
       io.request.valid.poke(comes)
-      room.valid.poke(offers)
+      environment.valid.poke(offers)
       if (comes) pokeHit(io.request.bits, hitsLeft.head)
-      if (offers) pokePoint(room.bits, pointsLeft.head)
+      if (offers) pokePoint(environment.bits, pointsLeft.head)
       val accepts = isWilling
       io.lit.ready.poke(accepts)
 
@@ -188,7 +188,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
         taken :+= Left(hitsLeft.head)
         hitsLeft = hitsLeft.tail
       }
-      if (offers && room.ready.peekBoolean()) {
+      if (offers && environment.ready.peekBoolean()) {
         assert(!comes, "one at a time")
         taken :+= Right(pointsLeft.head)
         pointsLeft = pointsLeft.tail
@@ -198,35 +198,35 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
         results :+= peek(io.lit.bits)
         idle = 0
       }
-      isPromised = io.takesNext.peekBoolean()
+      isPromised = io.readyNext.peekBoolean()
       shader.clock.step()
     }
     (taken, results)
   }
 
   for (config <- TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.room))))
-    it should s"light points of a room between hits, with ${config.precision} and ${config.geometry.vertexBits}-bit vertices" in
+    it should s"light points of an environment between hits, with ${config.precision} and ${config.geometry.vertexBits}-bit vertices" in
       test(new Shader(config)).withAnnotations(verilator) { shader =>
-        val random    = new Random(25)
-        val questions = new ShaderQuestions(config, random)
+        val random   = new Random(25)
+        val stimulus = new ShaderStimulus(config, random)
         for (stalls <- Seq(0, 0.3, 0.6, 0.9, 0.5, 0.8)) {
-          val light = questions.light().copy(shadows = stalls != 0.5)
+          val light = stimulus.light().copy(shadows = stalls != 0.5)
           pokeLight(shader.io, light)
-          val hits             = Seq.fill(12)(questions.surfaceHit(light))
-          val points           = Seq.fill(12)(questions.roomPoint())
+          val hits             = Seq.fill(12)(stimulus.surfaceHit(light))
+          val points           = Seq.fill(12)(stimulus.environmentPoint())
           val (taken, results) = mix(shader, hits, points, random, stalls)
           val ofHits           =
-            hits.zip(Model.answers(config, hits.map(ShaderQuestions.words(_, light)), "shade")).map {
+            hits.zip(Model.answers(config, hits.map(ShaderStimulus.words(_, light)), "shade")).map {
               case (hit, answer) =>
                 Left(hit) -> expected(answer, hit, light)
             }
           val ofPoints =
-            points.zip(Model.answers(config, points.map(ShaderQuestions.words(_, light)), "lightroom")).map {
+            points.zip(Model.answers(config, points.map(ShaderStimulus.words(_, light)), "lightroom")).map {
               case (point, answer) => Right(point) -> expected(answer, light, point.albedo, point.context)
             }
-          val answers = (ofHits ++ ofPoints).toMap[Either[HitQuestion, RoomPointQuestion], Seq[BigInt]]
-          for ((question, result) <- taken.zip(results))
-            assert(unpack(result, answers(question).size) == answers(question), s"of $question under $light")
+          val answers = (ofHits ++ ofPoints).toMap[Either[HitCase, EnvironmentPointCase], Seq[BigInt]]
+          for ((hit, result) <- taken.zip(results))
+            assert(unpack(result, answers(hit).size) == answers(hit), s"of $hit under $light")
         }
       }
 }

@@ -7,7 +7,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** Each ray goes from its context's surface to its light. */
+/** A shadow ray goes from its context's surface to its light. */
 class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ShadowRays"
 
@@ -32,12 +32,12 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
         }
         dut.io.surface.valid.poke(false)
         for ((context, light) <- random.shuffle(for (c <- surfaces.indices; l <- lights.indices) yield (c, l))) {
-          dut.io.question.valid.poke(true)
-          dut.io.question.bits.context.poke(context)
-          dut.io.question.bits.light.poke(light)
-          dut.io.question.ready.expect(true)
+          dut.io.req.valid.poke(true)
+          dut.io.req.bits.context.poke(context)
+          dut.io.req.bits.light.poke(light)
+          dut.io.req.ready.expect(true)
           dut.clock.step()
-          dut.io.question.valid.poke(false)
+          dut.io.req.valid.poke(false)
           dut.clock.step(4)
           dut.io.ray.valid.expect(true)
           if (random.nextBoolean()) dut.clock.step(2)

@@ -50,7 +50,7 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       driver.begin(context = 1, limit = 100, isShadow = true)
       driver.offer(1, driver.result(t = 30, id = 0, isClear = true))
       dut.io.hasHit(1).expect(false)
-      dut.io.occlusions(1).expect(Occlusion.clear)
+      dut.io.occlusions(1).expect(Occlusion.transmissive)
       driver.offer(1, driver.result(t = 60, id = 4))
       dut.io.hasHit(1).expect(true)
       dut.io.occlusions(1).expect(Occlusion.opaque)
@@ -86,7 +86,7 @@ private object HitTableSpec {
     def hits: Vector[Result] = within.filter(hit => !isShadow || !hit.isClear)
 
     def occlusion: Occlusion.Type =
-      if (hits.nonEmpty) Occlusion.opaque else if (within.nonEmpty) Occlusion.clear else Occlusion.none
+      if (hits.nonEmpty) Occlusion.opaque else if (within.nonEmpty) Occlusion.transmissive else Occlusion.none
 
     def best: Option[Result] = hits.minByOption(hit => (hit.t, hit.id))
   }

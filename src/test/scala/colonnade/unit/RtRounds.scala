@@ -118,7 +118,7 @@ private class RtRounds(dut: RtController, count: Int, seed: Int, isThere: Boolea
     for (index <- seeker) assert(contexts(index).wanted.contains(dut.io.shadow.bits.light.peekInt().toInt))
     for (index <- ended) {
       dut.io.end.bits.isBackground.expect(contexts(index).isBackground)
-      dut.io.end.bits.isSeen.foreach(_.expect(contexts(index).isSeen))
+      dut.io.end.bits.isDirectView.foreach(_.expect(contexts(index).isSeen))
       if (!contexts(index).isBackground)
         dut.io.end.bits.occlusions.zip(contexts(index).occlusions).foreach { case (port, met) => port.expect(met) }
     }

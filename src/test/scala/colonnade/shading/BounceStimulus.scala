@@ -4,10 +4,10 @@ import colonnade.config.{ColonnadeConfig, NumberFormats}
 
 import scala.util.Random
 
-/** A hit on a mirror or on glass in raw integers, as the model's "bounce" asks for it. `shear` and `negative` are of the
-  * ray's frame, all else of the object's.
+/** A hit on a mirror or glass in raw integers: the model's input for "bounce". `shear` and `negative` are in the ray's
+  * frame, everything else is in the object's.
   */
-final case class BounceQuestion(
+final case class BounceCase(
     context:         Int,
     axis:            Int,
     negative:        Boolean,
@@ -22,41 +22,41 @@ final case class BounceQuestion(
     etas:            Seq[BigInt],
     reflectance:     BigInt
 ) {
-  private def turned(vector: Seq[BigInt]): Seq[BigInt] = if (backSide) vector.map(-_) else vector
+  private def faceForward(vector: Seq[BigInt]): Seq[BigInt] = if (backSide) vector.map(-_) else vector
 
-  /** Object axes of the ray's frame. */
+  /** The object's axes in the order of the ray's frame. */
   private val axes = Seq(1, 2, 3).map(i => (axis + i) % 3)
 
-  val facing:   Seq[BigInt] = turned(geometricNormal)
-  val smooth:   Seq[BigInt] = turned(Seq(0, 1, 2).map(a => normals.zip(weights).map { case (n, w) => n(a) * w }.sum))
-  val isSmooth: Boolean     = !isFlat && smooth.exists(_ != 0)
-  val eta:      BigInt      = etas(if (backSide) 1 else 0)
+  val faceForwardNormal: Seq[BigInt] = faceForward(geometricNormal)
+  val smooth: Seq[BigInt] = faceForward(Seq(0, 1, 2).map(a => normals.zip(weights).map { case (n, w) => n(a) * w }.sum))
+  val isSmooth: Boolean = !isFlat && smooth.exists(_ != 0)
+  val eta:      BigInt  = etas(if (backSide) 1 else 0)
 
-  /** Ray's direction; its dominant component is ±2^(shadeBits − 1). */
-  def towards(numbers: NumberFormats): Seq[BigInt] = {
+  /** The ray's direction; its dominant component is ±2^(shadeBits − 1). */
+  def dir(numbers: NumberFormats): Seq[BigInt] = {
     val drop = numbers.shearFraction - (numbers.shadeBits - 1)
     val one  = BigInt(1) << (numbers.shadeBits - 1)
-    val own  = shear.map(BounceQuestions.floor(_, drop)) :+ (if (negative) -one else one)
+    val own  = shear.map(BounceStimulus.floor(_, drop)) :+ (if (negative) -one else one)
     Seq(0, 1, 2).map(a => own(axes.indexOf(a)))
   }
 
   /** Block-normalised to `shadeBits` bits. */
   def normal(numbers: NumberFormats): Seq[BigInt] = {
-    val from = if (isSmooth) smooth else facing
+    val from = if (isSmooth) smooth else faceForwardNormal
     val drop = from.map(_.abs.bitLength).max - numbers.shadeBits
-    from.map(BounceQuestions.floor(_, drop))
+    from.map(BounceStimulus.floor(_, drop))
   }
 
-  /** Positive where the geometric normal is turned against the ray. */
+  /** Positive if the geometric normal is turned against the ray. */
   def against(numbers: NumberFormats): BigInt =
-    -facing.zip(towards(numbers)).map { case (f, d) => f * d }.sum
+    -faceForwardNormal.zip(dir(numbers)).map { case (f, d) => f * d }.sum
 
-  /** Where a reflection starts. */
-  def origin(offset: BigInt): Seq[BigInt] = point.zip(facing).map { case (p, f) =>
-    p + BounceQuestions.nearestEven(offset * f, NumberFormats.normalFraction)
+  /** A reflection's origin. */
+  def origin(offset: BigInt): Seq[BigInt] = point.zip(faceForwardNormal).map { case (p, f) =>
+    p + BounceStimulus.nearestEven(offset * f, NumberFormats.normalFraction)
   }
 
-  /** The words of the model's question: a hit right at the ray's origin. */
+  /** The model's input words, for a hit at the ray's origin. */
   def words(offset: BigInt): Seq[BigInt] = {
     def bit(claim: Boolean): BigInt = if (claim) 1 else 0
     (BigInt(axis) +: Seq.fill(3)(bit(negative))) ++ axes.map(point(_)) ++ shear ++ (BigInt(0) +: weights) ++
@@ -65,7 +65,7 @@ final case class BounceQuestion(
   }
 }
 
-object BounceQuestions {
+object BounceStimulus {
   def floor(x: BigInt, bits: Int): BigInt = if (bits >= 0) x >> bits else x << -bits
 
   def nearestEven(x: BigInt, bits: Int): BigInt = {
@@ -75,15 +75,15 @@ object BounceQuestions {
   }
 }
 
-/** Random bounces: of all kinds, and those where a decision is close. */
-final class BounceQuestions(config: ColonnadeConfig, random: Random) {
+/** Random bounces of all kinds, and bounces close to a decision. */
+final class BounceStimulus(config: ColonnadeConfig, random: Random) {
   private val numbers  = config.numbers
   private val one      = 1 << NumberFormats.etaFraction
   private val steepest = BigInt(1) << numbers.shearFraction
 
   private def chance(oneIn: Int): Boolean = random.nextInt(oneIn) == 0
 
-  private def three[T](value: => T): Seq[T] = Seq.fill(3)(value)
+  private def xyz[T](value: => T): Seq[T] = Seq.fill(3)(value)
 
   private def natural(bits: Int): BigInt =
     if (chance(8)) BigInt(0) else if (chance(8)) (BigInt(1) << bits) - 1 else BigInt(random.nextInt(bits) + 1, random)
@@ -96,7 +96,7 @@ final class BounceQuestions(config: ColonnadeConfig, random: Random) {
     vector.map(x => BigInt(math.round(x / length * 2047)))
   }
 
-  private def anyUnit: Seq[BigInt] = unit(three(random.nextGaussian()))
+  private def anyUnit: Seq[BigInt] = unit(xyz(random.nextGaussian()))
 
   private def nearly(vector: Seq[BigInt], by: Double): Seq[BigInt] =
     unit(vector.map(_.toDouble + random.nextGaussian() * by + 1e-3))
@@ -109,60 +109,60 @@ final class BounceQuestions(config: ColonnadeConfig, random: Random) {
 
   def offset(): BigInt = natural(numbers.gridBits - 2)
 
-  /** Components of any size, in no order. */
-  def any(): BounceQuestion = BounceQuestion(
+  /** Components of any size, independent of each other. */
+  def any(): BounceCase = BounceCase(
     context = random.nextInt(config.array.contexts),
     axis = random.nextInt(3),
     negative = random.nextBoolean(),
     shear = Seq.fill(2)(if (chance(8)) steepest else natural(numbers.shearFraction)).map(s =>
       if (random.nextBoolean()) s else -s
     ),
-    point = three(signed(numbers.gridBits)),
-    weights = three(natural(numbers.barycentricBits)),
+    point = xyz(signed(numbers.gridBits)),
+    weights = xyz(natural(numbers.barycentricBits)),
     backSide = random.nextBoolean(),
-    normals = three(three(signed(NumberFormats.normalBits))),
-    geometricNormal = three(signed(NumberFormats.normalBits)),
+    normals = xyz(xyz(signed(NumberFormats.normalBits))),
+    geometricNormal = xyz(signed(NumberFormats.normalBits)),
     isFlat = chance(3),
     isGlass = !chance(3),
     etas = Seq.fill(2)(if (chance(3)) natural(NumberFormats.etaBits) else eta),
     reflectance = reflectance
   )
 
-  /** A surface met from its side: unit normals, the vertices' near the geometric one. */
-  def surface(spread: Double = 200): BounceQuestion = {
+  /** Unit normals; the vertices' normals are near the geometric one. */
+  def surface(spread: Double = 200): BounceCase = {
     val slopes = Seq.fill(2)(BigInt(((random.nextDouble() * 2 - 1) * steepest.toDouble).toLong))
     val plain  = any().copy(shear = slopes, etas = Seq.fill(2)(eta))
     val normal = anyUnit
-    val turned = plain.copy(geometricNormal = normal, normals = three(nearly(normal, spread)))
+    val turned = plain.copy(geometricNormal = normal, normals = xyz(nearly(normal, spread)))
     turned.copy(backSide = turned.copy(backSide = false).against(numbers) < 0)
   }
 
-  /** A ray along the surface, more or less: the vertices' normals turn away, or reflect it into the surface. */
-  def grazing(): BounceQuestion = {
+  /** A grazing ray: the vertices' normals turn away from it, or reflect it into the surface. */
+  def grazing(): BounceCase = {
     val plain  = surface()
-    val along  = plain.towards(numbers).map(_.toDouble)
+    val along  = plain.dir(numbers).map(_.toDouble)
     val any    = anyUnit.map(_.toDouble)
     val length = along.map(x => x * x).sum
     val part   = along.zip(any).map { case (a, b) => a * b }.sum / length
     val across = unit(any.zip(along).map { case (b, a) => b - part * a + 1e-6 })
     val normal = if (random.nextBoolean()) across else nearly(across, 60)
-    val turned = plain.copy(geometricNormal = normal, normals = three(nearly(normal, 150)))
+    val turned = plain.copy(geometricNormal = normal, normals = xyz(nearly(normal, 150)))
     turned.copy(backSide = turned.copy(backSide = false).against(numbers) < 0)
   }
 
-  /** An index at which the ray is just refracted, or just not any more. */
-  def critical(): BounceQuestion = {
+  /** An index of refraction close to total internal reflection. */
+  def critical(): BounceCase = {
     val plain    = surface().copy(isGlass = true, isFlat = random.nextBoolean())
-    val (d, n)   = (plain.towards(numbers).map(_.toDouble), plain.normal(numbers).map(_.toDouble))
+    val (d, n)   = (plain.dir(numbers).map(_.toDouble), plain.normal(numbers).map(_.toDouble))
     val product  = d.zip(n).map { case (a, b) => a * b }.sum
     val cosine   = product * product / d.map(x => x * x).sum / n.map(x => x * x).sum
     val critical = one / math.sqrt((1 - cosine).max(1e-6))
     val near     = BigInt(math.round(critical).min((1L << NumberFormats.etaBits) - 3).toInt + random.nextInt(7) - 3)
-    plain.copy(etas = three(near.min(65535)).take(2))
+    plain.copy(etas = xyz(near.min(65535)).take(2))
   }
 
-  /** Head-on, and with an index of one: the ray goes on as it came. */
-  def straight(): BounceQuestion = {
+  /** Normal incidence with an index of about one: the direction does not change. */
+  def straight(): BounceCase = {
     val axis   = random.nextInt(3)
     val sign   = if (random.nextBoolean()) 1 else -1
     val normal = Seq.tabulate(3)(i => BigInt(if (i == axis) 2047 * sign else 0))
@@ -170,28 +170,28 @@ final class BounceQuestions(config: ColonnadeConfig, random: Random) {
       axis = axis,
       negative = sign > 0,
       shear = Seq.fill(2)(BigInt(random.nextInt(3) - 1)),
-      normals = three(normal),
+      normals = xyz(normal),
       geometricNormal = normal,
       backSide = false,
       etas = Seq(BigInt(one + random.nextInt(3) - 1), BigInt(one))
     )
   }
 
-  /** The vertices' normals cancel, or no normal is there at all. */
-  def withoutNormal(): BounceQuestion = {
-    val plain = if (random.nextBoolean()) surface().copy(weights = three(BigInt(0))) else any()
-    if (chance(2)) plain else plain.copy(geometricNormal = three(BigInt(0)))
+  /** The vertices' normals cancel, or all normals are zero. */
+  def withoutNormal(): BounceCase = {
+    val plain = if (random.nextBoolean()) surface().copy(weights = xyz(BigInt(0))) else any()
+    if (chance(2)) plain else plain.copy(geometricNormal = xyz(BigInt(0)))
   }
 
   /** Every number at an end of its range. */
-  def extreme(): BounceQuestion = {
+  def extreme(): BounceCase = {
     def end(bits: Int): BigInt = if (random.nextBoolean()) -(BigInt(1) << (bits - 1)) else (BigInt(1) << (bits - 1)) - 1
     any().copy(
       shear = Seq.fill(2)(if (random.nextBoolean()) steepest else -steepest),
-      point = three(end(numbers.gridBits)),
-      weights = three((BigInt(1) << numbers.barycentricBits) - 1),
-      normals = three(three(end(NumberFormats.normalBits))),
-      geometricNormal = three(end(NumberFormats.normalBits)),
+      point = xyz(end(numbers.gridBits)),
+      weights = xyz((BigInt(1) << numbers.barycentricBits) - 1),
+      normals = xyz(xyz(end(NumberFormats.normalBits))),
+      geometricNormal = xyz(end(NumberFormats.normalBits)),
       etas = Seq.fill(2)(BigInt(Seq(0, 1, 8191, 8192, 8193, 65535)(random.nextInt(6)))),
       reflectance = Seq(BigInt(0), BigInt(4096), BigInt(8191))(random.nextInt(3))
     )

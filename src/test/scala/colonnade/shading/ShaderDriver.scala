@@ -5,9 +5,9 @@ import chiseltest._
 import colonnade.formats.{Rgb, Vec3}
 import colonnade.numbers.Fixed
 
-/** Questions at the shader's ports, and its answers. */
-object ShaderPorts {
-  import AnswerPacking._
+/** Drives the inputs of the shader and reads its outputs. */
+object ShaderDriver {
+  import ResultPacking._
 
   private def pokeFixed(port: Fixed, raw: BigInt): Unit = port.raw match {
     case signed: SInt => signed.poke(raw)
@@ -20,7 +20,7 @@ object ShaderPorts {
   private def pokeColour(port: Rgb[UInt], raw: Seq[BigInt]): Unit =
     port.channels.zip(raw).foreach { case (to, value) => to.poke(value) }
 
-  def pokeLight(io: ShaderIO, light: LightQuestion): Unit = {
+  def pokeLight(io: ShaderIO, light: LightCase): Unit = {
     for ((port, source) <- io.lights.zip(light.sources)) {
       port.position.axes.zip(source.position).foreach { case (to, value) => to.poke(value) }
       port.colour.channels.zip(source.colour).foreach { case (to, value) => pokeFixed(to, value) }
@@ -35,7 +35,7 @@ object ShaderPorts {
     io.materials.zip(light.albedos).foreach { case (to, value) => pokeColour(to.albedo, value) }
   }
 
-  def pokeHit(port: ShadeRequest, hit: HitQuestion): Unit = {
+  def pokeHit(port: ShadeRequest, hit: HitCase): Unit = {
     port.context.poke(hit.context)
     port.ray.heading.axis.poke(hit.axis)
     port.ray.heading.negative.zip(hit.negative).foreach { case (to, value) => to.poke(value) }
@@ -50,7 +50,7 @@ object ShaderPorts {
     port.face.material.poke(hit.material)
   }
 
-  def pokePoint(port: RoomSurface, point: RoomPointQuestion): Unit = {
+  def pokePoint(port: EnvironmentSurface, point: EnvironmentPointCase): Unit = {
     port.context.poke(point.context)
     pokeVector(port.point, point.point)
     port.normal.axes.zip(point.normal).foreach { case (to, value) => to.poke(value) }
@@ -60,7 +60,7 @@ object ShaderPorts {
 
   def peek(port: LitSurface): BigInt = pack(
     port.origin.axes.map(_.integer.peekInt()) ++
-      port.directs.zip(port.needsShadowRays).flatMap { case (direct, needs) =>
+      port.directLight.zip(port.needsShadowRays).flatMap { case (direct, needs) =>
         direct.channels.map(_.natural.peekInt()) :+ needs.peekInt()
       } ++ port.albedo.channels.map(_.peekInt()) :+ port.context.peekInt()
   )

@@ -1,7 +1,7 @@
 package colonnade.shading
 
-/** Answers of several numbers as one integer each, so that streams of them are compared at once. */
-object AnswerPacking {
+/** Packs a result's numbers into one integer, so that streams of results are compared as a whole. */
+object ResultPacking {
 
   /** Bits of each number's field. */
   private val fieldBits = 96

@@ -4,8 +4,8 @@ import colonnade.config.{ColonnadeConfig, NumberFormats}
 
 import scala.util.Random
 
-/** A hit in raw integers, as the model's "shade" asks for it. */
-final case class HitQuestion(
+/** A hit in raw integers: the model's input for "shade". */
+final case class HitCase(
     context:         Int,
     axis:            Int,
     negative:        Seq[Boolean],
@@ -19,8 +19,8 @@ final case class HitQuestion(
     material:        Int
 )
 
-/** A point of a room, as the model's "lightroom" asks for it. */
-final case class RoomPointQuestion(
+/** A point of an environment: the model's input for "lightroom". */
+final case class EnvironmentPointCase(
     context: Int,
     point:   Seq[BigInt],
     normal:  Seq[BigInt],
@@ -31,8 +31,8 @@ final case class RoomPointQuestion(
 /** A light, in raw integers. */
 final case class LightSource(position: Seq[BigInt], colour: Seq[BigInt], reachMantissa: BigInt, reachExponent: Int)
 
-/** What the registers say, in raw integers; the first `shining` sources shine. */
-final case class LightQuestion(
+/** The shading registers in raw integers; the first `shining` lights are on. */
+final case class LightCase(
     sources:   Seq[LightSource],
     shining:   Int,
     unitShift: Int,
@@ -42,22 +42,22 @@ final case class LightQuestion(
     shadows:   Boolean
 ) {
 
-  /** With all lights at one place. */
-  def at(position: Seq[BigInt]): LightQuestion = copy(sources = sources.map(_.copy(position = position)))
+  /** All lights in one position. */
+  def at(position: Seq[BigInt]): LightCase = copy(sources = sources.map(_.copy(position = position)))
 }
 
-object ShaderQuestions {
+object ShaderStimulus {
 
-  /** The words of the model's question. */
-  def words(hit: HitQuestion, light: LightQuestion): Seq[BigInt] =
+  /** The words of the model's hit. */
+  def words(hit: HitCase, light: LightCase): Seq[BigInt] =
     (BigInt(hit.axis) +: hit.negative.map(bit)) ++ hit.origin ++ hit.shear ++ (hit.t +: hit.weights) ++
       (bit(hit.backSide) +: hit.normals.flatten) ++ hit.geometricNormal ++
       Seq(light.offset, bit(light.isFlat), bit(light.shadows)) ++ words(light)
 
-  def words(room: RoomPointQuestion, light: LightQuestion): Seq[BigInt] =
-    room.point ++ room.normal ++ Seq(light.offset, bit(light.shadows && room.shadows)) ++ words(light)
+  def words(point: EnvironmentPointCase, light: LightCase): Seq[BigInt] =
+    point.point ++ point.normal ++ Seq(light.offset, bit(light.shadows && point.shadows)) ++ words(light)
 
-  private def words(light: LightQuestion): Seq[BigInt] =
+  private def words(light: LightCase): Seq[BigInt] =
     BigInt(light.shining) +: light.sources.take(light.shining).flatMap(source =>
       source.position.map(_ << light.unitShift) ++ source.colour ++
         Seq(source.reachMantissa, BigInt(source.reachExponent))
@@ -66,8 +66,8 @@ object ShaderQuestions {
   def bit(claim: Boolean): BigInt = if (claim) 1 else 0
 }
 
-/** Random hits and lights: of all sizes, with the corners of every range. */
-final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
+/** Random hits and lights of all sizes, with the limits of every range. */
+final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
   private val numbers = config.numbers
 
   private def chance(oneIn: Int): Boolean = random.nextInt(oneIn) == 0
@@ -80,80 +80,80 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
     if (chance(16)) -(BigInt(1) << (bits - 1)) else if (random.nextBoolean()) magnitude else -magnitude
   }
 
-  private def three[T](value: => T): Seq[T] = Seq.fill(3)(value)
+  private def xyz[T](value: => T): Seq[T] = Seq.fill(3)(value)
 
   private def unit(vector: Seq[Double]): Seq[BigInt] = {
     val length = math.sqrt(vector.map(x => x * x).sum)
     vector.map(x => BigInt(math.round(x / length * 2047)))
   }
 
-  private def anyUnit: Seq[BigInt] = unit(three(random.nextGaussian()))
+  private def anyUnit: Seq[BigInt] = unit(xyz(random.nextGaussian()))
 
   private def nearly(vector: Seq[BigInt]): Seq[BigInt] = unit(vector.map(_.toDouble + random.nextGaussian() * 300))
 
-  def light(): LightQuestion = {
+  def light(): LightCase = {
     val shift = random.nextInt((numbers.sceneBits - 4).min(if (random.nextBoolean()) 6 else 64))
     val bits  = numbers.macBits.min(numbers.sceneBits - shift)
-    LightQuestion(
+    LightCase(
       sources = Seq.fill(config.frame.lights)(source(bits)),
       shining = if (chance(4)) random.nextInt(config.frame.lights + 1) else config.frame.lights,
       unitShift = shift,
-      albedos = Seq.fill(config.frame.materials)(three(natural(NumberFormats.colourBits))),
+      albedos = Seq.fill(config.frame.materials)(xyz(natural(NumberFormats.colourBits))),
       offset = natural(numbers.gridBits - 2),
       isFlat = chance(4),
       shadows = !chance(4)
     )
   }
 
-  /** Without a falloff, or with one that reaches somewhere near the scene, or anywhere. */
+  /** A light without falloff, or with a reference distance near the scene, or with any. */
   private def source(positionBits: Int): LightSource = {
     val reach =
       if (chance(3)) BigInt(0) else (BigInt(1) << (numbers.mantissaBits - 1)) + BigInt(numbers.mantissaBits - 1, random)
     val nearby  = 2 * numbers.gridBits - numbers.mantissaBits + random.nextInt(16) - 10
     val largest = 1 << (NumberFormats.bitLength(2 * numbers.sceneBits))
     LightSource(
-      position = three(signed(positionBits)),
-      colour = three(natural(NumberFormats.lightBits)),
+      position = xyz(signed(positionBits)),
+      colour = xyz(natural(NumberFormats.lightBits)),
       reachMantissa = reach,
       reachExponent = if (chance(6)) random.nextInt(2 * largest) - largest else nearby
     )
   }
 
   /** Components of any size. */
-  def anyHit(): HitQuestion = hit(
-    origin = three(signed(numbers.gridBits)),
+  def anyHit(): HitCase = hit(
+    origin = xyz(signed(numbers.gridBits)),
     t = natural(numbers.gridBits - 1),
-    normals = three(three(signed(NumberFormats.normalBits))),
-    geometricNormal = three(signed(NumberFormats.normalBits))
+    normals = xyz(xyz(signed(NumberFormats.normalBits))),
+    geometricNormal = xyz(signed(NumberFormats.normalBits))
   )
 
-  /** A surface of unit normals, turned to the light or away from it, more or less. */
-  def surfaceHit(light: LightQuestion): HitQuestion = {
-    val way     = light.sources.head.position.map(x => (x << light.unitShift).toDouble)
-    val facing  = if (way.forall(_ == 0)) anyUnit else unit(way.map(x => if (chance(10)) -x else x))
-    val average = if (chance(3)) anyUnit else if (chance(3)) facing else nearly(facing)
-    val normals = three(if (chance(5)) average else nearly(average))
+  /** Unit normals that face the light, or face away from it. */
+  def surfaceHit(light: LightCase): HitCase = {
+    val way               = light.sources.head.position.map(x => (x << light.unitShift).toDouble)
+    val faceForwardNormal = if (way.forall(_ == 0)) anyUnit else unit(way.map(x => if (chance(10)) -x else x))
+    val average           = if (chance(3)) anyUnit else if (chance(3)) faceForwardNormal else nearly(faceForwardNormal)
+    val normals           = xyz(if (chance(5)) average else nearly(average))
     hit(
-      origin = three(signed(numbers.gridBits - random.nextInt(8))),
+      origin = xyz(signed(numbers.gridBits - random.nextInt(8))),
       t = natural(numbers.gridBits - 4),
       normals = normals,
       geometricNormal = if (chance(3)) average else nearly(average)
     )
   }
 
-  /** Anywhere in a room, at most half as far as the scene reaches; with any normal, or none. */
-  def roomPoint(): RoomPointQuestion = RoomPointQuestion(
+  /** Anywhere in an environment, at most half as far as the scene's size; with any normal, or none. */
+  def environmentPoint(): EnvironmentPointCase = EnvironmentPointCase(
     context = random.nextInt(config.array.contexts),
-    point = three(signed(if (random.nextBoolean()) numbers.gridBits else numbers.sceneBits - 1)),
-    normal = if (chance(10)) three(signed(NumberFormats.normalBits)) else if (chance(20)) three(BigInt(0)) else anyUnit,
-    albedo = three(natural(NumberFormats.colourBits)),
+    point = xyz(signed(if (random.nextBoolean()) numbers.gridBits else numbers.sceneBits - 1)),
+    normal = if (chance(10)) xyz(signed(NumberFormats.normalBits)) else if (chance(20)) xyz(BigInt(0)) else anyUnit,
+    albedo = xyz(natural(NumberFormats.colourBits)),
     shadows = random.nextBoolean()
   )
 
-  /** Smooth normals that cancel out, or weigh nothing. */
-  def withoutSmoothNormal(): HitQuestion = {
+  /** Vertex normals that cancel, or that have the weight 0. */
+  def withoutSmoothNormal(): HitCase = {
     val plain = anyHit()
-    if (random.nextBoolean()) plain.copy(weights = three(BigInt(0)))
+    if (random.nextBoolean()) plain.copy(weights = xyz(BigInt(0)))
     else {
       val normal = anyUnit
       plain.copy(
@@ -163,8 +163,8 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
     }
   }
 
-  /** Products halfway between two grid steps, or just beside; the offset's too when it is odd. */
-  def halfway(): HitQuestion = {
+  /** Products halfway between two grid steps, or next to that; the offset's product too if it is odd. */
+  def halfway(): HitCase = {
     val half = BigInt(1) << (numbers.shearFraction - 1)
     anyHit().copy(
       shear = Seq.fill(2)((half + random.nextInt(3) - 1) * (if (random.nextBoolean()) 1 else -1)),
@@ -173,26 +173,26 @@ final class ShaderQuestions(config: ColonnadeConfig, random: Random) {
     )
   }
 
-  /** No normal at all. */
-  def withoutNormal(): HitQuestion = withoutSmoothNormal().copy(geometricNormal = three(BigInt(0)))
+  /** All normals are zero. */
+  def withoutNormal(): HitCase = withoutSmoothNormal().copy(geometricNormal = xyz(BigInt(0)))
 
   private def hit(
       origin:          Seq[BigInt],
       t:               BigInt,
       normals:         Seq[Seq[BigInt]],
       geometricNormal: Seq[BigInt]
-  ): HitQuestion = {
+  ): HitCase = {
     val steepest = BigInt(1) << numbers.shearFraction
-    HitQuestion(
+    HitCase(
       context = random.nextInt(config.array.contexts),
       axis = random.nextInt(3),
-      negative = three(random.nextBoolean()),
+      negative = xyz(random.nextBoolean()),
       origin = origin,
       shear = Seq.fill(2)(if (chance(8)) steepest else natural(numbers.shearFraction)).map(s =>
         if (random.nextBoolean()) s else -s
       ),
       t = t,
-      weights = three(natural(numbers.barycentricBits)),
+      weights = xyz(natural(numbers.barycentricBits)),
       backSide = random.nextBoolean(),
       normals = normals,
       geometricNormal = geometricNormal,

@@ -1,0 +1,67 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{Cat, Mux1H, PriorityEncoder, Reverse}
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.numbers.Rounding
+
+/** Ports of [[GeometryAccumulator]]. */
+final class GeometryAccumulatorIO(config: ColonnadeConfig) extends Bundle {
+  private val formats = new ShaderFormats(config.numbers)
+
+  // See [[GeometryControl]]
+  val accumulate       = Input(Bool())
+  val startSum         = Input(Bool())
+  val shiftAccumulator = Input(Bool())
+  val roundShear       = Input(Bool())
+
+  val product = Input(SInt(formats.productBits.W))
+  val sum     = Output(SInt((formats.productBits + 1).W))
+
+  /** The sum of the cycle before, rounded. */
+  val rounded = Output(SInt(ShaderFormats.originBits(config).W))
+
+  /** The sum as a squared length, see [[Angle]]. */
+  val mantissa = Output(UInt(formats.shadeBits.W))
+  val exponent = Output(UInt(2.W))
+}
+
+/** Adds up products, and rounds sums to the nearest even number. */
+final class GeometryAccumulator(config: ColonnadeConfig) extends Module {
+  private val formats   = new ShaderFormats(config.numbers)
+  private val shadeBits = formats.shadeBits
+
+  val io = IO(new GeometryAccumulatorIO(config))
+
+  private val sum = Reg(chiselTypeOf(io.sum))
+
+  /** Bits that were shifted out of the sum: the highest one, and whether any other was set. */
+  private val half   = Reg(Bool())
+  private val sticky = Reg(Bool())
+
+  private val lowDigit = sum.asUInt(shadeBits - 1, 0)
+  private val previous = Mux(io.startSum, 0.S, Mux(io.shiftAccumulator, sum >> shadeBits, sum))
+  when(io.accumulate) {
+    sum    := Rounding.narrow(previous + io.product, sum.getWidth)
+    half   := io.shiftAccumulator && lowDigit(shadeBits - 1)
+    sticky := io.shiftAccumulator && (lowDigit(shadeBits - 2, 0).orR || half || sticky)
+  }
+  io.sum := sum
+
+  // Both kinds of sum are aligned so that the same number of bits is dropped
+  private val shearDrop  = config.numbers.shearFraction - shadeBits * (formats.shearDigits - 1) + 2
+  private val normalDrop = NumberFormats.normalFraction
+  private val drop       = shearDrop.max(normalDrop)
+  private val shearSum   = (Cat(sum.asUInt, half, sticky).asSInt << (drop - shearDrop)).asSInt
+  private val normalSum  = (sum << (drop - normalDrop)).asSInt
+  private val rounded    = Reg(chiselTypeOf(io.rounded))
+  rounded    := Rounding.narrow(Rounding.nearestEven(Mux(io.roundShear, shearSum, normalSum), drop), rounded.getWidth)
+  io.rounded := rounded
+
+  // The highest bit of a squared length is one of the top four
+  private val top = sum.asUInt(formats.dotBits - 1, formats.dotBits - 4)
+  io.exponent := Mux(top(3, 1).orR, 3.U - PriorityEncoder(Reverse(top(3, 1))), 0.U)
+  io.mantissa := Mux1H(
+    (0 to 3).map(k => (io.exponent === k.U) -> sum.asUInt(k + 2 * shadeBits - 2, k + shadeBits - 1))
+  )
+}
