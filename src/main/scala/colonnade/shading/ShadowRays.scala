@@ -71,5 +71,5 @@ final class ShadowRays(config: ColonnadeConfig) extends Module {
   io.ray.bits.context  := request.context
   io.ray.bits.isShadow := true.B
   io.ray.bits.origin   := origin
-  io.ray.bits.towards.axes.zip(dir).foreach { case (to, from) => to := from }
+  io.ray.bits.dir.axes.zip(dir).foreach { case (to, from) => to := from }
 }

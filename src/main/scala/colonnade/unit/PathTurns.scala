@@ -55,7 +55,7 @@ final class PathTurns(config: ColonnadeConfig) extends Module {
   direct.turn.context  := bounce.context
   direct.turn.albedo   := io.bounced.bits.albedo
   direct.turn.isTinted := io.bounced.bits.isTinted
-  direct.turn.fresnel  := bounce.fresnel
+  direct.turn.fresnel    := bounce.fresnel
   direct.turn.hasSurface.foreach(_ := false.B)
   direct.isRefraction := bounce.isRefraction
   direct.origin       := bounce.origin
@@ -82,7 +82,7 @@ final class PathTurns(config: ColonnadeConfig) extends Module {
   io.ray.bits.context     := context
   io.ray.bits.isShadow    := false.B
   io.ray.bits.origin      := path.bits.origin
-  io.ray.bits.towards     := path.bits.towards
+  io.ray.bits.dir         := path.bits.towards
   io.turned.valid         := path.fire
   io.turned.bits.context  := context
   io.turned.bits.isTraced := isTraced
