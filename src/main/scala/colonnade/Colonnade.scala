@@ -6,7 +6,7 @@ import colonnade.column.Column
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
-import colonnade.frame.{CounterFile, FrameController, RoomWindow}
+import colonnade.frame.{CounterFile, EnvironmentWindow, FrameController}
 import colonnade.unit.{RenderUnit, RenderUnitIO}
 
 /** Ports of [[Colonnade]]. */
@@ -16,24 +16,25 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   /** Ready while no frame runs. */
   val load = Flipped(Decoupled(new Load(config)))
 
-  /** One stream for each column, in no particular order; all pixels of a frame come once. */
+  /** One stream per column, in any order; each pixel of a frame comes once. */
   val pixels = Vec(config.array.columns, Decoupled(new Pixel(config)))
 
-  /** Only of a holdable memory: which banks wait, one bit for each, column by column. For verification. */
+  /** For verification, if the memory is holdable: stalls banks, one bit per bank, column by column. */
   val memoryHolds =
     if (config.columnBvhMemory.holdable) Some(Input(UInt((config.array.columns * config.columnBvhMemory.banks).W)))
     else None
 
-  /** The frame is complete; falls with the next start. */
+  /** The frame is complete; cleared by the next start. */
   val done = Output(Bool())
 }
 
 /** The device: columns of render units, run frame by frame.
   *
-  * Load the records, write the frame registers, start; take the pixels until `done`, then read errors and counters. A
-  * frame with an error bit is not to be shown. An aborted frame withdraws pixels that the sink has not taken.
+  * The host loads the records, writes the frame registers and starts the frame. It accepts pixels until `done`, then reads
+  * errors and counters. A frame with an error bit is invalid. An aborted frame withdraws pixels that the sink has not
+  * accepted.
   *
-  * @param renderUnit makes a render unit; another one with the same ports for specs
+  * @param renderUnit makes a render unit; specs pass another one with the same ports
   */
 final class Colonnade(
     config:     ColonnadeConfig,
@@ -47,12 +48,12 @@ final class Colonnade(
   private val clears     = reset.asBool || controller.io.aborts
   private val columns    = Seq.fill(config.array.columns)(withReset(clears)(Module(new Column(config, renderUnit))))
 
-  // Records go to all columns
+  // Loads go to all columns
   private val load = Pipe(io.load.fire, io.load.bits)
   io.load.ready := !controller.io.status.busy
   columns.foreach(_.io.load := load)
 
-  // Maps of a room that all columns share
+  // The environment's maps, if all columns share them
   for (ports <- Some(columns.flatMap(_.io.room)) if ports.nonEmpty) {
     val tagBits = AttributeArbiter.tagBits(config.array.rows, AttributePort.tagBits(config))
     val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, config.array.columns, tagBits)))
@@ -60,14 +61,14 @@ final class Colonnade(
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
   }
 
-  // A frame: tiles out, pixels back
+  // Frame: tiles to the columns, pixels from them
   registers.io.register <> io.register
   controller.io.start  := registers.io.start
   controller.io.frame  := registers.io.frame.frame
-  controller.io.window := RoomWindow(config, registers.io.frame)
+  controller.io.window := EnvironmentWindow(config, registers.io.frame)
   for ((column, index) <- columns.zipWithIndex) {
     column.io.registers := registers.io.frame
-    column.io.start     := controller.io.begins
+    column.io.start     := controller.io.frameStart
     column.io.tiles <> controller.io.tiles(index)
     column.io.backgroundTiles <> controller.io.backgroundTiles(index)
     io.pixels(index) <> column.io.pixels
@@ -77,11 +78,11 @@ final class Colonnade(
     controller.io.progress(index) := column.io.progress
     counters.io.events(index)     := column.io.events
   }
-  controller.io.traffic.leaves := io.pixels.map(_.fire).reduce(_ || _)
-  controller.io.traffic.stalls := io.pixels.map(pixels => pixels.valid && !pixels.ready).reduce(_ || _)
+  controller.io.traffic.retires := io.pixels.map(_.fire).reduce(_ || _)
+  controller.io.traffic.stalls  := io.pixels.map(pixels => pixels.valid && !pixels.ready).reduce(_ || _)
 
-  // What the host reads
-  counters.io.clear      := controller.io.begins
+  // Status for the host
+  counters.io.clear      := controller.io.frameStart
   counters.io.isCounting := controller.io.isRunning
 
   private val device = registers.io.device

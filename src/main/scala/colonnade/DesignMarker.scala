@@ -7,8 +7,8 @@ import java.security.MessageDigest
 import scala.jdk.CollectionConverters._
 import scala.util.Using
 
-/** How the generator knows the directories that it wrote: `.colonnade.sha256` lists every other file with its SHA-256, as
-  * `sha256sum --check` reads it. The host's `design_folder.py` writes and obeys the same file.
+/** Marks the directories that the generator wrote: `.colonnade.sha256` lists every other file with its SHA-256, in the
+  * format of `sha256sum --check`. The host's `design_folder.py` writes and reads the same file.
   */
 object DesignMarker {
   val name: String = ".colonnade.sha256"
@@ -26,7 +26,7 @@ object DesignMarker {
     ()
   }
 
-  /** Why the directory is no unchanged output; none for one that is, or that is empty. */
+  /** The reason why the directory is not an unchanged output; none if it is one, or is empty. */
   def foreign(directory: Path): Option[String] =
     if (Using.resource(Files.list(directory))(!_.iterator.hasNext)) None
     else if (!Files.isRegularFile(directory.resolve(name), NOFOLLOW_LINKS))
@@ -57,7 +57,7 @@ object DesignMarker {
 
   private def unknown(file: String): String = s"holds $file, which colonnade generate did not write"
 
-  /** SHA-256 by name; none for a file that is no list of ours. */
+  /** SHA-256 by name; none if the file is not such a list. */
   private def read(file: Path): Option[Map[String, String]] =
     if (Files.size(file) > mostBytes) None
     else

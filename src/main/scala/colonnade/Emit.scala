@@ -7,10 +7,10 @@ import colonnade.formats.Json
 import java.nio.file.{Files, Path}
 import scala.jdk.CollectionConverters._
 
-/** SystemVerilog of a design, a file for each module, with their list in `filelist.f`. */
+/** Writes the SystemVerilog of a design: a file per module, and their list in `filelist.f`. */
 object Emit {
 
-  /** Styles that Verilator, Yosys and older readers agree on. */
+  /** A Verilog style that Verilator, Yosys and older readers accept. */
   private val lowering =
     Seq("disallowLocalVariables", "disallowPackedArrays", "locationInfoStyle=none", "emittedLineLength=120")
 
@@ -29,7 +29,7 @@ object Emit {
     if (blackBoxMemories) describeMemories(directory)
   }
 
-  /** Rewrites firtool's list of memories, alternating names and values on a line each, as JSON. */
+  /** Converts firtool's list of memories, with alternating names and values on each line, to JSON. */
   private def describeMemories(directory: Path): Unit = {
     val list     = directory.resolve(memoryList)
     val lines    = if (Files.exists(list)) Files.readAllLines(list).asScala.toSeq.filter(_.trim.nonEmpty) else Nil

@@ -38,7 +38,7 @@ object Generate {
     if (status != 0) sys.exit(status)
   }
 
-  /** Does what the arguments say; the result is the exit status. */
+  /** Runs the command; returns the exit status. */
   def run(arguments: Seq[String]): Int =
     try {
       val options = parse(arguments.toList, Options())
@@ -98,7 +98,7 @@ object Generate {
       case error: InvalidPathException => throw new ConfigError(s"'$name' is no path: ${error.getReason}")
     }
 
-  /** The JDK's file errors often say no more than the file's name. */
+  /** A message for an I/O error; the JDK's own often contain only the file's name. */
   private def reason(error: IOException): String = error match {
     case taken: FileAlreadyExistsException => s"${taken.getFile}: there is a file where a directory is needed"
     case denied: AccessDeniedException     => s"${denied.getFile}: permission denied"

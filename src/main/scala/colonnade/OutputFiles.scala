@@ -9,10 +9,10 @@ import java.nio.file.{Files, Path, Paths}
 import java.util.Comparator
 import scala.util.Using
 
-/** Files and directories that appear complete or not at all: written under another name beside, then moved. */
+/** Writes files and directories atomically: under a temporary name in the same directory, then moved. */
 object OutputFiles {
 
-  /** Replaces a regular file, or nothing: no link, directory, pipe or device, and no file that is read-only. */
+  /** Writes a new file, or replaces a regular writable one; a link, directory, pipe or device is refused. */
   def writeFile(file: Path, text: String): Unit = {
     if (Files.isDirectory(file)) throw new ConfigError(s"$file is a directory; name a file")
     if (Files.isSymbolicLink(file)) throw new ConfigError(s"$file is a symbolic link; name the file itself")
@@ -30,7 +30,7 @@ object OutputFiles {
     } finally Files.deleteIfExists(fresh)
   }
 
-  /** Fills a new directory and puts it in the place of `directory`, which may be an earlier output, unchanged, or empty. */
+  /** Fills a new directory and replaces `directory` with it, which may be empty or an unchanged earlier output. */
   def replaceDirectory(directory: Path)(fill: Path => Unit): Unit = {
     checkReplaceable(directory)
     val parent = Option(directory.getParent).getOrElse(throw new ConfigError(s"$directory cannot be an output"))
@@ -65,12 +65,12 @@ object OutputFiles {
     }
   }
 
-  /** Also for the superuser, who may write everything. */
+  /** Applies to the superuser, too, who may write every file. */
   private def isWritableByAnybody(file: Path): Boolean =
     !Files.getFileStore(file).supportsFileAttributeView("posix") ||
       Files.getPosixFilePermissions(file).toString.contains("WRITE")
 
-  /** A temporary directory is its owner's alone; an output is for everybody. */
+  /** A temporary directory is private; an output gets the default permissions. */
   private def open(directory: Path): Unit = {
     directory.toFile.setReadable(true, false)
     directory.toFile.setExecutable(true, false)

@@ -5,8 +5,8 @@ import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 
-/** How the column BVH controller reads one bank, whatever is behind it: a memory or a cache. Responses come in the order
-  * of requests, at any time after them, and cannot be stalled.
+/** The read port of one bank, which may be a memory or a cache. Responses come in the order of requests, with any latency,
+  * and cannot be stalled.
   */
 final class BankPort(config: ColonnadeConfig) extends Bundle {
 
@@ -15,10 +15,10 @@ final class BankPort(config: ColonnadeConfig) extends Bundle {
   val response = Flipped(Valid(new RecordFormats(config).record))
 }
 
-/** Banks are interleaved by record: the low bits of a record's address name its bank, the others its place there. */
+/** Banks are interleaved by record: the low bits of a record's address select the bank, the others the word in it. */
 object Banks {
 
-  /** Records of one bank. */
+  /** Number of records in one bank. */
   def depth(config: ColonnadeConfig): Int =
     (config.columnBvhMemory.depth + config.columnBvhMemory.banks - 1) / config.columnBvhMemory.banks
 

@@ -5,7 +5,15 @@ import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributePort, ColumnRoom}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
-import colonnade.frame.{BackgroundWalker, ColumnProgress, EventSums, PixelCollector, RoomWindow, Tile, TileWalker}
+import colonnade.frame.{
+  BackgroundWalker,
+  ColumnProgress,
+  EnvironmentWindow,
+  EventSums,
+  PixelCollector,
+  Tile,
+  TileWalker
+}
 import colonnade.unit.{RenderUnit, RenderUnitIO}
 
 /** Ports of [[Column]]. */
@@ -14,7 +22,7 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   /** Constant while a frame runs. */
   val registers = Input(new FrameRegisters(config))
 
-  /** A frame begins; precedes its first tile. */
+  /** A frame starts; precedes its first tile. */
   val start = Input(Bool())
 
   /** Only while idle. */
@@ -24,23 +32,23 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   val holds = if (config.columnBvhMemory.holdable) Some(Input(UInt(config.columnBvhMemory.banks.W))) else None
   val tiles = Flipped(Decoupled(new Tile(config)))
 
-  /** Tiles without a pixel that may see the object. */
+  /** Tiles without a pixel whose primary ray may hit the object. */
   val backgroundTiles = Flipped(Decoupled(new Tile(config)))
 
-  /** In no particular order. */
+  /** In any order. */
   val pixels   = Decoupled(new Pixel(config))
   val progress = Output(new ColumnProgress)
 
-  /** Where the columns share the maps of a room. */
+  /** If the columns share the maps of the environment. */
   val room = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
 
-  /** One cycle after they happened. */
+  /** Delayed by one cycle. */
   val events = Output(new EventSums(config, 1))
 }
 
-/** Render units that share one memory of records. A reset clears all but the memory.
+/** A column of render units that share one record memory. A reset clears all but the memory.
   *
-  * @param renderUnit makes a render unit; another one with the same ports for specs
+  * @param renderUnit makes a render unit; specs pass another one with the same ports
   */
 final class Column(
     config:     ColonnadeConfig,
@@ -55,26 +63,26 @@ final class Column(
   private val memory     = Module(new ColumnBvhMemory(config))
   private val collector  = Module(new PixelCollector(config, config.array.rows + 1))
 
-  // Tiles become pixels to render
+  // Walk tiles: pixel positions for the units
   walker.io.frame  := io.registers.frame
-  walker.io.window := RoomWindow(config, io.registers)
+  walker.io.window := EnvironmentWindow(config, io.registers)
   walker.io.tiles <> io.tiles
   units.zip(walker.io.positions).foreach { case (unit, positions) => unit.positions <> positions }
 
-  // Tiles of the background, and the others' pixels outside the object's outline, become pixels at once
+  // Tiles of the background, and pixels outside the object's outline, become finished pixels at once
   background.io.frame  := io.registers.frame
   background.io.colour := io.registers.background
   background.io.tiles <> io.backgroundTiles
   background.io.others <> walker.io.others
 
-  // Units ask for records and see all that are read
+  // Records: units send requests and receive all broadcasts
   controller.io.requests.zip(units).foreach { case (requests, unit) => requests <> unit.requests }
   memory.io.banks <> controller.io.memory
   units.foreach(_.broadcasts := controller.io.broadcasts)
   memory.io.load := io.load
   memory.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
 
-  // Units ask for the maps of a room: the column's own, or those that all columns share
+  // Environment: units read the column's own maps, or those that all columns share
   private val room = config.physicalAttributeMemory.map(_ => Module(new ColumnRoom(config)).io)
   for (maps <- room) {
     maps.load := io.load
@@ -82,26 +90,26 @@ final class Column(
     maps.ports.zip(units.flatMap(_.maps)).foreach { case (port, unit) => port <> unit }
   }
 
-  // Colours leave
+  // Collect finished pixels
   collector.io.sources.zip(units.map(_.pixels) :+ background.io.pixels).foreach { case (source, pixels) =>
     source <> pixels
   }
   io.pixels <> collector.io.pixels
 
-  // What all units know
+  // Registers
   for ((unit, row) <- units.zipWithIndex) {
     unit.row       := row.U
     unit.registers := io.registers
     unit.start     := io.start
   }
 
-  // Pixels handed out and not yet gone
+  // Progress: pixels that have started and not yet retired
   private val inFlight = RegInit(0.U((2 * config.numbers.coordinateBits).W))
   private val enters   = PopCount(walker.io.positions.map(_.fire) :+ background.io.pixels.fire)
-  private val leaves   = io.pixels.fire
-  inFlight := inFlight + enters - leaves
+  private val retired  = io.pixels.fire
+  inFlight := inFlight + enters - retired
 
-  io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === leaves.asUInt
+  io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === retired.asUInt
   io.progress.isIdle    := RegNext(units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle, true.B)
   io.events             := RegNext(EventSums.ofColumn(
     config,

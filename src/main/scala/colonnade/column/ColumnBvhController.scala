@@ -10,10 +10,10 @@ import colonnade.frame.ColumnBvhEvents
 final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 
-  /** One for each row; may be withdrawn while not accepted. */
+  /** By row; a request may be withdrawn until it is accepted. */
   val requests = Vec(config.array.rows, Flipped(Decoupled(new RecordRequest(config))))
 
-  /** One for each bank. */
+  /** By bank. */
   val broadcasts = Output(Vec(banks, Valid(new RecordBroadcast(config))))
   val memory     = Vec(banks, new BankPort(config))
   val events     = Output(new ColumnBvhEvents(config))
@@ -22,12 +22,12 @@ final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Reads records for the render units of a column and shows each to all of them.
+/** Reads records for the render units of a column and broadcasts each one to all of them.
   *
-  * A bank accepts one request a cycle, from the rows in turn, and shows the record one cycle after the memory has
-  * answered: two cycles after the request for a memory of latency 1. Every accepted request is read and shown once, in
-  * the bank's order of acceptance, whoever else has asked for the same record: a unit that finds its record in another
-  * one's read withdraws its request by itself.
+  * A bank accepts one request per cycle, in round-robin order of rows. It broadcasts the record one cycle after the
+  * memory's response, which is two cycles after the request for a memory of latency 1. Every accepted request gives one
+  * read and one broadcast, in order per bank. A unit that gets its record from another unit's read withdraws its own
+  * request.
   */
 final class ColumnBvhController(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnBvhControllerIO(config))

@@ -11,16 +11,16 @@ final class ColumnBvhMemoryIO(config: ColonnadeConfig) extends Bundle {
   /** Only while no read is in flight. */
   val load = Flipped(Valid(new Load(config)))
 
-  /** One bit for each bank: it neither accepts nor answers. */
+  /** By bank: the bank neither accepts nor responds. */
   val holds = if (config.columnBvhMemory.holdable) Some(Input(UInt(config.columnBvhMemory.banks.W))) else None
   val banks = Vec(config.columnBvhMemory.banks, Flipped(new BankPort(config)))
 }
 
-/** The records that the render units of a column share. Each bank answers one read a cycle, `readLatency` cycles later.
+/** The record memory of a column. Each bank accepts one read per cycle and responds `readLatency` cycles later.
   *
-  * A bank has a single port, for reads and loads exclude each other; cycles of latency beyond the first are spent before
-  * it, where a register holds an address and not a record. A bank that can be held has a queue for its answers. A load
-  * beyond the depth is dropped.
+  * A bank has a single port, because reads and loads exclude each other. Latency beyond one cycle is spent in registers
+  * before the memory, which hold addresses instead of records. A bank that can be held has a queue for its responses. A
+  * load beyond the depth is dropped.
   */
 final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnBvhMemoryIO(config))
@@ -37,7 +37,7 @@ final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
 
     val address = Mux(writes, Banks.addressIn(config, place), read.bits)
     val answer  = Wire(Decoupled(new RecordFormats(config).record))
-    val answers = if (config.columnBvhMemory.holdable) Queue(answer, ReadList.room(config), flow = true) else answer
+    val answers = if (config.columnBvhMemory.holdable) Queue(answer, ReadList.depth(config), flow = true) else answer
     val isHeld  = io.holds.map(_(bank)).getOrElse(false.B)
     answer.valid        := RegNext(read.valid, false.B)
     answer.bits         := records.readWrite(address, io.load.bits.record, writes || read.valid, writes)

@@ -13,41 +13,41 @@ final class Read(config: ColonnadeConfig) extends Bundle {
 
 /** Ports of [[ReadList]]. */
 final class ReadListIO(config: ColonnadeConfig) extends Bundle {
-  val begins = Flipped(Decoupled(new Read(config)))
+  val push   = Flipped(Decoupled(new Read(config)))
   val oldest = Decoupled(new Read(config))
 
-  /** All of them. */
-  val reads = Output(Vec(ReadList.room(config), Valid(new Read(config))))
+  /** All reads in flight, the oldest first. */
+  val reads = Output(Vec(ReadList.depth(config), Valid(new Read(config))))
 }
 
 object ReadList {
-  def room(config: ColonnadeConfig): Int = config.columnBvhMemory.readLatency + 1
+  def depth(config: ColonnadeConfig): Int = config.columnBvhMemory.readLatency + 1
 }
 
-/** The reads of a bank that are in flight, in order: as many as a memory of `readLatency` holds when it accepts one a
-  * cycle. They move up through registers, for there are few, and model checkers are slow on memories.
+/** The reads in flight of a bank, in order: as many as a memory of `readLatency` holds at full throughput. This is a shift
+  * register, because there are few, and model checkers are slow on memories.
   */
 final class ReadList(config: ColonnadeConfig) extends Module {
   val io = IO(new ReadListIO(config))
 
-  private val room  = ReadList.room(config)
-  private val reads = Reg(Vec(room, new Read(config)))
-  private val count = RegInit(0.U(log2Ceil(room + 1).W))
+  private val depth = ReadList.depth(config)
+  private val reads = Reg(Vec(depth, new Read(config)))
+  private val count = RegInit(0.U(log2Ceil(depth + 1).W))
   private val left  = count - io.oldest.fire
 
-  io.begins.ready := count =/= room.U
+  io.push.ready   := count =/= depth.U
   io.oldest.valid := count =/= 0.U
   io.oldest.bits  := reads.head
-  for (((port, read), place) <- io.reads.zip(reads).zipWithIndex) {
-    port.valid := count > place.U
+  for (((port, read), index) <- io.reads.zip(reads).zipWithIndex) {
+    port.valid := count > index.U
     port.bits  := read
   }
 
   when(io.oldest.fire) {
     reads.zip(reads.tail).foreach { case (read, next) => read := next }
   }
-  for ((read, place) <- reads.zipWithIndex) {
-    when(io.begins.fire && left === place.U) { read := io.begins.bits }
+  for ((read, index) <- reads.zipWithIndex) {
+    when(io.push.fire && left === index.U) { read := io.push.bits }
   }
-  count := left + io.begins.fire
+  count := left + io.push.fire
 }

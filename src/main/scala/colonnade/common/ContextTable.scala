@@ -3,10 +3,10 @@ package colonnade.common
 import chisel3._
 import colonnade.config.ColonnadeConfig
 
-/** Something that each context remembers, in a memory: one entry is read and one is written in a cycle.
+/** A table with one entry per context, as a memory with one read port and one write port.
   *
-  * What is read comes in the next cycle, and for that cycle only. No context's entry is read in the cycle in which it is
-  * written: which of both values a memory would show is its own affair.
+  * The entry comes in the cycle after the read, and is valid in that cycle only. Read-during-write is undefined: no entry
+  * is read in the cycle in which it is written.
   */
 object ContextTable {
   def apply[T <: Data](config: ColonnadeConfig, entry: T): SyncReadMem[T] =

@@ -7,23 +7,23 @@ import chisel3.util.Decoupled
 final class DispatcherIO[T <: Data](private val item: T, count: Int) extends Bundle {
   val items = Flipped(Decoupled(item))
 
-  /** Valid only where ready is set: a taker must not wait for an item before it is ready. */
+  /** Valid only where ready is set: ready must not depend on valid. */
   val takers = Vec(count, Decoupled(item))
 }
 
-/** Hands each item to one of the takers that are ready, in turn, so that consecutive items spread.
+/** Dispatches each item to one of the ready takers in round-robin order, so that consecutive items spread.
   *
-  * Combinational; one item a cycle.
+  * Combinational; throughput one item per cycle.
   */
 final class Dispatcher[T <: Data](item: T, count: Int) extends Module {
   val io = IO(new DispatcherIO(item, count))
 
-  private val turn = Module(new RoundRobin(count))
-  turn.io.requests := VecInit(io.takers.map(_.ready)).asUInt
-  turn.io.isTaken  := io.items.fire
+  private val arbiter = Module(new RoundRobin(count))
+  arbiter.io.requests := VecInit(io.takers.map(_.ready)).asUInt
+  arbiter.io.isTaken  := io.items.fire
 
-  io.items.ready := turn.io.requests.orR
-  io.takers.zip(turn.io.grant.asBools).foreach { case (taker, isGranted) =>
+  io.items.ready := arbiter.io.requests.orR
+  io.takers.zip(arbiter.io.grant.asBools).foreach { case (taker, isGranted) =>
     taker.valid := io.items.valid && isGranted
     taker.bits  := io.items.bits
   }

@@ -2,25 +2,25 @@ package colonnade.common
 
 import chisel3._
 
-/** Ports of [[RoundRobin]]; bit i is requester i. */
+/** Ports of [[RoundRobin]]; bit i belongs to requester i. */
 final class RoundRobinIO(count: Int) extends Bundle {
   val requests = Input(UInt(count.W))
 
-  /** One of the requests, or none when there is none. */
+  /** One of the requests, one-hot; 0 without requests. */
   val grant = Output(UInt(count.W))
 
-  /** The granted one has been served: it is now the last in line. */
+  /** The grant is accepted: this requester now has the lowest priority. */
   val isTaken = Input(Bool())
 }
 
-/** Grants one of several requesters, in turn: of `count` grants taken, one is that of a requester that keeps asking.
+/** A round-robin arbiter: a requester that stays valid gets one of the next `count` accepted grants.
   *
-  * Combinational from request to grant. Requests may come and go; a grant follows them while it is not taken.
+  * Combinational from request to grant. Requests may be withdrawn; the grant follows them until it is accepted.
   */
 final class RoundRobin(count: Int) extends Module {
   val io = IO(new RoundRobinIO(count))
 
-  // Requesters after the last one served; those up to it wait until none of these asks.
+  // Requesters after the last one granted have priority over the others.
   private val after = RegInit(0.U(count.W))
   private val ahead = io.requests & after
 

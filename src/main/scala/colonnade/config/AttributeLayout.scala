@@ -1,8 +1,8 @@
 package colonnade.config
 
-/** Sizes of the physical-attribute memory's parts. Words are laid out in `formats.AttributeRecords`.
+/** Sizes of the parts of the physical-attribute memory. `formats.AttributeRecords` defines the words.
   *
-  * A map has a descriptor for each tile; what the fixed parts leave of its bytes is its heap, which tiles point into.
+  * A map has a descriptor per tile. The bytes that the fixed parts leave are its heap, to which descriptors point.
   */
 final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
   import AttributeLayout._
@@ -31,7 +31,7 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
   val tableIndexBits: Int     = planeIdBits.max(shellIndexBits)
   val isSliding:      Boolean = encoding == MapEncoding.Sliding
 
-  /** Heap words of a two-level map; 0 of a sliding one, which has none. */
+  /** Heap words of a two-level map; 0 for a sliding map. */
   val mapHeapWords: Int = {
     val descriptors = tiles * mapDescriptorBits / 8
     if (isSliding) {
@@ -83,7 +83,7 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
     "shellPlanes"    -> shellPlanes
   )
 
-  /** Words of what is left.
+  /** Heap words in the remaining bytes.
     *
     * @param largestTile words of the finest mode
     */
@@ -106,7 +106,7 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
 
 object AttributeLayout {
 
-  /** Of a configuration that has the memory. */
+  /** The layout of a configuration with the memory. */
   def of(config: ColonnadeConfig): AttributeLayout = config.physicalAttributeMemory match {
     case Some(memory) => memory.layout
     case None         => throw new ConfigError("physicalAttributeMemory is null; a unit of the background needs it")
@@ -114,29 +114,29 @@ object AttributeLayout {
 
   val heapWordBits: Int = 16
 
-  /** Of a heap word; also holds the mask of a tile's coarsest mode, and a flat tile's plane id. */
+  /** Width of a heap word; a word also holds the mask of a tile's coarsest mode, or the plane id of a flat tile. */
   val pointerBits: Int = 13
   val modeBits:    Int = 3
 
-  /** An index into a palette, or into the plane table, as tiles and heap hold it. */
+  /** Width of a stored index into a palette or into the plane table. */
   val indexBits: Int = 8
 
-  /** Components of a palette entry or a seed. */
+  /** Width of a component of a palette entry or of a seed. */
   val componentBits: Int = 12
   val entryBits:     Int = 3 * componentBits
 
-  /** Of a block: which of the nine seeds around. */
+  /** Width of a block label: one of the nine neighbouring seeds. */
   val labelBits: Int = 4
 
   val mapDescriptorBits:   Int = modeBits + pointerBits + 2 * indexBits
   val planeDescriptorBits: Int = modeBits + pointerBits
 
-  /** A plane's coefficients share an exponent. */
+  /** Width of the exponent that the coefficients of a plane share. */
   val coefficientBits: Int = 20
   val exponentBits:    Int = 4
   val planeBits:       Int = 3 * coefficientBits + exponentBits
 
-  /** A shell entry counts whole heap words. */
+  /** Size of a bounding plane, rounded up to heap words. */
   val shellEntryBytes: Int = (planeBits + 2 * entryBits + heapWordBits - 1) / heapWordBits * (heapWordBits / 8)
 
   private val cellsPerBlockRow = 4
@@ -145,6 +145,6 @@ object AttributeLayout {
 
   private def log2(power: Int): Int = Integer.numberOfTrailingZeros(power)
 
-  /** Bits of an index of so many things; at least one. */
+  /** Width of an index to this many items; at least 1. */
   private def bitsOf(count: Int): Int = NumberFormats.bitLength(count - 1).max(1)
 }

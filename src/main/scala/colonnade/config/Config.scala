@@ -17,7 +17,7 @@ object ArrayConfig {
   val mostRows:    Int = 256
   val mostColumns: Int = 256
 
-  /** Render units of a device: twelve times `edge`. */
+  /** Maximum number of render units: twelve times `edge`. */
   val mostUnits: Int = 1024
 }
 
@@ -59,10 +59,10 @@ final case class GeometryConfig(
   Require.oneOf("geometry.trianglesPerRecord", trianglesPerRecord, Seq(1, 2))
 }
 
-/** How much of a render unit's work is done side by side.
+/** Parallel lanes in a render unit.
   *
-  * @param boxLanes      children that the box unit tests in a cycle
-  * @param triangleLanes triangle tests of four cycles each that run beside each other
+  * @param boxLanes      children that the box unit tests per cycle
+  * @param triangleLanes parallel triangle units of four cycles per test
   */
 final case class UnitsConfig(boxLanes: Int, triangleLanes: Int) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
@@ -74,10 +74,10 @@ final case class UnitsConfig(boxLanes: Int, triangleLanes: Int) {
   * @param depth         records
   * @param banks         independent banks, interleaved by record address
   * @param stackDepth    traversal stack entries of each context
-  * @param snooping      every context that waits for a record takes it when anybody reads it
-  * @param recordBuffers records that a render unit can hold or expect at a time
+  * @param snooping      a context gets its record from the read of any render unit of the column
+  * @param recordBuffers record buffers of a render unit
   * @param readLatency   cycles from an accepted read to its record
-  * @param holdable      an input for each bank that makes it wait: for verification, to vary the latency at run time
+  * @param holdable      an input per bank that stalls it, so that verification can vary the latency at run time
   */
 final case class ColumnBvhMemoryConfig(
     depth:         Int,
@@ -95,11 +95,11 @@ final case class ColumnBvhMemoryConfig(
   Require.within("columnBvhMemory.readLatency", readLatency, 1, 16)
 }
 
-/** What a frame may hold.
+/** Limits of a frame.
   *
   * @param maxWidth   widest frame, pixels
   * @param maxHeight  highest frame, pixels
-  * @param tileSize   edge of the square tiles handed to columns, pixels
+  * @param tileSize   edge of the square tiles that are dispatched to columns, pixels
   * @param materials  entries of the material table
   * @param lights     point lights
   * @param maxBounces reflections and refractions of a path that are traced; 0: every material is diffuse
@@ -121,13 +121,13 @@ final case class FrameConfig(
   Require.within("frame.lights", lights, 1, 8)
   Require.within("frame.maxBounces", maxBounces, 0, 15)
 
-  /** There are mirrors and glass. */
+  /** The device supports mirrors and glass. */
   val hasBounces: Boolean = maxBounces > 0
 }
 
 /** A whole generator configuration: immutable, checked at construction.
   *
-  * @param physicalAttributeMemory none: the device knows no room
+  * @param physicalAttributeMemory none for a device without an environment
   */
 final case class ColonnadeConfig(
     array:                   ArrayConfig,
@@ -142,6 +142,6 @@ final case class ColonnadeConfig(
 
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
-  /** Rays may meet a room. */
+  /** The device supports an environment. */
   val hasRoom: Boolean = physicalAttributeMemory.nonEmpty
 }

@@ -9,10 +9,10 @@ import java.nio.file.{Files, InvalidPathException, Path, Paths}
   */
 object ConfigIO {
 
-  /** Configurations that are always there, by name. */
+  /** The presets, by name. */
   val presets: Seq[String] = Seq("tiny", "small", "edge")
 
-  /** Of a configuration's file. */
+  /** Maximum size of a configuration file. */
   private val mostBytes = 1 << 20
 
   private val notation = """(\d{1,6})b(\d{1,6})s(\d{1,6})d""".r

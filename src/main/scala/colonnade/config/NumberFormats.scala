@@ -2,7 +2,7 @@ package colonnade.config
 
 /** Every derived width and constant of the datapaths, by the rules of docs/numbers.md.
   *
-  * The manifest carries [[entries]]; model, packer and harness take them from there and derive nothing themselves.
+  * The manifest contains [[entries]]; model, packer and harness read them and derive nothing themselves.
   */
 final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionConfig, frame: FrameConfig) {
   import NumberFormats._
@@ -32,12 +32,12 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   val distanceDigits:  Int = gridBits.min(mantissaBits)
   val barycentricBits: Int = weightBits.min(colourBits)
 
-  /** Magnitude bits of a vector component in the shader's dot products: a cosine good to [[colourBits]] needs no more than 18. */
+  /** Magnitude bits of a vector component in the shader's dot products: 18 suffice for a cosine of [[colourBits]]. */
   val shadeBits:      Int = macBits.min(colourBits + 6)
   val radicandBits:   Int = precision.sqrt / 2 * 2
   val cosineFraction: Int = mantissaBits.min(colourBits + 4)
 
-  /** Of the squared cosine behind a refraction, unsigned: what the shader's multiplier takes, and no more than there is. */
+  /** Width of the squared cosine of a refraction, unsigned: that of the shader's multiplier at most. */
   val rootBits: Int = (2 * shadeBits + 1).min(gridBits.max(shadeBits + 1).max(lightBits + 2) - 1)
 
   /** Largest exponent of a node: a child's planes are less than two cubes from its node's corner. */
@@ -46,7 +46,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   /** Signed distances of the box test, in units. */
   val boxDistanceBits: Int = vertexBits + 3
 
-  /** Log2 of the units by which a box is widened: the sum of all roundings between a box and the triangles in it. */
+  /** Log2 of the padding of a box in units: the sum of all rounding errors between a box and its triangles. */
   val boxPadLog: Int = {
     val reach = 1.5 * power(vertexBits)
     val step  = power(-gridFraction)

@@ -5,16 +5,16 @@ sealed abstract class MapEncoding(val name: String)
 
 object MapEncoding {
 
-  /** Tiles with a mode: two or four palette entries, chosen for cells of the size that the tile needs. */
+  /** Each tile has a mode: two or four palette entries, and the size of the cells that select one of them. */
   case object TwoLevel extends MapEncoding("twoLevel")
 
-  /** SLIC superpixels, one seed a tile: a block of pixels names the one of nine neighbouring seeds that it belongs to. */
+  /** SLIC superpixels with one seed per tile: the label of a block of pixels selects one of nine neighbouring seeds. */
   case object Sliding extends MapEncoding("slic")
 
   val all: Seq[MapEncoding] = Seq(TwoLevel, Sliding)
 }
 
-/** The room's maps on chip: albedo, normals, and planes.
+/** The on-chip maps of the environment: albedo, normals and planes.
   *
   * @param width       of the maps, pixels
   * @param height      of the maps, pixels
@@ -23,9 +23,9 @@ object MapEncoding {
   * @param paletteSize entries of a two-level map's palette
   * @param mapBytes    of albedo, and of normals
   * @param planes      entries of the plane table
-  * @param planeBytes  of the plane map, its table and its shell
-  * @param shellPlanes planes beyond the view
-  * @param shared      one memory for the device; or else a copy in every column
+  * @param planeBytes  of the plane map, its table and the bounding planes
+  * @param shellPlanes bounding planes outside the view
+  * @param shared      one memory for the device; otherwise a copy in every column
   */
 final case class PhysicalAttributeMemoryConfig(
     width:       Int,
@@ -48,13 +48,13 @@ final case class PhysicalAttributeMemoryConfig(
   Require.oneOf(s"$section.planes", planes, powers)
   Require.within(s"$section.shellPlanes", shellPlanes, 2, 16)
 
-  /** All sizes that follow. */
+  /** All derived sizes. */
   val layout: AttributeLayout = AttributeLayout(this)
 }
 
 object PhysicalAttributeMemoryConfig {
   private[config] val section = "physicalAttributeMemory"
 
-  /** An index takes a byte at most. */
+  /** An index has one byte at most. */
   private val powers = Seq(16, 32, 64, 128, 256)
 }

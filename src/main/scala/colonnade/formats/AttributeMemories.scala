@@ -3,19 +3,19 @@ package colonnade.formats
 import chisel3.Bundle
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 
-/** One memory of the room's maps.
+/** One memory of the environment's maps.
   *
   * @param name   MAP.PART
   * @param depth  words
-  * @param bits   of a word; a load has them in the low bits of its record
-  * @param target its number for loads
+  * @param bits   width of a word, which is in the low bits of a load's record
+  * @param target number of the memory for loads
   */
 final case class AttributeMemory(name: String, depth: Int, bits: Int, target: Int)
 
-/** All memories of the room's maps. */
+/** All memories of the environment's maps. */
 object AttributeMemories {
 
-  /** None where the device knows no room. */
+  /** Empty for a device without an environment. */
   def apply(config: ColonnadeConfig): Seq[AttributeMemory] =
     config.physicalAttributeMemory.toSeq.flatMap { memory =>
       val layout = memory.layout
@@ -30,7 +30,7 @@ object AttributeMemories {
       }
     }
 
-  /** Kinds of word by their manifest key; a heap's words are plain bits. */
+  /** Types of words by their manifest key; a heap's words are plain bits. */
   val layouts: Seq[(String, () => Bundle)] = Seq(
     "mapDescriptor"   -> (() => new MapDescriptor),
     "albedo"          -> (() => new AlbedoEntry),

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
 
-/** What happened in a render unit in one cycle; names as in `Counters`. */
+/** Events of a render unit in one cycle; names as in `Counters`. */
 final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   private def contexts                               = UInt(log2Ceil(config.array.contexts + 1).W)
   private def ifRoom[T <: Data](event: T): Option[T] = if (config.hasRoom) Some(event) else None
@@ -23,8 +23,8 @@ final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   val busyTriangleUnit = UInt(log2Ceil(config.units.triangleLanes + 1).W)
   val busyShader       = Bool()
 
-  /** Contexts without a pixel; whose ray is generated or set up; that wait for a record, or with it for a unit; in box
-    * unit and stack; in the triangle unit; in the shader. The others are on their way out.
+  /** Numbers of contexts by state: without a pixel; in ray generation or set-up; waiting for a record; waiting with their
+    * record for a unit; in box unit and stack; in the triangle unit; in the shader. The others are in later stages.
     */
   val idleContexts      = contexts
   val contextsSetUp     = contexts
@@ -34,15 +34,15 @@ final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   val contextsTriangles = contexts
   val contextsShading   = contexts
 
-  /** Rays that look for a point of the room, tiles and cells that they pass; the march is busy; contexts that wait for
-    * it, or are in it.
+  /** With an environment: rays that start the march; tiles and cells that they visit; the march is busy; contexts that
+    * wait for it or are in it.
     */
   val raysRoom     = ifRoom(Bool())
   val marchSteps   = ifRoom(Bool())
   val busyRoom     = ifRoom(Bool())
   val contextsRoom = ifRoom(contexts)
 
-  /** Most entries that any of the unit's stacks has held since the frame's start: a level, not an event. */
+  /** The maximum number of entries of any stack of the unit since the start of the frame: a level, not an event. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
 
   /** Errors. */
@@ -50,7 +50,7 @@ final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   val illegalRecord = Bool()
 }
 
-/** Questions accepted in one cycle; names as in `Counters`. */
+/** Reads of the maps that are accepted in one cycle; names as in `Counters`. */
 final class AttributeEvents extends Bundle {
   val albedoReads = Bool()
   val normalReads = Bool()

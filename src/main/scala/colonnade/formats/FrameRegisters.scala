@@ -19,7 +19,7 @@ final class HalfPlane(coordinateBits: Int) extends Bundle {
   val x = SInt(HalfPlane.normalBits.W)
   val y = SInt(HalfPlane.normalBits.W)
 
-  /** As large as what it has to make up for in the largest frame. */
+  /** Wide enough for the products of the largest frame. */
   val offset = SInt((HalfPlane.normalBits + coordinateBits + 1).W)
 }
 
@@ -27,22 +27,22 @@ object HalfPlane {
   val normalBits: Int = 12
 }
 
-/** A record, not a bundle: Chisel keeps the name `width` for itself. */
+/** A record, not a bundle: Chisel reserves the name `width`. */
 final class FrameSettings(numbers: NumberFormats) extends Record {
 
-  /** Called `width` and `height` outside. */
+  /** Their register names are `width` and `height`. */
   val pixelsWide = UInt(numbers.coordinateBits.W)
   val pixelsHigh = UInt(numbers.coordinateBits.W)
 
-  /** Only pixels in the rectangle and in all half-planes have rays that may meet the object. */
+  /** Only pixels in the rectangle and in all half-planes have primary rays that may hit the object. */
   val objectRect    = new PixelRect(numbers.coordinateBits)
   val objectOutline = Vec(FrameRegisters.outlineEdges, new HalfPlane(numbers.coordinateBits))
 
-  /** A position of the camera or the light, shifted left by this, is in grid steps. */
+  /** Left shift of a position of camera or light to grid steps. */
   val unitShift = UInt(NumberFormats.bitLength(numbers.sceneBits).W)
 
-  /** A frame in which no pixel leaves for so many cycles ends with an error; 0 waits for ever. Cycles in which the
-    * pixel sink stalls do not count.
+  /** A frame in which no pixel leaves for this many cycles ends with an error; 0 disables the watchdog. Cycles in which
+    * the pixel sink stalls do not count.
     */
   val watchdogCycles = UInt(32.W)
 
@@ -58,14 +58,14 @@ final class FrameSettings(numbers: NumberFormats) extends Record {
 
 /** The ray of pixel (x, y) has the direction `(direction << stepShift) + x · stepX + y · stepY`.
   *
-  * A record, not a bundle: Chisel keeps the name `direction` for itself.
+  * A record, not a bundle: Chisel reserves the name `direction`.
   */
 final class Camera(numbers: NumberFormats) extends Record {
   private def vector = Vec3(SInt(numbers.macBits.W))
 
   val position = vector
 
-  /** Towards the picture's first pixel; called `direction` outside. */
+  /** The direction to the frame's first pixel; its register name is `direction`. */
   val dir       = vector
   val stepX     = vector
   val stepY     = vector
@@ -86,21 +86,21 @@ final class Bounds(numbers: NumberFormats) extends Bundle {
   val high = Vec3(UInt(numbers.vertexBits.W))
 }
 
-/** Where the sections of the column BVH memory lie: nodes, then triangles, then attributes. A base beyond the next one,
-  * or beyond `recordCount`, counts as that.
+/** The sections of the column BVH memory: nodes, then triangles, then attributes. A base above the next one, or above
+  * `recordCount`, is clamped to it.
   */
 final class SceneMap(countBits: Int) extends Bundle {
 
-  /** Records in all. */
+  /** Total number of records. */
   val recordCount     = UInt(countBits.W)
   val triangleBase    = UInt(countBits.W)
   val triangleRecords = UInt(countBits.W)
   val attributeBase   = UInt(countBits.W)
 }
 
-/** What the host writes before a frame. Constant while a frame runs.
+/** The registers that the host writes before a frame. Constant while a frame runs.
   *
-  * A record, not a bundle: without a physical-attribute memory there is no room.
+  * A record, not a bundle, because `room` exists only with a physical-attribute memory.
   */
 final class FrameRegisters(config: ColonnadeConfig) extends Record {
   private val numbers = config.numbers
@@ -133,22 +133,22 @@ final class FrameRegisters(config: ColonnadeConfig) extends Record {
 
 object FrameRegisters {
 
-  /** A box seen from anywhere outside has no more edges. */
+  /** The outline of a box has at most this many edges. */
   val outlineEdges: Int = 6
 
   /** A light's intensity in one channel. */
   def intensity: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightBits, NumberFormats.lightFraction))
 
-  /** A part of the whole: 2^fraction is all of it. */
+  /** A weight from 0 to 1: 2^fraction is 1. */
   def share: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightFraction + 1, NumberFormats.lightFraction))
 
-  /** All of it. */
+  /** The weight 1. */
   def whole: Fixed = Fixed.literal(share.format, BigInt(1) << NumberFormats.lightFraction)
 
   /** A linear colour channel; all ones is 1.0. */
   def colour: UInt = UInt(NumberFormats.colourBits.W)
 
-  /** A record's elements, given as in a bundle: the first is the most significant. */
+  /** The elements of a record in the order of a bundle: the first is the most significant. */
   private[formats] def fields(named: (String, Data)*): SeqMap[String, Data] = SeqMap(named.reverse: _*)
 }
 
@@ -166,21 +166,21 @@ final class Errors extends Bundle {
   val watchdog      = Bool()
 }
 
-/** What happened in the last frame. Sums over the array, except where a field says otherwise. */
+/** Event counters of the last frame, summed over the array unless a field says otherwise. */
 final class Counters(config: ColonnadeConfig) extends Bundle {
-  private def counter     = UInt(Counters.bits.W)
-  private def roomCounter = config.physicalAttributeMemory.map(_ => counter)
+  private def counter            = UInt(Counters.bits.W)
+  private def environmentCounter = config.physicalAttributeMemory.map(_ => counter)
 
-  /** From start to the last pixel. */
+  /** Cycles from the start to the last pixel. */
   val cycles      = counter
   val raysPrimary = counter
   val raysShadow  = counter
 
-  /** Traced: not those that meet the background only. */
+  /** Traced rays, without those that only meet the background. */
   val raysReflection = counter
   val raysRefraction = counter
 
-  /** Rays of all kinds that entered the object's box. */
+  /** Rays of all kinds that enter the object's box. */
   val raysInBox     = counter
   val nodeReads     = counter
   val boxTests      = counter
@@ -189,21 +189,21 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
   /** Primary rays that hit the object. */
   val hits = counter
 
-  /** Most entries that any stack held. */
+  /** Maximum number of entries of any stack. */
   val deepestStack = counter
   val recordReads  = counter
 
-  /** Records that a context took from a read of another one. */
+  /** Records that a context got from the read of another context. */
   val snoopHits     = counter
   val bankConflicts = counter
 
-  /** Unit cycles in which a unit's narrowest stage held work. */
+  /** Cycles in which the bottleneck stage of a unit is busy, summed over units. */
   val busyRaySetup     = counter
   val busyBoxUnit      = counter
   val busyTriangleUnit = counter
   val busyShader       = counter
 
-  /** Context cycles by where the context was; what is left of all context cycles, it was on its way out. */
+  /** Context cycles by state of the context; in the remaining cycles the context is in a later stage. */
   val idleContexts      = counter
   val contextsSetUp     = counter
   val waitRecord        = counter
@@ -212,26 +212,26 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
   val contextsTriangles = counter
   val contextsShading   = counter
 
-  /** Rays that looked for a point of the room, and the tiles and cells that they passed; unit cycles in which the march
-    * was busy; context cycles in which a context waited for it, or its point was in work.
+  /** Environment march: rays; tiles and cells visited; cycles in which the march is busy, summed over units; context
+    * cycles in which a context waits for the march or is in it.
     */
-  val raysRoom     = roomCounter
-  val marchSteps   = roomCounter
-  val busyRoom     = roomCounter
-  val contextsRoom = roomCounter
+  val raysRoom     = environmentCounter
+  val marchSteps   = environmentCounter
+  val busyRoom     = environmentCounter
+  val contextsRoom = environmentCounter
 
-  /** Questions that the maps of a room have answered. */
-  val albedoReads = roomCounter
-  val normalReads = roomCounter
-  val cellReads   = roomCounter
-  val planeReads  = roomCounter
+  /** Reads of the maps of the environment. */
+  val albedoReads = environmentCounter
+  val normalReads = environmentCounter
+  val cellReads   = environmentCounter
+  val planeReads  = environmentCounter
 }
 
 object Counters {
   val bits: Int = 48
 }
 
-/** What the host reads. */
+/** The registers that the host reads. */
 final class DeviceStatus(config: ColonnadeConfig) extends Bundle {
   val status   = new Status
   val errors   = new Errors
@@ -244,7 +244,7 @@ final class Control extends Bundle {
   val start = Bool()
 }
 
-/** What the host pulses. */
+/** The registers that the host pulses. */
 final class HostCommands extends Bundle {
   val control = new Control
 }

@@ -3,7 +3,7 @@ package colonnade.formats
 import java.nio.charset.StandardCharsets.UTF_8
 import java.security.MessageDigest
 
-/** How JSON is written: for readers, and for hashes. */
+/** Writes JSON: indented for readers, canonical for hashes. */
 object Json {
 
   /** Indented, with each innermost object or list on one line. */

@@ -6,16 +6,16 @@ import colonnade.numbers.Fixed
 /** One number of a record, register or stream.
   *
   * @param name     flattened by `.` and `[i]`
-  * @param offset   bit, 0 is the least significant
+  * @param offset   number of its lowest bit; bit 0 is the least significant
   * @param fraction fraction bits, 0 for integers
   */
 final case class Field(name: String, offset: Int, width: Int, signed: Boolean, fraction: Int) {
   def end: Int = offset + width
 }
 
-/** Where the numbers of a Chisel type lie in its bits. Read off the definition itself, so that there is no other one.
+/** The bit positions of the numbers in a Chisel type, derived from its definition, which is the only one.
   *
-  * Of a bundle the first declared element is the most significant; of a vector, element 0 is the least significant.
+  * The first declared element of a bundle is the most significant. Element 0 of a vector is the least significant.
   */
 object Layout {
 

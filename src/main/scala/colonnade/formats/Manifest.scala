@@ -2,12 +2,12 @@ package colonnade.formats
 
 import colonnade.config.{ColonnadeConfig, ConfigIO}
 
-/** What the host must know of a design: configuration, number formats, and where every number of a record, register
-  * or stream lies. Written next to the Verilog; packer, model and harness take it from there.
+/** The description of a design for the host: configuration, number formats, and the bit position of every number in
+  * records, registers and streams. The generator writes it beside the Verilog; packer, model and harness read it.
   */
 object Manifest {
 
-  /** Raised when a key changes its meaning. */
+  /** Incremented when a key changes its meaning. */
   val version: Int = 1
 
   def apply(config: ColonnadeConfig): ujson.Obj = {
@@ -63,7 +63,7 @@ object Manifest {
     manifest
   }
 
-  /** What an image of the room's maps depends on; not how many copies of them there are. */
+  /** The settings that determine an image of the environment's maps; the number of copies is not one of them. */
   private def attributes(config: ColonnadeConfig): ujson.Obj = ujson.Obj(
     "sizes" -> ujson.Obj.from(config.physicalAttributeMemory.toSeq.flatMap(_.layout.entries).map {
       case (name, value) => name -> ujson.Num(value)

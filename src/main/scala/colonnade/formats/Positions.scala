@@ -9,9 +9,9 @@ class PixelPosition(config: ColonnadeConfig) extends Bundle {
   val y = UInt(config.numbers.coordinateBits.W)
 }
 
-/** A pixel for a render unit. */
+/** A pixel to render in a render unit. */
 final class UnitPosition(config: ColonnadeConfig) extends PixelPosition(config) {
 
-  /** It may see the object; a unit without a room gets no others. */
+  /** Its primary ray may hit the object; always so without an environment. */
   val meetsObject = if (config.hasRoom) Some(Bool()) else None
 }

@@ -5,7 +5,7 @@ import chisel3.util.log2Ceil
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
-/** What a child of a node is. */
+/** The kind of a child of a node. */
 object ChildKind {
   val bits = 2
 
@@ -38,8 +38,8 @@ final class NodeRecord(config: ColonnadeConfig) extends Bundle {
   val low   = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
   val high  = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
 
-  /** What every reader relies on: known kinds, boxes within two cubes, and nodes below this one, so that no walk comes
-    * back to a node. A child that would lie beyond the addresses is refused by its section otherwise.
+  /** The guarantees that every reader relies on: known kinds, boxes within two cubes, and child nodes at higher addresses,
+    * so that no traversal returns to a node. The record fetch reports other illegal child addresses.
     *
     * @param at the node's own address
     */
@@ -62,21 +62,21 @@ final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
   /** From 1 to `trianglesPerRecord`. */
   val count = UInt(NumberFormats.bitLength(geometry.trianglesPerRecord).W)
 
-  /** Of each triangle: it lets some light through, see `shading.clearness`. */
+  /** By triangle: its material transmits light, see `shading.clearness`. */
   val isClear = Vec(geometry.trianglesPerRecord, Bool())
 
-  /** Three for each triangle, in vertex units. */
+  /** Three per triangle, in vertex units. */
   val vertices = Vec(3 * geometry.trianglesPerRecord, Vec3(UInt(geometry.vertexBits.W)))
 
-  /** It has triangles, and no more than there is space for. */
+  /** `count` is in range. */
   def isLegal: Bool = count =/= 0.U && count <= geometry.trianglesPerRecord.U
 }
 
-/** What shading needs of one face. Normals have unit length. */
+/** The attributes of one face for shading. Normals have unit length. */
 final class Face extends Bundle {
   private val component = new Fixed(FixedPointFormat.signed(NumberFormats.normalBits, NumberFormats.normalFraction))
 
-  /** One for each vertex. */
+  /** One per vertex. */
   val normals         = Vec(3, Vec3(component))
   val geometricNormal = Vec3(component)
 
@@ -91,13 +91,13 @@ final class AttributesRecord extends Bundle {
   val faces = Vec(RecordFormats.facesPerRecord, new Face)
 }
 
-/** The records of the column BVH memory: one width for all kinds; a kind takes the low bits it needs. */
+/** The records of the column BVH memory. All kinds have one width; a kind uses the low bits that it needs. */
 final class RecordFormats(config: ColonnadeConfig) {
 
-  /** Bits of a record's address. */
+  /** Width of a record address. */
   val addressBits: Int = RecordFormats.addressBits(config)
 
-  /** Bits of a number of records, and of a packed triangle id. */
+  /** Width of a number of records, and of a packed triangle id. */
   val idBits: Int = RecordFormats.idBits(config)
 
   def node: NodeRecord = new NodeRecord(config)
@@ -109,7 +109,7 @@ final class RecordFormats(config: ColonnadeConfig) {
   /** The widest kind, rounded up to whole 32-bit words. */
   val recordBits: Int = (Seq(node, triangles, attributes).map(_.getWidth).max + 31) / 32 * 32
 
-  /** A record as the memory holds it. */
+  /** A record in memory. */
   def record: UInt = UInt(recordBits.W)
 
   def asNode(record: UInt): NodeRecord = as(record, node)
@@ -123,10 +123,10 @@ final class RecordFormats(config: ColonnadeConfig) {
 
 object RecordFormats {
 
-  /** Bits of a material's index. */
+  /** Width of a material index. */
   val materialBits: Int = 8
 
-  /** Faces of one attributes record: a power of two, so that a packed id splits into record and slot. */
+  /** Faces per attribute record: a power of two, so that a packed id splits into record and slot. */
   val facesPerRecord: Int = 2
   val faceSlotBits:   Int = log2Ceil(facesPerRecord)
 
@@ -134,6 +134,6 @@ object RecordFormats {
 
   def idBits(config: ColonnadeConfig): Int = addressBits(config) + 1
 
-  /** A box coordinate shifted by the largest exponent still reaches across the cube. */
+  /** The largest exponent lets a box coordinate reach across the cube. */
   def exponentBits(config: ColonnadeConfig): Int = NumberFormats.bitLength(config.numbers.mostExponent)
 }

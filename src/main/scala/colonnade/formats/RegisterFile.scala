@@ -4,16 +4,16 @@ import chisel3._
 import chisel3.util.{log2Ceil, Cat}
 import colonnade.config.ColonnadeConfig
 
-/** The host's way to the registers: one word a cycle. */
+/** The host's port to the registers: one word per cycle. */
 final class RegisterPort(addressBits: Int) extends Bundle {
   val write = Input(Bool())
   val read  = Input(Bool())
 
-  /** In words. */
+  /** Word address. */
   val address   = Input(UInt(addressBits.W))
   val writeData = Input(UInt(RegisterMap.dataBits.W))
 
-  /** Of the read one cycle before; holds until the next. Bits beyond a number's width, and unknown addresses, are 0. */
+  /** Result of the last read, from one cycle after it until the next read. Unused bits and unknown addresses read as 0. */
   val readData = Output(UInt(RegisterMap.dataBits.W))
 }
 
@@ -22,15 +22,14 @@ final class RegisterFileIO(config: ColonnadeConfig) extends Bundle {
   val frame    = Output(new FrameRegisters(config))
   val device   = Input(new DeviceStatus(config))
 
-  /** One cycle: a frame begins. */
+  /** A pulse: a frame starts. */
   val start = Output(Bool())
 }
 
-/** Holds what the host writes and shows what it reads, at the addresses of [[RegisterMap]]. The device gets no setting
-  * above its limit.
+/** The registers of the host, at the addresses of [[RegisterMap]]. Settings above their limit are clamped for the device.
   *
-  * While the device is busy every write is ignored, so that the frame's settings hold still. A read takes one cycle; the
-  * words of a wide number are read one by one, so wide ones are consistent only when the device is not busy.
+  * Writes are ignored while the device is busy, so the settings of a frame are constant. A read takes one cycle. The words
+  * of a wide number are read one by one, so it is consistent only while the device is idle.
   */
 final class RegisterFile(config: ColonnadeConfig) extends Module {
   val io = IO(new RegisterFileIO(config))
@@ -38,12 +37,12 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   private val registers = RegisterMap(config)
   private val writes    = io.register.write && !io.device.status.busy
 
-  // Settings: a hardware register for each number, put together to the bundle by its layout.
+  // Settings: one hardware register per number, combined to the bundle by its layout.
   private val settings = registers.filter(_.access == Access.ReadWrite).map(r => r -> storage(r))
   private val legal    = settings.map { case (r, value) => r.name -> RegisterLimits.clamp(value, r.limit) }.toMap
   io.frame := Cat(Layout.of(io.frame).sortBy(-_.offset).map(field => legal(field.name))).asTypeOf(io.frame)
 
-  // Sections end where the next one begins, at the latest
+  // A section ends at the base of the next one at the latest
   private val scene         = io.frame.scene
   private val attributeBase = least(legal("scene.attributeBase"), legal("scene.recordCount"))
   scene.attributeBase := attributeBase
@@ -53,7 +52,7 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   private val start = registers.filter(_.access == Access.WriteOnly).head
   io.start := writes && io.register.address === start.address.U && io.register.writeData(0)
 
-  // Reads: settings and status alike.
+  // Reads of settings and status.
   private val status   = Layout.of(io.device).map(field => field.name -> field).toMap
   private val observed = registers.filter(_.access == Access.ReadOnly).map { r =>
     val field = status(r.name)
@@ -64,7 +63,7 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
     word       <- 0 until r.words
   } yield r.address + word -> wordOf(value, word)).toMap
 
-  // By the address's bits, one after the other: of an OR over all words synthesis may make a chain
+  // A multiplexer tree over the bits of the address: synthesis may turn an OR over all words into a chain
   private val readData = Reg(UInt(RegisterMap.dataBits.W))
   private val shown    =
     VecInit(Seq.tabulate(1 << io.register.address.getWidth)(words.getOrElse(_, 0.U(readData.getWidth.W))))

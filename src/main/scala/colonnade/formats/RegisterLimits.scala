@@ -3,12 +3,12 @@ package colonnade.formats
 import chisel3._
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 
-/** The greatest legal value of each register that can hold more. The host reads back what it wrote; the device takes
-  * the limit for anything above it. Every other register may have any value that fits. docs/errors.md.
+/** The maximum legal value of each register that can hold larger ones. The host reads back what it wrote; the device uses
+  * the limit instead of larger values. Other registers may have any value; docs/errors.md.
   */
 object RegisterLimits {
 
-  /** By the register's name; all of them are unsigned. */
+  /** By register name; all of them are unsigned. */
   def apply(config: ColonnadeConfig): Map[String, BigInt] = {
     val numbers   = config.numbers
     val whole     = BigInt(1) << NumberFormats.lightFraction
@@ -29,7 +29,7 @@ object RegisterLimits {
     limits.filter { case (name, limit) => most.get(name).exists(limit < _) }.toMap
   }
 
-  /** The value, or its register's limit. */
+  /** The value, clamped to the limit of its register. */
   def clamp(value: UInt, limit: Option[BigInt]): UInt =
     limit.fold(value)(most => Mux(value > most.U, most.U(value.getWidth.W), value))
 }

@@ -2,7 +2,7 @@ package colonnade.formats
 
 import colonnade.config.ColonnadeConfig
 
-/** How the host may use a register. */
+/** The access of the host to a register. */
 sealed abstract class Access(val label: String)
 
 object Access {
@@ -13,9 +13,9 @@ object Access {
 
 /** A number behind the register port.
   *
-  * @param address of its lowest 32 bits, in words
-  * @param words   consecutive addresses it takes, low word first
-  * @param limit   the greatest value that the device takes, see [[RegisterLimits]]; None: all that fit
+  * @param address word address of its lowest 32 bits
+  * @param words   number of consecutive words, low word first
+  * @param limit   maximum value in the device, see [[RegisterLimits]]; None if all values are legal
   */
 final case class Register(
     name:    String,
@@ -27,12 +27,12 @@ final case class Register(
     limit:   Option[BigInt]
 )
 
-/** Addresses of all registers, in the order of their declaration: control, status, errors, counters, then
-  * [[FrameRegisters]]. Each number starts at a word of its own.
+/** Addresses of all registers, in order of declaration: control, status, errors, counters, then
+  * [[FrameRegisters]]. Each number starts at its own word.
   */
 object RegisterMap {
 
-  /** Bits of a word. */
+  /** Width of a word. */
   val dataBits: Int = 32
 
   def apply(config: ColonnadeConfig): Seq[Register] = {
@@ -50,6 +50,6 @@ object RegisterMap {
     }
   }
 
-  /** Words in all. */
+  /** Total number of words. */
   def size(registers: Seq[Register]): Int = registers.map(r => r.address + r.words).max
 }

@@ -5,33 +5,33 @@ import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
-/** What a primary ray met, for tests and for the host's `--hits`. */
+/** The hit of a primary ray, for tests and for the host's `--hits`. */
 final class PixelHit(config: ColonnadeConfig) extends Bundle {
 
-  /** Packed triangle id; only of pixels with `isObject`. */
+  /** Packed triangle id; valid if `isObject`. */
   val triangle = UInt(RecordFormats.idBits(config).W)
 
-  /** Distance from the camera along the ray's dominant axis, in the grid: entry and t together. */
+  /** Distance from the camera along the ray's dominant axis, in grid steps: the entry distance plus t. */
   val distance = new Fixed(
     FixedPointFormat.unsigned(config.numbers.sceneBits + 1, config.numbers.gridFraction)
   )
 }
 
-/** A finished pixel as it leaves the device. */
+/** A finished pixel. */
 final class Pixel(config: ColonnadeConfig) extends Bundle {
   val x = UInt(config.numbers.coordinateBits.W)
   val y = UInt(config.numbers.coordinateBits.W)
 
-  /** Linear. */
+  /** A linear colour. */
   val colour   = Rgb(FrameRegisters.colour)
   val isObject = Bool()
 
-  /** Of a pixel that shows the room: the part of the light that the object leaves to it; otherwise all. */
+  /** The shadow ratio: the fraction of the light that the object leaves to a pixel of the environment; 1 for others. */
   val ratio = if (config.hasRoom) Some(Rgb(FrameRegisters.share)) else None
   val hit   = if (config.frame.hits) Some(new PixelHit(config)) else None
 }
 
-/** Which memories a [[Load]] is for. */
+/** The target memory of a [[Load]]. */
 object LoadTarget {
 
   /** The first of the [[AttributeMemories]]. */
@@ -42,16 +42,16 @@ object LoadTarget {
   def columnBvh(config: ColonnadeConfig): UInt = 0.U(bits(config).W)
 }
 
-/** A record on its way into the device's memories: into that of every column. */
+/** A write to the device's memories: to the record memories of all columns, or to a memory of the environment's maps. */
 final class Load(config: ColonnadeConfig) extends Bundle {
   private val formats = new RecordFormats(config)
 
-  /** See [[LoadTarget]]; a load for no memory is dropped. */
+  /** See [[LoadTarget]]; a load with an unknown target is dropped. */
   val target = UInt(LoadTarget.bits(config).W)
 
-  /** As wide as the deepest memory needs. */
+  /** Wide enough for the deepest memory. */
   val address = UInt((formats.addressBits +: AttributeMemories(config).map(m => log2Ceil(m.depth))).max.W)
 
-  /** A word of another memory has the low bits. */
+  /** A word of another memory is in the low bits. */
   val record = formats.record
 }

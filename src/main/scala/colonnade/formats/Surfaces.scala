@@ -6,8 +6,8 @@ import colonnade.numbers.{Fixed, FixedPointFormat}
 
 import scala.collection.immutable.SeqMap
 
-/** A point light. Its colour is its intensity where the squared distance is `reachMantissa · 2^reachExponent`, in grid
-  * steps; it falls with the squared distance. With a mantissa of 0 it is the same everywhere.
+/** A point light. `colour` is its intensity at the squared distance `reachMantissa · 2^reachExponent`, in grid steps; the
+  * intensity falls with the squared distance. A mantissa of 0 disables falloff.
   */
 final class Light(numbers: NumberFormats) extends Bundle {
   val position      = Vec3(SInt(numbers.macBits.W))
@@ -16,26 +16,26 @@ final class Light(numbers: NumberFormats) extends Bundle {
   val reachExponent = SInt((NumberFormats.bitLength(2 * numbers.sceneBits) + 1).W)
 }
 
-/** A record, not a bundle: without bounces some fields are not there. */
+/** A record, not a bundle, because some fields exist only with bounces. */
 final class Shading(config: ColonnadeConfig) extends Record {
   private def ifBounces[T](field: => T): Option[T] = if (config.frame.hasBounces) Some(field) else None
 
-  /** Shade with geometric normals, not with the vertices'. */
+  /** Shade with geometric normals instead of vertex normals. */
   val flat = Bool()
 
   /** Send shadow rays. */
   val shadows = Bool()
 
-  /** Lights that shine: the first so many. */
+  /** Number of lights that are on, from the first one. */
   val lights = UInt(NumberFormats.bitLength(config.frame.lights).W)
 
-  /** How far a secondary ray starts from the surface, in grid steps along the normal. */
+  /** Distance of the origin of a secondary ray from the surface, in grid steps along the normal. */
   val offset = UInt((config.numbers.gridBits - 2).W)
 
-  /** Reflections and refractions of a path that are traced; what comes then meets the background only. */
+  /** Maximum number of traced reflections and refractions of a path; the next one meets the background only. */
   val bounces = ifBounces(UInt(NumberFormats.bitLength(config.frame.maxBounces).W))
 
-  /** What clear triangles let through of a light. */
+  /** Transmittance of transmissive triangles for shadow rays. */
   val clearness = ifBounces(FrameRegisters.share)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
@@ -44,23 +44,23 @@ final class Shading(config: ColonnadeConfig) extends Record {
   )
 }
 
-/** What becomes of a ray that meets a surface. */
+/** The interaction of a ray with a surface. */
 object MaterialKind {
   val bits = 2
 
-  /** Lambert's: it takes light from the lights. */
+  /** Lambertian reflection of the lights. */
   def diffuse: UInt = 0.U(bits.W)
 
   def mirror: UInt = 1.U(bits.W)
 
-  /** Refracts, and reflects Schlick's part. */
+  /** Refracts, and reflects by Schlick's approximation. */
   def glass: UInt = most.U(bits.W)
 
-  /** The greatest kind. */
+  /** The last kind. */
   val most: BigInt = 2
 }
 
-/** A record, not a bundle: without bounces all that there is of a material is its albedo. */
+/** A record, not a bundle, because a material without bounces has an albedo only. */
 final class Material(config: ColonnadeConfig) extends Record {
   private def ifBounces[T](field: => T): Option[T] = if (config.frame.hasBounces) Some(field) else None
   private def eta = new Fixed(FixedPointFormat.unsigned(NumberFormats.etaBits, NumberFormats.etaFraction))
@@ -70,13 +70,13 @@ final class Material(config: ColonnadeConfig) extends Record {
   /** See [[MaterialKind]]. */
   val kind = ifBounces(UInt(MaterialKind.bits.W))
 
-  /** Glass: the index of the side that the ray comes from over the other one's, for a ray that meets the front or the
-    * back of a triangle.
+  /** Glass: the refractive index on the incident side divided by that on the other side, for a ray that hits the front or
+    * the back of a triangle.
     */
   val etaFront = ifBounces(eta)
   val etaBack  = ifBounces(eta)
 
-  /** Glass: what it reflects head-on. */
+  /** Glass: reflectance at normal incidence. */
   val reflectance = ifBounces(FrameRegisters.share)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(

@@ -15,7 +15,7 @@ final class Vec3[T <: Data](private val component: T) extends Bundle {
 object Vec3 {
   def apply[T <: Data](component: T): Vec3[T] = new Vec3(component)
 
-  /** A wire with the given components. */
+  /** A wire with these components. */
   def of[T <: Data](x: T, y: T, z: T): Vec3[T] = {
     val vector = Wire(new Vec3(chiselTypeOf(x)))
     vector.x := x

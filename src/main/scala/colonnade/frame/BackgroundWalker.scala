@@ -11,7 +11,7 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val colour = Input(Rgb(FrameRegisters.colour))
   val tiles  = Flipped(Decoupled(new Tile(config)))
 
-  /** Pixels of other tiles; they come first. */
+  /** Background pixels of other tiles; they have priority. */
   val others = Flipped(Decoupled(new PixelPosition(config)))
   val pixels = Decoupled(new Pixel(config))
 
@@ -19,8 +19,8 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Gives pixels that cannot see the object the background's colour, one a cycle, beside the render units, which work on
-  * other pixels meanwhile: all of the tiles that it takes, and what the column's [[TileWalker]] sorts out.
+/** Colours the pixels that show the background, in parallel with the render units: all pixels of its own tiles, and those
+  * that the column's [[TileWalker]] rejects. Throughput: one pixel per cycle.
   */
 final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new BackgroundWalkerIO(config))

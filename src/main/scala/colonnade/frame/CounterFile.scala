@@ -8,13 +8,13 @@ import colonnade.formats.Counters
 /** Ports of [[CounterFile]]. */
 final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
 
-  /** Of each column, one cycle after they happened. */
+  /** By column, delayed by one cycle. */
   val events = Input(Vec(config.array.columns, new EventSums(config, 1)))
 
-  /** A frame begins. */
+  /** A frame starts. */
   val clear = Input(Bool())
 
-  /** What happens in this cycle counts. */
+  /** Count the events of this cycle. */
   val isCounting = Input(Bool())
 
   val counters = Output(new Counters(config))
@@ -24,10 +24,10 @@ final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
   val illegalRecord = Output(Bool())
 }
 
-/** The array's counters and the errors of its units: of the cycles that count, and of those only.
+/** The counters and sticky errors of the array, over the cycles of `isCounting`.
   *
-  * Complete [[CounterFile.settleCycles]] cycles after the last one that counted. Sums pass a register in each column and
-  * another one here, so that no path crosses the array and adds as well.
+  * They are complete [[CounterFile.settleCycles]] cycles after the last counted one. Sums pass one register in each column
+  * and one here, so no path both crosses the array and adds.
   */
 final class CounterFile(config: ColonnadeConfig) extends Module {
   import CounterFile._
@@ -39,7 +39,7 @@ final class CounterFile(config: ColonnadeConfig) extends Module {
   private val illegal  = RegInit(false.B)
   private val events   = RegNext(EventSums.ofArray(config, io.events))
 
-  // Levels and errors say the same for longer; units forget theirs some cycles after a frame begins.
+  // Levels and errors lag behind events; units reset theirs some cycles after a frame starts.
   private val countsEvents = ShiftRegister(io.isCounting, eventStages, false.B, true.B)
   private val countsLevels = ShiftRegister(countsEvents, levelStages, false.B, true.B)
 
@@ -69,10 +69,10 @@ final class CounterFile(config: ColonnadeConfig) extends Module {
 
 object CounterFile {
 
-  /** Registers that sums of events pass on their way here. */
+  /** Pipeline registers of the sums of events. */
   private val eventStages = 2
 
-  /** Cycles that a unit's levels may lag behind its events. */
+  /** Cycles by which a unit's levels may lag behind its events. */
   private val levelStages = 2
 
   private val levels = Set("deepestStack", "stackOverflow", "illegalRecord")

@@ -5,26 +5,26 @@ import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{AttributeEvents, UnitEvents}
 
-/** What happened in a column BVH controller in one cycle; names as in `Counters`. */
+/** Events of a column BVH controller in one cycle; names as in `Counters`. */
 final class ColumnBvhEvents(config: ColonnadeConfig) extends Bundle {
   val recordReads = UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)
 
-  /** Requests that wait because the bank serves another row. */
+  /** Requests that wait because the bank reads for another row. */
   val bankConflicts = UInt(log2Ceil(config.array.rows + 1).W)
 }
 
-/** What happened in some columns in one cycle: sums over their units and controllers; names as in `Counters`. */
+/** Events of some columns in one cycle, summed over their units and controllers; names as in `Counters`. */
 final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   private val units = columns * config.array.rows
 
-  private def sum(most: Int): UInt = UInt(log2Ceil(most + 1).W)
-  private def perUnit              = sum(units)
-  private def perContext           = sum(units * config.array.contexts)
-  private def perRoom              = ifRoom(sum(columns))
+  private def sum(max: Int): UInt = UInt(log2Ceil(max + 1).W)
+  private def perUnit             = sum(units)
+  private def perContext          = sum(units * config.array.contexts)
+  private def perEnvironment      = ifEnvironment(sum(columns))
 
-  private def ifRoom[T <: Data](event: T): Option[T] = if (config.hasRoom) Some(event) else None
+  private def ifEnvironment[T <: Data](event: T): Option[T] = if (config.hasRoom) Some(event) else None
 
-  /** With those of the background, which go past the units. */
+  /** Including background pixels, which bypass the units. */
   val raysPrimary      = sum(units + columns)
   val raysShadow       = perUnit
   val raysReflection   = perUnit
@@ -50,18 +50,18 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val contextsTriangles = perContext
   val contextsShading   = perContext
 
-  /** Where there is a room. */
-  val raysRoom     = ifRoom(perUnit)
-  val marchSteps   = ifRoom(perUnit)
-  val busyRoom     = ifRoom(perUnit)
-  val contextsRoom = ifRoom(perContext)
+  /** With an environment. */
+  val raysRoom     = ifEnvironment(perUnit)
+  val marchSteps   = ifEnvironment(perUnit)
+  val busyRoom     = ifEnvironment(perUnit)
+  val contextsRoom = ifEnvironment(perContext)
 
-  val albedoReads = perRoom
-  val normalReads = perRoom
-  val cellReads   = perRoom
-  val planeReads  = perRoom
+  val albedoReads = perEnvironment
+  val normalReads = perEnvironment
+  val cellReads   = perEnvironment
+  val planeReads  = perEnvironment
 
-  /** A level, not an event: the most of all units. */
+  /** A level, not an event: the maximum of all units. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
 
   /** Errors in any unit. */
@@ -71,7 +71,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
 
 object EventSums {
 
-  /** A column's, from the pixels it has begun and from those of its units, of its controller and of the room's maps. */
+  /** The events of a column: its started pixels, its units, its controller and the environment's maps. */
   def ofColumn(
       config:      ColonnadeConfig,
       raysPrimary: UInt,
@@ -87,11 +87,11 @@ object EventSums {
     sums
   }
 
-  /** The array's, from those of its columns. */
+  /** The events of the array, from those of its columns. */
   def ofArray(config: ColonnadeConfig, columns: Seq[EventSums]): EventSums =
     joined(new EventSums(config, columns.size), columns.map(_.elements.toMap))
 
-  /** Joins what the parts have by the same name. */
+  /** Sums the fields of all parts by name. */
   private def joined(result: EventSums, parts: Seq[Map[String, Data]]): EventSums = {
     val sums = Wire(result)
     for ((name, sum) <- sums.elements if parts.head.contains(name)) {

@@ -5,21 +5,21 @@ import chisel3.util.{is, log2Ceil, switch, Decoupled}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, Status}
 
-/** How far a column is. */
+/** The progress of a column. */
 final class ColumnProgress extends Bundle {
 
-  /** Every pixel of the tiles taken has left, the one that leaves in this cycle included. */
+  /** Every pixel of the accepted tiles has retired, including the one that retires in this cycle. */
   val isDrained = Bool()
 
-  /** Nothing moves any more. */
+  /** The column is idle. */
   val isIdle = Bool()
 }
 
-/** What the streams of pixels do in a cycle. */
+/** The state of the pixel streams in a cycle. */
 final class PixelTraffic extends Bundle {
 
   /** A pixel leaves the device. */
-  val leaves = Bool()
+  val retires = Bool()
 
   /** A pixel waits for the sink. */
   val stalls = Bool()
@@ -29,28 +29,28 @@ final class PixelTraffic extends Bundle {
 final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   private val columns = config.array.columns
 
-  /** Begins a frame; ignored while one runs. */
+  /** Starts a frame; ignored while one runs. */
   val start = Input(Bool())
   val frame = Input(new FrameSettings(config.numbers))
 
-  /** Render units get its pixels too. */
-  val window = Input(new RoomWindow(config))
+  /** Render units get the pixels of this window, too. */
+  val window = Input(new EnvironmentWindow(config))
 
   /** Valid only where ready is set, see [[Dispatcher]]. */
   val tiles = Vec(columns, Decoupled(new Tile(config)))
 
-  /** Tiles without a pixel that may see the object. */
+  /** Tiles without a pixel for the render units. */
   val backgroundTiles = Vec(columns, Decoupled(new Tile(config)))
   val progress        = Input(Vec(columns, new ColumnProgress))
   val traffic         = Input(new PixelTraffic)
 
-  /** A frame begins: clears what is left of the last one. */
-  val begins = Output(Bool())
+  /** A frame starts: resets the state of the previous one. */
+  val frameStart = Output(Bool())
 
-  /** From the cycle after the start to that of the last pixel. */
+  /** From the cycle after the start to the cycle of the last pixel. */
   val isRunning = Output(Bool())
 
-  /** The columns forget all that is in flight. */
+  /** Resets the columns. */
   val aborts = Output(Bool())
 
   val status = Output(new Status)
@@ -59,11 +59,12 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   val watchdogError = Output(Bool())
 }
 
-/** Runs frames: hands out the tiles, those of the object and those of the background side by side, sees the last pixel leave, and ends the frame when the device has come to rest.
+/** Runs frames: dispatches tiles for the object and for the background in parallel, waits for the last pixel, and ends the
+  * frame when the device is idle.
   *
-  * The first tile is out four cycles after the start; `done` follows the last pixel by [[FrameController.settleCycles]]
-  * or more, so that counters and errors are complete. A frame without pixels ends at once. A frame from which no pixel
-  * leaves for `watchdogCycles` (stalls of the sink not counted, 0 is for ever) is aborted: it ends with an error.
+  * The first tile comes four cycles after the start. `done` follows the last pixel by [[FrameController.settleCycles]] or
+  * more, so that counters and errors are complete. A frame without pixels ends at once. The watchdog aborts a frame in
+  * which no pixel leaves for `watchdogCycles`, not counting stalls of the sink; the frame then ends with an error.
   */
 final class FrameController(config: ColonnadeConfig) extends Module {
   import FrameController._
@@ -75,12 +76,12 @@ final class FrameController(config: ColonnadeConfig) extends Module {
   private val done     = RegInit(false.B)
   private val error    = RegInit(false.B)
 
-  private val dealers = withReset(reset.asBool || io.aborts) {
-    Seq(true, false).map(ofObject => Module(new TileDealer(config, ofObject)))
+  private val schedulers = withReset(reset.asBool || io.aborts) {
+    Seq(true, false).map(ofObject => Module(new TileScheduler(config, ofObject)))
   }
   private val watchdog = Module(new Watchdog(io.frame.watchdogCycles.getWidth))
 
-  private val isFinished = dealers.map(_.io.isIdle).reduce(_ && _) && io.progress.map(_.isDrained).reduce(_ && _)
+  private val isFinished = schedulers.map(_.io.isIdle).reduce(_ && _) && io.progress.map(_.isDrained).reduce(_ && _)
   private val isAtRest   = settling === 0.U && io.progress.map(_.isIdle).reduce(_ && _)
 
   switch(state) {
@@ -114,19 +115,19 @@ final class FrameController(config: ColonnadeConfig) extends Module {
     }
   }
 
-  io.begins    := state === State.waiting && io.start
-  io.isRunning := state === State.running
-  io.aborts    := state === State.aborting
+  io.frameStart := state === State.waiting && io.start
+  io.isRunning  := state === State.running
+  io.aborts     := state === State.aborting
 
   watchdog.io.limit   := io.frame.watchdogCycles
-  watchdog.io.restart := io.begins || io.aborts || io.traffic.leaves
+  watchdog.io.restart := io.frameStart || io.aborts || io.traffic.retires
   watchdog.io.hold    := io.traffic.stalls || state === State.waiting
 
-  dealers.zip(Seq(io.tiles, io.backgroundTiles)).foreach { case (dealer, tiles) =>
-    dealer.io.frame  := io.frame
-    dealer.io.window := io.window
-    dealer.io.start  := io.begins
-    tiles <> dealer.io.tiles
+  schedulers.zip(Seq(io.tiles, io.backgroundTiles)).foreach { case (scheduler, tiles) =>
+    scheduler.io.frame  := io.frame
+    scheduler.io.window := io.window
+    scheduler.io.start  := io.frameStart
+    tiles <> scheduler.io.tiles
   }
 
   io.status.busy   := state =/= State.waiting
@@ -136,7 +137,7 @@ final class FrameController(config: ColonnadeConfig) extends Module {
 
 object FrameController {
 
-  /** Cycles that the counters need after the last pixel. */
+  /** Cycles until the counters are complete after the last pixel. */
   val settleCycles: Int = CounterFile.settleCycles
 
   private object State extends ChiselEnum {

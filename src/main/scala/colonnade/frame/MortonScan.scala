@@ -23,11 +23,11 @@ final class MortonScanIO(levels: Int) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** The cells of a grid in Morton order, so that neighbours come close to each other.
+/** Scans the cells of a grid in Morton order, so that consecutive cells are close to each other.
   *
-  * One cell a cycle, the first one in the cycle after its grid is taken; the next grid is taken with the last step of
-  * this one. Codes outside the grid are skipped in whole blocks, at most three for each level between two cells. A grid
-  * without cells gives none.
+  * Throughput: one cell per cycle, the first one in the cycle after the grid is accepted. The next grid is accepted with
+  * the last step of the current one. Codes outside the grid are skipped in whole blocks, at most three per level between
+  * two cells. An empty grid gives no cell.
   */
 final class MortonScan(levels: Int) extends Module {
   val io = IO(new MortonScanIO(levels))
@@ -41,7 +41,7 @@ final class MortonScan(levels: Int) extends Module {
   cell.y := Cat((0 until levels).reverse.map(level => code(2 * level + 1)))
   private val isInside = cell.x < size.wide && cell.y < size.high
 
-  // A block that begins outside lies outside: go on after the largest one that begins here.
+  // A block whose first cell is outside is wholly outside: skip the largest block that starts here.
   private val digits = Cat((0 until levels).reverse.map(level => code(2 * level + 1, 2 * level).orR))
   private val lowest = digits & (0.U - digits)
   private val block  = Cat((0 until levels).reverse.map(level => Cat(0.U(1.W), lowest(level))))

@@ -5,28 +5,28 @@ import chisel3.util.{Decoupled, RegEnable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, FrameSettings, PixelPosition, PixelRect}
 
-/** A square of pixels, by its first one. */
+/** A square of pixels, named by its first pixel. */
 final class TestedSquare(config: ColonnadeConfig) extends Bundle {
   val first = new PixelPosition(config)
 
-  /** One of its pixels may see the object; or that, or show the room. */
+  /** A pixel of it may show the object; a pixel of it may show the object or the environment. */
   val meetsObject = Bool()
   val isForUnits  = Bool()
 }
 
-/** Where pixels show the room, if there is one. */
-final class RoomWindow(config: ColonnadeConfig) extends Bundle {
-  val isThere = Bool()
+/** The window of pixels that show the environment, if the frame has one. */
+final class EnvironmentWindow(config: ColonnadeConfig) extends Bundle {
+  val enabled = Bool()
   val rect    = new PixelRect(config.numbers.coordinateBits)
 }
 
-object RoomWindow {
+object EnvironmentWindow {
 
-  /** As the registers say. */
-  def apply(config: ColonnadeConfig, registers: FrameRegisters): RoomWindow = {
-    val window = WireInit(0.U.asTypeOf(new RoomWindow(config)))
+  /** The window in the registers. */
+  def apply(config: ColonnadeConfig, registers: FrameRegisters): EnvironmentWindow = {
+    val window = WireInit(0.U.asTypeOf(new EnvironmentWindow(config)))
     for (room <- registers.room) {
-      window.isThere := room.isThere
+      window.enabled := room.isThere
       window.rect    := room.window
     }
     window
@@ -36,7 +36,7 @@ object RoomWindow {
 /** Ports of [[OutlineTest]]. */
 final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
   val frame   = Input(new FrameSettings(config.numbers))
-  val window  = Input(new RoomWindow(config))
+  val window  = Input(new EnvironmentWindow(config))
   val squares = Flipped(Decoupled(new PixelPosition(config)))
   val tested  = Decoupled(new TestedSquare(config))
 
@@ -44,11 +44,11 @@ final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Holds squares of `size` pixels against the object's rectangle and outline: a square meets the object unless it lies
-  * outside the rectangle or wholly outside one edge's half-plane. Render units get the squares that meet the object or
-  * the room's window.
+/** Tests squares of `size` pixels against the object's rectangle and outline. A square meets the object unless it is
+  * outside the rectangle or wholly outside the half-plane of one edge. Render units get the squares that meet the object
+  * or the environment's window.
   *
-  * One square a cycle, in order, two cycles after it came: products, then their sums.
+  * Throughput: one square per cycle, in order. Latency: two cycles, for products and their sums.
   */
 final class OutlineTest(config: ColonnadeConfig, size: Int) extends Module {
   val io = IO(new OutlineTestIO(config))
@@ -67,10 +67,10 @@ final class OutlineTest(config: ColonnadeConfig, size: Int) extends Module {
   io.tested.valid  := isTested
   io.isIdle        := !isMultiplied && !isTested
 
-  // Products, of the corner that is furthest inside
+  // Products of the corner that is farthest inside
   private val square   = io.squares.bits
   private val inRect   = meets(rectangle)
-  private val inWindow = io.window.isThere && meets(io.window.rect)
+  private val inWindow = io.window.enabled && meets(io.window.rect)
   private val products = outline.map { edge =>
     Seq(edge.x -> square.x, edge.y -> square.y).map { case (normal, first) =>
       val furthest = Mux(normal > 0.S, first +& (size - 1).U, first)

@@ -17,8 +17,8 @@ final class TileScanIO(config: ColonnadeConfig) extends Bundle {
 
 /** The pixels of a tile, clipped at the frame's edge, in Morton order.
   *
-  * One pixel a cycle; the next tile is taken when few pixels of this one are left, so that tiles follow each other
-  * without a gap.
+  * Throughput: one pixel per cycle. The next tile is accepted with the last pixel of the current one, so tiles follow each
+  * other without a gap.
   */
 final class TileScan(config: ColonnadeConfig) extends Module {
   val io = IO(new TileScanIO(config))
@@ -37,7 +37,7 @@ final class TileScan(config: ColonnadeConfig) extends Module {
   scan.io.cells.ready := io.positions.ready
   io.isIdle           := scan.io.isIdle
 
-  /** Pixels of a tile in one direction. */
+  /** The size of a tile in one direction. */
   private def clipped(frame: UInt, first: UInt): UInt = {
     val size = config.frame.tileSize.U
     val left = frame - first

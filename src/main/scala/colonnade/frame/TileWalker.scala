@@ -11,25 +11,25 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
   val tiles = Flipped(Decoupled(new Tile(config)))
 
-  /** Pixels that may see the object, one port for each render unit. */
+  /** Pixels to render, by render unit. */
   val positions = Vec(config.array.rows, Decoupled(new UnitPosition(config)))
 
-  /** Render units get its pixels too. */
-  val window = Input(new RoomWindow(config))
+  /** Render units get the pixels of this window, too. */
+  val window = Input(new EnvironmentWindow(config))
 
-  /** Pixels that do not. */
+  /** Pixels that show the background. */
   val others = Decoupled(new PixelPosition(config))
 
-  /** No pixel is left to hand out. */
+  /** No pixel is left. */
   val isIdle = Output(Bool())
 }
 
-/** Hands the pixels of a tile that may see the object, in the order of [[TileScan]], to whichever render unit is ready,
-  * in turn; and the others, in the same order, to whoever draws the background.
+/** Dispatches the pixels of a tile in the order of [[TileScan]]: those that may show the object or the environment to ready
+  * render units, round-robin; the others to the background walker.
   *
-  * One pixel a cycle, the first one four cycles after its tile is taken. A slot in front of each render unit holds its
-  * next pixel. The next tile is taken when no more than these and two pixels of this one are left, so that tiles follow
-  * each other without a gap and no column hoards them.
+  * Throughput: one pixel per cycle, the first one four cycles after its tile is accepted. A queue of one entry before each
+  * render unit holds its next pixel. The next tile is accepted when only these and two more pixels are left, so tiles
+  * follow each other without a gap, and no column takes tiles early.
   */
 final class TileWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new TileWalkerIO(config))

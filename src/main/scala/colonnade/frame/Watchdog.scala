@@ -5,19 +5,19 @@ import chisel3._
 /** Ports of [[Watchdog]]. */
 final class WatchdogIO(bits: Int) extends Bundle {
 
-  /** Cycles without progress that are too many; 0 is never. */
+  /** Cycles without progress until it expires; 0 disables it. */
   val limit = Input(UInt(bits.W))
 
-  /** Starts counting anew. */
+  /** Resets the count. */
   val restart = Input(Bool())
 
-  /** This cycle does not count. */
+  /** Do not count this cycle. */
   val hold = Input(Bool())
 
   val isExpired = Output(Bool())
 }
 
-/** Counts the cycles since the last progress; expires with the one after `limit` of them. */
+/** Counts the cycles since the last progress; expires in the cycle after `limit` of them. */
 final class Watchdog(bits: Int) extends Module {
   val io = IO(new WatchdogIO(bits))
 

@@ -11,10 +11,10 @@ class RoundRobinProof(count: Int) extends Module {
   val requests = IO(Input(UInt(count.W)))
   val isTaken  = IO(Input(Bool()))
 
-  private val turn = Module(new RoundRobin(count))
-  turn.io.requests := requests
-  turn.io.isTaken  := isTaken
-  private val grant = turn.io.grant
+  private val arbiter = Module(new RoundRobin(count))
+  arbiter.io.requests := requests
+  arbiter.io.isTaken  := isTaken
+  private val grant = arbiter.io.grant
 
   assert((grant & ~requests) === 0.U, "a grant without a request")
   assert(PopCount(grant) === requests.orR.asUInt, "one grant when there is a request")

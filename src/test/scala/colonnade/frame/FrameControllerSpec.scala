@@ -20,15 +20,15 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     var backgrounds  = Vector.empty[(Int, Int)]
     private var left = 0
 
-    /** Before the clock's edge: whether a pixel leaves. */
+    /** Before the clock's edge: whether a pixel retires. */
     def drive(): Boolean = {
-      val port   = dut.io.tiles(index)
-      val leaves = left > 0 && !isStuck
+      val port    = dut.io.tiles(index)
+      val retires = left > 0 && !isStuck
       port.ready.poke(left == 0)
       dut.io.backgroundTiles(index).ready.poke(random.nextBoolean())
-      dut.io.progress(index).isDrained.poke(left == 0 || (left == 1 && leaves))
+      dut.io.progress(index).isDrained.poke(left == 0 || (left == 1 && retires))
       dut.io.progress(index).isIdle.poke(left == 0)
-      leaves
+      retires
     }
 
     def step(): Unit = {
@@ -87,8 +87,8 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
 
     private def step(): Unit = {
-      val leaves = columns.map(_.drive()).reduce(_ || _)
-      dut.io.traffic.leaves.poke(leaves)
+      val retires = columns.map(_.drive()).reduce(_ || _)
+      dut.io.traffic.retires.poke(retires)
       dut.io.traffic.stalls.poke(stalls)
       if (dut.io.aborts.peekBoolean()) aborts += 1
       if (dut.io.isRunning.peekBoolean()) running += 1
@@ -147,7 +147,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       val bench  = new Bench(dut)
       val window = dut.io.window
       for ((hasWindow, right, tiles) <- Seq((true, 64, 48), (false, 64, 1), (true, 17, 18))) {
-        window.isThere.poke(hasWindow)
+        window.enabled.poke(hasWindow)
         window.rect.x0.poke(0)
         window.rect.y0.poke(0)
         window.rect.x1.poke(right)
@@ -222,10 +222,10 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.frame.pixelsWide.poke(8)
       dut.io.frame.pixelsHigh.poke(8)
       dut.io.start.poke(true)
-      dut.io.begins.expect(true)
+      dut.io.frameStart.expect(true)
       for (_ <- 0 until 10) {
         dut.clock.step()
-        dut.io.begins.expect(false)
+        dut.io.frameStart.expect(false)
         dut.io.status.busy.expect(true)
       }
     }

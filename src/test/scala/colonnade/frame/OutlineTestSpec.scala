@@ -10,7 +10,7 @@ class OutlineTestSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "OutlineTest"
 
   private val config = TestConfigs.tiny
-  private val most   = 1 << config.numbers.coordinateBits
+  private val limit  = 1 << config.numbers.coordinateBits
 
   private type Edge = (Int, Int, Int)
 
@@ -65,9 +65,10 @@ class OutlineTestSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.clock.setTimeout(0)
       for (round <- 0 until 12) {
         def coordinate(limit: Int) = random.nextInt(limit / size) * size
-        val squares                = Seq.fill(60)((coordinate(most), coordinate(most))) ++
-          Seq((0, 0), (most - size, most - size), (0, most - size))
-        val rect = if (round == 0) Seq(9, 9, 9, 40) else Seq(random.nextInt(64), random.nextInt(64), most - 9, most - 1)
+        val squares                = Seq.fill(60)((coordinate(limit), coordinate(limit))) ++
+          Seq((0, 0), (limit - size, limit - size), (0, limit - size))
+        val rect =
+          if (round == 0) Seq(9, 9, 9, 40) else Seq(random.nextInt(64), random.nextInt(64), limit - 9, limit - 1)
         val edges = Seq.fill(6) {
           val (x, y) = (random.nextInt(4096) - 2048, random.nextInt(4096) - 2048)
           if (random.nextBoolean()) (0, 0, 0)

@@ -86,7 +86,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
         edge.y.poke(-2)
         edge.offset.poke(-9)
         val window = dut.io.window
-        window.isThere.poke(hasWindow)
+        window.enabled.poke(hasWindow)
         Seq(window.rect.x0, window.rect.y0, window.rect.x1, window.rect.y1).zip(Seq(2, 3, 12, 15)).foreach {
           case (port, value) => port.poke(value)
         }

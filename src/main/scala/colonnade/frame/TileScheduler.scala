@@ -6,14 +6,14 @@ import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.FrameSettings
 
-/** Ports of [[TileDealer]]. */
-final class TileDealerIO(config: ColonnadeConfig) extends Bundle {
+/** Ports of [[TileScheduler]]. */
+final class TileSchedulerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 
-  /** Tiles that meet it count as those that meet the object. */
-  val window = Input(new RoomWindow(config))
+  /** Tiles that meet it go to render units, too. */
+  val window = Input(new EnvironmentWindow(config))
 
-  /** Deals the tiles of a frame; only while idle. */
+  /** Starts the tiles of a frame; only while idle. */
   val start = Input(Bool())
 
   /** Valid only where ready is set, see [[Dispatcher]]. */
@@ -23,17 +23,16 @@ final class TileDealerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Hands the tiles of a frame in Morton order to whichever column is ready, in turn: those that meet the object, or the
-  * others.
+/** Dispatches the tiles of a frame in Morton order to ready columns, round-robin: those for render units, or the others.
   *
-  * One tile a cycle while the queue lasts, the first one four cycles after the start. Codes outside the frame are skipped
-  * ahead of need: skipping between two tiles takes fewer cycles than a column has pixels in one. A tile of the other kind
-  * takes one cycle.
+  * Throughput: one tile per cycle while the queue holds tiles; the first one comes four cycles after the start. The queue
+  * hides the cycles in which codes outside the frame are skipped: a column needs more cycles per tile than a skip takes.
+  * A tile of the other kind takes one cycle.
   */
-final class TileDealer(config: ColonnadeConfig, ofObject: Boolean) extends Module {
-  import TileDealer._
+final class TileScheduler(config: ColonnadeConfig, ofObject: Boolean) extends Module {
+  import TileScheduler._
 
-  val io = IO(new TileDealerIO(config))
+  val io = IO(new TileSchedulerIO(config))
 
   private val coordinateBits = config.numbers.coordinateBits
   private val pixelLevels    = Tile.pixelLevels(config)
@@ -53,12 +52,12 @@ final class TileDealer(config: ColonnadeConfig, ofObject: Boolean) extends Modul
   outline.io.squares.bits.y := firstPixel(scan.io.cells.bits.y)
   scan.io.cells.ready       := outline.io.squares.ready
 
-  private val tested  = outline.io.tested
-  private val isMeant = tested.bits.isForUnits === ofObject.B
-  tiles.valid  := tested.valid && isMeant
+  private val tested     = outline.io.tested
+  private val isSelected = tested.bits.isForUnits === ofObject.B
+  tiles.valid  := tested.valid && isSelected
   tiles.bits.x := tested.bits.first.x
   tiles.bits.y := tested.bits.first.y
-  tested.ready := tiles.ready || !isMeant
+  tested.ready := tiles.ready || !isSelected
 
   dispatch.io.items <> Queue(tiles, queueEntries)
   io.tiles <> dispatch.io.takers
@@ -66,10 +65,10 @@ final class TileDealer(config: ColonnadeConfig, ofObject: Boolean) extends Modul
 
   private def tilesIn(pixels: UInt): UInt = (pixels +& (config.frame.tileSize - 1).U) >> pixelLevels
 
-  /** The bits above a coordinate's are zero, for a tile begins inside the frame. */
+  /** The bits above those of a coordinate are 0, because a tile starts inside the frame. */
   private def firstPixel(cell: UInt): UInt = Cat(cell, 0.U(pixelLevels.W)).pad(coordinateBits)(coordinateBits - 1, 0)
 }
 
-object TileDealer {
+object TileScheduler {
   private val queueEntries = 4
 }
