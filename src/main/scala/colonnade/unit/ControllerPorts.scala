@@ -1,50 +1,137 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Decoupled, Valid}
+import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.RoomQuestion
+import colonnade.shading.{Occlusion, PathTermination, ShadowRequest}
+
+/** The state of a context. */
+object ContextState extends ChiselEnum {
+
+  /** It holds no pixel. */
+  val idle = Value
+
+  /** Its ray is generated or prepared. */
+  val raySetup = Value
+
+  /** Its ray visits records. */
+  val traversing = Value
+
+  /** Its trace has ended; the controller has not yet resolved the result. */
+  val resolve = Value
+
+  /** Its hit, or its point of the environment, waits for attributes or is in the shader. */
+  val shading = Value
+
+  /** Its surface is known; shadow rays may be left to trace. */
+  val shadowTest = Value
+
+  /** Its ray has missed the object: it waits for the environment march, or is in it. */
+  val environmentPending, environmentMarch = Value
+
+  /** Its deferred Fresnel reflection has missed the environment; the bounce waits to resume. */
+  val resumeBounce = Value
+
+  /** Its path has ended; its colour waits to be accumulated, or is being accumulated. */
+  val accumulatePending, accumulating = Value
+
+  /** The colour of its pixel is complete. */
+  val done = Value
+}
 
 /** A context whose hit has been shaded. */
 final class Shaded(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
 
-  /** By light, of a surface that ends the path. */
+  /** By light, for a surface that ends the path. */
   val needsShadowRays = Vec(config.frame.lights, Bool())
 }
 
-/** A context whose path goes on from a mirror or glass. */
+/** A context whose path continues from a mirror or glass. */
 final class Bounced(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
 
-  /** The ray meets the object's records; otherwise the background only. */
+  /** The ray is traced through the object; otherwise it only meets the background or the environment. */
   val isTraced = Bool()
 }
 
-/** A context whose path may turn now. */
-final class PathAside(config: ColonnadeConfig) extends Bundle {
+/** A context whose deferred Fresnel reflection is complete, so that its bounce may resume. */
+final class ResumedBounce(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
 
-  /** What lies beside it is the background. */
+  /** The reflection shows the background. */
   val isBackground = Bool()
 }
 
-/** What rays do that meet nothing of the object, where there may be a room. */
-final class RoomControl(config: ColonnadeConfig) extends Bundle {
+/** Control of rays that miss the object, if there may be an environment. */
+final class EnvironmentControl(config: ColonnadeConfig) extends Bundle {
 
-  /** There is a room in this frame. */
-  val isThere = Input(Bool())
+  /** This frame has an environment. */
+  val enabled = Input(Bool())
 
-  /** A ray that cannot meet the object; a reflection beside a path that goes on, which waits. */
-  val passes = Flipped(Valid(Context(config)))
-  val aside  = Flipped(Valid(Context(config)))
+  /** A primary ray that cannot hit the object. */
+  val bypass = Flipped(Valid(Context(config)))
 
-  /** A context to meet the room; one that has, and is in the shader; one that has met nothing there. */
-  val question = Decoupled(new RoomQuestion(config))
-  val met      = Flipped(Valid(Context(config)))
-  val nothing  = Flipped(Valid(Context(config)))
+  /** A Fresnel reflection that is resolved first, while its path's bounce is deferred. */
+  val fresnelReflection = Flipped(Valid(Context(config)))
 
-  /** A path that need not wait any more. */
-  val turn = Decoupled(new PathAside(config))
+  /** A ray to march through the environment; its result. */
+  val req  = Decoupled(new RoomQuestion(config))
+  val hit  = Flipped(Valid(Context(config)))
+  val miss = Flipped(Valid(Context(config)))
+
+  /** A deferred bounce that may resume. */
+  val resume = Decoupled(new ResumedBounce(config))
+}
+
+/** Ports of [[RtController]]. */
+final class RtControllerIO(config: ColonnadeConfig) extends Bundle {
+  private val contexts     = config.array.contexts
+  private def contextCount = Output(UInt(log2Ceil(contexts + 1).W))
+
+  /** An idle context, and whether it gets a pixel. */
+  val free     = Output(Valid(Context(config)))
+  val allocate = Input(Bool())
+
+  /** A prepared ray that enters the object's box. */
+  val entered = Flipped(Valid(Context(config)))
+
+  /** Traces that have ended: the ray misses the box, has no record left to visit, or is occluded. */
+  val ended = Flipped(Vec(3, Valid(Context(config))))
+
+  /** The ended ray that is resolved in this cycle. */
+  val resolved   = Output(Valid(Context(config)))
+  val hasHit     = Input(Vec(contexts, Bool()))
+  val occlusions = Input(Vec(contexts, Occlusion()))
+
+  val shaded  = Flipped(Valid(new Shaded(config)))
+  val bounced = Flipped(Valid(new Bounced(config)))
+
+  val environment = if (config.hasRoom) Some(new EnvironmentControl(config)) else None
+
+  /** A hit whose attributes have an illegal address: the path ends in the background. */
+  val fetchFailed = Flipped(Valid(Context(config)))
+
+  /** The next shadow ray of a context. */
+  val shadow = Decoupled(new ShadowRequest(config))
+
+  /** A path that has ended, and a context whose colour is complete. */
+  val end         = Decoupled(new PathTermination(config))
+  val accumulated = Flipped(Valid(Context(config)))
+
+  /** A context whose pixel is complete, and whether it retires. */
+  val done   = Output(Valid(Context(config)))
+  val retire = Input(Bool())
+
+  /** By context: its ray is a shadow ray; its ray is the primary ray; its colour has been accumulated. */
+  val isShadow  = Output(Vec(contexts, Bool()))
+  val isPrimary = Output(Vec(contexts, Bool()))
+  val hasColour = Output(Vec(contexts, Bool()))
+
+  /** Numbers of contexts that are idle, in ray set-up, and waiting for the environment march or in it. */
+  val idleCount        = contextCount
+  val raySetupCount    = contextCount
+  val environmentCount = if (config.hasRoom) Some(contextCount) else None
 }

@@ -4,7 +4,9 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.formats.{NodeRecord, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.ray.BoxRay
+import colonnade.traversal.TriangleHit
 
 /** The kind of a record; each kind has one unit that takes it: box unit, triangle unit, shader. */
 object RecordKind extends ChiselEnum {
@@ -30,6 +32,33 @@ final class FetchResponse(config: ColonnadeConfig) extends Bundle {
 final class FetchError(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val kind    = RecordKind()
+}
+
+/** A node, and the ray to test against its children. */
+final class NodeCandidate(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val address = UInt(RecordFormats.addressBits(config).W)
+  val node    = new NodeRecord(config)
+  val ray     = new BoxRay(config.numbers)
+}
+
+/** A read port of the [[HitTable]] for a granted context, seen from the reader. */
+final class GrantedHitReader(config: ColonnadeConfig) extends Bundle {
+
+  /** The context of the next cycle, and that of this cycle. */
+  val grantNext = Output(Valid(Context(config)))
+  val context   = Output(Context(config))
+  val hit       = Input(new TriangleHit(config))
+}
+
+/** Events of [[FetchStage]]; names as in `UnitEvents`. */
+final class FetchEvents(config: ColonnadeConfig) extends Bundle {
+  private def contextCount = UInt(log2Ceil(config.array.contexts + 1).W)
+
+  val waitRecord    = contextCount
+  val waitUnit      = contextCount
+  val snoopHits     = contextCount
+  val illegalRecord = Bool()
 }
 
 /** Ports of [[RecordFetch]]. */

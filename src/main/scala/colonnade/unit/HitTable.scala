@@ -8,7 +8,7 @@ import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 import colonnade.shading.Occlusion
-import colonnade.traversal.{TMaxUnits, TriangleHit, TriangleResult}
+import colonnade.traversal.{TMaxUnits, TriangleResult}
 
 /** A ray whose trace starts: only hits with t < `tMax` count. */
 final class TraceStart(config: ColonnadeConfig) extends Bundle {
@@ -39,10 +39,8 @@ final class HitTableIO(config: ColonnadeConfig) extends Bundle {
   /** Distance and id of a context's hit, in the same cycle. */
   val closest = Flipped(new ClosestHitReader(config))
 
-  /** The hit of the context that `grantNext` named one cycle earlier; `responseContext` repeats it. */
-  val grantNext       = Flipped(Valid(Context(config)))
-  val responseContext = Input(Context(config))
-  val hit             = Output(new TriangleHit(config))
+  /** The hit of the context that `grantNext` named one cycle earlier. */
+  val granted = Flipped(new GrantedHitReader(config))
 }
 
 /** The closest hit of every context's ray: the least (t, packed triangle id), whatever the order of tests.
@@ -100,11 +98,11 @@ final class HitTable(config: ColonnadeConfig) extends Module {
   io.closest.t  := closestT(io.closest.context)
   io.closest.id := ids(io.closest.context)
 
-  private val detail = details.read(io.grantNext.bits, io.grantNext.valid)
-  io.hit.t        := closestT(io.responseContext)
-  io.hit.id       := ids(io.responseContext)
-  io.hit.weights  := detail.weights
-  io.hit.backSide := detail.backSide
+  private val detail = details.read(io.granted.grantNext.bits, io.granted.grantNext.valid)
+  io.granted.hit.t        := closestT(io.granted.context)
+  io.granted.hit.id       := ids(io.granted.context)
+  io.granted.hit.weights  := detail.weights
+  io.granted.hit.backSide := detail.backSide
 }
 
 /** The parts of a hit that no comparison needs. */

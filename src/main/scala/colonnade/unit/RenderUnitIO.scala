@@ -6,7 +6,7 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.environment.AttributePort
 import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitEvents, UnitPosition}
 
-/** The ports of a render unit. `registers` are constant while a frame runs; `start` precedes its first pixel. */
+/** Ports of a render unit. `registers` is constant while a frame runs; `start` precedes the first position. */
 final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
   val row        = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
   val registers  = Input(new FrameRegisters(config))
@@ -16,7 +16,7 @@ final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
   val pixels     = Decoupled(new Pixel(config))
 
-  /** To the maps of a room. */
+  /** To the maps of the environment. */
   val maps =
     if (config.hasRoom) Some(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))) else None
 

@@ -6,58 +6,55 @@ import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
 import colonnade.numbers.Fixed
-import colonnade.ray.{BoxRay, RayFormats}
+import colonnade.ray.RayFormats
 import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TraversalStack, TraversalStep}
 
-/** Which record each ray visits next: BoxUnit and TraversalStack, or without a BVH the exhaustive walk. */
+/** Ports of [[Traversal]]. */
+final class TraversalIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Resets `deepest`. */
+  val clear = Input(Bool())
+  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
+
+  /** A ray enters the object's box; its first record is [[Traversal.root]]. */
+  val start = Flipped(Valid(Context(config)))
+  val nodes = Flipped(Decoupled(new NodeCandidate(config)))
+
+  /** `nodes` is ready in the next cycle. */
+  val readyNext = Output(Bool())
+
+  /** Contexts that have finished a triangle record. */
+  val resume    = Flipped(Decoupled(Context(config)))
+  val tMaxUnits = Input(Vec(config.array.contexts, new Fixed(new RayFormats(config.numbers).units)))
+  val steps     = Decoupled(new TraversalStep(config))
+
+  /** For the counters. */
+  val boxTests = Output(UInt(log2Ceil(config.geometry.arity + 1).W))
+  val busy     = Output(Bool())
+  val deepest  = Output(UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W))
+  val overflow = Output(Bool())
+
+  /** A node was illegal and treated as empty. */
+  val illegal = Output(Bool())
+}
+
+/** Decides which record each ray visits next: BoxUnit and TraversalStack, or LinearScan without a BVH. */
 final class Traversal(config: ColonnadeConfig) extends Module {
-  private val contexts = config.array.contexts
+  val io = IO(new TraversalIO(config))
 
-  val io = IO(new Bundle {
-    val clear = Input(Bool())
-    val scene = Input(new SceneMap(RecordFormats.idBits(config)))
-
-    /** A ray enters the object's box; its first visit is [[Traversal.root]]. */
-    val start = Flipped(Valid(Context(config)))
-
-    /** A node for a context. */
-    val nodes = Flipped(Decoupled(new FetchResponse(config)))
-
-    /** `nodes` will be ready in the next cycle. */
-    val readyNext = Output(Bool())
-
-    /** The ray of `nodes.bits.context`. */
-    val ray = Input(new BoxRay(config.numbers))
-
-    /** Contexts that are through with a triangles record. */
-    val resume    = Flipped(Decoupled(Context(config)))
-    val tMaxUnits = Input(Vec(contexts, new Fixed(new RayFormats(config.numbers).units)))
-    val steps     = Decoupled(new TraversalStep(config))
-
-    /** For the counters. */
-    val boxTests = Output(UInt(log2Ceil(config.geometry.arity + 1).W))
-    val busy     = Output(Bool())
-    val deepest  = Output(UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W))
-    val overflow = Output(Bool())
-
-    /** A node was illegal and counted as empty. */
-    val illegal = Output(Bool())
-  })
-
-  /** Contexts are tokens: a queue of as many places never fills. */
-  private val resume = Queue(io.resume, contexts)
+  /** Contexts are tokens, so this queue never overflows. */
+  private val resume = Queue(io.resume, config.array.contexts)
 
   if (config.geometry.bvh) {
     val boxUnit = Module(new BoxUnit(config))
     val stack   = Module(new TraversalStack(config))
-    val node    = new RecordFormats(config).asNode(io.nodes.bits.record)
-    val isLegal = node.isLegal(io.nodes.bits.address)
+    val isLegal = io.nodes.bits.node.isLegal(io.nodes.bits.address)
 
     boxUnit.io.in.valid        := io.nodes.valid
     boxUnit.io.in.bits.context := io.nodes.bits.context
-    boxUnit.io.in.bits.node    := node
+    boxUnit.io.in.bits.node    := io.nodes.bits.node
     when(!isLegal)(boxUnit.io.in.bits.node.kinds.foreach(_ := ChildKind.empty))
-    boxUnit.io.in.bits.ray  := io.ray
+    boxUnit.io.in.bits.ray  := io.nodes.bits.ray
     boxUnit.io.in.bits.tMax := io.tMaxUnits(io.nodes.bits.context)
     io.nodes.ready          := boxUnit.io.in.ready
     io.readyNext            := boxUnit.io.readyNext
@@ -75,11 +72,11 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     io.overflow := stack.io.overflow
     io.illegal  := io.nodes.fire && !isLegal
   } else {
-    val walk = Module(new LinearScan(config))
-    walk.io.scene := io.scene
-    walk.io.start := io.start
-    walk.io.resume :<>= resume
-    io.steps :<>= walk.io.steps
+    val scan = Module(new LinearScan(config))
+    scan.io.scene := io.scene
+    scan.io.start := io.start
+    scan.io.resume :<>= resume
+    io.steps :<>= scan.io.steps
 
     io.nodes.ready := true.B
     io.readyNext   := true.B
@@ -93,11 +90,11 @@ final class Traversal(config: ColonnadeConfig) extends Module {
 
 object Traversal {
 
-  /** Where every ray begins: the root, or without a BVH the first triangles record. */
+  /** The first record of every ray: the root node, or without a BVH the first triangle record. */
   def root(config: ColonnadeConfig, scene: SceneMap): NodeRef = {
-    val target = Wire(new NodeRef(config))
-    target.isLeaf  := (!config.geometry.bvh).B
-    target.address := (if (config.geometry.bvh) 0.U else scene.triangleBase)
-    target
+    val root = Wire(new NodeRef(config))
+    root.isLeaf  := (!config.geometry.bvh).B
+    root.address := (if (config.geometry.bvh) 0.U else scene.triangleBase)
+    root
   }
 }

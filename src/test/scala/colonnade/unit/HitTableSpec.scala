@@ -106,7 +106,7 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
 
   dut.io.start.valid.poke(false)
   dut.io.result.valid.poke(false)
-  dut.io.grantNext.valid.poke(true)
+  dut.io.granted.grantNext.valid.poke(true)
 
   def best(context: Int): Option[Result] = traces(context).flatMap(_.best)
 
@@ -151,13 +151,13 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
       dut.io.closest.context.poke(context)
       assert(dut.io.closest.t.peekRaw() == hit.t, s"context $context, $ray")
       assert(dut.io.closest.id.peekInt() == hit.id, s"context $context, $ray")
-      dut.io.grantNext.bits.poke(context)
+      dut.io.granted.grantNext.bits.poke(context)
       dut.clock.step()
-      dut.io.responseContext.poke(context)
-      assert(dut.io.hit.t.peekRaw() == hit.t, s"context $context, $ray")
-      assert(dut.io.hit.id.peekInt() == hit.id, s"context $context, $ray")
-      assert(dut.io.hit.weights.map(_.peekRaw()) == hit.weights)
-      dut.io.hit.backSide.expect(hit.backSide)
+      dut.io.granted.context.poke(context)
+      assert(dut.io.granted.hit.t.peekRaw() == hit.t, s"context $context, $ray")
+      assert(dut.io.granted.hit.id.peekInt() == hit.id, s"context $context, $ray")
+      assert(dut.io.granted.hit.weights.map(_.peekRaw()) == hit.weights)
+      dut.io.granted.hit.backSide.expect(hit.backSide)
     }
   }
 

@@ -65,9 +65,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.nodes.valid.poke(true)
         dut.io.nodes.bits.context.poke(0)
         dut.io.nodes.bits.address.poke(address)
-        dut.io.nodes.bits.record.poke(
-          new Packed(new NodeRecord(shape)).pack(fields).U(new RecordFormats(shape).recordBits.W)
-        )
+        dut.node.poke(new Packed(new NodeRecord(shape)).pack(fields))
         dut.ray.poke(ray)
         dut.io.nodes.ready.expect(true)
         dut.io.illegal.expect(!isLegal)
@@ -108,14 +106,16 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
 }
 
-/** Packs the ray into one port. */
+/** Packs node and ray into one port each. */
 private class TraversalHarness(config: ColonnadeConfig) extends Module {
   private val unit = Module(new Traversal(config))
 
-  val ray = IO(Input(UInt(new BoxRay(config.numbers).getWidth.W)))
-  val io  = IO(chiselTypeOf(unit.io))
+  val node = IO(Input(UInt(new NodeRecord(config).getWidth.W)))
+  val ray  = IO(Input(UInt(new BoxRay(config.numbers).getWidth.W)))
+  val io   = IO(chiselTypeOf(unit.io))
   io :<>= unit.io
-  unit.io.ray := ray.asTypeOf(new BoxRay(config.numbers))
+  unit.io.nodes.bits.node := node.asTypeOf(new NodeRecord(config))
+  unit.io.nodes.bits.ray  := ray.asTypeOf(new BoxRay(config.numbers))
 }
 
 /** Rays in a random tree; each context has at most one. */
@@ -132,8 +132,8 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
   private val reference = new StackReference(contexts, config.columnBvhMemory.stackDepth)
   private val walks     = mutable.Map.empty[Int, Walk]
 
-  private val rayBits    = tree.rays.map(ray => new Packed(new BoxRay(config.numbers)).pack(tree.fields(ray, "ray.")))
-  private val recordBits = tree.nodes.map(node => new Packed(new NodeRecord(config)).pack(tree.fields(node, "node.")))
+  private val rayBits  = tree.rays.map(ray => new Packed(new BoxRay(config.numbers)).pack(tree.fields(ray, "ray.")))
+  private val nodeBits = tree.nodes.map(node => new Packed(new NodeRecord(config)).pack(tree.fields(node, "node.")))
 
   /** The state of contexts: a record is read, then offered; or the next step is expected. */
   private val reading  = mutable.Map.empty[Int, StackReference.Child]
@@ -189,7 +189,7 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
     for ((context, address) <- nodes.headOption) {
       dut.io.nodes.bits.context.poke(context)
       dut.io.nodes.bits.address.poke(address)
-      dut.io.nodes.bits.record.poke(recordBits(address).U(new RecordFormats(config).recordBits.W))
+      dut.node.poke(nodeBits(address))
       dut.ray.poke(rayBits(walks(context).ray))
     }
     dut.io.resume.valid.poke(resuming.nonEmpty)

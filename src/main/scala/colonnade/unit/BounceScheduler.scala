@@ -1,0 +1,133 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Decoupled, RegEnable, Valid}
+import colonnade.common.{Context, ContextTable}
+import colonnade.config.ColonnadeConfig
+import colonnade.environment.RememberedRay
+import colonnade.formats.Shading
+import colonnade.ray.RayRequest
+import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay}
+
+/** Ports of [[BounceScheduler]] that an environment adds. */
+final class DeferredBounceIO(config: ColonnadeConfig) extends Bundle {
+
+  /** This frame has an environment. */
+  val enabled = Input(Bool())
+
+  /** A context whose bounce is deferred until its Fresnel reflection is resolved; a context whose bounce may resume. */
+  val fresnelReflection = Valid(Context(config))
+  val resume            = Flipped(Decoupled(new ResumedBounce(config)))
+
+  /** The Fresnel reflection, or the ray with which a path continues. */
+  val ray = Valid(new RememberedRay(config))
+}
+
+/** Ports of [[BounceScheduler]]. */
+final class BounceSchedulerIO(config: ColonnadeConfig) extends Bundle {
+  val shading = Input(new Shading(config))
+
+  /** A context gets a new pixel. */
+  val start = Flipped(Valid(Context(config)))
+
+  /** From the shader; to the colour unit and to ray set-up. */
+  val in     = Flipped(Decoupled(new BouncedRay(config)))
+  val update = Decoupled(new BounceUpdate(config))
+  val ray    = Decoupled(new RayRequest(config))
+
+  /** A bounce that is issued. */
+  val bounced      = Valid(new Bounced(config))
+  val isRefraction = Output(Bool())
+  val environment  = if (config.hasRoom) Some(new DeferredBounceIO(config)) else None
+}
+
+/** Issues bounces at mirrors and glass. In the same cycle, the colour unit gets the update of the path's throughput, and
+  * ray set-up gets the next ray, as long as the path has bounces left.
+  *
+  * With an environment, the Fresnel reflection of glass is resolved first. It takes the context, and the bounce waits in
+  * a table. Bounces from the table have priority; they are issued three cycles after `resume`.
+  */
+final class BounceScheduler(config: ColonnadeConfig) extends Module {
+  val io = IO(new BounceSchedulerIO(config))
+
+  private val incoming = Wire(new PendingBounce(config))
+  private val result   = io.in.bits.bounce
+  incoming.update.context  := result.context
+  incoming.update.albedo   := io.in.bits.albedo
+  incoming.update.isTinted := io.in.bits.isTinted
+  incoming.update.fresnel  := result.fresnel
+  incoming.update.hasSurface.foreach(_ := false.B)
+  incoming.isRefraction := result.isRefraction
+  incoming.origin       := result.origin
+  incoming.dir          := result.dir
+
+  // The bounce to issue
+  private val bounce = Wire(Decoupled(new PendingBounce(config)))
+  bounce.valid := io.in.valid
+  bounce.bits  := incoming
+  io.in.ready  := bounce.ready
+  io.environment.foreach(deferBounces)
+
+  // Trace its ray as long as the path has bounces left
+  private val counts   = Reg(Vec(config.array.contexts, chiselTypeOf(io.shading.bounces.get)))
+  private val context  = bounce.bits.update.context
+  private val isTraced = counts(context) =/= io.shading.bounces.get
+  when(bounce.fire && isTraced) { counts(context) := counts(context) + 1.U }
+  when(io.start.valid) { counts(io.start.bits) := 0.U }
+
+  bounce.ready             := io.update.ready && (!isTraced || io.ray.ready)
+  io.update.valid          := bounce.valid && (!isTraced || io.ray.ready)
+  io.update.bits           := bounce.bits.update
+  io.ray.valid             := bounce.valid && isTraced && io.update.ready
+  io.ray.bits.context      := context
+  io.ray.bits.isShadow     := false.B
+  io.ray.bits.origin       := bounce.bits.origin
+  io.ray.bits.dir          := bounce.bits.dir
+  io.bounced.valid         := bounce.fire
+  io.bounced.bits.context  := context
+  io.bounced.bits.isTraced := isTraced
+  io.isRefraction          := bounce.bits.isRefraction
+
+  private def deferBounces(environment: DeferredBounceIO): Unit = {
+    val bounces       = ContextTable(config, new PendingBounce(config))
+    val hasReflection = environment.enabled && result.fresnel.natural =/= 0.U
+
+    // Read the table, and hold the bounce until it is issued
+    val isRead    = RegNext(environment.resume.fire, false.B)
+    val isHeld    = RegInit(false.B)
+    val resumed   = RegEnable(bounces.read(environment.resume.bits.context, environment.resume.fire), isRead)
+    val resumedBy = RegEnable(environment.resume.bits, environment.resume.fire)
+    environment.resume.ready := !isRead && !isHeld
+    when(isRead) { isHeld := true.B }.elsewhen(bounce.fire) { isHeld := false.B }
+
+    // Write the table
+    environment.fresnelReflection.valid := io.in.valid && hasReflection && !bounce.fire
+    environment.fresnelReflection.bits  := result.context
+    when(environment.fresnelReflection.valid) { bounces.write(result.context, incoming) }
+
+    bounce.valid := isHeld || (io.in.valid && !hasReflection)
+    io.in.ready  := Mux(hasReflection, !bounce.fire, bounce.ready && !isHeld)
+    when(isHeld) {
+      bounce.bits                       := resumed
+      bounce.bits.update.hasSurface.get := !resumedBy.isBackground
+    }
+
+    environment.ray.valid        := bounce.fire || environment.fresnelReflection.valid
+    environment.ray.bits.context := Mux(bounce.fire, bounce.bits.update.context, result.context)
+    val ray = environment.ray.bits.ray
+    ray.pixel   := DontCare
+    ray.origin  := Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get)
+    ray.towards := bounce.bits.dir
+    when(!bounce.fire) {
+      ray.towards.axes.zip(result.reflection.axes).foreach { case (to, from) => to := from }
+    }
+  }
+}
+
+/** A bounce to issue: the update of the path, and the next ray. */
+final private class PendingBounce(config: ColonnadeConfig) extends Bundle {
+  val update       = new BounceUpdate(config)
+  val isRefraction = Bool()
+  val origin       = new BounceResult(config).origin.cloneType
+  val dir          = new BounceResult(config).dir.cloneType
+}

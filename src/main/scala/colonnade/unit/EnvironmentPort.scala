@@ -1,0 +1,75 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.Decoupled
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.environment.{AttributePort, MarchEvents, RoomStage}
+import colonnade.formats.{PixelPosition, RoomView}
+import colonnade.ray.RayRequest
+import colonnade.shading.EnvironmentSurface
+
+/** Ports of [[EnvironmentPort]]. */
+final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
+  val view    = Input(new RoomView(config.numbers))
+  val control = Flipped(new EnvironmentControl(config))
+
+  /** Primary rays, their pixels, and whether they may hit the object; those that may. */
+  val primary     = Flipped(Decoupled(new RayRequest(config)))
+  val pixel       = Input(new PixelPosition(config))
+  val meetsObject = Input(Bool())
+  val objectRays  = Decoupled(new RayRequest(config))
+  val bounces     = if (config.frame.hasBounces) Some(Flipped(new DeferredBounceIO(config))) else None
+
+  /** Points of the environment to shade. */
+  val surfaces = Decoupled(new EnvironmentSurface(config))
+  val maps     = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
+  val events   = Output(new MarchEvents)
+}
+
+/** Routes rays to the environment march: every ray that may miss the object is stored there. A primary ray that cannot
+  * hit the object bypasses ray set-up.
+  */
+final class EnvironmentPort(config: ColonnadeConfig) extends Module {
+  val io = IO(new EnvironmentPortIO(config))
+
+  private val stage   = Module(new RoomStage(config))
+  private val control = io.control
+  control.enabled := io.view.isThere
+  stage.io.view   := io.view
+  io.maps <> stage.io.maps
+  io.events := stage.io.events
+
+  // March
+  stage.io.question :<>= control.req
+  control.miss := stage.io.nothing
+  io.surfaces :<>= stage.io.surface
+  control.hit.valid := stage.io.surface.fire
+  control.hit.bits  := stage.io.surface.bits.context
+
+  // Deferred bounces
+  control.fresnelReflection := 0.U.asTypeOf(control.fresnelReflection)
+  control.resume.ready      := false.B
+  for (bounces <- io.bounces) {
+    bounces.enabled           := io.view.isThere
+    control.fresnelReflection := bounces.fresnelReflection
+    bounces.resume :<>= control.resume
+  }
+
+  // Store rays; those of bounces have priority
+  private val primary   = io.primary.bits
+  private val bounceRay = io.bounces.map(_.ray)
+  private val isBounce  = bounceRay.map(_.valid).getOrElse(false.B)
+  stage.io.ray.valid            := isBounce || io.primary.fire
+  stage.io.ray.bits.context     := primary.context
+  stage.io.ray.bits.ray.origin  := primary.origin
+  stage.io.ray.bits.ray.towards := primary.dir
+  for (ray <- bounceRay) when(ray.valid) { stage.io.ray.bits := ray.bits }
+  stage.io.ray.bits.ray.pixel := io.pixel
+
+  // Trace primary rays that may hit the object
+  io.objectRays.valid  := io.primary.valid && !isBounce && io.meetsObject
+  io.objectRays.bits   := primary
+  io.primary.ready     := !isBounce && (io.objectRays.ready || !io.meetsObject)
+  control.bypass.valid := io.primary.fire && !io.meetsObject
+  control.bypass.bits  := primary.context
+}

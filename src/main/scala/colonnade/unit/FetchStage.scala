@@ -1,0 +1,106 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.common.{Context, ContextTable}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.ray.{PreparedRay, TracedRay}
+import colonnade.shading.ShadeRequest
+import colonnade.traversal.TriangleCandidate
+
+/** Ports of [[FetchStage]]. */
+final class FetchStageIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Invalidates all record buffers. */
+  val start      = Input(Bool())
+  val row        = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
+  val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
+  val requests   = Decoupled(new RecordRequest(config))
+  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+
+  /** A ray whose trace starts. */
+  val ray     = Flipped(Valid(new PreparedRay(config)))
+  val fetches = Flipped(Vec(3, Valid(new FetchRequest(config))))
+
+  /** The closest hit of the context whose attributes come. */
+  val closestHit = new GrantedHitReader(config)
+
+  /** A record with the ray of its context; one of the three ports in a cycle. */
+  val nodes     = Decoupled(new NodeCandidate(config))
+  val triangles = Decoupled(new TriangleCandidate(config))
+  val hits      = Decoupled(new ShadeRequest(config))
+
+  /** `nodes`, `triangles` and `hits` are ready in the next cycle. */
+  val readyNext = Input(Vec(RecordKind.all.size, Bool()))
+
+  /** Contexts that get no record because its address is illegal: during traversal, and for attributes. */
+  val traversalError = Output(Valid(Context(config)))
+  val attributeError = Output(Valid(Context(config)))
+  val events         = Output(new FetchEvents(config))
+}
+
+/** Fetches records and joins each one with the ray of its context, which a table holds.
+  *
+  * The table is read with the context that [[RecordFetch]] grants one cycle early, so it may be a memory with a
+  * registered address, and no combinational path connects the units that accept records.
+  */
+final class FetchStage(config: ColonnadeConfig) extends Module {
+  private val formats = new RecordFormats(config)
+
+  val io = IO(new FetchStageIO(config))
+
+  private val recordFetch = Module(new RecordFetch(config))
+  recordFetch.io.start      := io.start
+  recordFetch.io.row        := io.row
+  recordFetch.io.scene      := io.scene
+  recordFetch.io.broadcasts := io.broadcasts
+  recordFetch.io.fetches    := io.fetches
+  recordFetch.io.readyNext  := io.readyNext
+  io.requests :<>= recordFetch.io.requests
+
+  private val rays = ContextTable(config, new TracedRay(config.numbers))
+  when(io.ray.valid) { rays.write(io.ray.bits.context, io.ray.bits.ray) }
+
+  // Join the record with the ray of its context
+  private val response = recordFetch.io.response.bits
+  private val ray      = rays.read(recordFetch.io.grantNext.bits, recordFetch.io.grantNext.valid)
+  io.closestHit.grantNext := recordFetch.io.grantNext
+  io.closestHit.context   := response.context
+
+  io.nodes.valid        := isFor(RecordKind.node)
+  io.nodes.bits.context := response.context
+  io.nodes.bits.address := response.address
+  io.nodes.bits.node    := formats.asNode(response.record)
+  io.nodes.bits.ray     := ray.forBoxes
+
+  io.triangles.valid        := isFor(RecordKind.triangles)
+  io.triangles.bits.context := response.context
+  io.triangles.bits.record  := formats.asTriangles(response.record)
+  io.triangles.bits.ray     := ray.forTriangles
+
+  private val faceSlot = io.closestHit.hit.id(RecordFormats.faceSlotBits - 1, 0)
+  io.hits.valid        := isFor(RecordKind.attributes)
+  io.hits.bits.context := response.context
+  io.hits.bits.ray     := ray.forTriangles
+  io.hits.bits.hit     := io.closestHit.hit
+  io.hits.bits.face    := formats.asAttributes(response.record).faces(faceSlot)
+
+  assert(!io.nodes.valid || io.nodes.ready, "the box unit does not accept its node")
+  assert(!io.triangles.valid || io.triangles.ready, "the triangle unit does not accept its record")
+  assert(!io.hits.valid || io.hits.ready, "the shader does not accept its hit")
+
+  // Errors and events
+  private val error        = recordFetch.io.error
+  private val isAttributes = error.bits.kind === RecordKind.attributes
+  io.traversalError.valid := error.valid && !isAttributes
+  io.traversalError.bits  := error.bits.context
+  io.attributeError.valid := error.valid && isAttributes
+  io.attributeError.bits  := error.bits.context
+  io.events.waitRecord    := recordFetch.io.stalledContexts
+  io.events.waitUnit      := recordFetch.io.readyContexts
+  io.events.snoopHits     := recordFetch.io.snoopHits
+  io.events.illegalRecord := error.valid
+
+  private def isFor(kind: RecordKind.Type): Bool = recordFetch.io.response.valid && response.kind === kind
+}

@@ -1,0 +1,180 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{log2Ceil, Arbiter, Decoupled, Pipe, RegEnable, Valid}
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordFormats, SceneMap}
+import colonnade.numbers.Fixed
+import colonnade.ray.{PreparedRay, RayFormats}
+import colonnade.shading.Occlusion
+import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanes}
+
+/** The closest hit of a ray that is to be shaded. */
+final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
+  val context   = Context(config)
+  val isPrimary = Bool()
+
+  /** Packed triangle id. */
+  val id = UInt(RecordFormats.idBits(config).W)
+  val t  = new Fixed(new RayFormats(config.numbers).grid)
+}
+
+/** Events of [[Intersector]]; names as in `UnitEvents`. */
+final class IntersectorEvents(config: ColonnadeConfig) extends Bundle {
+  private def contextCount = UInt(log2Ceil(config.array.contexts + 1).W)
+
+  val raysInBox         = Bool()
+  val nodeReads         = Bool()
+  val boxTests          = UInt(log2Ceil(config.geometry.arity + 1).W)
+  val triangleTests     = Bool()
+  val hits              = Bool()
+  val busyBoxUnit       = Bool()
+  val busyTriangleUnit  = UInt(log2Ceil(config.units.triangleLanes + 1).W)
+  val contextsBox       = contextCount
+  val contextsTriangles = contextCount
+  val deepestStack      = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
+  val stackOverflow     = Bool()
+  val illegalRecord     = Bool()
+}
+
+/** Ports of [[Intersector]]. */
+final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
+  private val contexts = config.array.contexts
+
+  /** A frame starts. */
+  val start = Input(Bool())
+  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
+  val rays  = Flipped(Decoupled(new PreparedRay(config)))
+
+  /** A ray that enters the object's box, and traces that have ended: see [[RtControllerIO]]. */
+  val entered = Valid(new PreparedRay(config))
+  val ended   = Vec(3, Valid(Context(config)))
+
+  /** Fetches of the first record, of the next record, and of the attributes of a hit. */
+  val fetches    = Vec(3, Valid(new FetchRequest(config)))
+  val nodes      = Flipped(Decoupled(new NodeCandidate(config)))
+  val triangles  = Flipped(Decoupled(new TriangleCandidate(config)))
+  val fetchError = Flipped(Valid(Context(config)))
+
+  /** `nodes` and `triangles` are ready in the next cycle. */
+  val nodesReadyNext     = Output(Bool())
+  val trianglesReadyNext = Output(Bool())
+
+  /** By context: its ray is a shadow ray; its ray is the primary ray. */
+  val isShadow  = Input(Vec(contexts, Bool()))
+  val isPrimary = Input(Vec(contexts, Bool()))
+
+  /** By context: its ray has a hit; what its shadow ray has hit. */
+  val hasHit     = Output(Vec(contexts, Bool()))
+  val occlusions = Output(Vec(contexts, Occlusion()))
+
+  /** The ended ray that the controller resolves; its context if it has a surface to shade; one cycle later its hit. */
+  val resolved   = Flipped(Valid(Context(config)))
+  val hasSurface = Valid(Context(config))
+  val surfaceHit = Valid(new SurfaceHit(config))
+  val closestHit = Flipped(new GrantedHitReader(config))
+  val events     = Output(new IntersectorEvents(config))
+}
+
+/** Intersects rays with the scene: BVH traversal, triangle tests, closest hits, and early termination of shadow rays.
+  *
+  * A ray requests its next record as soon as the current one is tested. A shadow ray ends at its first opaque hit.
+  */
+final class Intersector(config: ColonnadeConfig) extends Module {
+  val io = IO(new IntersectorIO(config))
+
+  private val traversal = Module(new Traversal(config))
+  private val triangles = Module(new TriangleLanes(config))
+  private val hitTable  = Module(new HitTable(config))
+
+  // Start a trace, or end it at once if the ray misses the object's box
+  private val ray = io.rays.bits
+  io.rays.ready                  := true.B
+  io.entered.valid               := io.rays.fire && ray.enters
+  io.entered.bits                := ray
+  traversal.io.start.valid       := io.entered.valid
+  traversal.io.start.bits        := ray.context
+  hitTable.io.start.valid        := io.rays.fire
+  hitTable.io.start.bits.context := ray.context
+  hitTable.io.start.bits.tMax    := ray.tMax
+  drive(io.ended(0), io.rays.fire && !ray.enters, ray.context)
+  fetch(io.fetches(0), io.entered.valid, ray.context, Traversal.root(config, io.scene))
+
+  // Traverse the BVH
+  private val step = traversal.io.steps
+  traversal.io.clear     := io.start
+  traversal.io.scene     := io.scene
+  traversal.io.tMaxUnits := hitTable.io.tMaxUnits
+  traversal.io.nodes :<>= io.nodes
+  step.ready := true.B
+  drive(io.ended(1), step.fire && step.bits.isDone, step.bits.context)
+  fetch(io.fetches(1), step.fire && !step.bits.isDone, step.bits.context, step.bits.target)
+
+  // Test triangles: a result terminates an occluded shadow ray, or the ray resumes after its record.
+  // The termination is registered, so that no path leads from the triangle unit through the hit table to the controller
+  private val result     = triangles.io.result
+  private val isShadow   = io.isShadow(result.bits.context)
+  private val isOccluded = isShadow && hitTable.io.hasHitNow
+  private val resumes    = Module(new Arbiter(Context(config), 2))
+  triangles.io.candidate :<>= io.triangles
+  hitTable.io.result.valid := result.fire
+  hitTable.io.result.bits  := result.bits
+  hitTable.io.isShadow     := isShadow
+  result.ready             := isOccluded || !result.bits.isLast || resumes.io.in(1).ready
+  io.ended(2)              := Pipe(result.fire && result.bits.isLast && isOccluded, result.bits.context)
+
+  // A record with an illegal address is skipped
+  resumes.io.in(0).valid := io.fetchError.valid
+  resumes.io.in(0).bits  := io.fetchError.bits
+  resumes.io.in(1).valid := result.valid && result.bits.isLast && !isOccluded
+  resumes.io.in(1).bits  := result.bits.context
+  traversal.io.resume :<>= resumes.io.out
+
+  // Fetch the attributes of a hit, unless it belongs to a shadow ray
+  private val resolved   = io.resolved.bits
+  private val hasSurface = io.resolved.valid && hitTable.io.hasHit(resolved) && !io.isShadow(resolved)
+  private val closest    = hitTable.io.closest
+  drive(io.hasSurface, hasSurface, resolved)
+  closest.context              := RegEnable(resolved, hasSurface)
+  io.surfaceHit.valid          := RegNext(hasSurface, false.B)
+  io.surfaceHit.bits.context   := closest.context
+  io.surfaceHit.bits.isPrimary := RegNext(io.isPrimary(resolved))
+  io.surfaceHit.bits.id        := closest.id
+  io.surfaceHit.bits.t         := closest.t
+  io.fetches(2).valid          := io.surfaceHit.valid
+  io.fetches(2).bits.context   := closest.context
+  io.fetches(2).bits.kind      := RecordKind.attributes
+  io.fetches(2).bits.address   := io.scene.attributeBase + (closest.id >> RecordFormats.faceSlotBits)
+
+  io.nodesReadyNext     := traversal.io.readyNext
+  io.trianglesReadyNext := triangles.io.readyNext
+  io.hasHit             := hitTable.io.hasHit
+  io.occlusions         := hitTable.io.occlusions
+  hitTable.io.granted :<>= io.closestHit
+
+  io.events.raysInBox         := io.entered.valid
+  io.events.nodeReads         := io.nodes.fire
+  io.events.boxTests          := traversal.io.boxTests
+  io.events.triangleTests     := result.fire
+  io.events.hits              := io.surfaceHit.valid && io.surfaceHit.bits.isPrimary
+  io.events.busyBoxUnit       := traversal.io.busy
+  io.events.busyTriangleUnit  := triangles.io.busy
+  io.events.contextsBox       := Occupancy(config, Seq(io.nodes.fire, traversal.io.resume.fire), Seq(step.fire))
+  io.events.contextsTriangles := Occupancy(config, Seq(io.triangles.fire), Seq(result.fire && result.bits.isLast))
+  io.events.deepestStack      := traversal.io.deepest
+  io.events.stackOverflow     := traversal.io.overflow
+  io.events.illegalRecord     := traversal.io.illegal || (io.triangles.fire && !io.triangles.bits.record.isLegal)
+
+  private def drive(port: Valid[UInt], valid: Bool, context: UInt): Unit = {
+    port.valid := valid
+    port.bits  := context
+  }
+
+  private def fetch(port: Valid[FetchRequest], valid: Bool, context: UInt, target: NodeRef): Unit = {
+    port.valid        := valid
+    port.bits.context := context
+    port.bits.kind    := Mux(target.isLeaf, RecordKind.triangles, RecordKind.node)
+    port.bits.address := target.address
+  }
+}

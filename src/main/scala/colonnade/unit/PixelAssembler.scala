@@ -1,0 +1,88 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
+import colonnade.common.{Context, ContextTable}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{FrameRegisters, Pixel, PixelHit, PixelPosition, Rgb}
+import colonnade.numbers.Rounding
+import colonnade.ray.PreparedRay
+import colonnade.shading.PathColour
+
+/** Ports of [[PixelAssembler]]. */
+final class PixelAssemblerIO(config: ColonnadeConfig) extends Bundle {
+  val background = Input(Rgb(FrameRegisters.colour))
+  val allocated  = Flipped(Valid(new AllocatedPixel(config)))
+
+  /** A ray that enters the object's box; a context whose ray has a surface; one cycle later its hit. */
+  val entered    = Flipped(Valid(new PreparedRay(config)))
+  val hasSurface = Flipped(Valid(Context(config)))
+  val surfaceHit = Flipped(Valid(new SurfaceHit(config)))
+  val colour     = Flipped(Valid(new PathColour(config)))
+
+  /** A context whose pixel is complete, whether it has an accumulated colour, and whether it retires. */
+  val done      = Flipped(Valid(Context(config)))
+  val hasColour = Input(Bool())
+  val retire    = Output(Bool())
+  val pixels    = Decoupled(new Pixel(config))
+
+  /** No pixel waits here. */
+  val isIdle = Output(Bool())
+}
+
+/** Keeps what each context knows of its pixel, and assembles the pixel when it is done.
+  *
+  * A context retires when its tables are read; the pixel follows one cycle later, into a queue that has space for it.
+  */
+final class PixelAssembler(config: ColonnadeConfig) extends Module {
+  val io = IO(new PixelAssemblerIO(config))
+
+  private val pixels   = ContextTable(config, new PixelPosition(config))
+  private val colours  = ContextTable(config, new PathColour(config))
+  private val isObject = Reg(Vec(config.array.contexts, Bool()))
+  when(io.allocated.valid) {
+    pixels.write(io.allocated.bits.context, io.allocated.bits.pixel)
+    isObject(io.allocated.bits.context) := false.B
+  }
+  when(io.hasSurface.valid) { isObject(io.hasSurface.bits) := true.B }
+  when(io.colour.valid) { colours.write(io.colour.bits.context, io.colour.bits) }
+
+  // Retire a context
+  private val finished = Wire(Decoupled(new Pixel(config)))
+  private val queue    = Module(new Queue(new Pixel(config), 1))
+  private val retires  = io.done.valid && queue.io.enq.ready && !finished.valid
+  io.retire := retires
+  queue.io.enq :<>= finished
+  io.pixels :<>= queue.io.deq
+  io.isIdle := !finished.valid && !io.pixels.valid
+
+  // Assemble its pixel
+  private val pixel     = pixels.read(io.done.bits, retires)
+  private val colour    = colours.read(io.done.bits, retires)
+  private val hasColour = RegEnable(io.hasColour, retires)
+  finished.valid         := RegNext(retires, false.B)
+  finished.bits.x        := pixel.x
+  finished.bits.y        := pixel.y
+  finished.bits.colour   := Mux(hasColour, colour.colour, io.background)
+  finished.bits.isObject := RegEnable(isObject(io.done.bits), retires)
+  for (ratio <- finished.bits.ratio; shadow <- colour.ratio; channel <- 0 until 3)
+    ratio.channels(channel) :=
+      Mux(hasColour && !finished.bits.isObject, shadow.channels(channel), FrameRegisters.whole)
+
+  // The primary ray's hit; its distance is the sum of the entry distance and t
+  for (hit <- finished.bits.hit) {
+    val hits    = ContextTable(config, new PixelHit(config))
+    val entries = ContextTable(config, UInt(config.numbers.entryBits.W))
+    when(io.entered.valid) { entries.write(io.entered.bits.context, io.entered.bits.tEntry.natural) }
+    val tEntry = entries.read(io.hasSurface.bits, io.hasSurface.valid)
+    when(io.surfaceHit.valid && io.surfaceHit.bits.isPrimary) {
+      val primary = Wire(new PixelHit(config))
+      primary.triangle     := io.surfaceHit.bits.id
+      primary.distance.raw :=
+        Rounding.floor(tEntry, -config.numbers.gridFraction) +& io.surfaceHit.bits.t.integer.asUInt
+      hits.write(io.surfaceHit.bits.context, primary)
+    }
+    val read = hits.read(io.done.bits, retires)
+    hit := Mux(finished.bits.isObject, read, 0.U.asTypeOf(new PixelHit(config)))
+  }
+}

@@ -1,0 +1,58 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Decoupled, Valid}
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{PixelPosition, UnitPosition}
+import colonnade.ray.{CameraRegisters, RayGenerator, RayRequest}
+
+/** A context that gets a pixel. */
+final class AllocatedPixel(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val pixel   = new PixelPosition(config)
+}
+
+/** Ports of [[PrimaryRays]]. */
+final class PrimaryRaysIO(config: ColonnadeConfig) extends Bundle {
+  val camera    = Input(new CameraRegisters(config))
+  val positions = Flipped(Decoupled(new UnitPosition(config)))
+
+  /** An idle context; it gets the pixel that `allocated` names in the same cycle. */
+  val free      = Flipped(Valid(Context(config)))
+  val allocated = Valid(new AllocatedPixel(config))
+  val ray       = Decoupled(new RayRequest(config))
+
+  /** The pixel of `ray`, and whether the ray may hit the object. */
+  val pixel       = Output(new PixelPosition(config))
+  val meetsObject = Output(Bool())
+}
+
+/** Allocates an idle context to each pixel position, and generates its primary ray. */
+final class PrimaryRays(config: ColonnadeConfig) extends Module {
+  val io = IO(new PrimaryRaysIO(config))
+
+  private val generator = Module(new RayGenerator(config))
+  private val position  = io.positions.bits
+  generator.io.registers             := io.camera
+  generator.io.position.valid        := io.positions.valid && io.free.valid
+  generator.io.position.bits.context := io.free.bits
+  generator.io.position.bits.x       := position.x
+  generator.io.position.bits.y       := position.y
+  io.positions.ready                 := generator.io.position.ready && io.free.valid
+
+  io.allocated.valid        := generator.io.position.fire
+  io.allocated.bits.context := io.free.bits
+  io.allocated.bits.pixel.x := position.x
+  io.allocated.bits.pixel.y := position.y
+
+  io.ray :<>= generator.io.ray
+  io.pixel.x     := generator.io.pixel.x
+  io.pixel.y     := generator.io.pixel.y
+  io.meetsObject := true.B
+  for (meetsObject <- position.meetsObject) {
+    val table = Reg(Vec(config.array.contexts, Bool()))
+    when(io.allocated.valid) { table(io.free.bits) := meetsObject }
+    io.meetsObject := table(io.ray.bits.context)
+  }
+}

@@ -1,0 +1,265 @@
+package colonnade.unit
+
+import chisel3._
+import chiseltest._
+import colonnade.shading.Occlusion
+
+import scala.util.Random
+
+/** The expected state of a context and of its path. */
+private class ContextModel(lights: Int) {
+  var state         = ContextState.idle
+  var isShadow      = false
+  var isPrimary     = false
+  var hasColour     = false
+  var isBackground  = false
+  var hasHit        = false
+  var occlusion     = Occlusion.none
+  var shadowPending = Seq.empty[Int]
+  var shadowLight   = 0
+  var occlusions    = Seq.fill(lights)(Occlusion.none)
+  var waited        = 0
+
+  /** The pixel shows the environment; its ray is a Fresnel reflection. */
+  var isDirectView        = false
+  var isFresnelReflection = false
+
+  /** Its primary ray cannot hit the object. */
+  var bypasses = false
+
+  /** The shader's result, if it is determined: a bounce, or a lit surface. */
+  var willBounce = Option.empty[Boolean]
+}
+
+/** A model of all contexts beside the controller; it drives random events that are legal in their states.
+  *
+  * @param hasEnvironment the frame has an environment, if the configuration has one
+  */
+private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvironment: Boolean = false) {
+  private val random   = new Random(seed)
+  private val lights   = dut.io.shaded.bits.needsShadowRays.size
+  private val contexts = Seq.fill(count)(new ContextModel(lights))
+  private var started  = 0
+  private var retired  = 0
+
+  /** Results of the environment march: of a Fresnel reflection or not, with a hit or without. */
+  var outcomes = Set.empty[(Boolean, Boolean)]
+
+  private def contextsWith(claim: ContextModel => Boolean): Seq[Int] =
+    contexts.indices.filter(index => claim(contexts(index)))
+
+  private def at(state: ContextState.Type): Seq[Int] = contextsWith(_.state == state)
+
+  private def needsShadow: Seq[Int] =
+    contextsWith(context => context.state == ContextState.shadowTest && context.shadowPending.nonEmpty)
+
+  private def ending: Seq[Int] =
+    contextsWith(context =>
+      context.state == ContextState.accumulatePending || (isShadowDone(context) && !context.isFresnelReflection)
+    )
+
+  private def resumable: Seq[Int] =
+    contextsWith(context =>
+      context.state == ContextState.resumeBounce || (isShadowDone(context) && context.isFresnelReflection)
+    )
+
+  private def isShadowDone(context: ContextModel): Boolean =
+    context.state == ContextState.shadowTest && context.shadowPending.isEmpty
+
+  def run(pixels: Int, eagerness: Double): Unit = {
+    def happens = random.nextDouble() < eagerness
+    while (retired < pixels) cycle { events =>
+      events.allocate = started < pixels && happens
+      events.retire = happens
+      events.shadow = happens
+      events.end = happens
+      events.march = happens
+      events.resume = happens
+      // Each stage names one context, and no two stages name the same one
+      val (starting, passing) = random.shuffle(at(ContextState.raySetup)).partition(!contexts(_).bypasses)
+      for (context <- starting.headOption if happens)
+        if (random.nextInt(3) > 0) events.entered = Some(context) else events.ended(0) = Some(context)
+      for (context <- passing.headOption if happens) events.bypasses = Some(context)
+      val traversing = random.shuffle(at(ContextState.traversing))
+      for (context <- traversing.headOption if happens) events.ended(1) = Some(context)
+      for (context <- traversing.drop(1).headOption if happens) events.ended(2) = Some(context)
+      val shading = random.shuffle(at(ContextState.shading))
+      for (context <- shading.headOption if happens) finishShading(context, events)
+      for (context <- shading.drop(1).find(contexts(_).willBounce.isEmpty) if happens && random.nextInt(3) == 0)
+        events.fetchFailed = Some(context)
+      for (context <- one(at(ContextState.environmentMarch)) if happens)
+        if (random.nextBoolean()) events.environmentHit = Some(context) else events.environmentMiss = Some(context)
+      for (context <- one(at(ContextState.accumulating)) if happens) events.accumulated = Some(context)
+    }
+    assert(started == pixels && at(ContextState.idle).size == count, "every pixel has retired")
+  }
+
+  private def finishShading(index: Int, events: ControllerEvents): Unit = {
+    val context = contexts(index)
+    if (!context.willBounce.getOrElse(random.nextInt(3) == 0))
+      events.shaded = Some((index, Seq.fill(lights)(!context.isFresnelReflection && random.nextBoolean())))
+    else if (hasEnvironment && context.willBounce.isEmpty && random.nextInt(4) > 0)
+      events.fresnelReflection = Some(index)
+    else events.bounced = Some((index, random.nextInt(3) > 0))
+  }
+
+  /** One cycle: checks all outputs, then drives the events that `happen` sets. */
+  def cycle(happen: ControllerEvents => Unit): Unit = {
+    dut.io.idleCount.expect(at(ContextState.idle).size)
+    val free     = shown(dut.io.free.valid, dut.io.free.bits, at(ContextState.idle))
+    val resolved = shown(dut.io.resolved.valid, dut.io.resolved.bits, at(ContextState.resolve))
+    val done     = shown(dut.io.done.valid, dut.io.done.bits, at(ContextState.done))
+    val shadowed = shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow)
+    val ended    = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
+    val marched  = dut.io.environment.flatMap(environment =>
+      shown(environment.req.valid, environment.req.bits.context, at(ContextState.environmentPending))
+    )
+    val resumed = dut.io.environment.flatMap(environment =>
+      shown(environment.resume.valid, environment.resume.bits.context, resumable)
+    )
+    dut.io.environmentCount.foreach(
+      _.expect(at(ContextState.environmentPending).size + at(ContextState.environmentMarch).size)
+    )
+    for ((context, index) <- contexts.zipWithIndex if context.state != ContextState.idle) {
+      dut.io.isShadow(index).expect(context.isShadow, s"context $index at ${context.state}")
+      dut.io.isPrimary(index).expect(context.isPrimary, s"context $index at ${context.state}")
+      dut.io.hasColour(index).expect(context.hasColour, s"context $index at ${context.state}")
+      context.waited += 1
+      assert(context.waited < 2000, s"context $index is stuck in ${context.state}")
+    }
+    for (index <- shadowed) assert(contexts(index).shadowPending.contains(dut.io.shadow.bits.light.peekInt().toInt))
+    for (index <- ended) {
+      dut.io.end.bits.isBackground.expect(contexts(index).isBackground)
+      dut.io.end.bits.isDirectView.foreach(_.expect(contexts(index).isDirectView))
+      if (!contexts(index).isBackground)
+        dut.io.end.bits.occlusions.zip(contexts(index).occlusions).foreach { case (port, occlusion) =>
+          port.expect(occlusion)
+        }
+    }
+
+    for (environment <- dut.io.environment; index <- marched) {
+      environment.req.bits.isSeen.expect(contexts(index).isPrimary)
+      environment.req.bits.isAside.expect(contexts(index).isFresnelReflection)
+    }
+    for (environment <- dut.io.environment; index <- resumed)
+      environment.resume.bits.isBackground.expect(contexts(index).isBackground)
+
+    val events = new ControllerEvents
+    happen(events)
+    val allocated = free.filter(_ => events.allocate)
+    val retires   = done.filter(_ => events.retire)
+    val light     = dut.io.shadow.bits.light.peekInt().toInt
+    events.poke(dut, allocated.nonEmpty, retires.nonEmpty, hasEnvironment)(random.nextInt(count))
+    dut.clock.step()
+
+    def change(index: Option[Int])(how: ContextModel => Unit): Unit = index.foreach(index => how(contexts(index)))
+    change(allocated) { context =>
+      context.state = ContextState.raySetup
+      context.isShadow = false
+      context.isPrimary = true
+      context.hasColour = false
+      context.isDirectView = false
+      context.isFresnelReflection = false
+      context.bypasses = hasEnvironment && random.nextInt(3) == 0
+      started += 1
+    }
+    change(events.entered)(_.state = ContextState.traversing)
+    change(resolved)(resolve)
+    events.ended.flatten.foreach { index =>
+      val context = contexts(index)
+      context.state = ContextState.resolve
+      context.hasHit = random.nextBoolean()
+      context.occlusion = random.shuffle(Occlusion.all).head
+      dut.io.hasHit(index).poke(context.hasHit)
+      dut.io.occlusions(index).poke(context.occlusion)
+    }
+    for ((index, needs) <- events.shaded) change(Some(index)) { context =>
+      context.state = ContextState.shadowTest
+      context.isBackground = false
+      context.shadowPending = needs.indices.filter(needs(_))
+      context.occlusions = Seq.fill(lights)(Occlusion.none)
+    }
+    for ((index, isTraced) <- events.bounced) change(Some(index)) { context =>
+      context.state = if (isTraced) ContextState.raySetup
+      else if (hasEnvironment) ContextState.environmentPending else ContextState.accumulatePending
+      context.isPrimary = false
+      context.isBackground = true
+    }
+    change(events.fetchFailed) { context =>
+      context.state = ContextState.accumulatePending
+      context.isBackground = true
+    }
+    change(shadowed.filter(_ => events.shadow)) { context =>
+      context.state = ContextState.raySetup
+      context.isShadow = true
+      context.shadowLight = light
+      context.shadowPending = context.shadowPending.filter(_ != light)
+    }
+    change(ended.filter(_ => events.end))(_.state = ContextState.accumulating)
+    change(events.accumulated) { context =>
+      context.state = ContextState.done
+      context.hasColour = true
+    }
+    change(events.bypasses) { context =>
+      context.state = ContextState.environmentPending
+      context.bypasses = false
+    }
+    change(events.fresnelReflection) { context =>
+      context.state = ContextState.environmentPending
+      context.isFresnelReflection = true
+      context.isPrimary = false
+    }
+    change(marched.filter(_ => events.march)) { context =>
+      context.state = ContextState.environmentMarch
+      context.isDirectView = context.isPrimary
+      context.isShadow = false
+    }
+    change(events.environmentHit) { context =>
+      context.state = ContextState.shading
+      context.willBounce = Some(false)
+      outcomes += ((context.isFresnelReflection, true))
+    }
+    change(events.environmentMiss) { context =>
+      context.state = if (context.isFresnelReflection) ContextState.resumeBounce else afterMiss(context)
+      context.isBackground = true
+      outcomes += ((context.isFresnelReflection, false))
+    }
+    change(resumed.filter(_ => events.resume)) { context =>
+      context.state = ContextState.shading
+      context.isFresnelReflection = false
+      context.willBounce = Some(true)
+    }
+    change(retires) { context =>
+      context.state = ContextState.idle
+      context.waited = 0
+      retired += 1
+    }
+  }
+
+  private def resolve(context: ContextModel): Unit =
+    if (context.isShadow) {
+      context.state = ContextState.shadowTest
+      context.occlusions = context.occlusions.updated(context.shadowLight, context.occlusion)
+    } else if (context.hasHit) {
+      context.state = ContextState.shading
+      context.willBounce = None
+    } else {
+      context.state = if (hasEnvironment) ContextState.environmentPending else afterMiss(context)
+      context.isBackground = true
+    }
+
+  private def afterMiss(context: ContextModel): ContextState.Type =
+    if (context.isPrimary) ContextState.done else ContextState.accumulatePending
+
+  /** The context that the controller selects from `these`, if there are any. */
+  private def shown(valid: Bool, bits: UInt, these: Seq[Int]): Option[Int] = {
+    valid.expect(these.nonEmpty, s"contexts $these")
+    Option.when(valid.peekBoolean()) {
+      val context = bits.peekInt().toInt
+      assert(these.contains(context), s"context $context is not one of $these")
+      context
+    }
+  }
+
+  private def one(candidates: Seq[Int]): Option[Int] = random.shuffle(candidates).headOption
+}

@@ -1,0 +1,62 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.Valid
+import chiseltest._
+
+/** The inputs of the controller in one cycle. */
+private class ControllerEvents {
+  var allocate    = false
+  var retire      = false
+  var entered     = Option.empty[Int]
+  val ended       = Array.fill(3)(Option.empty[Int])
+  var shaded      = Option.empty[(Int, Seq[Boolean])]
+  var bounced     = Option.empty[(Int, Boolean)]
+  var fetchFailed = Option.empty[Int]
+  var shadow      = false
+  var end         = false
+  var accumulated = Option.empty[Int]
+
+  // With an environment
+  var bypasses          = Option.empty[Int]
+  var fresnelReflection = Option.empty[Int]
+  var march             = false
+  var environmentHit    = Option.empty[Int]
+  var environmentMiss   = Option.empty[Int]
+  var resume            = false
+
+  /** @param other the context on ports that are not valid */
+  def poke(dut: RtController, allocates: Boolean, retires: Boolean, hasEnvironment: Boolean)(other: => Int): Unit = {
+    def name(port: Valid[UInt], context: Option[Int]): Unit = {
+      port.valid.poke(context.nonEmpty)
+      port.bits.poke(context.getOrElse(other))
+    }
+    dut.io.allocate.poke(allocates)
+    dut.io.retire.poke(retires)
+    dut.io.shadow.ready.poke(shadow)
+    dut.io.end.ready.poke(end)
+    name(dut.io.entered, entered)
+    dut.io.ended.zip(ended).foreach { case (port, context) => name(port, context) }
+    dut.io.shaded.valid.poke(shaded.nonEmpty)
+    for ((context, needs) <- shaded) {
+      dut.io.shaded.bits.context.poke(context)
+      dut.io.shaded.bits.needsShadowRays.zip(needs).foreach { case (port, need) => port.poke(need) }
+    }
+    dut.io.bounced.valid.poke(bounced.nonEmpty)
+    for ((context, isTraced) <- bounced) {
+      dut.io.bounced.bits.context.poke(context)
+      dut.io.bounced.bits.isTraced.poke(isTraced)
+    }
+    name(dut.io.fetchFailed, fetchFailed)
+    name(dut.io.accumulated, accumulated)
+    for (environment <- dut.io.environment) {
+      environment.enabled.poke(hasEnvironment)
+      environment.req.ready.poke(march)
+      environment.resume.ready.poke(resume)
+      name(environment.bypass, bypasses)
+      name(environment.fresnelReflection, fresnelReflection)
+      name(environment.hit, environmentHit)
+      name(environment.miss, environmentMiss)
+    }
+  }
+}
