@@ -86,29 +86,53 @@ final class EnvironmentControl(config: ColonnadeConfig) extends Bundle {
   val resume = Decoupled(new ResumedBounce(config))
 }
 
-/** Ports of [[RtController]]. */
-final class RtControllerIO(config: ColonnadeConfig) extends Bundle {
-  private val contexts     = config.array.contexts
-  private def contextCount = Output(UInt(log2Ceil(contexts + 1).W))
+/** Allocation of a context, seen from the stage that gives it a pixel. */
+final class AllocationControl(config: ColonnadeConfig) extends Bundle {
 
   /** An idle context, and whether it gets a pixel. */
-  val free     = Output(Valid(Context(config)))
-  val allocate = Input(Bool())
+  val free     = Flipped(Valid(Context(config)))
+  val allocate = Output(Bool())
+}
+
+/** Control of traces, seen from the stage that traces rays. */
+final class TraceControl(config: ColonnadeConfig) extends Bundle {
+  private val contexts = config.array.contexts
 
   /** A prepared ray that enters the object's box. */
-  val entered = Flipped(Valid(Context(config)))
+  val entered = Valid(Context(config))
 
   /** Traces that have ended: the ray misses the box, has no record left to visit, or is occluded. */
-  val ended = Flipped(Vec(3, Valid(Context(config))))
+  val ended = Vec(3, Valid(Context(config)))
+
+  /** By context: its ray has a hit; what its shadow ray has hit. */
+  val hasHit     = Output(Vec(contexts, Bool()))
+  val occlusions = Output(Vec(contexts, Occlusion()))
 
   /** The ended ray that is resolved in this cycle. */
-  val resolved   = Output(Valid(Context(config)))
-  val hasHit     = Input(Vec(contexts, Bool()))
-  val occlusions = Input(Vec(contexts, Occlusion()))
+  val resolved = Flipped(Valid(Context(config)))
 
-  val shaded  = Flipped(Valid(new Shaded(config)))
-  val bounced = Flipped(Valid(new Bounced(config)))
+  /** By context: its ray is a shadow ray; its ray is the primary ray. */
+  val isShadow  = Input(Vec(contexts, Bool()))
+  val isPrimary = Input(Vec(contexts, Bool()))
+}
 
+/** Retirement of pixels, seen from the stage that assembles them. */
+final class PixelControl(config: ColonnadeConfig) extends Bundle {
+
+  /** A context whose pixel is complete, whether it has an accumulated colour, and whether it retires. */
+  val done      = Flipped(Valid(Context(config)))
+  val hasColour = Input(Bool())
+  val retire    = Output(Bool())
+}
+
+/** Ports of [[RtController]]. */
+final class RtControllerIO(config: ColonnadeConfig) extends Bundle {
+  private def contextCount = Output(UInt(log2Ceil(config.array.contexts + 1).W))
+
+  val allocation  = Flipped(new AllocationControl(config))
+  val trace       = Flipped(new TraceControl(config))
+  val shaded      = Flipped(Valid(new Shaded(config)))
+  val bounced     = Flipped(Valid(new Bounced(config)))
   val environment = if (config.hasRoom) Some(new EnvironmentControl(config)) else None
 
   /** A hit whose attributes have an illegal address: the path ends in the background. */
@@ -120,15 +144,7 @@ final class RtControllerIO(config: ColonnadeConfig) extends Bundle {
   /** A path that has ended, and a context whose colour is complete. */
   val end         = Decoupled(new PathTermination(config))
   val accumulated = Flipped(Valid(Context(config)))
-
-  /** A context whose pixel is complete, and whether it retires. */
-  val done   = Output(Valid(Context(config)))
-  val retire = Input(Bool())
-
-  /** By context: its ray is a shadow ray; its ray is the primary ray; its colour has been accumulated. */
-  val isShadow  = Output(Vec(contexts, Bool()))
-  val isPrimary = Output(Vec(contexts, Bool()))
-  val hasColour = Output(Vec(contexts, Bool()))
+  val pixel       = Flipped(new PixelControl(config))
 
   /** Numbers of contexts that are idle, in ray set-up, and waiting for the environment march or in it. */
   val idleCount        = contextCount

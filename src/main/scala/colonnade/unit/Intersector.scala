@@ -7,7 +7,6 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordFormats, SceneMap}
 import colonnade.numbers.Fixed
 import colonnade.ray.{PreparedRay, RayFormats}
-import colonnade.shading.Occlusion
 import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanes}
 
 /** The closest hit of a ray that is to be shaded. */
@@ -40,16 +39,15 @@ final class IntersectorEvents(config: ColonnadeConfig) extends Bundle {
 
 /** Ports of [[Intersector]]. */
 final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
-  private val contexts = config.array.contexts
 
   /** A frame starts. */
-  val start = Input(Bool())
-  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
-  val rays  = Flipped(Decoupled(new PreparedRay(config)))
+  val start   = Input(Bool())
+  val scene   = Input(new SceneMap(RecordFormats.idBits(config)))
+  val control = new TraceControl(config)
+  val rays    = Flipped(Decoupled(new PreparedRay(config)))
 
-  /** A ray that enters the object's box, and traces that have ended: see [[RtControllerIO]]. */
+  /** A ray that enters the object's box. */
   val entered = Valid(new PreparedRay(config))
-  val ended   = Vec(3, Valid(Context(config)))
 
   /** Fetches of the first record, of the next record, and of the attributes of a hit. */
   val fetches    = Vec(3, Valid(new FetchRequest(config)))
@@ -61,16 +59,7 @@ final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
   val nodesReadyNext     = Output(Bool())
   val trianglesReadyNext = Output(Bool())
 
-  /** By context: its ray is a shadow ray; its ray is the primary ray. */
-  val isShadow  = Input(Vec(contexts, Bool()))
-  val isPrimary = Input(Vec(contexts, Bool()))
-
-  /** By context: its ray has a hit; what its shadow ray has hit. */
-  val hasHit     = Output(Vec(contexts, Bool()))
-  val occlusions = Output(Vec(contexts, Occlusion()))
-
-  /** The ended ray that the controller resolves; its context if it has a surface to shade; one cycle later its hit. */
-  val resolved   = Flipped(Valid(Context(config)))
+  /** A resolved context whose ray has a surface to shade; one cycle later its hit. */
   val hasSurface = Valid(Context(config))
   val surfaceHit = Valid(new SurfaceHit(config))
   val closestHit = Flipped(new GrantedHitReader(config))
@@ -87,18 +76,19 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   private val traversal = Module(new Traversal(config))
   private val triangles = Module(new TriangleLanes(config))
   private val hitTable  = Module(new HitTable(config))
+  private val control   = io.control
 
   // Start a trace, or end it at once if the ray misses the object's box
   private val ray = io.rays.bits
-  io.rays.ready                  := true.B
-  io.entered.valid               := io.rays.fire && ray.enters
-  io.entered.bits                := ray
-  traversal.io.start.valid       := io.entered.valid
-  traversal.io.start.bits        := ray.context
+  io.rays.ready    := true.B
+  io.entered.valid := io.rays.fire && ray.enters
+  io.entered.bits  := ray
+  drive(control.entered, io.entered.valid, ray.context)
+  drive(traversal.io.start, io.entered.valid, ray.context)
   hitTable.io.start.valid        := io.rays.fire
   hitTable.io.start.bits.context := ray.context
   hitTable.io.start.bits.tMax    := ray.tMax
-  drive(io.ended(0), io.rays.fire && !ray.enters, ray.context)
+  drive(control.ended(0), io.rays.fire && !ray.enters, ray.context)
   fetch(io.fetches(0), io.entered.valid, ray.context, Traversal.root(config, io.scene))
 
   // Traverse the BVH
@@ -108,13 +98,13 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   traversal.io.tMaxUnits := hitTable.io.tMaxUnits
   traversal.io.nodes :<>= io.nodes
   step.ready := true.B
-  drive(io.ended(1), step.fire && step.bits.isDone, step.bits.context)
+  drive(control.ended(1), step.fire && step.bits.isDone, step.bits.context)
   fetch(io.fetches(1), step.fire && !step.bits.isDone, step.bits.context, step.bits.target)
 
   // Test triangles: a result terminates an occluded shadow ray, or the ray resumes after its record.
   // The termination is registered, so that no path leads from the triangle unit through the hit table to the controller
   private val result     = triangles.io.result
-  private val isShadow   = io.isShadow(result.bits.context)
+  private val isShadow   = control.isShadow(result.bits.context)
   private val isOccluded = isShadow && hitTable.io.hasHitNow
   private val resumes    = Module(new Arbiter(Context(config), 2))
   triangles.io.candidate :<>= io.triangles
@@ -122,7 +112,7 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   hitTable.io.result.bits  := result.bits
   hitTable.io.isShadow     := isShadow
   result.ready             := isOccluded || !result.bits.isLast || resumes.io.in(1).ready
-  io.ended(2)              := Pipe(result.fire && result.bits.isLast && isOccluded, result.bits.context)
+  control.ended(2)         := Pipe(result.fire && result.bits.isLast && isOccluded, result.bits.context)
 
   // A record with an illegal address is skipped
   resumes.io.in(0).valid := io.fetchError.valid
@@ -132,14 +122,14 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   traversal.io.resume :<>= resumes.io.out
 
   // Fetch the attributes of a hit, unless it belongs to a shadow ray
-  private val resolved   = io.resolved.bits
-  private val hasSurface = io.resolved.valid && hitTable.io.hasHit(resolved) && !io.isShadow(resolved)
+  private val resolved   = control.resolved.bits
+  private val hasSurface = control.resolved.valid && hitTable.io.hasHit(resolved) && !control.isShadow(resolved)
   private val closest    = hitTable.io.closest
   drive(io.hasSurface, hasSurface, resolved)
   closest.context              := RegEnable(resolved, hasSurface)
   io.surfaceHit.valid          := RegNext(hasSurface, false.B)
   io.surfaceHit.bits.context   := closest.context
-  io.surfaceHit.bits.isPrimary := RegNext(io.isPrimary(resolved))
+  io.surfaceHit.bits.isPrimary := RegNext(control.isPrimary(resolved))
   io.surfaceHit.bits.id        := closest.id
   io.surfaceHit.bits.t         := closest.t
   io.fetches(2).valid          := io.surfaceHit.valid
@@ -149,8 +139,8 @@ final class Intersector(config: ColonnadeConfig) extends Module {
 
   io.nodesReadyNext     := traversal.io.readyNext
   io.trianglesReadyNext := triangles.io.readyNext
-  io.hasHit             := hitTable.io.hasHit
-  io.occlusions         := hitTable.io.occlusions
+  control.hasHit        := hitTable.io.hasHit
+  control.occlusions    := hitTable.io.occlusions
   hitTable.io.granted :<>= io.closestHit
 
   io.events.raysInBox         := io.entered.valid

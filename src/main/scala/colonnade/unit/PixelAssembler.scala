@@ -20,11 +20,8 @@ final class PixelAssemblerIO(config: ColonnadeConfig) extends Bundle {
   val surfaceHit = Flipped(Valid(new SurfaceHit(config)))
   val colour     = Flipped(Valid(new PathColour(config)))
 
-  /** A context whose pixel is complete, whether it has an accumulated colour, and whether it retires. */
-  val done      = Flipped(Valid(Context(config)))
-  val hasColour = Input(Bool())
-  val retire    = Output(Bool())
-  val pixels    = Decoupled(new Pixel(config))
+  val control = new PixelControl(config)
+  val pixels  = Decoupled(new Pixel(config))
 
   /** No pixel waits here. */
   val isIdle = Output(Bool())
@@ -48,23 +45,24 @@ final class PixelAssembler(config: ColonnadeConfig) extends Module {
   when(io.colour.valid) { colours.write(io.colour.bits.context, io.colour.bits) }
 
   // Retire a context
+  private val done     = io.control.done
   private val finished = Wire(Decoupled(new Pixel(config)))
   private val queue    = Module(new Queue(new Pixel(config), 1))
-  private val retires  = io.done.valid && queue.io.enq.ready && !finished.valid
-  io.retire := retires
+  private val retires  = done.valid && queue.io.enq.ready && !finished.valid
+  io.control.retire := retires
   queue.io.enq :<>= finished
   io.pixels :<>= queue.io.deq
   io.isIdle := !finished.valid && !io.pixels.valid
 
   // Assemble its pixel
-  private val pixel     = pixels.read(io.done.bits, retires)
-  private val colour    = colours.read(io.done.bits, retires)
-  private val hasColour = RegEnable(io.hasColour, retires)
+  private val pixel     = pixels.read(done.bits, retires)
+  private val colour    = colours.read(done.bits, retires)
+  private val hasColour = RegEnable(io.control.hasColour, retires)
   finished.valid         := RegNext(retires, false.B)
   finished.bits.x        := pixel.x
   finished.bits.y        := pixel.y
   finished.bits.colour   := Mux(hasColour, colour.colour, io.background)
-  finished.bits.isObject := RegEnable(isObject(io.done.bits), retires)
+  finished.bits.isObject := RegEnable(isObject(done.bits), retires)
   for (ratio <- finished.bits.ratio; shadow <- colour.ratio; channel <- 0 until 3)
     ratio.channels(channel) :=
       Mux(hasColour && !finished.bits.isObject, shadow.channels(channel), FrameRegisters.whole)
@@ -82,7 +80,7 @@ final class PixelAssembler(config: ColonnadeConfig) extends Module {
         Rounding.floor(tEntry, -config.numbers.gridFraction) +& io.surfaceHit.bits.t.integer.asUInt
       hits.write(io.surfaceHit.bits.context, primary)
     }
-    val read = hits.read(io.done.bits, retires)
+    val read = hits.read(done.bits, retires)
     hit := Mux(finished.bits.isObject, read, 0.U.asTypeOf(new PixelHit(config)))
   }
 }

@@ -18,8 +18,10 @@ final class PrimaryRaysIO(config: ColonnadeConfig) extends Bundle {
   val camera    = Input(new CameraRegisters(config))
   val positions = Flipped(Decoupled(new UnitPosition(config)))
 
-  /** An idle context; it gets the pixel that `allocated` names in the same cycle. */
-  val free      = Flipped(Valid(Context(config)))
+  val control = new AllocationControl(config)
+
+  /** A context that gets a pixel: for the stages that reset its path, and with its pixel. */
+  val start     = Valid(Context(config))
   val allocated = Valid(new AllocatedPixel(config))
   val ray       = Decoupled(new RayRequest(config))
 
@@ -34,15 +36,19 @@ final class PrimaryRays(config: ColonnadeConfig) extends Module {
 
   private val generator = Module(new RayGenerator(config))
   private val position  = io.positions.bits
+  private val free      = io.control.free
   generator.io.registers             := io.camera
-  generator.io.position.valid        := io.positions.valid && io.free.valid
-  generator.io.position.bits.context := io.free.bits
+  generator.io.position.valid        := io.positions.valid && free.valid
+  generator.io.position.bits.context := free.bits
   generator.io.position.bits.x       := position.x
   generator.io.position.bits.y       := position.y
-  io.positions.ready                 := generator.io.position.ready && io.free.valid
+  io.positions.ready                 := generator.io.position.ready && free.valid
 
+  io.control.allocate       := generator.io.position.fire
+  io.start.valid            := generator.io.position.fire
+  io.start.bits             := free.bits
   io.allocated.valid        := generator.io.position.fire
-  io.allocated.bits.context := io.free.bits
+  io.allocated.bits.context := free.bits
   io.allocated.bits.pixel.x := position.x
   io.allocated.bits.pixel.y := position.y
 
@@ -52,7 +58,7 @@ final class PrimaryRays(config: ColonnadeConfig) extends Module {
   io.meetsObject := true.B
   for (meetsObject <- position.meetsObject) {
     val table = Reg(Vec(config.array.contexts, Bool()))
-    when(io.allocated.valid) { table(io.free.bits) := meetsObject }
+    when(io.allocated.valid) { table(free.bits) := meetsObject }
     io.meetsObject := table(io.ray.bits.context)
   }
 }

@@ -46,44 +46,45 @@ final class RtController(config: ColonnadeConfig) extends Module {
 
   /** The light of a context's current shadow ray. */
   private val shadowLight = Reg(Vec(contexts, chiselTypeOf(io.shadow.bits.light)))
-  io.isShadow  := isShadow
-  io.isPrimary := isPrimary
-  io.hasColour := hasColour
-
-  io.free          := firstOf(isAt(ContextState.idle))
-  io.resolved      := firstOf(isAt(ContextState.resolve))
-  io.done          := firstOf(isAt(ContextState.done))
   io.idleCount     := PopCount(isAt(ContextState.idle))
   io.raySetupCount := PopCount(isAt(ContextState.raySetup))
 
-  when(io.allocate) {
-    state(io.free.bits)     := ContextState.raySetup
-    isShadow(io.free.bits)  := false.B
-    isPrimary(io.free.bits) := true.B
-    hasColour(io.free.bits) := false.B
+  // Allocate an idle context
+  private val free = firstOf(isAt(ContextState.idle))
+  io.allocation.free := free
+  when(io.allocation.allocate) {
+    state(free.bits)     := ContextState.raySetup
+    isShadow(free.bits)  := false.B
+    isPrimary(free.bits) := true.B
+    hasColour(free.bits) := false.B
     if (config.hasRoom) {
-      isFresnelReflection(io.free.bits) := false.B
-      isDirectView(io.free.bits)        := false.B
+      isFresnelReflection(free.bits) := false.B
+      isDirectView(free.bits)        := false.B
     }
   }
-  when(io.entered.valid) { state(io.entered.bits) := ContextState.traversing }
-  io.ended.foreach(ended => when(ended.valid) { state(ended.bits) := ContextState.resolve })
+
+  // Trace its ray
+  io.trace.isShadow  := isShadow
+  io.trace.isPrimary := isPrimary
+  io.trace.resolved  := firstOf(isAt(ContextState.resolve))
+  when(io.trace.entered.valid) { state(io.trace.entered.bits) := ContextState.traversing }
+  io.trace.ended.foreach(ended => when(ended.valid) { state(ended.bits) := ContextState.resolve })
 
   // Resolve an ended ray
-  private val resolved = io.resolved.bits
-  when(io.resolved.valid) {
+  private val resolved = io.trace.resolved.bits
+  when(io.trace.resolved.valid) {
     when(isShadow(resolved)) {
       state(resolved) := ContextState.shadowTest
       for (light <- 0 until lights)
         when((lights == 1).B || shadowLight(resolved) === light.U) {
-          occlusions(resolved)(light) := io.occlusions(resolved)
+          occlusions(resolved)(light) := io.trace.occlusions(resolved)
         }
-    }.elsewhen(io.hasHit(resolved)) {
+    }.elsewhen(io.trace.hasHit(resolved)) {
       state(resolved) := ContextState.shading
     }.otherwise {
       state(resolved) := Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
     }
-    isBackground(resolved) := !isShadow(resolved) && !io.hasHit(resolved)
+    isBackground(resolved) := !isShadow(resolved) && !io.trace.hasHit(resolved)
   }
 
   // Results of the shader
@@ -139,7 +140,12 @@ final class RtController(config: ColonnadeConfig) extends Module {
     state(io.accumulated.bits)     := ContextState.done
     hasColour(io.accumulated.bits) := true.B
   }
-  when(io.retire) { state(io.done.bits) := ContextState.idle }
+
+  // Retire pixels
+  private val done = firstOf(isAt(ContextState.done))
+  io.pixel.done      := done
+  io.pixel.hasColour := hasColour(done.bits)
+  when(io.pixel.retire) { state(done.bits) := ContextState.idle }
 
   // Rays that miss the object, and bounces that wait for their Fresnel reflection
   for (environment <- io.environment) {

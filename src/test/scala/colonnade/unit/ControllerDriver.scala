@@ -106,9 +106,9 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
   /** One cycle: checks all outputs, then drives the events that `happen` sets. */
   def cycle(happen: ControllerEvents => Unit): Unit = {
     dut.io.idleCount.expect(at(ContextState.idle).size)
-    val free     = shown(dut.io.free.valid, dut.io.free.bits, at(ContextState.idle))
-    val resolved = shown(dut.io.resolved.valid, dut.io.resolved.bits, at(ContextState.resolve))
-    val done     = shown(dut.io.done.valid, dut.io.done.bits, at(ContextState.done))
+    val free     = shown(dut.io.allocation.free.valid, dut.io.allocation.free.bits, at(ContextState.idle))
+    val resolved = shown(dut.io.trace.resolved.valid, dut.io.trace.resolved.bits, at(ContextState.resolve))
+    val done     = shown(dut.io.pixel.done.valid, dut.io.pixel.done.bits, at(ContextState.done))
     val shadowed = shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow)
     val ended    = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
     val marched  = dut.io.environment.flatMap(environment =>
@@ -121,12 +121,12 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
       _.expect(at(ContextState.environmentPending).size + at(ContextState.environmentMarch).size)
     )
     for ((context, index) <- contexts.zipWithIndex if context.state != ContextState.idle) {
-      dut.io.isShadow(index).expect(context.isShadow, s"context $index at ${context.state}")
-      dut.io.isPrimary(index).expect(context.isPrimary, s"context $index at ${context.state}")
-      dut.io.hasColour(index).expect(context.hasColour, s"context $index at ${context.state}")
+      dut.io.trace.isShadow(index).expect(context.isShadow, s"context $index at ${context.state}")
+      dut.io.trace.isPrimary(index).expect(context.isPrimary, s"context $index at ${context.state}")
       context.waited += 1
       assert(context.waited < 2000, s"context $index is stuck in ${context.state}")
     }
+    for (index <- done) dut.io.pixel.hasColour.expect(contexts(index).hasColour)
     for (index <- shadowed) assert(contexts(index).shadowPending.contains(dut.io.shadow.bits.light.peekInt().toInt))
     for (index <- ended) {
       dut.io.end.bits.isBackground.expect(contexts(index).isBackground)
@@ -170,8 +170,8 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
       context.state = ContextState.resolve
       context.hasHit = random.nextBoolean()
       context.occlusion = random.shuffle(Occlusion.all).head
-      dut.io.hasHit(index).poke(context.hasHit)
-      dut.io.occlusions(index).poke(context.occlusion)
+      dut.io.trace.hasHit(index).poke(context.hasHit)
+      dut.io.trace.occlusions(index).poke(context.occlusion)
     }
     for ((index, needs) <- events.shaded) change(Some(index)) { context =>
       context.state = ContextState.shadowTest

@@ -31,12 +31,12 @@ private class ControllerEvents {
       port.valid.poke(context.nonEmpty)
       port.bits.poke(context.getOrElse(other))
     }
-    dut.io.allocate.poke(allocates)
-    dut.io.retire.poke(retires)
+    dut.io.allocation.allocate.poke(allocates)
+    dut.io.pixel.retire.poke(retires)
     dut.io.shadow.ready.poke(shadow)
     dut.io.end.ready.poke(end)
-    name(dut.io.entered, entered)
-    dut.io.ended.zip(ended).foreach { case (port, context) => name(port, context) }
+    name(dut.io.trace.entered, entered)
+    dut.io.trace.ended.zip(ended).foreach { case (port, context) => name(port, context) }
     dut.io.shaded.valid.poke(shaded.nonEmpty)
     for ((context, needs) <- shaded) {
       dut.io.shaded.bits.context.poke(context)

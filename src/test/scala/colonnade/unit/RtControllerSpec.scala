@@ -44,10 +44,10 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         events.ended(2) = Some(2)
       }
       for (_ <- 0 until 2) {
-        dut.io.resolved.valid.expect(true)
+        dut.io.trace.resolved.valid.expect(true)
         rounds.cycle(_.retire = true)
       }
-      dut.io.resolved.valid.expect(false)
+      dut.io.trace.resolved.valid.expect(false)
       rounds.cycle(_.retire = true)
       dut.io.idleCount.expect(3)
     }
