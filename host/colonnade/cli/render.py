@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
 from colonnade.common.limits import MAX_FRAMES
+
+if TYPE_CHECKING:
+    from colonnade.render.report import FrameReport
+    from colonnade.render.request import Backend
 
 
 @click.command(short_help="Render frames through the hardware, its model, or Embree.")
@@ -38,7 +42,7 @@ def render(
     scene: Path,
     config: str,
     overrides: tuple[str, ...],
-    backend: str,
+    backend: Backend,
     size: str | None,
     mesh: str | None,
     background: Path | None,
@@ -50,7 +54,7 @@ def render(
 ) -> None:
     """Render one frame of SCENE, a TOML file, and print what it took. With --frames the object or the light moves."""
     from colonnade.common.frame_size import parse_size
-    from colonnade.render.sequence import frames_report, numbered, picture_files
+    from colonnade.render.sequence import numbered, picture_files
 
     pixels = parse_size(size) if size is not None else None
     pictures = [output] if output is not None else []
@@ -60,25 +64,27 @@ def render(
         hits_files = numbered(hits_file, frames) if hits_file is not None else []
     require_outputs(*pictures, *hits_files, json_file)
 
-    from colonnade.common import progress
     from colonnade.common.hits import Hits, write_hits
     from colonnade.common.image_io import encode_srgb, write_png, write_webp
+    from colonnade.common.progress import for_terminal
     from colonnade.render.frames import render_frames
+    from colonnade.render.report import sequence_report
+    from colonnade.render.request import RenderRequest
 
-    shown = progress.for_terminal()
-    results = render_frames(
-        scene,
-        config,
-        overrides,
-        backend,
-        pixels,
-        frames or 1,
+    progress = for_terminal()
+    request = RenderRequest(
+        scene=scene,
+        config=config,
+        overrides=overrides,
+        backend=backend,
+        size=pixels,
+        frames=frames or 1,
         mesh=mesh,
         background=background,
         hits=hits_file is not None,
-        progress=shown,
         relit=relit,
     )
+    results = render_frames(request, progress)
     is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"
     reports, film = [], []
     for index, result in enumerate(results):
@@ -90,26 +96,25 @@ def render(
             write_hits(hits_files[index], Hits(result.hit_triangles, result.t))
         reports.append(result.report)
     if is_film:
-        with shown.step(f"writing {pictures[0].name}"):
+        with progress.step(f"writing {pictures[0].name}"):
             write_webp(pictures[0], film)
-    report = reports[0] if frames is None else frames_report(reports)
+    report = reports[0] if frames is None else sequence_report(reports)
     echo(summary(report))
-    finish(report, json_file)
+    finish(report.as_json(), json_file)
 
 
-def summary(report: dict[str, Any]) -> str:
-    """One or two lines for people from a render's report."""
-    rays = report["rays"]
-    several = f"{len(report['frames'])} frames, " if "frames" in report else ""
+def summary(report: FrameReport) -> str:
+    """One line for people."""
+    sequence = f"{len(report.frames)} frames, " if report.frames else ""
     words = [
-        f"{report['backend']}: {several}{report['mesh']['triangles']:,} triangles",
-        f"{sum(rays[kind] for kind in ('primary', 'shadow', 'reflection', 'refraction') if rays.get(kind)):,} rays",
+        f"{report.backend}: {sequence}{report.mesh.triangles:,} triangles",
+        f"{report.all_rays:,} rays",
     ]
-    if report.get("cycles"):
-        words.append(f"{report['cycles']:,} cycles")
-        words.append(f"{report['rays_per_cycle_in_box']:.3f} rays per cycle in box")
-        words.append(f"{report['rays_per_cycle']:.3f} of all")
-    if environment := report.get("room"):
-        words.append(f"{environment['look_ups']:,} look-ups in the room of {environment['cycles']:.0f} cycles")
-    seconds = ", ".join(f"{step} {value:.1f} s" for step, value in report["seconds"].items() if value is not None)
+    if report.cycles:
+        words.append(f"{report.cycles:,} cycles")
+        words.append(f"{report.rays_per_cycle_in_box:.3f} rays per cycle in box")
+        words.append(f"{report.rays_per_cycle:.3f} of all")
+    if report.room is not None:
+        words.append(f"{report.room.look_ups:,} look-ups in the room of {report.room.cycles:.0f} cycles")
+    seconds = ", ".join(f"{step} {value:.1f} s" for step, value in report.seconds.items() if value is not None)
     return ", ".join(words) + (f" ({seconds})" if seconds else "")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import hashlib
 import json
 import os
@@ -20,6 +19,7 @@ from typing import Any
 from colonnade.common import temporary
 from colonnade.common.atomic_files import write_json
 from colonnade.common.errors import UserError
+from colonnade.common.locks import locked
 from colonnade.common.progress import QUIET, Progress
 
 #: The file that is written last.
@@ -75,7 +75,7 @@ def entry(
     if _is_known(folder) and is_usable(folder):
         return folder
     try:
-        with turn(folder.parent / f"{folder.name}.lock", what, progress):
+        with locked(folder.parent / f"{folder.name}.lock", what, progress):
             if not (_is_known(folder) and is_usable(folder)):
                 if os.path.lexists(folder):
                     progress.note(f"the cached {what} was damaged and is built again")
@@ -130,22 +130,6 @@ def stored(file: Path, key: Mapping[str, Any], progress: Progress = QUIET) -> di
         pass
     progress.note(f"the cached measurement {file.name} was damaged and is made again")
     return None
-
-
-@contextlib.contextmanager
-def turn(lock: Path, what: str, progress: Progress = QUIET) -> Iterator[None]:
-    """Hold an exclusive lock, so that processes take turns; shows whom it waits for."""
-    lock.parent.mkdir(parents=True, exist_ok=True)
-    handle = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            with progress.step(f"waiting for another process that makes the {what}"):
-                fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)
 
 
 def _fill(place: Path, make: Callable[[Path], None], folder: Path) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import field_places
 from colonnade.environment.encoding.image import memory_words
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
 
-Floats = NDArray[np.float64]
 
 #: Grid steps a metre, log2, where no object says how large the grid is.
 GRID_LOG = 20

@@ -7,7 +7,7 @@ import json
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +148,11 @@ def _prepared(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
     known = cache.stored(kept, key, progress) if conditions.reuse else None
     visits = 0
     if known is not None:
-        known |= {"config": manifest.config, "config_hash": manifest.config_hash, "mesh": mesh_report(image.header)}
+        known |= {
+            "config": manifest.config,
+            "config_hash": manifest.config_hash,
+            "mesh": asdict(mesh_report(image.header)),
+        }
     elif conditions.jobs > 1:
         small = frame_registers(scene, image.header, manifest, max(1, width // 8), max(1, height // 8))
         counters = model_frame(loaded_model(manifest, image), small).counters
@@ -166,7 +170,7 @@ def _measured(frame: _Prepared, progress: Progress) -> dict[str, Any]:
     rendered = simulated.frames[0]
     require_no_errors(rendered)
     report = {
-        **frame_report("rtl", design.manifest, image.header, rendered),
+        **frame_report("rtl", design.manifest, image.header, rendered).as_json(),
         "config_hash": design.manifest.config_hash,
         "cycles_per_second": simulated.cycles_per_second,
         "seconds": {"pack": frame.seconds, "run": run_seconds},

@@ -13,6 +13,7 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.common.progress import QUIET, Progress
 from colonnade.quality.image_metrics import compare_hits, psnr
 from colonnade.render.frames import render
+from colonnade.render.request import Backend, RenderRequest
 from colonnade.render.result import RenderResult
 
 
@@ -54,7 +55,7 @@ class Fidelity:
 def equality(rtl: RenderResult, model: RenderResult) -> Equality:
     """How the RTL's frame differs from the model's."""
     same_t = (rtl.t == model.t) | (np.isnan(rtl.t) & np.isnan(model.t))
-    theirs: dict[str, int] = model.report["counters"]
+    theirs = model.report.counters
     differs = (rtl.image != model.image).any(axis=2)
     if model.ratio is not None:
         assert rtl.ratio is not None
@@ -62,7 +63,7 @@ def equality(rtl: RenderResult, model: RenderResult) -> Equality:
     return Equality(
         pixels=int(differs.sum()),
         triangles=int(((rtl.hit_triangles != model.hit_triangles) | ~same_t).sum()),
-        counters=sum(rtl.report["counters"][name] != value for name, value in theirs.items()),
+        counters=sum(rtl.report.counters[name] != value for name, value in theirs.items()),
     )
 
 
@@ -97,12 +98,13 @@ def verify(
     equal = True
     for name in meshes:
 
-        def frame(backend: str, mesh: str = name) -> RenderResult:
+        def frame(backend: Backend, mesh: str = name) -> RenderResult:
             hits = backend == "rtl"
-            return render(scene, config, overrides, backend, size, mesh=mesh, hits=hits, progress=progress, relit=True)
+            request = RenderRequest(scene, config, overrides, backend, size, mesh=mesh, hits=hits, relit=True)
+            return render(request, progress)
 
         model = frame("model")
-        result: dict[str, Any] = {"triangles": model.report["mesh"]["triangles"], "rtl": None, "reference": None}
+        result: dict[str, Any] = {"triangles": model.report.mesh.triangles, "rtl": None, "reference": None}
         if with_rtl:
             found = equality(frame("rtl"), model)
             equal = equal and found.holds

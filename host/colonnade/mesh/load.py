@@ -16,11 +16,12 @@ import numpy.typing as npt
 
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import is_file, require_regular
+from colonnade.common.types import Floats
 from colonnade.mesh import catalog, primitives, teapot
 from colonnade.mesh.formats import SUFFIXES, read_surface
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.topology import Faces, Floats, drop_faces, merge_rows, subdivide, vertex_normals
+from colonnade.mesh.topology import Faces, drop_faces, merge_rows, subdivide, vertex_normals
 
 TEAPOT_LEVEL = 10
 TEAPOT_LIMIT = 200

@@ -15,12 +15,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 Vector = tuple[float, float, float]
 
 #: The device's kinds of surfaces.
-KINDS = ("diffuse", "mirror", "glass")
+Kind = Literal["diffuse", "mirror", "glass"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 #: Index of refraction of glass that does not say; also glTF's.
 GLASS_IOR = 1.5

@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common.types import Floats
 from colonnade.mesh import primitives
 from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.topology import Faces, Floats
+from colonnade.mesh.topology import Faces
 
 
 @dataclass(frozen=True)

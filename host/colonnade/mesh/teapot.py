@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from colonnade.common.types import Floats
 
 # Profiles of the turned parts: (radius, height), from the outside of the rim inward and down.
 _PROFILES: tuple[tuple[tuple[float, float], ...], ...] = (
@@ -53,9 +53,9 @@ _HALVES: tuple[tuple[tuple[tuple[float, float, float], ...], ...], ...] = (
 )
 
 
-def patches() -> Array:
+def patches() -> Floats:
     """Control points of the 32 bicubic patches: float64 [32, 4, 4, 3], y up, normals outward."""
-    result: list[Array] = []
+    result: list[Floats] = []
     for profile in _PROFILES:
         patch = np.array([_quarter_turn(radius, height) for radius, height in profile])
         result.extend(_turned(patch, quadrant) for quadrant in range(4))
@@ -72,14 +72,14 @@ def _quarter_turn(radius: float, height: float) -> list[tuple[float, float, floa
     return [(radius, height, 0.0), (radius, height, flat), (flat, height, radius), (0.0, height, radius)]
 
 
-def _turned(patch: Array, quarters: int) -> Array:
+def _turned(patch: Floats, quarters: int) -> Floats:
     """The patch turned about y by whole quarters: exact, so that neighbours share their edges bit for bit."""
     for _ in range(quarters):
         patch = np.stack([-patch[..., 2], patch[..., 1], patch[..., 0]], axis=-1)
     return patch
 
 
-def tessellate(level: int) -> tuple[Array, npt.NDArray[np.int32]]:
+def tessellate(level: int) -> tuple[Floats, npt.NDArray[np.int32]]:
     """Two triangles for each of level × level cells of every patch; those at the poles that have no area are left out.
 
     Returns:

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
+
 Faces = npt.NDArray[np.int32]
 
 
@@ -49,20 +51,12 @@ def vertex_normals(vertices: Floats, faces: Faces) -> Floats:
     """Unit normals float64 [n, 3]: the faces' normals weighted by their angle at the vertex."""
     corners = vertices[faces] / float((vertices.max(axis=0) - vertices.min(axis=0)).max())
     sides = np.roll(corners, -1, axis=1) - corners
-    normals = unit_rows(np.cross(sides[:, 0], -sides[:, 2]).astype(np.float64))
-    sides = unit_rows(sides)
+    normals = unit_vectors(np.cross(sides[:, 0], -sides[:, 2]).astype(np.float64))
+    sides = unit_vectors(sides)
     cosine = -np.einsum("mcx,mcx->mc", sides, np.roll(sides, 1, axis=1))
     weighted = np.arccos(np.clip(cosine, -1.0, 1.0))[:, :, None] * normals[:, None, :]
     flat, target = weighted.reshape(-1, 3), faces.reshape(-1)
     sums = [np.bincount(target, flat[:, axis], len(vertices)) for axis in range(3)]
     total = np.stack(sums, axis=1).astype(np.float64)
     total[np.linalg.norm(total, axis=1) < 1e-9] = 0.0
-    return unit_rows(total)
-
-
-def unit_rows(vectors: Floats) -> Floats:
-    """Vectors [..., 3] scaled to length 1; zero vectors stay zero."""
-    scale = np.abs(vectors).max(axis=-1, keepdims=True)
-    safe = vectors / np.where(scale > 0, scale, 1.0)
-    length = np.linalg.norm(safe, axis=-1, keepdims=True)
-    return np.asarray(safe / np.where(length > 0, length, 1.0), dtype=np.float64)
+    return unit_vectors(total)

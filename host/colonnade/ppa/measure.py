@@ -15,7 +15,7 @@ from colonnade.ppa.netlist.synthesis import Technology, count_gates, require_yos
 from colonnade.ppa.power.recording import require_recordable
 from colonnade.ppa.power.report import Operation, measure_power
 from colonnade.ppa.timing import opensta
-from colonnade.ppa.timing.static import Analysis, Path, Timing, gates_by_name
+from colonnade.ppa.timing.static import Analysis, Timing, TimingPath, gates_by_name
 
 #: Called with the level, the name and the report of each unit as soon as it is known.
 Finished = Callable[[str, str, Mapping[str, Any]], None]
@@ -147,7 +147,7 @@ def _timing(netlist: Netlist, into: Technology) -> dict[str, Any]:
 def _paths(timing: Timing, into: Technology) -> dict[str, Any]:
     fo4 = into.library.fo4 if into.library else 1.0
 
-    def path(found: Path | None) -> dict[str, Any] | None:
+    def path(found: TimingPath | None) -> dict[str, Any] | None:
         if found is None:
             return None
         facts = {"ns": found.ns, "fo4": found.ns / fo4, "from": found.begin, "to": found.end}

@@ -24,8 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import processes
-from colonnade.common.atomic_files import locked, replacing
+from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
+from colonnade.common.locks import locked
 from colonnade.common.progress import QUIET
 from colonnade.common.temporary import temporary_folder
 
@@ -111,7 +112,7 @@ def _content(source: Source) -> bytes:
     try:
         content = _checked(kept, source)
         if content is None:
-            with locked(folder() / "lock"):
+            with locked(folder() / "lock", "weights of DISTS"):
                 content = _checked(kept, source) or _fetched(kept, source)
     except OSError as error:
         raise UserError(f"DISTS's weights cannot be kept in {folder()}: {error.strerror}") from None

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 
 
 @dataclass(frozen=True)
@@ -63,16 +64,12 @@ def _about(
     rest = 1 - eta**2 * (1 - cosine**2)
     refracted = glass & (rest >= 0) & (cosine > 0)
     deeper = eta * cosine - np.sqrt(rest.clip(min=0))
-    through = _unit(eta[:, None] * directions + deeper[:, None] * normals)
+    through = unit_vectors(eta[:, None] * directions + deeper[:, None] * normals)
     return np.where(refracted[:, None], through, _reflected(normals, directions)), refracted
 
 
 def _reflected(normals: Floats, directions: Floats) -> Floats:
-    return _unit(directions - 2 * _dot(normals, directions)[:, None] * normals)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)
+    return unit_vectors(directions - 2 * _dot(normals, directions)[:, None] * normals)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

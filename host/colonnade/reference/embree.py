@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from colonnade.common.types import Floats
 
 #: Rays start this share of the box's edge before the box, so that 32-bit coordinates stay small.
 _RUN_UP = 1 / 64

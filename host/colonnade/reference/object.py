@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.types import Floats, Indices
+from colonnade.common.vectors import unit_vectors
 from colonnade.reference.embree import RayTracer, Triangles
 
 if TYPE_CHECKING:
     from colonnade.mesh.mesh import Mesh
     from colonnade.scene.view import View
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Kinds of materials as numbers.
 DIFFUSE, MIRROR, GLASS = range(3)
@@ -68,7 +68,7 @@ class PlacedObject:
         """Where rays meet the faces that they were found to meet first."""
         met = self.tracer.surface_points(faces, origins, directions)
         corners = self.tracer.corners[faces]
-        geometric = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+        geometric = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         back_side = np.einsum("ni,ni->n", geometric, directions) > 0
         turned = np.where(back_side, -1.0, 1.0)[:, None]
         facing = geometric * turned
@@ -77,7 +77,7 @@ class PlacedObject:
             mesh = self._mesh
             smooth = np.einsum("nj,njk->nk", met.weights, mesh.vertex_normals[mesh.faces[faces]]) * turned
             normals = np.where(smooth.any(axis=1, keepdims=True), smooth, facing)
-        return ObjectPoints(met.position, facing, unit(normals), ~back_side, met.t)
+        return ObjectPoints(met.position, facing, unit_vectors(normals), ~back_side, met.t)
 
     def let_through(self, origins: Floats, to_light: Floats) -> Floats:
         """What reaches each origin of a light at origin + ``to_light``: 0 behind something opaque; float64 [n]."""
@@ -87,9 +87,3 @@ class PlacedObject:
         if self._opaque is not None:
             share[self._opaque.occluded(origins, to_light)] = 0.0
         return share
-
-
-def unit(vectors: Floats) -> Floats:
-    """Vectors [n, 3] at length 1; zero stays zero."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 0, length, 1.0), dtype=np.float64)

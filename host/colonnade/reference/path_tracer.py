@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.types import Floats, Indices
+from colonnade.common.vectors import unit_vectors
 from colonnade.reference.bounce import bounce
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints
-from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, PlacedObject, unit
+from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, PlacedObject
 
 if TYPE_CHECKING:
     from colonnade.scene.view import View
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Points = TypeVar("Points", ObjectPoints, BackdropPoints)
 
 #: Nearer to a light than half its reach it gets no brighter.
@@ -85,7 +85,7 @@ class PathTracer:
             if len(path) == 0:
                 break
             ray_origins, ray_directions, met = self._go_on(
-                path, met, points_met, unit(ray_directions[on]), weight, gathered, outside, bounced
+                path, met, points_met, unit_vectors(ray_directions[on]), weight, gathered, outside, bounced
             )
             lost = np.flatnonzero(met < 0)
             colours[path[lost]], outside_now = self._background(ray_origins[lost], ray_directions[lost], shadows=True)
@@ -150,7 +150,7 @@ class PathTracer:
         if self._backdrop is None or len(origins) == 0:
             return colours, np.zeros(len(origins), dtype=np.bool_)
         turn, shift = self._to_view()
-        met = self._in_mesh(self._backdrop.meet(origins @ turn.T + shift, unit(directions @ turn.T)))
+        met = self._in_mesh(self._backdrop.meet(origins @ turn.T + shift, unit_vectors(directions @ turn.T)))
         known = np.flatnonzero(~met.outside)
         colours[known], _ = self._lit_background(_select(met, known), shadows)
         return colours, met.outside
@@ -161,7 +161,7 @@ class PathTracer:
         everything = visible.copy()
         for light in self._view.lights:
             to_light = light.position - origins
-            cosine = np.einsum("ni,ni->n", normals, unit(to_light)).clip(min=0.0)
+            cosine = np.einsum("ni,ni->n", normals, unit_vectors(to_light)).clip(min=0.0)
             share = np.ones(len(origins))
             if shadows:
                 asking = np.flatnonzero(cosine > 0)
@@ -187,7 +187,7 @@ class PathTracer:
         """Points of view space in mesh space."""
         assert self._view.view_to_mesh is not None
         turn, shift = self._view.view_to_mesh[:, :3], self._view.view_to_mesh[:, 3]
-        position, normals = points.position @ turn.T + shift, unit(points.normals @ turn.T)
+        position, normals = points.position @ turn.T + shift, unit_vectors(points.normals @ turn.T)
         return type(points)(position, normals, points.albedo, points.outside)
 
 

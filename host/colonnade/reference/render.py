@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.progress import QUIET, Progress
+from colonnade.common.types import Floats
 from colonnade.reference.object import PlacedObject
 from colonnade.reference.path_tracer import PathTracer, Traced
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from colonnade.reference.environment.surface import Backdrop
     from colonnade.scene.view import View
 
-Floats = NDArray[np.float64]
 
 #: Rays traced at once, in whole rows: keeps the arrays small and the progress lively.
 _RAYS_AT_ONCE = 1 << 16

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
 from colonnade.environment.encoding.planes import SLOPE_PIXELS, Picture
 from colonnade.registers.shadow_window import shadow_window, whole_frame
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from colonnade.scene.view import View
     from colonnade.scene_image.file import ImageHeader
 
-Floats = npt.NDArray[np.float64]
 AXES = "xyz"
 #: Fraction bits of the maps' rotation, and those of a step beyond those of a place in the map.
 ROTATION_FRACTION = 14

@@ -8,10 +8,11 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import ConvexHull, QhullError
 
 from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.design.frame_limits import check_size
 from colonnade.design.manifest import Manifest
 from colonnade.environment.encoded import EncodedEnvironment
 from colonnade.registers.environment import environment_registers
@@ -21,7 +22,6 @@ from colonnade.scene.model import Scene
 from colonnade.scene.view import View, make_view
 from colonnade.scene_image.file import ImageHeader
 
-Floats = npt.NDArray[np.float64]
 AXES = "xyz"
 
 
@@ -48,15 +48,7 @@ def frame_registers(
     Raises:
         UserError: The frame, or the camera's or light's distance, is more than the hardware can hold.
     """
-    limits = manifest.config["frame"]
-    for name, value, setting in (("wide", width, "maxWidth"), ("high", height, "maxHeight")):
-        if not 1 <= value <= int(limits[setting]):
-            raise UserError(
-                f"a frame of {width}x{height} is too {name}: it must be from 1 to {limits[setting]} pixels"
-                f" (frame.{setting})"
-                if value > 0
-                else f"a frame of {width}x{height} has no pixels"
-            )
+    check_size((width, height), manifest)
     view = make_view(
         scene, header.extent, width, height, header.materials, None if environment is None else environment.environment
     )

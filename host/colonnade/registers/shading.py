@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.scene.view import PlacedLight, View
 from colonnade.scene_image.file import ImageHeader
 
-Floats = npt.NDArray[np.float64]
 CHANNELS = "rgb"
 KINDS = {"diffuse": 0, "mirror": 1, "glass": 2}
 

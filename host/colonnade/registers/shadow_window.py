@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common.types import Floats
+
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.view import View
 
-Floats = npt.NDArray[np.float64]
 #: x0, y0, x1, y1; the latter two exclusive.
 Window = tuple[int, int, int, int]
 

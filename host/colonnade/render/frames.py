@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +18,8 @@ from colonnade.environment.encoded import EncodedEnvironment
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
-from colonnade.render.report import frame_report
+from colonnade.render.report import FrameReport, frame_report
+from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
@@ -28,72 +27,39 @@ from colonnade.scene.view import View, make_view, with_overrides
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
-BACKENDS = ("rtl", "model", "reference")
 
-
-def render(
-    scene_path: Path,
-    config: str,
-    overrides: Sequence[str],
-    backend: str,
-    size: tuple[int, int] | None,
-    mesh: str | None = None,
-    background: Path | None = None,
-    hits: bool = False,
-    progress: Progress = QUIET,
-    relit: bool = False,
-) -> RenderResult:
-    """Renders one frame of a scene file: the first of `render_frames`."""
-    (result,) = render_frames(scene_path, config, overrides, backend, size, 1, mesh, background, hits, progress, relit)
+def render(request: RenderRequest, progress: Progress = QUIET) -> RenderResult:
+    """Renders one frame: the first of `render_frames`."""
+    (result,) = render_frames(replace(request, frames=1), progress)
     return result
 
 
-def render_frames(
-    scene_path: Path,
-    config: str,
-    overrides: Sequence[str],
-    backend: str,
-    size: tuple[int, int] | None,
-    frames: int,
-    mesh: str | None = None,
-    background: Path | None = None,
-    hits: bool = False,
-    progress: Progress = QUIET,
-    relit: bool = False,
-) -> Iterator[RenderResult]:
-    """Renders the frames of a scene file's motion; mesh and room are loaded once.
+def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterator[RenderResult]:
+    """Renders the frames of a scene's motion; mesh and environment are loaded once.
 
     Args:
-        scene_path: TOML.
-        config: Preset, path, or precision such as ``32b32s64d``; changed by ``overrides`` (``key=value``).
-        backend: One of `BACKENDS`.
-        size: (width, height); the scene's unless given.
-        frames: How many, from 1: the first is the scene as it stands.
-        mesh: Replaces the scene's mesh: a name or a file.
-        background: A room's folder, in place of the scene's background.
-        hits: The hit triangles are wanted: the hardware must be configured to deliver them.
+        request: What to render.
         progress: Shows the steps.
-        relit: Show the room in the scene's lights even if there is a photo of it.
 
     Raises:
         UserError: Something about the input is wrong, or the hardware flagged an error.
     """
-    scene = load_scene(scene_path)
-    if background is not None:
-        scene = scene.with_environment(background)
-    if mesh is not None:
-        scene = scene.with_mesh(mesh)
-    width, height = size or (scene.frame.width, scene.frame.height)
-    manifest = manifest_for(config, overrides, progress).manifest
+    scene = load_scene(request.scene)
+    if request.background is not None:
+        scene = scene.with_environment(request.background)
+    if request.mesh is not None:
+        scene = scene.with_mesh(request.mesh)
+    width, height = request.size or (scene.frame.width, scene.frame.height)
+    manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size((width, height), manifest)
-    places = [scene.at(share) for share in scene.motion.shares(frames)]
-    if backend == "reference":
+    poses = [scene.at(share) for share in scene.motion.shares(request.frames)]
+    if request.backend == "reference":
         from colonnade.render.reference_frames import reference_frames
 
-        yield from reference_frames(places, manifest, (width, height), progress)
+        yield from reference_frames(poses, manifest, (width, height), progress)
         return
     folder = scene.background.room
-    if hits and backend == "rtl":
+    if request.hits and request.backend == "rtl":
         from colonnade.device.verilator import require_hits
 
         require_hits(manifest)
@@ -102,32 +68,35 @@ def render_frames(
     with progress.step("packing the scene"):
         environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
         image = pack_scene(scene, manifest, environment)
-        shows_environment = relit or environment is None or environment.environment.photo is None
+        shows_environment = request.relit or environment is None or environment.environment.photo is None
         registers = [
-            frame_registers(place, image.header, manifest, width, height, environment, shows_environment)
-            for place in places
+            frame_registers(pose, image.header, manifest, width, height, environment, shows_environment)
+            for pose in poses
         ]
     packed = time.perf_counter() - begun
     seen = None if environment is None else environment.environment
-    if backend == "rtl":
-        rendered = _rtl_frames(design_for(config, overrides, progress), image, registers, progress)
+    if request.backend == "rtl":
+        rendered = _rtl_frames(design_for(request.config, request.overrides, progress), image, registers, progress)
     else:
         rendered = _model_frames(manifest, image, registers, progress)
-    for place, (frame, more) in zip(places, rendered, strict=True):
+    for pose, (frame, seconds, rate) in zip(poses, rendered, strict=True):
         require_no_errors(frame)
-        report = frame_report(backend, manifest, image.header, frame) | {"share": place.share} | more
-        report["seconds"] = {"pack": packed, "build": None} | report["seconds"]
-        view = make_view(place, image.header.extent, width, height, image.header.materials, seen)
+        report = replace(
+            frame_report(request.backend, manifest, image.header, frame),
+            share=pose.share,
+            seconds={"pack": packed, "build": None} | seconds,
+            simulated_cycles_per_second=rate,
+            bytes=None if environment is None else environment.image.byte_counts(),
+        )
+        view = make_view(pose, image.header.extent, width, height, image.header.materials, seen)
         result = _result(frame, image, view, manifest, report)
-        if environment is not None:
-            report["bytes"] = environment.image.byte_counts()
-            if not relit:
-                result = replace(result, image=composited(result.image, frame, environment.environment))
+        if environment is not None and not request.relit:
+            result = replace(result, image=composited(result.image, frame, environment.environment))
         yield result
 
 
-#: A frame, and what its report says beyond `frame_report`.
-Rendered = tuple[Frame, dict[str, Any]]
+#: A frame, the seconds it took by step, and the cycles that the RTL simulated a second.
+Rendered = tuple[Frame, dict[str, float], float | None]
 
 
 def _rtl_frames(
@@ -143,8 +112,7 @@ def _rtl_frames(
     simulated = render_rtl(design, image, list(registers), progress=progress)
     run = (time.perf_counter() - built) / len(registers)
     for frame in simulated.frames:
-        seconds = {"build": built - begun, "run": run}
-        yield frame, {"seconds": seconds, "simulated_cycles_per_second": simulated.cycles_per_second}
+        yield frame, {"build": built - begun, "run": run}, simulated.cycles_per_second
 
 
 def _model_frames(
@@ -159,7 +127,7 @@ def _model_frames(
         begun = time.perf_counter()
         with progress.step("rendering in the model") as share:
             frame = model_frame(model, values, lambda done, total: share(done / total))
-        return frame, {"seconds": {"run": time.perf_counter() - begun}}
+        return frame, {"run": time.perf_counter() - begun}, None
 
     yield from map(one, registers)
 
@@ -186,7 +154,7 @@ def require_no_errors(frame: Frame) -> None:
         raise UserError("the frame failed: " + "; ".join(advice.get(error, error) for error in frame.errors))
 
 
-def _result(frame: Frame, image: SceneImage, view: View, manifest: Manifest, report: dict[str, Any]) -> RenderResult:
+def _result(frame: Frame, image: SceneImage, view: View, manifest: Manifest, report: FrameReport) -> RenderResult:
     white = (1 << manifest.numbers["colourBits"]) - 1
     source = np.append(image.source_faces.astype(np.int64), -1)
     x, y = np.arange(view.width)[None, :, None], np.arange(view.height)[:, None, None]

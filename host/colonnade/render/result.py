@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from colonnade.render.report import FrameReport
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class RenderResult:
         object_mask: bool [height, width].
         hit_triangles: int64 [height, width]; face index in the mesh's file, -1 where the ray missed.
         t: float64 [height, width]; depth in mesh units (lengths of the pixel's direction), not a number for a miss.
-        report: What ``--json`` writes.
+        report: What it took.
         ratio: uint16 [height, width, 3], see `Frame`; None without a room.
     """
 
@@ -26,5 +27,5 @@ class RenderResult:
     object_mask: npt.NDArray[np.bool_]
     hit_triangles: npt.NDArray[np.int64]
     t: npt.NDArray[np.float64]
-    report: dict[str, Any]
+    report: FrameReport
     ratio: npt.NDArray[np.uint16] | None = None

@@ -1,7 +1,7 @@
 """Writes the tables of ``docs/performance.md`` from the data that `tools/performance` measured.
 
 A table stands between ``<!-- NAME -->`` and ``<!-- end -->``; everything else of the page is left alone.
-Run as ``python -m colonnade.performance_page DOCS``.
+Run as ``python -m colonnade.report.performance_page DOCS``.
 """
 
 from __future__ import annotations

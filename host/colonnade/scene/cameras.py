@@ -7,25 +7,23 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from colonnade.common.errors import UserError
-from colonnade.scene.model import Camera as SceneCamera
-from colonnade.scene.model import Vector
+from colonnade.common.types import Floats
+from colonnade.scene.model import Camera, Vector
 from colonnade.scene.object_pose import Pose
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Extent
 
-Floats = npt.NDArray[np.float64]
 
 #: A framed object is at most this part of the picture's width.
 WIDEST = 0.9
 
 
 @dataclass(frozen=True)
-class Camera:
+class WorldCamera:
     """A pinhole camera in the world; the ray of pixel (x, y) runs along ``corner + x * step_x + y * step_y``.
 
     Attributes:
@@ -40,7 +38,7 @@ class Camera:
     axes: Floats
 
 
-def scene_camera(camera: SceneCamera, pose: Pose, extent: Extent, width: int, height: int) -> Camera:
+def scene_camera(camera: Camera, pose: Pose, extent: Extent, width: int, height: int) -> WorldCamera:
     """The camera that a scene places or frames."""
     centre, edge = pose.to_world(extent.centre), extent.edge * pose.scale
     slope = math.tan(math.radians(camera.fov) / 2)
@@ -51,7 +49,6 @@ def scene_camera(camera: SceneCamera, pose: Pose, extent: Extent, width: int, he
             raise UserError("the camera's position is its target: move one of them")
         right, up, toward = camera_axes(position - target, camera.up)
     else:
-        assert camera.direction is not None
         right, up, toward = camera_axes(np.array(camera.direction), camera.up)
         outline = pose.to_world(extent.outline) - centre
         across, along = camera.framing * 2 * slope, WIDEST * 2 * slope * width / height
@@ -59,10 +56,10 @@ def scene_camera(camera: SceneCamera, pose: Pose, extent: Extent, width: int, he
         position = centre + aside * right + above * up + distance * toward
     pixel = 2 * slope / height
     corner = -toward + (0.5 - width / 2) * pixel * right + (height / 2 - 0.5) * pixel * up
-    return Camera(position, corner, pixel * right, -pixel * up, np.stack([right, up, toward]))
+    return WorldCamera(position, corner, pixel * right, -pixel * up, np.stack([right, up, toward]))
 
 
-def read_camera(environment: Environment, width: int, height: int) -> Camera:
+def environment_camera(environment: Environment, width: int, height: int) -> WorldCamera:
     """The camera that saw the room, for a frame of any size in the maps' proportions."""
     if abs(width * environment.height - height * environment.width) >= max(environment.width, environment.height):
         raise UserError(
@@ -78,7 +75,7 @@ def read_camera(environment: Environment, width: int, height: int) -> Camera:
         + (0.5 * across - environment.cx) / environment.fx * right
         + (0.5 * along - environment.cy) / environment.fy * down
     )
-    return Camera(position, corner, step_x, step_y, np.stack([right, -down, -forward]))
+    return WorldCamera(position, corner, step_x, step_y, np.stack([right, -down, -forward]))
 
 
 def camera_axes(toward: Floats, up: Vector) -> tuple[Floats, Floats, Floats]:

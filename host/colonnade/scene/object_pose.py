@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
 from colonnade.scene.model import Placement, Scene, Transform, Vector, between
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Extent
 
-Floats = npt.NDArray[np.float64]
 
 #: Without a word in the scene the object stands in the middle of the picture, this far down.
 _STANDS_DOWN = 0.7

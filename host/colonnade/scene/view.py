@@ -1,4 +1,7 @@
-"""Camera and light of a scene in the mesh's own space, in floats: what the reference renders and `placement` rounds."""
+"""Camera and lights of a scene in the mesh's own space, in floats.
+
+The reference renders this view; `colonnade.registers.frame.frame_registers` rounds it.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +10,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from colonnade.common.types import Floats
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Extent
-from colonnade.scene.cameras import Camera, read_camera, scene_camera
-from colonnade.scene.model import Light, Material, Scene
+from colonnade.scene.cameras import WorldCamera, environment_camera, scene_camera
+from colonnade.scene.model import Material, PointLight, Scene
 from colonnade.scene.object_pose import Pose, object_pose
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ def make_view(
     start = object_pose(scene.at(0.0), extent, environment)
     centre, edge = start.to_world(extent.centre), extent.edge * start.scale
     if environment is not None:
-        camera = read_camera(environment, width, height)
+        camera = environment_camera(environment, width, height)
     else:
         camera = scene_camera(scene.camera, start, extent, width, height)
     return View(
@@ -142,7 +143,7 @@ def with_overrides(own: Sequence[MeshMaterial], wanted: Material) -> tuple[MeshM
     return tuple(replace(material, **given) for material in own)
 
 
-def _placed(light: Light, camera: Camera, centre: Floats, edge: float, pose: Pose) -> PlacedLight:
+def _placed(light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose) -> PlacedLight:
     if light.position is not None:
         position = np.array(light.position)
     else:

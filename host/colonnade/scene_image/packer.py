@@ -14,15 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.errors import UserError
+from colonnade.common.types import Bytes
+from colonnade.common.vectors import unit_vectors
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.topology import drop_faces, merge_rows, unit_rows
+from colonnade.mesh.topology import drop_faces, merge_rows
 from colonnade.scene_image.bvh import LEAF, NODE, Bvh, build_bvh
 from colonnade.scene_image.file import ImageHeader, ObjectFrame, SceneImage
 
 Units = npt.NDArray[np.int32]
-Records = npt.NDArray[np.uint8]
 AXES = "xyz"
 #: The column memory's largest configuration, records.
 DEEPEST_MEMORY = 1 << 22
@@ -173,7 +174,7 @@ def _full_leaves(triangles: int, per_record: int) -> tuple[npt.NDArray[np.uint32
     return first, np.minimum(per_record, triangles - first).astype(np.uint32)
 
 
-def _node_records(bvh: Bvh, manifest: Manifest, triangle_base: int) -> Records:
+def _node_records(bvh: Bvh, manifest: Manifest, triangle_base: int) -> Bytes:
     """Node records; child addresses are absolute, 0 where a node has no child of that kind."""
     has_nodes, has_leaves = (bvh.kinds == NODE).any(axis=1), (bvh.kinds == LEAF).any(axis=1)
     values: dict[str, npt.NDArray[Any]] = {
@@ -194,7 +195,7 @@ def _triangle_records(
     leaf_count: npt.NDArray[np.uint32],
     is_clear: npt.NDArray[np.bool_],
     manifest: Manifest,
-) -> Records:
+) -> Bytes:
     values: dict[str, npt.NDArray[Any]] = {"firstTriangle": leaf_first, "count": leaf_count}
     for k in range(int(manifest.config["geometry"]["trianglesPerRecord"])):
         present = leaf_count > k
@@ -208,7 +209,7 @@ def _triangle_records(
 
 def _attribute_records(
     mesh: Mesh, quantised: QuantisedMesh, order: npt.NDArray[np.uint32], manifest: Manifest, per_record: int
-) -> Records:
+) -> Bytes:
     """Shading attributes in the order of packed ids; the last record may have empty slots."""
     one = (1 << manifest.numbers["normalFraction"]) - 1
     rows = quantised.mesh_faces[order]
@@ -231,7 +232,7 @@ def _attribute_records(
 def geometric_normals(quantised: QuantisedMesh) -> npt.NDArray[np.float64]:
     """Unit normals float64 [m, 3] of the quantised triangles, by their winding; the cross product is exact."""
     corners = quantised.vertices[quantised.faces].astype(np.int64)
-    return unit_rows(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).astype(np.float64))
+    return unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).astype(np.float64))
 
 
 def _vector(name: str, values: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:

@@ -20,9 +20,9 @@ from colonnade.common.parallel import in_order
 SWEEP = """
 import sys, time
 from pathlib import Path
-from colonnade import processes
-from colonnade.parallel import in_order
-from colonnade.temporary import temporary_folder
+from colonnade.common import processes
+from colonnade.common.parallel import in_order
+from colonnade.common.temporary import temporary_folder
 
 def one(number):
     with temporary_folder(".job.", Path(sys.argv[1])) as place:

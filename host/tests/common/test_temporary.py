@@ -17,7 +17,7 @@ from colonnade.common.temporary import remove_abandoned, replace, temporary_fold
 HOLDER = """
 import sys, time
 from pathlib import Path
-from colonnade.temporary import temporary_folder
+from colonnade.common.temporary import temporary_folder
 with temporary_folder(".entry.", Path(sys.argv[1])) as place:
     (place / "inner").mkdir()
     (place / "inner" / "file").write_text("something")

@@ -13,6 +13,7 @@ from colonnade.design.toolchain import project_root
 from colonnade.environment.load import load_environment
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render
+from colonnade.render.request import RenderRequest
 
 ROOMS = project_root() / "scenes" / "rooms"
 SCENE = """
@@ -42,18 +43,19 @@ def scene(tmp_path: Path) -> Path:
 
 
 def test_a_frame_in_a_room_is_near_the_reference(scene: Path) -> None:
-    model = render(scene, "small", (), "model", (320, 240), relit=True)
-    reference = render(scene, "small", (), "reference", (320, 240))
+    model = render(RenderRequest(scene, "small", (), "model", (320, 240), relit=True))
+    reference = render(RenderRequest(scene, "small", (), "reference", (320, 240)))
     np.testing.assert_array_equal(model.object_mask, reference.object_mask)
     # Clustering alone costs the living room's picture to 30 dB
     assert psnr(encode_srgb(reference.image), encode_srgb(model.image)) > 24
-    assert model.report["bytes"]["albedo"] == model.report["bytes"]["normals"] == 16384
+    assert model.report.bytes is not None
+    assert model.report.bytes["albedo"] == model.report.bytes["normals"] == 16384
 
 
 def test_the_photo_is_kept_but_for_object_and_shadow(scene: Path) -> None:
     photo = load_environment(ROOMS / "living").photo
     assert photo is not None
-    result = render(scene, "small", (), "model", (640, 480))
+    result = render(RenderRequest(scene, "small", (), "model", (640, 480)))
     before, after = decode_srgb(photo), result.image
     untouched = ~result.object_mask & (np.abs(after - before).max(axis=2) < 1e-9)
     shadow = ~result.object_mask & ~untouched
@@ -64,4 +66,4 @@ def test_the_photo_is_kept_but_for_object_and_shadow(scene: Path) -> None:
 
 def test_hardware_without_a_memory_for_rooms_refuses_one(scene: Path) -> None:
     with pytest.raises(UserError, match="set physicalAttributeMemory, as in the preset small"):
-        render(scene, "tiny", (), "model", None)
+        render(RenderRequest(scene, "tiny", (), "model", None))

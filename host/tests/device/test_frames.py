@@ -146,9 +146,8 @@ def test_counters_account_for_every_cycle_and_record(holdable: GeneratedDesign, 
     """Contexts are in one place at a time, units are busy no longer than a frame, and records are taken for a cause."""
     image = pack(load_mesh("teapot:3"), holdable.manifest)
     settings = frame_registers(TEAPOT, image.header, holdable.manifest, 40, 30)
-    report = frame_report(
-        "rtl", holdable.manifest, image.header, render_rtl(holdable, image, [settings], stalls).frames[0]
-    )
+    frame = render_rtl(holdable, image, [settings], stalls).frames[0]
+    report = frame_report("rtl", holdable.manifest, image.header, frame).as_json()
     found, counters = figures(report), report["counters"]
     assert all(0 < share < 1 for share in found["stalls"].values()), found["stalls"]
     assert all(0 < share < 1 for share in found["utilisation"].values()), found["utilisation"]

@@ -14,6 +14,7 @@ from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.frames import render
+from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
@@ -45,7 +46,7 @@ PRECISIONS = ("16b16s16d", "16b32s64d", "24b24s32d", "32b16s16d", "64b64s64d", "
 
 def frame(backend: str, mesh: str, overrides: tuple[str, ...] = (), config: str = "small") -> RenderResult:
     scene: Path = toolchain.project_root() / "scenes" / "object.toml"
-    return render(scene, config, overrides, backend, SIZE, mesh=mesh, hits=True)
+    return render(RenderRequest(scene, config, overrides, backend, SIZE, mesh=mesh, hits=True))
 
 
 def assert_equal(first: RenderResult, second: RenderResult) -> None:
@@ -86,7 +87,7 @@ def test_random_memory_latency_changes_no_frame(contexts: int, snooping: str, ba
 def test_hardware_equals_its_model_at_every_precision(precision: str, mesh: str) -> None:
     hardware, model = frame("rtl", mesh, config=precision), frame("model", mesh, config=precision)
     assert_equal(hardware, model)
-    assert hardware.report["rays"] == model.report["rays"]
+    assert hardware.report.rays == model.report.rays
 
 
 @pytest.mark.parametrize("mesh", ("teapot", "torus"))

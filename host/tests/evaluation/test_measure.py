@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -68,7 +69,7 @@ def rendered(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     monkeypatch.setattr(measuring, "build_simulator", lambda *_: None)
     monkeypatch.setattr(measuring, "render_rtl", render)
     monkeypatch.setattr(measuring, "require_no_errors", lambda _: None)
-    monkeypatch.setattr(measuring, "frame_report", lambda *_: a_report(1234))
+    monkeypatch.setattr(measuring, "frame_report", lambda *_: SimpleNamespace(as_json=lambda: a_report(1234)))
     return frames
 
 

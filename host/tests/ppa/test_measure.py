@@ -14,7 +14,7 @@ from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.ppa import measure
 from colonnade.ppa.library import liberty
-from colonnade.ppa.library.cells import Library, Table
+from colonnade.ppa.library.cells import Library, LookupTable
 from colonnade.ppa.netlist import memories
 from colonnade.ppa.netlist.hierarchy import BORDERS, Hierarchy, Memory
 from colonnade.ppa.netlist.mapped import Netlist
@@ -71,10 +71,10 @@ def small(tmp_path: Path) -> Library:
 
 
 def test_tables_are_bilinear_and_go_straight_on() -> None:
-    table = Table((0.0, 1.0), (0.0, 2.0), ((0.0, 2.0), (1.0, 3.0)))
+    table = LookupTable((0.0, 1.0), (0.0, 2.0), ((0.0, 2.0), (1.0, 3.0)))
     assert table.at(0.5, 1.0) == pytest.approx(1.5)
     assert table.at(2.0, 4.0) == pytest.approx(6.0)
-    assert Table((0.0,), (0.0,), ((7.0,),)).at(3.0, 4.0) == 7.0
+    assert LookupTable((0.0,), (0.0,), ((7.0,),)).at(3.0, 4.0) == 7.0
 
 
 def test_a_liberty_is_read_in_ns_and_pf(small: Library) -> None:

@@ -53,11 +53,11 @@ def test_the_attic_is_read_as_it_was_made(scene: Path) -> None:
 
 def test_the_reference_shows_object_and_room(scene: Path, make_manifest: Callable[..., Manifest]) -> None:
     (result,) = reference_frames([load_scene(scene)], make_manifest(), (64, 48), QUIET)
-    rays = result.report["rays"]
+    rays = result.report.rays
     assert 20 < result.object_mask.sum() < 400
     assert rays["refraction"] > result.object_mask.sum() and rays["primary"] == 64 * 48
     assert rays["shadow"] > 64 * 48
-    assert result.report["backend"] == "reference"
+    assert result.report.backend == "reference"
     bright = result.image[~result.object_mask]
     assert 0.02 < bright.mean() < 0.9
 

@@ -20,6 +20,7 @@ from colonnade.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
 from colonnade.render import frames as render_module
 from colonnade.render.frames import render, render_frames
+from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.model import Motion
 from colonnade.scene.object_pose import object_pose, turning
@@ -70,14 +71,14 @@ def same(one: RenderResult, other: RenderResult) -> bool:
 
 
 def in_environment(file: Path, backend: str, frames: int) -> list[RenderResult]:
-    return list(render_frames(file, "small", ROOM, backend, (96, 72), frames))
+    return list(render_frames(RenderRequest(file, "small", ROOM, backend, (96, 72), frames)))
 
 
 @pytest.mark.parametrize("backend", ["model", "reference"])
 def test_each_frame_is_the_single_frame_of_its_place(folder: Path, backend: str) -> None:
     motion = "[motion]\nturn = 60.0\nstand_at = [60, 45.5]\nlight = [-1.0, 2.0, 0.6]\n"
     frames = in_environment(scene_file(folder, standing(), motion), backend, 3)
-    assert [frame.report["share"] for frame in frames] == [0.0, 0.5, 1.0]
+    assert [frame.report.share for frame in frames] == [0.0, 0.5, 1.0]
     (first,) = in_environment(scene_file(folder, standing()), backend, 1)
     (last,) = in_environment(scene_file(folder, standing(70.0, (60, 45.5), (-1.0, 2.0, 0.6))), backend, 1)
     assert same(frames[0], first) and same(frames[2], last)
@@ -87,20 +88,21 @@ def test_each_frame_is_the_single_frame_of_its_place(folder: Path, backend: str)
 def test_without_a_motion_the_object_turns_once(folder: Path) -> None:
     frames = in_environment(scene_file(folder, standing()), "model", 4)
     for index, frame in enumerate(frames):
-        assert same(frame, render(scene_file(folder, standing(10.0 + 90.0 * index)), "small", ROOM, "model", (96, 72)))
+        turned = scene_file(folder, standing(10.0 + 90.0 * index))
+        assert same(frame, render(RenderRequest(turned, "small", ROOM, "model", (96, 72))))
 
 
 def test_one_frame_is_the_plain_one(folder: Path) -> None:
     file = scene_file(folder, ALONE, "[motion]\nturn = 90.0\ntranslate = [1.0, 0.0, 0.0]\n")
-    (only,) = render_frames(file, "tiny", (), "model", SIZE, 1)
-    assert same(only, render(scene_file(folder, ALONE), "tiny", (), "model", SIZE))
+    (only,) = render_frames(RenderRequest(file, "tiny", (), "model", SIZE, 1))
+    assert same(only, render(RenderRequest(scene_file(folder, ALONE), "tiny", (), "model", SIZE)))
 
 
 def test_the_scene_is_packed_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     packed: list[object] = []
     whole = render_module.pack_scene
     monkeypatch.setattr(render_module, "pack_scene", lambda *given: packed.append(given) or whole(*given))
-    assert len(list(render_frames(scene_file(folder, ALONE), "tiny", (), "model", SIZE, 5))) == 5
+    assert len(list(render_frames(RenderRequest(scene_file(folder, ALONE), "tiny", (), "model", SIZE, 5)))) == 5
     assert len(packed) == 1
 
 

@@ -19,6 +19,7 @@ from colonnade.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render
+from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
@@ -43,8 +44,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def both(folder: Path, text: str) -> tuple[RenderResult, RenderResult]:
     """The model's frame, and the reference's."""
     (folder / "scene.toml").write_text(text)
-    model = render(folder / "scene.toml", "small", ROOM, "model", SIZE, relit=True)
-    return model, render(folder / "scene.toml", "small", ROOM, "reference", SIZE)
+    model = render(RenderRequest(folder / "scene.toml", "small", ROOM, "model", SIZE, relit=True))
+    return model, render(RenderRequest(folder / "scene.toml", "small", ROOM, "reference", SIZE))
 
 
 def assert_alike(model: RenderResult, reference: RenderResult) -> None:

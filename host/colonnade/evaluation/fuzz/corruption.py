@@ -9,9 +9,9 @@ import numpy as np
 
 from colonnade.design.manifest import Manifest
 from colonnade.evaluation.fuzz.cases import Case
+from colonnade.evaluation.fuzz.environments import corrupt_maps
 from colonnade.evaluation.fuzz.records import corrupt_records
 from colonnade.evaluation.fuzz.registers import corrupt_registers
-from colonnade.evaluation.fuzz.environments import corrupt_maps
 
 #: Gives the corrupt case and says in a few words what was changed.
 Corrupt = Callable[[np.random.Generator, Case, Manifest], tuple[Case, str]]

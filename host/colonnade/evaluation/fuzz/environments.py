@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common.types import Bytes
 from colonnade.design.manifest import Field, Manifest, value_range
 from colonnade.design.toolchain import project_root
 from colonnade.environment.encoded import EncodedEnvironment
@@ -21,8 +22,6 @@ from colonnade.scene.view import with_overrides
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.file import LoadSection
 from colonnade.scene_image.packer import pack
-
-Words = npt.NDArray[np.uint8]
 
 #: The room's legal frames take a hundredth of it; rays that take all of their steps take up to a hundred times as long.
 WATCHDOG_CYCLES = 8_000_000
@@ -143,7 +142,7 @@ def _some(random: np.random.Generator, count: int) -> npt.NDArray[np.int64]:
     return chosen if chosen.size else random.integers(0, count, 1)
 
 
-def _with(case: Case, place: int, words: Words) -> Case:
+def _with(case: Case, place: int, words: Bytes) -> Case:
     sections = list(case.image.attributes)
     sections[place] = LoadSection(sections[place].memory, words)
     return replace(case, image=replace(case.image, attributes=tuple(sections)))

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from colonnade.common.types import Bytes
 from colonnade.design.manifest import Field, Manifest
 from colonnade.evaluation.fuzz.cases import Case
 from colonnade.evaluation.fuzz.values import random_value
 from colonnade.scene_image.file import ImageHeader
-
-Records = npt.NDArray[np.uint8]
 
 
 def corrupt_records(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
@@ -28,13 +26,13 @@ def corrupt_records(random: np.random.Generator, case: Case, manifest: Manifest)
     return replace(case, image=replace(case.image, records=records)), "; ".join(changes)
 
 
-def _flip_bits(random: np.random.Generator, records: Records, header: ImageHeader, manifest: Manifest) -> str:
+def _flip_bits(random: np.random.Generator, records: Bytes, header: ImageHeader, manifest: Manifest) -> str:
     address, bit = int(random.integers(len(records))), int(random.integers(8 * records.shape[1]))
     records[address, bit // 8] ^= 1 << (bit % 8)
     return f"bit {bit} of record {address}"
 
 
-def _set_field(random: np.random.Generator, records: Records, header: ImageHeader, manifest: Manifest) -> str:
+def _set_field(random: np.random.Generator, records: Bytes, header: ImageHeader, manifest: Manifest) -> str:
     address = int(random.integers(len(records)))
     kind = _kind(address, header)
     fields = list(manifest.layouts[kind].fields.values())
@@ -50,7 +48,7 @@ def _set_field(random: np.random.Generator, records: Records, header: ImageHeade
 _DECIDING = {"exponent", "firstChild", "firstTriangles", "kinds", "firstTriangle", "count", "isClear", "material"}
 
 
-def _redirect(random: np.random.Generator, records: Records, header: ImageHeader, manifest: Manifest) -> str:
+def _redirect(random: np.random.Generator, records: Bytes, header: ImageHeader, manifest: Manifest) -> str:
     """Point a node at itself, at a border of a section or just before it, or at the end of the memory."""
     address = int(random.integers(max(header.triangle_base, 1)))
     name = ("firstChild", "firstTriangles")[int(random.integers(2))]
@@ -62,7 +60,7 @@ def _redirect(random: np.random.Generator, records: Records, header: ImageHeader
     return f"node {address}: {name} = {value}"
 
 
-def _overwrite(random: np.random.Generator, records: Records, header: ImageHeader, manifest: Manifest) -> str:
+def _overwrite(random: np.random.Generator, records: Bytes, header: ImageHeader, manifest: Manifest) -> str:
     address = int(random.integers(len(records)))
     fill = (random.integers(0, 256, records.shape[1], dtype=np.uint8), np.uint8(0), np.uint8(255))
     choice = int(random.integers(3))
@@ -70,7 +68,7 @@ def _overwrite(random: np.random.Generator, records: Records, header: ImageHeade
     return f"record {address} is {('random', 'zeros', 'ones')[choice]}"
 
 
-def _copy(random: np.random.Generator, records: Records, header: ImageHeader, manifest: Manifest) -> str:
+def _copy(random: np.random.Generator, records: Bytes, header: ImageHeader, manifest: Manifest) -> str:
     to, source = (int(address) for address in random.integers(len(records), size=2))
     records[to] = records[source]
     return f"record {to} is record {source}"
@@ -91,7 +89,7 @@ def _kind(address: int, header: ImageHeader) -> str:
     return "triangles" if address < header.attribute_base else "attributes"
 
 
-def write_field(record: Records, field: Field, value: int) -> None:
+def write_field(record: Bytes, field: Field, value: int) -> None:
     """Sets a field of a little-endian record; a value that does not fit keeps its low bits."""
     whole = int.from_bytes(record.tobytes(), "little")
     mask = ((1 << field.width) - 1) << field.offset

@@ -15,11 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from colonnade.common.image_io import encode_srgb, write_png
 from colonnade.common.progress import QUIET, Progress
+from colonnade.common.types import Floats
 from colonnade.quality.region_metrics import RegionDifference, compare_regions, frame_regions
 from colonnade.reference.environment.decoded import backdrops
 from colonnade.reference.render import ReferenceResult, render_reference
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
     from colonnade.reference.environment.ray_march import Rebuild
     from colonnade.scene.view import View
 
-Floats = NDArray[np.float64]
 #: Differences by part of the picture: frame, object, shadow.
 Regions = Mapping[str, RegionDifference]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from colonnade.common.types import Floats
+
 #: Albedo of points [n, 3] of a part, in its own coordinates: float64 [n, 3].
 Paint = Callable[[Floats], Floats]
 Rgb = tuple[float, float, float]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
+from colonnade.common.types import Floats
 from colonnade.evaluation.studies.probe_spheres import (
     PICTURE,
     Rays,
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.reference.environment.surface import Meetings
 
-Floats = NDArray[np.float64]
 
 NEAR_PIXELS = 5.0
 NEAR_METRES = 0.05

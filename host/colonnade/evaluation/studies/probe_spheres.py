@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 from colonnade.reference.bounce import bounce
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
 
-Floats = NDArray[np.float64]
 
 #: Radius of a sphere, metres.
 RADIUS = 0.15
@@ -119,8 +120,8 @@ def glass_rays(centre: Floats, radius: float = RADIUS) -> Rays:
 
 def cosine_rays(centre: Floats, count: int, random: np.random.Generator, radius: float = RADIUS) -> Rays:
     """Rays from points all over the sphere, their directions distributed as the cosine to the normal."""
-    normals = _unit(random.normal(size=(count, 3)))
-    directions = _unit(normals + _unit(random.normal(size=(count, 3))))
+    normals = unit_vectors(random.normal(size=(count, 3)))
+    directions = unit_vectors(normals + unit_vectors(random.normal(size=(count, 3))))
     return Rays(centre + (radius + 1e-4) * normals, directions, np.full(count, -1, dtype=np.int64))
 
 
@@ -128,10 +129,10 @@ def _picture_rays(centre: Floats, radius: float) -> tuple[Floats, NDArray[np.int
     """Unit directions from the camera to a square picture around the sphere, those that meet it, and their pixels."""
     distance = float(np.linalg.norm(centre))
     forward = centre / distance
-    right = _unit(np.cross([0.0, 1.0, 0.0], forward)[None])[0]
+    right = unit_vectors(np.cross([0.0, 1.0, 0.0], forward)[None])[0]
     edge = radius / np.sqrt(distance**2 - radius**2)
     y, x = (np.mgrid[:PICTURE, :PICTURE] + 0.5).reshape(2, -1) / PICTURE * 2 - 1
-    directions = _unit(forward + edge * (x[:, None] * right + y[:, None] * np.cross(forward, right)))
+    directions = unit_vectors(forward + edge * (x[:, None] * right + y[:, None] * np.cross(forward, right)))
     meets = directions @ forward > distance / np.hypot(distance, radius) + 1e-6
     meets &= np.linalg.norm(np.cross(directions, centre), axis=1) < radius * 0.999
     return directions[meets], np.flatnonzero(meets)
@@ -142,7 +143,3 @@ def _first_meeting(directions: Floats, centre: Floats, radius: float) -> Floats:
     along = directions @ centre
     t = along - np.sqrt((along**2 - centre @ centre + radius**2).clip(min=0))
     return np.asarray(t[:, None] * directions, dtype=np.float64)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True), dtype=np.float64)

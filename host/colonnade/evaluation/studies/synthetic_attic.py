@@ -3,7 +3,7 @@
 It is what the rebuild is tried on that nobody tuned for, and what tests stand objects in at any size. Nothing in it is
 taken from elsewhere.
 
-`python -m colonnade.attic FOLDER [WIDTHxHEIGHT]` writes it as a room.
+`python -m colonnade.evaluation.studies.synthetic_attic FOLDER [WIDTHxHEIGHT]` writes it as a room.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from colonnade.common.atomic_files import replacing
 from colonnade.common.image_io import encode_srgb, write_png
+from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 from colonnade.environment.model import Environment, EnvironmentCamera
 from colonnade.evaluation.studies.attic_paints import Paint, boards, plaster, rings, spiral, stripes
 from colonnade.mesh import primitives
 from colonnade.reference.embree import RayTracer, Triangles
-
-Floats = NDArray[np.float64]
 
 EYE, TARGET = np.array([0.9, 1.55, 2.5]), np.array([-0.05, 0.85, -1.0])
 #: Focal length in picture widths.
@@ -79,7 +79,7 @@ def attic(width: int = 640, height: int = 480) -> Attic:
         raise ValueError("the attic has a hole")
     points = tracer.surface_points(met, origins, directions)
     corners = tracer.corners[met]
-    normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normals = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     albedo = np.empty_like(normals)
     for index, part in enumerate(parts):
         rows = np.flatnonzero(owner[met] == index)
@@ -89,7 +89,7 @@ def attic(width: int = 640, height: int = 480) -> Attic:
     normals *= np.where(np.einsum("ni,ni->n", normals, directions) > 0, -1.0, 1.0)[:, None]
 
     to_lamp = LAMP - points.position
-    cosine = np.einsum("ni,ni->n", normals, _unit(to_lamp)).clip(min=0)
+    cosine = np.einsum("ni,ni->n", normals, unit_vectors(to_lamp)).clip(min=0)
     lit = ~tracer.occluded(points.position + 1e-3 * normals, to_lamp)
     falloff = 1 / np.einsum("ni,ni->n", to_lamp, to_lamp).clip(min=0.25)
     light = albedo * (AMBIENT + LAMP_COLOUR * (cosine * lit * falloff)[:, None])
@@ -122,7 +122,7 @@ def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
         "cy": environment.cy,
     }
     meta |= {"cam_to_world": [*pose.tolist(), [0.0, 0.0, 0.0, 1.0]], "albedo_encoding": "srgb"}
-    meta |= {"depth_step": DEPTH_STEP, "licence": "CC0: made by colonnade.attic"}
+    meta |= {"depth_step": DEPTH_STEP, "licence": "CC0: made by colonnade.evaluation.studies.synthetic_attic"}
     write_png(folder / "albedo.png", environment.albedo)
     pictures = {
         "normal.png": np.rint((environment.normals * np.array([1.0, -1.0, -1.0]) * 0.5 + 0.5) * 255).astype(np.uint8),
@@ -137,8 +137,8 @@ def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
 
 
 def _camera(width: int, height: int) -> EnvironmentCamera:
-    forward = _unit((TARGET - EYE)[None])[0]
-    right = _unit(np.cross(forward, [0.0, 1.0, 0.0])[None])[0]
+    forward = unit_vectors((TARGET - EYE)[None])[0]
+    right = unit_vectors(np.cross(forward, [0.0, 1.0, 0.0])[None])[0]
     pose = np.column_stack([right, np.cross(forward, right), forward, EYE])
     return EnvironmentCamera(FOCAL * width, FOCAL * width, width / 2, height / 2, pose)
 
@@ -198,13 +198,9 @@ def _smooth(points: Floats, flat: Floats, part: Part) -> Floats:
     away = points - np.array(part.centre)
     if part.is_round:
         size = np.ptp(part.vertices, axis=0)
-        return _unit(away / size**2)
-    around = _unit(away * (1.0, 0.0, 1.0))
+        return unit_vectors(away / size**2)
+    around = unit_vectors(away * (1.0, 0.0, 1.0))
     return np.where(np.abs(flat[:, 1:2]) > 0.9, flat, around)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float64)
 
 
 if __name__ == "__main__":

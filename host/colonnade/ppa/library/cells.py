@@ -11,7 +11,7 @@ from colonnade.common.errors import UserError
 
 
 @dataclass(frozen=True)
-class Table:
+class LookupTable:
     """A value, in ns, over input slew (ns) and output load (pF); a table of one row or column, or a scalar too."""
 
     slews: tuple[float, ...]
@@ -51,7 +51,7 @@ class Arc:
     related: str
     kind: str
     sense: str
-    tables: dict[str, Table]
+    tables: dict[str, LookupTable]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from colonnade.common.errors import UserError
 from colonnade.ppa.library import liberty
-from colonnade.ppa.library.cells import Table
+from colonnade.ppa.library.cells import LookupTable
 
 _WATTS = {"pw": 1e-9, "nw": 1e-6, "uw": 1e-3, "mw": 1.0}
 _EDGES = ("rise_power", "fall_power")
@@ -28,7 +28,7 @@ class CellEnergy:
     """
 
     leakage: float
-    pins: dict[str, tuple[tuple[Table, ...], tuple[Table, ...]]]
+    pins: dict[str, tuple[tuple[LookupTable, ...], tuple[LookupTable, ...]]]
 
     def of_transition(self, pin: str, slew: float, load: float) -> float:
         """pJ of one transition of a pin: the mean of rise and fall, of the pins that may cause it, and of states."""
@@ -71,7 +71,7 @@ def _cell(group: liberty.Group, library: liberty.Group, reader: liberty.Reader) 
     picojoules = reader.load
     pins = {}
     for pin in group.of("pin"):
-        tables: dict[str, list[Table]] = {edge: [] for edge in _EDGES}
+        tables: dict[str, list[LookupTable]] = {edge: [] for edge in _EDGES}
         for part in _at_supply(pin.of("internal_power"), grounds):
             for table in part.of(*_EDGES):
                 if table.values.get("values"):

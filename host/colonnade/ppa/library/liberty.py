@@ -20,7 +20,7 @@ from pathlib import Path
 from colonnade.common.errors import UserError, reason_of
 from colonnade.common.input_files import is_folder, read_input, require_regular
 from colonnade.common.limits import MAX_LIBERTY_BYTES
-from colonnade.ppa.library.cells import Arc, Cell, ClockGate, Library, Pin, State, Table
+from colonnade.ppa.library.cells import Arc, Cell, ClockGate, Library, LookupTable, Pin, State
 
 #: Cells for scan, power domains and probing; delay cells.
 AVOIDED = (
@@ -225,7 +225,7 @@ class Reader:
         sense = group.text("timing_sense", "non_unate")
         return Arc(group.text("related_pin"), group.text("timing_type", "combinational"), sense, tables)
 
-    def table(self, group: Group, scale: float) -> Table:
+    def table(self, group: Group, scale: float) -> LookupTable:
         """A table with its values times `scale`.
 
         Slew, or a constrained pin's slew, becomes `slews`; load, or the clock's slew, becomes `loads`.
@@ -247,7 +247,7 @@ class Reader:
             values = tuple(tuple(flat[i * len(loads) : (i + 1) * len(loads)]) for i in range(len(slews)))
         else:
             values = tuple(tuple(flat[i :: len(slews)]) for i in range(len(slews)))
-        return Table(slews, loads, values)
+        return LookupTable(slews, loads, values)
 
 
 def _state(cell: Group) -> State | None:

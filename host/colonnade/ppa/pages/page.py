@@ -1,7 +1,7 @@
 """Writes the tables of ``docs/ppa.md`` from the data that `tools/ppa` measured.
 
 A table stands between ``<!-- NAME -->`` and ``<!-- end -->``; everything else of the page is left alone.
-Run as ``python -m colonnade.ppa.page DOCS``.
+Run as ``python -m colonnade.ppa.pages.page DOCS``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Gates of each unit of `tiny`, by Yosys's own cells: what is on record is held against what the sources give.
 
-Run as ``python -m colonnade.ppa.guard FILE`` it writes the record.
+Run as ``python -m colonnade.ppa.studies.guard FILE`` it writes the record.
 """
 
 from __future__ import annotations

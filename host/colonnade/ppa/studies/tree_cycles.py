@@ -2,7 +2,7 @@
 
 Without a tree every ray is tested against every triangle, so that whole meshes would take days: they are reduced by
 merging the vertices of each cell of a grid (Rossignac and Borrel 1993).
-Run as ``python -m colonnade.ppa.tree_gain CONFIG SIZE COUNT,COUNT,… FILE`` it writes the figures.
+Run as ``python -m colonnade.ppa.studies.tree_cycles CONFIG SIZE COUNT,COUNT,… FILE`` it writes the figures.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.atomic_files import replacing, write_json
@@ -37,36 +36,13 @@ NO_TREE = "geometry.bvh=false"
 
 
 def reduced(mesh: Mesh, maximum: int) -> tuple[Array, Array]:
-    """Vertices [n, 3] and faces [m, 3] of a mesh on the finest grid that leaves at most so many faces."""
-    minimum = mesh.vertices.min(axis=0)
-    edge = float((mesh.vertices.max(axis=0) - minimum).max())
-    finest: tuple[Array, Array] | None = None
-    # The number of faces grows with the grid, if not strictly
-    low, high = 1, 1024
-    while low < high - 1:
-        cells = (low + high) // 2
-        vertices, faces = _clustered(mesh, np.floor((mesh.vertices - minimum) / edge * cells).astype(np.int64))
-        if 0 < len(faces) <= maximum:
-            low, finest = cells, (vertices, faces)
-        else:
-            low, high = (low, cells) if len(faces) else (cells, high)
-    if finest is None:
+    """Vertices [n, 3] and faces [m, 3] of a mesh, simplified by quadrics to at most so many faces."""
+    import fast_simplification
+
+    points, faces = fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=maximum)
+    if len(faces) > maximum:
         raise RuntimeError(f"{mesh.name} cannot be reduced to {maximum} triangles")
-    return finest
-
-
-def _clustered(mesh: Mesh, cells: Array) -> tuple[Array, Array]:
-    """The vertices of a cell become their mean; faces that lose their area, and copies, go."""
-    _, index, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    index = index.reshape(-1)
-    sums = np.zeros((len(counts), 3))
-    np.add.at(sums, index, mesh.vertices)
-    faces = index[mesh.faces]
-    corners = np.sort(faces, axis=1)
-    is_flat = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2])
-    _, first = np.unique(corners, axis=0, return_index=True)
-    kept = np.intersect1d(first, np.flatnonzero(~is_flat))
-    return sums / counts[:, None], faces[kept]
+    return points, faces
 
 
 def tree_gain(config: str, counts: Sequence[int], size: tuple[int, int]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """What the tree costs in records: each mesh packed with nodes and without.
 
-Run as ``python -m colonnade.ppa.nodes CONFIG FILE`` it writes the figures of the benchmark's meshes.
+Run as ``python -m colonnade.ppa.studies.tree_records CONFIG FILE`` it writes the figures of the benchmark's meshes.
 """
 
 from __future__ import annotations

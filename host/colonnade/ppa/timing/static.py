@@ -21,7 +21,7 @@ _NEVER = -1.0
 
 
 @dataclass(frozen=True)
-class Path:
+class TimingPath:
     """The slowest path of a kind.
 
     Attributes:
@@ -41,10 +41,10 @@ class Path:
 class Timing:
     """The slowest path of each kind; None where there is no such path."""
 
-    register_to_register: Path | None
-    input_to_register: Path | None
-    register_to_output: Path | None
-    input_to_output: Path | None
+    register_to_register: TimingPath | None
+    input_to_register: TimingPath | None
+    register_to_output: TimingPath | None
+    input_to_output: TimingPath | None
 
 
 class Analysis:
@@ -95,7 +95,7 @@ class Analysis:
 
         return [worst("cell_rise"), worst("cell_fall"), worst("rise_transition"), worst("fall_transition")]
 
-    def _slowest(self, begins: dict[int, Edges]) -> tuple[Path | None, Path | None]:
+    def _slowest(self, begins: dict[int, Edges]) -> tuple[TimingPath | None, TimingPath | None]:
         edges = {net: list(values) for net, values in begins.items()}
         before: dict[int, tuple[Instance, int]] = {}
         for instance in self.order:
@@ -167,12 +167,12 @@ class Analysis:
                         latest = max(latest, at[edge] + arc.tables[name].at(at[edge + 2], self.slew))
         return latest
 
-    def _path(self, ns: float, net: int, end: str, before: Mapping[int, tuple[Instance, int]]) -> Path:
+    def _path(self, ns: float, net: int, end: str, before: Mapping[int, tuple[Instance, int]]) -> TimingPath:
         cells: list[str] = []
         while net in before:
             instance, net = before[net]
             cells.append(instance.cell.name)
-        return Path(ns, self._name(net), end, tuple(reversed(cells)))
+        return TimingPath(ns, self._name(net), end, tuple(reversed(cells)))
 
     def _name(self, net: int) -> str:
         return self._netlist.names.get(net, "a net without a name")

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from colonnade.common.types import Floats
 from colonnade.environment.encoding.planes import SLOPE_PIXELS, Picture, unpacked_planes
 from colonnade.reference.environment.depth_mesh import DepthMesh
 from colonnade.reference.environment.ray_march import PlaneMarch, Rebuild, RebuiltGeometry
@@ -18,8 +18,6 @@ from colonnade.reference.environment.surface import Backdrop, BackdropPoints
 if TYPE_CHECKING:
     from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
-
-Floats = NDArray[np.float64]
 
 
 class PlaneShell:

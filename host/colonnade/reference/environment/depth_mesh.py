@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.types import Floats
 from colonnade.reference.embree import RayTracer, Triangles
 from colonnade.reference.environment.surface import Backdrop, Meetings
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
 
-Floats = NDArray[np.float64]
 
 #: Neighbours of which one is farther than this many times the other may lie on different things …
 JUMP = 1.05

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.types import Floats
 from colonnade.reference.environment.surface import Meetings
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
 
-Floats = NDArray[np.float64]
 
 #: What became of a ray: it met a surface that the camera sees, the extension of one behind another, left the view, or
 #: was given up.

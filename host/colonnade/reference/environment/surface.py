@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.mesh.topology import unit_rows
+from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -119,4 +118,4 @@ class Backdrop:
     def _of_texels(
         self, position: Floats, row: NDArray[np.intp], column: NDArray[np.intp], outside: NDArray[np.bool_]
     ) -> BackdropPoints:
-        return BackdropPoints(position, unit_rows(self.normals[row, column]), self.albedo[row, column], outside)
+        return BackdropPoints(position, unit_vectors(self.normals[row, column]), self.albedo[row, column], outside)
