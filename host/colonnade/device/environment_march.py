@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 #: Grid steps a metre, log2, where no object says how large the grid is.
 GRID_LOG = 20
-#: Kinds of points as `RoomModel` numbers them.
+#: Kinds of points as `EnvironmentModel` numbers them.
 _MAP, _SHELL = 1, 2
 
 
 class DeviceMarch:
-    """The march of `cpp/model/background.hpp` through an attribute image."""
+    """The march of `cpp/model/environment.hpp` through an attribute image."""
 
     def __init__(self, environment: Environment, image: AttributeImage, manifest: Manifest) -> None:
         """For hardware with a physical-attribute memory of the image's layout."""
@@ -35,7 +35,7 @@ class DeviceMarch:
         if attributes is None:
             raise ValueError("the hardware has no physical-attribute memory")
         numbers = dict(manifest.numbers) | dict.fromkeys(("arity", "trianglesPerRecord", "stackDepth", "bvh"), 0)
-        self._model: Any = _core.RoomModel(numbers, dict(attributes.sizes), field_places(attributes.layouts))
+        self._model: Any = _core.EnvironmentModel(numbers, dict(attributes.sizes), field_places(attributes.layouts))
         for memory, words in memory_words(image):
             self._model.load(memory, words)
         self._environment = environment

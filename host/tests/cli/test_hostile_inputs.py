@@ -114,7 +114,7 @@ CASES |= {
     "nan-camera": Case(X, "finite", scene("[camera]\nposition = [nan, 0, 0]\n")),
     "infinite-fov": Case(X, "camera.fov", scene("[camera]\nfov = inf\n")),
     "zero-up": Case(X, "must not be zero", scene("[camera]\nup = [0, 0, 0]\n")),
-    "nan-colour": Case(X, "finite", scene("[light]\ncolour = [nan, 1, 1]\n")),
+    "nan-colour": Case(X, "from 0 to 15", scene("[light]\ncolour = [nan, 1, 1]\n")),
     "negative-colour": Case(X, "from 0", scene("[background]\ncolour = [-1, 0, 0]\n")),
     "negative-falloff": Case(X, "light.falloff", scene("[light]\nfalloff = -1\n")),
     "infinite-pixel": Case(X, "two numbers", scene('[object]\nstand_at = [inf, 1]\n[background]\nroom = "room"\n')),

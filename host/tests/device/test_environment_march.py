@@ -38,7 +38,7 @@ room = "{room}"
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     file = tmp_path / "room.toml"
-    file.write_text(SCENE.format(kind="mirror", environment=(ROOMS / "living").as_posix()))
+    file.write_text(SCENE.format(kind="mirror", room=(ROOMS / "living").as_posix()))
     return file
 
 

@@ -100,7 +100,7 @@ def test_maps_that_do_not_fill_the_memories_are_refused(tmp_path: Path, hardware
             words = np.ascontiguousarray(words)
             sections = (replace(first, words=words), *sections)
             memories = (LoadedMemory(first.memory, *words.shape), *memories)
-        header = replace(image.header, environment=replace(environment, memories=memories))
+        header = replace(image.header, room=replace(environment, memories=memories))
         file = replace(image, header=header, attributes=sections).save(tmp_path)
         with pytest.raises(UserError, match=place):
             SceneImage.load(file, hardware)

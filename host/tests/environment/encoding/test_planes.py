@@ -211,7 +211,7 @@ def test_a_room_is_encoded_once(
         raise AssertionError("encoded again")
 
     with monkeypatch.context() as patch:
-        patch.setattr("colonnade.environment.encoding.cache.encode_room", refuse)
+        patch.setattr("colonnade.environment.encoding.cache.encode_environment", refuse)
         assert all_words(encoded_environment(environment, layout, tmp_path)) == all_words(first)
         for other in (
             replace(environment, albedo=environment.albedo * 0.5),

@@ -6,7 +6,7 @@ namespace colonnade {
 
 /// The frame registers of a room, decoded. A position P in grid steps has the projection p = matrix · P + (offset << offsetShift), in steps of
 /// 2^-exponent: it is seen at the map's pixel 1024 · (p0, p1) / p2, and its inverse depth is w = 1 / p2.
-struct RoomView {
+struct EnvironmentView {
     std::array<Vector, 3> matrix, rotation;
     Vector offset;
     /// Counts as sceneBits above that.
@@ -22,7 +22,7 @@ struct RoomView {
 };
 
 /// What a point of the room is made of; the normal in object space, 11 fraction bits.
-struct RoomTexel {
+struct EnvironmentTexel {
     Colour albedo;
     Vector normal;
     /// A word was read beyond a heap.
@@ -31,8 +31,8 @@ struct RoomTexel {
 
 /// Where a ray meets the room: it has the albedo and the normal of pixel (x, y), or of a shell's entry. The way there is travel · 2^travelExponent
 /// times the ray's direction. `isHidden`: on the extension of a surface that something else hides.
-struct RoomPoint {
-    enum class Kind { nothing, map, shell } kind;
+struct EnvironmentPoint {
+    enum class Kind { nothing, map, boundingPlane } kind;
     int x, y, entry;
     bool isHidden;
     std::int64_t travel;
@@ -47,8 +47,8 @@ struct RoomPoint {
 struct MapRay {
     bool isInFront;
     Vector position, direction;
-    Vector from, towards;
-    int fromShift, towardsShift, directionShift;
+    Vector from, dir;
+    int fromShift, dirShift, directionShift;
 };
 
 /// Scales a vector so that its components take `bits` bits and a sign; returns by how many bits it was shifted down.

@@ -1,8 +1,8 @@
-// colonnade._core.RoomModel: the bit-exact model of a room in the physical-attribute memory (cpp/model) for Python.
+// colonnade._core.EnvironmentModel: the bit-exact model of a room in the physical-attribute memory (cpp/model) for Python.
 #include <cmath>
 
 #include "binding.hpp"
-#include "model/background.hpp"
+#include "model/environment.hpp"
 
 using namespace nanobind::literals;
 using namespace colonnade;
@@ -10,8 +10,8 @@ using namespace colonnade::binding;
 
 namespace {
 
-RoomView viewOf(const Values& registers) {
-    RoomView view{};
+EnvironmentView viewOf(const Values& registers) {
+    EnvironmentView view{};
     const auto vector = [&](const std::string& name) { return Vector{lookUp(registers, name + ".x"), lookUp(registers, name + ".y"), lookUp(registers, name + ".z")}; };
     for (int row = 0; row < 3; ++row) view.matrix[row] = vector("matrix[" + std::to_string(row) + "]");
     view.offset = vector("offset");
@@ -21,15 +21,15 @@ RoomView viewOf(const Values& registers) {
     return view;
 }
 
-class RoomModel {
+class EnvironmentModel {
 public:
-    RoomModel(const Values& numbers, const Values& sizes, const FieldTuples& layouts)
+    EnvironmentModel(const Values& numbers, const Values& sizes, const FieldTuples& layouts)
         : numbers_(numbers), image_(AttributeSizes(sizes), layoutsOf(layouts)) {}
 
     void load(const std::string& memory, const Records& words) { image_.load(memory, words.data(), words.shape(0), words.shape(1)); }
 
     nb::dict march(const Values& registers, const Vectors& origins, const Vectors& directions) {
-        const RoomView view = viewOf(registers);
+        const EnvironmentView view = viewOf(registers);
         const Background background(numbers_, image_);
         const std::size_t count = origins.shape(0);
         std::int64_t *kind, *x, *y, *entry, *steps;
@@ -51,7 +51,7 @@ public:
                 origin[a] = origins(i, a);
                 direction[a] = directions(i, a);
             }
-            const RoomPoint point = background.meet(origin, direction, view);
+            const EnvironmentPoint point = background.meet(origin, direction, view);
             kind[i] = static_cast<std::int64_t>(point.kind);
             x[i] = point.x;
             y[i] = point.y;
@@ -70,12 +70,12 @@ private:
 
 } // namespace
 
-void bind_background(nb::module_& module) {
-    nb::class_<RoomModel>(module, "RoomModel", "A room in the physical-attribute memory: rays go in, the points of the room that they meet come out.")
+void bind_environment(nb::module_& module) {
+    nb::class_<EnvironmentModel>(module, "EnvironmentModel", "A room in the physical-attribute memory: rays go in, the points of the room that they meet come out.")
         .def(nb::init<const Values&, const Values&, const FieldTuples&>(), "numbers"_a, "sizes"_a, "layouts"_a,
              "From the manifest's numbers and its attributes: sizes, and layouts as word -> field -> (offset, width, signed).")
-        .def("load", &RoomModel::load, "memory"_a, "words"_a, "Fills a memory by its name: uint8 [words, bytes], low byte first.")
-        .def("march", &RoomModel::march, "registers"_a, "origins"_a, "directions"_a,
+        .def("load", &EnvironmentModel::load, "memory"_a, "words"_a, "Fills a memory by its name: uint8 [words, bytes], low byte first.")
+        .def("march", &EnvironmentModel::march, "registers"_a, "origins"_a, "directions"_a,
              "Where rays meet the room. Origins int64 [n, 3], grid steps; directions int64 [n, 3], components of shadeBits bits and a sign. Registers: "
              "matrix[0..2].{x,y,z}, offset.{x,y,z}, offsetShift, exponent, shellPlanes. Gives kind int64 [n] (0 nothing, 1 map, 2 shell), the map's pixel "
              "x, y, the shell's entry, is_hidden bool, travel float64 (directions from the origin), steps.");

@@ -17,7 +17,7 @@
 #include <optional>
 #include <vector>
 
-#include "model/background.hpp"
+#include "model/environment.hpp"
 #include "questions.hpp"
 
 namespace colonnade {
@@ -55,7 +55,7 @@ public:
         Answer answer;
         if (kind == "plane") return put(answer, image().planeOf(first));
         if (kind == "shell") {
-            const ShellEntry& entry = image().shell(first);
+            const BoundingPlaneEntry& entry = image().boundingPlane(first);
             put(answer, entry.plane) << entry.albedo.r << entry.albedo.g << entry.albedo.b;
             return answer << entry.normal.x << entry.normal.y << entry.normal.z;
         }
@@ -81,7 +81,7 @@ private:
     static Answer& put(Answer& answer, const PlaneWord& plane) { return answer << plane.a << plane.b << plane.c << plane.e; }
 
     Answer march(Question& ask, const Numbers& numbers) {
-        RoomView view{};
+        EnvironmentView view{};
         for (auto& row : view.matrix) row = ask.vector();
         view.offset = ask.vector();
         view.offsetShift = static_cast<int>(ask.number());
@@ -95,12 +95,12 @@ private:
         Vector direction;
         blockScale(ask.wideVector(), numbers.shadeBits, direction);
         const Background background(numbers, image());
-        const RoomPoint point = isSeen ? background.seen(x, y, direction, view) : background.meet(origin, direction, view);
+        const EnvironmentPoint point = isSeen ? background.seen(x, y, direction, view) : background.meet(origin, direction, view);
         Answer answer;
         answer << static_cast<int>(point.kind) << point.x << point.y << point.entry << point.isHidden;
         answer << point.travel << point.travelExponent << point.steps;
-        if (point.kind == RoomPoint::Kind::nothing) return answer.all(std::array<int, 9>{}) << point.isIllegal;
-        const RoomTexel texel = background.texelOf(point, view);
+        if (point.kind == EnvironmentPoint::Kind::nothing) return answer.all(std::array<int, 9>{}) << point.isIllegal;
+        const EnvironmentTexel texel = background.texelOf(point, view);
         return answer.all(background.reached(origin, direction, point)).all(texel.albedo).all(texel.normal) << (point.isIllegal || texel.isIllegal);
     }
 

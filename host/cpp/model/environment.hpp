@@ -7,21 +7,21 @@ namespace colonnade {
 class Background : private MapGeometry {
 public:
     /// Steps of a march at most: then the ray meets the shell.
-    static constexpr int mostSteps = 128;
+    static constexpr int maxSteps = 128;
 
     Background(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers, image.sizes()), n_(numbers), image_(image) {}
 
     /// The point of the room that a ray from `origin` (grid steps) along `direction` (components of shadeBits bits and a sign) meets.
-    RoomPoint meet(const WideVector& origin, const Vector& direction, const RoomView& view) const {
+    EnvironmentPoint meet(const WideVector& origin, const Vector& direction, const EnvironmentView& view) const {
         const MapRay ray = project(origin, direction, view);
-        RoomPoint point{};
-        if (ray.isInFront && !march(ray, view, point)) meetShell(ray, view, point);
+        EnvironmentPoint point{};
+        if (ray.isInFront && !march(ray, view, point)) meetBoundingPlanes(ray, view, point);
         return point;
     }
 
     /// The point that the map's own camera sees in pixel (x, y) of the frame; `direction` is that of the pixel's ray, as for `meet`.
-    RoomPoint seen(std::int64_t x, std::int64_t y, const Vector& direction, const RoomView& view) const {
-        RoomPoint point{};
+    EnvironmentPoint seen(std::int64_t x, std::int64_t y, const Vector& direction, const EnvironmentView& view) const {
+        EnvironmentPoint point{};
         Vector place{};
         const std::array<std::int64_t, 2> pixel = {x, y};
         for (int a = 0; a < 2; ++a) place[a] = ((2 * pixel[a] + 1) * view.step[a]) >> stepGuard;
@@ -37,26 +37,26 @@ public:
         const CellPlane cell = image_.cellAt(point.x, point.y);
         point.isIllegal = cell.isIllegal;
         const Depth depth = depthOf(ray, image_.planeOf(cell.id), 0);
-        const std::int64_t w = std::min(most(), -inW(depth.value, depth));
-        const Wide towards = times(view.matrix[2], {direction[0], direction[1], direction[2]});
-        if (w <= 0 || towards <= 0) {
-            RoomPoint nothing{};
+        const std::int64_t w = std::min(maximum(), -inW(depth.value, depth));
+        const Wide dir = times(view.matrix[2], {direction[0], direction[1], direction[2]});
+        if (w <= 0 || dir <= 0) {
+            EnvironmentPoint nothing{};
             nothing.isIllegal = cell.isIllegal;
             return nothing;
         }
-        point.kind = RoomPoint::Kind::map;
-        const Normalised fall = normalise(UnsignedWide(towards), f_), speed = normalise(UnsignedWide(w) * fall.mantissa, f_);
+        point.kind = EnvironmentPoint::Kind::map;
+        const Normalised fall = normalise(UnsignedWide(dir), f_), speed = normalise(UnsignedWide(w) * fall.mantissa, f_);
         point.travel = reciprocal(speed.mantissa);
         point.travelExponent = 1 + f_ - speed.exponent - fall.exponent + view.exponent;
         return point;
     }
 
     /// Albedo and normal of a point.
-    RoomTexel texelOf(const RoomPoint& point, const RoomView& view) const {
-        const bool isShell = point.kind == RoomPoint::Kind::shell;
-        const Rgb12 albedo = isShell ? image_.shell(point.entry).albedo : image_.albedoAt(point.x, point.y);
-        const Normal12 normal = isShell ? image_.shell(point.entry).normal : image_.normalAt(point.x, point.y);
-        RoomTexel texel{{albedo.r, albedo.g, albedo.b}, {}, albedo.isIllegal || normal.isIllegal};
+    EnvironmentTexel texelOf(const EnvironmentPoint& point, const EnvironmentView& view) const {
+        const bool isBoundingPlane = point.kind == EnvironmentPoint::Kind::boundingPlane;
+        const Rgb12 albedo = isBoundingPlane ? image_.boundingPlane(point.entry).albedo : image_.albedoAt(point.x, point.y);
+        const Normal12 normal = isBoundingPlane ? image_.boundingPlane(point.entry).normal : image_.normalAt(point.x, point.y);
+        EnvironmentTexel texel{{albedo.r, albedo.g, albedo.b}, {}, albedo.isIllegal || normal.isIllegal};
         const std::int64_t one = std::int64_t(1) << n_.normalFraction;
         for (int a = 0; a < 3; ++a) {
             const std::int64_t turned = view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z;
@@ -66,13 +66,13 @@ public:
     }
 
     /// Where a ray has met the room, grid steps; at most half as far as a scene reaches, so that there is room for an offset and for the way to a light.
-    WideVector reached(const WideVector& origin, const Vector& direction, const RoomPoint& point) const {
+    WideVector reached(const WideVector& origin, const Vector& direction, const EnvironmentPoint& point) const {
         WideVector result;
-        const Wide most = largest(n_.sceneBits);
+        const Wide maximum = largest(n_.sceneBits);
         for (int a = 0; a < 3; ++a) {
             const Wide step = Wide(point.travel) * direction[a];
-            const Wide way = point.travelExponent > f_ ? (step < 0 ? -most - 1 : step > 0 ? most : 0) : floorShift<Wide>(step, -point.travelExponent);
-            result[a] = clamp<Wide>(origin[a] + clamp<Wide>(way, -most - 1, most), -(most / 2) - 1, most / 2);
+            const Wide way = point.travelExponent > f_ ? (step < 0 ? -maximum - 1 : step > 0 ? maximum : 0) : floorShift<Wide>(step, -point.travelExponent);
+            result[a] = clamp<Wide>(origin[a] + clamp<Wide>(way, -maximum - 1, maximum), -(maximum / 2) - 1, maximum / 2);
         }
         return result;
     }
@@ -153,9 +153,9 @@ private:
         return result;
     }
 
-    std::int64_t farthest() const { return (most() << guardBits) | ((std::int64_t(1) << guardBits) - 1); }
+    std::int64_t farthest() const { return (maximum() << guardBits) | ((std::int64_t(1) << guardBits) - 1); }
 
-    bool march(const MapRay& ray, const RoomView& view, RoomPoint& point) const {
+    bool march(const MapRay& ray, const EnvironmentView& view, EnvironmentPoint& point) const {
         const int toPixel = f_ - mapLog;
         std::array<int, 2> pixel = {static_cast<int>(ray.position[0] >> toPixel), static_cast<int>(ray.position[1] >> toPixel)};
         if (!sizes_.covers(pixel[0], pixel[1])) return false;
@@ -185,7 +185,7 @@ private:
             } else if (throughCells(ray, info, depths, tile, axes, begin, end, state, point)) {
                 return hit(ray, view, state, point);
             }
-            if (point.steps >= mostSteps || end >= farthest() || along(ray, 2, s1) <= 0 || along(ray, 2, s1) >= most()) return false;
+            if (point.steps >= maxSteps || end >= farthest() || along(ray, 2, s1) <= 0 || along(ray, 2, s1) >= maximum()) return false;
             begin = end;
             const int axis = axes[0].next <= axes[1].next ? 0 : 1;
             tile[axis] += axes[axis].isNegative ? -1 : 1;
@@ -206,7 +206,7 @@ private:
     }
 
     bool throughCells(const MapRay& ray, const TileInfo& info, const std::array<Depth, 4>& depths, const std::array<int, 2>& tile, const std::array<Axis, 2>& axes,
-                      std::int64_t begin, std::int64_t end, March& state, RoomPoint& point) const {
+                      std::int64_t begin, std::int64_t end, March& state, EnvironmentPoint& point) const {
         const int cellLog = info.cellLog2, perTile = 1 << (sizes_.tileLog - cellLog);
         const auto start = pixelAt(ray, tile, begin >> guardBits);
         std::array<int, 2> cell;
@@ -229,7 +229,7 @@ private:
             const auto [x, y] = pixelIn(ray, corner, cellLog, begin >> guardBits);
             ++point.steps;
             if (pass(ray, depths[which], begin >> guardBits, stop >> guardBits, x, y, state)) return true;
-            if (stop >= end || point.steps >= mostSteps) return false;
+            if (stop >= end || point.steps >= maxSteps) return false;
             begin = stop;
             const int axis = next[0] <= next[1] ? 0 : 1;
             cell[axis] += axes[axis].isNegative ? -1 : 1;
@@ -248,8 +248,8 @@ private:
     }
 
     /// Reports what a march has met.
-    bool hit(const MapRay& ray, const RoomView& view, const March& state, RoomPoint& point) const {
-        point.kind = RoomPoint::Kind::map;
+    bool hit(const MapRay& ray, const EnvironmentView& view, const March& state, EnvironmentPoint& point) const {
+        point.kind = EnvironmentPoint::Kind::map;
         point.isHidden = state.isBehind;
         // A plane met behind another one has its own last pixel's colour
         point.x = state.x;
@@ -261,7 +261,7 @@ private:
         const std::int64_t w = std::max<std::int64_t>(1, along(ray, 2, state.hit));
         const Normalised way = normalise(magnitude(state.hit), f_), depth = normalise(magnitude(w), f_);
         point.travel = static_cast<std::int64_t>(divide(way.mantissa, depth.mantissa, f_));
-        point.travelExponent = way.exponent - depth.exponent - f_ + view.exponent - ray.directionShift - ray.towardsShift;
+        point.travelExponent = way.exponent - depth.exponent - f_ + view.exponent - ray.directionShift - ray.dirShift;
         return true;
     }
 
@@ -270,17 +270,17 @@ private:
     }
 
     /// The nearest of the shell's planes: it lies in front of the ray's origin, and the ray goes towards it.
-    void meetShell(const MapRay& ray, const RoomView& view, RoomPoint& point) const {
+    void meetBoundingPlanes(const MapRay& ray, const EnvironmentView& view, EnvironmentPoint& point) const {
         std::uint64_t bestQuotient = 0;
         int bestExponent = 0;
         for (int i = 0; i < std::min(view.shellPlanes, sizes_.shellPlanes); ++i) {
-            const PlaneWord& plane = image_.shell(i).plane;
+            const PlaneWord& plane = image_.boundingPlane(i).plane;
             const std::int64_t front = depthOf(ray, plane, i).value;
             const std::int64_t centreU = std::int64_t(sizes_.width) << (f_ - mapLog - 1), centreV = std::int64_t(sizes_.height) << (f_ - mapLog - 1);
-            const auto off = [&](int axis, std::int64_t centre) { return ray.towards[axis] - static_cast<std::int64_t>(floorShift<Wide>(Wide(centre) * ray.towards[2], f_)); };
-            const Wide towards = Wide(plane.a) * off(0, centreU) + Wide(plane.b) * off(1, centreV) + Wide(plane.c) * ray.towards[2];
-            if (front <= 0 || towards <= 0) continue;
-            const Normalised speed = normalise(magnitude(towards), f_), way = normalise(magnitude(front), f_);
+            const auto off = [&](int axis, std::int64_t centre) { return ray.dir[axis] - static_cast<std::int64_t>(floorShift<Wide>(Wide(centre) * ray.dir[2], f_)); };
+            const Wide dir = Wide(plane.a) * off(0, centreU) + Wide(plane.b) * off(1, centreV) + Wide(plane.c) * ray.dir[2];
+            if (front <= 0 || dir <= 0) continue;
+            const Normalised speed = normalise(magnitude(dir), f_), way = normalise(magnitude(front), f_);
             const std::uint64_t quotient = divide(speed.mantissa, way.mantissa, f_);
             const int exponent = speed.exponent - way.exponent;
             const Normalised now = normalise(quotient, f_ + 1);
@@ -289,15 +289,15 @@ private:
                 bestQuotient = now.mantissa;
                 bestExponent = length;
                 point.entry = i;
-                point.kind = RoomPoint::Kind::shell;
+                point.kind = EnvironmentPoint::Kind::boundingPlane;
             }
         }
-        if (point.kind == RoomPoint::Kind::nothing) return;
+        if (point.kind == EnvironmentPoint::Kind::nothing) return;
         // travel = front / towards · p2
         const Normalised depth = normalise(magnitude(ray.from[2]), f_);
         const Normalised rate = normalise(bestQuotient, f_);
         point.travel = static_cast<std::int64_t>(divide(depth.mantissa, rate.mantissa, f_));
-        point.travelExponent = depth.exponent - (bestExponent - f_) - f_ + ray.fromShift - ray.towardsShift;
+        point.travelExponent = depth.exponent - (bestExponent - f_) - f_ + ray.fromShift - ray.dirShift;
     }
 
     const Numbers& n_;
