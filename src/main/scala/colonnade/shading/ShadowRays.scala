@@ -70,5 +70,5 @@ final class ShadowRays(config: ColonnadeConfig) extends Module {
   io.ray.bits.context  := asked.context
   io.ray.bits.isShadow := true.B
   io.ray.bits.origin   := origin
-  io.ray.bits.towards.axes.zip(towards).foreach { case (to, from) => to := from }
+  io.ray.bits.dir.axes.zip(towards).foreach { case (to, from) => to := from }
 }

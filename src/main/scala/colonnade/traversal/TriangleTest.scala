@@ -7,14 +7,14 @@ import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
 import colonnade.ray.{RayFormats, TriangleRay}
 
-/** One ray against the triangles of one record. */
+/** One ray to test against the triangles of one record. */
 final class TriangleCandidate(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val record  = new RecordFormats(config).triangles
   val ray     = new TriangleRay(config.numbers)
 }
 
-/** Where a ray meets a triangle. */
+/** The intersection of a ray with a triangle. */
 final class TriangleHit(config: ColonnadeConfig) extends Bundle {
   private val formats = new RayFormats(config.numbers)
 
@@ -28,17 +28,17 @@ final class TriangleHit(config: ColonnadeConfig) extends Bundle {
   val backSide = Bool()
 }
 
-/** The outcome of one triangle; results come in the order of candidates, and of triangles in a record. */
+/** The result of one triangle. Results follow the order of candidates, and of triangles in a record. */
 final class TriangleResult(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
 
-  /** The ray meets the triangle at `hit.t` ≥ 0. */
+  /** The ray intersects the triangle at `hit.t` ≥ 0. */
   val isHit = Bool()
   val hit   = new TriangleHit(config)
 
-  /** It lets some light through. */
-  val isClear = Bool()
+  /** The material transmits light. */
+  val isTransmissive = Bool()
 
-  /** The record's last triangle. */
+  /** This is the last triangle of the record. */
   val isLast = Bool()
 }

@@ -5,17 +5,17 @@ import scala.util.Random
 import colonnade.Model
 import colonnade.config.ColonnadeConfig
 
-/** A ray as the triangle test sees it: raw integers in its own frame. */
+/** A ray for the triangle test: raw integers in its own frame. */
 final case class TestRay(axis: Int, negative: Seq[Boolean], origin: Seq[BigInt], shear: Seq[BigInt])
 
 /** A triangle by its vertices in object space. */
 final case class TestTriangle(vertices: Seq[Seq[BigInt]])
 
-/** What is expected of one triangle. */
+/** The expected result of one triangle. */
 final case class ExpectedHit(isHit: Boolean, t: BigInt, weights: Seq[BigInt], backSide: Boolean)
 
-/** Random and directed rays and triangles of a configuration, and what the model says of them. */
-final class TriangleQuestions(config: ColonnadeConfig, seed: Int) {
+/** Random and directed rays and triangles of a configuration, and the model's results. */
+final class TriangleStimulus(config: ColonnadeConfig, seed: Int) {
   private val numbers = config.numbers
   private val random  = new Random(seed)
   private val cube    = BigInt(1) << numbers.vertexBits
@@ -51,7 +51,7 @@ final class TriangleQuestions(config: ColonnadeConfig, seed: Int) {
 
   def ray: TestRay = {
     val shears = Seq.fill(2)(shear)
-    // A sign says no more than the shear does, and is its own for a shear of zero.
+    // A sign equals that of the shear; it is free if the shear is 0.
     val signs = shears.map(s => if (s == 0) random.nextBoolean() else s < 0)
     TestRay(random.nextInt(3), signs :+ random.nextBoolean(), Seq.fill(3)(origin), shears)
   }

@@ -6,13 +6,13 @@ import colonnade.config.ColonnadeConfig
 import scala.util.Random
 
 /** A ray and a node as integers; the ray's numbers are in its own frame. */
-final case class BoxQuestion(
+final case class BoxCase(
     axis:           Int,
     negative:       Seq[Boolean],
     boxOrigin:      Seq[BigInt],
     reciprocal:     Seq[BigInt],
     exponent:       Seq[Int],
-    limit:          BigInt,
+    tMax:           BigInt,
     origin:         Seq[BigInt],
     shift:          Seq[Int],
     kinds:          Seq[Int],
@@ -23,24 +23,24 @@ final case class BoxQuestion(
     context:        Int
 ) {
 
-  /** In the form that vectors.cpp reads. */
+  /** The input of the model, in the format of vectors.cpp. */
   def words: Seq[BigInt] =
     (BigInt(axis) +: negative.map(sign => BigInt(if (sign) 1 else 0))) ++ boxOrigin ++ reciprocal ++ exponent.map(
       BigInt(_)
     ) ++
-      Seq(limit) ++ origin ++ shift.map(BigInt(_)) ++ Seq(firstChild, firstTriangles) ++
+      Seq(tMax) ++ origin ++ shift.map(BigInt(_)) ++ Seq(firstChild, firstTriangles) ++
       kinds.indices.flatMap(slot => BigInt(kinds(slot)) +: (low(slot) ++ high(slot)))
 
-  /** Named as in [[BoxCandidate]]. */
-  def fields(limitUnits: BigInt): Map[String, BigInt] = {
+  /** The fields of [[BoxCandidate]] by name. */
+  def fields(tMaxUnits: BigInt): Map[String, BigInt] = {
     def vector(name: String, values: Seq[BigInt]) = Seq("x", "y", "z").zip(values).map { case (axis, value) =>
       s"$name.$axis" -> value
     }
     def indexed(name: String, values: Seq[BigInt]) = values.zipWithIndex.map { case (value, i) =>
       s"$name[$i]" -> value
     }
-    Map("context" -> BigInt(context), "limit" -> limitUnits, "ray.heading.axis" -> BigInt(axis)) ++
-      indexed("ray.heading.negative", negative.map(sign => BigInt(if (sign) 1 else 0))) ++ indexed(
+    Map("context" -> BigInt(context), "tMax" -> tMaxUnits, "ray.orientation.axis" -> BigInt(axis)) ++
+      indexed("ray.orientation.negative", negative.map(sign => BigInt(if (sign) 1 else 0))) ++ indexed(
         "ray.origin",
         boxOrigin
       ) ++
@@ -54,8 +54,8 @@ final case class BoxQuestion(
   }
 }
 
-/** Random and directed questions within what the packer and ray set-up guarantee. */
-final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
+/** Random and directed cases within the guarantees of the packer and of ray set-up. */
+final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
   private val numbers  = config.numbers
   private val random   = new Random(seed)
   private val cube     = BigInt(1) << numbers.vertexBits
@@ -64,23 +64,23 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
   private val farthest = (BigInt(1) << (numbers.gridBits - 1)) - 1
   private val address  = BigInt(config.columnBvhMemory.depth)
 
-  def apply(count: Int): Seq[BoxQuestion] = Seq.fill(count)(one())
+  def apply(count: Int): Seq[BoxCase] = Seq.fill(count)(one())
 
-  /** Pairs of questions that differ by one unit of one origin, and in the number of children entered: a result that is
-    * one off anywhere shows.
+  /** Pairs of cases whose origins differ by one unit and whose numbers of entered children differ, so that an error of
+    * one unit shows.
     */
-  def atBrinks(count: Int): Seq[BoxQuestion] = {
-    def entered(questions: Seq[BoxQuestion]): Seq[BigInt] =
-      Model.answers(config, questions.map(_.words), "box").map(_(1))
-    def moved(question: BoxQuestion, axis: Int, to: BigInt) =
-      question.copy(boxOrigin = question.boxOrigin.updated(axis, to))
+  def atBoundaries(count: Int): Seq[BoxCase] = {
+    def entered(cases: Seq[BoxCase]): Seq[BigInt] =
+      Model.answers(config, cases.map(_.words), "box").map(_(1))
+    def moved(testCase: BoxCase, axis: Int, to: BigInt) =
+      testCase.copy(boxOrigin = testCase.boxOrigin.updated(axis, to))
 
-    val any    = apply(400 * count).map(question => (question, random.nextInt(3)))
-    val ends   = Seq(lowest, highest).map(end => any.map { case (question, axis) => moved(question, axis, end) })
+    val any    = apply(400 * count).map(testCase => (testCase, random.nextInt(3)))
+    val ends   = Seq(lowest, highest).map(end => any.map { case (testCase, axis) => moved(testCase, axis, end) })
     val counts = ends.map(entered)
     val start  = any.indices.filter(i => counts.head(i) != counts.last(i)).take(count)
-    require(start.size == count, s"only ${start.size} of $count brinks")
-    // Halve the way between two ends that differ, all questions at a time
+    require(start.size == count, s"only ${start.size} of $count boundaries")
+    // Bisect between two ends that differ, all cases at a time
     val axes  = start.map(any(_)._2)
     val first = start.map(i => (ends.head(i), ends.last(i)))
     val pairs = (0 to numbers.vertexBits + 1).foldLeft(first) { (pairs, _) =>
@@ -97,19 +97,19 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
 
   private def below(bound: BigInt): BigInt = BigInt(bound.bitLength + 8, random) % bound
 
-  private def one(): BoxQuestion = {
+  private def one(): BoxCase = {
     val shift  = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits + 2))
     val origin = shift.map(s => below(cube).min(cube - 1) >> (if (random.nextInt(3) == 0) 0 else s.min(3)))
     val kinds  =
       Seq.fill(config.geometry.arity)(if (random.nextInt(8) == 0) random.nextInt(4) else 1 + random.nextInt(2))
     val boxes = kinds.map(_ => Seq.tabulate(3)(a => interval(shift(a))))
-    BoxQuestion(
+    BoxCase(
       axis = random.nextInt(3),
       negative = Seq.fill(3)(random.nextBoolean()),
       boxOrigin = Seq.tabulate(3)(_ => boxOrigin(origin, shift, boxes.flatten)),
       reciprocal = Seq.fill(2)(reciprocal()),
       exponent = Seq.fill(2)(exponent()),
-      limit = if (random.nextInt(4) == 0) farthest else below(farthest) >> random.nextInt(6),
+      tMax = if (random.nextInt(4) == 0) farthest else below(farthest) >> random.nextInt(6),
       origin = origin,
       shift = shift,
       kinds = kinds,
@@ -121,7 +121,7 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
     )
   }
 
-  /** Low and high plane: any, flat, or across the node. No plane lies two cubes from the corner. */
+  /** Low and high plane: any, equal, or across the node. Planes are less than two cubes from the corner. */
   private def interval(shift: Int): (BigInt, BigInt) = {
     val most   = ((BigInt(1) << numbers.boxBits) - 1).min((2 * cube - 1) >> shift)
     val planes = Seq(below(most + 1), below(most + 1)).sorted
@@ -132,7 +132,7 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
     }
   }
 
-  /** Anywhere in reach, at its ends, inside the object's cube, or on a plane. */
+  /** Any legal origin, an extreme one, one inside the object's cube, or one on a plane. */
   private def boxOrigin(origin: Seq[BigInt], shift: Seq[Int], planes: Seq[(BigInt, BigInt)]): BigInt = {
     val axis        = random.nextInt(3)
     val (low, high) = planes(random.nextInt(planes.size))
@@ -145,7 +145,7 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
     }).max(lowest).min(highest)
   }
 
-  /** Between a half and two, with the digits that set-up computes; a zero component's is one. */
+  /** Between a half and two, with the digits that set-up computes; 1 for a component that is 0. */
   private def reciprocal(): BigInt = {
     val digits = numbers.reciprocalDigits
     val raw    = random.nextInt(6) match {
@@ -163,31 +163,31 @@ final class BoxQuestions(config: ColonnadeConfig, seed: Int) {
   }
 }
 
-object BoxQuestions {
+object BoxStimulus {
 
-  /** The unit's inputs and the results they should give, as fields of [[BoxCandidate]] and [[BoxResult]]. */
-  def solved(config: ColonnadeConfig, questions: Seq[BoxQuestion]): Seq[(Map[String, BigInt], Map[String, BigInt])] = {
-    val limits  = Model.answers(config, questions.map(question => Seq(question.limit)), "limit").map(_.head)
-    val answers = Model.answers(config, questions.map(_.words), "box")
-    for (((question, limit), answer) <- questions.zip(limits).zip(answers)) yield {
+  /** The unit's inputs and expected results, as fields of [[BoxCandidate]] and [[BoxResult]]. */
+  def solved(config: ColonnadeConfig, cases: Seq[BoxCase]): Seq[(Map[String, BigInt], Map[String, BigInt])] = {
+    val tMaxUnits = Model.answers(config, cases.map(testCase => Seq(testCase.tMax)), "limit").map(_.head)
+    val answers   = Model.answers(config, cases.map(_.words), "box")
+    for (((testCase, tMax), answer) <- cases.zip(tMaxUnits).zip(answers)) yield {
       val count    = answer(1).toInt
       val children =
-        for (i <- 0 until count; (field, value) <- child(question, answer(2 + 2 * i).toInt, answer(3 + 2 * i)))
+        for (i <- 0 until count; (field, value) <- child(testCase, answer(2 + 2 * i).toInt, answer(3 + 2 * i)))
           yield s"children[$i].$field" -> value
-      question.fields(limit) ->
-        (children.toMap ++ Map("context" -> BigInt(question.context), "tests" -> answer.head, "count" -> answer(1)))
+      testCase.fields(tMax) ->
+        (children.toMap ++ Map("context" -> BigInt(testCase.context), "tests" -> answer.head, "count" -> answer(1)))
     }
   }
 
   /** Children of a kind are consecutive, in slot order. */
-  private def child(question: BoxQuestion, slot: Int, near: BigInt): Seq[(String, BigInt)] = {
-    val kind    = question.kinds(slot)
+  private def child(testCase: BoxCase, slot: Int, tNear: BigInt): Seq[(String, BigInt)] = {
+    val kind    = testCase.kinds(slot)
     val isLeaf  = kind == 2
-    val earlier = question.kinds.take(slot).count(_ == kind)
+    val earlier = testCase.kinds.take(slot).count(_ == kind)
     Seq(
-      "visit.isLeaf"  -> BigInt(if (isLeaf) 1 else 0),
-      "visit.address" -> ((if (isLeaf) question.firstTriangles else question.firstChild) + earlier),
-      "near"          -> near
+      "target.isLeaf"  -> BigInt(if (isLeaf) 1 else 0),
+      "target.address" -> ((if (isLeaf) testCase.firstTriangles else testCase.firstChild) + earlier),
+      "tNear"          -> tNear
     )
   }
 }

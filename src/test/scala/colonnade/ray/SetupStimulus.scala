@@ -5,27 +5,27 @@ import colonnade.config.ColonnadeConfig
 
 import scala.util.Random
 
-/** A ray to set up. */
-final case class SetUpRequest(context: Int, isShadow: Boolean, origin: Seq[BigInt], towards: Seq[BigInt])
+/** A ray to prepare. */
+final case class SetupRequest(context: Int, isShadow: Boolean, origin: Seq[BigInt], dir: Seq[BigInt])
 
 /** An object's box with rays for it, random and directed. */
-final case class SetUpCase(low: Seq[BigInt], high: Seq[BigInt], requests: Seq[SetUpRequest]) {
+final case class SetupCase(low: Seq[BigInt], high: Seq[BigInt], requests: Seq[SetupRequest]) {
 
-  /** What the model makes of each request; the numbers are in the order that vectors.cpp documents for `setup`. */
+  /** The model's result of each request; vectors.cpp documents the order of numbers under `setup`. */
   def answers(config: ColonnadeConfig): Seq[Seq[BigInt]] = {
-    val questions = requests.map(r => BigInt(if (r.isShadow) 1 else 0) +: (r.origin ++ r.towards ++ low ++ high))
+    val questions = requests.map(r => BigInt(if (r.isShadow) 1 else 0) +: (r.origin ++ r.dir ++ low ++ high))
     Model.answers(config, questions, "setup")
   }
 }
 
-/** Rays that aim at a box from everywhere, and those at which set-up might stumble. */
-final class SetUpCases(config: ColonnadeConfig, random: Random) {
+/** Rays that aim at a box from everywhere, and corner cases of ray set-up. */
+final class SetupStimulus(config: ColonnadeConfig, random: Random) {
   private val numbers  = config.numbers
   private val fraction = numbers.gridFraction
   private val cube     = BigInt(1) << numbers.vertexBits
 
-  def all(raysPerBox: Int): Seq[SetUpCase] = boxes.map { case (low, high) =>
-    SetUpCase(low, high, extremes(low, high) ++ Seq.fill(raysPerBox)(ray(low, high)))
+  def all(raysPerBox: Int): Seq[SetupCase] = boxes.map { case (low, high) =>
+    SetupCase(low, high, extremes(low, high) ++ Seq.fill(raysPerBox)(ray(low, high)))
   }
 
   private def boxes: Seq[(Seq[BigInt], Seq[BigInt])] = {
@@ -40,10 +40,10 @@ final class SetUpCases(config: ColonnadeConfig, random: Random) {
 
   private def steps(units: BigInt): BigInt = if (fraction >= 0) units << fraction else units >> -fraction
 
-  private def request(origin: Seq[BigInt], towards: Seq[BigInt]): SetUpRequest =
-    SetUpRequest(random.nextInt(config.array.contexts), random.nextBoolean(), origin, towards)
+  private def request(origin: Seq[BigInt], dir: Seq[BigInt]): SetupRequest =
+    SetupRequest(random.nextInt(config.array.contexts), random.nextBoolean(), origin, dir)
 
-  private def extremes(low: Seq[BigInt], high: Seq[BigInt]): Seq[SetUpRequest] = {
+  private def extremes(low: Seq[BigInt], high: Seq[BigInt]): Seq[SetupRequest] = {
     val least  = -(BigInt(1) << (numbers.sceneBits - 1))
     val lowest = -(BigInt(1) << (numbers.directionBits - 1))
     val centre = low.zip(high).map { case (l, h) => steps((l + h) / 2) }
@@ -60,8 +60,8 @@ final class SetUpCases(config: ColonnadeConfig, random: Random) {
     )
   }
 
-  /** Aims at a point in the box, or nearly, or anywhere. */
-  private def ray(low: Seq[BigInt], high: Seq[BigInt]): SetUpRequest = {
+  /** A ray at a point in the box, close to it, or anywhere. */
+  private def ray(low: Seq[BigInt], high: Seq[BigInt]): SetupRequest = {
     val target = low.zip(high).map { case (l, h) => steps(l) + BigInt(numbers.gridBits, random) % (steps(h - l) + 1) }
     val origin = random.nextInt(4) match {
       case 0 => Seq.fill(3)(signed(numbers.sceneBits))
@@ -69,8 +69,8 @@ final class SetUpCases(config: ColonnadeConfig, random: Random) {
       case 2 => target.map(_ + signed(numbers.gridBits - 2 - random.nextInt(8)))
       case _ => low.zip(high).map { case (l, h) => steps(if (random.nextBoolean()) l else h) }
     }
-    val exact  = target.zip(origin).map { case (t, o) => t - o }
-    val turned = random.nextInt(6) match {
+    val exact   = target.zip(origin).map { case (t, o) => t - o }
+    val changed = random.nextInt(6) match {
       case 0 => exact.updated(random.nextInt(3), BigInt(0))
       case 1 => exact.updated(random.nextInt(3), BigInt(random.nextInt(5) - 2))
       case 2 => Seq.fill(3)(exact.head * (random.nextInt(3) - 1))
@@ -78,9 +78,9 @@ final class SetUpCases(config: ColonnadeConfig, random: Random) {
       case _ => exact
     }
     // A shadow ray ends at its target; others have any length
-    val room    = numbers.directionBits - 1 - turned.map(_.abs.bitLength).max
-    val shift   = if (room > 0) random.nextInt(room + 1) else 0
-    val towards = if (random.nextInt(3) == 0) turned.map(_ << shift) else turned
-    request(origin, if (random.nextInt(12) == 0) Seq.fill(3)(signed(numbers.directionBits)) else towards)
+    val space = numbers.directionBits - 1 - changed.map(_.abs.bitLength).max
+    val shift = if (space > 0) random.nextInt(space + 1) else 0
+    val dir   = if (random.nextInt(3) == 0) changed.map(_ << shift) else changed
+    request(origin, if (random.nextInt(12) == 0) Seq.fill(3)(signed(numbers.directionBits)) else dir)
   }
 }

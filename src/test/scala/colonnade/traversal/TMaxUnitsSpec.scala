@@ -10,7 +10,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-class LimitUnitsSpec extends AnyFlatSpec with ChiselScalatestTester {
+class TMaxUnitsSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "LimitUnits"
 
   for ((config, i) <- TestConfigs.formats.zipWithIndex)
@@ -21,23 +21,23 @@ class LimitUnitsSpec extends AnyFlatSpec with ChiselScalatestTester {
       // Where saturation begins
       val brink =
         ((BigInt(1) << (numbers.vertexBits + 2)) - 2 - (BigInt(1) << numbers.boxPadLog)) << numbers.gridFraction.max(0)
-      val around = (-3 to 3).map(brink + _).filter(limit => limit >= 0 && limit <= farthest)
-      val limits = Seq(BigInt(0), BigInt(1), farthest, farthest - 1) ++ around ++
+      val around    = (-3 to 3).map(brink + _).filter(tMax => tMax >= 0 && tMax <= farthest)
+      val tMaxUnits = Seq(BigInt(0), BigInt(1), farthest, farthest - 1) ++ around ++
         Seq.fill(300)(BigInt(numbers.gridBits - 1, random) >> random.nextInt(numbers.gridBits - 1))
-      val expected = Model.answers(config, limits.map(Seq(_)), "limit").map(_.head)
-      test(new LimitUnitsHarness(config)) { dut =>
-        for ((limit, units) <- limits.zip(expected)) {
-          dut.limit.poke(limit.S)
+      val expected = Model.answers(config, tMaxUnits.map(Seq(_)), "limit").map(_.head)
+      test(new TMaxUnitsHarness(config)) { dut =>
+        for ((tMax, units) <- tMaxUnits.zip(expected)) {
+          dut.tMax.poke(tMax.S)
           dut.units.expect(units.S)
         }
       }
     }
 }
 
-private class LimitUnitsHarness(config: ColonnadeConfig) extends Module {
+private class TMaxUnitsHarness(config: ColonnadeConfig) extends Module {
   private val numbers = config.numbers
 
-  val limit = IO(Input(SInt(numbers.gridBits.W)))
+  val tMax  = IO(Input(SInt(numbers.gridBits.W)))
   val units = IO(Output(SInt(numbers.boxDistanceBits.W)))
-  units := LimitUnits(numbers)(Fixed(new RayFormats(numbers).grid, limit)).integer
+  units := TMaxUnits(numbers)(Fixed(new RayFormats(numbers).grid, tMax)).integer
 }
