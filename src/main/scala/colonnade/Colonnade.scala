@@ -2,9 +2,9 @@ package colonnade
 
 import chisel3._
 import chisel3.util.{Decoupled, Pipe}
-import colonnade.background.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
 import colonnade.column.Column
 import colonnade.config.ColonnadeConfig
+import colonnade.environment.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, FrameController, RoomWindow}
 import colonnade.unit.{RenderUnit, RenderUnitIO}

@@ -2,9 +2,10 @@ package colonnade.column
 
 import chisel3._
 import chisel3.util.{Decoupled, Mux1H, OHToUInt, PopCount, RegEnable, Valid}
+import colonnade.common.RoundRobin
 import colonnade.config.ColonnadeConfig
-import colonnade.frame.{ColumnBvhEvents, RoundRobin}
-import colonnade.unit.{RecordBroadcast, RecordRequest}
+import colonnade.formats.{RecordBroadcast, RecordRequest}
+import colonnade.frame.ColumnBvhEvents
 
 /** Ports of [[BankReader]]. */
 final class BankReaderIO(config: ColonnadeConfig) extends Bundle {

@@ -2,8 +2,8 @@ package colonnade.column
 
 import chisel3._
 import chisel3.util.{Decoupled, PopCount, Valid}
-import colonnade.background.{AttributePort, ColumnRoom}
 import colonnade.config.ColonnadeConfig
+import colonnade.environment.{AttributePort, ColumnRoom}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{BackgroundWalker, ColumnProgress, EventSums, PixelCollector, RoomWindow, Tile, TileWalker}
 import colonnade.unit.{RenderUnit, RenderUnitIO}

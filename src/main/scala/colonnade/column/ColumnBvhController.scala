@@ -3,8 +3,8 @@ package colonnade.column
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordBroadcast, RecordRequest}
 import colonnade.frame.ColumnBvhEvents
-import colonnade.unit.{RecordBroadcast, RecordRequest}
 
 /** Ports of [[ColumnBvhController]]. */
 final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {

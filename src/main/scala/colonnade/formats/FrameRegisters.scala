@@ -66,14 +66,14 @@ final class Camera(numbers: NumberFormats) extends Record {
   val position = vector
 
   /** Towards the picture's first pixel; called `direction` outside. */
-  val towards   = vector
+  val dir       = vector
   val stepX     = vector
   val stepY     = vector
   val stepShift = UInt(NumberFormats.bitLength(numbers.coordinateBits).W)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
     "position"  -> position,
-    "direction" -> towards,
+    "direction" -> dir,
     "stepX"     -> stepX,
     "stepY"     -> stepY,
     "stepShift" -> stepShift

@@ -3,8 +3,7 @@ package colonnade.frame
 import chisel3._
 import chisel3.util.{Arbiter, Decoupled}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameRegisters, FrameSettings, Pixel, PixelHit, Rgb}
-import colonnade.unit.PixelPosition
+import colonnade.formats.{FrameRegisters, FrameSettings, Pixel, PixelHit, PixelPosition, Rgb}
 
 /** Ports of [[BackgroundWalker]]. */
 final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {

@@ -2,9 +2,8 @@ package colonnade.frame
 
 import chisel3._
 import chisel3.util.log2Ceil
-import colonnade.background.AttributeEvents
 import colonnade.config.ColonnadeConfig
-import colonnade.unit.UnitEvents
+import colonnade.formats.{AttributeEvents, UnitEvents}
 
 /** What happened in a column BVH controller in one cycle; names as in `Counters`. */
 final class ColumnBvhEvents(config: ColonnadeConfig) extends Bundle {

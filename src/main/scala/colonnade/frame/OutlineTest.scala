@@ -3,8 +3,7 @@ package colonnade.frame
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameRegisters, FrameSettings, PixelRect}
-import colonnade.unit.PixelPosition
+import colonnade.formats.{FrameRegisters, FrameSettings, PixelPosition, PixelRect}
 
 /** A square of pixels, by its first one. */
 final class TestedSquare(config: ColonnadeConfig) extends Bundle {

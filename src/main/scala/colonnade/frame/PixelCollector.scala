@@ -2,6 +2,7 @@ package colonnade.frame
 
 import chisel3._
 import chisel3.util.{Decoupled, Mux1H, Queue}
+import colonnade.common.RoundRobin
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Pixel
 

@@ -2,6 +2,7 @@ package colonnade.frame
 
 import chisel3._
 import chisel3.util.{Cat, Decoupled, Queue}
+import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.FrameSettings
 

@@ -3,8 +3,7 @@ package colonnade.frame
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.FrameSettings
-import colonnade.unit.PixelPosition
+import colonnade.formats.{FrameSettings, PixelPosition}
 
 /** Ports of [[TileScan]]. */
 final class TileScanIO(config: ColonnadeConfig) extends Bundle {

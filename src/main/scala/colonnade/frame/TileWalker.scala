@@ -2,9 +2,9 @@ package colonnade.frame
 
 import chisel3._
 import chisel3.util.{Decoupled, Queue}
+import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.FrameSettings
-import colonnade.unit.{PixelPosition, UnitPosition}
+import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
 
 /** Ports of [[TileWalker]]. */
 final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {

@@ -2,26 +2,27 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable}
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
 
-/** Mantissas of a direction in the ray's own frame: what the quotients are made of. */
+/** Mantissas of a direction in the ray's own frame, from which the quotients are computed. */
 final class DirectionMantissas(numbers: NumberFormats) extends Bundle {
 
   /** 0 for a component that is 0; otherwise the top bit is set. */
   val minor = Vec(2, UInt(numbers.mantissaBits.W))
 
-  /** As [[minor]]. */
+  /** See [[minor]]. */
   val dominant = UInt(numbers.mantissaBits.W)
 }
 
-/** What set-up knows of a ray's direction besides its mantissas. */
-final class RayCourse(config: ColonnadeConfig) extends Bundle {
-  val context  = Context(config)
-  val isShadow = Bool()
-  val heading  = new Heading
+/** Properties of a ray's direction besides its mantissas. */
+final class DirectionInfo(config: ColonnadeConfig) extends Bundle {
+  val context     = Context(config)
+  val isShadow    = Bool()
+  val orientation = new RayOrientation
 
-  /** By how many bits x' and y' are shorter than the dominant component. */
+  /** Bits by which x' and y' are shorter than the dominant component. */
   val exponent = Vec(2, UInt(Normalise.exponentBits(config.numbers.directionBits).W))
 
   /** Components of the direction that are 0. */
@@ -32,11 +33,11 @@ final class RayCourse(config: ColonnadeConfig) extends Bundle {
 final class PermutedRay(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
 
-  val course = new RayCourse(config)
+  val info   = new DirectionInfo(config)
   val origin = Vec(3, new Fixed(new RayFormats(numbers).scene))
 
-  /** Largest t in grid steps; saturated beyond what an entry distance and the largest t of the grid add up to. */
-  val limit = UInt((numbers.sceneBits + 1).W)
+  /** Largest t in grid steps; it saturates above the sum of an entry distance and the largest t of the grid. */
+  val tMax = UInt((numbers.sceneBits + 1).W)
 }
 
 final class DirectionNormaliserIO(config: ColonnadeConfig) extends Bundle {
@@ -45,11 +46,11 @@ final class DirectionNormaliserIO(config: ColonnadeConfig) extends Bundle {
   val ray       = Decoupled(new PermutedRay(config))
 }
 
-/** Finds a ray's dominant axis, turns the ray into its own frame and normalises its direction.
+/** Finds a ray's dominant axis, permutes the ray to its own frame and normalises its direction.
   *
-  * The components pass one normaliser in turn, then the ray is rotated axis by axis: 4 cycles from the request to both
-  * results for dominant axis z, 5 for x, 6 for y. The results leave independently of each other; the next request is
-  * accepted in the cycle in which the last of them does. Source: docs/numbers.md, sections 2.1 and 2.2.
+  * The components share one normaliser, then the axes rotate one step per cycle. Latency from the request to both
+  * results: 4 cycles for dominant axis z, 5 for x, 6 for y. The results are independent of each other; the next request
+  * is accepted in the cycle that takes the last of them. Source: docs/numbers.md, sections 2.1 and 2.2.
   */
 final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
   import DirectionNormaliser._
@@ -57,17 +58,17 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
 
   val io = IO(new DirectionNormaliserIO(config))
 
-  // Control: the magnitude of one component, the mantissa of the one before, then the turns
+  // Control: the magnitude of a component and the mantissa of the previous one, then rotations
   private val step         = RegInit(idle)
-  private val turns        = Reg(UInt(2.W))
+  private val rotations    = Reg(UInt(2.W))
   private val hasMantissas = RegInit(false.B)
   private val hasRay       = RegInit(false.B)
 
   private val measures   = io.request.fire || (step =/= idle && step < last)
   private val normalises = step =/= idle && step <= last
   private val isLeft     = (!hasMantissas || io.mantissas.ready) && (!hasRay || io.ray.ready)
-  private val isSettled  = step === settled && turns === 0.U
-  private val rotates    = step === settled && turns =/= 0.U
+  private val isSettled  = step === settled && rotations === 0.U
+  private val rotates    = step === settled && rotations =/= 0.U
 
   io.mantissas.valid := isSettled && hasMantissas
   io.ray.valid       := isSettled && hasRay
@@ -82,57 +83,57 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
     hasRay       := true.B
   }
 
-  // Datapath: x is measured as it comes, y and z wait; what is normalised enters `directions` at its end
+  // Datapath: the magnitude of x is computed on arrival, y and z wait; normalised components shift into `directions`
   private val context    = RegEnable(io.request.bits.context, io.request.fire)
   private val isShadow   = RegEnable(io.request.bits.isShadow, io.request.fire)
   private val axis       = Reg(UInt(2.W))
   private val origin     = Reg(Vec(3, new Fixed(new RayFormats(numbers).scene)))
-  private val towards    = Reg(Vec(2, SInt(numbers.directionBits.W)))
+  private val dir        = Reg(Vec(2, SInt(numbers.directionBits.W)))
   private val directions =
     Reg(Vec(3, new Normalised(numbers.mantissaBits, Normalise.exponentBits(numbers.directionBits))))
   private val negative = Reg(Vec(3, Bool()))
   private val largest  = Reg(UInt(numbers.directionBits.W))
 
-  // The most negative component's magnitude has as many bits as the component.
+  // The magnitude of the most negative component is as wide as the component.
   private val isBetween  = step === idle || step === settled
-  private val measured   = Mux(isBetween, io.request.bits.towards.x, towards.head)
+  private val measured   = Mux(isBetween, io.request.bits.dir.x, dir.head)
   private val magnitude  = RegEnable(magnitudeOf(measured), measures)
   private val isNegative = RegEnable(measured < 0.S, measures)
   private val isDominant = step === first || magnitude > largest
 
   when(io.request.fire) {
     origin.zip(io.request.bits.origin.axes).foreach { case (to, from) => to := from }
-    towards.zip(io.request.bits.towards.axes.tail).foreach { case (to, from) => to := from }
-  }.elsewhen(measures) { towards.head := towards.last }
+    dir.zip(io.request.bits.dir.axes.tail).foreach { case (to, from) => to := from }
+  }.elsewhen(measures) { dir.head := dir.last }
   when(normalises || rotates) {
     shift(directions, Mux(rotates, directions.head, Normalise(magnitude, numbers.mantissaBits)))
     shift(negative, Mux(rotates, negative.head, isNegative))
   }
   when(normalises && isDominant) {
-    largest := magnitude
-    axis    := step - first
-    turns   := Mux(step === last, 0.U, step)
+    largest   := magnitude
+    axis      := step - first
+    rotations := Mux(step === last, 0.U, step)
   }
   when(rotates) {
     shift(origin, origin.head)
-    turns := turns - 1.U
+    rotations := rotations - 1.U
   }
 
   private val dominant = directions.last
   io.mantissas.bits.minor.zip(directions).foreach { case (to, from) => to := from.mantissa }
   io.mantissas.bits.dominant := dominant.mantissa
 
-  private val course = io.ray.bits.course
-  course.context          := context
-  course.isShadow         := isShadow
-  course.heading.axis     := axis
-  course.heading.negative := negative
-  course.exponent.zip(directions).foreach { case (to, from) => to := dominant.exponent - from.exponent }
-  course.isZero.zip(directions).foreach { case (to, from) => to := from.exponent === 0.U }
+  private val info = io.ray.bits.info
+  info.context              := context
+  info.isShadow             := isShadow
+  info.orientation.axis     := axis
+  info.orientation.negative := negative
+  info.exponent.zip(directions).foreach { case (to, from) => to := dominant.exponent - from.exponent }
+  info.isZero.zip(directions).foreach { case (to, from) => to := from.exponent === 0.U }
 
   io.ray.bits.origin := origin
   private val unlimited = ((BigInt(1) << (numbers.sceneBits + 1)) - 1).U
-  io.ray.bits.limit := Mux(isShadow, Rounding.saturate(largest, numbers.sceneBits + 1), unlimited)
+  io.ray.bits.tMax := Mux(isShadow, Rounding.saturate(largest, numbers.sceneBits + 1), unlimited)
 
   private def magnitudeOf(component: SInt): UInt = Mux(component < 0.S, 0.S -% component, component).asUInt
 

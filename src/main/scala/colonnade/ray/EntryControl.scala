@@ -3,46 +3,46 @@ package colonnade.ray
 import chisel3._
 import chisel3.util.log2Ceil
 
-/** What the [[EntryDatapath]] does in a cycle; `side` is 0 for x', 1 for y'. */
+/** Control signals of the [[EntryDatapath]] for one cycle; `side` is 0 for x', 1 for y'. */
 final class EntryCommand(slices: Int) extends Bundle {
 
-  /** Take a new ray over. */
+  /** Load a new ray. */
   val loads = Bool()
 
-  /** Round the head of the origin's queue to units. */
+  /** Round the first axis of the origin to units. */
   val roundsOrigin = Bool()
 
-  /** Turn the origin's queue as it is. */
-  val turnsOrigin = Bool()
+  /** Rotate the axes of the origin without a change. */
+  val rotatesOrigin = Bool()
 
-  /** Distance of the first (`crossesFar`: the second) plane of the axis whose origin was rounded. */
+  /** Compute the distance to the near (`crossesFar`: far) plane of the axis whose origin was rounded. */
   val crosses      = Bool()
   val crossesFar   = Bool()
   val crossesSide  = Bool()
   val crossingSide = UInt(1.W)
 
-  /** The last distance is the dominant axis's first, or second. */
+  /** The last distance belongs to the dominant axis's near plane, or far plane. */
   val takesAlongNear = Bool()
   val takesAlongFar  = Bool()
 
-  /** The quotients are there: both reciprocals and the first shear factor, then the second one. */
+  /** The quotients are valid: load both reciprocals and the first shear factor, then the second one. */
   val takesReciprocals = Bool()
   val takesShear       = Bool()
   val shearSide        = UInt(1.W)
 
-  /** Multiply the last distance by a reciprocal, or the entry by a slice of a shear factor. */
+  /** Multiply the last distance by a reciprocal, or the entry distance by a slice of a shear factor. */
   val multipliesShear = Bool()
   val multiplySide    = UInt(1.W)
   val slice           = UInt(log2Ceil(slices.max(2)).W)
 
-  /** Scale the last product to a distance along the ray; one cycle later hold it against the entry or the exit. */
+  /** Scale the last product to a distance along the ray; one cycle later clip the entry or exit distance with it. */
   val scales    = Bool()
   val scalesFar = Bool()
   val scaleSide = UInt(1.W)
   val limits    = Bool()
   val limitsFar = Bool()
 
-  /** Move the head of the origin's queue to the entry, and turn the queue. */
+  /** Advance the first axis of the origin to the entry point, and rotate the axes. */
   val advancesAlong = Bool()
   val advancesSide  = Bool()
 }
@@ -55,16 +55,17 @@ final class EntryControlIO(slices: Int) extends Bundle {
   val outputValid    = Output(Bool())
   val outputReady    = Input(Bool())
 
-  /** Whether the ray meets the box; known once all axes are. */
+  /** The ray intersects the box; valid when all axes are done. */
   val enters  = Input(Bool())
   val command = Output(new EntryCommand(slices))
   val busy    = Output(Bool())
 }
 
-/** The steps of [[RayEntry]]: three for the dominant axis; the quotients, for which they wait; both sides, a plane each
-  * cycle on its way through distance, product, scale and limit; then the advance, `slices` cycles a side, which a ray
-  * that misses the box skips. The planes come as near x', near y', far y', far x', so that the entry is known, and the
-  * advance begins, while the exits are still on their way.
+/** Sequences [[RayEntry]]: three steps for the dominant axis, a wait for the quotients, then both sides, then the advance.
+  *
+  * The sides are pipelined: each cycle one plane starts distance, product, scaling and clipping. Their order is near x',
+  * near y', far y', far x', so that the advance starts while the exit distance is still computed. The advance takes
+  * `slices` cycles per side; a ray that misses the box skips it.
   */
 final class EntryControl(slices: Int) extends Module {
   val io = IO(new EntryControlIO(slices))
@@ -93,7 +94,7 @@ final class EntryControl(slices: Int) extends Module {
   when(io.outputValid && io.outputReady) { busy := false.B }
   when(io.command.loads) { busy := true.B }
 
-  // What the multiplier takes is decided a cycle before: its operands have no time to wait for it
+  // The multiplier's operands are selected one cycle early, for timing
   private val shears     = RegNext(next >= advance.U)
   private val shearsLast = next >= (advance + slices).U
   private val side       = RegNext(Mux(next >= advance.U, shearsLast, next === 5.U || next === 6.U).asUInt)
@@ -103,7 +104,7 @@ final class EntryControl(slices: Int) extends Module {
   private val command = io.command
   command.loads            := io.rayValid && io.rayReady
   command.roundsOrigin     := at(0, 2, 5) || command.takesReciprocals
-  command.turnsOrigin      := command.roundsOrigin || at(4, 6)
+  command.rotatesOrigin    := command.roundsOrigin || at(4, 6)
   command.crosses          := at(1, 2, 4, 5, 6) || command.takesReciprocals
   command.crossesFar       := at(2, 5, 6)
   command.crossesSide      := !at(1, 2)

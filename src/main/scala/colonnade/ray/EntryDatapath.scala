@@ -18,12 +18,12 @@ final class EntryDatapathIO(config: ColonnadeConfig) extends Bundle {
   val quotients = Input(new SlopeQuotients(config))
   val bounds    = Input(new Bounds(config.numbers))
   val enters    = Output(Bool())
-  val output    = Output(new SetUpRay(config))
+  val output    = Output(new PreparedRay(config))
 }
 
 /** Arithmetic of [[RayEntry]]: one rounder, one adder for distances, one multiplier, one shifter and one adder for
-  * positions, each used for all axes in turn. The multiplier takes a distance or the entry on one side, a reciprocal or
-  * as many bits of a shear factor on the other.
+  * positions. All axes share them. The multiplier's first operand is a distance or the entry distance; its second one is
+  * a reciprocal or a slice of a shear factor.
   */
 final class EntryDatapath(config: ColonnadeConfig) extends Module {
   private val numbers  = config.numbers
@@ -31,52 +31,52 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   private val slices   = EntryDatapath.slices(config)
   private val fraction = numbers.gridFraction
 
-  // A signed distance in units, of anything in the scene; |entry| leaves a spare bit for what lies outside the scene.
+  // A signed distance in units within the scene; the format of the entry has a spare bit for points outside the scene.
   private val distanceBits = numbers.entryBits + 1
   private val sliceBits    = formats.reciprocal.width
 
   val io              = IO(new EntryDatapathIO(config))
   private val command = io.command
 
-  // The ray. The origin is a queue: z', x', y' before each pass over the axes
-  private val ray        = RegEnable(io.ray.course, command.loads)
+  // The ray. The axes of the origin rotate; their order is z', x', y' before each pass
+  private val ray        = RegEnable(io.ray.info, command.loads)
   private val origin     = Reg(Vec(3, SInt(numbers.sceneBits.W)))
-  private val limit      = Reg(UInt(io.ray.limit.getWidth.W))
+  private val tMax       = Reg(UInt(io.ray.tMax.getWidth.W))
   private val shear      = Reg(Vec(2, SInt(numbers.gridBits.W)))
   private val reciprocal = Reg(Vec(2, UInt(sliceBits.W)))
-  private val near       = Reg(UInt(numbers.entryBits.W))
-  private val far        = Reg(SInt(distanceBits.W))
-  private val entry      = if (fraction < 0) Cat(near >> -fraction, 0.U((-fraction).W)) else near
+  private val tNear      = Reg(UInt(numbers.entryBits.W))
+  private val tFar       = Reg(SInt(distanceBits.W))
+  private val tEntry     = if (fraction < 0) Cat(tNear >> -fraction, 0.U((-fraction).W)) else tNear
   private val isTiny     = ray.isZero.take(2).zip(ray.exponent).map { case (zero, by) =>
     zero || by > numbers.reciprocalFraction.U
   }
 
-  // Distances of planes from the origin, widened, in units; the sum of plane, origin and pad stays below 2^entryBits
+  // Distances from the origin to padded planes, in units; the sum of plane, origin and pad stays below 2^entryBits
   private val unitOrigin =
     RegEnable(Rounding.narrow(Rounding.nearestEven(origin.head, fraction), distanceBits), command.roundsOrigin)
-  private val planeAxis  = Mux(command.crossesSide, 1.U +& command.crossingSide, 0.U) +& ray.heading.axis
+  private val planeAxis  = Mux(command.crossesSide, 1.U +& command.crossingSide, 0.U) +& ray.orientation.axis
   private val isNegative =
-    Mux(command.crossesSide, onSide(ray.heading.negative, command.crossingSide), ray.heading.negative(2))
+    Mux(command.crossesSide, onSide(ray.orientation.negative, command.crossingSide), ray.orientation.negative(2))
   private val plane = Mux(
     isNegative === command.crossesFar,
     onAxis(io.bounds.low.axes, planeAxis),
     onAxis(io.bounds.high.axes, planeAxis)
   )
   private val boxPad   = (BigInt(1) << numbers.boxPadLog).U
-  private val pad      = Mux(command.crossesSide, boxPad +& (near >> numbers.vertexBits), boxPad).zext
+  private val pad      = Mux(command.crossesSide, boxPad +& (tNear >> numbers.vertexBits), boxPad).zext
   private val forward  = Mux(isNegative, unitOrigin, plane.zext) -& Mux(isNegative, plane.zext, unitOrigin)
   private val widened  = Mux(command.crossesFar, forward +& pad, forward -& pad)
   private val distance = RegEnable(Rounding.narrow(widened, distanceBits), command.crosses)
 
-  // Products: the low slices of a shear factor count as unsigned, and what they leave behind is kept for the rounding
+  // Products: the low slices of a shear factor are unsigned; the low product bits are kept for rounding
   private val productBits  = distanceBits + sliceBits + 1
   private val product      = Reg(SInt(productBits.W))
-  private val multiplicand = Mux(command.multipliesShear, entry.zext, distance)
+  private val multiplicand = Mux(command.multipliesShear, tEntry.zext, distance)
   private val shearSlice   =
     MuxLookup(command.slice, sliceOf(slices - 1))((0 until slices - 1).map(i => i.U -> sliceOf(i)))
   private val multiplier = Mux(command.multipliesShear, shearSlice, onSide(reciprocal, command.multiplySide).zext)
   private val carries    = command.multipliesShear && command.slice =/= 0.U
-  // An entry times a slice has a bit less than productBits: the carried part, shorter by a slice, adds no bit.
+  // An entry times a slice is one bit shorter than productBits; the carried part, shorter by a slice, adds no bit.
   product := Rounding.narrow(multiplicand * multiplier +& Mux(carries, product >> sliceBits, 0.S), productBits)
   private val whole =
     if (slices == 1) product
@@ -86,44 +86,46 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
       Cat(product, low).asSInt
     }
 
-  // Scales: a shear factor to the dominant component's exponent, a product to units
+  // Scale a shear factor to the dominant component's exponent, or a product to units
   private val quotient =
     Cat(onSide(io.quotients.shear, command.shearSide), 0.U((numbers.shearFraction - numbers.shearDigits).W))
-  private val drop = Mux(
+  private val shiftRight = Mux(
     command.takesShear,
     onSide(ray.exponent, command.shearSide),
     Mux(onSide(isTiny, command.scaleSide), 0.U, numbers.reciprocalFraction.U - onSide(ray.exponent, command.scaleSide))
   )
-  private val scaled   = Rounding.floor(Mux(command.takesShear, quotient.zext, product), drop)
-  private val isRising = !onSide(ray.heading.negative, command.shearSide)
-  // Below 2^shearFraction, and equal to it on a diagonal: one bit less than the format with its sign.
+  private val scaled   = Rounding.floor(Mux(command.takesShear, quotient.zext, product), shiftRight)
+  private val isRising = !onSide(ray.orientation.negative, command.shearSide)
+  // At most 2^shearFraction, which occurs on a diagonal: one bit shorter than the format with its sign.
   private val slope = Rounding.narrow(scaled, numbers.gridBits)
 
-  // Entry and exit along the ray. Below 0 all values count alike, so only the upper end saturates exactly
+  // Entry and exit along the ray. All values below 0 are equivalent, so only the upper bound saturates exactly
   private val unitsAlong = Rounding.saturate(scaled, distanceBits) +& command.scalesFar.asUInt.zext
   private val crossing   = RegEnable(Rounding.saturate(unitsAlong, distanceBits), command.scales)
   private val slack      = crossing >> numbers.entrySlackShift
   private val bound      = Rounding.saturate(Mux(command.limitsFar, crossing +& slack, crossing -& slack), distanceBits)
 
-  // Advance: what leaves the head of the queue comes in at its end
-  private val entrySteps = Rounding.floor(entry, -fraction)
+  // Advance: the first axis moves, and comes in again as the last
+  private val entrySteps = Rounding.floor(tEntry, -fraction)
   private val sideways   = Rounding.nearestEven(whole, numbers.vertexBits + 1)
-  private val along      = Mux(ray.heading.negative(2), 0.S -& entrySteps.zext, entrySteps.zext)
+  private val along      = Mux(ray.orientation.negative(2), 0.S -& entrySteps.zext, entrySteps.zext)
   private val moved      = origin.head +& Mux(command.advancesAlong, along, sideways)
   private val half       = BigInt(1) << (numbers.vertexBits - 1 + fraction)
   private val inReach    = Rounding.saturate(moved, -half, 3 * half)
 
   when(command.loads) {
     origin.zip(Seq(2, 0, 1)).foreach { case (to, from) => to := io.ray.origin(from).integer }
-    limit := io.ray.limit
+    tMax := io.ray.tMax
   }
-  when(command.turnsOrigin || command.advancesAlong || command.advancesSide) {
+  when(command.rotatesOrigin || command.advancesAlong || command.advancesSide) {
     origin(0) := origin(1)
     origin(1) := origin(2)
-    origin(2) := Mux(command.turnsOrigin, origin(0), inReach)
+    origin(2) := Mux(command.rotatesOrigin, origin(0), inReach)
   }
-  when(command.takesAlongNear) { near := Mux(distance < 0.S, 0.U, Rounding.narrow(distance.asUInt, numbers.entryBits)) }
-  when(command.takesAlongFar) { far := distance }
+  when(command.takesAlongNear) {
+    tNear := Mux(distance < 0.S, 0.U, Rounding.narrow(distance.asUInt, numbers.entryBits))
+  }
+  when(command.takesAlongFar) { tFar := distance }
   when(command.takesReciprocals) {
     reciprocal.zip(io.quotients.reciprocal).zip(isTiny).foreach { case ((to, from), tiny) =>
       val one = (BigInt(1) << numbers.reciprocalFraction).U(sliceBits.W)
@@ -131,23 +133,23 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
     }
   }
   when(command.takesShear) { shear(command.shearSide) := Mux(isRising, slope, 0.S -% slope) }
-  when(command.limits && !command.limitsFar && bound > near.zext) {
-    near := Rounding.narrow(bound.asUInt, numbers.entryBits)
+  when(command.limits && !command.limitsFar && bound > tNear.zext) {
+    tNear := Rounding.narrow(bound.asUInt, numbers.entryBits)
   }
-  when(command.limits && command.limitsFar && bound < far) { far := bound }
+  when(command.limits && command.limitsFar && bound < tFar) { tFar := bound }
   when(command.advancesAlong) {
     val farthest = formats.grid.highest
-    limit := Rounding.saturate(limit.zext -& entrySteps.zext, 0, farthest).asUInt
+    tMax := Rounding.saturate(tMax.zext -& entrySteps.zext, 0, farthest).asUInt
   }
 
-  io.enters := near.zext <= far && !ray.isZero(2)
+  io.enters := tNear.zext <= tFar && !ray.isZero(2)
   private val output = io.output
-  output.context     := ray.context
-  output.isShadow    := ray.isShadow
-  output.enters      := io.enters
-  output.ray.heading := ray.heading
+  output.context         := ray.context
+  output.isShadow        := ray.isShadow
+  output.enters          := io.enters
+  output.ray.orientation := ray.orientation
   Seq(1, 2, 0).zipWithIndex.foreach { case (from, to) =>
-    // In reach, thus within the grid.
+    // Clamped above, so it fits the grid.
     output.ray.origin(to) := Fixed(formats.grid, Rounding.narrow(origin(from), numbers.gridBits))
   }
   (0 until 2).foreach { side =>
@@ -155,16 +157,16 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
     output.ray.reciprocal(side) := Fixed(formats.reciprocal, reciprocal(side))
     output.ray.exponent(side)   := Mux(isTiny(side), numbers.reciprocalFraction.U, ray.exponent(side))
   }
-  output.entry := Fixed(formats.entry, entry)
-  output.limit := Fixed(formats.grid, Rounding.narrow(limit.zext, numbers.gridBits))
+  output.tEntry := Fixed(formats.entry, tEntry)
+  output.tMax   := Fixed(formats.grid, Rounding.narrow(tMax.zext, numbers.gridBits))
 
   private def onSide[T <: Data](values: Seq[T], side: UInt): T = Mux(side.asBool, values(1), values(0))
 
-  /** The component of an axis that is counted on beyond z. */
+  /** The component of an axis, where 3 and 4 stand for x and y. */
   private def onAxis(components: Seq[UInt], axis: UInt): UInt =
     MuxLookup(axis, components(2))(Seq(0, 1, 3, 4).map(index => index.U -> components(index % 3)))
 
-  /** A slice of the shear factor at work: a low one is not negative, the highest one has the sign. */
+  /** A slice of the current shear factor: low slices are unsigned, the highest one has the sign. */
   private def sliceOf(index: Int): SInt = {
     val factor = onSide(shear, command.multiplySide).pad(slices * sliceBits)
     if (index < slices - 1) factor((index + 1) * sliceBits - 1, index * sliceBits).zext
@@ -174,7 +176,7 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
 
 object EntryDatapath {
 
-  /** Products that an entry times a shear factor takes. */
+  /** Number of products of an entry and a shear factor. */
   def slices(config: ColonnadeConfig): Int = {
     val formats = new RayFormats(config.numbers)
     (formats.shear.width + formats.reciprocal.width - 1) / formats.reciprocal.width

@@ -9,15 +9,15 @@ final class RayEntryIO(config: ColonnadeConfig) extends Bundle {
   val ray       = Flipped(Decoupled(new PermutedRay(config)))
   val quotients = Flipped(Decoupled(new SlopeQuotients(config)))
   val bounds    = Input(new Bounds(config.numbers))
-  val output    = Decoupled(new SetUpRay(config))
+  val output    = Decoupled(new PreparedRay(config))
   val busy      = Output(Bool())
 }
 
-/** Finds where a ray enters the object's box, and advances its origin to there.
+/** Computes the distance at which a ray enters the object's box, and advances the ray's origin by it.
   *
-  * A ray may come before its quotients, which must stay offered until they are taken. With them in time the result is
-  * offered 10 + 2 · slices cycles after the ray was taken (14 with a shear factor of two multiplier slices), 12 when it
-  * misses the box; the next ray is taken in the cycle in which the last one leaves. Source: docs/numbers.md, sections 2.3 to 2.8.
+  * A ray may come before its quotients, which must stay valid until they are accepted. If they are in time, the latency
+  * is 10 + 2 · slices cycles (14 with a shear factor of two multiplier slices), or 12 for a ray that misses the box. The
+  * next ray is accepted in the cycle in which the result is taken. Source: docs/numbers.md, sections 2.3 to 2.8.
   */
 final class RayEntry(config: ColonnadeConfig) extends Module {
   val io = IO(new RayEntryIO(config))

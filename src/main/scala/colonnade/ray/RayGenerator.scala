@@ -2,11 +2,12 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.{Counter, Decoupled, RegEnable}
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{Camera, Vec3}
 import colonnade.numbers.{Fixed, Rounding}
 
-/** A pixel whose primary ray a context wants. */
+/** A pixel, and the context of its primary ray. */
 final class RayPosition(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val x       = UInt(config.numbers.coordinateBits.W)
@@ -17,7 +18,7 @@ final class RayPosition(config: ColonnadeConfig) extends Bundle {
 final class CameraRegisters(config: ColonnadeConfig) extends Bundle {
   val camera = new Camera(config.numbers)
 
-  /** A camera position shifted left by this is in grid steps. */
+  /** Left shift of a camera position to grid steps. */
   val unitShift = UInt(NumberFormats.bitLength(config.numbers.sceneBits).W)
 }
 
@@ -26,15 +27,15 @@ final class RayGeneratorIO(config: ColonnadeConfig) extends Bundle {
   val position  = Flipped(Decoupled(new RayPosition(config)))
   val ray       = Decoupled(new RayRequest(config))
 
-  /** The pixel whose ray is offered. */
+  /** The pixel of the offered ray. */
   val pixel = Output(new RayPosition(config))
 }
 
-/** Primary rays: `towards = (camera.towards << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
+/** Generates primary rays: `dir = (camera.dir << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
   *
-  * One multiplier takes the six products in turn: a ray is offered 8 cycles after its pixel was accepted, and the next
-  * pixel is accepted in the cycle that takes the ray. The registers are constant while a pixel is inside. A position
-  * that leaves the scene wraps around; the host refuses it. Source: docs/numbers.md, section 1.
+  * One multiplier computes the six products in sequence. Latency: a ray is offered 8 cycles after its pixel was accepted,
+  * and the next pixel is accepted in the cycle that takes the ray. The registers are constant while a pixel is in the
+  * unit. A position outside the scene wraps around; the host rejects it. Source: docs/numbers.md, section 1.
   */
 final class RayGenerator(config: ColonnadeConfig) extends Module {
   private val numbers = config.numbers
@@ -42,7 +43,7 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
 
   val io = IO(new RayGeneratorIO(config))
 
-  // Control: six products, one cycle behind them their sums
+  // Control: six products; each sum follows one cycle later
   private val products   = 2 * 3
   private val occupied   = RegInit(false.B)
   private val multiplies = RegInit(false.B)
@@ -62,7 +63,7 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
     multiplies := true.B
   }
 
-  // Datapath: the components in their order, each first of the x product, then of the y product
+  // Datapath: the components in order, for each the x product, then the y product
   private val position = RegEnable(io.position.bits, io.position.fire)
   private val camera   = io.registers.camera
 
@@ -73,7 +74,7 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
 
   private val step       = Mux(ofY, component(camera.stepY), component(camera.stepX))
   private val coordinate = Mux(ofY, position.y, position.x)
-  private val base       = Mux(ofY, component(camera.position), component(camera.towards))
+  private val base       = Mux(ofY, component(camera.position), component(camera.dir))
   private val amount     = Mux(ofY, io.registers.unitShift, camera.stepShift)
   private val term       = Reg(SInt((numbers.macBits + numbers.coordinateBits + 1).W))
   private val shifted    = Reg(SInt(numbers.directionBits.W))
@@ -81,15 +82,15 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
   term    := step * coordinate.zext
   shifted := shiftLeft(base, amount)
 
-  private val origin  = Reg(Vec(3, SInt(scene.width.W)))
-  private val towards = Reg(Vec(3, SInt(numbers.directionBits.W)))
+  private val origin = Reg(Vec(3, SInt(scene.width.W)))
+  private val dir    = Reg(Vec(3, SInt(numbers.directionBits.W)))
 
-  // Neither sum overflows: directionBits holds all three terms.
-  private val sum = Rounding.narrow(Mux(addsOfY, towards.last, shifted) +& term, numbers.directionBits)
+  // The sums cannot overflow: directionBits holds all three terms.
+  private val sum = Rounding.narrow(Mux(addsOfY, dir.last, shifted) +& term, numbers.directionBits)
   when(adds && !addsOfY) {
-    towards.zip(towards.tail).foreach { case (to, from) => to := from }
+    dir.zip(dir.tail).foreach { case (to, from) => to := from }
   }
-  when(adds) { towards.last := sum }
+  when(adds) { dir.last := sum }
   when(adds && addsOfY) {
     origin.zip(origin.tail).foreach { case (to, from) => to := from }
     origin.last := Rounding.narrow(shifted, scene.width)
@@ -99,7 +100,7 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
   io.ray.bits.context  := position.context
   io.ray.bits.isShadow := false.B
   io.ray.bits.origin.axes.zip(origin).foreach { case (to, from) => to := Fixed(scene, from) }
-  io.ray.bits.towards.axes.zip(towards).foreach { case (to, from) => to := from }
+  io.ray.bits.dir.axes.zip(dir).foreach { case (to, from) => to := from }
 
   private def shiftLeft(value: SInt, by: UInt): SInt = {
     val wide = value.pad(numbers.directionBits)

@@ -9,11 +9,11 @@ import colonnade.numbers.Divider
 final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
   val request = Flipped(Decoupled(new RayRequest(config)))
 
-  /** Constant while a ray is inside. */
+  /** Constant while a ray is in the unit. */
   val bounds = Input(new Bounds(config.numbers))
-  val ray    = Decoupled(new SetUpRay(config))
+  val ray    = Decoupled(new PreparedRay(config))
 
-  /** The stage that lasts longest, the entry, holds a ray. */
+  /** The longest stage, [[RayEntry]], holds a ray. */
   val busy = Output(Bool())
 }
 
@@ -21,9 +21,9 @@ final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
   * request ─▶ DirectionNormaliser ─ mantissas ─▶ 4 × Divider ─ quotients ─▶ RayEntry ─▶ ray
   *                    └────────────────── the ray in its own frame ───────────▲
   * }}}
-  * In order; up to three rays are inside. With quotients of 31 and 19 bits a ray takes some 30 cycles and a new one is
-  * taken every 16 at most. A component that is 0 is divided all the same and its quotients are replaced; a direction of
-  * 0 comes out as a ray that does not enter. Source: docs/numbers.md, section 2.
+  * In order, with up to three rays in flight. With quotients of 31 and 19 bits, the latency is about 30 cycles and the
+  * throughput at least one ray every 16 cycles. The quotients of a component that is 0 are computed, then replaced. A
+  * direction of 0 gives a ray that does not enter the box. Source: docs/numbers.md, section 2.
   */
 final class RaySetup(config: ColonnadeConfig) extends Module {
   private val numbers = config.numbers
@@ -42,7 +42,7 @@ final class RaySetup(config: ColonnadeConfig) extends Module {
   io.ray :<>= entry.io.output
   io.busy := entry.io.busy
 
-  // All dividers start together, and their quotients leave together
+  // All dividers start together, and their quotients are taken together
   private val mantissas = normaliser.io.mantissas
   private val areFree   = dividers.map(_.io.division.ready).reduce(_ && _)
   mantissas.ready := areFree
@@ -62,6 +62,6 @@ final class RaySetup(config: ColonnadeConfig) extends Module {
   entry.io.quotients.bits.shear.zip(shears).foreach { case (to, divider) => to := divider.io.quotient.bits }
   entry.io.quotients.bits.reciprocal.zip(reciprocals).foreach { case (to, divider) => to := divider.io.quotient.bits }
 
-  /** Of a component that is 0 too: any denominator will do there, as long as its top bit is set. */
+  /** Sets the top bit, also of a component that is 0, whose quotient is not used. */
   private def normalised(mantissa: UInt): UInt = Cat(true.B, mantissa(numbers.mantissaBits - 2, 0))
 }

@@ -1,12 +1,12 @@
 package colonnade.ray
 
 import chisel3._
-import chisel3.util.log2Ceil
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.Vec3
 import colonnade.numbers.{Fixed, FixedPointFormat, Rounding}
 
-/** Formats of a ray's numbers (docs/numbers.md). */
+/** Number formats of a ray (docs/numbers.md). */
 final class RayFormats(numbers: NumberFormats) {
 
   /** A position or distance near the object. */
@@ -25,7 +25,7 @@ final class RayFormats(numbers: NumberFormats) {
   /** Signed whole units near the object: box origins and the box test's distances. */
   val units: FixedPointFormat = FixedPointFormat.signed(numbers.boxDistanceBits, 0)
 
-  /** How far an origin is advanced: whole units. */
+  /** The distance by which an origin is advanced, in whole units. */
   val entry: FixedPointFormat = FixedPointFormat.unsigned(numbers.entryBits, 0)
 
   /** A barycentric weight for the shader, up to a common factor. */
@@ -34,72 +34,67 @@ final class RayFormats(numbers: NumberFormats) {
   val exponentBits: Int = NumberFormats.bitLength(numbers.reciprocalFraction)
 }
 
-/** Names a ray in flight in its render unit. */
-object Context {
-  def apply(config: ColonnadeConfig): UInt = UInt(log2Ceil(config.array.contexts.max(2)).W)
-}
-
-/** A ray as it is asked for. `towards` is its direction, of any scale. A shadow ray ends at origin + towards, the light. */
+/** A ray to prepare. `dir` is its direction, of any length. A shadow ray ends at origin + dir, the light. */
 final class RayRequest(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
 
   val context  = Context(config)
   val isShadow = Bool()
   val origin   = Vec3(new Fixed(new RayFormats(numbers).scene))
-  val towards  = Vec3(SInt(numbers.directionBits.W))
+  val dir      = Vec3(SInt(numbers.directionBits.W))
 }
 
-/** Which way a ray goes: its dominant axis (0, 1, 2) and the signs in its own frame, where x' and y' are the axes after
-  * the dominant one (cyclically) and z' is the dominant one.
+/** A ray's dominant axis (0, 1, 2) and the signs of its direction in the ray's own frame. There, z' is the dominant axis,
+  * and x' and y' are the axes after it in cyclic order.
   */
-final class Heading extends Bundle {
+final class RayOrientation extends Bundle {
   val axis     = UInt(2.W)
   val negative = Vec(3, Bool())
 }
 
-/** What the box test knows of a ray; numbers of its own frame. */
+/** A ray for the box test, in its own frame. */
 final class BoxRay(numbers: NumberFormats) extends Bundle {
   private val formats = new RayFormats(numbers)
 
-  val heading    = new Heading
-  val origin     = Vec(3, new Fixed(formats.units))
-  val reciprocal = Vec(2, new Fixed(formats.reciprocal))
-  val exponent   = Vec(2, UInt(formats.exponentBits.W))
+  val orientation = new RayOrientation
+  val origin      = Vec(3, new Fixed(formats.units))
+  val reciprocal  = Vec(2, new Fixed(formats.reciprocal))
+  val exponent    = Vec(2, UInt(formats.exponentBits.W))
 }
 
-/** What the triangle test and the shader know of a ray; numbers of its own frame. */
+/** A ray for the triangle test and the shader, in its own frame. */
 final class TriangleRay(numbers: NumberFormats) extends Bundle {
   private val formats = new RayFormats(numbers)
 
-  val heading = new Heading
-  val origin  = Vec(3, new Fixed(formats.grid))
-  val shear   = Vec(2, new Fixed(formats.shear))
+  val orientation = new RayOrientation
+  val origin      = Vec(3, new Fixed(formats.grid))
+  val shear       = Vec(2, new Fixed(formats.shear))
 }
 
-/** What is kept of a ray while it is traced; numbers of its own frame. */
+/** The stored data of a ray that is traced, in its own frame. */
 final class TracedRay(numbers: NumberFormats) extends Bundle {
   private val formats = new RayFormats(numbers)
 
-  val heading    = new Heading
-  val origin     = Vec(3, new Fixed(formats.grid))
-  val shear      = Vec(2, new Fixed(formats.shear))
-  val reciprocal = Vec(2, new Fixed(formats.reciprocal))
-  val exponent   = Vec(2, UInt(formats.exponentBits.W))
+  val orientation = new RayOrientation
+  val origin      = Vec(3, new Fixed(formats.grid))
+  val shear       = Vec(2, new Fixed(formats.shear))
+  val reciprocal  = Vec(2, new Fixed(formats.reciprocal))
+  val exponent    = Vec(2, UInt(formats.exponentBits.W))
 
   def forTriangles: TriangleRay = {
     val ray = Wire(new TriangleRay(numbers))
-    ray.heading := heading
-    ray.origin  := origin
-    ray.shear   := shear
+    ray.orientation := orientation
+    ray.origin      := origin
+    ray.shear       := shear
     ray
   }
 
-  /** Its origin in units: near the object, thus within the box test's. */
+  /** The origin rounded to units; it is close to the object, so it fits the format of the box test. */
   def forBoxes: BoxRay = {
     val ray = Wire(new BoxRay(numbers))
-    ray.heading    := heading
-    ray.reciprocal := reciprocal
-    ray.exponent   := exponent
+    ray.orientation := orientation
+    ray.reciprocal  := reciprocal
+    ray.exponent    := exponent
     ray.origin.zip(origin).foreach { case (units, position) =>
       val rounded = Rounding.nearestEven(position.integer, numbers.gridFraction)
       units := Fixed(formats.units, Rounding.narrow(rounded, numbers.boxDistanceBits))
@@ -108,8 +103,8 @@ final class TracedRay(numbers: NumberFormats) extends Bundle {
   }
 }
 
-/** The outcome of ray set-up. Without `enters` the rest is meaningless. */
-final class SetUpRay(config: ColonnadeConfig) extends Bundle {
+/** The result of ray set-up. If the ray does not enter the object's box (`enters`), the other fields are invalid. */
+final class PreparedRay(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new RayFormats(numbers)
 
@@ -117,15 +112,15 @@ final class SetUpRay(config: ColonnadeConfig) extends Bundle {
   val isShadow = Bool()
   val enters   = Bool()
   val ray      = new TracedRay(numbers)
-  val entry    = new Fixed(formats.entry)
+  val tEntry   = new Fixed(formats.entry)
 
-  /** Largest t that still counts, never negative. */
-  val limit = new Fixed(formats.grid)
+  /** Hits with t < `tMax` count; never negative. */
+  val tMax = new Fixed(formats.grid)
 }
 
 object PermutedFrame {
 
-  /** Components of an object-space vector in the frame of a ray with the given dominant axis. */
+  /** Components of an object-space vector in the frame of a ray with this dominant axis. */
   def apply[T <: Data](vector: Vec3[T], axis: UInt): Seq[T] = {
     val Seq(x, y, z) = vector.axes
     Seq(Seq(y, z, x), Seq(z, x, y), Seq(x, y, z)).map { case Seq(first, second, third) =>

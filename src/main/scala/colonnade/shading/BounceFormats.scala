@@ -1,10 +1,11 @@
 package colonnade.shading
 
 import chisel3._
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Vec3}
 import colonnade.numbers.{Fixed, FixedPointFormat}
-import colonnade.ray.{Context, RayFormats}
+import colonnade.ray.RayFormats
 
 /** Widths of reflection and refraction, by the bounds that docs/bounce.md gives for what they hold. */
 final class BounceFormats(numbers: NumberFormats) {

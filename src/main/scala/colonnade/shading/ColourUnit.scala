@@ -2,11 +2,10 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, MuxLookup, Valid}
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
 import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.Context
-import colonnade.unit.ContextTable
 
 final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   val ambient    = Input(Rgb(FrameRegisters.intensity))

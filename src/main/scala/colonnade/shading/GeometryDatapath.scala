@@ -249,8 +249,8 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
     }
     slopes     := VecInit(request.ray.shear.map(_.integer))
     distance   := request.hit.t.integer
-    axis       := request.ray.heading.axis
-    isNegative := request.ray.heading.negative(2)
+    axis       := request.ray.orientation.axis
+    isNegative := request.ray.orientation.negative(2)
     backSide   := request.hit.backSide
     context    := request.context
     material   := request.face.material

@@ -1,9 +1,9 @@
 package colonnade.shading
 
 import chisel3._
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Rgb}
-import colonnade.ray.Context
 
 /** A path that meets its last surface. */
 final class PathEnd(config: ColonnadeConfig) extends Bundle {

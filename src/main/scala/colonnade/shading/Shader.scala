@@ -21,7 +21,7 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   val room = if (config.hasRoom) Some(Flipped(Decoupled(new RoomSurface(config)))) else None
 
   /** `request` will be ready in the next cycle. */
-  val takesNext = Output(Bool())
+  val readyNext = Output(Bool())
 
   /** Hits on diffuse surfaces. */
   val lit = Decoupled(new LitSurface(config))
@@ -65,7 +65,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
   }
   private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse && !surface.isRoom).getOrElse(false.B)
   geometry.io.request <> io.request
-  io.takesNext           := geometry.io.takesNext
+  io.readyNext           := geometry.io.readyNext
   geometry.io.shading    := io.shading
   geometry.io.lights     := io.lights
   geometry.io.unitShift  := io.unitShift

@@ -2,9 +2,9 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.log2Ceil
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{RecordFormats, Vec3}
-import colonnade.ray.Context
 
 /** Widths inside the shader, by the bounds that docs/numbers.md gives for what they hold. */
 final class ShaderFormats(numbers: NumberFormats) {

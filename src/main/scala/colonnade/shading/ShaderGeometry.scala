@@ -15,7 +15,7 @@ final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
   val room = if (config.hasRoom) Some(Flipped(Decoupled(new RoomSurface(config)))) else None
 
   /** `request` will be ready in the next cycle. */
-  val takesNext = Output(Bool())
+  val readyNext = Output(Bool())
   val lights    = Input(Vec(config.frame.lights, new Light(numbers)))
   val shading   = Input(new Shading(config))
 
@@ -75,7 +75,7 @@ final class ShaderGeometry(config: ColonnadeConfig) extends Module {
 
   io.request.ready := !isBusy
   io.room.foreach(_.ready := !isBusy && !io.request.valid)
-  io.takesNext    := (!isBusy && !io.request.valid && !isRoom) || (io.result.fire && isLast)
+  io.readyNext    := (!isBusy && !io.request.valid && !isRoom) || (io.result.fire && isLast)
   io.result.valid := isBusy && isDone
 
   datapath.io.control := control

@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{Light, Vec3}
 import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.{Context, RayFormats, RayRequest}
-import colonnade.unit.ContextTable
+import colonnade.ray.{RayFormats, RayRequest}
 
 /** A light that a surface wants to know about. */
 final class ShadowQuestion(config: ColonnadeConfig) extends Bundle {
@@ -70,5 +70,5 @@ final class ShadowRays(config: ColonnadeConfig) extends Module {
   io.ray.bits.context  := asked.context
   io.ray.bits.isShadow := true.B
   io.ray.bits.origin   := origin
-  io.ray.bits.towards.axes.zip(towards).foreach { case (to, from) => to := from }
+  io.ray.bits.dir.axes.zip(towards).foreach { case (to, from) => to := from }
 }

@@ -4,13 +4,13 @@ import chisel3._
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Rounding
 
-/** Where a ray is within a child's box, in units; nothing when `near` is beyond `far`. */
+/** The interval of t in which a ray is inside a child's box, in units; empty if `tNear` exceeds `tFar`. */
 final class BoxInterval(config: ColonnadeConfig) extends Bundle {
   val isOccupied = Bool()
-  val near       = UInt((config.numbers.boxDistanceBits - 1).W)
-  val far        = SInt(config.numbers.boxDistanceBits.W)
+  val tNear      = UInt((config.numbers.boxDistanceBits - 1).W)
+  val tFar       = SInt(config.numbers.boxDistanceBits.W)
 
-  def isEntered: Bool = isOccupied && near.zext <= far
+  def isEntered: Bool = isOccupied && tNear.zext <= tFar
 }
 
 /** Ports of [[BoxDatapath]]. */
@@ -20,10 +20,10 @@ final class BoxDatapathIO(config: ColonnadeConfig, lanes: Int) extends Bundle {
   val intervals = Output(Vec(lanes, new BoxInterval(config)))
 }
 
-/** Slab test of one ray against `lanes` boxes in padded integers (docs/numbers.md, section 3), without control.
+/** Slab test of one ray against `lanes` boxes in padded integers (docs/numbers.md, section 3), without control logic.
   *
-  * Latency [[BoxDatapath.latency]] cycles, a set of boxes each cycle; it never stalls. Four multipliers a lane: the
-  * dominant axis needs none. A box beyond the limit comes out with `far` before `near`.
+  * Latency [[BoxDatapath.latency]] cycles, throughput one set of boxes per cycle, no stalls. Each lane has four
+  * multipliers, because the dominant axis needs none. A box beyond `tMax` has an empty interval.
   */
 class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
   private val numbers      = config.numbers
@@ -36,8 +36,8 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
 
   val io = IO(new BoxDatapathIO(config, lanes))
 
-  // Distances of the planes from the ray's origin, along the ray's signs, the box widened.
-  // Where the ray goes down, -(corner + plane) ∓ pad is the complement of corner + plane ± pad - 1.
+  // Signed distances from the ray's origin to the planes of the padded box, along the ray's signs.
+  // For a negative direction, -(corner + plane) ∓ pad is the complement of corner + plane ± pad - 1.
   private def widenedCorner(axis: Int, by: BigInt): SInt = {
     val constant = Mux(io.node.negative(axis), (-by - 1).S, by.S)
     Rounding.narrow(io.node.corner(axis) +& constant, numbers.vertexBits + 2) // at most 1.75 cubes
@@ -50,42 +50,44 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
     val upward = Rounding.narrow(corners(axis) +& plane.zext, distanceBits)                      // less than four
     registered(Mux(io.node.negative(axis), ~upward, upward))
   }
-  private val nears       = io.children.map(child => Seq.tabulate(3)(distance(nearCorners, child.near)))
-  private val fars        = io.children.map(child => Seq.tabulate(3)(distance(farCorners, child.far)))
+  private val tNears      = io.children.map(child => Seq.tabulate(3)(distance(nearCorners, child.nearPlanes)))
+  private val tFars       = io.children.map(child => Seq.tabulate(3)(distance(farCorners, child.farPlanes)))
   private val reciprocals = registered(io.node.reciprocal)
-  private val limit       = registered(io.node.limit)
+  private val tMax        = registered(io.node.tMax)
 
-  // Times the reciprocals; the dominant axis is a distance already
+  // Multiply by the reciprocals; along the dominant axis the distance is t already
   private def product(axis: Int)(distance: SInt): SInt = {
     val exact = distance * reciprocals(axis).zext
     registered(Rounding.narrow(exact, distanceBits + reciprocals(axis).getWidth))
   }
-  private val nearProducts = nears.map(near => Seq.tabulate(2)(axis => product(axis)(near(axis))))
-  private val farProducts  = fars.map(far => Seq.tabulate(2)(axis => product(axis)(far(axis))))
-  private val dominantNear = nears.map(near => registered(atLeastZero(near(2))))
-  private val dominantFar  = fars.map(far => registered(least(far(2), limit)))
+  private val nearProducts  = tNears.map(tNear => Seq.tabulate(2)(axis => product(axis)(tNear(axis))))
+  private val farProducts   = tFars.map(tFar => Seq.tabulate(2)(axis => product(axis)(tFar(axis))))
+  private val dominantTNear = tNears.map(tNear => registered(atLeastZero(tNear(2))))
+  private val dominantTFar  = tFars.map(tFar => registered(least(tFar(2), tMax)))
 
-  // Whole units
-  private val drop      = registered(registered(io.node.drop))
-  private val unitShift = Seq.tabulate(2)(axis => new UnitShift(drop(axis), numbers))
-  private val sideNears = nearProducts.map(_.zip(unitShift).map { case (product, shift) => registered(shift(product)) })
-  private val sideFars  = farProducts.map(_.zip(unitShift).map { case (product, shift) => registered(shift(product)) })
+  // Round to whole units
+  private val shiftRight = registered(registered(io.node.shiftRight))
+  private val unitShift  = Seq.tabulate(2)(axis => new UnitShift(shiftRight(axis), numbers))
+  private val sideTNears = nearProducts.map(_.zip(unitShift).map { case (product, shift) =>
+    registered(shift(product))
+  })
+  private val sideTFars = farProducts.map(_.zip(unitShift).map { case (product, shift) => registered(shift(product)) })
 
-  // The interval in which the ray is within all slabs
+  // Intersect the intervals of the three slabs
   for (lane <- 0 until lanes) {
-    val interval = Wire(new BoxInterval(config))
-    val sideNear = greatest(sideNears(lane)(0), sideNears(lane)(1))
-    val sideFar  = least(sideFars(lane)(0), sideFars(lane)(1))
-    val near     = greatest(sideNear, registered(dominantNear(lane)).zext)
-    val far      = registered(dominantFar(lane))
+    val interval  = Wire(new BoxInterval(config))
+    val sideTNear = greatest(sideTNears(lane)(0), sideTNears(lane)(1))
+    val sideTFar  = least(sideTFars(lane)(0), sideTFars(lane)(1))
+    val tNear     = greatest(sideTNear, registered(dominantTNear(lane)).zext)
+    val tFar      = registered(dominantTFar(lane))
     interval.isOccupied := registered(registered(registered(io.children(lane).isOccupied)))
-    interval.near       := near.asUInt(distanceBits - 2, 0)
-    // One is added to a side's far, which floor has made too small; below `far` that can't overflow
-    interval.far       := Mux(sideFar < far, Rounding.narrow(sideFar +& 1.S, distanceBits), far)
+    interval.tNear      := tNear.asUInt(distanceBits - 2, 0)
+    // Floor rounds the side's tFar down, so add one unit; this cannot overflow because sideTFar < tFar
+    interval.tFar      := Mux(sideTFar < tFar, Rounding.narrow(sideTFar +& 1.S, distanceBits), tFar)
     io.intervals(lane) := registered(interval)
   }
 
-  /** One cycle later; unlike `RegNext`, as wide as it is known to be. */
+  /** Delays by one cycle; unlike `RegNext`, it keeps the known width. */
   private def registered[T <: Data](x: T): T = {
     val register = Reg(chiselTypeOf(x))
     register := x

@@ -5,39 +5,39 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{ChildKind, NodeRecord, RecordFormats, Vec3}
 import colonnade.ray.{PermutedFrame, RayFormats}
 
-/** What the box test of all children of a node shares: numbers of the ray's own frame. */
+/** Operands that the box tests of all children of a node share, in the ray's own frame. */
 final class NodeOperands(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new RayFormats(numbers)
 
   val negative = Vec(3, Bool())
 
-  /** The node's corner as seen from the ray's origin, in units. Ray set-up keeps the origin within half a cube of the
-    * object's cube, so that the difference takes no more bits.
+  /** The node's corner relative to the ray's origin, in units. Ray set-up keeps the origin within half a cube of the
+    * object's cube, which bounds the width of the difference.
     */
   val corner = Vec(3, SInt((numbers.vertexBits + 2).W))
 
-  /** Units of a child's planes, as a shift. */
+  /** Log2 of the unit of a child's planes. */
   val exponent = Vec(3, UInt(RecordFormats.exponentBits(config).W))
 
-  /** The reciprocals' computed digits; the low bits that set-up leaves clear are not carried along. */
+  /** The computed digits of the reciprocals, without the low bits, which ray set-up leaves at 0. */
   val reciprocal = Vec(2, UInt((numbers.reciprocalDigits + 1).W))
 
-  /** Bits to drop from a product with a whole reciprocal. */
-  val drop = Vec(2, UInt(formats.exponentBits.W))
+  /** Right shift of a product with a full-width reciprocal. */
+  val shiftRight = Vec(2, UInt(formats.exponentBits.W))
 
-  /** Largest near that counts, in units. */
-  val limit = SInt(numbers.boxDistanceBits.W)
+  /** Largest entry distance that may hold a hit, in units. */
+  val tMax = SInt(numbers.boxDistanceBits.W)
 }
 
-/** A child's planes relative to the node's corner, in the ray's own frame: `near` are those met first. */
+/** A child's planes relative to the node's corner, in the ray's own frame: the ray crosses `nearPlanes` first. */
 final class ChildPlanes(config: ColonnadeConfig) extends Bundle {
   val isOccupied = Bool()
-  val near       = Vec(3, UInt(config.geometry.boxBits.W))
-  val far        = Vec(3, UInt(config.geometry.boxBits.W))
+  val nearPlanes = Vec(3, UInt(config.geometry.boxBits.W))
+  val farPlanes  = Vec(3, UInt(config.geometry.boxBits.W))
 }
 
-/** A child as its record has it, in the object's frame. */
+/** A child as its record stores it, in the object's frame. */
 final class StoredChild(config: ColonnadeConfig) extends Bundle {
   private val plane = UInt(config.geometry.boxBits.W)
 
@@ -46,18 +46,18 @@ final class StoredChild(config: ColonnadeConfig) extends Bundle {
   val high = Vec3(plane)
 }
 
-/** Turns a record and a ray into operands: selections, and one subtraction an axis. */
+/** Converts a record and a ray to operands: selections, and one subtraction per axis. */
 object BoxOperands {
 
   def node(config: ColonnadeConfig, candidate: BoxCandidate): NodeOperands = {
     val numbers  = config.numbers
     val ray      = candidate.ray
     val operands = Wire(new NodeOperands(config))
-    operands.negative := ray.heading.negative
-    operands.exponent := VecInit(PermutedFrame(candidate.node.exponent, ray.heading.axis))
-    operands.limit    := candidate.limit.integer
+    operands.negative := ray.orientation.negative
+    operands.exponent := VecInit(PermutedFrame(candidate.node.exponent, ray.orientation.axis))
+    operands.tMax     := candidate.tMax.integer
 
-    val origin = PermutedFrame(candidate.node.origin, ray.heading.axis)
+    val origin = PermutedFrame(candidate.node.origin, ray.orientation.axis)
     for (axis <- 0 until 3) {
       val difference = origin(axis).zext -& ray.origin(axis).integer
       operands.corner(axis) := difference.asUInt(numbers.vertexBits + 1, 0).asSInt
@@ -65,8 +65,8 @@ object BoxOperands {
     for (axis <- 0 until 2) {
       operands.reciprocal(
         axis
-      )                   := ray.reciprocal(axis).natural >> (numbers.reciprocalFraction - numbers.reciprocalDigits)
-      operands.drop(axis) := numbers.reciprocalFraction.U - ray.exponent(axis)
+      ) := ray.reciprocal(axis).natural >> (numbers.reciprocalFraction - numbers.reciprocalDigits)
+      operands.shiftRight(axis) := numbers.reciprocalFraction.U - ray.exponent(axis)
     }
     operands
   }
@@ -79,19 +79,19 @@ object BoxOperands {
     stored
   }
 
-  /** The planes in the frame of a ray with that dominant axis and those signs. */
+  /** The planes in the frame of a ray with this dominant axis and these signs. */
   def planes(config: ColonnadeConfig, child: StoredChild, axis: UInt, negative: Seq[Bool]): ChildPlanes = {
     val result = Wire(new ChildPlanes(config))
     val low    = PermutedFrame(child.low, axis)
     val high   = PermutedFrame(child.high, axis)
     result.isOccupied := BoxOperands.isOccupied(child.kind)
     for (a <- 0 until 3) {
-      result.near(a) := Mux(negative(a), high(a), low(a))
-      result.far(a)  := Mux(negative(a), low(a), high(a))
+      result.nearPlanes(a) := Mux(negative(a), high(a), low(a))
+      result.farPlanes(a)  := Mux(negative(a), low(a), high(a))
     }
     result
   }
 
-  /** Whether there is a child to test: a node or a leaf. */
+  /** Whether the slot holds a child to test: a node or a leaf. */
   def isOccupied(kind: UInt): Bool = kind === ChildKind.node || kind === ChildKind.leaf
 }

@@ -4,13 +4,13 @@ import chisel3._
 import chisel3.util.{log2Ceil, Mux1H, PopCount}
 import colonnade.config.ColonnadeConfig
 
-/** A child that may have been entered, by its slot. */
+/** A child by its slot, and its entry distance. */
 final class OrderedChild(config: ColonnadeConfig) extends Bundle {
-  val slot = UInt(log2Ceil(config.geometry.arity).W)
-  val near = UInt((config.numbers.boxDistanceBits - 1).W)
+  val slot  = UInt(log2Ceil(config.geometry.arity).W)
+  val tNear = UInt((config.numbers.boxDistanceBits - 1).W)
 }
 
-/** The children entered: the first `count` of `children`, near to far, the lower slot first among equals. */
+/** The children that the ray enters: the first `count` of `children`, sorted by entry distance, then by slot. */
 final class ChildOrder(config: ColonnadeConfig) extends Bundle {
   val count    = UInt(log2Ceil(config.geometry.arity + 1).W)
   val children = Vec(config.geometry.arity, new OrderedChild(config))
@@ -18,20 +18,20 @@ final class ChildOrder(config: ColonnadeConfig) extends Bundle {
 
 object ChildOrder {
 
-  /** Combinational: all pairs are compared at once, and each child goes where its number of predecessors says. */
-  def apply(config: ColonnadeConfig, isEntered: Seq[Bool], near: Seq[UInt]): ChildOrder = {
-    val slots      = near.indices
-    val isNotAfter = Map.from(for (i <- slots; j <- slots if i < j) yield (i, j) -> (near(i) <= near(j)))
+  /** Sorts by rank, combinationally: all pairs are compared at once, and a child's rank is its number of predecessors. */
+  def apply(config: ColonnadeConfig, isEntered: Seq[Bool], tNear: Seq[UInt]): ChildOrder = {
+    val slots      = tNear.indices
+    val isNotAfter = Map.from(for (i <- slots; j <- slots if i < j) yield (i, j) -> (tNear(i) <= tNear(j)))
 
     def precedes(i: Int, j: Int): Bool = isEntered(i) && (if (i < j) isNotAfter((i, j)) else !isNotAfter((j, i)))
-    val places                         = slots.map(slot => PopCount(slots.filter(_ != slot).map(precedes(_, slot))))
+    val ranks                          = slots.map(slot => PopCount(slots.filter(_ != slot).map(precedes(_, slot))))
 
     val order = Wire(new ChildOrder(config))
     order.count := PopCount(isEntered)
-    for (place <- slots) {
-      val isHere = slots.map(slot => isEntered(slot) && places(slot) === place.U)
-      order.children(place).slot := Mux1H(isHere, slots.map(_.U))
-      order.children(place).near := Mux1H(isHere, near)
+    for (rank <- slots) {
+      val isHere = slots.map(slot => isEntered(slot) && ranks(slot) === rank.U)
+      order.children(rank).slot  := Mux1H(isHere, slots.map(_.U))
+      order.children(rank).tNear := Mux1H(isHere, tNear)
     }
     order
   }

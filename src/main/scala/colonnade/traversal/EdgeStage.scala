@@ -8,19 +8,19 @@ import colonnade.numbers.{Fixed, Rounding}
 final class EdgeStageIO(formats: TriangleFormats) extends Bundle {
   val schedule = Input(new TriangleSchedule)
 
-  /** x and y of vertex 0, 1, 2 in phase 2, 3, 0. */
+  /** x and y of vertices 0, 1, 2 in phases 2, 3, 0. */
   val sheared = Input(Vec(2, new Fixed(formats.grid)))
 
-  /** The ray's line crosses the triangle whose vertex 0 came seven cycles ago. Valid in phase 1, as are the others. */
-  val isCrossed  = Output(Bool())
-  val isPositive = Output(Bool())
-  val magnitudes = Output(Vec(3, UInt(formats.edgeBits.W)))
+  /** The ray's line crosses the triangle whose vertex 0 came seven cycles ago. All outputs are valid in phase 1. */
+  val crossesTriangle = Output(Bool())
+  val isPositive      = Output(Bool())
+  val magnitudes      = Output(Vec(3, UInt(formats.edgeBits.W)))
 }
 
 /** Exact edge functions of the sheared triangle; numbers.md 4.3.
   *
-  * Multiplies in phases 0, 1, 2 (edges 2, 0, 1), subtracts and looks at the signs in the two cycles that follow.
-  * A triangle seen from its edge, all of whose edge functions are zero, is not crossed.
+  * It multiplies in phases 0, 1, 2 (edges 2, 0, 1), then subtracts and tests the signs in the two cycles that follow.
+  * A triangle seen edge-on, whose edge functions are all zero, is not crossed.
   */
 final class EdgeStage(numbers: NumberFormats) extends Module {
   private val formats = new TriangleFormats(numbers)
@@ -29,17 +29,17 @@ final class EdgeStage(numbers: NumberFormats) extends Module {
   private val schedule = io.schedule
   private val advances = schedule.advances
 
-  // The last three vertices; the eldest comes around to close the triangle
-  private val current, previous, eldest = Reg(Vec(2, new Fixed(formats.grid)))
+  // The last three vertices; the oldest one comes again to close the triangle
+  private val current, previous, oldest = Reg(Vec(2, new Fixed(formats.grid)))
   when(advances) {
-    current  := Mux(schedule.is(1), eldest, io.sheared)
+    current  := Mux(schedule.is(1), oldest, io.sheared)
     previous := current
-    eldest   := previous
+    oldest   := previous
   }
   private val forward  = RegEnable(previous(0).integer * current(1).integer, advances)
   private val backward = RegEnable(previous(1).integer * current(0).integer, advances)
 
-  // The three edges, elder ones by magnitude; they rest in phase 0
+  // The three edges; the older two are kept as magnitudes. They hold in phase 0
   private val edge          = Reg(SInt(formats.edgeBits.W))
   private val edge0, edge2  = Reg(UInt(formats.edgeBits.W))
   private val edgeMagnitude = edge.abs.asUInt
@@ -56,7 +56,7 @@ final class EdgeStage(numbers: NumberFormats) extends Module {
     anyPositive := edge > 0.S || (anyPositive && !isFirst)
   }
 
-  io.isCrossed  := anyNegative =/= anyPositive
-  io.isPositive := anyPositive
-  io.magnitudes := VecInit(edge0, edgeMagnitude, edge2)
+  io.crossesTriangle := anyNegative =/= anyPositive
+  io.isPositive      := anyPositive
+  io.magnitudes      := VecInit(edge0, edgeMagnitude, edge2)
 }

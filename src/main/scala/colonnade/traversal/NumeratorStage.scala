@@ -11,16 +11,16 @@ final class NumeratorStageIO(config: ColonnadeConfig) extends Bundle {
 
   val weighted = Flipped(Decoupled(new WeightedTriangle(config)))
 
-  /** Multiplications for the shear stage; `products` come in the cycle after one was taken. */
+  /** Multiplications for the shear stage; `products` is valid in the cycle after one was accepted. */
   val weighing = Decoupled(new WeighingOperands(formats))
   val products = Input(Vec(2, SInt((2 * config.numbers.gridBits).W)))
-  val question = Decoupled(new DistanceQuestion(config))
+  val request  = Decoupled(new DistanceRequest(config))
 }
 
-/** Puts the distance as a division of two mantissas; numbers.md 4.5.
+/** Prepares the distance as a division of two mantissas; numbers.md 4.5.
   *
-  * One triangle at a time, every 5 cycles and those until the multipliers are lent (at most 3): products, sum,
-  * magnitude, leading zeros, and the shift while it is handed over.
+  * One triangle at a time, every 5 cycles plus at most 3 cycles of wait for the shared multipliers: products, sum,
+  * magnitude, leading zeros, and the shift in the output cycle.
   */
 final class NumeratorStage(config: ColonnadeConfig) extends Module {
   val io = IO(new NumeratorStageIO(config))
@@ -34,13 +34,13 @@ final class NumeratorStage(config: ColonnadeConfig) extends Module {
   // Control
   private val state = RegInit(idle)
   io.weighing.valid := state === multiplying
-  io.question.valid := state === offering
-  io.weighted.ready := state === idle || io.question.fire
+  io.request.valid  := state === offering
+  io.weighted.ready := state === idle || io.request.fire
   when(io.weighing.fire) { state := adding }
   when(state === adding) { state := negating }
   when(state === negating) { state := counting }
   when(state === counting) { state := offering }
-  when(io.question.fire) { state := idle }
+  when(io.request.fire) { state := idle }
   when(io.weighted.fire) { state := multiplying }
 
   // Datapath
@@ -68,17 +68,18 @@ final class NumeratorStage(config: ColonnadeConfig) extends Module {
     if (width >= bits) x(width - 1, width - bits) else Cat(x, 0.U((bits - width).W))
   }
 
-  // The exponents' difference is gridBits - 3, less the numerator's leading zeros, plus the sum's: at most one
+  // The difference of the exponents is gridBits - 3, minus the leading zeros of the numerator, plus those of the sum
+  // (at most one)
   private val sum     = triangle.sum
   private val isShort = !sum(formats.weightBits - 1)
-  private val terms   = io.question.bits.terms
-  io.question.bits.dividend := mantissa(TriangleFormats.shiftLeft(magnitude, zeros))
-  io.question.bits.divisor  := mantissa(Mux(isShort, (sum << 1)(formats.weightBits - 1, 0), sum))
-  terms.first               := triangle.depths.first
-  terms.isNegative          := isNegative
-  terms.drop                := zeros +& formats.excessDigits.U - isShort
-  terms.id                  := triangle.id
-  terms.backSide            := triangle.backSide
+  private val terms   = io.request.bits.terms
+  io.request.bits.dividend := mantissa(TriangleFormats.shiftLeft(magnitude, zeros))
+  io.request.bits.divisor  := mantissa(Mux(isShort, (sum << 1)(formats.weightBits - 1, 0), sum))
+  terms.first              := triangle.depths.first
+  terms.isNegative         := isNegative
+  terms.shiftRight         := zeros +& formats.excessDigits.U - isShort
+  terms.id                 := triangle.id
+  terms.backSide           := triangle.backSide
   terms.weights.zip(triangle.weights).foreach { case (port, weight) =>
     val format = new RayFormats(numbers).weight
     port := Fixed(format, Rounding.floor(weight, formats.weightBits - numbers.barycentricBits))

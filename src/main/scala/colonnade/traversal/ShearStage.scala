@@ -7,7 +7,7 @@ import colonnade.formats.Vec3
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PermutedFrame, TriangleRay}
 
-/** Two products that somebody else asks of the shear's multipliers. */
+/** Operands of the numerator stage for the two multipliers that it shares with the shear. */
 final class WeighingOperands(formats: TriangleFormats) extends Bundle {
   val weights = Vec(2, UInt(formats.weightBits.W))
   val rises   = Vec(2, SInt(formats.riseBits.W))
@@ -21,24 +21,24 @@ final class ShearStageIO(config: ColonnadeConfig) extends Bundle {
   /** Vertex 0, 1, 2 in phase 0, 1, 2. */
   val vertex = Input(Vec3(UInt(config.geometry.vertexBits.W)))
 
-  /** Stays from phase 0 to 3. */
+  /** Constant from phase 0 to 3. */
   val ray = Input(new TriangleRay(config.numbers))
 
-  /** x and y of that vertex relative to the ray, two cycles later. */
+  /** x and y of the vertex relative to the ray, two cycles after it came. */
   val sheared = Output(Vec(2, new Fixed(formats.grid)))
 
-  /** Of the triangle that started nine cycles ago; valid in phase 1. */
+  /** Depths of the triangle that started nine cycles ago; valid in phase 1. */
   val depths = Output(new TriangleDepths(formats))
 
-  /** Taken when the multipliers are free; `products` of it follow in the next cycle, for one cycle. */
+  /** Accepted when the multipliers are free; `products` is valid in the next cycle only. */
   val weighing = Flipped(Decoupled(new WeighingOperands(formats)))
   val products = Output(Vec(2, SInt((2 * config.numbers.gridBits).W)))
 }
 
-/** Vertices relative to the ray: translated to its origin, in its frame, sheared along it; numbers.md 4.1, 4.2.
+/** Transforms vertices to the ray's frame: translation to its origin, permutation of axes, shear; numbers.md 4.1, 4.2.
   *
-  * A vertex a cycle in phases 0 to 2: select and subtract, multiply, round and subtract. The two multipliers are lent
-  * in phase 0 and while phase 1 pauses, when no product of the shear is waiting behind them.
+  * One vertex per cycle in phases 0 to 2: select and subtract, multiply, round and subtract. The numerator stage may use
+  * the two multipliers in phase 0 and while phase 1 pauses, when the shear has no product in flight.
   */
 final class ShearStage(config: ColonnadeConfig) extends Module {
   val io = IO(new ShearStageIO(config))
@@ -49,32 +49,32 @@ final class ShearStage(config: ColonnadeConfig) extends Module {
   private val advances = schedule.advances
 
   // Translate: differences are within 1.5 · 2^(gridBits - 3) steps
-  private val heading = io.ray.heading
-  private val vertex  = PermutedFrame(io.vertex, heading.axis).map { coordinate =>
+  private val orientation = io.ray.orientation
+  private val vertex      = PermutedFrame(io.vertex, orientation.axis).map { coordinate =>
     Rounding.nearestEven(coordinate, -numbers.gridFraction).zext
   }
   private val origin     = io.ray.origin.map(_.integer)
-  private val minuend    = Mux(heading.negative(2), origin(2), vertex(2))
-  private val subtrahend = Mux(heading.negative(2), vertex(2), origin(2))
+  private val minuend    = Mux(orientation.negative(2), origin(2), vertex(2))
+  private val subtrahend = Mux(orientation.negative(2), vertex(2), origin(2))
 
   private def grid(x: SInt): Fixed = Fixed(formats.grid, Rounding.narrow(x, numbers.gridBits))
 
   private val translated = Seq(0, 1).map(a => RegEnable(grid(vertex(a) -& origin(a)), advances))
   private val depth      = RegEnable(grid(minuend -& subtrahend), advances)
 
-  // Multiply, for the shear or for somebody else
-  private val isLent = schedule.is(0) || schedule.pauses
-  io.weighing.ready := isLent
+  // Multiply, for the shear or for the numerator stage
+  private val isShared = schedule.is(0) || schedule.pauses
+  io.weighing.ready := isShared
   private val products = Seq(0, 1).map { a =>
-    val factor  = Mux(isLent, io.weighing.bits.weights(a).zext.pad(numbers.gridBits), io.ray.shear(a).integer)
-    val stretch = Mux(isLent, io.weighing.bits.rises(a).pad(numbers.gridBits), depth.integer)
+    val factor  = Mux(isShared, io.weighing.bits.weights(a).zext.pad(numbers.gridBits), io.ray.shear(a).integer)
+    val stretch = Mux(isShared, io.weighing.bits.rises(a).pad(numbers.gridBits), depth.integer)
     val product = Reg(SInt((2 * numbers.gridBits).W))
     product := factor * stretch
     product
   }
   io.products.zip(products).foreach { case (port, product) => port := product }
 
-  // Shear: the sum of two numbers within 1.5 · 2^(gridBits - 3) steps. In phase 1 nothing is on its way here.
+  // Shear: the sum of two numbers within 1.5 · 2^(gridBits - 3) steps. In phase 1 no product arrives.
   private val position = translated.map(RegNext(_))
   io.sheared.zip(position.zip(products)).foreach { case (port, (straight, product)) =>
     port := grid(straight.integer -& Rounding.nearestEven(product, numbers.shearFraction))

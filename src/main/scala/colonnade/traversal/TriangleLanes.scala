@@ -2,25 +2,25 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, PopCount, RRArbiter}
+import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
-import colonnade.frame.Dispatcher
 
 /** Ports of [[TriangleLanes]]. */
 final class TriangleLanesIO(config: ColonnadeConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
 
   /** `candidate` will be ready in the next cycle. */
-  val takesNext = Output(Bool())
+  val readyNext = Output(Bool())
 
-  /** Those of one record in their order. */
+  /** The results of one record stay in order. */
   val result = Decoupled(new TriangleResult(config))
 
-  /** Lanes into which a triangle's vertices go. */
+  /** Lanes that accept a triangle's vertices. */
   val busy = Output(UInt(log2Ceil(config.units.triangleLanes + 1).W))
 }
 
-/** `units.triangleLanes` [[TriangleUnit]]s: a record goes to one that is free, in turn, and results leave in turn.
-  * Latency and each lane's throughput are those of the unit.
+/** `units.triangleLanes` parallel [[TriangleUnit]]s with round-robin dispatch and round-robin collection of results.
+  * Latency and throughput of a lane are those of the unit.
   */
 final class TriangleLanes(config: ColonnadeConfig) extends Module {
   val io = IO(new TriangleLanesIO(config))
@@ -35,6 +35,6 @@ final class TriangleLanes(config: ColonnadeConfig) extends Module {
     result :<>= lane.result
   }
   io.result :<>= results.io.out
-  io.takesNext := VecInit(lanes.map(_.takesNext)).asUInt.orR
+  io.readyNext := VecInit(lanes.map(_.readyNext)).asUInt.orR
   io.busy      := PopCount(lanes.map(_.busy))
 }

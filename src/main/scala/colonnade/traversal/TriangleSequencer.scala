@@ -11,22 +11,22 @@ final class TriangleSequencerIO(config: ColonnadeConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
 
   /** `candidate` will be ready in the next cycle. */
-  val takesNext = Output(Bool())
+  val readyNext = Output(Bool())
 
   /** The vertex of this phase (phases 0 to 2). */
   val vertex = Output(Vec3(UInt(config.geometry.vertexBits.W)))
 
-  /** Stays from phase 0 to 3. */
+  /** Constant from phase 0 to 3. */
   val ray = Output(new TriangleRay(config.numbers))
 
-  /** The triangle under way from phase 0 to 3. */
+  /** The current triangle, from phase 0 to 3. */
   val tag = Output(Valid(new TriangleTag(config)))
 }
 
-/** Holds a record and hands out its triangles, one each round of the schedule, a vertex a phase.
+/** Sequences the triangles of a record: one triangle per round of the schedule, one vertex per phase.
   *
-  * A candidate is taken in phase 3 and starts in the next cycle: no round is lost between records. A record with an
-  * illegal `count` gives one absent triangle.
+  * A candidate is accepted in phase 3 and starts in the next cycle, so records follow each other without a lost round.
+  * A record with an illegal `count` gives one absent triangle.
   */
 final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   val io = IO(new TriangleSequencerIO(config))
@@ -44,7 +44,7 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
 
   private val isFree = !isOccupied || isLast
   io.candidate.ready := isEnd && isFree
-  io.takesNext       := io.schedule.is(2) && isFree
+  io.readyNext       := io.schedule.is(2) && isFree
   when(isEnd) {
     index := index + 1.U
     when(io.candidate.ready) {
@@ -63,13 +63,13 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   io.vertex := Mux(io.schedule.is(0), vertices(0), Mux(io.schedule.is(1), vertices(1), vertices(2)))
   io.ray    := candidate.ray
 
-  io.tag.valid        := isOccupied
-  io.tag.bits.context := candidate.context
-  io.tag.bits.id      := record.firstTriangle + index
-  io.tag.bits.isLast  := isLast
-  io.tag.bits.isClear := triangles.indices.tail.foldLeft(record.isClear(0)) { case (other, k) =>
+  io.tag.valid               := isOccupied
+  io.tag.bits.context        := candidate.context
+  io.tag.bits.id             := record.firstTriangle + index
+  io.tag.bits.isLast         := isLast
+  io.tag.bits.isTransmissive := triangles.indices.tail.foldLeft(record.isClear(0)) { case (other, k) =>
     Mux(index === k.U, record.isClear(k), other)
   }
   io.tag.bits.isAbsent   := !record.isLegal
-  io.tag.bits.isNegative := candidate.ray.heading.negative(2)
+  io.tag.bits.isNegative := candidate.ray.orientation.negative(2)
 }

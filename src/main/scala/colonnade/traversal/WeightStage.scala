@@ -12,8 +12,8 @@ final class WeightStageIO(config: ColonnadeConfig) extends Bundle {
 
 /** Barycentric weights: the edges' magnitudes, shifted so that their sum fills `weightBits`; numbers.md 4.4.
   *
-  * One triangle at a time, every 8 cycles: three for the sum, one to count its leading zeros, three to shift the edges
-  * through one shifter, one to hand over (and to take the next).
+  * One triangle at a time, every 8 cycles: three cycles for the sum, one to count its leading zeros, three to shift the
+  * edges through one shifter, one for the output, in which the next triangle may enter.
   */
 final class WeightStage(config: ColonnadeConfig) extends Module {
   val io = IO(new WeightStageIO(config))
@@ -26,11 +26,11 @@ final class WeightStage(config: ColonnadeConfig) extends Module {
   // Control
   private val state   = RegInit(idle)
   private val edge    = Reg(UInt(2.W))
-  private val isTurn  = state === adding || state === shifting
+  private val rotates = state === adding || state === shifting
   private val isFinal = edge === 2.U
   io.weighted.valid := state === offering
   io.crossed.ready  := state === idle || io.weighted.fire
-  when(isTurn) { edge := Mux(isFinal, 0.U, edge + 1.U) }
+  when(rotates) { edge := Mux(isFinal, 0.U, edge + 1.U) }
   when(state === adding && isFinal) { state := counting }
   when(state === counting) { state := shifting }
   when(state === shifting && isFinal) { state := offering }
@@ -40,7 +40,7 @@ final class WeightStage(config: ColonnadeConfig) extends Module {
     edge  := 0.U
   }
 
-  // Datapath: three edges go around until weights have taken their place
+  // Datapath: a ring of three edges, which weights replace one by one
   private val triangle = Reg(new CrossedTriangle(config))
   private val ring     = triangle.magnitudes
   private val total    = Reg(UInt(formats.edgeBits.W))
@@ -51,7 +51,7 @@ final class WeightStage(config: ColonnadeConfig) extends Module {
     TriangleFormats.shiftLeft(ring(0), zeros)(formats.edgeBits - 1, formats.edgeBits - formats.weightBits)
   private val sumSoFar = Mux(edge === 1.U, 0.U, sum) + ring(2)(formats.weightBits - 1, 0)
 
-  when(isTurn) {
+  when(rotates) {
     ring(0) := ring(1)
     ring(1) := ring(2)
     ring(2) := Mux(state === shifting, weight, ring(0))

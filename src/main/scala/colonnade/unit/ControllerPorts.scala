@@ -2,8 +2,9 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.ray.Context
+import colonnade.environment.RoomQuestion
 
 /** A context whose hit has been shaded. */
 final class Shaded(config: ColonnadeConfig) extends Bundle {
@@ -19,17 +20,6 @@ final class Bounced(config: ColonnadeConfig) extends Bundle {
 
   /** The ray meets the object's records; otherwise the background only. */
   val isTraced = Bool()
-}
-
-/** A context whose ray is to meet the room. */
-final class RoomQuestion(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config)
-
-  /** It is the pixel's own ray. */
-  val isSeen = Bool()
-
-  /** It is beside the path. */
-  val isAside = Bool()
 }
 
 /** A context whose path may turn now. */

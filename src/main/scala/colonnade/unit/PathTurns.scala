@@ -2,10 +2,11 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
-import colonnade.background.RememberedRay
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
+import colonnade.environment.RememberedRay
 import colonnade.formats.Shading
-import colonnade.ray.{Context, RayRequest}
+import colonnade.ray.RayRequest
 import colonnade.shading.{BounceResult, BouncedRay, PathTurn}
 
 /** What a room adds to [[PathTurns]]. */
@@ -81,7 +82,7 @@ final class PathTurns(config: ColonnadeConfig) extends Module {
   io.ray.bits.context     := context
   io.ray.bits.isShadow    := false.B
   io.ray.bits.origin      := path.bits.origin
-  io.ray.bits.towards     := path.bits.towards
+  io.ray.bits.dir         := path.bits.towards
   io.turned.valid         := path.fire
   io.turned.bits.context  := context
   io.turned.bits.isTraced := isTraced

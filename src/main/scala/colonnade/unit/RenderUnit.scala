@@ -2,13 +2,14 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, Arbiter, Decoupled, Pipe, PopCount, Queue, RegEnable, Valid}
-import colonnade.background.{AttributePort, RoomStage, RoomStageIO}
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameRegisters, Pixel, PixelHit, RecordFormats}
+import colonnade.environment.{AttributePort, RoomStage, RoomStageIO}
+import colonnade.formats.{FrameRegisters, Pixel, PixelHit, PixelPosition, RecordFormats}
 import colonnade.numbers.Rounding
-import colonnade.ray.{Context, RayGenerator, RayRequest, RaySetup, TracedRay}
+import colonnade.ray.{RayGenerator, RayRequest, RaySetup, TracedRay}
 import colonnade.shading.{ColourUnit, PathColour, Shader, ShadowRays}
-import colonnade.traversal.{TriangleLanes, Visit}
+import colonnade.traversal.{NodeRef, TriangleLanes}
 
 /** One render unit: turns pixel positions into pixels, with `contexts` rays in flight.
   *
@@ -72,11 +73,11 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   setUpRay.ready := true.B
   when(enters) {
     rays.write(setUpRay.bits.context, setUpRay.bits.ray)
-    entries.write(setUpRay.bits.context, setUpRay.bits.entry.natural)
+    entries.write(setUpRay.bits.context, setUpRay.bits.tEntry.natural)
   }
-  hitTable.io.search.valid        := setUpRay.fire
-  hitTable.io.search.bits.context := setUpRay.bits.context
-  hitTable.io.search.bits.limit   := setUpRay.bits.limit
+  hitTable.io.start.valid        := setUpRay.fire
+  hitTable.io.start.bits.context := setUpRay.bits.context
+  hitTable.io.start.bits.tMax    := setUpRay.bits.tMax
   connect(controller.io.entered, enters, setUpRay.bits.context)
   connect(controller.io.ended(0), setUpRay.fire && !setUpRay.bits.enters, setUpRay.bits.context)
 
@@ -84,23 +85,23 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   traversal.io.clear := io.start
   traversal.io.scene := io.registers.scene
   connect(traversal.io.start, enters, setUpRay.bits.context)
-  private val (chosen, served) = (recordFetch.io.chosen, recordFetch.io.served)
-  private val ray              = rays.read(chosen.bits, chosen.valid)
-  recordFetch.io.takesNext  := VecInit(traversal.io.takesNext, triangleUnit.io.takesNext, shader.io.takesNext)
-  traversal.io.nodes.valid  := isFor(RecordUse.node)
-  traversal.io.nodes.bits   := served.bits
-  traversal.io.ray          := ray.forBoxes
-  traversal.io.limits       := hitTable.io.limits
-  traversal.io.visits.ready := true.B
-  private val next = traversal.io.visits
+  private val (grantNext, response) = (recordFetch.io.grantNext, recordFetch.io.response)
+  private val ray                   = rays.read(grantNext.bits, grantNext.valid)
+  recordFetch.io.readyNext := VecInit(traversal.io.readyNext, triangleUnit.io.readyNext, shader.io.readyNext)
+  traversal.io.nodes.valid := isFor(RecordKind.node)
+  traversal.io.nodes.bits  := response.bits
+  traversal.io.ray         := ray.forBoxes
+  traversal.io.tMaxUnits   := hitTable.io.tMaxUnits
+  traversal.io.steps.ready := true.B
+  private val next = traversal.io.steps
   connect(controller.io.ended(1), next.fire && next.bits.isDone, next.bits.context)
-  wish(0, enters, setUpRay.bits.context, Traversal.firstVisit(config, io.registers.scene))
-  wish(1, next.fire && !next.bits.isDone, next.bits.context, next.bits.visit)
+  fetch(0, enters, setUpRay.bits.context, Traversal.root(config, io.registers.scene))
+  fetch(1, next.fire && !next.bits.isDone, next.bits.context, next.bits.target)
 
   // Triangles
-  triangleUnit.io.candidate.valid        := isFor(RecordUse.triangles)
-  triangleUnit.io.candidate.bits.context := served.bits.context
-  triangleUnit.io.candidate.bits.record  := formats.asTriangles(served.bits.record)
+  triangleUnit.io.candidate.valid        := isFor(RecordKind.triangles)
+  triangleUnit.io.candidate.bits.context := response.bits.context
+  triangleUnit.io.candidate.bits.record  := formats.asTriangles(response.bits.record)
   triangleUnit.io.candidate.bits.ray     := ray.forTriangles
 
   // A result either ends its ray (a shadow ray that is occluded) or lets it go on
@@ -119,11 +120,11 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   traversal.io.resume :<>= resumes.io.out
 
   // A record that does not exist is passed over; a pixel without attributes stays as it is
-  private val refused      = recordFetch.io.refused
-  private val isAttributes = refused.bits.use === RecordUse.attributes
-  resumes.io.in(0).valid := refused.valid && !isAttributes
-  resumes.io.in(0).bits  := refused.bits.context
-  connect(controller.io.dropped, refused.valid && isAttributes, refused.bits.context)
+  private val error        = recordFetch.io.error
+  private val isAttributes = error.bits.kind === RecordKind.attributes
+  resumes.io.in(0).valid := error.valid && !isAttributes
+  resumes.io.in(0).bits  := error.bits.context
+  connect(controller.io.dropped, error.valid && isAttributes, error.bits.context)
 
   // An ended ray: a hit wishes for its attributes, unless it is in a light's way
   private val judged = controller.io.judged
@@ -133,23 +134,23 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   when(isSeen) { isObject(judged.bits) := true.B }
   private val seen    = RegNext(isSeen, false.B)
   private val isFirst = RegNext(isSeen && controller.io.isPrimary(judged.bits), false.B)
-  hitTable.io.nearest.context := RegEnable(judged.bits, isSeen)
-  private val nearest = hitTable.io.nearest
-  recordFetch.io.wishes(2).valid        := seen
-  recordFetch.io.wishes(2).bits.context := nearest.context
-  recordFetch.io.wishes(2).bits.use     := RecordUse.attributes
-  recordFetch.io.wishes(2).bits.address :=
-    io.registers.scene.attributeBase + (nearest.id >> RecordFormats.faceSlotBits)
+  hitTable.io.closest.context := RegEnable(judged.bits, isSeen)
+  private val closest = hitTable.io.closest
+  recordFetch.io.fetches(2).valid        := seen
+  recordFetch.io.fetches(2).bits.context := closest.context
+  recordFetch.io.fetches(2).bits.kind    := RecordKind.attributes
+  recordFetch.io.fetches(2).bits.address :=
+    io.registers.scene.attributeBase + (closest.id >> RecordFormats.faceSlotBits)
 
   // Shading
-  hitTable.io.chosen := chosen
-  hitTable.io.served := served.bits.context
+  hitTable.io.grantNext       := grantNext
+  hitTable.io.responseContext := response.bits.context
   private val shadedHit = hitTable.io.hit
-  shader.io.request.valid        := isFor(RecordUse.attributes)
-  shader.io.request.bits.context := served.bits.context
+  shader.io.request.valid        := isFor(RecordKind.attributes)
+  shader.io.request.bits.context := response.bits.context
   shader.io.request.bits.ray     := ray.forTriangles
   shader.io.request.bits.hit     := shadedHit
-  shader.io.request.bits.face    := formats.asAttributes(served.bits.record).faces(shadedHit.id(
+  shader.io.request.bits.face    := formats.asAttributes(response.bits.record).faces(shadedHit.id(
     RecordFormats.faceSlotBits - 1,
     0
   ))
@@ -229,9 +230,9 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     val entry     = entries.read(judged.bits, isSeen)
     when(isFirst) {
       val pixelHit = Wire(new PixelHit(config))
-      pixelHit.triangle     := nearest.id
-      pixelHit.distance.raw := Rounding.floor(entry, -numbers.gridFraction) +& nearest.t.integer.asUInt
-      pixelHits.write(nearest.context, pixelHit)
+      pixelHit.triangle     := closest.id
+      pixelHit.distance.raw := Rounding.floor(entry, -numbers.gridFraction) +& closest.t.integer.asUInt
+      pixelHits.write(closest.context, pixelHit)
     }
     val pixelHit = pixelHits.read(complete.bits, leaves)
     when(finished.bits.isObject) { finished.bits.hit.get := pixelHit }
@@ -261,8 +262,8 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   events.idleContexts      := controller.io.freeCount
   events.contextsSetUp     := controller.io.setUpCount
-  events.waitRecord        := recordFetch.io.waiting
-  events.waitUnit          := recordFetch.io.holding
+  events.waitRecord        := recordFetch.io.stalledContexts
+  events.waitUnit          := recordFetch.io.readyContexts
   events.contextsBox       := population(Seq(traversal.io.nodes.fire, traversal.io.resume.fire), next.fire)
   events.contextsTriangles := population(Seq(triangleUnit.io.candidate.fire), tested.fire && tested.bits.isLast)
   events.contextsShading   := population(
@@ -277,7 +278,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
 
   events.deepestStack  := traversal.io.deepest
   events.stackOverflow := traversal.io.overflow
-  events.illegalRecord := refused.valid || traversal.io.illegal ||
+  events.illegalRecord := error.valid || traversal.io.illegal ||
     (triangleUnit.io.candidate.fire && !triangleUnit.io.candidate.bits.record.isLegal) ||
     room.map(_.events.illegal).getOrElse(false.B)
   io.isIdle := controller.io.freeCount === contexts.U && !finished.valid && !io.pixels.valid
@@ -317,7 +318,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     stage.ray.valid            := isTurning || first.fire
     stage.ray.bits.context     := context
     stage.ray.bits.ray.origin  := first.bits.origin
-    stage.ray.bits.ray.towards := first.bits.towards
+    stage.ray.bits.ray.towards := first.bits.dir
     for (ray <- turning) when(ray.valid) { stage.ray.bits := ray.bits }
     stage.ray.bits.ray.pixel := pixelOf(rayGenerator.io.pixel.x, rayGenerator.io.pixel.y)
   }
@@ -330,7 +331,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   }
 
   /** The record served is for this use. */
-  private def isFor(use: RecordUse.Type): Bool = served.valid && served.bits.use === use
+  private def isFor(kind: RecordKind.Type): Bool = response.valid && response.bits.kind === kind
 
   /** Contexts that have entered and not left. */
   private def population(enter: Seq[Bool], leaves: UInt): UInt = {
@@ -344,10 +345,10 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
     port.bits  := context
   }
 
-  private def wish(port: Int, valid: Bool, context: UInt, visit: Visit): Unit = {
-    recordFetch.io.wishes(port).valid        := valid
-    recordFetch.io.wishes(port).bits.context := context
-    recordFetch.io.wishes(port).bits.use     := Mux(visit.isLeaf, RecordUse.triangles, RecordUse.node)
-    recordFetch.io.wishes(port).bits.address := visit.address
+  private def fetch(port: Int, valid: Bool, context: UInt, target: NodeRef): Unit = {
+    recordFetch.io.fetches(port).valid        := valid
+    recordFetch.io.fetches(port).bits.context := context
+    recordFetch.io.fetches(port).bits.kind    := Mux(target.isLeaf, RecordKind.triangles, RecordKind.node)
+    recordFetch.io.fetches(port).bits.address := target.address
   }
 }

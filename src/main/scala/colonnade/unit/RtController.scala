@@ -2,8 +2,8 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, PopCount, PriorityEncoder, Valid}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.ray.Context
 import colonnade.shading.{Occlusion, PathEnd, ShadowQuestion}
 
 /** What a context is at. */

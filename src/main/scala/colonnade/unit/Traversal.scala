@@ -2,11 +2,12 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
 import colonnade.numbers.Fixed
-import colonnade.ray.{BoxRay, Context, RayFormats}
-import colonnade.traversal.{BoxUnit, ExhaustiveWalk, NextVisit, TraversalStack, Visit}
+import colonnade.ray.{BoxRay, RayFormats}
+import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TraversalStack, TraversalStep}
 
 /** Which record each ray visits next: BoxUnit and TraversalStack, or without a BVH the exhaustive walk. */
 final class Traversal(config: ColonnadeConfig) extends Module {
@@ -16,22 +17,22 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     val clear = Input(Bool())
     val scene = Input(new SceneMap(RecordFormats.idBits(config)))
 
-    /** A ray enters the object's box; its first visit is [[Traversal.firstVisit]]. */
+    /** A ray enters the object's box; its first visit is [[Traversal.root]]. */
     val start = Flipped(Valid(Context(config)))
 
     /** A node for a context. */
-    val nodes = Flipped(Decoupled(new ServedRecord(config)))
+    val nodes = Flipped(Decoupled(new FetchResponse(config)))
 
     /** `nodes` will be ready in the next cycle. */
-    val takesNext = Output(Bool())
+    val readyNext = Output(Bool())
 
     /** The ray of `nodes.bits.context`. */
     val ray = Input(new BoxRay(config.numbers))
 
     /** Contexts that are through with a triangles record. */
-    val resume = Flipped(Decoupled(Context(config)))
-    val limits = Input(Vec(contexts, new Fixed(new RayFormats(config.numbers).units)))
-    val visits = Decoupled(new NextVisit(config))
+    val resume    = Flipped(Decoupled(Context(config)))
+    val tMaxUnits = Input(Vec(contexts, new Fixed(new RayFormats(config.numbers).units)))
+    val steps     = Decoupled(new TraversalStep(config))
 
     /** For the counters. */
     val boxTests = Output(UInt(log2Ceil(config.geometry.arity + 1).W))
@@ -56,17 +57,17 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     boxUnit.io.in.bits.context := io.nodes.bits.context
     boxUnit.io.in.bits.node    := node
     when(!isLegal)(boxUnit.io.in.bits.node.kinds.foreach(_ := ChildKind.empty))
-    boxUnit.io.in.bits.ray   := io.ray
-    boxUnit.io.in.bits.limit := io.limits(io.nodes.bits.context)
-    io.nodes.ready           := boxUnit.io.in.ready
-    io.takesNext             := boxUnit.io.takesNext
+    boxUnit.io.in.bits.ray  := io.ray
+    boxUnit.io.in.bits.tMax := io.tMaxUnits(io.nodes.bits.context)
+    io.nodes.ready          := boxUnit.io.in.ready
+    io.readyNext            := boxUnit.io.readyNext
 
     stack.io.clear := io.clear
     stack.io.start := io.start
     stack.io.results :<>= boxUnit.io.out
     stack.io.resume :<>= resume
-    stack.io.limits := io.limits
-    io.visits :<>= stack.io.visits
+    stack.io.tMaxUnits := io.tMaxUnits
+    io.steps :<>= stack.io.steps
 
     io.boxTests := Mux(boxUnit.io.out.fire, boxUnit.io.out.bits.tests, 0.U)
     io.busy     := boxUnit.io.busy
@@ -74,14 +75,14 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     io.overflow := stack.io.overflow
     io.illegal  := io.nodes.fire && !isLegal
   } else {
-    val walk = Module(new ExhaustiveWalk(config))
+    val walk = Module(new LinearScan(config))
     walk.io.scene := io.scene
     walk.io.start := io.start
     walk.io.resume :<>= resume
-    io.visits :<>= walk.io.visits
+    io.steps :<>= walk.io.steps
 
     io.nodes.ready := true.B
-    io.takesNext   := true.B
+    io.readyNext   := true.B
     io.boxTests    := 0.U
     io.busy        := false.B
     io.deepest     := 0.U
@@ -93,10 +94,10 @@ final class Traversal(config: ColonnadeConfig) extends Module {
 object Traversal {
 
   /** Where every ray begins: the root, or without a BVH the first triangles record. */
-  def firstVisit(config: ColonnadeConfig, scene: SceneMap): Visit = {
-    val visit = Wire(new Visit(config))
-    visit.isLeaf  := (!config.geometry.bvh).B
-    visit.address := (if (config.geometry.bvh) 0.U else scene.triangleBase)
-    visit
+  def root(config: ColonnadeConfig, scene: SceneMap): NodeRef = {
+    val target = Wire(new NodeRef(config))
+    target.isLeaf  := (!config.geometry.bvh).B
+    target.address := (if (config.geometry.bvh) 0.U else scene.triangleBase)
+    target
   }
 }

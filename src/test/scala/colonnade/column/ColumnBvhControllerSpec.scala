@@ -4,8 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Load, RecordFormats}
-import colonnade.unit.{RecordBroadcast, RecordRequest}
+import colonnade.formats.{Load, RecordBroadcast, RecordFormats, RecordRequest}
 import colonnade.{Proofs, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 

@@ -3,8 +3,8 @@ package colonnade.column
 import chisel3._
 import chisel3.util.random.LFSR
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Pixel, RecordFormats}
-import colonnade.unit.{PixelPosition, RenderUnitIO}
+import colonnade.formats.{Pixel, PixelPosition, RecordFormats}
+import colonnade.unit.RenderUnitIO
 
 /** Renders a pixel by following records: the position names the first, each record the next. Takes any time between.
   * With `shading.shadows` it hangs at [[FakeRenderUnit.hangsAt]]; with `shading.flat` it reports an illegal record

@@ -2,9 +2,8 @@ package colonnade.formats
 
 import chisel3._
 import colonnade.config.{ColonnadeConfig, ConfigIO}
+import colonnade.{ArbitraryConfig, Packed, Properties}
 import chiseltest._
-import colonnade.traversal.Packed
-import colonnade.{ArbitraryConfig, Properties}
 import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers

@@ -29,7 +29,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
-  it should "take a pixel every 8 cycles" in {
+  it should "accept a pixel every 8 cycles" in {
     val config = TestConfigs.tiny
     test(new RayGenerator(config)) { generator =>
       generator.io.position.valid.poke(true)
@@ -52,7 +52,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       val accepts = random.nextInt(3) > 0
       generator.io.position.valid.poke(offers)
       generator.io.ray.ready.poke(accepts)
-      // What is not offered must not matter
+      // Bits without valid must have no effect
       val offered = if (offers) pixels(sent) else pixels(random.nextInt(pixels.size))
       generator.io.position.bits.context.poke(offered.context)
       generator.io.position.bits.x.poke(offered.x)
@@ -71,8 +71,8 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     ray.context.expect(pixel.context)
     ray.isShadow.expect(false)
     for (axis <- 0 until 3) {
-      val towards = (frame.towards(axis) << frame.stepShift) + frame.stepX(axis) * pixel.x + frame.stepY(axis) * pixel.y
-      ray.towards.axes(axis).peekInt() shouldBe towards
+      val dir = (frame.dir(axis) << frame.stepShift) + frame.stepX(axis) * pixel.x + frame.stepY(axis) * pixel.y
+      ray.dir.axes(axis).peekInt() shouldBe dir
       ray.origin.axes(axis).raw.asInstanceOf[SInt].peekInt() shouldBe (frame.position(axis) << frame.unitShift)
     }
   }
@@ -83,7 +83,7 @@ object RayGeneratorSpec {
   private case class Pixel(context: Int, x: BigInt, y: BigInt)
   private case class Frame(
       position:  Vector,
-      towards:   Vector,
+      dir:       Vector,
       stepX:     Vector,
       stepY:     Vector,
       stepShift: Int,
@@ -120,7 +120,7 @@ object RayGeneratorSpec {
     val camera                                  = generator.io.registers.camera
     def set(port: Vec3[SInt], to: Vector): Unit = port.axes.zip(to).foreach { case (p, v) => p.poke(v) }
     set(camera.position, frame.position)
-    set(camera.towards, frame.towards)
+    set(camera.dir, frame.dir)
     set(camera.stepX, frame.stepX)
     set(camera.stepY, frame.stepY)
     camera.stepShift.poke(frame.stepShift)

@@ -10,7 +10,7 @@ import org.scalatest.matchers.should.Matchers
 
 import scala.util.Random
 
-/** With the ray as box tests take it. */
+/** Adds the ray in the format of the box test. */
 private class RaySetupHarness(config: ColonnadeConfig) extends Module {
   private val setup = Module(new RaySetup(config))
 
@@ -20,7 +20,7 @@ private class RaySetupHarness(config: ColonnadeConfig) extends Module {
   forBoxes := setup.io.ray.bits.ray.forBoxes
 }
 
-/** Set-up rays equal the model's, bit for bit. */
+/** Prepared rays equal the model's, bit for bit. */
 class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   import RaySetupSpec._
   behavior of "RaySetup"
@@ -29,18 +29,18 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     it should s"equal the model under random stalls, ${config.precision} with ${config.geometry.vertexBits}-bit vertices" in {
       test(new RaySetupHarness(config)) { setup =>
         val random = new Random(2)
-        val cases  = new SetUpCases(config, random).all(raysPerBox = 14)
+        val cases  = new SetupStimulus(config, random).all(raysPerBox = 14)
         val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
         cases.zip(rates).foreach { case (box, rate) => run(setup, box, box.answers(config), random, rate) }
       }
     }
   }
 
-  it should "take a ray every 16 cycles at 32b32s64d, and lose none" in {
+  it should "accept a ray every 16 cycles at 32b32s64d, and lose none" in {
     val config = TestConfigs.tiny
     test(new RaySetupHarness(config)) { setup =>
       val random   = new Random(3)
-      val box      = new SetUpCases(config, random).all(raysPerBox = 40).head
+      val box      = new SetupStimulus(config, random).all(raysPerBox = 40).head
       val answers  = box.answers(config)
       val inBox    = answers.map(_.head == 1)
       val left     = run(setup, box, answers, random, Rates(1, 1))
@@ -50,10 +50,10 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     }
   }
 
-  /** Sends all requests and checks all answers; the cycles in which these left. */
+  /** Sends all requests and checks all results; returns the cycles of the results. */
   private def run(
       setup:   RaySetupHarness,
-      box:     SetUpCase,
+      box:     SetupCase,
       answers: Seq[Seq[BigInt]],
       random:  Random,
       rates:   Rates
@@ -69,7 +69,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       val accepts = random.nextInt(rates.accept) == 0
       setup.io.request.valid.poke(offers)
       setup.io.ray.ready.poke(accepts)
-      // What is offered may be withdrawn; what is not offered must not matter
+      // An offer may be withdrawn; bits without valid must have no effect
       val shown = if (offers) sent else requests.size - 1
       if (shown != offered) offer(setup.io.request.bits, requests(shown))
       offered = shown
@@ -85,9 +85,9 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
   }
 
   private def expect(
-      ray:     SetUpRay,
+      ray:     PreparedRay,
       units:   Seq[Fixed],
-      request: SetUpRequest,
+      request: SetupRequest,
       answer:  Seq[BigInt]
   ): Unit = withClue(s"$request: ") {
     ray.context.peekInt() shouldBe request.context
@@ -95,9 +95,9 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     ray.enters.peekInt() shouldBe answer.head
     if (answer.head == 1) {
       val traced  = ray.ray
-      val numbers = Seq(traced.heading.axis.peekInt()) ++ traced.heading.negative.map(_.peekInt()) ++
+      val numbers = Seq(traced.orientation.axis.peekInt()) ++ traced.orientation.negative.map(_.peekInt()) ++
         traced.origin.map(raw) ++ units.map(raw) ++ traced.shear.map(raw) ++ traced.reciprocal.map(raw) ++
-        traced.exponent.map(_.peekInt()) ++ Seq(raw(ray.entry), raw(ray.limit))
+        traced.exponent.map(_.peekInt()) ++ Seq(raw(ray.tEntry), raw(ray.tMax))
       numbers shouldBe answer.tail
     }
   }
@@ -105,7 +105,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
 object RaySetupSpec {
 
-  /** One cycle in `offer` has a request on offer, one in `accept` takes a ray. */
+  /** A request is offered in one of `offer` cycles, a ray is accepted in one of `accept` cycles. */
   private case class Rates(offer: Int, accept: Int)
 
   private def raw(number: Fixed): BigInt = number.raw match {
@@ -113,10 +113,10 @@ object RaySetupSpec {
     case other        => other.asInstanceOf[UInt].peekInt()
   }
 
-  private def offer(port: RayRequest, request: SetUpRequest): Unit = {
+  private def offer(port: RayRequest, request: SetupRequest): Unit = {
     port.context.poke(request.context)
     port.isShadow.poke(request.isShadow)
     port.origin.axes.zip(request.origin).foreach { case (to, from) => to.raw.asInstanceOf[SInt].poke(from) }
-    port.towards.axes.zip(request.towards).foreach { case (to, from) => to.poke(from) }
+    port.dir.axes.zip(request.dir).foreach { case (to, from) => to.poke(from) }
   }
 }

@@ -37,8 +37,8 @@ object ShaderPorts {
 
   def pokeHit(port: ShadeRequest, hit: HitQuestion): Unit = {
     port.context.poke(hit.context)
-    port.ray.heading.axis.poke(hit.axis)
-    port.ray.heading.negative.zip(hit.negative).foreach { case (to, value) => to.poke(value) }
+    port.ray.orientation.axis.poke(hit.axis)
+    port.ray.orientation.negative.zip(hit.negative).foreach { case (to, value) => to.poke(value) }
     port.ray.origin.zip(hit.origin).foreach { case (to, value) => pokeFixed(to, value) }
     port.ray.shear.zip(hit.shear).foreach { case (to, value) => pokeFixed(to, value) }
     pokeFixed(port.hit.t, hit.t)

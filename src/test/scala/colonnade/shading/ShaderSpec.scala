@@ -198,7 +198,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
         results :+= peek(io.lit.bits)
         idle = 0
       }
-      isPromised = io.takesNext.peekBoolean()
+      isPromised = io.readyNext.peekBoolean()
       shader.clock.step()
     }
     (taken, results)

@@ -44,7 +44,7 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
           dut.io.ray.bits.context.expect(context)
           dut.io.ray.bits.isShadow.expect(true)
           for ((axis, i) <- dut.io.ray.bits.origin.axes.zipWithIndex) assert(axis.peekRaw() == surfaces(context)(i))
-          for ((axis, i) <- dut.io.ray.bits.towards.axes.zipWithIndex)
+          for ((axis, i) <- dut.io.ray.bits.dir.axes.zipWithIndex)
             axis.expect((lights(light)(i) << shift) - surfaces(context)(i))
           dut.io.ray.ready.poke(true)
           dut.clock.step()

@@ -1,8 +1,8 @@
 package colonnade.traversal
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
+import colonnade.{Packed, PackedStreams, PackedUnit, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -22,17 +22,17 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   for ((config, i) <- (TestConfigs.formats ++ (binary +: laneVariants)).zipWithIndex)
     it should s"follow the model under random stalls, format $i (${shape(config)})" in
       test(new PackedBoxUnit(config)) { dut =>
-        val questions = new BoxQuestions(config, seed = 100 + i)
-        compare(dut, config, questions.atBrinks(20), offered = 1, accepted = 1)
-        for ((offered, accepted) <- Seq((0.4, 1.0), (0.8, 0.3))) compare(dut, config, questions(60), offered, accepted)
+        val cases = new BoxStimulus(config, seed = 100 + i)
+        compare(dut, config, cases.atBoundaries(20), offered = 1, accepted = 1)
+        for ((offered, accepted) <- Seq((0.4, 1.0), (0.8, 0.3))) compare(dut, config, cases(60), offered, accepted)
       }
 
   it should "order equally near children by slot, and skip empty and illegal ones" in
     test(new PackedBoxUnit(TestConfigs.tiny)) { dut =>
       val config = TestConfigs.tiny
-      val around = new BoxQuestions(config, seed = 5)(1).head.copy(
+      val around = new BoxStimulus(config, seed = 5)(1).head.copy(
         boxOrigin = Seq.fill(3)(BigInt(1000)),
-        limit = (BigInt(1) << (config.numbers.gridBits - 1)) - 1,
+        tMax = (BigInt(1) << (config.numbers.gridBits - 1)) - 1,
         origin = Seq.fill(3)(BigInt(900)),
         shift = Seq.fill(3)(0),
         low = Seq.fill(4)(Seq.fill(3)(BigInt(0))),
@@ -53,27 +53,27 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       test(new PackedBoxUnit(config)) { dut =>
         val nodes   = 40
         val beats   = config.geometry.arity / config.units.boxLanes
-        val cycles  = compare(dut, config, new BoxQuestions(config, seed = 3)(nodes), offered = 1, accepted = 1)
+        val cycles  = compare(dut, config, new BoxStimulus(config, seed = 3)(nodes), offered = 1, accepted = 1)
         val latency = 5 + beats
         assert(cycles == beats * (nodes - 1) + latency)
       }
 
   /** @return cycles from the first accepted input to the last result */
   private def compare(
-      dut:       PackedBoxUnit,
-      config:    ColonnadeConfig,
-      questions: Seq[BoxQuestion],
-      offered:   Double,
-      accepted:  Double
+      dut:      PackedBoxUnit,
+      config:   ColonnadeConfig,
+      cases:    Seq[BoxCase],
+      offered:  Double,
+      accepted: Double
   ): Int = {
     val input             = new Packed(new BoxCandidate(config))
     val output            = new Packed(new BoxResult(config))
-    val solved            = BoxQuestions.solved(config, questions)
+    val solved            = BoxStimulus.solved(config, cases)
     val (results, cycles) =
       PackedStreams.run(dut, solved.map(pair => input.pack(pair._1)), offered, accepted, new Random(11))
-    for (((result, (_, expected)), question) <- results.zip(solved).zip(questions)) {
+    for (((result, (_, expected)), testCase) <- results.zip(solved).zip(cases)) {
       val fields = output.unpack(result)
-      for ((name, value) <- expected) assert(fields(name) == value, s"for $name, expected $expected of $question")
+      for ((name, value) <- expected) assert(fields(name) == value, s"for $name, expected $expected of $testCase")
     }
     cycles
   }

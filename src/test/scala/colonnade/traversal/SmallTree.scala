@@ -6,23 +6,23 @@ import colonnade.traversal.StackReference.Child
 
 import scala.util.Random
 
-/** A random tree a few nodes deep, random rays, and which children each ray enters, by the model. */
+/** A random tree of a few levels and random rays; the model says which children each ray enters. */
 final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
   import SmallTree._
 
   private val random = new Random(seed)
   private val arity  = config.geometry.arity
 
-  /** Nodes by address: their halves of a question. Children of a kind are consecutive, in slot order. */
-  val nodes: Vector[BoxQuestion] = {
-    val questions = new BoxQuestions(config, seed)
-    var depths    = Vector(0) // of all nodes known so far, by address
-    var leaves    = 0
-    var grown     = Vector.empty[BoxQuestion]
+  /** Nodes by address, as cases without a ray. Children of a kind are consecutive, in slot order. */
+  val nodes: Vector[BoxCase] = {
+    val cases  = new BoxStimulus(config, seed)
+    var depths = Vector(0) // of all nodes known so far, by address
+    var leaves = 0
+    var grown  = Vector.empty[BoxCase]
     while (grown.size < depths.size) {
       val depth = depths(grown.size)
       val kinds = Seq.tabulate(arity)(slot => if (depth == 0 && slot < 2) node else kind(depth))
-      grown :+= boxes(questions(1).head, isRoot = depth == 0).copy(
+      grown :+= boxes(cases(1).head, isRoot = depth == 0).copy(
         kinds = kinds,
         firstChild = depths.size,
         firstTriangles = firstLeaf + leaves
@@ -33,43 +33,43 @@ final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
     grown
   }
 
-  /** The rays' halves of a question: of many those that enter most of the root's children. */
-  val rays: Vector[BoxQuestion] = {
-    val many    = new BoxQuestions(config, seed + 1)(4 * rayCount)
+  /** Rays, as cases without a node: those of many random ones that enter most of the root's children. */
+  val rays: Vector[BoxCase] = {
+    val many    = new BoxStimulus(config, seed + 1)(4 * rayCount)
     val entered = Model.answers(config, many.map(against(_, nodes.head).words), "box").map(_(1))
     many.zip(entered).sortBy(-_._2).take(rayCount).map(_._1).toVector
   }
 
-  /** Fields of [[BoxCandidate]] of a ray or a node, by their name behind `prefix`. */
-  def fields(question: BoxQuestion, prefix: String): Map[String, BigInt] =
-    question.fields(0).collect { case (name, value) if name.startsWith(prefix) => name.stripPrefix(prefix) -> value }
+  /** Fields of [[BoxCandidate]] of a ray or a node, by their name after `prefix`. */
+  def fields(testCase: BoxCase, prefix: String): Map[String, BigInt] =
+    testCase.fields(0).collect { case (name, value) if name.startsWith(prefix) => name.stripPrefix(prefix) -> value }
 
-  /** By ray and node: the children that the ray enters when nothing limits it, near to far. */
+  /** By ray and node: the children that an unlimited ray enters, sorted by entry distance. */
   private val entered: Map[(Int, Int), Seq[Child]] = {
     val pairs = for (ray <- rays.indices; address <- nodes.indices) yield (ray, address)
     val asked = pairs.map { case (ray, address) => against(rays(ray), nodes(address)) }
-    pairs.zip(BoxQuestions.solved(config, asked).map { case (_, result) =>
+    pairs.zip(BoxStimulus.solved(config, asked).map { case (_, result) =>
       (0 until result("count").toInt).map { i =>
         val child = s"children[$i]"
-        Child(result(s"$child.visit.isLeaf") == 1, result(s"$child.visit.address"), result(s"$child.near"))
+        Child(result(s"$child.target.isLeaf") == 1, result(s"$child.target.address"), result(s"$child.tNear"))
       }
     }).toMap
   }
 
-  /** The children of a node that a ray enters no farther away than `limit`, in units. */
-  def children(ray: Int, address: Int, limit: BigInt): Seq[Child] = entered((ray, address)).filter(_.near <= limit)
+  /** The children of a node that a ray enters no farther away than `tMax`, in units. */
+  def children(ray: Int, address: Int, tMax: BigInt): Seq[Child] = entered((ray, address)).filter(_.tNear <= tMax)
 
-  /** All leaves that a ray reaches, without regard to their order. */
-  def leaves(ray: Int, limit: BigInt): Set[Int] = {
-    def below(address: Int): Set[Int] = children(ray, address, limit).flatMap { child =>
+  /** All leaves that a ray reaches, in any order. */
+  def leaves(ray: Int, tMax: BigInt): Set[Int] = {
+    def below(address: Int): Set[Int] = children(ray, address, tMax).flatMap { child =>
       if (child.isLeaf) Set(child.address.toInt) else below(child.address.toInt)
     }.toSet
     below(0)
   }
 
-  /** A ray that nothing limits against a node. */
-  private def against(ray: BoxQuestion, node: BoxQuestion): BoxQuestion = ray.copy(
-    limit = (BigInt(1) << (config.numbers.gridBits - 1)) - 1,
+  /** An unlimited ray against a node. */
+  private def against(ray: BoxCase, node: BoxCase): BoxCase = ray.copy(
+    tMax = (BigInt(1) << (config.numbers.gridBits - 1)) - 1,
     origin = node.origin,
     shift = node.shift,
     kinds = node.kinds,
@@ -82,8 +82,8 @@ final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
   private def kind(depth: Int): Int =
     if (depth == deepest) Seq(0, leaf, leaf)(random.nextInt(3)) else Seq(0, node, node, leaf)(random.nextInt(4))
 
-  /** The root's boxes are the cube; half of the others reach across its middle, the rest are as they come. */
-  private def boxes(question: BoxQuestion, isRoot: Boolean): BoxQuestion = {
+  /** The root's boxes are the cube; half of the others cross its centre, the rest are random. */
+  private def boxes(testCase: BoxCase, isRoot: Boolean): BoxCase = {
     val numbers = config.numbers
     val top     = (1 << (numbers.boxBits - 1)) - 1
     val planes  = Seq.fill(arity) {
@@ -95,7 +95,7 @@ final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
           (ends.min, ends.max)
         }
     }
-    question.copy(
+    testCase.copy(
       origin = Seq.fill(3)(BigInt(0)),
       shift = Seq.fill(3)(numbers.vertexBits - numbers.boxBits + 1),
       low = planes.map(_.map(plane => BigInt(plane._1))),

@@ -1,6 +1,6 @@
 package colonnade.traversal
 
-/** What [[TraversalStack]] should do, one operation at a time. */
+/** Reference model of [[TraversalStack]], one operation at a time. */
 final class StackReference(contexts: Int, stackDepth: Int) {
   import StackReference._
 
@@ -10,21 +10,21 @@ final class StackReference(contexts: Int, stackDepth: Int) {
 
   def start(context: Int): Unit = stacks(context) = Nil
 
-  def result(context: Int, children: Seq[Child], limit: BigInt): Option[Child] = {
+  def result(context: Int, children: Seq[Child], tMax: BigInt): Option[Child] = {
     for (child <- children.drop(1).reverse)
       if (stacks(context).size < stackDepth) stacks(context) = child :: stacks(context) else overflows += 1
     deepest = deepest.max(stacks(context).size)
-    children.headOption.orElse(resume(context, limit))
+    children.headOption.orElse(resume(context, tMax))
   }
 
-  /** None: nothing is left. */
-  def resume(context: Int, limit: BigInt): Option[Child] = {
-    val rest = stacks(context).dropWhile(_.near > limit)
+  /** None if the stack is empty. */
+  def resume(context: Int, tMax: BigInt): Option[Child] = {
+    val rest = stacks(context).dropWhile(_.tNear > tMax)
     stacks(context) = rest.drop(1)
     rest.headOption
   }
 }
 
 object StackReference {
-  final case class Child(isLeaf: Boolean, address: BigInt, near: BigInt)
+  final case class Child(isLeaf: Boolean, address: BigInt, tNear: BigInt)
 }

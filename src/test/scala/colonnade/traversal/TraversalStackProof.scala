@@ -5,10 +5,11 @@ import chisel3.util.{log2Ceil, Fill, PriorityEncoder, RegEnable}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
 
-/** Offers results and resumptions of all contexts, starts, limits and stalls as freely as the stack's contract lets
-  * them come, and compares the answers of one context, whichever it is, with a plain stack. An address is all zeros or
-  * all ones, chosen for each child, and so are nears, and limits but for their sign: which entry an answer is can be
-  * told by these bits, for any two entries may differ in them.
+/** Drives results, resumptions, starts, tMax and stalls of all contexts as freely as the contract of the stack allows.
+  * It compares the steps of one context, which is free, with a plain stack.
+  *
+  * To keep the proof small, each address and each entry distance is all zeros or all ones, chosen per child; so is tMax
+  * but for its sign. These bits identify an entry, because any two entries may differ in them.
   */
 private[traversal] final class TraversalStackProof(config: ColonnadeConfig) extends Module {
   private val arity      = config.geometry.arity
@@ -16,18 +17,18 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   private val stackDepth = config.columnBvhMemory.stackDepth
   require(contexts == 2)
 
-  val finds    = IO(Input(Bool()))
-  val found    = IO(Input(new FoundChildren(arity)))
-  val resumes  = IO(Input(Bool()))
-  val resumed  = IO(Input(UInt(1.W)))
-  val starts   = IO(Input(Bool()))
-  val started  = IO(Input(UInt(1.W)))
-  val limits   = IO(Input(Vec(contexts, UInt(2.W))))
-  val ready    = IO(Input(Bool()))
-  val followed = IO(Input(UInt(1.W)))
+  val finds     = IO(Input(Bool()))
+  val found     = IO(Input(new FoundChildren(arity)))
+  val resumes   = IO(Input(Bool()))
+  val resumed   = IO(Input(UInt(1.W)))
+  val starts    = IO(Input(Bool()))
+  val started   = IO(Input(UInt(1.W)))
+  val tMaxUnits = IO(Input(Vec(contexts, UInt(2.W))))
+  val ready     = IO(Input(Bool()))
+  val observed  = IO(Input(UInt(1.W)))
 
   private val dut     = Module(new TraversalStack(config))
-  private val visit   = dut.io.visits
+  private val step    = dut.io.steps
   private val accepts = dut.io.results.fire || dut.io.resume.fire
 
   // Drive the stack
@@ -36,20 +37,20 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   dut.io.results.bits.context := found.context
   dut.io.results.bits.count   := found.count
   for ((child, i) <- dut.io.results.bits.children.zipWithIndex) {
-    child.visit.isLeaf  := (i == 0).B // only the nearest, which is not pushed
-    child.visit.address := Fill(child.visit.address.getWidth, found.marks(i))
-    child.near          := Fixed(child.near.format, Fill(child.near.format.width - 1, found.isFar(i)).zext)
+    child.target.isLeaf  := (i == 0).B // only the nearest, which is not pushed
+    child.target.address := Fill(child.target.address.getWidth, found.marks(i))
+    child.tNear          := Fixed(child.tNear.format, Fill(child.tNear.format.width - 1, found.isFar(i)).zext)
   }
   dut.io.resume.valid := resumes
   dut.io.resume.bits  := resumed
   dut.io.start.valid  := starts
   dut.io.start.bits   := started
-  for ((limit, bits) <- dut.io.limits.zip(limits))
-    limit      := Fixed(limit.format, (bits(1) ## Fill(limit.format.width - 1, bits(0))).asSInt)
+  for ((tMax, bits) <- dut.io.tMaxUnits.zip(tMaxUnits))
+    tMax       := Fixed(tMax.format, (bits(1) ## Fill(tMax.format.width - 1, bits(0))).asSInt)
   dut.io.clear := false.B
-  visit.ready  := ready
+  step.ready   := ready
 
-  // The contract: one operation of a context at a time, a result that waits stays, a start when nothing is under way
+  // The contract: one operation per context at a time, a waiting result is stable, a start without an operation
   private val underWay = RegInit(VecInit.fill(contexts)(false.B))
   private val stays    = RegNext(finds && !dut.io.results.ready, false.B)
   assume(found.count <= arity.U)
@@ -57,28 +58,28 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   assume(!resumes || !(underWay(resumed) || (finds && found.context === resumed)))
   assume(!starts || !(underWay(started) || (finds && found.context === started) || (resumes && resumed === started)))
   assume(!stays || (finds && found.asUInt === RegNext(found.asUInt)))
-  when(visit.fire) { underWay(visit.bits.context) := false.B }
+  when(step.fire) { underWay(step.bits.context) := false.B }
   when(dut.io.results.fire) { underWay(found.context) := true.B }
   when(dut.io.resume.fire) { underWay(resumed) := true.B }
 
   assert(!(dut.io.results.fire && dut.io.resume.fire), "one operation at a time")
-  assert(!visit.valid || underWay(visit.bits.context), "no visit that nobody asked for")
-  assert(!underWay.reduce(_ || _) || dut.io.busy, "busy while something is under way")
+  assert(!step.valid || underWay(step.bits.context), "no step without an operation")
+  assert(!underWay.reduce(_ || _) || dut.io.busy, "busy while an operation is in flight")
 
-  // The stack of the context that is followed, as it should be: newest first
+  // Reference stack of the observed context, newest entry first
   private val isFirst  = RegNext(false.B, true.B)
-  private val context  = Mux(isFirst, followed, RegEnable(followed, isFirst))
+  private val context  = Mux(isFirst, observed, RegEnable(observed, isFirst))
   private val entries  = RegInit(VecInit.fill(stackDepth)(0.U.asTypeOf(new ProofEntry)))
   private val level    = RegInit(0.U(log2Ceil(stackDepth + 1).W))
   private val isFound  = dut.io.results.fire && found.context === context
   private val pops     = (isFound && found.count === 0.U) || (dut.io.resume.fire && resumed === context)
-  private val limit    = limits(context)
-  private val isCulled = entries.map(_.isBeyond(limit))
+  private val tMax     = tMaxUnits(context)
+  private val isCulled = entries.map(_.isBeyond(tMax))
   private val counts   = VecInit(isCulled.zipWithIndex.map { case (culled, i) => i.U < level && !culled })
   private val isEmpty  = !counts.asUInt.orR
   private val drops    = PriorityEncoder(counts)
 
-  // Push the children but the nearest, far first
+  // Push all children but the nearest, the farthest first
   private val pushed = (1 until arity).reverse.foldLeft(Pushed(entries, level, 0.U)) { case (before, i) =>
     val isPushed = found.count > i.U
     val isFull   = before.level === stackDepth.U
@@ -110,28 +111,28 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
     "an overflow for each entry that does not fit, and for no other"
   )
 
-  // The answer
+  // The step
   private val isDone   = RegEnable(pops && isEmpty, isFound || pops)
   private val isPopped = RegEnable(pops, isFound || pops)
   private val mark     = RegEnable(Mux(pops, entries(drops).mark, found.marks(0)), isFound || pops)
-  private val answers  = visit.fire && visit.bits.context === context
+  private val answers  = step.fire && step.bits.context === context
   when(answers) {
-    assert(visit.bits.isDone === isDone, "done when nothing within the limit is left")
-    assert(isDone || visit.bits.visit.isLeaf === !isPopped, "the nearest child, or else an entry")
-    assert(isDone || visit.bits.visit.address === Fill(visit.bits.visit.address.getWidth, mark), "the right entry")
+    assert(step.bits.isDone === isDone, "done when no entry within tMax is left")
+    assert(isDone || step.bits.target.isLeaf === !isPopped, "the nearest child, or else an entry")
+    assert(isDone || step.bits.target.address === Fill(step.bits.target.address.getWidth, mark), "the right entry")
   }
 
-  // While visits are taken, neither an operation nor its answer waits for long, and offers take turns
+  // While steps are accepted, operations and steps have a bounded latency, and the arbiter is fair
   private val unanswered = RegInit(0.U(4.W))
   private val refused    = RegInit(0.U(4.W))
   unanswered := Mux(underWay(context) && !answers, unanswered + ready, 0.U)
   refused    := Mux(accepts || !(finds || resumes), 0.U, refused + ready)
-  assert(unanswered <= (stackDepth + 2).U, "a visit soon after each operation")
+  assert(unanswered <= (stackDepth + 2).U, "a step soon after each operation")
   assert(refused <= (stackDepth + 2).U, "operations are accepted")
   for ((one, other) <- Seq(dut.io.results -> dut.io.resume, dut.io.resume -> dut.io.results)) {
     val isPassedOver = RegInit(false.B)
     isPassedOver := one.valid && !one.ready && (isPassedOver || other.fire)
-    assert(!(isPassedOver && one.valid && other.fire), "operations take turns")
+    assert(!(isPassedOver && one.valid && other.fire), "the arbiter is fair")
   }
 
   // What has to happen for this to say something; with two children an overflow takes too many cycles
@@ -141,7 +142,7 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   when(isFound && !pops && pushed.lost =/= 0.U) { wasFull := true.B }
   cover(answers && isPopped && !isDone && culled > 1.U, "an entry below two that are culled")
   cover(answers && isPopped && isDone && ended, "all entries are culled")
-  cover(underWay.reduce(_ && _) && visit.valid && RegNext(visit.valid && !ready, false.B), "both contexts wait")
+  cover(underWay.reduce(_ && _) && step.valid && RegNext(step.valid && !ready, false.B), "both contexts wait")
   if (arity > 2) cover(answers && isPopped && !isDone && wasFull, "an entry after an overflow")
 }
 
@@ -157,8 +158,8 @@ private final class ProofEntry extends Bundle {
   val mark  = Bool()
   val isFar = Bool()
 
-  /** Near is 0 or the largest; bit 1 of the limit is its sign, bit 0 all its others. */
-  def isBeyond(limit: UInt): Bool = limit(1) || (isFar && !limit(0))
+  /** The entry distance is 0 or the maximum; bit 1 of tMax is its sign, bit 0 stands for all others. */
+  def isBeyond(tMax: UInt): Bool = tMax(1) || (isFar && !tMax(0))
 }
 
 private object ProofEntry {

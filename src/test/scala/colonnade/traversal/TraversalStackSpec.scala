@@ -30,7 +30,7 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
     }
 
   for ((arity, cycles) <- Seq((2, 11), (4, 10)))
-    it should s"lose, double and mix up no entry, and cull only those beyond the limit, arity $arity" in {
+    it should s"neither lose, duplicate nor reorder entries, and cull only those beyond tMax, arity $arity" in {
       val shape = config(arity, stackDepth = 4, contexts = 2)
       prove(cycles) {
         new TraversalStackProof(
@@ -42,7 +42,7 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
       }
     }
 
-  it should "pop an entry a cycle while it drops those beyond the limit" in {
+  it should "pop one entry per cycle while it culls those beyond tMax" in {
     val shape = config(arity = 4, stackDepth = 16, contexts = 2)
     test(new TraversalStack(shape)) { dut =>
       val driver = new StackDriver(dut, shape, seed = 1)
@@ -55,7 +55,7 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
     }
   }
 
-  it should "push in one cycle a sibling, and send the nearest child on in the next" in {
+  it should "push one child per cycle, and give the nearest child in the next cycle" in {
     val shape = config(arity = 4, stackDepth = 16, contexts = 2)
     test(new TraversalStack(shape)) { dut =>
       val driver = new StackDriver(dut, shape, seed = 1)
@@ -76,13 +76,13 @@ private final case class Found(context: Int, children: Seq[Child]) extends Stack
 
 private final case class Resumed(context: Int) extends StackOperation
 
-/** Plays the render unit: each context has one operation under way or none. */
+/** Drives the stack like the render unit: each context has at most one operation in flight. */
 private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: Int) {
   private val contexts  = config.array.contexts
   private val arity     = config.geometry.arity
   private val random    = new Random(seed)
   private val reference = new StackReference(contexts, config.columnBvhMemory.stackDepth)
-  private val limits    = Array.fill(contexts)(BigInt(1000))
+  private val tMaxUnits = Array.fill(contexts)(BigInt(1000))
   private val expected  = Array.fill(contexts)(Option.empty[Option[Child]])
 
   private val foundQueue   = mutable.Queue.empty[Found]
@@ -106,12 +106,12 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
     dut.io.start.valid.poke(false.B)
   }
 
-  def setLimit(context: Int, limit: BigInt): Unit = {
-    limits(context) = limit
-    dut.io.limits(context).raw.asInstanceOf[SInt].poke(limit.S)
+  def setLimit(context: Int, tMax: BigInt): Unit = {
+    tMaxUnits(context) = tMax
+    dut.io.tMaxUnits(context).raw.asInstanceOf[SInt].poke(tMax.S)
   }
 
-  /** @return cycles until the visit came */
+  /** @return cycles until the step */
   def send(context: Int, children: Seq[Child]): Int = {
     offer(Found(context, children))
     await()
@@ -125,14 +125,14 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
   private def await(): Int = {
     var cycles = 0
     while (expected.exists(_.nonEmpty)) {
-      assert(cycles < 100, "no visit came")
+      assert(cycles < 100, "no step came")
       step(accepted = 1)
       cycles += 1
     }
     cycles - 1
   }
 
-  /** Random operations on random contexts, then checks the measurements. */
+  /** Sends random operations on random contexts, then checks the statistics. */
   def run(operations: Int, accepted: Double): Unit = {
     var done = 0
     while (done < operations) {
@@ -141,14 +141,14 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
         if (random.nextInt(25) == 0) start(context)
         setLimit(context, if (random.nextInt(4) == 0) BigInt(random.nextInt(12)) else 1000)
         val children = Seq.fill((random.nextInt(arity + 3) - 1).max(0).min(arity))(child())
-        offer(if (random.nextInt(3) == 0) Resumed(context) else Found(context, children.sortBy(_.near)))
+        offer(if (random.nextInt(3) == 0) Resumed(context) else Found(context, children.sortBy(_.tNear)))
         done += 1
       }
       step(accepted)
     }
     while (expected.exists(_.nonEmpty)) step(accepted)
     for (_ <- 0 until 5) {
-      dut.io.visits.valid.expect(false.B)
+      dut.io.steps.valid.expect(false.B)
       dut.io.busy.expect(false.B)
       step(accepted = 1)
     }
@@ -161,10 +161,10 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
 
   private def offer(operation: StackOperation): Unit = operation match {
     case found: Found =>
-      expected(found.context) = Some(reference.result(found.context, found.children, limits(found.context)))
+      expected(found.context) = Some(reference.result(found.context, found.children, tMaxUnits(found.context)))
       foundQueue += found
     case resumed: Resumed =>
-      expected(resumed.context) = Some(reference.resume(resumed.context, limits(resumed.context)))
+      expected(resumed.context) = Some(reference.resume(resumed.context, tMaxUnits(resumed.context)))
       resumedQueue += resumed
   }
 
@@ -175,19 +175,19 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
       bits.context.poke(found.context.U)
       bits.count.poke(found.children.size.U)
       for ((child, i) <- found.children.zipWithIndex) {
-        bits.children(i).visit.isLeaf.poke(child.isLeaf.B)
-        bits.children(i).visit.address.poke(child.address.U)
-        bits.children(i).near.raw.asInstanceOf[SInt].poke(child.near.S)
+        bits.children(i).target.isLeaf.poke(child.isLeaf.B)
+        bits.children(i).target.address.poke(child.address.U)
+        bits.children(i).tNear.raw.asInstanceOf[SInt].poke(child.tNear.S)
       }
     }
     dut.io.resume.valid.poke(resumedQueue.nonEmpty.B)
     for (resumed <- resumedQueue.headOption) dut.io.resume.bits.poke(resumed.context.U)
     val accepts = random.nextDouble() < accepted
-    dut.io.visits.ready.poke(accepts.B)
+    dut.io.steps.ready.poke(accepts.B)
 
     waited += 1
     assert(waited < 100, "nothing happens")
-    if (accepts && dut.io.visits.valid.peekBoolean()) check()
+    if (accepts && dut.io.steps.valid.peekBoolean()) check()
     if (dut.io.overflow.peekBoolean()) overflows += 1
     if (foundQueue.nonEmpty && dut.io.results.ready.peekBoolean()) foundQueue.dequeue()
     if (resumedQueue.nonEmpty && dut.io.resume.ready.peekBoolean()) resumedQueue.dequeue()
@@ -195,13 +195,13 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
   }
 
   private def check(): Unit = {
-    val visit   = dut.io.visits.bits
-    val context = visit.context.peekInt().toInt
-    val answer  = expected(context).getOrElse(fail(s"context $context has nothing under way"))
-    visit.isDone.expect(answer.isEmpty.B)
+    val step    = dut.io.steps.bits
+    val context = step.context.peekInt().toInt
+    val answer  = expected(context).getOrElse(fail(s"context $context has no operation in flight"))
+    step.isDone.expect(answer.isEmpty.B)
     for (child <- answer) {
-      visit.visit.isLeaf.expect(child.isLeaf.B)
-      visit.visit.address.expect(child.address.U)
+      step.target.isLeaf.expect(child.isLeaf.B)
+      step.target.address.expect(child.address.U)
     }
     expected(context) = None
     waited = 0

@@ -13,13 +13,13 @@ final case class TestCandidate(context: Int, firstTriangle: Int, ray: TestRay, t
 final case class ExpectedResult(candidate: TestCandidate, index: Int, isLast: Boolean, hit: ExpectedHit)
 
 /** Drives a [[TriangleUnit]] and holds it against the model. */
-final class TriangleHarness(config: ColonnadeConfig, questions: TriangleQuestions) extends Matchers {
+final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus) extends Matchers {
   private val perRecord = config.geometry.trianglesPerRecord
 
   private val miss = ExpectedHit(isHit = false, 0, Seq.fill(3)(BigInt(0)), backSide = false)
 
   private def expected(candidates: Seq[TestCandidate]): Seq[ExpectedResult] = {
-    val hits = questions.expected(candidates.flatMap(c => c.triangles.map((c.ray, _)))).iterator
+    val hits = stimulus.expected(candidates.flatMap(c => c.triangles.map((c.ray, _)))).iterator
     candidates.flatMap { c =>
       if (c.triangles.isEmpty) Seq(ExpectedResult(c, 0, isLast = true, miss))
       else c.triangles.indices.map(k => ExpectedResult(c, k, k == c.triangles.size - 1, hits.next()))
@@ -28,14 +28,14 @@ final class TriangleHarness(config: ColonnadeConfig, questions: TriangleQuestion
 
   /** Random candidates, a few of them empty. */
   def random(count: Int): Seq[TestCandidate] = Seq.fill(count) {
-    val (ray, triangles) = questions.meeting(if (questions.chance(20)) 0 else 1 + questions.nextInt(perRecord))
+    val (ray, triangles) = stimulus.meeting(if (stimulus.chance(20)) 0 else 1 + stimulus.nextInt(perRecord))
     candidate(ray, triangles)
   }
 
   def candidate(ray: TestRay, triangles: Seq[TestTriangle]): TestCandidate =
     TestCandidate(
-      questions.nextInt(config.array.contexts),
-      questions.nextInt(config.columnBvhMemory.depth),
+      stimulus.nextInt(config.array.contexts),
+      stimulus.nextInt(config.columnBvhMemory.depth),
       ray,
       triangles
     )
@@ -54,12 +54,12 @@ final class TriangleHarness(config: ColonnadeConfig, questions: TriangleQuestion
     unit.clock.setTimeout(0)
     while (received < awaited.size) {
       withClue(s"after $received of ${awaited.size} results: ")(cycles should be < limit)
-      if (!isOffered && sent < candidates.size && (bubbles == 0 || !questions.chance(bubbles))) {
+      if (!isOffered && sent < candidates.size && (bubbles == 0 || !stimulus.chance(bubbles))) {
         poke(unit, candidates(sent))
         isOffered = true
       }
       unit.io.candidate.valid.poke(isOffered.B)
-      val accepts = stalls == 0 || questions.chance(stalls)
+      val accepts = stalls == 0 || stimulus.chance(stalls)
       unit.io.result.ready.poke(accepts.B)
       if (accepts && unit.io.result.valid.peekBoolean()) {
         check(unit.io.result.bits, awaited(received))
@@ -103,8 +103,8 @@ final class TriangleHarness(config: ColonnadeConfig, questions: TriangleQuestion
     bits.record.count.poke((if (candidate.triangles.isEmpty) illegal else candidate.triangles.size).U)
     for ((triangle, k) <- candidate.triangles.zipWithIndex; (vertex, j) <- triangle.vertices.zipWithIndex)
       bits.record.vertices(3 * k + j).axes.zip(vertex).foreach { case (port, value) => port.poke(value.U) }
-    ray.heading.axis.poke(candidate.ray.axis.U)
-    ray.heading.negative.zip(candidate.ray.negative).foreach { case (port, value) => port.poke(value.B) }
+    ray.orientation.axis.poke(candidate.ray.axis.U)
+    ray.orientation.negative.zip(candidate.ray.negative).foreach { case (port, value) => port.poke(value.B) }
     ray.origin.zip(candidate.ray.origin).foreach { case (port, value) => poke(port, value) }
     ray.shear.zip(candidate.ray.shear).foreach { case (port, value) => poke(port, value) }
   }

@@ -1,8 +1,8 @@
 package colonnade.traversal
 
 import chiseltest._
-import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -18,7 +18,7 @@ class TriangleUnitSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   for ((config, seed) <- TestConfigs.formats.zipWithIndex)
     it should s"answer as the model does, under bubbles and stalls, at ${name(config)}" in {
       test(new TriangleUnit(config)).withAnnotations(simulation) { unit =>
-        val harness = new TriangleHarness(config, new TriangleQuestions(config, seed))
+        val harness = new TriangleHarness(config, new TriangleStimulus(config, seed))
         val hits    = Seq((0, 0), (3, 0), (0, 4), (3, 12)).map { case (bubbles, stalls) =>
           harness.run(unit, harness.random(if (stalls == 0) 300 else 60), bubbles, stalls)._2
         }
@@ -29,7 +29,7 @@ class TriangleUnitSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   it should "test records of one triangle with two division lanes" in {
     val config = TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(trianglesPerRecord = 1))
     test(new TriangleUnit(config, distanceLanes = 2)).withAnnotations(simulation) { unit =>
-      val harness = new TriangleHarness(config, new TriangleQuestions(config, seed = 10))
+      val harness = new TriangleHarness(config, new TriangleStimulus(config, seed = 10))
       harness.run(unit, harness.random(300), bubbles = 0, stalls = 0)._2 should be > 60
     }
   }
@@ -37,11 +37,11 @@ class TriangleUnitSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   it should "take a triangle every four cycles, and a hit as fast as the lanes divide" in {
     val config = TestConfigs.tiny
     test(new TriangleUnit(config)).withAnnotations(simulation) { unit =>
-      val questions = new TriangleQuestions(config, seed = 11)
-      val harness   = new TriangleHarness(config, questions)
-      val point     = questions.vertex
-      val flat      = TestTriangle(Seq(point, point, questions.vertex))
-      val misses    = Seq.fill(50)(harness.candidate(questions.ray, Seq(flat, flat)))
+      val stimulus = new TriangleStimulus(config, seed = 11)
+      val harness  = new TriangleHarness(config, stimulus)
+      val point    = stimulus.vertex
+      val flat     = TestTriangle(Seq(point, point, stimulus.vertex))
+      val misses   = Seq.fill(50)(harness.candidate(stimulus.ray, Seq(flat, flat)))
       harness.run(unit, misses, bubbles = 0, stalls = 0) should matchPattern {
         case (cycles: Int, 0) if cycles <= 4 * 100 + 16 =>
       }

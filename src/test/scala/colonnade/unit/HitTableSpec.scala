@@ -2,15 +2,15 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
-import colonnade.{Model, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.FixedPorts._
 import colonnade.shading.Occlusion
+import colonnade.{Model, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** The table knows of each ray what a list of all its results says: the least (t, id) below the ray's limit. */
+/** The table equals a list of all results of a ray: the least (t, id) with t < tMax. */
 class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "HitTable"
 
@@ -27,28 +27,28 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
     test(new HitTable(TestConfigs.tiny)) { dut =>
       for (ids <- Seq(Seq(7, 3, 5), Seq(3, 5, 7), Seq(5, 7, 3))) {
         val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-        driver.begin(context = 2, limit = 100, isShadow = false)
+        driver.begin(context = 2, tMax = 100, isShadow = false)
         ids.foreach(id => driver.offer(2, driver.result(t = 40, id)))
         driver.check()
         assert(driver.best(2).get.id == 3)
       }
     }
 
-  it should "not let a shadow ray hit at its very limit, the light" in
+  it should "ignore a shadow ray's hit at tMax, the light" in
     test(new HitTable(TestConfigs.tiny)) { dut =>
       val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-      driver.begin(context = 1, limit = 100, isShadow = true)
+      driver.begin(context = 1, tMax = 100, isShadow = true)
       driver.offer(1, driver.result(t = 100, id = 0))
       dut.io.hasHit(1).expect(false)
       driver.offer(1, driver.result(t = 99, id = 9))
       dut.io.hasHit(1).expect(true)
     }
 
-  it should "let a shadow ray pass what is clear, and remember it" in
+  it should "let a shadow ray pass transmissive triangles, and record them" in
     test(new HitTable(TestConfigs.tiny)) { dut =>
       val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-      driver.begin(context = 1, limit = 100, isShadow = true)
-      driver.offer(1, driver.result(t = 30, id = 0, isClear = true))
+      driver.begin(context = 1, tMax = 100, isShadow = true)
+      driver.offer(1, driver.result(t = 30, id = 0, isTransmissive = true))
       dut.io.hasHit(1).expect(false)
       dut.io.occlusions(1).expect(Occlusion.clear)
       driver.offer(1, driver.result(t = 60, id = 4))
@@ -56,12 +56,12 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.occlusions(1).expect(Occlusion.opaque)
     }
 
-  it should "forget the hit of the ray before" in
+  it should "discard the hit of the previous ray" in
     test(new HitTable(TestConfigs.tiny)) { dut =>
       val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-      driver.begin(context = 0, limit = 100, isShadow = false)
+      driver.begin(context = 0, tMax = 100, isShadow = false)
       driver.offer(0, driver.result(t = 10, id = 1))
-      driver.begin(context = 0, limit = 50, isShadow = false)
+      driver.begin(context = 0, tMax = 50, isShadow = false)
       dut.io.hasHit(0).expect(false)
       driver.offer(0, driver.result(t = 20, id = 4))
       driver.check()
@@ -71,19 +71,19 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
 
 private object HitTableSpec {
   final case class Result(
-      isHit:    Boolean,
-      t:        BigInt,
-      id:       BigInt,
-      weights:  Seq[BigInt],
-      backSide: Boolean,
-      isClear:  Boolean
+      isHit:          Boolean,
+      t:              BigInt,
+      id:             BigInt,
+      weights:        Seq[BigInt],
+      backSide:       Boolean,
+      isTransmissive: Boolean
   )
 
-  final case class Search(limit: BigInt, isShadow: Boolean, results: Vector[Result] = Vector.empty) {
-    private val within = results.filter(result => result.isHit && result.t < limit)
+  final case class Trace(tMax: BigInt, isShadow: Boolean, results: Vector[Result] = Vector.empty) {
+    private val within = results.filter(result => result.isHit && result.t < tMax)
 
-    /** A shadow ray only hits what is opaque. */
-    def hits: Vector[Result] = within.filter(hit => !isShadow || !hit.isClear)
+    /** Only opaque triangles end a shadow ray. */
+    def hits: Vector[Result] = within.filter(hit => !isShadow || !hit.isTransmissive)
 
     def occlusion: Occlusion.Type =
       if (hits.nonEmpty) Occlusion.opaque else if (within.nonEmpty) Occlusion.clear else Occlusion.none
@@ -92,31 +92,31 @@ private object HitTableSpec {
   }
 }
 
-/** Plays ray set-up and the triangle unit, and remembers everything that was ever offered for a ray. */
+/** Drives the ports of ray set-up and of the triangle unit, and keeps all results of each ray. */
 private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) {
   import HitTableSpec._
 
   private val contexts = config.array.contexts
   private val farthest = (BigInt(1) << (config.numbers.gridBits - 1)) - 1
   private val random   = new Random(seed)
-  private val searches = Array.fill(contexts)(Option.empty[Search])
+  private val traces   = Array.fill(contexts)(Option.empty[Trace])
 
-  /** Pairs of a limit in the grid and what the table made of it, to be asked of the model at the end. */
-  private val limits = Seq.newBuilder[(BigInt, BigInt)]
+  /** Pairs of a tMax in grid steps and the table's tMaxUnits; the model checks them at the end. */
+  private val tMaxUnits = Seq.newBuilder[(BigInt, BigInt)]
 
-  dut.io.search.valid.poke(false)
+  dut.io.start.valid.poke(false)
   dut.io.result.valid.poke(false)
-  dut.io.chosen.valid.poke(true)
+  dut.io.grantNext.valid.poke(true)
 
-  def best(context: Int): Option[Result] = searches(context).flatMap(_.best)
+  def best(context: Int): Option[Result] = traces(context).flatMap(_.best)
 
-  def result(t: BigInt, id: BigInt, isHit: Boolean = true, isClear: Boolean = false): Result = {
+  def result(t: BigInt, id: BigInt, isHit: Boolean = true, isTransmissive: Boolean = false): Result = {
     val bits = config.numbers.barycentricBits
-    Result(isHit, t, id, Seq.fill(3)(BigInt(bits, random)), random.nextBoolean(), isClear)
+    Result(isHit, t, id, Seq.fill(3)(BigInt(bits, random)), random.nextBoolean(), isTransmissive)
   }
 
-  def begin(context: Int, limit: BigInt, isShadow: Boolean): Unit = {
-    pokeSearch(context, limit, isShadow)
+  def begin(context: Int, tMax: BigInt, isShadow: Boolean): Unit = {
+    pokeStart(context, tMax, isShadow)
     step()
   }
 
@@ -125,35 +125,35 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     step()
   }
 
-  /** A search and a result in the same cycle are of two contexts. */
+  /** A start and a result in the same cycle belong to different contexts. */
   def run(cycles: Int): Unit = {
-    (0 until contexts).foreach(begin(_, limit(), random.nextBoolean()))
+    (0 until contexts).foreach(begin(_, tMax(), random.nextBoolean()))
     for (_ <- 0 until cycles) {
       val begun = Option.when(random.nextInt(8) == 0)(random.nextInt(contexts))
-      begun.foreach(pokeSearch(_, limit(), random.nextInt(3) == 0))
+      begun.foreach(pokeStart(_, tMax(), random.nextInt(3) == 0))
       val tested = random.nextInt(contexts)
       if (random.nextInt(4) > 0 && !begun.contains(tested))
         pokeResult(tested, result(distance(tested), random.nextInt(8), random.nextInt(5) > 0, random.nextBoolean()))
       step()
       check()
     }
-    val (asked, found) = limits.result().distinct.unzip
+    val (asked, found) = tMaxUnits.result().distinct.unzip
     assert(found == Model.answers(config, asked.map(Seq(_)), "limit").map(_.head))
   }
 
-  /** Looks at every ray; the hit of one of them that is chosen comes a cycle later. */
-  def check(): Unit = for ((search, context) <- searches.zipWithIndex; ray <- search) {
+  /** Checks every ray; the hit of a granted context comes one cycle later. */
+  def check(): Unit = for ((trace, context) <- traces.zipWithIndex; ray <- trace) {
     dut.io.hasHit(context).expect(ray.hits.nonEmpty, s"context $context, $ray")
-    // What lies in a shadow ray's way does not shorten it
-    limits += (if (ray.isShadow) ray.limit else ray.best.fold(ray.limit)(_.t)) -> dut.io.limits(context).peekRaw()
+    // Hits do not shorten a shadow ray
+    tMaxUnits += (if (ray.isShadow) ray.tMax else ray.best.fold(ray.tMax)(_.t)) -> dut.io.tMaxUnits(context).peekRaw()
     if (ray.isShadow) dut.io.occlusions(context).expect(ray.occlusion)
     for (hit <- ray.best if !ray.isShadow) {
-      dut.io.nearest.context.poke(context)
-      assert(dut.io.nearest.t.peekRaw() == hit.t, s"context $context, $ray")
-      assert(dut.io.nearest.id.peekInt() == hit.id, s"context $context, $ray")
-      dut.io.chosen.bits.poke(context)
+      dut.io.closest.context.poke(context)
+      assert(dut.io.closest.t.peekRaw() == hit.t, s"context $context, $ray")
+      assert(dut.io.closest.id.peekInt() == hit.id, s"context $context, $ray")
+      dut.io.grantNext.bits.poke(context)
       dut.clock.step()
-      dut.io.served.poke(context)
+      dut.io.responseContext.poke(context)
       assert(dut.io.hit.t.peekRaw() == hit.t, s"context $context, $ray")
       assert(dut.io.hit.id.peekInt() == hit.id, s"context $context, $ray")
       assert(dut.io.hit.weights.map(_.peekRaw()) == hit.weights)
@@ -161,25 +161,25 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     }
   }
 
-  /** Few values, so that there are ties, also with the limit; now and then the extremes. */
-  private def limit(): BigInt = if (random.nextInt(3) == 0) farthest else random.nextInt(12)
+  /** Few values, so that ties occur, also with tMax; sometimes the extremes. */
+  private def tMax(): BigInt = if (random.nextInt(3) == 0) farthest else random.nextInt(12)
 
   private def distance(context: Int): BigInt = random.nextInt(6) match {
-    case 0 => searches(context).fold(farthest)(_.limit)
+    case 0 => traces(context).fold(farthest)(_.tMax)
     case 1 => BigInt(config.numbers.gridBits - 1, random)
     case _ => random.nextInt(12)
   }
 
-  private def pokeSearch(context: Int, limit: BigInt, isShadow: Boolean): Unit = {
-    dut.io.search.valid.poke(true)
-    dut.io.search.bits.context.poke(context)
-    dut.io.search.bits.limit.pokeRaw(limit)
-    searches(context) = Some(Search(limit, isShadow))
+  private def pokeStart(context: Int, tMax: BigInt, isShadow: Boolean): Unit = {
+    dut.io.start.valid.poke(true)
+    dut.io.start.bits.context.poke(context)
+    dut.io.start.bits.tMax.pokeRaw(tMax)
+    traces(context) = Some(Trace(tMax, isShadow))
   }
 
   private def pokeResult(context: Int, result: Result): Unit = {
-    val search = searches(context).get
-    searches(context) = Some(search.copy(results = search.results :+ result))
+    val trace = traces(context).get
+    traces(context) = Some(trace.copy(results = trace.results :+ result))
     val bits = dut.io.result.bits
     dut.io.result.valid.poke(true)
     bits.context.poke(context)
@@ -188,14 +188,14 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     bits.hit.id.poke(result.id)
     bits.hit.weights.zip(result.weights).foreach { case (port, weight) => port.pokeRaw(weight) }
     bits.hit.backSide.poke(result.backSide)
-    bits.isClear.poke(result.isClear)
-    dut.io.isShadow.poke(search.isShadow)
-    dut.io.hasHitNow.expect(searches(context).get.hits.nonEmpty, s"context $context, ${searches(context).get}")
+    bits.isTransmissive.poke(result.isTransmissive)
+    dut.io.isShadow.poke(trace.isShadow)
+    dut.io.hasHitNow.expect(traces(context).get.hits.nonEmpty, s"context $context, ${traces(context).get}")
   }
 
   private def step(): Unit = {
     dut.clock.step()
-    dut.io.search.valid.poke(false)
+    dut.io.start.valid.poke(false)
     dut.io.result.valid.poke(false)
   }
 }

@@ -10,7 +10,7 @@ import org.scalatest.matchers.should.Matchers
 import scala.collection.mutable
 import scala.util.Random
 
-/** Every wish is served once, with its record, whoever reads it and however the ports stall. */
+/** Every fetch gets one response with its record, whichever row reads it and however the ports stall. */
 class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "RecordFetch"
 
@@ -27,7 +27,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   /** Nodes, triangles and attributes. */
   private val sections = Seq(0 until 8, 8 until 16, 16 until recordCount)
 
-  private def useOf(address: Int): RecordUse.Type = RecordUse.all(sections.indexWhere(_.contains(address)))
+  private def kindOf(address: Int): RecordKind.Type = RecordKind.all(sections.indexWhere(_.contains(address)))
 
   private def contentOf(address: Int): BigInt = BigInt(address) * 1000003 + 7
 
@@ -39,79 +39,79 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     it should s"serve $contexts contexts from $banks banks and $recordBuffers buffers, snooping $snooping" in {
       val config = variant(contexts, banks, snooping, recordBuffers)
       test(new RecordFetch(config)) { dut =>
-        new Column(dut, config, new Random(contexts * 10 + banks)).run(wishes = 200)
+        new Column(dut, config, new Random(contexts * 10 + banks)).run(fetches = 200)
       }
     }
   }
 
-  it should "refuse an address outside the section of its use and ask for every other one" in {
+  it should "report an address outside the section of its kind and request every other one" in {
     val config = variant(contexts = 1, banks = 1, snooping = true)
     test(new RecordFetch(config)) { dut =>
       val column = new Column(dut, config, new Random(1))
       for {
-        (use, section) <- RecordUse.all.zip(sections)
-        address        <- Seq(0, 7, 8, 15, 16, 23, 24, 40)
-        // A face lies behind the base of its section
-        if use != RecordUse.attributes || address >= section.start
-      } withClue(s"$use at $address: ") {
+        (kind, section) <- RecordKind.all.zip(sections)
+        address         <- Seq(0, 7, 8, 15, 16, 23, 24, 40)
+        // The address of a face is never below the base of its section
+        if kind != RecordKind.attributes || address >= section.start
+      } withClue(s"$kind at $address: ") {
         dut.reset.asBool.poke(true)
         dut.clock.step()
         dut.reset.asBool.poke(false)
-        column.wish(0, address, use)
+        column.fetch(0, address, kind)
         dut.clock.step()
-        dut.io.wishes(0).valid.poke(false.B)
-        dut.io.refused.valid.peekBoolean() shouldBe !section.contains(address)
+        dut.io.fetches(0).valid.poke(false.B)
+        dut.io.error.valid.peekBoolean() shouldBe !section.contains(address)
         dut.io.requests.valid.peekBoolean() shouldBe section.contains(address)
         dut.clock.step()
-        dut.io.refused.valid.expect(false.B)
+        dut.io.error.valid.expect(false.B)
       }
     }
   }
 
-  /** The column around one fetch: banks that answer after a while, rows that read what they like, units that stall. */
+  /** The column around one fetch: banks with random latency, rows that read random records, units that stall. */
   private class Column(dut: RecordFetch, config: ColonnadeConfig, random: Random) {
-    private val banks    = config.columnBvhMemory.banks
-    private val contexts = config.array.contexts
-    private val inFlight = Seq.fill(banks)(mutable.Queue.empty[(Int, Int, Int)]) // (due, address, row)
-    private val wanted   = mutable.Map.empty[Int, (Int, RecordUse.Type)]
-    private var now      = 0
-    private var made     = 0
-    private var served   = 0
-    private var takers   = Seq.empty[RecordUse.Type]
-    private var chosen   = Option.empty[Int]
+    private val banks      = config.columnBvhMemory.banks
+    private val contexts   = config.array.contexts
+    private val inFlight   = Seq.fill(banks)(mutable.Queue.empty[(Int, Int, Int)]) // (due, address, row)
+    private val pending    = mutable.Map.empty[Int, (Int, RecordKind.Type)]
+    private var now        = 0
+    private var issued     = 0
+    private var responses  = 0
+    private var readyKinds = Seq.empty[RecordKind.Type]
+    private var granted    = Option.empty[Int]
 
     dut.io.row.poke(row.U)
     dut.io.scene.recordCount.poke(recordCount.U)
     dut.io.scene.triangleBase.poke(sections(1).start.U)
     dut.io.scene.attributeBase.poke(sections(2).start.U)
-    dut.io.wishes.foreach(_.valid.poke(false.B))
+    dut.io.fetches.foreach(_.valid.poke(false.B))
     dut.io.broadcasts.foreach(_.valid.poke(false.B))
 
-    def wish(context: Int, address: Int, use: RecordUse.Type): Unit = {
-      val port = dut.io.wishes(0)
+    def fetch(context: Int, address: Int, kind: RecordKind.Type): Unit = {
+      val port = dut.io.fetches(0)
       port.valid.poke(true.B)
       port.bits.context.poke(context.U)
-      port.bits.use.poke(use)
+      port.bits.kind.poke(kind)
       port.bits.address.poke(address.U)
-      wanted(context) = (address, use)
+      pending(context) = (address, kind)
     }
 
-    def run(wishes: Int): Unit = {
-      while (served < wishes && now < 40 * wishes) {
+    def run(fetches: Int): Unit = {
+      while (responses < fetches && now < 40 * fetches) {
         broadcast()
-        takeRequest()
-        takeServed()
-        val idle = (0 until contexts).filterNot(wanted.contains)
-        dut.io.wishes(0).valid.poke(false.B)
-        if (made < wishes && idle.nonEmpty && random.nextInt(3) > 0) {
+        acceptRequest()
+        checkResponse()
+        val idle = (0 until contexts).filterNot(pending.contains)
+        dut.io.fetches(0).valid.poke(false.B)
+        if (issued < fetches && idle.nonEmpty && random.nextInt(3) > 0) {
           val address = random.nextInt(recordCount)
-          wish(idle(random.nextInt(idle.size)), address, useOf(address))
-          made += 1
+          fetch(idle(random.nextInt(idle.size)), address, kindOf(address))
+          issued += 1
         }
         dut.clock.step()
         now += 1
       }
-      served shouldBe wishes
+      responses shouldBe fetches
     }
 
     private def broadcast(): Unit = for (bank <- 0 until banks) {
@@ -128,37 +128,37 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       }
     }
 
-    private def takeRequest(): Unit = {
-      val takes = random.nextInt(3) > 0
-      dut.io.requests.ready.poke(takes.B)
-      if (takes && dut.io.requests.valid.peekBoolean()) {
+    private def acceptRequest(): Unit = {
+      val accepts = random.nextInt(3) > 0
+      dut.io.requests.ready.poke(accepts.B)
+      if (accepts && dut.io.requests.valid.peekBoolean()) {
         val address = dut.io.requests.bits.address.peekInt().toInt
         inFlight(address % banks).enqueue((now + 1 + random.nextInt(5), address, row))
       }
     }
 
-    /** Who is served was chosen in the cycle before, for a unit that had promised to take it. */
-    private def takeServed(): Unit = {
-      val port = dut.io.served
-      port.valid.expect(chosen.nonEmpty)
-      for (context <- chosen) {
+    /** A response follows its grant by one cycle, and goes to a unit that was ready. */
+    private def checkResponse(): Unit = {
+      val port = dut.io.response
+      port.valid.expect(granted.nonEmpty)
+      for (context <- granted) {
         port.bits.context.expect(context)
-        val use = port.bits.use.peek()
-        takers.map(_.litValue) should contain(use.litValue)
-        withClue(s"context $context: ") { wanted.get(context).map(_._2.litValue) shouldBe Some(use.litValue) }
-        port.bits.address.expect(wanted(context)._1)
-        port.bits.record.peekInt() shouldBe contentOf(wanted(context)._1)
-        wanted -= context
-        served += 1
+        val kind = port.bits.kind.peek()
+        readyKinds.map(_.litValue) should contain(kind.litValue)
+        withClue(s"context $context: ") { pending.get(context).map(_._2.litValue) shouldBe Some(kind.litValue) }
+        port.bits.address.expect(pending(context)._1)
+        port.bits.record.peekInt() shouldBe contentOf(pending(context)._1)
+        pending -= context
+        responses += 1
       }
-      takers = RecordUse.all.zip(dut.io.takesNext).collect { case (use, port) if promises(port) => use }
-      chosen = Option.when(dut.io.chosen.valid.peekBoolean())(dut.io.chosen.bits.peekInt().toInt)
+      readyKinds = RecordKind.all.zip(dut.io.readyNext).collect { case (kind, port) if isReady(port) => kind }
+      granted = Option.when(dut.io.grantNext.valid.peekBoolean())(dut.io.grantNext.bits.peekInt().toInt)
     }
 
-    private def promises(port: Bool): Boolean = {
-      val takes = random.nextInt(3) > 0
-      port.poke(takes)
-      takes
+    private def isReady(port: Bool): Boolean = {
+      val accepts = random.nextInt(3) > 0
+      port.poke(accepts)
+      accepts
     }
   }
 }

@@ -3,11 +3,10 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.{Model, Simulation, TestConfigs}
-import colonnade.background.{AttributePort, PhysicalAttributeMemory, RoomImage, SlowMaps}
 import colonnade.config.{ColonnadeConfig, MapEncoding, UnitsConfig}
+import colonnade.environment.{AttributePort, PhysicalAttributeMemory, RoomImage, SlowMaps}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
-import colonnade.traversal.Packed
+import colonnade.{Model, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.collection.mutable

@@ -1,7 +1,7 @@
 package colonnade.unit
 
-import colonnade.background.{RoomScene, ViewQuestion}
 import colonnade.config.ColonnadeConfig
+import colonnade.environment.{RoomScene, ViewQuestion}
 
 import scala.util.Random
 

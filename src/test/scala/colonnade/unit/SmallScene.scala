@@ -1,8 +1,8 @@
 package colonnade.unit
 
+import colonnade.Packed
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.RecordFormats
-import colonnade.traversal.Packed
 
 import scala.util.Random
 

@@ -2,18 +2,18 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
-import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{NodeRecord, RecordFormats}
 import colonnade.numbers.FixedPorts._
 import colonnade.ray.BoxRay
-import colonnade.traversal.{Packed, SmallTree, StackReference}
+import colonnade.traversal.{SmallTree, StackReference}
+import colonnade.{Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.collection.mutable
 import scala.util.Random
 
-/** Whole trees, walked as the render unit does: each visit is served after a while, leaves may shrink the limit. */
+/** Traverses whole trees like the render unit: records come after a random latency, leaves may reduce tMax. */
 class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "Traversal"
 
@@ -31,7 +31,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
 
-  it should "count an illegal node as empty and say so" in {
+  it should "treat an illegal node as empty and report it" in {
     val shape = config(contexts = 1, arity = 4)
     val most  = (BigInt(1) << RecordFormats.addressBits(shape)) - 1
     val tree  = new SmallTree(shape, rayCount = 1, seed = 4)
@@ -55,8 +55,8 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
       (changed("exponent.y" -> (shape.numbers.mostExponent + 1)), 0, false)
     )
     test(new TraversalHarness(shape)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
-      dut.io.visits.ready.poke(true)
-      dut.io.limits(0).pokeRaw((BigInt(1) << (shape.numbers.boxDistanceBits - 1)) - 1)
+      dut.io.steps.ready.poke(true)
+      dut.io.tMaxUnits(0).pokeRaw((BigInt(1) << (shape.numbers.boxDistanceBits - 1)) - 1)
       for (((fields, address, isLegal), index) <- cases.zipWithIndex) withClue(s"case $index: ") {
         dut.io.start.valid.poke(true)
         dut.io.start.bits.poke(0)
@@ -74,41 +74,41 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.clock.step()
         dut.io.nodes.valid.poke(false)
         dut.io.illegal.expect(false)
-        for (_ <- 0 until 20 if !dut.io.visits.valid.peekBoolean()) dut.clock.step()
-        dut.io.visits.valid.expect(true)
-        dut.io.visits.bits.isDone.expect(!isLegal)
+        for (_ <- 0 until 20 if !dut.io.steps.valid.peekBoolean()) dut.clock.step()
+        dut.io.steps.valid.expect(true)
+        dut.io.steps.bits.isDone.expect(!isLegal)
         dut.clock.step()
       }
     }
   }
 
-  it should "visit every triangles record without a tree" in
+  it should "visit every triangle record without a tree" in
     test(new TraversalHarness(config(contexts = 2, arity = 4, bvh = false))) { dut =>
       dut.io.scene.triangleBase.poke(5)
       dut.io.scene.triangleRecords.poke(4)
-      dut.io.visits.ready.poke(true)
+      dut.io.steps.ready.poke(true)
       for (context <- 0 until 2) {
         dut.io.start.valid.poke(true)
         dut.io.start.bits.poke(context)
         dut.clock.step()
       }
       dut.io.start.valid.poke(false)
-      for (visit <- 1 to 4; context <- 0 until 2) {
+      for (count <- 1 to 4; context <- 0 until 2) {
         dut.io.resume.valid.poke(true)
         dut.io.resume.bits.poke(context)
         dut.clock.step()
         dut.io.resume.valid.poke(false)
-        for (_ <- 0 until 10 if !dut.io.visits.valid.peekBoolean()) dut.clock.step()
-        dut.io.visits.valid.expect(true)
-        dut.io.visits.bits.context.expect(context)
-        dut.io.visits.bits.isDone.expect(visit == 4)
-        if (visit < 4) dut.io.visits.bits.visit.address.expect(5 + visit)
+        for (_ <- 0 until 10 if !dut.io.steps.valid.peekBoolean()) dut.clock.step()
+        dut.io.steps.valid.expect(true)
+        dut.io.steps.bits.context.expect(context)
+        dut.io.steps.bits.isDone.expect(count == 4)
+        if (count < 4) dut.io.steps.bits.target.address.expect(5 + count)
         dut.clock.step()
       }
     }
 }
 
-/** With the ray in one port. */
+/** Packs the ray into one port. */
 private class TraversalHarness(config: ColonnadeConfig) extends Module {
   private val unit = Module(new Traversal(config))
 
@@ -118,10 +118,10 @@ private class TraversalHarness(config: ColonnadeConfig) extends Module {
   unit.io.ray := ray.asTypeOf(new BoxRay(config.numbers))
 }
 
-/** Rays in a random tree; each context has one or none. */
+/** Rays in a random tree; each context has at most one. */
 private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: Int) {
   private final class Walk(val ray: Int) {
-    var limit  = farthest
+    var tMax   = farthest
     var leaves = Vector.empty[Int]
   }
 
@@ -135,14 +135,14 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
   private val rayBits    = tree.rays.map(ray => new Packed(new BoxRay(config.numbers)).pack(tree.fields(ray, "ray.")))
   private val recordBits = tree.nodes.map(node => new Packed(new NodeRecord(config)).pack(tree.fields(node, "node.")))
 
-  /** Where contexts are: a record is read, and is then offered; or the next visit is expected. */
+  /** The state of contexts: a record is read, then offered; or the next step is expected. */
   private val reading  = mutable.Map.empty[Int, StackReference.Child]
   private val nodes    = mutable.Queue.empty[(Int, Int)]
   private val resuming = mutable.Queue.empty[Int]
   private val expected = mutable.Map.empty[Int, Option[StackReference.Child]]
   private var begun    = 0
   private var ended    = 0
-  private var visits   = 0
+  private var steps    = 0
 
   dut.io.clear.poke(true)
   dut.clock.step()
@@ -158,11 +158,11 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
       offer()
       dut.io.illegal.expect(false)
       val accepts = random.nextDouble() < accepted
-      dut.io.visits.ready.poke(accepts)
+      dut.io.steps.ready.poke(accepts)
 
       idle += 1
       assert(idle < 100, "nothing happens")
-      if (accepts && dut.io.visits.valid.peekBoolean()) {
+      if (accepts && dut.io.steps.valid.peekBoolean()) {
         take()
         idle = 0
       }
@@ -172,15 +172,15 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
       for (context <- reading.keys.toSeq.sorted if random.nextInt(3) == 0) finish(context, shrinks)
     }
     dut.io.deepest.expect(reference.deepest)
-    assert(reference.overflows == 0 && visits > 2 * rays, s"only $visits visits of $rays rays")
+    assert(reference.overflows == 0 && steps > 2 * rays, s"only $steps steps of $rays rays")
   }
 
   private def begin(context: Int): Unit = {
     dut.io.start.bits.poke(context)
     reference.start(context)
     walks(context) = new Walk(begun)
-    dut.io.limits(context).pokeRaw(farthest)
-    reading(context) = StackReference.Child(isLeaf = false, address = 0, near = 0)
+    dut.io.tMaxUnits(context).pokeRaw(farthest)
+    reading(context) = StackReference.Child(isLeaf = false, address = 0, tNear = 0)
     begun += 1
   }
 
@@ -196,36 +196,36 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
     resuming.headOption.foreach(dut.io.resume.bits.poke(_))
   }
 
-  /** A context has its record: it goes to the box unit, or a leaf is tested and the ray goes on. */
+  /** The record of a context has arrived: a node goes to the box unit, a leaf is tested and the ray resumes. */
   private def finish(context: Int, shrinks: Boolean): Unit = {
-    val walk  = walks(context)
-    val visit = reading.remove(context).get
-    if (visit.isLeaf) {
-      walk.leaves :+= visit.address.toInt
+    val walk   = walks(context)
+    val target = reading.remove(context).get
+    if (target.isLeaf) {
+      walk.leaves :+= target.address.toInt
       if (shrinks && random.nextBoolean()) {
-        walk.limit = walk.limit.min(visit.near + random.nextInt(1 << (config.numbers.vertexBits - 3)))
-        dut.io.limits(context).pokeRaw(walk.limit)
+        walk.tMax = walk.tMax.min(target.tNear + random.nextInt(1 << (config.numbers.vertexBits - 3)))
+        dut.io.tMaxUnits(context).pokeRaw(walk.tMax)
       }
-      expected(context) = reference.resume(context, walk.limit)
+      expected(context) = reference.resume(context, walk.tMax)
       resuming += context
     } else {
-      val address = visit.address.toInt
-      expected(context) = reference.result(context, tree.children(walk.ray, address, walk.limit), walk.limit)
+      val address = target.address.toInt
+      expected(context) = reference.result(context, tree.children(walk.ray, address, walk.tMax), walk.tMax)
       nodes += ((context, address))
     }
   }
 
   private def take(): Unit = {
-    val next    = dut.io.visits.bits
+    val next    = dut.io.steps.bits
     val context = next.context.peekInt().toInt
-    assert(expected.contains(context), s"context $context has asked for nothing")
+    assert(expected.contains(context), s"context $context has no operation in flight")
     val answer = expected.remove(context).get
     next.isDone.expect(answer.isEmpty)
     for (child <- answer) {
-      next.visit.isLeaf.expect(child.isLeaf)
-      next.visit.address.expect(child.address)
+      next.target.isLeaf.expect(child.isLeaf)
+      next.target.address.expect(child.address)
       reading(context) = child
-      visits += 1
+      steps += 1
     }
     if (answer.isEmpty) {
       end(walks.remove(context).get)
@@ -233,11 +233,11 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
     }
   }
 
-  /** Each leaf was visited once at most; none that lies within the last limit was left out. */
+  /** Each leaf was visited at most once, and all leaves within the final tMax were visited. */
   private def end(walk: Walk): Unit = {
     val visited = walk.leaves.toSet
     assert(visited.size == walk.leaves.size, walk.leaves.toString)
-    assert(tree.leaves(walk.ray, walk.limit).subsetOf(visited))
+    assert(tree.leaves(walk.ray, walk.tMax).subsetOf(visited))
     assert(visited.subsetOf(tree.leaves(walk.ray, farthest)))
   }
 }

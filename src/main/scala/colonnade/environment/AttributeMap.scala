@@ -1,0 +1,28 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Valid
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.Load
+
+/** Ports of [[AttributeMap]]. */
+final class AttributeMapIO[T <: Data](config: ColonnadeConfig, entry: T, tagBits: Int) extends Bundle {
+  val load   = Flipped(Valid(new Load(config)))
+  val pixels = Flipped(new AttributeChannel(new MapPixel(AttributeLayout.of(config)), entry, tagBits))
+}
+
+/** A map that knows an entry (a colour or a normal) for each pixel, in one of the encodings. */
+abstract class AttributeMap[T <: Data](config: ColonnadeConfig, entry: T, tagBits: Int) extends Module {
+  final val io = IO(new AttributeMapIO(config, entry, tagBits))
+}
+
+object AttributeMap {
+
+  /** In the configured encoding.
+    *
+    * @param name of the map in [[colonnade.formats.AttributeMemories]]
+    */
+  def apply[T <: Data](config: ColonnadeConfig, name: String, entry: T, tagBits: Int): AttributeMap[T] =
+    if (AttributeLayout.of(config).isSliding) new SlidingMap(config, name, entry, tagBits)
+    else new TwoLevelMap(config, name, entry, tagBits)
+}

@@ -1,0 +1,41 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Valid
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.{AttributeEvents, Load}
+
+/** Ports of [[ColumnRoom]]. */
+final class ColumnRoomIO(config: ColonnadeConfig) extends Bundle {
+  private val port = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
+
+  /** Only while no question is in flight. */
+  val load = Flipped(Valid(new Load(config)))
+
+  /** One for each render unit. */
+  val ports = Vec(config.array.rows, Flipped(port))
+
+  /** To the maps that all columns share, if they do. */
+  val shared = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
+  val events = Output(new AttributeEvents)
+}
+
+/** A column's way to the maps of a room: its own copy, or a port that leads to the one copy of the device. */
+final class ColumnRoom(config: ColonnadeConfig) extends Module {
+  val io = IO(new ColumnRoomIO(config))
+
+  private val tagBits = AttributePort.tagBits(config)
+
+  io.shared match {
+    case Some(shared) =>
+      val units = Module(new AttributeConcentrator(config, config.array.rows, tagBits))
+      units.io.ports <> io.ports
+      shared <> units.io.served
+      io.events := shared.events
+    case None =>
+      val maps = Module(new PhysicalAttributeMemory(config, config.array.rows, tagBits))
+      maps.io.ports <> io.ports
+      maps.io.load := io.load
+      io.events    := maps.io.events
+  }
+}

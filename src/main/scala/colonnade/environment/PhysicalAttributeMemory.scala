@@ -1,0 +1,42 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Valid
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.{AlbedoEntry, AttributeEvents, Load, NormalEntry}
+
+/** Ports of [[PhysicalAttributeMemory]]. */
+final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Bundle {
+
+  /** Only while no question is in flight. */
+  val load   = Flipped(Valid(new Load(config)))
+  val ports  = Vec(requesters, Flipped(new AttributePort(AttributeLayout.of(config), tagBits)))
+  val events = Output(new AttributeEvents)
+}
+
+/** The room's maps, with a port for each requester: render units, or columns where all share one memory. Each of the
+  * four channels takes one question a cycle, from the requesters in turn. A reset forgets questions, not maps.
+  *
+  * Latency: two cycles more than the map's own.
+  */
+final class PhysicalAttributeMemory(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Module {
+  val io = IO(new PhysicalAttributeMemoryIO(config, requesters, tagBits))
+
+  private val joinedBits = AttributeArbiter.tagBits(requesters, tagBits)
+  private val joined     = Module(new AttributeConcentrator(config, requesters, tagBits))
+  private val albedo     = Module(AttributeMap(config, "albedo", new AlbedoEntry, joinedBits))
+  private val normals    = Module(AttributeMap(config, "normals", new NormalEntry, joinedBits))
+  private val planes     = Module(new PlaneMap(config, joinedBits))
+
+  joined.io.ports <> io.ports
+  albedo.io.pixels <> joined.io.served.albedo
+  normals.io.pixels <> joined.io.served.normals
+  planes.io.cells <> joined.io.served.cells
+  planes.io.planes <> joined.io.served.planes
+
+  albedo.io.load  := io.load
+  normals.io.load := io.load
+  planes.io.load  := io.load
+
+  io.events := joined.io.served.events
+}

@@ -1,0 +1,29 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Valid
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.{Load, ShellEntry}
+
+/** Ports of [[PlaneMap]]. */
+final class PlaneMapIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
+  private val layout = AttributeLayout.of(config)
+
+  val load   = Flipped(Valid(new Load(config)))
+  val cells  = Flipped(new AttributeChannel(new CellQuestion(layout), new CellAnswer(layout), tagBits))
+  val planes = Flipped(new AttributeChannel(new PlaneQuestion(layout), new ShellEntry, tagBits))
+}
+
+/** The room's planes: which ones a tile or a cell lies in, and what they are. The two questions have channels of their
+  * own, so that neither waits for the other.
+  */
+final class PlaneMap(config: ColonnadeConfig, tagBits: Int) extends Module {
+  val io = IO(new PlaneMapIO(config, tagBits))
+
+  private val cells = Module(new CellLookup(config, tagBits))
+  private val table = Module(new PlaneTable(config, tagBits))
+  cells.io.load := io.load
+  table.io.load := io.load
+  io.cells <> cells.io.cells
+  io.planes <> table.io.planes
+}

@@ -1,0 +1,44 @@
+package colonnade.traversal
+
+import chisel3._
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.RecordFormats
+import colonnade.numbers.Fixed
+import colonnade.ray.{RayFormats, TriangleRay}
+
+/** One ray to test against the triangles of one record. */
+final class TriangleCandidate(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val record  = new RecordFormats(config).triangles
+  val ray     = new TriangleRay(config.numbers)
+}
+
+/** The intersection of a ray with a triangle. */
+final class TriangleHit(config: ColonnadeConfig) extends Bundle {
+  private val formats = new RayFormats(config.numbers)
+
+  val t = new Fixed(formats.grid)
+
+  /** Packed triangle id. */
+  val id = UInt(RecordFormats.idBits(config).W)
+
+  /** Barycentric weights of the vertices, up to a common factor. */
+  val weights  = Vec(3, new Fixed(formats.weight))
+  val backSide = Bool()
+}
+
+/** The result of one triangle. Results follow the order of candidates, and of triangles in a record. */
+final class TriangleResult(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+
+  /** The ray intersects the triangle at `hit.t` ≥ 0. */
+  val isHit = Bool()
+  val hit   = new TriangleHit(config)
+
+  /** The material transmits light. */
+  val isTransmissive = Bool()
+
+  /** This is the last triangle of the record. */
+  val isLast = Bool()
+}

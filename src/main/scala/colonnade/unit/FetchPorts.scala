@@ -1,0 +1,63 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+
+/** The kind of a record; each kind has one unit that takes it: box unit, triangle unit, shader. */
+object RecordKind extends ChiselEnum {
+  val node, triangles, attributes = Value
+}
+
+/** A context that needs a record. */
+final class FetchRequest(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val kind    = RecordKind()
+  val address = UInt(RecordFormats.idBits(config).W)
+}
+
+/** A record, and the context that requested it. */
+final class FetchResponse(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val kind    = RecordKind()
+  val address = UInt(RecordFormats.addressBits(config).W)
+  val record  = new RecordFormats(config).record
+}
+
+/** A request whose address lies outside the section of its kind; it gets no record. */
+final class FetchError(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val kind    = RecordKind()
+}
+
+/** Ports of [[RecordFetch]]. */
+final class RecordFetchIO(config: ColonnadeConfig) extends Bundle {
+  private def contextCount = UInt(log2Ceil(config.array.contexts + 1).W)
+
+  /** Invalidates all buffers: the memory may have changed. */
+  val start = Input(Bool())
+  val row   = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
+  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
+
+  /** A context has at most one request outstanding. */
+  val fetches    = Flipped(Vec(3, Valid(new FetchRequest(config))))
+  val requests   = Decoupled(new RecordRequest(config))
+  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+
+  /** By [[RecordKind]]: the unit accepts a record in the next cycle. It must keep to this. */
+  val readyNext = Input(Vec(RecordKind.all.size, Bool()))
+
+  /** The context that gets a response in the next cycle. */
+  val grantNext = Output(Valid(Context(config)))
+  val response  = Output(Valid(new FetchResponse(config)))
+  val error     = Output(Valid(new FetchError(config)))
+
+  /** Contexts that wait for their record, and contexts whose record waits for its unit. */
+  val stalledContexts = Output(contextCount)
+  val readyContexts   = Output(contextCount)
+
+  /** Contexts that get a record which another request has read. */
+  val snoopHits = Output(contextCount)
+}

@@ -1,0 +1,26 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.environment.AttributePort
+import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitEvents, UnitPosition}
+
+/** The ports of a render unit. `registers` are constant while a frame runs; `start` precedes its first pixel. */
+final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
+  val row        = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
+  val registers  = Input(new FrameRegisters(config))
+  val start      = Input(Bool())
+  val positions  = Flipped(Decoupled(new UnitPosition(config)))
+  val requests   = Decoupled(new RecordRequest(config))
+  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+  val pixels     = Decoupled(new Pixel(config))
+
+  /** To the maps of a room. */
+  val maps =
+    if (config.hasRoom) Some(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))) else None
+
+  /** No pixel is in flight. */
+  val isIdle = Output(Bool())
+  val events = Output(new UnitEvents(config))
+}

@@ -1,0 +1,55 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Valid
+import chiseltest._
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{AlbedoEntry, Load, NormalEntry}
+import colonnade.{Simulation, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+private class MapHarness(config: ColonnadeConfig) extends Module {
+  private val albedoMap  = Module(AttributeMap(config, "albedo", new AlbedoEntry, MapHarness.tagBits))
+  private val normalsMap = Module(AttributeMap(config, "normals", new NormalEntry, MapHarness.tagBits))
+
+  val load    = IO(Flipped(Valid(new Load(config))))
+  val albedo  = FlatChannel(albedoMap.io.pixels)
+  val normals = FlatChannel(normalsMap.io.pixels)
+  albedoMap.io.load  := load
+  normalsMap.io.load := load
+}
+
+private object MapHarness {
+  val tagBits: Int = 5
+}
+
+class AttributeMapSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "AttributeMap"
+
+  for ((config, seed) <- TestConfigs.rooms.zipWithIndex) {
+    val size = config.physicalAttributeMemory.get
+    it should s"answer as the model: ${size.width}x${size.height}, tiles of ${size.tileSize}, ${size.encoding.name}" in {
+      val count  = 600
+      val random = new Random(seed)
+      val room   = new RoomDialogue(config, random)
+      test(new MapHarness(config)).withAnnotations(Simulation.verilator) { maps =>
+        room.load(maps.load, maps.clock)
+        for (offered <- Seq(1.0, 0.3)) {
+          def tester(name: String, channel: FlatChannel, exchanges: Seq[Exchange]) =
+            new ChannelTester(name, channel, MapHarness.tagBits, exchanges, offered, random)
+          val testers = Seq(
+            tester("albedo", maps.albedo, room.albedo(count)),
+            tester("normals", maps.normals, room.normals(count))
+          )
+          val cycles = ChannelTester.run(maps.clock, testers)
+          // One cycle a pixel, or two where a tile has four entries; and the first one's latency
+          val most = if (size.layout.isSliding) count else 2 * count
+          if (offered == 1) assert(cycles <= most + 8)
+          testers.foreach(tester => assert(tester.latency == (if (size.layout.isSliding) 5 else 6)))
+        }
+      }
+    }
+  }
+}

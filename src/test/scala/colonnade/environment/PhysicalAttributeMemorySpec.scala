@@ -1,0 +1,74 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Valid
+import chiseltest._
+import colonnade.config.{ColonnadeConfig, MapEncoding}
+import colonnade.formats.{AttributeEvents, Load}
+import colonnade.{Simulation, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+/** The maps of a device of many units, wired as there: a copy in its only column, or one that all columns share. */
+private class RoomHarness(config: ColonnadeConfig) extends Module {
+  val load    = IO(Flipped(Valid(new Load(config))))
+  val columns = Seq.fill(config.array.columns)(Module(new ColumnRoom(config)).io)
+  val events  = IO(Vec(config.array.columns, Output(new AttributeEvents)))
+  columns.foreach(_.load := load)
+  events.zip(columns).foreach { case (port, column) => port := column.events }
+
+  if (config.physicalAttributeMemory.exists(_.shared)) {
+    val tagBits = AttributeArbiter.tagBits(config.array.rows, AttributePort.tagBits(config))
+    val maps    = Module(new PhysicalAttributeMemory(config, config.array.columns, tagBits))
+    maps.io.load := load
+    maps.io.ports.zip(columns).foreach { case (port, column) => column.shared.foreach(port <> _) }
+  }
+
+  /** Of each unit, all that it may ask. */
+  val channels = columns.flatMap(_.ports).map { port =>
+    Seq(FlatChannel(port.albedo), FlatChannel(port.normals), FlatChannel(port.cells), FlatChannel(port.planes))
+  }
+}
+
+class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "PhysicalAttributeMemory"
+
+  private def config(encoding: MapEncoding, rows: Int, columns: Int): ColonnadeConfig = {
+    val room = TestConfigs.withRoom(TestConfigs.room.copy(encoding = encoding, shared = columns > 1))
+    room.copy(array = room.array.copy(rows = rows, columns = columns))
+  }
+
+  for (
+    (encoding, rows, columns) <- Seq(
+      (MapEncoding.TwoLevel, 1, 1),
+      (MapEncoding.TwoLevel, 10, 1),
+      (MapEncoding.Sliding, 3, 1),
+      (MapEncoding.TwoLevel, 4, 3)
+    )
+  ) it should s"give each unit its own answers: $rows rows, $columns columns, ${encoding.name}" in {
+    val count  = 60
+    val random = new Random(rows)
+    val shape  = config(encoding, rows, columns)
+    val room   = new RoomDialogue(shape, random)
+    test(new RoomHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
+      room.load(dut.load, dut.clock)
+      val testers = dut.channels.zipWithIndex.map { case (channels, unit) =>
+        val dialogues = Seq(room.albedo(count), room.normals(count), room.cells(count), room.planes(count))
+        val names     = Seq("albedo", "normals", "cells", "planes")
+        channels.zip(names.zip(dialogues)).map { case (channel, (name, dialogue)) =>
+          // Some ask all the time, others now and then
+          val offered = if (unit % 3 == 0) 1.0 else 0.1
+          new ChannelTester(s"$name of unit $unit", channel, AttributePort.tagBits(shape), dialogue, offered, random)
+        }
+      }
+      var reads            = Seq.fill(4)(0)
+      def addReads(): Unit = for (events <- dut.events) {
+        val now = Seq(events.albedoReads, events.normalReads, events.cellReads, events.planeReads)
+        reads = reads.zip(now).map { case (sum, event) => sum + event.peekInt().toInt }
+      }
+      ChannelTester.run(dut.clock, testers.flatten, () => addReads())
+      assert(reads == Seq.fill(4)(count * rows * columns))
+    }
+  }
+}

@@ -1,0 +1,145 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Valid
+import chiseltest._
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.{Load, RoomView}
+import colonnade.numbers.StreamTester
+import colonnade.{Model, Packed, PackedUnit, Simulation, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+/** A march with the maps that answer it, later than they could if `isSlow`. */
+private class RoomMarchHarness(config: ColonnadeConfig)
+    extends PackedUnit(new MarchRequest(config), new MarchResult(config)) {
+  private val march = Module(new RoomMarch(config))
+  private val maps  = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
+
+  val load   = IO(Flipped(Valid(new Load(config))))
+  val view   = IO(Input(UInt(march.io.view.getWidth.W)))
+  val isSlow = IO(Input(Bool()))
+  val events = IO(Output(new MarchEvents))
+
+  connect(march.io.request, march.io.result)
+  SlowMaps.connect(march.io.maps, maps.io.ports.head, isSlow)
+  maps.io.load  := load
+  march.io.view := view.asTypeOf(march.io.view)
+  events        := march.io.events
+}
+
+class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "RoomMarch"
+
+  private val names = MarchQuestion.answer
+
+  /** Compares with the model; returns its answers. */
+  private def check(
+      unit:   RoomMarchHarness,
+      config: ColonnadeConfig,
+      words:  Map[String, Seq[BigInt]],
+      view:   ViewQuestion,
+      rays:   Seq[MarchQuestion],
+      random: Random,
+      isSlow: Boolean
+  ): Seq[Map[String, BigInt]] = {
+    val (request, result) = (new Packed(new MarchRequest(config)), new Packed(new MarchResult(config)))
+    unit.view.poke(new Packed(new RoomView(config.numbers)).pack(view.fields))
+    unit.isSlow.poke(isSlow)
+    val inputs = rays.map(ray => request.pack(ray.fields))
+    val found  = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
+      (port: UInt, bits: BigInt) => port.poke(bits),
+      (port: UInt) => port.peekInt()
+    )(random, if (isSlow) 0.5 else 0, 20000)
+    val answers = Model.attributes(config, words, rays.map(ray => view.words ++ ray.words), "march")
+    for (((bits, answer), ray) <- found.zip(answers).zip(rays)) {
+      val expected = names.zip(answer).toMap + ("context" -> BigInt(ray.context))
+      assert(result.unpack(bits) == expected, s"of $ray in $view with ${config.precision}")
+    }
+    answers.map(names.zip(_).toMap)
+  }
+
+  private def rooms: Seq[ColonnadeConfig] =
+    TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.room))) ++
+      TestConfigs.rooms.filterNot(_.physicalAttributeMemory.get.layout.isSliding).tail
+
+  for ((config, seed) <- rooms.zipWithIndex) {
+    val size = config.physicalAttributeMemory.get
+    val name =
+      s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a map of ${size.width}x${size.height}"
+
+    it should s"meet what the model meets with $name" in {
+      val random    = new Random(seed)
+      val questions = new MarchQuestions(config, random)
+      test(new RoomMarchHarness(config)).withAnnotations(Simulation.verilator) { unit =>
+        unit.clock.setTimeout(0)
+        val scene = new RoomScene(config, random)
+        RoomImage.load(unit.load, unit.clock, config, scene.words)
+        val met = for (round <- 0 until 4) yield {
+          val middle = if (round == 3) Seq(0.0, 0.0) else scene.middle
+          val camera = new questions.Camera(scene.focal, middle, isTurned = round % 2 == 1)
+          check(
+            unit,
+            config,
+            scene.words,
+            camera.view,
+            Seq.fill(60)(questions.inRoom(camera)) ++ Seq.fill(20)(questions.behindBox(camera)) ++
+              Seq.fill(30)(questions.fromCamera(camera)),
+            random,
+            isSlow = round == 1
+          )
+        }
+        val kinds = met.flatten.map(_("kind").toInt)
+        assert(Seq(RoomKind.nothing, RoomKind.map, RoomKind.shell).forall(kinds.contains), "every end")
+        assert(met.flatten.exists(_("isHidden") == 1) && met.flatten.exists(_("steps") > 5))
+
+        val image = new RoomImage(config, random)
+        RoomImage.load(unit.load, unit.clock, config, image.words)
+        for (round <- 0 until 6) {
+          val camera = new questions.Camera(scene.focal, scene.middle, isTurned = true)
+          check(
+            unit,
+            config,
+            image.words,
+            camera.view,
+            Seq.fill(30)(questions.inRoom(camera)) ++ Seq.fill(20)(questions.fromCamera(camera)),
+            random,
+            isSlow = round == 1
+          )
+          check(
+            unit,
+            config,
+            image.words,
+            questions.anyView(),
+            Seq.fill(20)(questions.anyRay()) ++ Seq.fill(20)(questions.anyPixel()),
+            random,
+            isSlow = round == 1
+          )
+        }
+
+        // Illegal maps and registers, each with legal ones and together
+        val illegal = new RoomImage(config, random, illegal = 0.3)
+        RoomImage.load(unit.load, unit.clock, config, illegal.words)
+        val answers = for (round <- 0 until 12) yield {
+          val camera = new questions.Camera(scene.focal, scene.middle, isTurned = true)
+          check(
+            unit,
+            config,
+            illegal.words,
+            if (round < 4) camera.view else questions.wildView(),
+            Seq.fill(20)(questions.inRoom(camera)) ++ Seq.fill(10)(questions.fromCamera(camera)) ++
+              Seq.fill(20)(questions.anyRay()) ++ Seq.fill(20)(questions.wildPixel()),
+            random,
+            isSlow = round == 1
+          )
+        }
+        val found = answers.flatten.map(_("isIllegal").toInt).toSet
+        // Of the largest heaps, too few pointers lead out
+        val words  = size.layout.mapHeapWords.min(size.layout.planeHeapWords)
+        val isFull = words > (1 << AttributeLayout.pointerBits) - 64
+        assert(found(0) && (isFull || found(1)), "legal and illegal tiles")
+      }
+    }
+  }
+}

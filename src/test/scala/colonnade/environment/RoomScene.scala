@@ -1,0 +1,121 @@
+package colonnade.environment
+
+import colonnade.Packed
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.{AttributeMemories, Plane, PlaneDescriptor, ShellEntry}
+
+import scala.util.Random
+
+/** A room with a box in it, as planes in the tiles of a map: floor, ceiling, three walls, the box's front and top. View
+  * space, metres; tiles are flat or have cells of a quarter or an eighth of their edge, as the planes need and the heap
+  * allows.
+  */
+final class RoomScene(config: ColonnadeConfig, random: Random) {
+  import RoomScene._
+
+  private val layout = AttributeLayout.of(config)
+
+  /** Pixels. */
+  val focal:  Double      = 0.8 * layout.config.width
+  val middle: Seq[Double] = Seq(layout.config.width / 2.0 + 3.2, layout.config.height / 2.0 - 1.7)
+
+  /** Inverse depth at a pixel; nothing where the plane is behind the camera. */
+  private def inverse(plane: Surface, x: Double, y: Double): Double = {
+    val ray = Seq((x - middle(0)) / focal, (y - middle(1)) / focal, 1.0)
+    plane.normal.zip(ray).map { case (n, r) => n * r }.sum / plane.distance
+  }
+
+  private def idAt(x: Int, y: Int): Int = {
+    val depths = surfaces.map(surface => inverse(surface, x + 0.5, y + 0.5))
+    val walls  = (0 until 5).maxBy(depths)
+    val inBox  = boxes.find { id =>
+      val z     = 1 / depths(id)
+      val point = Seq((x + 0.5 - middle(0)) / focal * z, (y + 0.5 - middle(1)) / focal * z, z)
+      z > 0 && point(0).abs < 0.6 && point(1) > 0.39 && point(2) > 1.99 && point(2) < 2.8 && depths(id) > depths(walls)
+    }
+    inBox.getOrElse(walls)
+  }
+
+  private def word(surface: Surface): Map[String, BigInt] = {
+    val (x, y)                              = (layout.config.width / 2.0, layout.config.height / 2.0)
+    val a                                   = (inverse(surface, x + 1, y) - inverse(surface, x, y)) * 1024 * depthUnit
+    val b                                   = (inverse(surface, x, y + 1) - inverse(surface, x, y)) * 1024 * depthUnit
+    val all                                 = Seq("a" -> a, "b" -> b, "c" -> inverse(surface, x, y) * depthUnit)
+    def field(value: Double, exponent: Int) =
+      BigDecimal(value * math.pow(2, 22.0 - exponent)).setScale(0, BigDecimal.RoundingMode.HALF_EVEN).toBigInt
+    val exponent = (0 to 15).find(e => all.forall(c => field(c._2, e).abs < (1 << 19))).get
+    all.map { case (name, value) => name -> field(value, exponent) }.toMap + ("exponent" -> BigInt(exponent))
+  }
+
+  /** By the memory's name; albedo and normals at random. */
+  val words: Map[String, Seq[BigInt]] = {
+    val others      = new RoomImage(config, random).words
+    val heap        = scala.collection.mutable.ArrayBuffer.empty[BigInt]
+    val descriptors = for {
+      row    <- 0 until layout.tileRows
+      column <- 0 until layout.tileColumns
+    } yield {
+      def idsOf(cells: Int) = {
+        val edge = layout.config.tileSize / cells
+        for (y <- 0 until cells; x <- 0 until cells)
+          yield idAt((column * cells + x) * edge + edge / 2, (row * cells + y) * edge + edge / 2)
+      }
+      val isFine = random.nextInt(3) != 0
+      val cells  = idsOf(if (isFine) 8 else 4)
+      val ids    = random.shuffle(cells.distinct).take(4)
+      val count  = if (ids.size == 1 && random.nextInt(6) != 0) 1 else if (ids.size <= 2) 2 else 4
+      val bits   = count / 2
+      val size   = bits + (cells.size * bits + 15) / 16
+      if (count == 1 || heap.size + size > layout.planeHeapWords) descriptor(0, ids.head)
+      else {
+        val named   = ids.padTo(count, ids.last)
+        val pointer = heap.size
+        heap ++= named.grouped(2).map(two => BigInt(two(0) | two(1) << 8))
+        val mask = cells.zipWithIndex.map { case (id, i) => BigInt(named.indexOf(id).max(0)) << (i * bits) }.sum
+        heap ++= Seq.tabulate((cells.size * bits + 15) / 16)(i => (mask >> (16 * i)) & 0xffff)
+        descriptor((if (count == 4) 3 else 1) + (if (isFine) 1 else 0), pointer)
+      }
+    }
+    val table = surfaces.map(surface => new Packed(new Plane).pack(word(surface)))
+    val shell = surfaces.take(5).map(surface =>
+      new Packed(new ShellEntry).pack(
+        word(surface).map { case (name, value) => s"plane.$name" -> value } ++
+          Seq("r", "g", "b").map(channel => s"albedo.$channel" -> BigInt(12, random)) ++
+          Seq("x", "y", "z").map(axis => s"normal.$axis" -> (BigInt(12, random) - 2048))
+      )
+    )
+    val made = Map(
+      "planes.descriptors" -> descriptors,
+      "planes.heap"        -> heap.toSeq,
+      "planes.planes"      -> table,
+      "planes.shell"       -> shell
+    )
+    AttributeMemories(config).map { memory =>
+      memory.name -> made.get(memory.name).fold(others(memory.name))(_.take(memory.depth).padTo(
+        memory.depth,
+        BigInt(0)
+      ))
+    }.toMap
+  }
+
+  private def descriptor(mode: Int, pointer: Int): BigInt =
+    new Packed(new PlaneDescriptor).pack(Map("mode" -> mode, "pointer" -> pointer))
+}
+
+object RoomScene {
+  private final case class Surface(normal: Seq[Double], distance: Double)
+
+  /** Floor, ceiling, left, right and back wall, the box's front and top. */
+  private val surfaces = Seq(
+    Surface(Seq(0, 1, 0), 1.2),
+    Surface(Seq(0, -1, 0), 1.3),
+    Surface(Seq(-1, 0, 0), 2),
+    Surface(Seq(1, 0, 0.1), 2.2),
+    Surface(Seq(0, 0.05, 1), 4),
+    Surface(Seq(0, 0, 1), 2),
+    Surface(Seq(0, 1, 0), 0.4)
+  )
+  private val boxes = Seq(5, 6)
+
+  val depthUnit: Double = 0.9
+}

@@ -1,0 +1,193 @@
+package colonnade.traversal
+
+import colonnade.Model
+import colonnade.config.ColonnadeConfig
+
+import scala.util.Random
+
+/** A ray and a node as integers; the ray's numbers are in its own frame. */
+final case class BoxCase(
+    axis:           Int,
+    negative:       Seq[Boolean],
+    boxOrigin:      Seq[BigInt],
+    reciprocal:     Seq[BigInt],
+    exponent:       Seq[Int],
+    tMax:           BigInt,
+    origin:         Seq[BigInt],
+    shift:          Seq[Int],
+    kinds:          Seq[Int],
+    low:            Seq[Seq[BigInt]],
+    high:           Seq[Seq[BigInt]],
+    firstChild:     BigInt,
+    firstTriangles: BigInt,
+    context:        Int
+) {
+
+  /** The input of the model, in the format of vectors.cpp. */
+  def words: Seq[BigInt] =
+    (BigInt(axis) +: negative.map(sign => BigInt(if (sign) 1 else 0))) ++ boxOrigin ++ reciprocal ++ exponent.map(
+      BigInt(_)
+    ) ++
+      Seq(tMax) ++ origin ++ shift.map(BigInt(_)) ++ Seq(firstChild, firstTriangles) ++
+      kinds.indices.flatMap(slot => BigInt(kinds(slot)) +: (low(slot) ++ high(slot)))
+
+  /** The fields of [[BoxCandidate]] by name. */
+  def fields(tMaxUnits: BigInt): Map[String, BigInt] = {
+    def vector(name: String, values: Seq[BigInt]) = Seq("x", "y", "z").zip(values).map { case (axis, value) =>
+      s"$name.$axis" -> value
+    }
+    def indexed(name: String, values: Seq[BigInt]) = values.zipWithIndex.map { case (value, i) =>
+      s"$name[$i]" -> value
+    }
+    Map("context" -> BigInt(context), "tMax" -> tMaxUnits, "ray.orientation.axis" -> BigInt(axis)) ++
+      indexed("ray.orientation.negative", negative.map(sign => BigInt(if (sign) 1 else 0))) ++ indexed(
+        "ray.origin",
+        boxOrigin
+      ) ++
+      indexed("ray.reciprocal", reciprocal) ++ indexed("ray.exponent", exponent.map(BigInt(_))) ++
+      vector("node.origin", origin) ++ vector("node.exponent", shift.map(BigInt(_))) ++
+      Map("node.firstChild" -> firstChild, "node.firstTriangles" -> firstTriangles) ++ indexed(
+        "node.kinds",
+        kinds.map(BigInt(_))
+      ) ++
+      kinds.indices.flatMap(slot => vector(s"node.low[$slot]", low(slot)) ++ vector(s"node.high[$slot]", high(slot)))
+  }
+}
+
+/** Random and directed cases within the guarantees of the packer and of ray set-up. */
+final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
+  private val numbers  = config.numbers
+  private val random   = new Random(seed)
+  private val cube     = BigInt(1) << numbers.vertexBits
+  private val lowest   = -cube / 2
+  private val highest  = cube * 3 / 2
+  private val farthest = (BigInt(1) << (numbers.gridBits - 1)) - 1
+  private val address  = BigInt(config.columnBvhMemory.depth)
+
+  def apply(count: Int): Seq[BoxCase] = Seq.fill(count)(one())
+
+  /** Pairs of cases whose origins differ by one unit and whose numbers of entered children differ, so that an error of
+    * one unit shows.
+    */
+  def atBoundaries(count: Int): Seq[BoxCase] = {
+    def entered(cases: Seq[BoxCase]): Seq[BigInt] =
+      Model.answers(config, cases.map(_.words), "box").map(_(1))
+    def moved(testCase: BoxCase, axis: Int, to: BigInt) =
+      testCase.copy(boxOrigin = testCase.boxOrigin.updated(axis, to))
+
+    val any    = apply(400 * count).map(testCase => (testCase, random.nextInt(3)))
+    val ends   = Seq(lowest, highest).map(end => any.map { case (testCase, axis) => moved(testCase, axis, end) })
+    val counts = ends.map(entered)
+    val start  = any.indices.filter(i => counts.head(i) != counts.last(i)).take(count)
+    require(start.size == count, s"only ${start.size} of $count boundaries")
+    // Bisect between two ends that differ, all cases at a time
+    val axes  = start.map(any(_)._2)
+    val first = start.map(i => (ends.head(i), ends.last(i)))
+    val pairs = (0 to numbers.vertexBits + 1).foldLeft(first) { (pairs, _) =>
+      val middles = pairs.zip(axes).map { case ((from, to), axis) =>
+        moved(from, axis, (from.boxOrigin(axis) + to.boxOrigin(axis)) >> 1)
+      }
+      val counted = entered(pairs.map(_._1)).zip(entered(middles))
+      pairs.zip(middles).zip(counted).map { case (((from, to), middle), (a, b)) =>
+        if (a == b) (middle, to) else (from, middle)
+      }
+    }
+    pairs.flatMap { case (from, to) => Seq(from, to) }
+  }
+
+  private def below(bound: BigInt): BigInt = BigInt(bound.bitLength + 8, random) % bound
+
+  private def one(): BoxCase = {
+    val shift  = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits + 2))
+    val origin = shift.map(s => below(cube).min(cube - 1) >> (if (random.nextInt(3) == 0) 0 else s.min(3)))
+    val kinds  =
+      Seq.fill(config.geometry.arity)(if (random.nextInt(8) == 0) random.nextInt(4) else 1 + random.nextInt(2))
+    val boxes = kinds.map(_ => Seq.tabulate(3)(a => interval(shift(a))))
+    BoxCase(
+      axis = random.nextInt(3),
+      negative = Seq.fill(3)(random.nextBoolean()),
+      boxOrigin = Seq.tabulate(3)(_ => boxOrigin(origin, shift, boxes.flatten)),
+      reciprocal = Seq.fill(2)(reciprocal()),
+      exponent = Seq.fill(2)(exponent()),
+      tMax = if (random.nextInt(4) == 0) farthest else below(farthest) >> random.nextInt(6),
+      origin = origin,
+      shift = shift,
+      kinds = kinds,
+      low = boxes.map(_.map(_._1)),
+      high = boxes.map(_.map(_._2)),
+      firstChild = below(address - 4),
+      firstTriangles = below(address - 4),
+      context = random.nextInt(config.array.contexts)
+    )
+  }
+
+  /** Low and high plane: any, equal, or across the node. Planes are less than two cubes from the corner. */
+  private def interval(shift: Int): (BigInt, BigInt) = {
+    val most   = ((BigInt(1) << numbers.boxBits) - 1).min((2 * cube - 1) >> shift)
+    val planes = Seq(below(most + 1), below(most + 1)).sorted
+    random.nextInt(6) match {
+      case 0 => (planes(0), planes(0))
+      case 1 => (BigInt(0), most)
+      case _ => (planes(0), planes(1))
+    }
+  }
+
+  /** Any legal origin, an extreme one, one inside the object's cube, or one on a plane. */
+  private def boxOrigin(origin: Seq[BigInt], shift: Seq[Int], planes: Seq[(BigInt, BigInt)]): BigInt = {
+    val axis        = random.nextInt(3)
+    val (low, high) = planes(random.nextInt(planes.size))
+    val onPlane     = origin(axis) + ((if (random.nextBoolean()) low else high) << shift(axis))
+    (random.nextInt(6) match {
+      case 0 => onPlane
+      case 1 => if (random.nextBoolean()) lowest else highest
+      case 2 => lowest + below(2 * cube)
+      case _ => below(cube)
+    }).max(lowest).min(highest)
+  }
+
+  /** Between a half and two, with the digits that set-up computes; 1 for a component that is 0. */
+  private def reciprocal(): BigInt = {
+    val digits = numbers.reciprocalDigits
+    val raw    = random.nextInt(6) match {
+      case 0 => BigInt(1) << digits
+      case 1 => (BigInt(1) << (digits + 1)) - 1
+      case _ => (BigInt(1) << (digits - 1)) + below(BigInt(3) << (digits - 1))
+    }
+    raw << (numbers.reciprocalFraction - digits)
+  }
+
+  private def exponent(): Int = random.nextInt(5) match {
+    case 0 => numbers.reciprocalFraction
+    case 1 => random.nextInt(numbers.reciprocalFraction + 1)
+    case _ => random.nextInt(4)
+  }
+}
+
+object BoxStimulus {
+
+  /** The unit's inputs and expected results, as fields of [[BoxCandidate]] and [[BoxResult]]. */
+  def solved(config: ColonnadeConfig, cases: Seq[BoxCase]): Seq[(Map[String, BigInt], Map[String, BigInt])] = {
+    val tMaxUnits = Model.answers(config, cases.map(testCase => Seq(testCase.tMax)), "limit").map(_.head)
+    val answers   = Model.answers(config, cases.map(_.words), "box")
+    for (((testCase, tMax), answer) <- cases.zip(tMaxUnits).zip(answers)) yield {
+      val count    = answer(1).toInt
+      val children =
+        for (i <- 0 until count; (field, value) <- child(testCase, answer(2 + 2 * i).toInt, answer(3 + 2 * i)))
+          yield s"children[$i].$field" -> value
+      testCase.fields(tMax) ->
+        (children.toMap ++ Map("context" -> BigInt(testCase.context), "tests" -> answer.head, "count" -> answer(1)))
+    }
+  }
+
+  /** Children of a kind are consecutive, in slot order. */
+  private def child(testCase: BoxCase, slot: Int, tNear: BigInt): Seq[(String, BigInt)] = {
+    val kind    = testCase.kinds(slot)
+    val isLeaf  = kind == 2
+    val earlier = testCase.kinds.take(slot).count(_ == kind)
+    Seq(
+      "target.isLeaf"  -> BigInt(if (isLeaf) 1 else 0),
+      "target.address" -> ((if (isLeaf) testCase.firstTriangles else testCase.firstChild) + earlier),
+      "tNear"          -> tNear
+    )
+  }
+}
