@@ -41,7 +41,15 @@ lazy val colonnade = (project in file("."))
     Test / javaOptions ++= Seq("-Xmx4g", "-Xss16m"),
     Test / testForkedParallel := true,
     // The simulators are compiled with the flags of the specs, not with those of the user.
-    Test / envVars ++= Seq("MAKEFLAGS", "MFLAGS", "GNUMAKEFLAGS", "CFLAGS", "CXXFLAGS", "CPPFLAGS", "LDFLAGS").map(_ -> "").toMap,
+    Test / envVars ++= Seq(
+      "MAKEFLAGS",
+      "MFLAGS",
+      "GNUMAKEFLAGS",
+      "CFLAGS",
+      "CXXFLAGS",
+      "CPPFLAGS",
+      "LDFLAGS"
+    ).map(_ -> "").toMap,
     Test / testOptions += Tests.Argument(TestFrameworks.ScalaTest, "-oD")
   )
 

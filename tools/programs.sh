@@ -7,7 +7,7 @@ sbt_launcher="$root/.tools/sbt-launch-$sbt_version.jar"
 sbt_launcher_sha256=1750c8fb61c2d2f82da40b2cd9014f4d8a1bd49a361402ea5b1cec061ed66578
 sbt_boot="$root/.cache/sbt-boot-$sbt_version" # sbt itself, as the launcher fetches it
 
-# The oldest versions. Verilator: the oldest that the tests have run with. host/colonnade/toolchain.py has its twin.
+# The oldest versions. Verilator: the oldest that the tests have run with. host/colonnade/design/toolchain.py has its twin.
 minimum_verilator=5.006
 minimum_gxx=10
 minimum_make=4.0

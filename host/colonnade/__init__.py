@@ -1,6 +1,6 @@
 """Host of the Colonnade ray-tracing accelerator: packs scenes, runs the hardware, judges the picture."""
 
-from colonnade.errors import UserError
+from colonnade.common.errors import UserError
 
 __version__ = "0.1.0"
 

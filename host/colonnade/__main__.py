@@ -1,6 +1,6 @@
 """``python -m colonnade``: the same as the ``colonnade`` command."""
 
-from colonnade.cli import main
+from colonnade.cli.main import main
 
 if __name__ == "__main__":
     main()

@@ -18,12 +18,12 @@ public:
     void load(const Records& records) { device_.load(records.data(), records.shape(0), records.shape(1)); }
 
     /// Gives the device a physical-attribute memory.
-    void addRoom(const Values& sizes, const FieldTuples& layouts) { room_ = std::make_unique<AttributeImage>(AttributeSizes(sizes), layoutsOf(layouts)); }
+    void addEnvironment(const Values& sizes, const FieldTuples& layouts) { environment_ = std::make_unique<AttributeImage>(AttributeSizes(sizes), layoutsOf(layouts)); }
 
-    void loadRoom(const std::string& memory, const Records& words) {
-        if (!room_) throw std::invalid_argument("there is no physical-attribute memory");
-        room_->load(memory, words.data(), words.shape(0), words.shape(1));
-        device_.load(*room_);
+    void loadEnvironment(const std::string& memory, const Records& words) {
+        if (!environment_) throw std::invalid_argument("there is no physical-attribute memory");
+        environment_->load(memory, words.data(), words.shape(0), words.shape(1));
+        device_.load(*environment_);
     }
 
     /// Rows [first, last) of the frame; `start` also takes the registers over.
@@ -64,7 +64,7 @@ public:
         std::int64_t* ids;
         auto result = makeArray<std::int64_t>({origins.shape(0)}, ids);
         for (std::size_t i = 0; i < origins.shape(0); ++i) {
-            const Hit hit = device_.trace(setUp(requestOf(origins, directions, i), device_.frame().bounds, numbers_));
+            const Hit hit = device_.trace(prepareRay(requestOf(origins, directions, i), device_.frame().bounds, numbers_));
             ids[i] = hit.found ? static_cast<std::int64_t>(hit.id) : -1;
         }
         return nb::cast(result);
@@ -83,7 +83,7 @@ public:
         result["origin"] = makeArray<std::int64_t>({count, 3}, origin);
         result["shear"] = makeArray<std::int64_t>({count, 2}, shear);
         for (std::size_t i = 0; i < count; ++i) {
-            const Ray ray = setUp(requestOf(origins, directions, i), device_.frame().bounds, numbers_);
+            const Ray ray = prepareRay(requestOf(origins, directions, i), device_.frame().bounds, numbers_);
             Node node{};
             node.kinds[0] = Child::leaf;
             for (std::size_t a = 0; a < 3; ++a) {
@@ -115,7 +115,7 @@ public:
                 {"raysInBox", value(c.raysInBox)},
                 {"nodeReads", value(c.nodeReads)},     {"boxTests", value(c.boxTests)},     {"triangleTests", value(c.triangleTests)},
                 {"hits", value(c.hits)},               {"deepestStack", value(c.deepestStack)}};
-        if (room_) values.merge(Values{{"raysRoom", value(c.raysRoom)}, {"marchSteps", value(c.marchSteps)}, {"albedoReads", value(c.albedoReads)}, {"normalReads", value(c.albedoReads)}});
+        if (environment_) values.merge(Values{{"raysRoom", value(c.raysRoom)}, {"marchSteps", value(c.marchSteps)}, {"albedoReads", value(c.albedoReads)}, {"normalReads", value(c.albedoReads)}});
         return values;
     }
 
@@ -137,7 +137,7 @@ private:
 
     Numbers numbers_;
     Device device_;
-    std::unique_ptr<AttributeImage> room_;
+    std::unique_ptr<AttributeImage> environment_;
 };
 
 } // namespace
@@ -147,8 +147,8 @@ void bind_model(nb::module_& module) {
         .def(nb::init<const Values&, const FieldTuples&, const Values&>(), "numbers"_a, "layouts"_a, "limits"_a,
              "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh), its record layouts: record -> field -> (offset, width, signed), and its registers' limits.")
         .def("load", &Model::load, "records"_a, "Loads the column memory: uint8 [records, bytes].")
-        .def("add_room", &Model::addRoom, "sizes"_a, "layouts"_a, "Gives the device a physical-attribute memory, of the manifest's attributes.")
-        .def("load_room", &Model::loadRoom, "memory"_a, "words"_a, "Fills one of its memories by name: uint8 [words, bytes], low byte first.")
+        .def("add_environment", &Model::addEnvironment, "sizes"_a, "layouts"_a, "Gives the device a physical-attribute memory, of the manifest's attributes.")
+        .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a, "Fills one of its memories by name: uint8 [words, bytes], low byte first.")
         .def("start", &Model::start, "registers"_a, "Takes registers over (name -> value); clears counters and errors.")
         .def("rows", &Model::rows, "first"_a, "last"_a,
              "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light left with the object there (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")

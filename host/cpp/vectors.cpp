@@ -26,7 +26,7 @@
 #include <sstream>
 
 #include "model/frame.hpp"
-#include "room_questions.hpp"
+#include "environment_questions.hpp"
 
 namespace {
 
@@ -53,7 +53,7 @@ void answerSetUp(Question& ask, const Numbers& n) {
     request.limit = isShadow ? static_cast<Wide>(magnitude(request.direction[dominantAxis(request.direction)])) : n.unlimited();
     Bounds bounds{ask.vector(), {}};
     bounds.high = ask.vector();
-    const Ray ray = setUp(request, bounds, n);
+    const Ray ray = prepareRay(request, bounds, n);
     Answer answer;
     answer << ray.enters << ray.axis;
     answer.all(ray.negative).all(ray.origin).all(ray.boxOrigin).all(ray.shear).all(ray.reciprocal).all(ray.exponent);
@@ -129,11 +129,11 @@ void answerShade(Question& ask, const Numbers& n) {
     const Surface surface = askSurface(ask, n);
     const std::int64_t offset = ask.number();
     const bool flat = ask.number() != 0, shadows = ask.number() != 0;
-    const WideVector origin = offSurface(surface.point, surface.facing, offset, n);
+    const WideVector origin = offSurface(surface.point, surface.faceForwardNormal, offset, n);
     answerLights(ask, origin, shadingNormal(surface, flat), shadows, n);
 }
 
-void answerLightRoom(Question& ask, const Numbers& n) {
+void answerLightEnvironment(Question& ask, const Numbers& n) {
     const WideVector point = ask.wideVector();
     const Vector normal = ask.vector();
     const WideVector origin = offSurface(point, normal, ask.number(), n);
@@ -222,7 +222,7 @@ int main() try {
     first >> kind;
     const Numbers numbers(readNumbers(first));
     Scene scene(numbers);
-    Room room;
+    Room environment;
     while (std::getline(std::cin, line)) {
         std::istringstream words(line);
         words >> kind;
@@ -231,18 +231,18 @@ int main() try {
         else if (kind == "box") answerBox(ask, numbers);
         else if (kind == "triangle") answerTriangle(ask, numbers);
         else if (kind == "shade") answerShade(ask, numbers);
-        else if (kind == "lightroom") answerLightRoom(ask, numbers);
+        else if (kind == "lightroom") answerLightEnvironment(ask, numbers);
         else if (kind == "bounce") answerBounce(ask, numbers);
         else if (kind == "layout") scene.readLayout(words);
         else if (kind == "records") scene.readRecords(words);
         else if (kind == "registers") {
-            if (room.maps()) scene.device().load(*room.maps());
+            if (environment.maps()) scene.device().load(*environment.maps());
             scene.device().start(readNumbers(words));
         }
         else if (kind == "pixel") answerPixel(ask, scene.device());
-        else if (kind == "sizes") room.begin(readNumbers(words), scene.layouts());
-        else if (kind == "words") room.load(words);
-        else if (room.knows(kind)) room.answer(kind, ask, numbers).print();
+        else if (kind == "sizes") environment.begin(readNumbers(words), scene.layouts());
+        else if (kind == "words") environment.load(words);
+        else if (environment.knows(kind)) environment.answer(kind, ask, numbers).print();
         else if (kind == "limit") (Answer() << limitUnits(ask.number(), numbers)).print();
         else throw std::invalid_argument("unknown question '" + kind + "'");
     }

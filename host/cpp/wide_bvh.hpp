@@ -118,11 +118,11 @@ private:
 
     /// Child boxes rounded outward to multiples of 2^exponent from the node's low corner.
     void quantise(WideTree& wide, std::uint32_t index, const Box& box, const std::vector<std::int32_t>& children) const {
-        const std::int64_t most = (std::int64_t{1} << boxBits_) - 1;
+        const std::int64_t maximum = (std::int64_t{1} << boxBits_) - 1;
         for (int a = 0; a < 3; ++a) {
             const std::int64_t origin = box.low[a], extent = box.high[a] - origin;
             int exponent = 0;
-            while (((extent + (std::int64_t{1} << exponent) - 1) >> exponent) > most) ++exponent;
+            while (((extent + (std::int64_t{1} << exponent) - 1) >> exponent) > maximum) ++exponent;
             wide.origin[index * 3 + a] = static_cast<std::uint32_t>(origin);
             wide.exponent[index * 3 + a] = static_cast<std::uint8_t>(exponent);
             for (std::size_t slot = 0; slot < children.size(); ++slot) {

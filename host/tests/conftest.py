@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from colonnade.manifest import Manifest
+from colonnade.design.manifest import Manifest
 
 MakeManifest = Callable[..., Manifest]
 

@@ -21,8 +21,8 @@ import pytest
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from colonnade import toolchain
-from colonnade.cli import cli
+from colonnade.cli.main import cli
+from colonnade.design import toolchain
 
 #: Seconds after which a command line counts as hung.
 PATIENCE = 20
@@ -73,12 +73,12 @@ def world(folder: Path) -> None:
     shape = (8, 8)
     np.savez(folder / "h.npz", triangle=np.zeros(shape, np.int64), t=np.ones(shape))
     (folder / "c.json").write_bytes((toolchain.project_root() / "configs" / "tiny.json").read_bytes())
-    room = folder / "room"
-    room.mkdir()
-    (room / "meta.json").write_text(json.dumps(meta()))
+    environment = folder / "room"
+    environment.mkdir()
+    (environment / "meta.json").write_text(json.dumps(meta()))
     for name, colour in (("albedo.png", (128, 128, 128)), ("normal.png", (128, 128, 255))):
-        Image.new("RGB", (64, 48), colour).save(room / name)
-    np.save(room / "depth.npy", np.full((48, 64), 2.0))
+        Image.new("RGB", (64, 48), colour).save(environment / name)
+    np.save(environment / "depth.npy", np.full((48, 64), 2.0))
     with inside(folder):
         packed = CliRunner().invoke(cli, shlex.split(f"{PACK} --output p"))
     assert packed.exit_code == 0, packed.output

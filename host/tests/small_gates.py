@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from colonnade.ppa import liberty
-from colonnade.ppa.cells import Library
-from colonnade.ppa.hierarchy import Hierarchy
-from colonnade.ppa.netlist import Netlist
-from colonnade.ppa.recording import Port, Recording
+from colonnade.ppa.library import liberty
+from colonnade.ppa.library.cells import Library
+from colonnade.ppa.netlist.hierarchy import Hierarchy
+from colonnade.ppa.netlist.mapped import Netlist
+from colonnade.ppa.power.recording import Port, Recording
 
 #: Energies at 2 V: 3 fJ for an output's change (4 and 2, at the supply alone), 1 fJ for a clock pin's; leakage 5 pW.
 LIBERTY = """library (small) {

@@ -1,1 +1,1 @@
-"""What a configuration costs: gates, memories and the slowest paths, unit by unit, with open programs only."""
+"""Power, performance and area of a configuration, with open tools."""

@@ -6,15 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from colonnade.generator import black_boxed_design_for
-from colonnade.ppa import memories, opensta
-from colonnade.ppa.hierarchy import LEVELS, Hierarchy, Level, Memory
-from colonnade.ppa.netlist import Netlist
-from colonnade.ppa.power_report import Operation, measure_power
-from colonnade.ppa.recording import require_recordable
-from colonnade.ppa.synthesis import Technology, count_gates, require_yosys, synthesise, technology
-from colonnade.ppa.timing import Analysis, Path, Timing, gates_by_name
-from colonnade.progress import QUIET, Progress
+from colonnade.common.progress import QUIET, Progress
+from colonnade.design.generator import black_boxed_design_for
+from colonnade.ppa.netlist import memories
+from colonnade.ppa.netlist.hierarchy import LEVELS, Hierarchy, Level, Memory
+from colonnade.ppa.netlist.mapped import Netlist
+from colonnade.ppa.netlist.synthesis import Technology, count_gates, require_yosys, synthesise, technology
+from colonnade.ppa.power.recording import require_recordable
+from colonnade.ppa.power.report import Operation, measure_power
+from colonnade.ppa.timing import opensta
+from colonnade.ppa.timing.static import Analysis, Timing, TimingPath, gates_by_name
 
 #: Called with the level, the name and the report of each unit as soon as it is known.
 Finished = Callable[[str, str, Mapping[str, Any]], None]
@@ -32,7 +33,7 @@ def measure(
     """Synthesise every unit of a configuration and add them up.
 
     Args:
-        config: name of the configuration, see `colonnade.configuration`.
+        config: name of the configuration, see `colonnade.design.config_name`.
         overrides: ``key.path=value`` changes.
         liberties: files or folders; Yosys's own gates without any.
         delay: target for abc in ns.
@@ -114,7 +115,7 @@ def _unit(
         joined = {name: netlists[name] for name in (module, *parts)}
         netlist = Netlist(joined, module, into.library)
         paths = _timing(netlist, into)
-        if paths["register_to_register"] and opensta.is_there():
+        if paths["register_to_register"] and opensta.is_available():
             edges = Analysis.edges(into.library)
             paths["register_to_register"]["opensta_ns"] = opensta.register_to_register(netlist, into.library, *edges)
     return {
@@ -146,7 +147,7 @@ def _timing(netlist: Netlist, into: Technology) -> dict[str, Any]:
 def _paths(timing: Timing, into: Technology) -> dict[str, Any]:
     fo4 = into.library.fo4 if into.library else 1.0
 
-    def path(found: Path | None) -> dict[str, Any] | None:
+    def path(found: TimingPath | None) -> dict[str, Any] | None:
         if found is None:
             return None
         facts = {"ns": found.ns, "fo4": found.ns / fo4, "from": found.begin, "to": found.end}

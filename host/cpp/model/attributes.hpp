@@ -41,7 +41,7 @@ struct MapEntry {
 };
 
 /// A plane beyond the view, with the one colour and normal it has.
-struct ShellEntry {
+struct BoundingPlaneEntry {
     PlaneWord plane;
     Rgb12 albedo;
     Normal12 normal;
@@ -155,7 +155,7 @@ class AttributeImage {
 public:
     /// @param layouts the manifest's `attributes.layouts`
     AttributeImage(const AttributeSizes& sizes, const std::map<std::string, Layout>& layouts)
-        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes), planes_(sizes.planes), shell_(sizes.shellPlanes) {}
+        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes), planes_(sizes.planes), boundingPlanes_(sizes.shellPlanes) {}
 
     /// Fills a memory from address 0, by its name in the manifest, with words of `stride` bytes, low byte first. Words beyond its depth are dropped.
     void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
@@ -169,7 +169,7 @@ public:
         else if (memory == "planes.descriptors") ids_.loadDescriptors(by("planeDescriptor"));
         else if (memory == "planes.heap") ids_.heap().load(words, count, stride);
         else if (memory == "planes.planes") loadPlanes(by("plane"));
-        else if (memory == "planes.shell") loadShell(by("shellEntry"));
+        else if (memory == "planes.shell") loadBoundingPlanes(by("shellEntry"));
         else throw std::invalid_argument("there is no attribute memory '" + memory + "'");
     }
 
@@ -188,17 +188,17 @@ public:
     TileInfo tileAt(int x, int y) const { return ids_.tileAt(x, y); }
     CellPlane cellAt(int x, int y) const { return ids_.planeAt(x, y); }
     const PlaneWord& planeOf(int id) const { return planes_.at(id); }
-    const ShellEntry& shell(int index) const { return shell_.at(index); }
+    const BoundingPlaneEntry& boundingPlane(int index) const { return boundingPlanes_.at(index); }
 
 private:
     void loadPlanes(const AttributeWords& words) {
         for (std::size_t i = 0; i < std::min(words.count(), planes_.size()); ++i) planes_[i] = words.plane(i, "");
     }
-    void loadShell(const AttributeWords& words) {
-        for (std::size_t i = 0; i < std::min(words.count(), shell_.size()); ++i) {
+    void loadBoundingPlanes(const AttributeWords& words) {
+        for (std::size_t i = 0; i < std::min(words.count(), boundingPlanes_.size()); ++i) {
             const auto [r, g, b] = words.three(i, "albedo.", "rgb");
             const auto [x, y, z] = words.three(i, "normal.", "xyz");
-            shell_[i] = {words.plane(i, "plane."), {r, g, b, false}, {x, y, z, false}};
+            boundingPlanes_[i] = {words.plane(i, "plane."), {r, g, b, false}, {x, y, z, false}};
         }
     }
 
@@ -207,7 +207,7 @@ private:
     ComponentMap albedo_, normals_;
     PlaneIds ids_;
     std::vector<PlaneWord> planes_;
-    std::vector<ShellEntry> shell_;
+    std::vector<BoundingPlaneEntry> boundingPlanes_;
 };
 
 } // namespace colonnade

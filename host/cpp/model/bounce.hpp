@@ -30,7 +30,7 @@ inline Mirrored mirrorAbout(const WideVector& about, const Surface& surface, con
     Mirrored result{};
     Vector normal;
     blockNormalise(about, n.shadeBits, normal);
-    const Wide nn = dot(normal, normal), against = -dot(normal, surface.towards);
+    const Wide nn = dot(normal, normal), against = -dot(normal, surface.dir);
     result.isFacing = against > 0;
     result.cosine = std::max<Wide>(0, against);
     result.nn = nn;
@@ -39,7 +39,7 @@ inline Mirrored mirrorAbout(const WideVector& about, const Surface& surface, con
     const int drop = bitLength(nn) - n.shadeBits, keep = n.shadeBits - 4;
     const std::int64_t square = static_cast<std::int64_t>(floorShift(nn, drop)), along = static_cast<std::int64_t>(floorShift(result.cosine, drop));
     for (int a = 0; a < 3; ++a)
-        result.reflection[a] = static_cast<std::int64_t>(floorShift<Wide>(Wide(square) * surface.towards[a] + 2 * Wide(along) * normal[a], keep));
+        result.reflection[a] = static_cast<std::int64_t>(floorShift<Wide>(Wide(square) * surface.dir[a] + 2 * Wide(along) * normal[a], keep));
     result.direction = result.reflection;
     if (material.kind != MaterialKind::glass) return result;
 
@@ -47,7 +47,7 @@ inline Mirrored mirrorAbout(const WideVector& about, const Surface& surface, con
     const std::int64_t eta = material.eta[surface.backSide];
     const std::int64_t etaSquared = (eta * eta) >> n.etaFraction;
     const int small = drop - (n.shadeBits - 1), low = std::max(0, 2 * n.shadeBits + 1 - n.rootBits);
-    const Wide dd = dot(surface.towards, surface.towards) >> (n.shadeBits - 1);
+    const Wide dd = dot(surface.dir, surface.dir) >> (n.shadeBits - 1);
     const Wide whole = floorShift<Wide>(Wide(square) * dd, low), upright = floorShift<Wide>(floorShift<Wide>(Wide(along) * along, -small), low);
     const Wide rest = whole - floorShift<Wide>(std::max<Wide>(0, whole - upright) * etaSquared, n.etaFraction);
     if (rest < 0) return result;
@@ -59,7 +59,7 @@ inline Mirrored mirrorAbout(const WideVector& about, const Surface& surface, con
     const Wide root = floorShift<Wide>(squareRoot(odd ? radicand.mantissa >> 1 : radicand.mantissa), -((exponent + (odd ? 1 : 0)) / 2));
     const Wide scale = floorShift<Wide>(Wide(eta) * square, n.etaFraction), deeper = floorShift<Wide>(Wide(eta) * along, n.etaFraction) - root;
     for (int a = 0; a < 3; ++a)
-        result.direction[a] = static_cast<std::int64_t>(floorShift<Wide>(scale * surface.towards[a] + deeper * normal[a], keep));
+        result.direction[a] = static_cast<std::int64_t>(floorShift<Wide>(scale * surface.dir[a] + deeper * normal[a], keep));
     result.isRefraction = true;
     return result;
 }
@@ -67,22 +67,22 @@ inline Mirrored mirrorAbout(const WideVector& about, const Surface& surface, con
 /// Where a ray goes on from a mirror or from glass. The shading normal is the smooth one unless that turns away from the ray, or would send the
 /// ray to the wrong side of the surface: then the geometric one.
 inline Bounce bounce(const Surface& surface, const Material& material, bool flat, std::int64_t offset, const Numbers& n) {
-    const WideVector geometric = {surface.facing[0], surface.facing[1], surface.facing[2]};
+    const WideVector geometric = {surface.faceForwardNormal[0], surface.faceForwardNormal[1], surface.faceForwardNormal[2]};
     const bool isSmooth = !flat && !isZero(surface.smooth);
     Mirrored mirrored = mirrorAbout(shadingNormal(surface, flat), surface, material, n);
     if (isSmooth) {
-        const Wide side = dot(mirrored.direction, surface.facing);
+        const Wide side = dot(mirrored.direction, surface.faceForwardNormal);
         if (!mirrored.isFacing || (mirrored.isRefraction ? side >= 0 : side <= 0)) mirrored = mirrorAbout(geometric, surface, material, n);
     }
 
     Bounce result{};
     result.isRefraction = mirrored.isRefraction;
     result.reflection = mirrored.reflection;
-    result.ray = {offSurface(surface.point, surface.facing, mirrored.isRefraction ? -offset : offset, n), {}, n.unlimited(), ~std::uint64_t(0)};
+    result.ray = {offSurface(surface.point, surface.faceForwardNormal, mirrored.isRefraction ? -offset : offset, n), {}, n.unlimited(), ~std::uint64_t(0)};
     for (int a = 0; a < 3; ++a) result.ray.direction[a] = mirrored.direction[a];
     if (mirrored.isRefraction && !surface.backSide) {
         const std::int64_t one = std::int64_t(1) << n.lightFraction;
-        const std::int64_t cosine = cosineOf(mirrored.cosine, mirrored.nn, dot(surface.towards, surface.towards), n);
+        const std::int64_t cosine = cosineOf(mirrored.cosine, mirrored.nn, dot(surface.dir, surface.dir), n);
         const std::int64_t away = one - floorShift(cosine, n.cosineFraction - n.lightFraction);
         result.share = material.reflectance + (((one - material.reflectance) * fifthPower(away, n.lightFraction)) >> n.lightFraction);
     }

@@ -2,7 +2,7 @@
 #pragma once
 #include <optional>
 
-#include "background.hpp"
+#include "environment.hpp"
 #include "column_memory.hpp"
 #include "registers.hpp"
 
@@ -29,11 +29,11 @@ struct Pixel {
 };
 
 /// What a shadow ray has met on its way to the light; the later the less light.
-enum class Occlusion { none, clear, opaque };
+enum class Occlusion { none, transmissive, opaque };
 
 /// What a path has gathered so far: the weight of what is still to come, 12 fraction bits a channel; the colour already certain; secondary rays traced.
 struct Path {
-    Colour throughput, gathered;
+    Colour throughput, radiance;
     int bounces;
 };
 
@@ -77,10 +77,10 @@ public:
         if (!frame_.maySeeObject(x, y)) return seen(pixel, x, y, request);
         Path path{{one, one, one}, {0, 0, 0}, 0};
         for (bool isPrimary = true;; isPrimary = false) {
-            const Ray ray = setUp(request, frame_.bounds, numbers_);
+            const Ray ray = prepareRay(request, frame_.bounds, numbers_);
             const Hit hit = trace(ray);
             if (!hit.found && isPrimary) return seen(pixel, x, y, request);
-            if (!hit.found) return finish(pixel, path, met(request));
+            if (!hit.found) return finish(pixel, path, missRadiance(request));
             if (isPrimary) {
                 ++counters.hits;
                 pixel.isObject = true;
@@ -95,7 +95,7 @@ public:
             const Surface surface = surfaceOf(ray, hit, *face, numbers_);
             const Material& material = frame_.lighting.materialOf(*face);
             if (material.kind == MaterialKind::diffuse) return finish(pixel, path, light(surface, material));
-            if (!goOn(surface, material, path, request)) return finish(pixel, path, met(request));
+            if (!continuePath(surface, material, path, request)) return finish(pixel, path, missRadiance(request));
         }
     }
 
@@ -140,7 +140,7 @@ private:
 
     Pixel finish(Pixel pixel, const Path& path, const Colour& colour) const {
         for (int channel = 0; channel < 3; ++channel)
-            pixel.colour[channel] = std::min(white(), path.gathered[channel] + ((path.throughput[channel] * colour[channel]) >> numbers_.lightFraction));
+            pixel.colour[channel] = std::min(white(), path.radiance[channel] + ((path.throughput[channel] * colour[channel]) >> numbers_.lightFraction));
         return pixel;
     }
 
@@ -156,16 +156,16 @@ private:
         Incoming result{lighting.ambient, lighting.ambient};
         for (const Light& source : lighting.lights) {
             const Illumination illumination = illuminate(origin, normal, source, lighting.shadows && shadows, numbers_);
-            Occlusion met = Occlusion::none;
+            Occlusion occluder = Occlusion::none;
             if (illumination.needsShadowRay) {
                 ++counters.raysShadow;
-                met = occlusion(setUp(illumination.shadowRay, frame_.bounds, numbers_));
+                occluder = occlusion(prepareRay(illumination.shadowRay, frame_.bounds, numbers_));
             }
             for (int channel = 0; channel < 3; ++channel) {
                 const std::int64_t direct = illumination.direct[channel];
                 result.all[channel] += direct;
-                if (met == Occlusion::none) result.visible[channel] += direct;
-                if (met == Occlusion::clear) result.visible[channel] += (direct * lighting.clearness) >> numbers_.lightFraction;
+                if (occluder == Occlusion::none) result.visible[channel] += direct;
+                if (occluder == Occlusion::transmissive) result.visible[channel] += (direct * lighting.shadowTransmittance) >> numbers_.lightFraction;
             }
         }
         return result;
@@ -178,49 +178,49 @@ private:
     }
 
     Colour light(const Surface& surface, const Material& material) {
-        const WideVector origin = offSurface(surface.point, surface.facing, frame_.lighting.offset, numbers_);
+        const WideVector origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
         return reflectedBy(material.albedo, incoming(origin, shadingNormal(surface, frame_.lighting.flat), true).visible);
     }
 
     /// The room's light at a point of it; `normal` has 11 fraction bits.
-    Incoming roomLight(const WideVector& point, const Vector& normal, bool shadows) {
+    Incoming environmentLight(const WideVector& point, const Vector& normal, bool shadows) {
         return incoming(offSurface(point, normal, frame_.lighting.offset, numbers_), {normal[0], normal[1], normal[2]}, shadows);
     }
 
-    const RoomPoint& count(const RoomPoint& point) {
+    const EnvironmentPoint& count(const EnvironmentPoint& point) {
         ++counters.raysRoom;
         counters.marchSteps += static_cast<std::uint64_t>(point.steps);
-        counters.albedoReads += point.kind == RoomPoint::Kind::map;
+        counters.albedoReads += point.kind == EnvironmentPoint::Kind::map;
         errors.illegalRecord = errors.illegalRecord || point.isIllegal;
         return point;
     }
 
-    RoomTexel texelOf(const RoomPoint& point) {
-        const RoomTexel texel = background_->texelOf(point, frame_.room);
+    EnvironmentTexel texelOf(const EnvironmentPoint& point) {
+        const EnvironmentTexel texel = background_->texelOf(point, frame_.environment);
         errors.illegalRecord = errors.illegalRecord || texel.isIllegal;
         return texel;
     }
 
     /// The colour of what a ray meets that meets nothing of the object.
-    Colour met(const RayRequest& ray, bool shadows = true) {
-        if (!frame_.hasRoom || !background_) return frame_.lighting.background;
+    Colour missRadiance(const RayRequest& ray, bool shadows = true) {
+        if (!frame_.hasEnvironment || !background_) return frame_.lighting.background;
         Vector direction;
         blockScale(ray.direction, numbers_.shadeBits, direction);
-        const RoomPoint point = count(background_->meet(ray.origin, direction, frame_.room));
-        if (point.kind == RoomPoint::Kind::nothing) return frame_.lighting.background;
-        const RoomTexel texel = texelOf(point);
-        return reflectedBy(texel.albedo, roomLight(background_->reached(ray.origin, direction, point), texel.normal, shadows).visible);
+        const EnvironmentPoint point = count(background_->meet(ray.origin, direction, frame_.environment));
+        if (point.kind == EnvironmentPoint::Kind::nothing) return frame_.lighting.background;
+        const EnvironmentTexel texel = texelOf(point);
+        return reflectedBy(texel.albedo, environmentLight(background_->reached(ray.origin, direction, point), texel.normal, shadows).visible);
     }
 
     /// A pixel that shows the room itself.
     Pixel seen(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray) {
-        if (!frame_.hasRoom || !background_ || (!frame_.maySeeObject(x, y) && !frame_.room.shows(x, y))) return pixel;
+        if (!frame_.hasEnvironment || !background_ || (!frame_.maySeeObject(x, y) && !frame_.environment.shows(x, y))) return pixel;
         Vector direction;
         blockScale(ray.direction, numbers_.shadeBits, direction);
-        const RoomPoint point = count(background_->seen(x, y, direction, frame_.room));
-        if (point.kind == RoomPoint::Kind::nothing) return pixel;
-        const RoomTexel texel = texelOf(point);
-        const Incoming light = roomLight(background_->reached(ray.origin, direction, point), texel.normal, true);
+        const EnvironmentPoint point = count(background_->seen(x, y, direction, frame_.environment));
+        if (point.kind == EnvironmentPoint::Kind::nothing) return pixel;
+        const EnvironmentTexel texel = texelOf(point);
+        const Incoming light = environmentLight(background_->reached(ray.origin, direction, point), texel.normal, true);
         pixel.colour = reflectedBy(texel.albedo, light.visible);
         for (int channel = 0; channel < 3; ++channel) pixel.ratio[channel] = ratioOf(light.visible[channel], light.all[channel]);
         return pixel;
@@ -230,15 +230,15 @@ private:
     std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const { return part == whole ? std::int64_t(1) << numbers_.lightFraction : (part << numbers_.lightFraction) / whole; }
 
     /// Sends the path on from a mirror or glass; false if the next ray meets the background only.
-    bool goOn(const Surface& surface, const Material& material, Path& path, RayRequest& request) {
+    bool continuePath(const Surface& surface, const Material& material, Path& path, RayRequest& request) {
         const Bounce next = bounce(surface, material, frame_.lighting.flat, frame_.lighting.offset, numbers_);
         Colour behind = frame_.lighting.background;
-        if (frame_.hasRoom && next.share != 0) {
+        if (frame_.hasEnvironment && next.share != 0) {
             RayRequest reflection = next.ray;
             // Schlick's part starts on the other side of the surface than the refracted ray
-            reflection.origin = offSurface(surface.point, surface.facing, frame_.lighting.offset, numbers_);
+            reflection.origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
             for (int a = 0; a < 3; ++a) reflection.direction[a] = next.reflection[a];
-            behind = met(reflection, false);
+            behind = missRadiance(reflection, false);
         }
         for (int channel = 0; channel < 3; ++channel) {
             std::int64_t& throughput = path.throughput[channel];
@@ -246,7 +246,7 @@ private:
             const std::int64_t albedo = material.albedo[channel] + (material.albedo[channel] >> (numbers_.colourBits - 1));
             if (!surface.backSide || material.kind == MaterialKind::mirror) throughput = (throughput * albedo) >> numbers_.lightFraction;
             const std::int64_t share = (throughput * next.share) >> numbers_.lightFraction;
-            path.gathered[channel] = std::min(white(), path.gathered[channel] + ((share * behind[channel]) >> numbers_.lightFraction));
+            path.radiance[channel] = std::min(white(), path.radiance[channel] + ((share * behind[channel]) >> numbers_.lightFraction));
             throughput -= share;
         }
         request = next.ray;
@@ -278,7 +278,7 @@ private:
             ++counters.triangleTests;
             Hit hit = search.best;
             if (!testTriangle(search.ray, record.vertices[i], memory_.idOf(record, i), numbers_, hit)) continue;
-            if (search.isShadow) search.occlusion = std::max(search.occlusion, record.isClear[i] && frame_.lighting.hasClear ? Occlusion::clear : Occlusion::opaque);
+            if (search.isShadow) search.occlusion = std::max(search.occlusion, record.isClear[i] && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
             else search.best = hit;
         }
     }

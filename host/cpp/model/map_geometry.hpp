@@ -1,7 +1,7 @@
 // Rays and planes in the map of a room, where both are straight. docs/background.md.
 #pragma once
 #include "attributes.hpp"
-#include "room_view.hpp"
+#include "environment_view.hpp"
 
 namespace colonnade {
 
@@ -22,7 +22,7 @@ protected:
     MapGeometry(const Numbers& numbers, const AttributeSizes& sizes) : f_(numbers.shadeBits), sceneBits_(numbers.sceneBits), sizes_(sizes) {}
 
     /// The largest position, and the largest distance along a ray.
-    std::int64_t most() const { return (std::int64_t(1) << (f_ + 3)) - 1; }
+    std::int64_t maximum() const { return (std::int64_t(1) << (f_ + 3)) - 1; }
 
     /// Modulo 2^128, which only the widest formats exceed.
     static Wide times(const Vector& row, const WideVector& v) {
@@ -32,16 +32,16 @@ protected:
     }
 
     /// Of a ray whose origin is behind the camera only the projections are known.
-    MapRay project(const WideVector& origin, const Vector& direction, const RoomView& view) const {
+    MapRay project(const WideVector& origin, const Vector& direction, const EnvironmentView& view) const {
         MapRay ray{};
-        WideVector from, towards;
+        WideVector from, dir;
         for (int i = 0; i < 3; ++i) {
             const Wide offset = shiftLeft<Wide>(view.offset[i], std::min(view.offsetShift, sceneBits_));
             from[i] = Wide(UnsignedWide(times(view.matrix[i], origin)) + UnsignedWide(offset));
-            towards[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
+            dir[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
         }
         ray.fromShift = blockScale(from, f_, ray.from);
-        ray.towardsShift = blockScale(towards, f_, ray.towards);
+        ray.dirShift = blockScale(dir, f_, ray.dir);
         ray.isInFront = ray.from[2] > 0;
         if (!ray.isInFront) return ray;
 
@@ -52,16 +52,16 @@ protected:
         ray.position[2] = inMap(inverse, depth.exponent - 1 + ray.fromShift - view.exponent);
 
         WideVector way;
-        for (int i = 0; i < 2; ++i) way[i] = shiftLeft<Wide>(ray.towards[i], f_) - Wide(ray.position[i]) * ray.towards[2];
-        way[2] = -Wide(ray.position[2]) * ray.towards[2];
+        for (int i = 0; i < 2; ++i) way[i] = shiftLeft<Wide>(ray.dir[i], f_) - Wide(ray.position[i]) * ray.dir[2];
+        way[2] = -Wide(ray.position[2]) * ray.dir[2];
         ray.directionShift = blockScale(way, f_, ray.direction);
         return ray;
     }
 
     /// A coordinate of the map: what is left without `drop` bits, or the nearest one that there is. Both are below 2^64.
     std::int64_t inMap(Wide value, int drop) const {
-        const Wide nearest = value < 0 ? -most() - 1 : most();
-        return static_cast<std::int64_t>(drop < -32 && value != 0 ? nearest : clamp<Wide>(floorShift<Wide>(value, drop), -most() - 1, most()));
+        const Wide nearest = value < 0 ? -maximum() - 1 : maximum();
+        return static_cast<std::int64_t>(drop < -32 && value != 0 ? nearest : clamp<Wide>(floorShift<Wide>(value, drop), -maximum() - 1, maximum()));
     }
 
     /// 2^(2f - 1) / mantissa, of f bits with the top one set: f + 1 bits.

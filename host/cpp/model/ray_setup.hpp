@@ -63,7 +63,7 @@ inline int dominantAxis(const WideVector& direction) {
     return axis;
 }
 
-inline Ray setUp(const RayRequest& request, const Bounds& bounds, const Numbers& n) {
+inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Numbers& n) {
     Ray ray{};
     ray.limitId = request.limitId;
     ray.axis = dominantAxis(request.direction);
@@ -96,8 +96,8 @@ inline Ray setUp(const RayRequest& request, const Bounds& bounds, const Numbers&
     }
 
     // Where the ray enters the object's box
-    const Wide pad = n.boxPad(), most = (Wide(1) << n.entryBits) - 1;
-    const auto saturate = [&](Wide distance) { return clamp<Wide>(distance, -most, most); };
+    const Wide pad = n.boxPad(), maximum = (Wide(1) << n.entryBits) - 1;
+    const auto saturate = [&](Wide distance) { return clamp<Wide>(distance, -maximum, maximum); };
     const auto slack = [&](Wide distance) { return distance > 0 ? distance >> n.entrySlackShift : Wide(0); };
     const auto low = [&](int a) { return Wide(bounds.low[ray.objectAxis(a)]); };
     const auto high = [&](int a) { return Wide(bounds.high[ray.objectAxis(a)]); };

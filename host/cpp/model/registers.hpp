@@ -1,6 +1,6 @@
 // The frame registers, decoded: what the host writes before a frame.
 #pragma once
-#include "room_view.hpp"
+#include "environment_view.hpp"
 #include "bounce.hpp"
 
 namespace colonnade {
@@ -25,8 +25,8 @@ struct Frame {
     Lighting lighting;
     std::size_t recordCount, triangleBase, triangleRecords, attributeBase;
     std::uint64_t watchdogCycles;
-    bool hasRoom;
-    RoomView room;
+    bool hasEnvironment;
+    EnvironmentView environment;
 
     Frame() = default;
     Frame(const Registers& registers, const Numbers& n) {
@@ -67,8 +67,8 @@ struct Frame {
         lighting.ambient = vector("ambient", "rgb");
         lighting.background = vector("background", "rgb");
         lighting.offset = take("shading.offset");
-        lighting.clearness = takeIfThere("shading.clearness");
-        lighting.hasClear = registers.count("shading.clearness") != 0;
+        lighting.shadowTransmittance = takeIfThere("shading.clearness");
+        lighting.hasTransmittance = registers.count("shading.clearness") != 0;
         lighting.flat = take("shading.flat") != 0;
         lighting.shadows = take("shading.shadows") != 0;
         lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
@@ -83,18 +83,18 @@ struct Frame {
         attributeBase = std::min(recordCount, static_cast<std::size_t>(take("scene.attributeBase")));
         triangleBase = std::min(attributeBase, static_cast<std::size_t>(take("scene.triangleBase")));
         watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
-        hasRoom = takeIfThere("room.isThere") != 0;
-        if (!hasRoom) return;
+        hasEnvironment = takeIfThere("room.isThere") != 0;
+        if (!hasEnvironment) return;
         for (int row = 0; row < 3; ++row) {
-            room.matrix[row] = vector("room.matrix[" + std::to_string(row) + "]");
-            room.rotation[row] = vector("room.rotation[" + std::to_string(row) + "]");
+            environment.matrix[row] = vector("room.matrix[" + std::to_string(row) + "]");
+            environment.rotation[row] = vector("room.rotation[" + std::to_string(row) + "]");
         }
-        room.offset = vector("room.offset");
-        room.offsetShift = static_cast<int>(take("room.offsetShift"));
-        room.exponent = static_cast<int>(take("room.exponent"));
-        room.shellPlanes = static_cast<int>(take("room.shellPlanes"));
-        room.step = {take("room.stepX"), take("room.stepY")};
-        room.window = {take("room.window.x0"), take("room.window.y0"), take("room.window.x1"), take("room.window.y1")};
+        environment.offset = vector("room.offset");
+        environment.offsetShift = static_cast<int>(take("room.offsetShift"));
+        environment.exponent = static_cast<int>(take("room.exponent"));
+        environment.shellPlanes = static_cast<int>(take("room.shellPlanes"));
+        environment.step = {take("room.stepX"), take("room.stepY")};
+        environment.window = {take("room.window.x0"), take("room.window.y0"), take("room.window.x1"), take("room.window.y1")};
     }
 
     /// What the names of a table's entry begin with.

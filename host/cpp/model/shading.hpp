@@ -30,9 +30,9 @@ struct Light {
 struct Lighting {
     std::vector<Light> lights;
     Colour ambient, background;
-    std::int64_t offset, clearness;
+    std::int64_t offset, shadowTransmittance;
     /// Clear triangles let light through; otherwise they are opaque like all others.
-    bool hasClear;
+    bool hasTransmittance;
     bool flat, shadows;
     int bounces;
     std::vector<Material> materials;
@@ -48,9 +48,9 @@ struct Lighting {
 /// ±2^(shadeBits − 1).
 struct Surface {
     WideVector point;
-    Vector facing;
+    Vector faceForwardNormal;
     WideVector smooth;
-    Vector towards;
+    Vector dir;
     bool backSide;
 };
 
@@ -100,8 +100,8 @@ inline Surface surfaceOf(const Ray& ray, const Hit& hit, const Face& face, const
     for (int a = 0; a < 3; ++a) {
         const int axis = ray.objectAxis(a);
         surface.point[axis] = permuted[a];
-        surface.towards[axis] = a < 2 ? floorShift(ray.shear[a], slopeDrop) : ray.negative[2] ? -one : one;
-        surface.facing[axis] = hit.backSide ? -face.geometricNormal[axis] : face.geometricNormal[axis];
+        surface.dir[axis] = a < 2 ? floorShift(ray.shear[a], slopeDrop) : ray.negative[2] ? -one : one;
+        surface.faceForwardNormal[axis] = hit.backSide ? -face.geometricNormal[axis] : face.geometricNormal[axis];
         for (int corner = 0; corner < 3; ++corner) surface.smooth[axis] += Wide(hit.weights[corner]) * face.normals[corner][axis];
         if (hit.backSide) surface.smooth[axis] = -surface.smooth[axis];
     }
@@ -109,9 +109,9 @@ inline Surface surfaceOf(const Ray& ray, const Hit& hit, const Face& face, const
 }
 
 /// A position off the surface, to the side of its facing normal or the other one.
-inline WideVector offSurface(const WideVector& point, const Vector& facing, std::int64_t offset, const Numbers& n) {
+inline WideVector offSurface(const WideVector& point, const Vector& faceForwardNormal, std::int64_t offset, const Numbers& n) {
     WideVector moved;
-    for (int a = 0; a < 3; ++a) moved[a] = point[a] + nearestEven<Wide>(Wide(offset) * facing[a], n.normalFraction);
+    for (int a = 0; a < 3; ++a) moved[a] = point[a] + nearestEven<Wide>(Wide(offset) * faceForwardNormal[a], n.normalFraction);
     return moved;
 }
 
@@ -119,7 +119,7 @@ inline bool isZero(const WideVector& v) { return v[0] == 0 && v[1] == 0 && v[2] 
 
 /// The normal that light and bounces see: smooth unless that is not wanted, or is zero.
 inline WideVector shadingNormal(const Surface& surface, bool flat) {
-    return flat || isZero(surface.smooth) ? WideVector{surface.facing[0], surface.facing[1], surface.facing[2]} : surface.smooth;
+    return flat || isZero(surface.smooth) ? WideVector{surface.faceForwardNormal[0], surface.faceForwardNormal[1], surface.faceForwardNormal[2]} : surface.smooth;
 }
 
 /// What one light gives to a surface at `origin` (off the surface) with a shading normal of any length.
@@ -134,9 +134,9 @@ inline Illumination illuminate(const WideVector& origin, const WideVector& norma
     if (light.reachMantissa != 0 && cosine != 0) {
         const Normalised square = normalise(ll, n.shadeBits), divisor = normalise(square.mantissa, n.mantissaBits);
         const int exponent = n.mantissaBits + light.reachExponent - square.exponent - 2 * drop;
-        const std::int64_t most = std::int64_t(4) << n.lightFraction;
+        const std::int64_t maximum = std::int64_t(4) << n.lightFraction;
         const Wide quotient = divide(static_cast<std::uint64_t>(light.reachMantissa), divisor.mantissa, n.cosineFraction);
-        const std::int64_t falloff = exponent > 3 ? most : static_cast<std::int64_t>(std::min<Wide>(most, floorShift<Wide>(quotient, n.cosineFraction - n.lightFraction - exponent)));
+        const std::int64_t falloff = exponent > 3 ? maximum : static_cast<std::int64_t>(std::min<Wide>(maximum, floorShift<Wide>(quotient, n.cosineFraction - n.lightFraction - exponent)));
         cosine = (cosine * falloff) >> n.lightFraction;
     }
     Illumination result{};

@@ -27,12 +27,12 @@ struct Entered {
 
 /// Tests a node's children; writes those entered, near to far, and returns their number. `tests` counts the children tested.
 inline int testBoxes(const Ray& ray, const Node& node, std::int64_t limit, const Numbers& n, std::array<Entered, 4>& entered, std::uint64_t& tests) {
-    const std::int64_t most = static_cast<std::int64_t>(largest(n.boxDistanceBits)), farthest = limitUnits(limit, n);
+    const std::int64_t maximum = static_cast<std::int64_t>(largest(n.boxDistanceBits)), farthest = limitUnits(limit, n);
     int count = 0;
     for (int slot = 0; slot < n.arity; ++slot) {
         if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
         ++tests;
-        std::int64_t near = 0, far = most;
+        std::int64_t near = 0, far = maximum;
         for (int a = 0; a < 3; ++a) {
             const int axis = ray.objectAxis(a);
             const std::int64_t origin = node.origin[axis] - ray.boxOrigin[a];
@@ -44,8 +44,8 @@ inline int testBoxes(const Ray& ray, const Node& node, std::int64_t limit, const
                 first = (first * ray.reciprocal[a]) >> drop;
                 last = ((last * ray.reciprocal[a]) >> drop) + 1;
             }
-            near = std::max(near, clamp(first, -most - 1, most));
-            far = std::min(far, clamp(last, -most - 1, most));
+            near = std::max(near, clamp(first, -maximum - 1, maximum));
+            far = std::min(far, clamp(last, -maximum - 1, maximum));
         }
         if (near > far || near > farthest) continue;
         int place = count++;

@@ -11,7 +11,7 @@ import scala.util.Try
 class CompilerSpec extends AnyFlatSpec with Matchers {
   behavior of "The C++ compiler"
 
-  private val canary: Path = Paths.get("host/colonnade/harness/canary.cpp")
+  private val canary: Path = Paths.get("host/colonnade/device/harness/canary.cpp")
 
   it should "count right with the flags of the specs' simulators" in {
     assume(Try(Process("g++ --version").!!(ProcessLogger(_ => ()))).isSuccess, "g++ is not installed")

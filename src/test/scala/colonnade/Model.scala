@@ -47,7 +47,7 @@ object Model {
     )
   }
 
-  /** Answers to questions about a room's maps, in the form that room_questions.hpp documents.
+  /** Answers to questions about a room's maps, in the form that environment_questions.hpp documents.
     *
     * @param words of each of the room's memories
     */

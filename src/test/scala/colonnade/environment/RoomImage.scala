@@ -33,7 +33,7 @@ final class RoomImage(config: ColonnadeConfig, random: Random, illegal: Double =
     x <- Seq(0, 1, layout.config.tileSize - 1, layout.config.tileSize, layout.config.width - 1)
   } yield (x, y)
 
-  /** What the model says; see room_questions.hpp. */
+  /** What the model says; see environment_questions.hpp. */
   def ask(kind: String, questions: Seq[Seq[BigInt]]): Seq[Seq[BigInt]] =
     Model.attributes(config, words, questions, kind)
 

@@ -1,0 +1,119 @@
+"""``colonnade bench``: rays per cycle of the benchmark's meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from colonnade.cli.options import (
+    FILE,
+    configuration_options,
+    echo,
+    finish,
+    json_option,
+    measurement_options,
+    require_outputs,
+)
+
+if TYPE_CHECKING:
+    from colonnade.common.text_table import Table
+    from colonnade.evaluation.measure import Conditions
+
+
+@click.command(short_help="Measure rays per cycle of the benchmark's meshes.")
+@configuration_options
+@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Only this mesh. May be repeated.")
+@measurement_options
+@click.option("--mirror/--no-mirror", default=True, help="Render the meshes as mirrors as well; by default yes.")
+@click.option("--plot", type=FILE, metavar="FILE", help="Draw where the cycles go, a PNG.")
+@json_option
+def bench(
+    config: str,
+    overrides: tuple[str, ...],
+    meshes: tuple[str, ...],
+    conditions: Conditions,
+    mirror: bool,
+    plot: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Render each benchmark mesh through the RTL; print rays per cycle and what holds it back. Then, where the hardware
+    has bounces, once more as a mirror whose reflections are traced once.
+
+    In box counts the rays that enter the object's box, over all cycles of the frame. Busiest names the unit or port
+    with the highest utilisation. The bounds are in-box rays per cycle with the same reads and tests: with a perfect
+    memory the busiest unit is the limit, with perfect units the busiest port. Meshes that are not built in are looked
+    for in the folders of COLONNADE_MESHES.
+    """
+    require_outputs(plot, json_file)
+
+    from colonnade.common import progress
+    from colonnade.design.generator import manifest_for
+    from colonnade.evaluation import bench as benchmark
+
+    shown = progress.for_terminal()
+    names = meshes or benchmark.MESHES
+
+    def measured(mirror: bool) -> dict[str, Any]:
+        table = _table()
+        report = benchmark.bench(config, overrides, names, conditions, shown, partial(_show, table), mirror)
+        in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
+        means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])
+        table.print("geometric mean", None, None, *means, None, None, None, "")
+        echo(
+            f"{in_box:.3f} in-box rays per cycle: "
+            f"{report['ratio_to_paper']:.1f} times the paper's {benchmark.PAPER_RAYS_PER_CYCLE}"
+        )
+        return report
+
+    report = measured(mirror=False)
+    if plot is not None:
+        from colonnade.report.stages import plot_stages
+
+        plot_stages(report, plot)
+    report["mirror"] = None
+    if mirror and int(manifest_for(config, overrides, shown).manifest.config["frame"]["maxBounces"]) > 0:
+        echo("\nAs mirrors, one reflection traced:")
+        report["mirror"] = measured(mirror=True)
+    finish(report, json_file)
+
+
+def _table() -> Table:
+    from colonnade.common.text_table import Column, Table
+
+    return Table(
+        (
+            Column("mesh", 14, is_text=True),
+            Column("triangles", 9, ","),
+            Column("cycles", 11, ","),
+            Column("in box", 6, ".3f", group="rays per cycle"),
+            Column("all", 6, ".3f", group="rays per cycle"),
+            Column("memory", 6, ".3f", group="bound, perfect"),
+            Column("units", 6, ".3f", group="bound, perfect"),
+            Column("reads/ray", 9, ".2f"),
+            Column("snooped", 7, ".0%"),
+            Column("busy", 4, ".0%"),
+            Column("busiest", 14, is_text=True),
+        ),
+        echo,
+    )
+
+
+def _show(table: Table, name: str, result: Mapping[str, Any]) -> None:
+    busiest, bounds = result["bottleneck"], result["bounds"]
+    table.print(
+        name,
+        result["triangles"],
+        result["cycles"],
+        result["rays_per_cycle_in_box"],
+        result["rays_per_cycle"],
+        bounds["perfect_memory"],
+        bounds["perfect_units"],
+        result["per_ray"]["record_reads"],
+        result["snoop_share"],
+        result["utilisation"][busiest],
+        busiest,
+    )

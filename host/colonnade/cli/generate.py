@@ -1,0 +1,67 @@
+"""``colonnade generate``: Verilog and manifest of a configuration."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.common.errors import UserError
+
+
+@click.command(short_help="Write the Verilog and the manifest of a configuration.")
+@configuration_options
+@click.option("--output", type=FILE, metavar="DIR", help="Folder to write; an unchanged earlier output is replaced.")
+@click.option("--manifest-only", is_flag=True, help="Write manifest.json only: much quicker.")
+@click.option("--print", "print_manifest", is_flag=True, help="Print the manifest instead of writing it.")
+@click.option("--black-box-memories", is_flag=True, help="Leave the memories out as black boxes, for SRAM macros.")
+@json_option
+def generate(
+    config: str,
+    overrides: tuple[str, ...],
+    output: Path | None,
+    manifest_only: bool,
+    print_manifest: bool,
+    black_box_memories: bool,
+    json_file: Path | None,
+) -> None:
+    """Generate the accelerator: SystemVerilog files, their list filelist.f, and manifest.json.
+
+    The manifest describes the configuration, the layouts of all records, the register map and the streams. DIR also
+    gets .colonnade.sha256, a list of its files: a later run replaces DIR only if it holds these, unchanged, and no
+    others.
+    """
+    if print_manifest == (output is not None):
+        raise click.UsageError("give either --output DIR or --print", click.get_current_context())
+    require_outputs(json_file)
+
+    from colonnade.common import progress
+    from colonnade.design import design_folder, generator
+
+    if output is not None:
+        design_folder.check_replaceable(output)
+        if json_file is not None and design_folder.holds(output, json_file):
+            raise UserError(f"{json_file} is in the folder that --output replaces: name another place for --json")
+
+    shown = progress.for_terminal()
+    if print_manifest or output is None:
+        design = generator.manifest_for(config, overrides, shown)
+        echo((design.dir / "manifest.json").read_text().rstrip("\n"))
+    else:
+        design = generator.generate(config, overrides, output, manifest_only, black_box_memories, shown)
+    files = design_folder.listed(design.dir)
+    manifest = json.loads((design.dir / "manifest.json").read_text())
+    if output is not None:
+        echo(f"{output}: {len(files)} files, configuration {manifest['configHash'][:12]}")
+    finish(
+        {
+            "config": manifest["config"],
+            "config_hash": manifest["configHash"],
+            "format_hash": manifest["formatHash"],
+            "output": None if output is None else str(output),
+            "files": files,
+        },
+        json_file,
+    )

@@ -1,0 +1,111 @@
+"""The ``colonnade`` command: one subcommand a file in `colonnade.commands`."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import click
+
+from colonnade import __version__
+from colonnade.cli.bench import bench
+from colonnade.cli.compare import compare
+from colonnade.cli.fuzz import fuzz
+from colonnade.cli.generate import generate
+from colonnade.cli.inspect import inspect
+from colonnade.cli.pack import pack
+from colonnade.cli.ppa import ppa
+from colonnade.cli.render import render
+from colonnade.cli.study import study
+from colonnade.cli.sweep import sweep
+from colonnade.cli.verify import verify
+from colonnade.common import ledger
+from colonnade.common.errors import UserError, reason_of
+from colonnade.common.processes import guarded
+from colonnade.common.terminal_text import one_line
+
+#: Exit status for wrong input, and for an error of Colonnade's own.
+WRONG_INPUT = 2
+BUG = 1
+#: Set to anything but 0, it shows the traceback of an unexpected error.
+DEBUG = "COLONNADE_DEBUG"
+
+
+class OneLineErrors(click.Group):
+    """A group whose errors are one line on standard error; a traceback is a bug."""
+
+    def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:  # type: ignore[override]
+        """Run a command line and exit: 0 when all is well, 2 for wrong input, 130 when interrupted; 1 for a bug."""
+        extra.pop("standalone_mode", None)
+        try:
+            with ledger.opened():
+                status = super().main(args, prog_name, standalone_mode=False, **extra)
+        except UserError as error:
+            _fail(str(error), WRONG_INPUT)
+        except click.UsageError as error:
+            command = error.ctx.command_path if error.ctx else "colonnade"
+            message = " ".join(error.format_message().split()).rstrip(".")
+            _fail(f"{message}; see {command} --help", WRONG_INPUT)
+        except click.ClickException as error:
+            _fail(error.format_message(), WRONG_INPUT)
+        except (click.Abort, KeyboardInterrupt):
+            _fail("interrupted", 130)
+        except Exception as error:
+            _fail(*_unexpected(error))
+        sys.exit(status if isinstance(status, int) else 0)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The commands in the order of the work, not of the alphabet."""
+        return list(self.commands)
+
+
+def _unexpected(error: Exception) -> tuple[str, int]:
+    """Message and exit status of what no command foresaw: the machine's limits, or a bug."""
+    if os.environ.get(DEBUG, "0") not in ("", "0"):
+        traceback.print_exception(error)
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this: use a smaller input or frame", WRONG_INPUT
+    if isinstance(error, RecursionError):
+        return "the input is nested too deeply", WRONG_INPUT
+    if isinstance(error, OSError):
+        places = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)]
+        return ": ".join([*places, reason_of(error)]), WRONG_INPUT
+    if isinstance(error, UnicodeError):
+        return f"the input is no text in UTF-8: {error}", WRONG_INPUT
+    said = f"{type(error).__name__}: {error}".rstrip(": ")
+    return f"{said} (an error of Colonnade's own; {DEBUG}=1 shows where)", BUG
+
+
+def _fail(message: str, status: int) -> NoReturn:
+    click.echo(f"colonnade: error: {one_line(message)}", err=True)
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        # Nobody takes the output: the interpreter must not try again when it ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(status)
+
+
+@click.group(cls=OneLineErrors, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="colonnade")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """Generate the Colonnade ray-tracing accelerator, render with it, and compare its pictures.
+
+    An output file replaces a regular file or nothing: it is refused where there is a symbolic link, a folder, a pipe,
+    a device or a read-only file, and where it would replace an input or another output of the same command.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+for command in (generate, pack, inspect, render, compare, study, verify, fuzz, bench, sweep, ppa):
+    cli.add_command(command)
+
+
+def main() -> NoReturn:
+    """Entry point of the console script."""
+    guarded(lambda: cli.main(prog_name="colonnade"))

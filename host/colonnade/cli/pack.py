@@ -1,0 +1,58 @@
+"""``colonnade pack``: the scene image that the hardware loads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+
+
+@click.command(short_help="Pack a scene into the image that the hardware loads.")
+@click.argument("scene", type=FILE)
+@configuration_options
+@click.option("--mesh", metavar="MESH", help="A mesh (name or file) in place of the scene's.")
+@click.option("--background", type=FILE, metavar="DIR", help="A background in place of the scene's.")
+@click.option("--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; made if missing.")
+@json_option
+def pack(
+    scene: Path,
+    config: str,
+    overrides: tuple[str, ...],
+    mesh: str | None,
+    background: Path | None,
+    output: Path,
+    json_file: Path | None,
+) -> None:
+    """Pack SCENE, a TOML file, for one configuration, and print what it uses of each memory."""
+    from colonnade.common import progress
+    from colonnade.common.ledger import declare_output
+    from colonnade.design.generator import manifest_for
+    from colonnade.environment.encoded import EncodedEnvironment
+    from colonnade.render.frames import pack_scene
+    from colonnade.scene.parser import load_scene
+    from colonnade.scene_image.file import check_image_file, image_file
+    from colonnade.scene_image.inspect import describe, print_report
+    from colonnade.scene_image.packer import memory_use
+
+    file = image_file(output)
+    check_image_file(file)
+    require_outputs(json_file, folders=[file.parent])
+    declare_output(file)
+    shown = progress.for_terminal()
+    described = load_scene(scene)
+    if mesh is not None:
+        described = described.with_mesh(mesh)
+    if background is not None:
+        described = described.with_environment(background)
+    manifest = manifest_for(config, overrides, shown).manifest
+    folder = described.background.room
+    with shown.step("packing"):
+        environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
+        image = pack_scene(described, manifest, environment)
+    image.save(output)
+
+    echo(f"packed      {file}")
+    print_report(image.header, manifest, echo)
+    finish({"file": str(file), **describe(image), "use": memory_use(image.header, manifest)}, json_file)

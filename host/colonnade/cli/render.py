@@ -1,0 +1,128 @@
+"""``colonnade render``: one frame of a scene, or those of its motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.common.limits import MAX_FRAMES
+
+if TYPE_CHECKING:
+    from colonnade.render.report import FrameReport
+    from colonnade.render.request import Backend
+
+
+@click.command(short_help="Render frames through the hardware, its model, or Embree.")
+@click.argument("scene", type=FILE)
+@configuration_options
+@click.option(
+    "--backend",
+    type=click.Choice(["rtl", "model", "reference"]),
+    default="rtl",
+    show_default=True,
+    help="rtl: the generated hardware in a simulator; model: its bit-exact model; reference: the unquantised scene.",
+)
+@click.option("--size", metavar="WxH", help="Size of the frame in pixels, e.g. 640x480. Default: the scene's.")
+@click.option("--mesh", metavar="MESH", help="A mesh (name or file) in place of the scene's.")
+@click.option("--background", type=FILE, metavar="DIR", help="A background in place of the scene's.")
+@click.option("--relit", is_flag=True, help="Show a room in the scene's lights, not the camera's photo of it.")
+@click.option(
+    "--frames",
+    type=click.IntRange(min=1, max=MAX_FRAMES),
+    metavar="N",
+    help="Render N frames of the scene's [motion]; a full turn of the object without one. Files are numbered.",
+)
+@click.option("--output", type=FILE, metavar="FILE", help="Write the picture, a PNG; with --frames also one .webp.")
+@click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances, an .npz file.")
+@click.option(
+    "--waveform",
+    type=FILE,
+    metavar="FILE",
+    help="Write the signals of the device, its first column and its first render unit, a VCD; for small frames.",
+)
+@json_option
+def render(
+    scene: Path,
+    config: str,
+    overrides: tuple[str, ...],
+    backend: Backend,
+    size: str | None,
+    mesh: str | None,
+    background: Path | None,
+    relit: bool,
+    frames: int | None,
+    output: Path | None,
+    hits_file: Path | None,
+    waveform: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Render one frame of SCENE, a TOML file, and print what it took. With --frames the object or the light moves."""
+    from colonnade.common.frame_size import parse_size
+    from colonnade.render.sequence import numbered, picture_files
+
+    pixels = parse_size(size) if size is not None else None
+    pictures = [output] if output is not None else []
+    hits_files = [hits_file] if hits_file is not None else []
+    if frames is not None:
+        pictures = picture_files(output, frames) if output is not None else []
+        hits_files = numbered(hits_file, frames) if hits_file is not None else []
+    require_outputs(*pictures, *hits_files, waveform, json_file)
+
+    from colonnade.common.hits import Hits, write_hits
+    from colonnade.common.image_io import encode_srgb, write_png, write_webp
+    from colonnade.common.progress import for_terminal
+    from colonnade.render.frames import render_frames
+    from colonnade.render.report import sequence_report
+    from colonnade.render.request import RenderRequest
+
+    progress = for_terminal()
+    request = RenderRequest(
+        scene=scene,
+        config=config,
+        overrides=overrides,
+        backend=backend,
+        size=pixels,
+        frames=frames or 1,
+        mesh=mesh,
+        background=background,
+        hits=hits_file is not None,
+        relit=relit,
+        waveform=waveform,
+    )
+    results = render_frames(request, progress)
+    is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"
+    reports, film = [], []
+    for index, result in enumerate(results):
+        if is_film:
+            film.append(encode_srgb(result.image))
+        elif pictures:
+            write_png(pictures[index], result.image)
+        if hits_files:
+            write_hits(hits_files[index], Hits(result.hit_triangles, result.t))
+        reports.append(result.report)
+    if is_film:
+        with progress.step(f"writing {pictures[0].name}"):
+            write_webp(pictures[0], film)
+    report = reports[0] if frames is None else sequence_report(reports)
+    echo(summary(report))
+    finish(report.as_json(), json_file)
+
+
+def summary(report: FrameReport) -> str:
+    """One line for people."""
+    sequence = f"{len(report.frames)} frames, " if report.frames else ""
+    words = [
+        f"{report.backend}: {sequence}{report.mesh.triangles:,} triangles",
+        f"{report.all_rays:,} rays",
+    ]
+    if report.cycles:
+        words.append(f"{report.cycles:,} cycles")
+        words.append(f"{report.rays_per_cycle_in_box:.3f} rays per cycle in box")
+        words.append(f"{report.rays_per_cycle:.3f} of all")
+    if report.room is not None:
+        words.append(f"{report.room.look_ups:,} look-ups in the room of {report.room.cycles:.0f} cycles")
+    seconds = ", ".join(f"{step} {value:.1f} s" for step, value in report.seconds.items() if value is not None)
+    return ", ".join(words) + (f" ({seconds})" if seconds else "")

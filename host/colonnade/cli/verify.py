@@ -1,0 +1,84 @@
+"""``colonnade verify``: is the hardware its model, and how far is the model from the float scene?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+
+
+@click.command(short_help="Compare the hardware with its model, and the model with Embree.")
+@configuration_options
+@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Only this mesh. May be repeated.")
+@click.option(
+    "--scene", type=FILE, metavar="FILE", help="Its surface, lights and paths. Default: the benchmark's scene."
+)
+@click.option("--size", metavar="WxH", help="Size of the frames in pixels. Default: the benchmark scene's.")
+@click.option("--rtl/--no-rtl", default=True, show_default=True, help="Render through the hardware too.")
+@click.option("--reference/--no-reference", default=True, show_default=True, help="Compare with the float scene too.")
+@json_option
+@click.pass_context
+def verify(
+    context: click.Context,
+    config: str,
+    overrides: tuple[str, ...],
+    meshes: tuple[str, ...],
+    scene: Path | None,
+    size: str | None,
+    rtl: bool,
+    reference: bool,
+    json_file: Path | None,
+) -> None:
+    """Render each benchmark mesh through the RTL, the model and Embree, and print what differs.
+
+    Exit status 1 when any pixel, hit or counter of the RTL differs from the model's.
+    """
+    from colonnade.common.frame_size import parse_size
+
+    pixels = parse_size(size) if size is not None else None
+    require_outputs(json_file)
+
+    from colonnade.common import progress
+    from colonnade.common.text_table import Column, Table
+    from colonnade.design.toolchain import project_root
+    from colonnade.evaluation import bench, verify
+
+    table = Table(
+        (
+            Column("mesh", 14, is_text=True),
+            Column("triangles", 9, ","),
+            Column("pixels", 8, group="RTL against model: differing"),
+            Column("hits", 8, group="RTL against model: differing"),
+            Column("counters", 8, group="RTL against model: differing"),
+            Column("hit/miss", 8, ".4%", group="model against float scene"),
+            Column("triangle", 8, ".4%", group="model against float scene"),
+            Column("PSNR dB", 7, ".2f", group="model against float scene"),
+        ),
+        echo,
+    )
+    keys = {
+        "rtl": ("pixels", "triangles", "counters"),
+        "reference": ("hit_disagreement", "triangle_disagreement", "psnr"),
+    }
+
+    def show(name: str, result: dict[str, Any]) -> None:
+        compared = [(result[part] or {}).get(key) for part, of_part in keys.items() for key in of_part]
+        table.print(name, result["triangles"], *compared)
+
+    report = verify.verify(
+        scene or project_root() / "scenes" / "object.toml",
+        config,
+        overrides,
+        meshes or bench.MESHES,
+        pixels,
+        with_rtl=rtl,
+        with_reference=reference,
+        progress=progress.for_terminal(),
+        finished=show,
+    )
+    finish(report, json_file)
+    if not report["equal"]:
+        context.exit(1)

@@ -1,1 +1,0 @@
-"""The subcommands of ``colonnade``. Heavy imports stay inside the commands, so that ``--help`` is quick."""

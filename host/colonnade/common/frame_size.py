@@ -1,0 +1,18 @@
+"""Frame sizes as users write them."""
+
+from __future__ import annotations
+
+import re
+
+from colonnade.common.errors import UserError
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Read ``WIDTHxHEIGHT`` in pixels, e.g. ``640x480``."""
+    match = re.fullmatch(r"(\d{1,9})[xX](\d{1,9})", text.strip(), re.ASCII)
+    if not match:
+        raise UserError(f"size {text} is not of the form WIDTHxHEIGHT, e.g. 640x480")
+    width, height = int(match[1]), int(match[2])
+    if width == 0 or height == 0:
+        raise UserError(f"size {text} holds no pixel: both numbers are at least 1, e.g. 640x480")
+    return width, height

@@ -1,0 +1,106 @@
+"""Pictures as files: linear colours to 8-bit sRGB, PNG or animated WebP, and back."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from colonnade.common.atomic_files import replacing
+from colonnade.common.errors import UserError
+from colonnade.common.input_files import read_input
+from colonnade.common.limits import MAX_PICTURE_BYTES, MAX_PIXELS
+from colonnade.common.srgb import curved, straightened
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+    from PIL.Image import Image as PillowImage
+
+#: What is read: no format that Pillow needs another program for.
+FORMATS = ("PNG", "JPEG", "WEBP")
+#: How long a frame of an animation is shown.
+FRAME_MILLISECONDS = 50
+
+
+def encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Linear colours (any shape, 0.0 to 1.0, saturated) as 8-bit sRGB, rounded to nearest."""
+    import numpy as np
+
+    return np.rint(curved(linear) * 255.0).astype(np.uint8)
+
+
+def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """8-bit sRGB (any shape) as linear colours, 0.0 to 1.0."""
+    import numpy as np
+
+    return straightened(encoded.astype(np.float64) / 255.0)
+
+
+def write_png(path: Path, linear: NDArray[np.float64]) -> None:
+    """Write a picture of linear colours, float64 [height, width, 3], as an 8-bit sRGB PNG."""
+    from PIL import Image
+
+    with replacing(path) as stream:
+        Image.fromarray(encode_srgb(linear)).save(stream, format="PNG")
+
+
+def write_webp(path: Path, frames: Iterable[NDArray[np.uint8]]) -> None:
+    """Write 8-bit sRGB pictures, uint8 [height, width, 3], as a WebP without loss, `FRAME_MILLISECONDS` each, over and
+    over.
+    """
+    from PIL import Image
+
+    first, *others = (Image.fromarray(frame) for frame in frames)
+    with replacing(path) as stream:
+        first.save(
+            stream,
+            format="WEBP",
+            save_all=True,
+            append_images=others,
+            duration=FRAME_MILLISECONDS,
+            loop=0,
+            lossless=True,
+        )
+
+
+@contextlib.contextmanager
+def opened_picture(path: Path, missing: str | None = None) -> Iterator[PillowImage]:
+    """A PNG, JPEG or WebP picture by its content, whatever its name says, within the limit of pixels.
+
+    Raises:
+        UserError: It is anything else, too large, or fails while it is decoded.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    data = read_input(path, "the picture", MAX_PICTURE_BYTES, missing)
+    too_large = UserError(f"{path} has too many pixels: a picture may have {MAX_PIXELS:,}")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(data), formats=FORMATS) as picture:
+                if picture.width * picture.height > MAX_PIXELS:
+                    raise too_large
+                yield picture
+    except (UserError, MemoryError):
+        raise
+    except Image.DecompressionBombError:
+        raise too_large from None
+    except UnidentifiedImageError:
+        raise UserError(f"{path} is no readable picture: give a PNG, JPEG or WebP file") from None
+    except Exception as error:  # whatever a decoder makes of noise
+        raise UserError(f"{path} is no readable picture: {type(error).__name__}: {error}") from None
+
+
+def read_picture(path: Path) -> NDArray[np.uint8]:
+    """Read a picture of 8 or 16 bits as 8-bit sRGB, uint8 [height, width, 3]; transparency is dropped."""
+    import numpy as np
+
+    with opened_picture(path, f"no picture {path}: check the path") as picture:
+        if picture.mode.startswith("I"):  # grey of 16 bits, which Pillow would cut off at 255
+            grey = np.rint(np.clip(np.asarray(picture, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
+            return np.repeat(grey[..., np.newaxis], 3, axis=2)
+        return np.asarray(picture.convert("RGB"))

@@ -1,0 +1,161 @@
+"""Reads input files: regular ones of a limited size, and JSON without traps."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from colonnade.common import ledger
+from colonnade.common.atomic_files import kind_of
+from colonnade.common.errors import UserError, reason_of
+from colonnade.common.limits import MAX_DEPTH, MAX_DIGITS, MAX_TEXT, MAX_TEXT_BYTES
+
+
+def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: str | None = None) -> bytes:
+    """The bytes of an input file.
+
+    Args:
+        path: a regular file, or a link to one.
+        what: for messages, e.g. ``"the scene"``.
+        most: bytes that it may have.
+        missing: the message where there is no such file.
+
+    Raises:
+        UserError: It is missing, no regular file, too large, cannot be read, or a declared output.
+    """
+    refused = require_regular(path, what, missing)
+    try:
+        # A pipe that took the file's place meanwhile must not be waited for
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with os.fdopen(handle, "rb") as stream:
+            status = os.fstat(handle)
+            if not stat.S_ISREG(status.st_mode):
+                raise refused
+            data = stream.read(maximum + 1) if status.st_size <= maximum else b""
+    except OSError as error:
+        raise UserError(f"cannot read {what} {path}: {reason_of(error)}") from None
+    if status.st_size > maximum or len(data) > maximum:
+        raise UserError(f"{what} {path} is too large: it may have {maximum:,} bytes")
+    ledger.add_input(path, status)
+    return data
+
+
+def require_regular(path: Path, what: str, missing: str | None = None) -> UserError:
+    """Refuse what is no regular file; the error for one that becomes something else before it is opened."""
+    try:
+        status = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        raise UserError(missing or f"{what} {path} does not exist") from None
+    except OSError as error:
+        raise UserError(f"cannot read {what} {path}: {reason_of(error)}") from None
+    except ValueError:
+        raise UserError(f"{what} {str(path)!r} does not exist: this is no file name") from None
+    refused = UserError(f"cannot read {what} {path}: it is {kind_of(status)}, name a file")
+    if not stat.S_ISREG(status.st_mode):
+        raise refused
+    return refused
+
+
+def exists(path: Path) -> bool:
+    """There is something of any kind at this path."""
+    try:
+        return os.path.lexists(path)
+    except ValueError:
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Whether the path is a folder; names that no file can have are none."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def is_file(path: Path) -> bool:
+    """Whether the path is a regular file; names that no file can have are none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def read_json(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: str | None = None) -> Any:
+    """The JSON in an input file; see `parse_json`."""
+    return parse_json(read_input(path, what, maximum, missing), f"{what} {path}")
+
+
+def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
+    """The value of a JSON text, whose texts may have ``most_text`` characters.
+
+    Raises:
+        UserError: It is no JSON in UTF-8, has a key twice in an object, a number that is too long or not finite, or is
+            nested too deeply.
+    """
+    try:
+        text = data.decode("utf-8") if isinstance(data, bytes) else data
+        value = json.loads(
+            text,
+            object_pairs_hook=_object,
+            parse_int=_whole_number,
+            parse_float=_real_number,
+            parse_constant=_no_constant,
+        )
+    except UnicodeDecodeError as error:
+        raise UserError(f"{what} is not JSON: it is no text in UTF-8 ({error.reason})") from None
+    except RecursionError:
+        raise UserError(f"{what} is nested too deeply: {MAX_DEPTH} levels at most") from None
+    except ValueError as error:
+        raise UserError(f"{what} is not JSON: {error}") from None
+    check_values(value, what, max_text)
+    return value
+
+
+def check_values(data: Any, what: str, max_text: int = MAX_TEXT) -> None:
+    """Refuse a parsed document that is nested too deeply, or holds overlong texts or numbers."""
+    level = [data]
+    for _ in range(MAX_DEPTH + 1):
+        below: list[Any] = []
+        for value in level:
+            if isinstance(value, Mapping):
+                below += value.values()
+            elif isinstance(value, list):
+                below += value
+            elif isinstance(value, str) and len(value) > max_text:
+                raise UserError(f"{what} holds a text of {len(value):,} characters: {max_text:,} at most")
+            elif isinstance(value, int) and abs(value) >= 10**MAX_DIGITS:
+                raise UserError(f"{what} holds a number of more than {MAX_DIGITS} digits")
+        if not below:
+            return
+        level = below
+    raise UserError(f"{what} is nested too deeply: {MAX_DEPTH} levels at most")
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"the key {key} is there twice in an object")
+        found[key] = value
+    return found
+
+
+def _whole_number(text: str) -> int:
+    if len(text) > MAX_DIGITS:
+        raise ValueError(f"a number has {len(text):,} digits, {MAX_DIGITS} at most")
+    return int(text)
+
+
+def _real_number(text: str) -> float:
+    value = float(text)
+    if value in (float("inf"), float("-inf")):
+        raise ValueError(f"the number {text} is too large")
+    return value
+
+
+def _no_constant(text: str) -> float:
+    raise ValueError(f"{text} is no number")

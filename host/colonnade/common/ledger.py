@@ -1,0 +1,112 @@
+"""What a command reads and writes: an output never replaces an input, nor another output.
+
+The command line opens a ledger for each run. Outputs are declared before the work starts; every file that is read is
+compared with them by device and inode, so that links and other spellings of a path are found too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from colonnade.common.errors import UserError
+
+#: Device and inode.
+Identity = tuple[int, int]
+
+
+@dataclass
+class Ledger:
+    """Files of one command.
+
+    Attributes:
+        outputs: Declared ones, by their resolved path.
+        existing: The declared ones that exist, by identity.
+        inputs: Files that were read.
+        written: Resolved paths that were written.
+    """
+
+    outputs: dict[Path, Path] = field(default_factory=dict)
+    existing: dict[Identity, Path] = field(default_factory=dict)
+    inputs: dict[Identity, Path] = field(default_factory=dict)
+    written: set[Path] = field(default_factory=set)
+
+
+_current: Ledger | None = None
+
+
+@contextlib.contextmanager
+def opened() -> Iterator[None]:
+    """Keep a ledger meanwhile, in all threads."""
+    global _current
+    before, _current = _current, Ledger()
+    try:
+        yield
+    finally:
+        _current = before
+
+
+def declare_output(path: Path) -> None:
+    """Refuse an output that is declared already, under any name."""
+    if _current is None:
+        return
+    place, identity = resolved(path), _identity(path)
+    other = _current.outputs.get(place) or (_current.existing.get(identity) if identity else None)
+    if other is not None:
+        raise UserError(f"two outputs name the same file, {other} and {path}: name another file for one of them")
+    if identity is not None and identity in _current.inputs:
+        raise _replaces_input(path, _current.inputs[identity])
+    _current.outputs[place] = path
+    if identity is not None:
+        _current.existing[identity] = path
+
+
+def add_input(path: Path, status: os.stat_result) -> None:
+    """Refuse an input that a declared output would replace."""
+    if _current is None:
+        return
+    identity = status.st_dev, status.st_ino
+    if identity in _current.existing:
+        raise _replaces_input(_current.existing[identity], path)
+    _current.inputs[identity] = path
+
+
+def check_write(path: Path) -> None:
+    """Refuse to replace an input, or a declared output that has been written."""
+    if _current is None:
+        return
+    identity = _identity(path)
+    if identity is not None and identity in _current.inputs:
+        raise _replaces_input(path, _current.inputs[identity])
+    place = resolved(path)
+    if place in _current.outputs and place in _current.written:
+        raise UserError(f"two outputs name the same file, {path}: name another file for one of them")
+
+
+def add_written(path: Path) -> None:
+    """The output is complete."""
+    if _current is not None:
+        _current.written.add(resolved(path))
+
+
+def resolved(path: Path) -> Path:
+    """The path without links and dots in its folders."""
+    try:
+        return path.parent.resolve() / path.name
+    except (OSError, RuntimeError, ValueError):
+        return path.absolute()
+
+
+def _identity(path: Path) -> Identity | None:
+    try:
+        status = path.lstat()
+    except (OSError, ValueError):
+        return None
+    return status.st_dev, status.st_ino
+
+
+def _replaces_input(output: Path, source: Path) -> UserError:
+    return UserError(f"the output {output} would replace {source}, which this command reads: name another output")

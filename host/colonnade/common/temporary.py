@@ -1,0 +1,153 @@
+"""Temporary folders that a later run removes when the process that made them was killed.
+
+``PREFIX…/lock`` is locked while the folder is in use, and the kernel frees the lock of a killed process. The user of
+the folder works in ``PREFIX…/content``. A folder goes away when its lock is free, and only if it holds nothing else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from colonnade.common import processes
+from colonnade.common.errors import UserError
+
+#: Of folders in the system's place for temporary files.
+PREFIX = "colonnade-"
+
+#: All that there is in such a folder: the lock; the content; what the content has replaced.
+LOCK, CONTENT, REPLACED = "lock", "content", "replaced"
+
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+
+_in_use: set[Path] = set()
+
+
+@contextlib.contextmanager
+def temporary_folder(prefix: str = PREFIX, parent: Path | None = None) -> Iterator[Path]:
+    """An empty folder that is gone after the block; renaming it away keeps it.
+
+    Folders of killed processes with the same prefix in the same place go away, too.
+
+    Args:
+        prefix: of its name; ``.NAME.`` for a neighbour of what it shall become.
+        parent: where it is; by default the system's place for temporary files.
+
+    Raises:
+        UserError: there is no space for it, or no permission to make it.
+    """
+    place = parent or Path(tempfile.gettempdir())
+    remove_abandoned(prefix, place)
+    try:
+        folder, lock = _made(prefix, place)
+    except OSError as error:
+        raise UserError(f"cannot make a temporary folder in {place}: {error.strerror}{_advice(parent)}") from None
+    _in_use.add(folder)
+    try:
+        yield folder / CONTENT
+    except OSError as error:
+        if error.errno in _FULL:
+            raise UserError(f"no space left on the disk of {place}: free some there{_advice(parent)}") from None
+        raise
+    finally:
+        _in_use.discard(folder)
+        with contextlib.suppress(OSError):
+            _remove(folder)
+        os.close(lock)
+
+
+def replace(content: Path, target: Path) -> None:
+    """Rename the folder that `temporary_folder` gave to `target`; a file or folder that is there goes away."""
+    replaced = content.with_name(REPLACED)
+    with contextlib.suppress(FileNotFoundError):
+        target.rename(replaced)
+    try:
+        content.rename(target)
+    except OSError:
+        if os.path.lexists(replaced):
+            replaced.rename(target)
+        raise
+
+
+def remove_abandoned(prefix: str, parent: Path) -> None:
+    """Remove the folders of processes that were killed."""
+    try:
+        with os.scandir(parent) as entries:
+            found = [entry.path for entry in entries if entry.name.startswith(prefix)]
+    except OSError:
+        return
+    for path in found:
+        # Removed by another process meanwhile, or not ours
+        with contextlib.suppress(OSError):
+            _remove_if_abandoned(Path(path))
+
+
+def _made(prefix: str, parent: Path) -> tuple[Path, int]:
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
+        try:
+            lock = os.open(folder / LOCK, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+        except OSError:
+            folder.rmdir()
+            raise
+        # Where the file system knows no locks, such folders stay when their maker is killed
+        with contextlib.suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        # Another process may have taken the lock first and removed the folder
+        if os.fstat(lock).st_nlink:
+            try:
+                (folder / CONTENT).mkdir()
+            except OSError:
+                _remove(folder)
+                os.close(lock)
+                raise
+            return folder, lock
+        os.close(lock)
+
+
+def _remove_if_abandoned(folder: Path) -> None:
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid():
+        return
+    if not {path.name for path in folder.iterdir()} <= {LOCK, CONTENT, REPLACED}:
+        return
+    lock = os.open(folder / LOCK, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
+    try:
+        status = os.fstat(lock)
+        if stat.S_ISREG(status.st_mode) and status.st_uid == os.geteuid():
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _remove(folder)
+    finally:
+        os.close(lock)
+
+
+def _remove(folder: Path) -> None:
+    """The lock goes last: what is interrupted here is finished by a later run."""
+    for name in (CONTENT, REPLACED):
+        path = folder / name
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+    (folder / LOCK).unlink(missing_ok=True)
+    folder.rmdir()
+
+
+def _remove_all() -> None:
+    for folder in list(_in_use):
+        with contextlib.suppress(OSError):
+            _remove(folder)
+
+
+def _advice(parent: Path | None) -> str:
+    return "" if parent else ", or name another place with TMPDIR"
+
+
+processes.when_leaving(_remove_all)

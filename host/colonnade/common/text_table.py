@@ -1,0 +1,69 @@
+"""Tables of plain text, printed row by row while the work goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes:
+        title: its heading; a longer one widens the column.
+        width: characters; longer cells push the row's rest to the right.
+        form: format specification of its cells, such as ``,`` or ``.3f``.
+        is_text: aligned to the left.
+        group: heading over this column and its neighbours of the same group.
+    """
+
+    title: str
+    width: int
+    form: str = ""
+    is_text: bool = False
+    group: str = ""
+
+    @property
+    def text_width(self) -> int:
+        """Characters that the column takes."""
+        return max(self.width, len(self.title))
+
+    def align(self, text: str) -> str:
+        """The text in the column's width."""
+        return text.ljust(self.text_width) if self.is_text else text.rjust(self.text_width)
+
+    def cell(self, value: object) -> str:
+        """One cell; a dash for None."""
+        return self.align("-" if value is None else format(value, self.form))
+
+
+class Table:
+    """Columns, two spaces apart. The heading is printed with the first row, so that a refusal stands alone."""
+
+    def __init__(self, columns: Sequence[Column], echo: Callable[[str], None] = print) -> None:
+        """Prepare a table whose lines are given to `echo`."""
+        self._columns = columns
+        self._echo = echo
+        self._is_begun = False
+
+    def heading(self) -> str:
+        """The titles, below the groups where there are any."""
+        lines = [_joined(column.align(column.title) for column in self._columns)]
+        if any(column.group for column in self._columns):
+            groups = [(name, list(members)) for name, members in groupby(self._columns, lambda column: column.group)]
+            spans = (name.ljust(sum(member.text_width + 2 for member in members) - 2) for name, members in groups)
+            lines.insert(0, _joined(spans))
+        return "\n".join(lines)
+
+    def print(self, *values: object) -> None:
+        """Print a row: a value for each column."""
+        if not self._is_begun:
+            self._echo(self.heading())
+        self._is_begun = True
+        self._echo(_joined(column.cell(value) for column, value in zip(self._columns, values, strict=True)))
+
+
+def _joined(cells: Iterable[str]) -> str:
+    return "  ".join(cells).rstrip()

@@ -1,0 +1,10 @@
+"""Names for arrays of numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Bytes = NDArray[np.uint8]

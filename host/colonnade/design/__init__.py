@@ -1,0 +1,1 @@
+"""Designs: configurations, the generator that makes Verilog of them, and its manifest."""

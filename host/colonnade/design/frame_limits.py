@@ -1,0 +1,19 @@
+"""The largest frame that a design renders."""
+
+from __future__ import annotations
+
+from colonnade.common.errors import UserError
+from colonnade.design.manifest import Manifest
+
+
+def check_size(size: tuple[int, int], manifest: Manifest) -> None:
+    """Refuse a frame larger than the design holds (`frame.maxWidth`, `frame.maxHeight`)."""
+    if min(size) < 1:
+        raise UserError(f"a frame of {size[0]}x{size[1]} has no pixels")
+    limits = manifest.config["frame"]
+    for length, key in zip(size, ("maxWidth", "maxHeight"), strict=True):
+        if length > limits[key]:
+            raise UserError(
+                f"size {size[0]}x{size[1]} is too large: frame.{key} is {limits[key]}; "
+                f"use a smaller --size or --set frame.{key}={length}"
+            )

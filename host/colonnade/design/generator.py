@@ -1,0 +1,203 @@
+"""Runs the Chisel generator and keeps what it made, by content.
+
+The generator is compiled once per state of its sources, with sbt; every configuration after that is one run of plain
+Java. Results are entries ``generator/SOURCES/KEY`` of the cache, where SOURCES stands for the generator's sources and
+KEY for the configuration, its overrides and the kind of output; the classes are ``generator/SOURCES/classes``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from colonnade.common import cache, processes
+from colonnade.common.errors import UserError
+from colonnade.common.progress import QUIET, Progress
+from colonnade.design.config_name import ConfigurationSource, find_configuration
+from colonnade.design.design_folder import check_replaceable, replace_folder
+from colonnade.design.manifest import Manifest
+from colonnade.design.toolchain import cache_directory, find_java, project_root
+
+#: States of the sources whose results are kept; older ones go once they have not been used for a day.
+KEPT_STATES = 4
+
+#: The folders of an entry: what the generator wrote; and the file that tells the class path.
+DESIGN = "design"
+CLASSPATH = "classpath.json"
+
+_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+
+
+@dataclass(frozen=True)
+class GeneratedDesign:
+    """What the generator wrote for one configuration.
+
+    Attributes:
+        dir: folder with ``manifest.json`` and, for a whole design, the SystemVerilog and ``filelist.f``.
+        manifest: the manifest, read.
+    """
+
+    dir: Path
+    manifest: Manifest
+
+    @property
+    def sources(self) -> list[Path]:
+        """The SystemVerilog files."""
+        return sorted(path for path in self.dir.iterdir() if path.suffix in (".sv", ".v"))
+
+    def digest(self) -> str:
+        """A SHA-256 of the SystemVerilog: two designs with the same one behave alike."""
+        known = cache.digests(self.dir.parent) or {}
+        lines = []
+        for path in self.sources:
+            content = known.get(f"{DESIGN}/{path.name}") or hashlib.sha256(path.read_bytes()).hexdigest()
+            lines.append(f"{path.name} {content}\n")
+        return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+def manifest_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
+    """The manifest of a configuration, without Verilog: all that packing, the model and placement need."""
+    return _cached(config, overrides, ("--manifest-only",), progress)
+
+
+def design_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
+    """The SystemVerilog and the manifest of a configuration: what a simulation is built from."""
+    return _cached(config, overrides, (), progress)
+
+
+def black_boxed_design_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
+    """The same with memories as black boxes, and ``memories.json`` with their shapes: what synthesis reads."""
+    return _cached(config, overrides, ("--black-box-memories",), progress)
+
+
+def generate(
+    config: str,
+    overrides: Sequence[str],
+    output: Path,
+    manifest_only: bool = False,
+    black_box_memories: bool = False,
+    progress: Progress = QUIET,
+) -> GeneratedDesign:
+    """Generate into ``output``, a folder of the user's: see `design_folder` for what it may replace."""
+    check_replaceable(output)
+    options = ("--manifest-only",) * manifest_only + ("--black-box-memories",) * black_box_memories
+    design = _cached(config, overrides, options, progress)
+    replace_folder(design.dir, output)
+    return GeneratedDesign(output, design.manifest)
+
+
+def source_hash(root: Path) -> str:
+    """A short hash of everything the generator is compiled from."""
+    sources = [*root.glob("*.sbt"), root / "project" / "build.properties", root / "project" / "dependencies.sha256"]
+    sources += [*(root / "project").glob("*.sbt"), *(root / "project").glob("*.scala")]
+    sources += [path for path in (root / "src" / "main").rglob("*") if path.is_file()]
+    digest = hashlib.sha256()
+    for path in sorted(sources):
+        if path.is_file():
+            content = path.read_bytes()
+            digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode() + content)
+    return digest.hexdigest()[:20]
+
+
+def _cached(config: str, overrides: Sequence[str], options: tuple[str, ...], progress: Progress) -> GeneratedDesign:
+    root = project_root()
+    source = find_configuration(config, overrides, root)
+    state = cache_directory(root) / "generator" / source_hash(root)
+
+    def make(place: Path) -> None:
+        java = find_java()
+        _run(root, java, _compiled(root, state, progress), source, options, place / DESIGN, state, progress)
+
+    entry = cache.entry(state / _key(source, options), make, "design", progress)
+    cache.touch(state)
+    return GeneratedDesign(entry / DESIGN, Manifest.load(entry / DESIGN / "manifest.json"))
+
+
+def _key(source: ConfigurationSource, options: Sequence[str]) -> str:
+    parts = [source.path.read_bytes(), *(part.encode() for part in (*source.overrides, *options))]
+    return hashlib.sha256(b"".join(f"{len(part)}:".encode() + part for part in parts)).hexdigest()[:20]
+
+
+def _compiled(root: Path, state: Path, progress: Progress) -> str:
+    """Compile the generator unless this state of it is compiled, and return its class path."""
+
+    def make(place: Path) -> None:
+        entries = _compile(root, state.parent / "sbt.log", progress)
+        # A later compile overwrites sbt's own folder of classes: keep those of this state
+        for index, folder in enumerate(entries):
+            if Path(folder).is_dir():
+                entries[index] = f"classes{index}"
+                shutil.copytree(folder, place / entries[index])
+        (place / CLASSPATH).write_text(json.dumps(entries))
+
+    def path(folder: Path) -> list[Path]:
+        return [folder / entry for entry in json.loads((folder / CLASSPATH).read_text())]
+
+    def has_libraries(folder: Path) -> bool:
+        return all(entry.exists() for entry in path(folder))
+
+    folder = cache.entry(state / "classes", make, "generator", progress, has_libraries)
+    _forget_old_states(state.parent)
+    return os.pathsep.join(map(str, path(folder)))
+
+
+def _compile(root: Path, log: Path, progress: Progress) -> list[str]:
+    """Compile with sbt; the class path, its folders being sbt's own."""
+    with progress.step("compiling the generator"), log.open("w") as stream:
+        command = [str(root / "tools" / "sbt"), "compile", "export Runtime/fullClasspath"]
+        status = processes.run(command, stdout=stream, stderr=subprocess.STDOUT).returncode
+    lines = _ANSI.sub("", log.read_text(errors="replace")).splitlines()
+    if status != 0:
+        errors = [line.removeprefix("[error]").strip() for line in lines if line.startswith("[error]")]
+        first = errors[0] if errors else (lines[-1] if lines else f"sbt ended with status {status}")
+        raise UserError(f"the generator does not compile: {first} (all of it: {log})")
+    entries = next((line for line in reversed(lines) if ".jar" in line and os.pathsep in line), "").split(os.pathsep)
+    if not any(Path(entry).is_dir() for entry in entries):
+        raise RuntimeError(f"sbt printed no class path: see {log}")
+    return entries
+
+
+def _run(
+    root: Path,
+    java: Path,
+    classpath: str,
+    source: ConfigurationSource,
+    options: Sequence[str],
+    design: Path,
+    state: Path,
+    progress: Progress,
+) -> None:
+    """One run of the generator; its error line becomes ours."""
+    sets = [argument for override in source.overrides for argument in ("--set", override)]
+    command = [str(java), *_java_options(root), "-cp", classpath, "colonnade.Generate"]
+    command += ["--config", str(source.path), "--output", str(design), *sets, *options]
+    with progress.step("generating the manifest" if "--manifest-only" in options else "generating the hardware"):
+        done = processes.run(command, cwd=root)
+    if done.returncode == 2:
+        lines = [line for line in done.stderr.splitlines() if line.strip()] or ["the generator refused its input"]
+        raise UserError(re.sub(r"^(colonnade(\.Generate)?: )?error: ", "", lines[-1].strip()))
+    if done.returncode != 0 or not (design / "manifest.json").is_file():
+        log = state / "generate.log"
+        log.write_text(done.stdout + done.stderr)
+        raise RuntimeError(f"the generator failed with status {done.returncode}: see {log}")
+
+
+def _java_options(root: Path) -> list[str]:
+    file = root / ".jvmopts"
+    lines = file.read_text().split("\n") if file.is_file() else ["-Xss16m"]
+    return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
+
+
+def _forget_old_states(folder: Path) -> None:
+    states = sorted((path for path in folder.iterdir() if path.is_dir()), key=lambda path: path.stat().st_mtime)
+    for state in states[:-KEPT_STATES]:
+        if time.time() - state.stat().st_mtime > 86_400:
+            shutil.rmtree(state, ignore_errors=True)

@@ -1,0 +1,1 @@
+"""The device: the bit-exact model, and the RTL under Verilator."""

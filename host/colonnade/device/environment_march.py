@@ -1,0 +1,63 @@
+"""The device's march through a rebuilt room, as a `Rebuild`: bit for bit what the hardware's numbers make of a ray."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from colonnade.common.types import Floats
+from colonnade.design.manifest import Manifest
+from colonnade.device.bit_exact import field_places
+from colonnade.environment.encoding.image import memory_words
+from colonnade.reference.environment.ray_march import HIDDEN, HIT, LEFT, LOST, Rebuilt
+from colonnade.registers.environment import projection_of, view_registers
+
+if TYPE_CHECKING:
+    from colonnade.environment.encoding.image import AttributeImage
+    from colonnade.environment.model import Environment
+
+
+#: Grid steps a metre, log2, where no object says how large the grid is.
+GRID_LOG = 20
+#: Kinds of points as `EnvironmentModel` numbers them.
+_MAP, _SHELL = 1, 2
+
+
+class DeviceMarch:
+    """The march of `cpp/model/environment.hpp` through an attribute image."""
+
+    def __init__(self, environment: Environment, image: AttributeImage, manifest: Manifest) -> None:
+        """For hardware with a physical-attribute memory of the image's layout."""
+        from colonnade import _core
+
+        attributes = manifest.attributes
+        if attributes is None:
+            raise ValueError("the hardware has no physical-attribute memory")
+        numbers = dict(manifest.numbers) | dict.fromkeys(("arity", "trianglesPerRecord", "stackDepth", "bvh"), 0)
+        self._model: Any = _core.EnvironmentModel(numbers, dict(attributes.sizes), field_places(attributes.layouts))
+        for memory, words in memory_words(image):
+            self._model.load(memory, words)
+        self._environment = environment
+        self._component = 1 << (manifest.numbers["shadeBits"] - 1)
+        registers = view_registers(projection_of(environment, image) / 2.0**GRID_LOG, np.zeros(3), manifest)
+        self._registers = {name.removeprefix("room."): value for name, value in registers.items()}
+        self._registers["shellPlanes"] = int(image.planes.shell.any(axis=1).sum())
+
+    def __call__(self, origins: Floats, directions: Floats) -> Rebuilt:
+        """Where rays of view space, float64 [n, 3] each, metres, meet the room."""
+        environment, grid = self._environment, 2.0**GRID_LOG
+        starts = np.rint(origins * grid).astype(np.int64)
+        ways = directions / np.abs(directions).max(axis=1, keepdims=True)
+        ways = np.rint(ways * self._component).astype(np.int64)
+        met = self._model.march(self._registers, np.ascontiguousarray(starts), np.ascontiguousarray(ways))
+        points = (starts + met["travel"][:, None] * ways) / grid
+        kind = np.where(met["kind"] == _MAP, np.where(met["is_hidden"], HIDDEN, HIT), LOST)
+        kind = np.where(met["kind"] == _SHELL, LEFT, kind)
+        z = points[:, 2]
+        seen_u, seen_v = met["x"] + 0.5, met["y"] + 0.5
+        is_ahead = ((kind == HIT) | (kind == HIDDEN)) & (z > 0)
+        depth = np.where(is_ahead, z, 1.0)
+        u = np.where(is_ahead, points[:, 0] / depth * environment.fx + environment.cx, seen_u)
+        v = np.where(is_ahead, points[:, 1] / depth * environment.fy + environment.cy, seen_v)
+        return Rebuilt(u, v, z, seen_u, seen_v, kind.astype(np.int64), met["steps"])

@@ -1,0 +1,192 @@
+// The device as Verilator models of render unit, column and device, coupled cycle by cycle.
+// How, and on which properties of the RTL it rests: simulator_sources.py, which writes coupling.hpp.
+#pragma once
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "VColonnade.h"
+#include "VColonnade___024root.h"
+#include "VColumn.h"
+#include "VColumn___024root.h"
+#include "VRenderUnitModel.h"
+#include "coupling.hpp"
+#ifdef WAVEFORM
+#include "verilated_vcd_c.h"
+#endif
+
+/// Assignments for each port of a kind between `variables` of the outer model and the ports of the `inner` one.
+#define INWARD(port) inner.port = *variables.port;
+#define OUTWARD(port) *variables.port = inner.port;
+#define REQUIRE_EQUAL(port) requireEqual(*variables.port, inner.port, #port);
+
+class Array {
+public:
+    /// The device around the columns. Set its inputs before `settle`, read its outputs after it.
+    VColonnade device;
+
+    Array() : columnVariables_(bindColumn(*device.rootp)) {
+        for (std::size_t i = 0; i < columnVariables_.size(); ++i) {
+            columns_.push_back(std::make_unique<VColumn>());
+            for (const RenderUnitVariables& variables : bindRenderUnit(*columns_.back()->rootp)) {
+                unitVariables_.push_back(variables);
+                units_.push_back(std::make_unique<VRenderUnitModel>());
+                units_.back()->eval();
+            }
+            columns_.back()->eval();
+        }
+    }
+    ~Array() {
+        for (auto& unit : units_) unit->final();
+        for (auto& column : columns_) column->final();
+        device.final();
+    }
+
+    /// Brings all that acts in this cycle to where it acts.
+    void settle() {
+        device.eval();
+        for (std::size_t i = 0; i < units_.size(); ++i) {
+            const RenderUnitVariables& variables = unitVariables_[i];
+            const VRenderUnitModel& inner = *units_[i];
+            RenderUnit_OUTPUTS(OUTWARD)
+        }
+        for (std::size_t i = 0; i < columns_.size(); ++i) {
+            const ColumnVariables& variables = columnVariables_[i];
+            VColumn& inner = *columns_[i];
+            Column_DIRECT(INWARD)
+            Column_INPUTS(INWARD)
+            inner.eval();
+            Column_OUTPUTS(OUTWARD)
+        }
+        device.eval();
+        intoColumns();
+        for (std::size_t i = 0; i < units_.size(); ++i) {
+            const RenderUnitVariables& variables = unitVariables_[i];
+            VRenderUnitModel& inner = *units_[i];
+            RenderUnit_DIRECT(INWARD)
+        }
+    }
+
+    /// The clock edge after `settle`. The frame registers cross only while they may change.
+    void edge(bool mayChangeRegisters) {
+        outerEdge(mayChangeRegisters);
+        unitsEdge(mayChangeRegisters);
+    }
+
+    /// A cycle of device and columns while the units stand still: for loads, of which idle units see nothing.
+    void outerCycle() {
+        device.eval();
+        intoColumns();
+        outerEdge(true);
+    }
+
+    /// Cycles of the units alone, as often as device and columns have moved without them.
+    void unitsEdge(bool mayChangeRegisters) {
+        for (std::size_t i = 0; i < units_.size(); ++i) {
+            const RenderUnitVariables& variables = unitVariables_[i];
+            VRenderUnitModel& inner = *units_[i];
+            RenderUnit_INPUTS(INWARD)
+            if (mayChangeRegisters) { RenderUnit_REGISTERS(INWARD) }
+            flip(inner);
+        }
+    }
+
+    /// Writes a record into the memory of each column, as the load port does; beyond the depth it is dropped.
+    void store(std::uint64_t address, const void* record, std::size_t bytes) {
+        for (auto& column : columns_) {
+            unsigned bank = 0;
+#define STORE(memory) storeInBank(column->rootp->memory, bank++, address, record, bytes);
+            RECORD_BANKS(STORE)
+#undef STORE
+        }
+    }
+
+    /// Throws if, after `settle`, evaluating anything once more changes what has crossed a border.
+    void check() {
+        for (std::size_t i = 0; i < units_.size(); ++i) {
+            const RenderUnitVariables& variables = unitVariables_[i];
+            VRenderUnitModel& inner = *units_[i];
+            inner.eval();
+            RenderUnit_OUTPUTS(REQUIRE_EQUAL)
+        }
+        for (std::size_t i = 0; i < columns_.size(); ++i) {
+            const ColumnVariables& variables = columnVariables_[i];
+            VColumn& inner = *columns_[i];
+            inner.eval();
+            Column_OUTPUTS(REQUIRE_EQUAL)
+            Column_REGISTERS(REQUIRE_EQUAL)
+        }
+        for (std::size_t i = 0; i < units_.size(); ++i) {
+            const RenderUnitVariables& variables = unitVariables_[i];
+            const VRenderUnitModel& inner = *units_[i];
+            RenderUnit_DIRECT(REQUIRE_EQUAL)
+            RenderUnit_INPUTS(REQUIRE_EQUAL)
+            RenderUnit_REGISTERS(REQUIRE_EQUAL)
+        }
+    }
+
+#ifdef WAVEFORM
+    /// Adds the device, its first column and that column's first unit to a waveform that is not yet open.
+    void addTo(VerilatedVcdC& waveform) {
+        device.trace(&waveform, 99);
+        columns_.front()->trace(&waveform, 99);
+        units_.front()->trace(&waveform, 99);
+    }
+
+    /// Evaluates again what `addTo` adds: after `settle`, some of its inputs are newer than its other signals.
+    void settleTraced() {
+        columns_.front()->eval();
+        units_.front()->eval();
+    }
+#endif
+
+private:
+    void intoColumns() {
+        for (std::size_t i = 0; i < columns_.size(); ++i) {
+            const ColumnVariables& variables = columnVariables_[i];
+            VColumn& inner = *columns_[i];
+            Column_DIRECT(INWARD)
+            Column_INPUTS(INWARD)
+        }
+    }
+
+    void outerEdge(bool mayChangeRegisters) {
+        flip(device);
+        for (std::size_t i = 0; i < columns_.size(); ++i) {
+            const ColumnVariables& variables = columnVariables_[i];
+            VColumn& inner = *columns_[i];
+            // Before the edge: the column hands them on to its units
+            if (mayChangeRegisters) { Column_REGISTERS(INWARD) }
+            flip(inner);
+        }
+    }
+
+    template <class Model> static void flip(Model& model) {
+        model.clock = !model.clock;
+        model.eval();
+    }
+
+    template <class Value> static void requireEqual(const Value& outer, const Value& inner, const char* port) {
+        if (std::memcmp(&outer, &inner, sizeof outer) != 0)
+            throw std::runtime_error(std::string("the coupling of the simulator's models does not hold for port ") + port);
+    }
+
+    template <class Memory>
+    static void storeInBank(Memory& memory, unsigned bank, std::uint64_t address, const void* record, std::size_t bytes) {
+        if (address % banksOfColumn != bank) return;
+        const std::uint64_t place = address / banksOfColumn;
+        if (place < sizeof memory / sizeof memory[0]) std::memcpy(&memory[place], record, bytes);
+    }
+
+    std::vector<std::unique_ptr<VColumn>> columns_;
+    std::vector<std::unique_ptr<VRenderUnitModel>> units_;
+    std::vector<ColumnVariables> columnVariables_;
+    std::vector<RenderUnitVariables> unitVariables_;
+};
+
+#undef INWARD
+#undef OUTWARD
+#undef REQUIRE_EQUAL

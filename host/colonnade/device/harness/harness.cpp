@@ -1,0 +1,337 @@
+// Runs the generated hardware under Verilator: carries out the commands of a job file, one a line.
+//
+//   load FILE BYTES TARGET   words of BYTES bytes each, to consecutive addresses of a target from 0; records (target 0) go
+//                            straight into the column memories
+//   stream FILE BYTES TARGET the same, all of it through the load port and cycle by cycle
+//   write ADDRESS VALUE      one register word
+//   frame FILE WIDTH HEIGHT START WATCHDOG  starts a frame by a write to register START, waits for its end, writes its
+//                            pixels (struct PixelBytes, row by row); WATCHDOG is the frame's, cycles, 0 for none
+//   read NAME ADDRESS WORDS  prints "value NAME VALUE"
+//
+// Options: --stall PERCENT (of the cycles in which the pixel sink does not take pixels), --seed N; where the memory can
+// be held: --memory PERCENT (of a frame's cycles in which each bank is held), --burst N (longest hold, cycles);
+// --check N: checks the coupling of the models (array.hpp) in each Nth cycle. Where compiled with WAVEFORM:
+// --waveform FILE: the signals of the frames' cycles, as VCD; a unit of its time is a cycle.
+// Progress goes to standard error as "progress SHARE". Exit status 0, or 3 when the hardware misbehaves.
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <random>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "array.hpp"
+#include "ports.hpp" // EACH_COLUMN(DO): DO(column) for each column; HIT_DISTANCE(column) where the stream carries hits,
+                       // RATIO(column, channel) where it carries the light left to a room; MEMORY_BANKS, of all columns, where they can be held
+
+namespace {
+
+#pragma pack(push, 1)
+struct PixelBytes {
+    std::uint16_t colour[3], ratio[3];
+    std::uint8_t isObject, isSeen;
+    std::uint32_t triangle;
+    double distance;
+};
+#pragma pack(pop)
+
+template <class Port> double numberOf(const Port& port) {
+    unsigned __int128 value = 0;
+    static_assert(sizeof(Port) <= sizeof value, "a distance of more than 128 bits");
+    std::memcpy(&value, &port, sizeof port);
+    return static_cast<double>(value);
+}
+
+/// Cycles that the hardware may take to end a frame once its watchdog has fired.
+constexpr std::uint64_t watchdogMargin = 100'000;
+
+/// A multiple of the periods of whatever runs freely in the hardware, such as the beats of shared arithmetic units.
+constexpr std::uint64_t freePeriods = 840;
+
+struct Options {
+    unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32, checkInterval = 64;
+    std::string waveform;
+};
+
+#ifdef MEMORY_BANKS
+/// Holds each bank on its own: for a random number of cycles, at random, so that it is held in `percent` of all cycles.
+class BankHolds {
+public:
+    explicit BankHolds(const Options& options) : random_(options.seed), percent_(options.memoryPercent), burst_(1, options.memoryBurst) {
+        const double held = percent_ / 100.0, length = (1.0 + options.memoryBurst) / 2.0;
+        begins_ = std::bernoulli_distribution(percent_ == 0 ? 0.0 : 1.0 / (1.0 + length * (1.0 - held) / held));
+    }
+
+    /// The bits of the next cycle.
+    template <class Port> void next(Port& port) {
+        if (percent_ == 0) return;
+        unsigned char bits[sizeof(Port)] = {};
+        for (unsigned bank = 0; bank < MEMORY_BANKS; ++bank) {
+            unsigned& left = left_[bank];
+            if (left == 0 && begins_(random_)) left = burst_(random_);
+            if (left == 0) continue;
+            --left;
+            bits[bank / 8] |= static_cast<unsigned char>(1u << (bank % 8));
+        }
+        std::memcpy(&port, bits, sizeof bits);
+    }
+
+private:
+    std::mt19937 random_;
+    unsigned percent_;
+    std::uniform_int_distribution<unsigned> burst_;
+    std::bernoulli_distribution begins_;
+    unsigned left_[MEMORY_BANKS] = {};
+};
+#endif
+
+class Harness {
+public:
+    explicit Harness(const Options& options)
+        : random_(options.seed), stallPercent_(options.stallPercent), checkInterval_(std::max(1u, options.checkInterval))
+#ifdef MEMORY_BANKS
+        , holds_(options)
+#endif
+    {
+#ifndef MEMORY_BANKS
+        if (options.memoryPercent != 0) throw std::runtime_error("this hardware's memory cannot be held");
+#endif
+#ifdef WAVEFORM
+        if (!options.waveform.empty()) {
+            Verilated::traceEverOn(true);
+            array_.addTo(waveform_);
+            waveform_.open(options.waveform.c_str());
+            if (!waveform_.isOpen()) throw std::runtime_error("the waveform cannot be written");
+        }
+#else
+        if (!options.waveform.empty()) throw std::runtime_error("this simulator writes no waveforms");
+#endif
+        top_.reset = 1;
+        for (int i = 0; i < 8; ++i) cycle();
+        top_.reset = 0;
+        cycle();
+    }
+
+    /// Words of a file to consecutive addresses of a target from 0. Words for a memory other than that of the columns
+    /// (target 0) may be narrower than the port.
+    ///
+    /// While words are loaded the render units are idle, so either the load costs no cycles (records) or the device
+    /// moves alone. What runs freely in the hardware then stands as after a load through the port.
+    void load(const std::string& file, std::size_t bytes, std::uint64_t target, bool throughPort) {
+        const std::size_t port = sizeof top_.io_load_bits_record;
+        if (target == 0 ? bytes != port : bytes > port) throw std::runtime_error("records of another width than the load port's");
+        if (!top_.io_load_ready) throw std::runtime_error("the load port takes no records");
+        std::ifstream stream(file, std::ios::binary);
+        if (!stream) throw std::runtime_error("no file " + file);
+        std::vector<char> word(bytes);
+        std::uint64_t address = 0;
+        for (; stream.read(word.data(), static_cast<std::streamsize>(bytes)); ++address) {
+            if (target == 0 && !throughPort) {
+                array_.store(address, word.data(), bytes);
+                continue;
+            }
+            top_.io_load_valid = 1;
+            top_.io_load_bits_target = static_cast<std::uint8_t>(target);
+            top_.io_load_bits_address = static_cast<std::uint32_t>(address);
+            std::memset(&top_.io_load_bits_record, 0, port);
+            std::memcpy(&top_.io_load_bits_record, word.data(), bytes);
+            if (throughPort) cycle();
+            else array_.outerCycle();
+        }
+        top_.io_load_valid = 0;
+        if (throughPort) return;
+        for (std::uint64_t left = address % freePeriods; left != 0; --left) {
+            if (target == 0) cycle();
+            else array_.unitsEdge(true);
+        }
+    }
+
+    void write(std::uint64_t address, std::uint32_t value) {
+        top_.io_register_write = 1;
+        top_.io_register_address = static_cast<std::uint32_t>(address);
+        top_.io_register_writeData = value;
+        cycle();
+        top_.io_register_write = 0;
+    }
+
+    unsigned __int128 read(std::uint64_t address, unsigned words) {
+        unsigned __int128 value = 0;
+        for (unsigned word = 0; word < words; ++word) {
+            top_.io_register_read = 1;
+            top_.io_register_address = static_cast<std::uint32_t>(address + word);
+            cycle();
+            top_.io_register_read = 0;
+            value |= static_cast<unsigned __int128>(top_.io_register_readData) << (32 * word);
+        }
+        return value;
+    }
+
+    void frame(const std::string& file, std::size_t width, std::size_t height, std::uint64_t startAddress, std::uint64_t watchdog) {
+        pixels_.assign(width * height, {});
+        width_ = width;
+        received_ = 0;
+        isTraced_ = true;
+        write(startAddress, 1);
+        const auto begun = std::chrono::steady_clock::now();
+        const std::uint64_t first = cycles_;
+        auto shown = begun;
+        quiet_ = 0;
+        mayChangeRegisters_ = false;
+        while (!top_.io_done) {
+#ifdef MEMORY_BANKS
+            holds_.next(top_.io_memoryHolds);
+#endif
+            cycle();
+            if (watchdog != 0 && quiet_ > watchdog + watchdogMargin) throw std::runtime_error("no pixel for longer than the watchdog waits");
+            if ((cycles_ & 0xff) == 0 && std::chrono::steady_clock::now() - shown > std::chrono::milliseconds(250)) {
+                shown = std::chrono::steady_clock::now();
+                std::cerr << "progress " << static_cast<double>(received_) / static_cast<double>(pixels_.size()) << std::endl;
+            }
+        }
+#ifdef MEMORY_BANKS
+        std::memset(&top_.io_memoryHolds, 0, sizeof top_.io_memoryHolds);
+#endif
+        mayChangeRegisters_ = true;
+        // The cycle in which `done` is up belongs to the waveform
+        if (traces()) cycle();
+        isTraced_ = false;
+        const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
+        std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(pixels_.data()), static_cast<std::streamsize>(pixels_.size() * sizeof(PixelBytes)));
+        std::cout << "simulated " << cycles_ - first << ' ' << seconds.count() << '\n';
+    }
+
+private:
+    /// One clock cycle; takes the pixels that are offered in it.
+    void cycle() {
+        const bool takes = stallPercent_ == 0 || random_() % 100 >= stallPercent_;
+#define OFFER(column) top_.io_pixels_##column##_ready = takes;
+        EACH_COLUMN(OFFER)
+#undef OFFER
+        array_.settle();
+        quiet_ += takes;
+#define TAKE(column)                                                                                                                      \
+    if (takes && top_.io_pixels_##column##_valid) {                                                                                       \
+        PixelBytes& pixel = at(top_.io_pixels_##column##_bits_x, top_.io_pixels_##column##_bits_y);                                       \
+        pixel.colour[0] = top_.io_pixels_##column##_bits_colour_r;                                                                        \
+        pixel.colour[1] = top_.io_pixels_##column##_bits_colour_g;                                                                        \
+        pixel.colour[2] = top_.io_pixels_##column##_bits_colour_b;                                                                        \
+        pixel.isObject = top_.io_pixels_##column##_bits_isObject;                                                                         \
+        TAKE_RATIO(column)                                                                                                                \
+        TAKE_HIT(column)                                                                                                                  \
+    }
+#ifdef RATIO
+#define TAKE_RATIO(column)                                                                                                                \
+    pixel.ratio[0] = RATIO(column, r);                                                                                                    \
+    pixel.ratio[1] = RATIO(column, g);                                                                                                    \
+    pixel.ratio[2] = RATIO(column, b);
+#else
+#define TAKE_RATIO(column)
+#endif
+#ifdef HIT_DISTANCE
+#define TAKE_HIT(column)                                                                                                                  \
+    pixel.triangle = top_.io_pixels_##column##_bits_hit_triangle;                                                                         \
+    pixel.distance = numberOf(HIT_DISTANCE(column));
+#else
+#define TAKE_HIT(column)
+#endif
+        EACH_COLUMN(TAKE)
+#undef TAKE
+        if (cycles_ % checkInterval_ == 0) array_.check();
+#ifdef WAVEFORM
+        if (traces()) {
+            array_.settleTraced();
+            waveform_.dump(cycles_);
+        }
+#endif
+        array_.edge(mayChangeRegisters_);
+        ++cycles_;
+    }
+
+    /// The cycle goes into the waveform.
+    bool traces() const {
+#ifdef WAVEFORM
+        return isTraced_ && waveform_.isOpen();
+#else
+        return false;
+#endif
+    }
+
+    PixelBytes& at(std::size_t x, std::size_t y) {
+        if (x >= width_ || y * width_ + x >= pixels_.size()) throw std::runtime_error("a pixel outside the frame");
+        PixelBytes& pixel = pixels_[y * width_ + x];
+        if (pixel.isSeen) throw std::runtime_error("a pixel came twice");
+        pixel.isSeen = 1;
+        ++received_;
+        quiet_ = 0;
+        return pixel;
+    }
+
+    Array array_;
+    VColonnade& top_ = array_.device;
+    std::mt19937 random_;
+    unsigned stallPercent_, checkInterval_;
+    bool mayChangeRegisters_ = true, isTraced_ = false;
+#ifdef WAVEFORM
+    VerilatedVcdC waveform_;
+#endif
+#ifdef MEMORY_BANKS
+    BankHolds holds_;
+#endif
+    std::uint64_t cycles_ = 0;
+    /// Since the last pixel, without those in which the sink took none.
+    std::uint64_t quiet_ = 0;
+    std::vector<PixelBytes> pixels_;
+    std::size_t width_ = 0, received_ = 0;
+};
+
+std::string decimal(unsigned __int128 value) {
+    std::string digits;
+    do digits.insert(digits.begin(), static_cast<char>('0' + static_cast<int>(value % 10)));
+    while (value /= 10);
+    return digits;
+}
+
+void run(const std::string& job, const Options& options) {
+    Harness harness(options);
+    std::ifstream commands(job);
+    for (std::string line; std::getline(commands, line);) {
+        std::istringstream words(line);
+        std::string command, name;
+        std::uint64_t a = 0, b = 0, c = 0, d = 0;
+        words >> command;
+        if ((command == "load" || command == "stream") && words >> name >> a >> b) harness.load(name, a, b, command == "stream");
+        else if (command == "write" && words >> a >> b) harness.write(a, static_cast<std::uint32_t>(b));
+        else if (command == "frame" && words >> name >> a >> b >> c >> d) harness.frame(name, a, b, c, d);
+        else if (command == "read" && words >> name >> a >> b) std::cout << "value " << name << ' ' << decimal(harness.read(a, static_cast<unsigned>(b))) << '\n';
+        else throw std::runtime_error("not a command: " + line);
+    }
+}
+
+} // namespace
+
+int main(int argc, char** argv) try {
+    std::string job;
+    Options options;
+    const std::pair<const char*, unsigned*> named[] = {
+        {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}, {"--check", &options.checkInterval}};
+    for (int i = 1; i < argc; ++i) {
+        const std::string argument = argv[i];
+        const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });
+        if (argument == "--waveform" && i + 1 < argc) options.waveform = argv[++i];
+        else if (option == std::end(named)) job = argument;
+        else if (++i < argc) *option->second = static_cast<unsigned>(std::stoul(argv[i]));
+        else throw std::runtime_error(argument + " without a number");
+    }
+    run(job, options);
+    return 0;
+} catch (const std::exception& problem) {
+    std::cerr << "harness: " << problem.what() << '\n';
+    return 3;
+}

@@ -1,0 +1,146 @@
+"""Builds the simulator of a design: compiled once, kept by the content of Verilog and harness, and by the tools."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from colonnade.common import cache, processes
+from colonnade.common.errors import UserError
+from colonnade.common.progress import QUIET, Progress
+from colonnade.common.temporary import temporary_folder
+from colonnade.design.generator import GeneratedDesign
+from colonnade.design.manifest import Manifest
+from colonnade.design.toolchain import cache_directory, project_root, require_program
+from colonnade.device.compiler import (
+    SAFE,
+    clean_environment,
+    require_compiler,
+    require_right_compiler,
+    require_verilator,
+)
+from colonnade.device.simulator_sources import DEVICE, write_sources
+
+PROGRAM = "simulator"
+
+#: Of all models. A model is flat, so that the variables of the coupling are in one structure.
+VERILATOR_OPTIONS = (
+    "--cc --build -j 0 -O3 --flatten --noassert --x-assign fast --x-initial fast --threads 1 "
+    "--output-split 20000 --output-split-cfuncs 2000 -Wno-fatal"
+).split()
+
+#: Of a simulator that writes waveforms: records are wider than Verilator would trace.
+WAVEFORM_OPTIONS = ("--trace", "--trace-max-width", "1024", "-CFLAGS", "-DWAVEFORM")
+
+#: Verilator's makefile would compile with -Os, which is a third slower.
+OPTIMISATION = ("-O2",)
+
+_HARNESS = ("harness.cpp", "array.hpp")
+
+#: What make and the shell take for one word.
+_PLAIN_PATH = re.compile(r"[\w/.+@%,-]+", re.ASCII)
+
+_PURPOSE = "the rtl backend (--backend model needs no simulator)"
+
+
+@dataclass(frozen=True)
+class Tools:
+    """The programs that a simulator is built with, and their versions."""
+
+    verilator: Path
+    compiler: Path
+    versions: tuple[str, str]
+
+
+def simulator_tools() -> Tools:
+    """Check for all that building a simulator takes."""
+    require_program("make", _PURPOSE)
+    compiler, compiler_version = require_compiler(_PURPOSE)
+    verilator, verilator_version = require_verilator(_PURPOSE)
+    return Tools(verilator, compiler, (verilator_version, compiler_version))
+
+
+def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, waveform: bool = False) -> Path:
+    """The simulator of a design, as `cache.entry` keeps it.
+
+    Args:
+        design: What is simulated.
+        progress: Shows the build.
+        waveform: It can write waveforms; it is then slower.
+
+    Raises:
+        UserError: a program is missing, too old, or compiles wrongly.
+        RuntimeError: the simulator does not build.
+    """
+    tools = simulator_tools()
+    harness = Path(__file__).parent / "harness"
+    here = Path(__file__).parent
+    recipe = [here / "simulator_build.py", here / "simulator_sources.py", *(harness / name for name in _HARNESS)]
+    parts = [*tools.versions, *(path.read_text() for path in recipe), design.digest()]
+    parts += ["waveform"] if waveform else []
+    key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
+    folder = cache_directory(project_root()) / "simulator" / key
+
+    def make(place: Path) -> None:
+        with progress.step("building the simulator"):
+            require_right_compiler(tools.compiler, (*OPTIMISATION, *SAFE))
+            _build(tools, design, harness, place, folder.with_suffix(".log"), waveform)
+
+    return cache.entry(folder, make, "simulator", progress) / PROGRAM
+
+
+def _build(
+    tools: Tools, design: GeneratedDesign, harness: Path, place: Path, log: Path, waveform: bool = False
+) -> None:
+    """Put the program into the folder `place`. It is built elsewhere: make cannot work in a path with spaces."""
+    with temporary_folder() as work:
+        if not _PLAIN_PATH.fullmatch(str(work)):
+            raise UserError(f"a simulator cannot be built in {work.parent.parent}: name a plain path with TMPDIR")
+        models = write_sources(design.sources, work)
+        (work / "ports.hpp").write_text(_ports_header(design.manifest, design.sources))
+        for name in _HARNESS:
+            shutil.copy(harness / name, work / name)
+        commands = [_verilate(tools, top, [path.relative_to(work) for path in paths]) for top, paths in models.items()]
+        if waveform:
+            commands = [[*command, *WAVEFORM_OPTIONS] for command in commands]
+        inner = [top for top in models if top != DEVICE]
+        commands[-1] += ["--exe", "-o", PROGRAM, "harness.cpp", "-CFLAGS", " ".join(f"-I../obj_{top}" for top in inner)]
+        commands[-1] += ["-CFLAGS", "-I..", "-LDFLAGS", " ".join(f"../obj_{top}/V{top}__ALL.a" for top in inner)]
+        with log.open("w") as stream:
+            for command in commands:
+                done = processes.run(command, cwd=work, env=clean_environment(), stdout=stream, stderr=stream)
+                if done.returncode != 0:
+                    raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
+        shutil.move(work / f"obj_{DEVICE}" / PROGRAM, place / PROGRAM)
+    log.unlink()
+
+
+def _verilate(tools: Tools, top: str, sources: Sequence[Path]) -> list[str]:
+    """The command that verilates and compiles one model into the folder ``obj_TOP``."""
+    flags = " ".join(OPTIMISATION)
+    return [
+        *(str(tools.verilator), *VERILATOR_OPTIONS, "--top-module", top, "--Mdir", f"obj_{top}"),
+        *("-CFLAGS", " ".join(SAFE), "-MAKEFLAGS", f"CXX={tools.compiler}"),
+        *("-MAKEFLAGS", f"OPT_FAST={flags}", "-MAKEFLAGS", f"OPT_GLOBAL={flags}"),
+        *map(str, sources),
+    ]
+
+
+def _ports_header(manifest: Manifest, sources: Sequence[Path]) -> str:
+    """What the harness has to know of this design's ports."""
+    columns = int(manifest.config["array"]["columns"])
+    header = "#pragma once\n#define EACH_COLUMN(DO) " + " ".join(f"DO({column})" for column in range(columns)) + "\n"
+    top = next(path for path in sources if path.stem == "Colonnade").read_text()
+    # Names of ports that end with their format
+    if match := re.search(r"io_pixels_0_bits_hit_distance_(\w+)", top):
+        header += f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_bits_hit_distance_{match.group(1)}\n"
+    if match := re.search(r"io_pixels_0_bits_ratio_r_(\w+)", top):
+        port = f"top_.io_pixels_##column##_bits_ratio_##channel##_{match.group(1)}"
+        header += f"#define RATIO(column, channel) {port}\n"
+    if manifest.config["columnBvhMemory"].get("holdable", False):
+        header += f"#define MEMORY_BANKS {columns * int(manifest.config['columnBvhMemory']['banks'])}\n"
+    return header

@@ -1,0 +1,233 @@
+"""Sources of a simulator: Verilator models of render unit, column and device, and their coupling.
+
+Verilator makes C++ for each copy of a module, some 170 MB of it for 80 render units. So render unit and column are
+models of their own, and each copy of them an object. A model that holds others is *opened*: its instances of them are
+taken out, and variables stand for their ports.
+
+One evaluation of each unit and a few of columns and device make a cycle exact, because of three properties of the RTL:
+
+1. A unit's outputs depend on its inputs in the same cycle only by way of inputs that a register drives.
+2. Those are all but the *direct* ones (`DIRECT`).
+3. What a column tells the device depends on what the device tells it in the same cycle by its pixel stream alone.
+
+In a cycle everything settles first: device, columns, device. Then comes the clock edge of the device, of the columns,
+and of the units. The inputs of a unit that are not direct cross between the last two, into registers around the unit
+(`UNIT_MODEL`): the unit sees each of them in the cycle in which the column's register holds it. The harness checks all
+of this at run time (``Array::check``). All models clock on both edges (`both_edges`), so that a cycle takes one
+evaluation of a unit and not two.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+UNIT, COLUMN, DEVICE = "RenderUnit", "Column", "Colonnade"
+
+#: The module with registers around the unit's inputs.
+UNIT_MODEL = "RenderUnitModel"
+
+#: Inputs of a unit that depend on its outputs, or on the device's inputs, in the same cycle.
+DIRECT = re.compile(r"reset|io_start|io_\w*_ready")
+
+#: Inputs that the host writes while no frame runs.
+FRAME_REGISTERS = "io_registers_"
+
+_PORT = re.compile(r"(?:(input|output)\s*)?(?:\[(\d+):0\])?\s*(\w+)")
+_CONNECTION = re.compile(r"\.(\w+)\s*\(((?:[^()]|\([^()]*\))*)\)")
+_INSTANCE = re.compile(r"^  (\w+) \w+ \(", re.MULTILINE)
+_BIND = re.compile(r"^bind (\w+) (\w+) ", re.MULTILINE)
+_RECORDS = re.compile(r"^  records_\w+ (records_(?:\d+_)?ext) \(", re.MULTILINE)
+_RECORDS_ARRAY = re.compile(r"(reg \[\d+:0\] Memory\[0:\d+\]);")
+
+
+@dataclass(frozen=True)
+class Port:
+    """A port of a module.
+
+    Attributes:
+        name: In Verilog.
+        is_input: Its direction.
+        bits: Its width.
+    """
+
+    name: str
+    is_input: bool
+    bits: int
+
+    @property
+    def range(self) -> str:
+        """In a Verilog declaration."""
+        return f"[{self.bits - 1}:0] " if self.bits > 1 else ""
+
+    @property
+    def cpp_type(self) -> str:
+        """The type that Verilator gives a variable of this width."""
+        for maximum, name in ((8, "CData"), (16, "SData"), (32, "IData"), (64, "QData")):
+            if self.bits <= maximum:
+                return name
+        return f"VlWide<{(self.bits + 31) // 32}>"
+
+    @property
+    def kind(self) -> str:
+        """The list of the coupling that it belongs to."""
+        if not self.is_input:
+            return "OUTPUTS"
+        if self.name.startswith(FRAME_REGISTERS):
+            return "REGISTERS"
+        return "DIRECT" if DIRECT.fullmatch(self.name) else "INPUTS"
+
+
+def both_edges(verilog: str) -> str:
+    """The same modules with all their registers clocked by both edges: a change of the clock is a cycle."""
+    return re.sub(r"@\(posedge (\w+)\)", r"@(edge \1)", verilog)
+
+
+def module_ports(verilog: str, module: str) -> list[Port]:
+    """The ports of a module as firtool writes them, but for its clock."""
+    header = re.search(rf"^module {module}\((.*?)\n\);", verilog, re.DOTALL | re.MULTILINE)
+    if header is None:
+        raise ValueError(f"the Verilog has no module {module} with ports")
+    ports: list[Port] = []
+    is_input, bits = True, 1
+    for text in header.group(1).split(","):
+        match = _PORT.fullmatch(text.strip())
+        if match is None:
+            raise ValueError(f"a port of {module} is not understood: {text.strip()}")
+        direction, top_bit, name = match.groups()
+        is_input = is_input if direction is None else direction == "input"
+        if direction is not None or top_bit is not None:
+            bits = int(top_bit or 0) + 1
+        ports.append(Port(name, is_input, bits))
+    return [port for port in ports if port.name != "clock"]
+
+
+def unit_model(ports: Iterable[Port]) -> str:
+    """Verilog of `UNIT_MODEL`: the unit with a register at each input that is not direct."""
+    declarations, registers, connections = ["  input clock"], [], ["    .clock(clock)"]
+    for port in ports:
+        declarations.append(f"  {'input' if port.is_input else 'output'} {port.range}{port.name}")
+        source = port.name
+        if port.kind in ("REGISTERS", "INPUTS"):
+            source = f"held_{port.name}"
+            registers.append(f"  reg {port.range}{source};\n  always @(edge clock) {source} <= {port.name};\n")
+        connections.append(f"    .{port.name}({source})")
+    header = f"module {UNIT_MODEL}(\n" + ",\n".join(declarations) + "\n);\n"
+    return header + "".join(registers) + f"  {UNIT} unit (\n" + ",\n".join(connections) + "\n  );\nendmodule\n"
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A module whose instances of another one are taken out: variables stand for their ports.
+
+    Attributes:
+        verilog: Of the module.
+        module: Its name.
+        ports: Of the instances; those that are connected to anything.
+        count: How many instances it had.
+        shared: Inputs that all instances have in common; they have one variable.
+    """
+
+    verilog: str
+    module: str
+    ports: tuple[Port, ...]
+    count: int
+    shared: frozenset[str]
+
+    def variable(self, instance: int, port: Port) -> str:
+        """The variable in Verilog that stands for a port of an instance."""
+        return _variable(self.shared, instance, port)
+
+
+def _variable(shared: frozenset[str], instance: int, port: Port) -> str:
+    return f"shared_{port.name}" if port.name in shared else f"instance{instance}_{port.name}"
+
+
+def open_module(verilog: str, module: str, inner: str, ports: Sequence[Port]) -> Opened:
+    """Take the instances of `inner`, which has these ports, out of a module's Verilog."""
+    instances = list(re.finditer(rf"^  {inner} \w+ \((.*?)\n  \);\n", verilog, re.DOTALL | re.MULTILINE))
+    if not instances:
+        raise ValueError(f"module {module} holds no {inner}")
+    connections = [{n: e.strip() for n, e in _CONNECTION.findall(instance.group(1))} for instance in instances]
+    wired = tuple(port for port in ports if not connections[0][port.name].startswith("/*"))
+    shared = frozenset(
+        port.name for port in wired if port.is_input and len({each[port.name] for each in connections}) == 1
+    )
+    text, end, declared = "", 0, set[str]()
+    for number, instance in enumerate(instances):
+        text += verilog[end : instance.start()]
+        end = instance.end()
+        for port in wired:
+            name, expression = _variable(shared, number, port), connections[number][port.name]
+            if name in declared:
+                continue
+            declared.add(name)
+            if port.is_input:
+                text += f"  wire {port.range}{name} /*verilator public_flat_rd*/ = {expression};\n"
+            else:
+                text += f"  reg {port.range}{name} /*verilator public_flat_rw*/;\n  assign {expression} = {name};\n"
+    return Opened(text + verilog[end:], module, wired, len(instances), shared)
+
+
+def coupling(opened: Opened, inner: str) -> str:
+    """C++ that gives the harness the variables of an opened module.
+
+    ``INNER_OUTPUTS(DO)``, ``_DIRECT``, ``_INPUTS`` and ``_REGISTERS`` expand ``DO(port)`` for each port of the kind;
+    ``INNERVariables`` has a pointer for each port, and ``bindINNER(root)`` gives those of all instances.
+    """
+    lines = [
+        f"#define {inner}_{kind}(DO) " + " ".join(f"DO({port.name})" for port in opened.ports if port.kind == kind)
+        for kind in ("OUTPUTS", "DIRECT", "INPUTS", "REGISTERS")
+    ]
+    lines += [f"struct {inner}Variables {{", *(f"    {port.cpp_type}* {port.name};" for port in opened.ports), "};"]
+    lines.append(
+        f"inline std::vector<{inner}Variables> bind{inner}(V{opened.module}___024root& root) {{\n    return {{"
+    )
+    for number in range(opened.count):
+        variables = (f"&root.{opened.module}__DOT__{opened.variable(number, port)}" for port in opened.ports)
+        lines.append("        {" + ", ".join(variables) + "},")
+    return "\n".join([*lines, "    };", "}"]) + "\n"
+
+
+def record_banks(verilog: str) -> str:
+    """``RECORD_BANKS(DO)``, which expands ``DO(memory)`` for each bank of a column's memory, in order."""
+    banks = [f"DO({COLUMN}__DOT__memory__DOT__{bank}__DOT__Memory)" for bank in _RECORDS.findall(verilog)]
+    return f"constexpr unsigned banksOfColumn = {len(banks)};\n#define RECORD_BANKS(DO) {' '.join(banks)}\n"
+
+
+def write_sources(sources: Iterable[Path], folder: Path) -> dict[str, list[Path]]:
+    """Write the Verilog of the models and their ``coupling.hpp`` into a folder.
+
+    Returns:
+        The files of each model, by its top module: `UNIT_MODEL`, `COLUMN`, `DEVICE`.
+    """
+    verilog = {path.stem: both_edges(path.read_text()) for path in sources}
+    ports = {module: module_ports(verilog[module], module) for module in (UNIT, COLUMN)}
+    column = open_module(verilog[COLUMN], COLUMN, UNIT, ports[UNIT])
+    device = open_module(verilog[DEVICE], DEVICE, COLUMN, ports[COLUMN])
+    header = "#pragma once\n" + record_banks(verilog["ColumnBvhMemory"])
+    (folder / "coupling.hpp").write_text(header + coupling(column, UNIT) + coupling(device, COLUMN))
+    for module in verilog:
+        if module.startswith("records_"):
+            verilog[module] = _RECORDS_ARRAY.sub(r"\1 /*verilator public_flat_rw*/;", verilog[module])
+    verilog |= {UNIT_MODEL: unit_model(ports[UNIT]), COLUMN: column.verilog, DEVICE: device.verilog}
+    return {top: list(_written(verilog, top, folder / top)) for top in (UNIT_MODEL, COLUMN, DEVICE)}
+
+
+def _written(verilog: dict[str, str], top: str, folder: Path) -> Iterator[Path]:
+    """Write the file of a module and those of all that it instantiates."""
+    folder.mkdir()
+    found, pending = set[str](), [top]
+    while pending:
+        module = pending.pop()
+        if module in found or module not in verilog:
+            continue
+        found.add(module)
+        pending += _INSTANCE.findall(verilog[module])
+    # What is bound to a module comes before it: see ppa.recording
+    binders = {name for name, text in verilog.items() if {module for module, _ in _BIND.findall(text)} & found}
+    for module in sorted(binders | found, key=lambda name: (name not in binders, name)):
+        (folder / f"{module}.sv").write_text(verilog[module])
+        yield folder / f"{module}.sv"

@@ -1,0 +1,74 @@
+"""The camera of a room, from its ``meta.json``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common.errors import UserError
+from colonnade.environment.model import EnvironmentCamera
+
+#: Pixels that a principal point or a focal length may have, and a focal length must have.
+_MAX_PIXELS = 1e6
+_LEAST_FOCAL = 1.0
+#: Metres that the camera may be away from the world's origin.
+_MAX_METRES = 1e6
+#: How far the axes of a pose may be from unit and at right angles.
+_AXES_TOLERANCE = 1e-3
+
+
+def read_camera(data: dict[str, Any], file: Path) -> EnvironmentCamera:
+    """Focal lengths, principal point and pose.
+
+    ``cam_to_world`` is the 4x4 (or 3x4) pose of a camera with x left, y up, z forward, as Mitsuba writes it; view
+    space turns its first two axes round.
+    """
+    values = {key: _number(data, key, file) for key in ("fx", "fy", "cx", "cy")}
+    for key in ("fx", "fy"):
+        if values[key] <= 0:
+            raise UserError(f"{file}: {key} is {values[key]:g}, a focal length must be more than 0 pixels")
+        if values[key] < _LEAST_FOCAL:
+            raise UserError(f"{file}: {key} is {values[key]:g}, a focal length must be at least {_LEAST_FOCAL:g}")
+    pose = _pose(data, file)
+    to_world = pose[:3] * np.array([-1.0, -1.0, 1.0, 1.0])
+    return EnvironmentCamera(values["fx"], values["fy"], values["cx"], values["cy"], to_world)
+
+
+def check_size(data: dict[str, Any], size: tuple[int, int], file: Path, map_file: Path) -> None:
+    """Refuse maps of another size than the camera's: its focal lengths would be wrong for them."""
+    for key, pixels in zip(("width", "height"), size, strict=True):
+        if key in data and data[key] != pixels:
+            raise UserError(
+                f"{map_file} is {size[0]}x{size[1]} pixels, but {file} says {key} {data[key]}: give maps of the"
+                " camera's size"
+            )
+
+
+def _number(data: dict[str, Any], key: str, file: Path) -> float:
+    if key not in data:
+        raise UserError(f"{file} lacks {key}: a room's camera needs fx, fy, cx, cy (pixels) and cam_to_world")
+    value = data[key]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _MAX_PIXELS:
+        raise UserError(f"{file}: {key} must be a finite number of pixels up to {_MAX_PIXELS:g}")
+    return float(value)
+
+
+def _pose(data: dict[str, Any], file: Path) -> NDArray[np.float64]:
+    """float64 [3 or 4, 4]: a right-handed frame and a place."""
+    if "cam_to_world" not in data:
+        raise UserError(f"{file} lacks cam_to_world: the camera's 4x4 pose, x left, y up, z forward")
+    try:
+        pose = np.array(data["cam_to_world"], dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        pose = np.empty(0)
+    if pose.shape not in ((3, 4), (4, 4)) or not np.isfinite(pose).all():
+        raise UserError(f"{file}: cam_to_world must be 4 rows of 4 finite numbers")
+    if np.abs(pose[:3, 3]).max() > _MAX_METRES:
+        raise UserError(f"{file}: cam_to_world has the camera more than {_MAX_METRES:g} metres away")
+    axes = pose[:3, :3]
+    if np.abs(axes.T @ axes - np.eye(3)).max() > _AXES_TOLERANCE or np.linalg.det(axes) < 0:
+        raise UserError(f"{file}: the axes of cam_to_world must be unit, at right angles and right-handed")
+    return pose

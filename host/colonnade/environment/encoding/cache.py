@@ -1,0 +1,69 @@
+"""Keeps encoded rooms, because encoding one takes seconds."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from colonnade.common import cache
+from colonnade.design.toolchain import cache_directory, project_root
+from colonnade.environment.encoding.image import AttributeImage, encode_environment
+from colonnade.environment.encoding.layout import AttributeLayout
+from colonnade.environment.model import Environment
+
+#: The file of an entry.
+FILE = "room.npz"
+
+
+def encoded_environment(
+    environment: Environment, layout: AttributeLayout, folder: Path | None = None
+) -> AttributeImage:
+    """`encode_environment` with a cache: in ``folder``, by default in the project's."""
+    place = folder or cache_directory(project_root()) / "rooms"
+
+    def make(entry: Path) -> None:
+        _write(entry / FILE, encode_environment(environment, layout))
+
+    return _read(cache.entry(place / _key(environment, layout), make, "room") / FILE, layout)
+
+
+def _key(environment: Environment, layout: AttributeLayout) -> str:
+    """Of all that the encoders look at, and of the encoders."""
+    digest = hashlib.sha256(_sources())
+    camera = environment.camera
+    digest.update(repr((astuple(layout), camera.fx, camera.fy, camera.cx, camera.cy)).encode())
+    for array in (environment.albedo, environment.normals, environment.depth, camera.to_world):
+        digest.update(repr(array.shape).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:32]
+
+
+@functools.cache
+def _sources() -> bytes:
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.digest()
+
+
+def _read(file: Path, layout: AttributeLayout) -> AttributeImage:
+    with np.load(file) as stored:
+        memories: dict[str, dict[str, Any]] = {}
+        for name in stored.files:
+            part, _, memory = name.partition(".")
+            if memory:
+                memories.setdefault(part, {})[memory] = stored[name]
+        return AttributeImage.from_memories(layout, memories, float(stored["depth_unit"]))
+
+
+def _write(file: Path, image: AttributeImage) -> None:
+    arrays: dict[str, Any] = {
+        f"{part}.{name}": words for part, group in image.memories().items() for name, words in group.items()
+    }
+    with file.open("wb") as stream:
+        np.savez(stream, depth_unit=np.float64(image.depth_unit), **arrays)

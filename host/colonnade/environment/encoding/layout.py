@@ -1,0 +1,196 @@
+"""Sizes of the physical-attribute memory: what a configuration gives each map, and what follows from it.
+
+| memory | word, bits | words |
+|---|---|---|
+| descriptors | 32 | tiles |
+| palette | three fields | `palette_size` |
+| heap | 16 | the rest of `map_bytes` |
+| seeds (`slic`) | three fields | tiles |
+| labels (`slic`) | 16: four labels | blocks / 4 |
+| plane descriptors | 16 | tiles |
+| planes | 64 | `planes` |
+| plane heap | 16 | the rest of `plane_bytes` |
+| shell | 144 | `shell_planes` |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from colonnade.common.errors import UserError
+
+#: Bits of a descriptor's pointer, in 16-bit words, and of a palette index or plane id.
+POINTER_BITS = 13
+INDEX_BITS = 8
+DESCRIPTOR_BITS = 32
+PLANE_DESCRIPTOR_BITS = 16
+HEAP_WORD_BITS = 16
+PLANE_BITS = 64
+SHELL_BITS = 144
+#: Labels of `slic`: one of the 3x3 neighbouring seeds.
+LABEL_BITS = 4
+#: Edge of the block of pixels that shares a label: a quarter of a tile's.
+BLOCKS_A_TILE_EDGE = 4
+
+
+#: What the hardware has not got a choice of.
+HOST_ONLY = ("field_bits", "plane_cells")
+
+
+@dataclass(frozen=True)
+class AttributeLayout:
+    """What the configuration says of the background's maps.
+
+    Attributes:
+        width, height: Pixels of the maps.
+        encoding: ``twoLevel`` or ``slic``, of albedo and normals.
+        tile_size: Edge of a tile, pixels: 8, 16 or 32.
+        palette_size: Vectors of a map that all its tiles share, 4 to 256.
+        field_bits: Of each of the three components of a vector, 6 to 13.
+        map_bytes: For the albedo map, and as many for the normals.
+        planes: Plane table, 2 to 128; its last one is nothing, infinitely far away.
+        plane_bytes: For planes, their map and the shell.
+        plane_cells: Most cells on a tile's edge in the plane map, 8 or 16.
+        shell_planes: Planes around the room, for rays that leave the view.
+    """
+
+    width: int = 640
+    height: int = 480
+    encoding: str = "twoLevel"
+    tile_size: int = 16
+    palette_size: int = 256
+    field_bits: int = 12
+    map_bytes: int = 16384
+    planes: int = 128
+    plane_bytes: int = 8192
+    plane_cells: int = 8
+    shell_planes: int = 8
+
+    def __post_init__(self) -> None:
+        def within(name: str, low: int, high: int) -> None:
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise UserError(f"background layout: {name} is {value}, it must be from {low} to {high}")
+
+        within("width", 1, 4096)
+        within("height", 1, 4096)
+        within("palette_size", 4, 1 << INDEX_BITS)
+        within("field_bits", 6, 13)
+        within("planes", 2, 128)
+        within("shell_planes", 1, 16)
+        if self.tile_size not in (8, 16, 32):
+            raise UserError(f"background layout: tile_size is {self.tile_size}, it must be 8, 16 or 32")
+        if self.plane_cells not in (8, 16) or self.plane_cells > self.tile_size:
+            raise UserError(
+                f"background layout: plane_cells is {self.plane_cells}, it must be 8, or 16 in larger tiles"
+            )
+        if self.encoding not in ("twoLevel", "slic"):
+            raise UserError(f"background layout: encoding is {self.encoding!r}, it must be twoLevel or slic")
+        if self.encoding == "twoLevel":
+            self._enough("map_bytes", self.map_bytes, self.tiles * DESCRIPTOR_BITS + self.palette_bits)
+        else:
+            self._enough("map_bytes", self.map_bytes, self.tiles * self.vector_bits + self.label_words * HEAP_WORD_BITS)
+        self._enough("plane_bytes", self.plane_bytes, self._fixed_plane_bits)
+
+    def _enough(self, name: str, available: int, needed_bits: int) -> None:
+        if available * 8 < needed_bits:
+            raise UserError(
+                f"background layout: {name} is {available:,}, but {self.width}x{self.height} pixels in tiles of"
+                f" {self.tile_size} need {-(-needed_bits // 8):,} at least: raise it, or take larger tiles"
+            )
+
+    @staticmethod
+    def from_config(section: Mapping[str, Any]) -> AttributeLayout:
+        """The layout of a configuration's section ``physicalAttributeMemory``."""
+        names = {"tileSize": "tile_size", "paletteSize": "palette_size", "mapBytes": "map_bytes"}
+        names |= {"planeBytes": "plane_bytes", "shellPlanes": "shell_planes"}
+        return AttributeLayout(**{names.get(key, key): value for key, value in section.items() if key != "shared"})
+
+    def to_config(self) -> dict[str, Any]:
+        """The section ``physicalAttributeMemory`` of a configuration with these sizes."""
+        names = {"tile_size": "tileSize", "palette_size": "paletteSize", "map_bytes": "mapBytes"}
+        names |= {"plane_bytes": "planeBytes", "shell_planes": "shellPlanes"}
+        sizes = {names.get(name, name): value for name, value in asdict(self).items() if name not in HOST_ONLY}
+        return {**sizes, "shared": False}
+
+    @property
+    def tile_columns(self) -> int:
+        """Tiles in a row."""
+        return -(-self.width // self.tile_size)
+
+    @property
+    def tile_rows(self) -> int:
+        """Rows of tiles."""
+        return -(-self.height // self.tile_size)
+
+    @property
+    def tiles(self) -> int:
+        """Tiles of the map; tile (x, y) has the index y * `tile_columns` + x."""
+        return self.tile_columns * self.tile_rows
+
+    @property
+    def vector_bits(self) -> int:
+        """Of a palette entry or a seed."""
+        return 3 * self.field_bits
+
+    @property
+    def palette_bits(self) -> int:
+        """Of a whole palette."""
+        return self.palette_size * self.vector_bits
+
+    @property
+    def heap_words(self) -> int:
+        """16-bit words for masks in a `twoLevel` map: what is left, as far as a pointer reaches."""
+        left = self.map_bytes * 8 - self.tiles * DESCRIPTOR_BITS - self.palette_bits
+        return min(left // HEAP_WORD_BITS, 1 << POINTER_BITS)
+
+    @property
+    def block_size(self) -> int:
+        """Edge of a block of pixels with one label."""
+        return self.tile_size // BLOCKS_A_TILE_EDGE
+
+    @property
+    def block_columns(self) -> int:
+        """Blocks in a row."""
+        return -(-self.width // self.block_size)
+
+    @property
+    def block_rows(self) -> int:
+        """Rows of blocks."""
+        return -(-self.height // self.block_size)
+
+    @property
+    def label_words(self) -> int:
+        """16-bit words of labels in a `slic` map."""
+        return -(-self.block_columns * self.block_rows * LABEL_BITS // HEAP_WORD_BITS)
+
+    @property
+    def _fixed_plane_bits(self) -> int:
+        tables = self.planes * PLANE_BITS + self.shell_planes * SHELL_BITS
+        return self.tiles * PLANE_DESCRIPTOR_BITS + tables
+
+    @property
+    def plane_heap_words(self) -> int:
+        """16-bit words for plane ids and masks."""
+        return min((self.plane_bytes * 8 - self._fixed_plane_bits) // HEAP_WORD_BITS, 1 << POINTER_BITS)
+
+    @property
+    def map_memory_bytes(self) -> int:
+        """Bytes of a map's memories."""
+        if self.encoding == "twoLevel":
+            bits = self.tiles * DESCRIPTOR_BITS + self.palette_bits + self.heap_words * HEAP_WORD_BITS
+        else:
+            bits = self.tiles * self.vector_bits + self.label_words * HEAP_WORD_BITS
+        return -(-bits // 8)
+
+    @property
+    def plane_memory_bytes(self) -> int:
+        """Bytes of the planes' memories."""
+        return -(-(self._fixed_plane_bits + self.plane_heap_words * HEAP_WORD_BITS) // 8)
+
+    @property
+    def nothing(self) -> int:
+        """Id of the plane that is infinitely far away."""
+        return self.planes - 1

@@ -1,0 +1,71 @@
+"""Every map of a room as pictures: before clustering, after it, and the difference."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common.atomic_files import make_folder, replacing
+from colonnade.common.image_io import encode_srgb
+from colonnade.environment.encoding.image import AttributeImage
+from colonnade.environment.encoding.planes import Picture
+from colonnade.environment.encoding.quality import angles, ray_errors, relit
+from colonnade.environment.model import Environment
+
+#: White in a difference: levels of 255, degrees, metres.
+FULL_LEVELS, FULL_DEGREES, FULL_METRES = 64.0, 30.0, 0.2
+
+
+def map_pictures(environment: Environment, image: AttributeImage) -> dict[str, NDArray[np.uint8]]:
+    """By name (``albedo-before`` and so on) uint8 [height, width, 3]; differences are dark where nothing changed."""
+    albedo, normals = image.decoded_albedo(), image.decoded_normals()
+    depth = image.decoded_depth(Picture.of(environment, image.depth_unit))
+    pictures = {}
+    for name, before, after in (
+        ("albedo", environment.albedo, albedo),
+        ("relit", relit(environment.albedo, environment.normals), relit(albedo, normals)),
+    ):
+        pair = encode_srgb(before), encode_srgb(after)
+        pictures[f"{name}-before"], pictures[f"{name}-after"] = pair
+        levels = np.abs(pair[0].astype(np.float64) - pair[1])
+        pictures[f"{name}-difference"] = _levels(levels / FULL_LEVELS)
+    pictures["normals-before"] = _normal_map(environment.normals)
+    pictures["normals-after"] = _normal_map(normals)
+    pictures["normals-difference"] = _grey(angles(environment.normals, normals) / FULL_DEGREES)
+    nearest = float(environment.depth.min())
+    pictures["depth-before"], pictures["depth-after"] = _grey(nearest / environment.depth), _grey(nearest / depth)
+    pictures["depth-difference"] = _grey(ray_errors(environment, depth) / FULL_METRES)
+    pictures["planes"] = _coloured(image.planes.ids(image.layout))
+    return pictures
+
+
+def write_pictures(folder: Path, pictures: dict[str, NDArray[np.uint8]]) -> None:
+    """Write ``NAME.png`` for each into ``folder``, which is made."""
+    from PIL import Image
+
+    make_folder(folder)
+    for name, picture in pictures.items():
+        with replacing(folder / f"{name}.png") as stream:
+            Image.fromarray(picture).save(stream, format="PNG")
+
+
+def _levels(values: NDArray[np.float64]) -> NDArray[np.uint8]:
+    return np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
+
+
+def _grey(values: NDArray[np.float64]) -> NDArray[np.uint8]:
+    return np.repeat(_levels(values)[..., np.newaxis], 3, axis=2)
+
+
+def _normal_map(normals: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """As files have them: x right, y up, z towards the viewer."""
+    return _levels(normals * np.array([0.5, -0.5, -0.5]) + 0.5)
+
+
+def _coloured(ids: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """A colour for each plane."""
+    colours = np.random.default_rng(5).integers(40, 256, (int(ids.max()) + 1, 3), dtype=np.uint8)
+    picture: NDArray[np.uint8] = colours[ids]
+    return picture

@@ -1,0 +1,1 @@
+"""Measurements: rays per cycle, sweeps, verification."""

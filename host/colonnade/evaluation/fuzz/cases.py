@@ -1,0 +1,63 @@
+"""Legal frames to corrupt: small scenes that use what a design has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from colonnade.design.manifest import Manifest
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
+from colonnade.scene.view import with_overrides
+from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.packer import pack
+
+#: Pixels of a legal frame.
+SIZE = (16, 12)
+
+#: A frame of that size takes a fraction of it.
+WATCHDOG_CYCLES = 400_000
+
+SKY = Background(colour=(0.2, 0.3, 0.5))
+
+
+@dataclass(frozen=True)
+class Case:
+    """All that a frame depends on.
+
+    Attributes:
+        name: Of the legal scene.
+        image: What is loaded.
+        registers: Every rw register by name.
+    """
+
+    name: str
+    image: SceneImage
+    registers: Mapping[str, int]
+
+
+def legal_cases(manifest: Manifest) -> tuple[Case, ...]:
+    """The legal frames that a design can render."""
+    return tuple(_case(name, scene, manifest) for name, scene in _scenes(manifest))
+
+
+def _scenes(manifest: Manifest) -> Iterator[tuple[str, Scene]]:
+    frame = manifest.config["frame"]
+    cube, sphere = Scene(MeshSource(name="cube"), background=SKY), Scene(MeshSource(name="sphere:1"), background=SKY)
+    yield "cube", cube
+    yield "sphere", replace(sphere, light=Light(falloff=2.0))
+    yield "inside", replace(sphere, camera=Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0)))
+    if int(frame["lights"]) > 1:
+        yield "two lights", replace(sphere, light=Light(falloff=3.0), more_lights=(Light(offset=(-1.0, 0.5, 2.0)),))
+    if int(frame["maxBounces"]) > 0:
+        mirror, glass = Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Material(kind="glass", ior=1.45)
+        yield "mirror", replace(cube, material=mirror, paths=Paths(bounces=3))
+        yield "glass", replace(sphere, material=glass, paths=Paths(bounces=4))
+
+
+def _case(name: str, scene: Scene, manifest: Manifest) -> Case:
+    mesh = load_mesh(scene.mesh_source)
+    image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
+    registers = frame_registers(scene, image.header, manifest, *SIZE)
+    return Case(name, image, registers | {"frame.watchdogCycles": WATCHDOG_CYCLES})

@@ -1,0 +1,44 @@
+"""Corrupt frame registers; those of a room are left to the maps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from colonnade.design.manifest import Manifest, Register, value_range
+from colonnade.evaluation.fuzz.cases import Case
+from colonnade.evaluation.fuzz.values import random_value
+
+#: Widest corrupt frame in both directions: larger ones say nothing new and take long.
+MAX_PIXELS = 40
+
+
+def corrupt_registers(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
+    """Set one to three registers of any group to any value that fits."""
+    groups: dict[str, list[Register]] = {}
+    for register in manifest.registers.values():
+        if (
+            register.access == "rw"
+            and register.name != "frame.watchdogCycles"
+            and not register.name.startswith("room.")
+        ):
+            groups.setdefault(register.name.split("[")[0].rsplit(".", 1)[0], []).append(register)
+    values = dict(case.registers)
+    changes = []
+    for _ in range(int(random.integers(1, 4))):
+        members = list(groups.values())[int(random.integers(len(groups)))]
+        register = members[int(random.integers(len(members)))]
+        values[register.name] = _value(random, register, values[register.name])
+        changes.append(f"{register.name} = {values[register.name]}")
+    return replace(case, registers=values), "; ".join(changes)
+
+
+def _value(random: np.random.Generator, register: Register, now: int) -> int:
+    minimum, greatest = value_range(register.width, register.signed)
+    if register.name in ("frame.width", "frame.height"):
+        return int(random.integers(MAX_PIXELS + 1))
+    if random.random() < 0.25:
+        flipped = (now ^ (1 << int(random.integers(register.width)))) & ((1 << register.width) - 1)
+        return flipped - (1 << register.width) if register.signed and flipped >> (register.width - 1) else flipped
+    return random_value(random, minimum, greatest)

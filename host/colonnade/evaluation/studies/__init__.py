@@ -1,0 +1,1 @@
+"""Studies of accuracy, each with its command under ``colonnade study``."""

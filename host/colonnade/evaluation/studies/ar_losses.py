@@ -1,0 +1,194 @@
+"""What an AR frame loses on its way into the device: by clustering, by the rebuild, by fixed point.
+
+The truth is the float reference with full maps and the mesh of the depth map:
+`colonnade.reference.environment.decoded.backdrops`.
+
+`colonnade study --frames ROOM …` prints the losses of three objects in rooms. The device's frames are the bit-exact
+model's.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from colonnade.common.image_io import encode_srgb, write_png
+from colonnade.common.progress import QUIET, Progress
+from colonnade.common.types import Floats
+from colonnade.quality.region_metrics import RegionDifference, compare_regions, frame_regions
+from colonnade.reference.environment.decoded import backdrops
+from colonnade.reference.render import ReferenceResult, render_reference
+from colonnade.registers.environment import environment_registers
+from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Placement, Scene
+
+if TYPE_CHECKING:
+    from colonnade.design.manifest import Manifest
+    from colonnade.environment.encoded import EncodedEnvironment
+    from colonnade.environment.encoding.image import AttributeImage
+    from colonnade.environment.model import Environment
+    from colonnade.mesh.mesh import Mesh
+    from colonnade.reference.environment.ray_march import Rebuild
+    from colonnade.scene.view import View
+
+#: Differences by part of the picture: frame, object, shadow.
+Regions = Mapping[str, RegionDifference]
+
+
+@dataclass(frozen=True)
+class Losses:
+    """What lies between the truth and a frame.
+
+    Attributes:
+        pictures: The frames in 64 bits by loss: `full` is the truth, `clustering` and `rebuild` have one loss each,
+            `both` has both.
+        by_loss: Each of them against the truth; with a device's frame also `fixed point`, that frame against `both`,
+            and `device`, that frame against the truth.
+    """
+
+    pictures: Mapping[str, ReferenceResult]
+    by_loss: Mapping[str, Regions]
+
+
+def losses(
+    mesh: Mesh,
+    view: View,
+    environment: Environment,
+    image: AttributeImage,
+    rebuild: Rebuild,
+    device: Floats | None = None,
+    with_dists: bool = True,
+    progress: Progress = QUIET,
+) -> Losses:
+    """Split the loss of a frame.
+
+    Args:
+        mesh: The object.
+        view: The frame's placement in the room.
+        room: With its full maps.
+        image: Its clustered maps and planes.
+        rebuild: Where rays meet the rebuilt room.
+        device: The device's frame, linear, float64 [height, width, 3], relit as the reference.
+        with_dists: Judge by DISTS too.
+        progress: Shows the frames.
+    """
+    pictures = {
+        name: render_reference(mesh, view, progress, backdrop)
+        for name, backdrop in backdrops(environment, image, rebuild).items()
+    }
+    truth = pictures["full"]
+    regions = frame_regions(truth.object_mask, truth.shadow_ratio)
+    encoded = {name: encode_srgb(picture.image) for name, picture in pictures.items()}
+    pairs = {name: (encoded["full"], encoded[name]) for name in encoded if name != "full"}
+    if device is not None:
+        judged = encode_srgb(device)
+        pairs |= {"fixed point": (encoded["both"], judged), "device": (encoded["full"], judged)}
+    return Losses(pictures, {name: compare_regions(*pair, regions, with_dists) for name, pair in pairs.items()})
+
+
+#: Where objects stand in the rooms that come along: on the table, on the bed, on the table.
+STANDING = {
+    "living": Placement((345.0, 304.0), 0.24, 25.0),
+    "office": Placement((170.0, 392.0), 0.40, 25.0),
+    "attic": Placement((318.0, 284.0), 0.40, 25.0),
+}
+#: Mesh and material of the frames that are measured.
+OBJECTS = {
+    "teapot, mirror": ("teapot", Material("mirror", (0.95, 0.95, 0.95))),
+    "teapot, glass": ("teapot", Material("glass", (0.92, 0.97, 0.95))),
+    "bunny, diffuse": ("bunny", Material("diffuse", (0.75, 0.6, 0.5))),
+}
+
+
+def standing_scene(mesh: str, material: Material, environment: Environment, placement: Placement) -> Scene:
+    """An object in a room, under a lamp a metre and a half off, above it, and ambient light."""
+    from colonnade.scene.object_pose import standing_point
+
+    x, y, z = standing_point(placement, environment)
+    return Scene(
+        MeshSource(mesh),
+        placement=placement,
+        material=material,
+        light=Light((x - 0.5, y + 1.3, z + 0.5), colour=(0.75, 0.72, 0.65), falloff=1.4),
+        ambient=Colour((0.30, 0.31, 0.33)),
+        background=Background((0.0, 0.0, 0.0), Path(environment.name)),
+    )
+
+
+def table(by_frame: Mapping[str, Mapping[str, Regions]]) -> str:
+    """Losses by frame as a table in Markdown: PSNR, FLIP and DISTS of each part."""
+    parts = ("frame", "object", "shadow")
+    lines = [("frame", "loss", *(f"{part}: dB, FLIP, DISTS" for part in parts)), ("---",) * (2 + len(parts))]
+    for frame, by_loss in by_frame.items():
+        for loss, regions in by_loss.items():
+            lines.append((frame, loss, *(_shown(regions[part]) for part in parts)))
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _shown(difference: RegionDifference) -> str:
+    if difference.psnr is None or difference.flip is None:
+        return "none"
+    dists = "-" if difference.dists is None else f"{difference.dists:.3f}"
+    return f"{difference.psnr:.1f}, {difference.flip:.3f}, {dists}"
+
+
+def device_frame(mesh: Mesh, view: View, held: EncodedEnvironment, manifest: Manifest) -> Floats:
+    """The device's frame, relit and linear: float64 [height, width, 3].
+
+    Args:
+        mesh: The object.
+        view: The frame's placement in the room.
+        held: The room, and its maps as the device has them.
+        manifest: Of the hardware.
+    """
+    from colonnade.device.bit_exact import render_model
+    from colonnade.registers.frame import registers_of
+    from colonnade.render.frames import require_no_errors
+    from colonnade.scene_image.environment import with_environment
+    from colonnade.scene_image.packer import pack
+
+    packed = with_environment(pack(mesh, manifest, view.materials), held, manifest)
+    registers = registers_of(view, packed.header, manifest)
+    frame = render_model(
+        manifest, packed, registers | environment_registers(view, held, packed.header, manifest, relit=True)
+    )
+    require_no_errors(frame)
+    return frame.colour / float((1 << manifest.numbers["colourBits"]) - 1)
+
+
+def study_frames(
+    folders: Iterable[Path], with_dists: bool = True, progress: Progress = QUIET, output: Path | None = None
+) -> dict[str, Mapping[str, Regions]]:
+    """The losses of `OBJECTS` in rooms, by room and object; the pictures in the folder ``output``, if there is one."""
+    from colonnade.design.generator import manifest_for
+    from colonnade.environment.encoded import EncodedEnvironment
+    from colonnade.environment.encoding.cache import encoded_environment
+    from colonnade.environment.encoding.layout import AttributeLayout
+    from colonnade.environment.load import load_environment
+    from colonnade.mesh.load import load_mesh
+    from colonnade.reference.environment.decoded import plane_march
+    from colonnade.scene.view import make_view
+
+    by_frame = {}
+    meshes = {name: load_mesh(name) for name, _ in OBJECTS.values()}
+    for folder in folders:
+        environment = load_environment(folder)
+        layout = AttributeLayout(width=environment.width, height=environment.height)
+        image = encoded_environment(environment, layout)
+        hardware = f"physicalAttributeMemory={json.dumps(layout.to_config())}"
+        manifest = manifest_for("small", (hardware,), progress).manifest
+        march = plane_march(environment, image)
+        for name, (mesh_name, material) in OBJECTS.items():
+            mesh = meshes[mesh_name]
+            scene = standing_scene(mesh_name, material, environment, STANDING.get(environment.name, Placement()))
+            view = make_view(scene, mesh.extent, environment.width, environment.height, mesh.materials, environment)
+            device = device_frame(mesh, view, EncodedEnvironment(environment, image), manifest)
+            measured = losses(mesh, view, environment, image, march, device, with_dists, progress)
+            by_frame[f"{environment.name}: {name}"] = measured.by_loss
+            if output is not None:
+                frames = {loss: picture.image for loss, picture in measured.pictures.items()} | {"device": device}
+                for loss, picture in frames.items():
+                    write_png(output / f"{environment.name}-{name.replace(', ', '-')}-{loss}.png", picture)
+    return by_frame

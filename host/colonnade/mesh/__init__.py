@@ -1,0 +1,1 @@
+"""Triangle meshes: files, the catalog of named meshes, made-up solids, materials."""

@@ -1,0 +1,95 @@
+"""What a mesh file says of its surfaces, in the device's three kinds: diffuse, mirror, glass.
+
+| | glTF | MTL |
+|---|---|---|
+| albedo | base colour factor, linear | `Kd`, taken as linear; `Tf` for glass where given |
+| mirror | metallic factor of at least ½, without a texture | `Pm` of at least ½, or `illum` 3 or 5 |
+| glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
+| index of refraction | `KHR_materials_ior` | `Ni` |
+
+Textures are not read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+Vector = tuple[float, float, float]
+
+#: The device's kinds of surfaces.
+Kind = Literal["diffuse", "mirror", "glass"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+#: Index of refraction of glass that does not say; also glTF's.
+GLASS_IOR = 1.5
+
+
+@dataclass(frozen=True)
+class MeshMaterial:
+    """One surface.
+
+    Attributes:
+        kind: diffuse, mirror or glass.
+        albedo: Linear, 0 to 1: reflected, or tint of what is mirrored or let through.
+        ior: Index of refraction of glass.
+    """
+
+    kind: str = "diffuse"
+    albedo: Vector = (0.8, 0.8, 0.8)
+    ior: float = GLASS_IOR
+
+
+#: Of meshes that do not say.
+PLAIN = MeshMaterial()
+
+
+def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
+    """A material of a glTF file's JSON."""
+    surface = material.get("pbrMetallicRoughness")
+    extensions = material.get("extensions", {})
+    transmission = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0)
+    ior = _number(extensions.get("KHR_materials_ior", {}).get("ior"), GLASS_IOR)
+    surface = {"metallicFactor": 0.0} if surface is None else surface
+    colour = _colour(surface.get("baseColorFactor", (1.0, 1.0, 1.0)), (1.0, 1.0, 1.0))
+    metallic = _number(surface.get("metallicFactor"), 1.0) if "metallicRoughnessTexture" not in surface else 0.0
+    if _number(transmission, 0.0) > 0.5:
+        return MeshMaterial("glass", colour, _ior(ior))
+    return MeshMaterial("mirror" if metallic >= 0.5 else "diffuse", colour)
+
+
+def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
+    """A material of an MTL file: values by keyword in lower case, as lists or numbers."""
+
+    def first(key: str, default: float) -> float:
+        value = entries.get(key)
+        return _number(value[0] if isinstance(value, list | tuple) and value else value, default)
+
+    colour = _colour(entries.get("kd"), PLAIN.albedo)
+    model = first("illum", 2.0)
+    if first("d", 1.0) < 0.5 or first("tr", 0.0) > 0.5 or model in (4.0, 6.0, 7.0, 9.0):
+        return MeshMaterial("glass", _colour(entries.get("tf"), colour), _ior(first("ni", GLASS_IOR)))
+    return MeshMaterial("mirror" if first("pm", 0.0) >= 0.5 or model in (3.0, 5.0) else "diffuse", colour)
+
+
+def _ior(value: float) -> float:
+    """1 and less is what exporters write that do not know."""
+    return min(value, 4.0) if value > 1.0 else GLASS_IOR
+
+
+def _number(value: Any, default: float) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return default
+    return number if math.isfinite(number) else default
+
+
+def _colour(values: Any, default: Vector) -> Vector:
+    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) < 3:
+        return default
+    channels = zip(values[:3], default, strict=True)
+    red, green, blue = (min(max(_number(value, fallback), 0.0), 1.0) for value, fallback in channels)
+    return red, green, blue

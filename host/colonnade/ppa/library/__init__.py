@@ -1,0 +1,1 @@
+"""Standard-cell libraries: liberty files and the functions of their cells."""

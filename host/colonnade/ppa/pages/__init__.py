@@ -1,0 +1,1 @@
+"""The report of ``colonnade ppa`` as text, and the tables of docs/ppa.md."""

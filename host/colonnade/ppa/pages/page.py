@@ -1,0 +1,200 @@
+"""Writes the tables of ``docs/ppa.md`` from the data that `tools/ppa` measured.
+
+A table stands between ``<!-- NAME -->`` and ``<!-- end -->``; everything else of the page is left alone.
+Run as ``python -m colonnade.ppa.pages.page DOCS``.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from colonnade.common.atomic_files import replacing
+from colonnade.common.markdown import markdown
+from colonnade.ppa.netlist.hierarchy import LEVELS
+from colonnade.ppa.pages.area import equal_area, gates
+from colonnade.ppa.pages.power import power_table, unit_power_table
+from colonnade.ppa.pages.text import LIBRARIES, MOST_FO4, TITLES, second_opinion
+from colonnade.ppa.pages.tree import bvh, gain, nodes
+
+Data = Mapping[str, Any]
+
+#: Smaller tables are left out of the page.
+LEAST_BITS = 100
+
+_TABLE = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def page(text: str, data: Path) -> str:
+    """The page with its tables written anew from the folder `data`."""
+
+    def replaced(match: re.Match[str]) -> str:
+        kind, _, precision = match[2].partition("_")
+        if precision:
+            reports = _reports(data, precision)
+            of_precision = {"units": units, "totals": totals, "tables": tables, "paths": paths}
+            of_precision |= {"power": power_table, "unitpower": unit_power_table, "gates": gates}
+            of_precision |= {"equal": lambda reports: equal_area(reports, data)}
+            body = of_precision[kind](reports) if reports else ""
+        else:
+            of_all = {"bvh": bvh, "nodes": nodes, "gain": gain, "ecp5": ecp5, "libraries": libraries}
+            body = of_all[kind](data)
+        return f"{match[1]}{body or 'Not measured: run `tools/ppa`.'}\n{match[3]}"
+
+    return _TABLE.sub(replaced, text)
+
+
+def units(reports: Mapping[str, Data]) -> str:
+    """kGE of each unit by each library, its share, its slowest path."""
+    first = next(iter(reports.values()))
+    timed = [name for name, report in reports.items() if report["technology"]["liberty"]]
+    titles = ["unit", *(f"kGE, {LIBRARIES[name]}" for name in reports), "share", "flip-flops"]
+    titles += [f"µm², {LIBRARIES[name]}" for name in timed] + [f"FO4, {LIBRARIES[name]}" for name in timed]
+    rows: list[list[str]] = []
+    for level in LEVELS:
+        rows.append([f"**{TITLES[level.name]}**", *[""] * (len(titles) - 1)])
+        for name, unit in first["units"].items():
+            if unit["level"] == level.name:
+                same = [report["units"][name] for report in reports.values()]
+                of_timed = [reports[library]["units"][name] for library in timed]
+                row = [name, *(f"{each['kge']:.1f}" for each in same), f"{100 * unit['share']:.1f} %"]
+                row += [f"{unit['flops']:,}", *(f"{each['um2']:,.0f}" for each in of_timed)]
+                rows.append([*row, *(_fo4(each["paths"]["register_to_register"]) for each in of_timed)])
+                rows += _parts(unit, same, of_timed)
+    return markdown(titles, rows)
+
+
+def _parts(unit: Data, same: Sequence[Data], of_timed: Sequence[Data]) -> list[list[str]]:
+    """Rows of what a unit is in part: its dividers and square roots, all of a kind together."""
+    rows = []
+    for part, facts in unit.get("parts", {}).items():
+        kge = (_of_part(each, part, "kge", ".1f") for each in same)
+        um2 = (_of_part(each, part, "um2", ",.0f") for each in of_timed)
+        row = [f"– {facts['count']} × {part}", *kge, "", f"{facts['flops']:,}", *um2, *[""] * len(of_timed)]
+        rows.append(row)
+    return rows
+
+
+def _of_part(unit: Data, part: str, key: str, form: str) -> str:
+    """A figure of a part; a dash where this library's report is older than its parts."""
+    facts = unit.get("parts", {}).get(part)
+    return f"{facts[key]:{form}}" if facts else "–"
+
+
+def totals(reports: Mapping[str, Data]) -> str:
+    """Render unit, column and array."""
+    rows = []
+    for level in LEVELS:
+        for library, report in reports.items():
+            total = report["levels"][level.name]
+            um2 = "–" if total["logic_um2"] is None else f"{total['logic_um2'] / 1e6:.4f}"
+            row = [TITLES[level.name], LIBRARIES[library], f"{total['logic_kge']:,.1f}", um2]
+            row += [f"{total['memory_bits'] / 1000:,.0f}", f"{total['kge']:,.1f}"]
+            rows.append([*row, f"{total['logic_mm2_28nm']:.3f}", f"{total['mm2_28nm']:.3f}"])
+    chip = next(iter(reports.values()))["chip"]
+    row = [
+        "the chip ÷ 80",
+        "–",
+        "–",
+        "–",
+        "–",
+        f"{chip['kge_per_unit']:.0f}",
+        "–",
+        f"{chip['mm2'] / chip['units']:.3f}",
+    ]
+    rows += [row, ["the chip", "–", "–", "–", "–", f"{chip['kge_per_unit'] * 80:,.0f}", "–", f"{chip['mm2']:.2f}"]]
+    titles = ["", "library", "logic, kGE", "logic, mm²", "memory, kbit", "with memory, kGE"]
+    return markdown([*titles, "logic scaled to 28 nm, mm²", "with memory at 28 nm, mm²"], rows)
+
+
+def tables(reports: Mapping[str, Data]) -> str:
+    """The memories of a render unit that are flip-flops."""
+    report = next(iter(reports.values()))
+    rows = [
+        [f"`{table['name']}`", table["unit"], str(table["count"]), f"{table['bits']:,}"]
+        for table in report["flop_tables"]
+        if table["level"] == "render_unit" and table["bits"] >= LEAST_BITS
+    ]
+    return markdown(["table (depth × width)", "unit", "of them", "bits"], rows)
+
+
+def paths(reports: Mapping[str, Data]) -> str:
+    """The slowest paths, and the units above the limit."""
+    rows, above = [], []
+    for library, report in reports.items():
+        if not report["technology"]["liberty"]:
+            continue
+        slowest, whole = report["slowest_path"], (report["render_unit_paths"] or {}).get("register_to_register")
+        found = [(f"within a unit: {slowest['unit']}", slowest), ("a render unit, across its units", whole)]
+        for title, path in found:
+            if path:
+                row = [title, LIBRARIES[library], f"{path['ns']:.3f}", f"{path['fo4']:.1f}"]
+                rows.append([*row, f"`{path['from']}`", f"`{path['to']}`", str(path["gates"])])
+        for name, unit in report["units"].items():
+            path = (unit["paths"] or {}).get("register_to_register")
+            if path and path["fo4"] > MOST_FO4:
+                above.append(f"{name} ({path['fo4']:.0f} with {LIBRARIES[library]})")
+    if not rows:
+        return ""
+    opinions = [
+        f"with {LIBRARIES[library]} {second_opinion(report['opensta'])}"
+        for library, report in reports.items()
+        if report["opensta"]
+    ]
+    verdict = f"Against OpenSTA, {'; '.join(opinions)}. " if opinions else ""
+    verdict += f"Units above {MOST_FO4} FO4: {', '.join(above) or 'none'}."
+    titles = ["slowest path", "library", "ns", "FO4", "from", "to", "gates"]
+    return f"{verdict}\n\n{markdown(titles, rows)}"
+
+
+def ecp5(data: Path) -> str:
+    """The FPGA's figures."""
+    file = data / "ppa-ecp5.json"
+    if not file.is_file():
+        return ""
+    report = json.loads(file.read_text())
+    rows = [
+        [title.replace("_", " "), f"{report[title]:,}", f"{number:,}"] for title, number in report["available"].items()
+    ]
+    depth = report["config"]["columnBvhMemory"]["depth"]
+    clock = "–" if report["fmax_mhz"] is None else f"{report['fmax_mhz']:.1f} MHz"
+    return f"{depth:,} records; fmax {clock}.\n\n{markdown([report['target'], 'used', 'there are'], rows)}"
+
+
+def libraries(data: Path) -> str:
+    """What the libraries' gate and FO4 are."""
+    rows = []
+    for library, report in _reports(data, "32b32s64d").items():
+        used = report["technology"]
+        if used["liberty"]:
+            row = [LIBRARIES[library], ", ".join(used["liberty"]), f"{used['um2_per_gate']:g}"]
+            rows.append([*row, f"{used['fo4_ns'] * 1e3:.1f}", used["fo4"], f"{used['delay_target_ns']:.3f}"])
+    titles = ["library", "files", "µm² a gate", "FO4, ps", "FO4 is", "abc's target, ns"]
+    return markdown(titles, rows) if rows else ""
+
+
+def _reports(data: Path, precision: str) -> dict[str, Data]:
+    files = {library: data / f"ppa-{precision}-{library}.json" for library in LIBRARIES}
+    return {library: json.loads(file.read_text()) for library, file in files.items() if file.is_file()}
+
+
+def _fo4(path: Data | None) -> str:
+    if path is None:
+        return "–"
+    return f"**{path['fo4']:.0f}**" if path["fo4"] > MOST_FO4 else f"{path['fo4']:.0f}"
+
+
+def main(docs: Path) -> None:
+    """Rewrite the tables of the page in the folder `docs`."""
+    file = docs / "ppa.md"
+    text = page(file.read_text(), docs / "data")
+    with replacing(file) as stream:
+        stream.write(text.encode())
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,135 @@
+"""The report of ``colonnade ppa`` as text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from colonnade.common.text_table import Column, Table
+from colonnade.ppa.netlist.hierarchy import LEVELS
+from colonnade.ppa.netlist.memories import CHIP_NODE, LEAST_SRAM_WORDS, REGISTER_FILE, SRAM, Rate
+from colonnade.ppa.pages.power_text import power_lines
+
+#: What the hardware's rule allows between two registers.
+MOST_FO4 = 100
+
+#: The files of a precision in the page's data, and what their columns are called.
+LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
+
+TITLES = {"render_unit": "render unit", "column": "column", "array": "array"}
+
+
+class UnitTable:
+    """A row for each unit as soon as it is synthesised."""
+
+    def __init__(self, echo: Callable[[str], None]) -> None:
+        path = "FO4 of the slowest path"
+        self._table = Table(
+            (
+                Column("part of", 11, is_text=True),
+                Column("unit", 19, is_text=True),
+                Column("kGE", 7, ".2f"),
+                Column("flops", 7, ".2f", group="of which"),
+                Column("gates", 7, ".2f", group="of which"),
+                Column("flip-flops", 10, ","),
+                Column("µm²", 9, ",.0f"),
+                Column("ns", 6, ".3f"),
+                Column("register", 8, ".1f", group=path),
+                Column("from input", 10, ".1f", group=path),
+                Column("to output", 9, ".1f", group=path),
+                Column("through", 7, ".1f", group=path),
+            ),
+            echo,
+        )
+
+    def print(self, level: str, name: str, unit: Mapping[str, Any]) -> None:
+        """The row of one unit."""
+        paths = unit["paths"] or {}
+        fo4 = [(paths.get(kind) or {}).get("fo4") for kind in PATHS]
+        self._table.print(
+            TITLES[level],
+            name,
+            unit["kge"],
+            unit["flops_kge"],
+            unit["combinational_kge"],
+            unit["flops"],
+            unit["um2"],
+            (paths.get("register_to_register") or {}).get("ns"),
+            *fo4,
+        )
+        for part, facts in unit["parts"].items():
+            row = (facts["kge"], None, None, facts["flops"], facts["um2"], *[None] * 5)
+            self._table.print("", f" {facts['count']} × {part}", *row)
+
+
+PATHS = ("register_to_register", "input_to_register", "register_to_output", "input_to_output")
+
+
+def summary(report: Mapping[str, Any]) -> Iterator[str]:
+    """Totals, memories, the slowest path, and how the figures were obtained."""
+    chip, used = report["chip"], report["technology"]
+    yield ""
+    for level in LEVELS:
+        total = report["levels"][level.name]
+        copies = total["of_the_level_below"]
+        yield (
+            f"{TITLES[level.name]}{f' ({copies} of the above and its own)' if copies else ''}: "
+            f"{total['logic_kge']:,.1f} kGE of logic, {total['memory_bits']:,} bits of memory"
+            f"{_um2(total['logic_um2'])}; at {CHIP_NODE} {total['logic_mm2_28nm']:,.3f} mm² of logic, "
+            f"{total['mm2_28nm']:,.3f} with memories"
+        )
+    yield (
+        f"render unit with its memories: {report['render_unit_kge']:,.1f} kGE; the chip's: {chip['kge_per_unit']:.0f} "
+        f"({chip['mm2']} mm² / {chip['units']}, memories and all, at {chip['um2_per_gate']} µm² a gate)"
+    )
+    for name, memory in report["memories"].items():
+        yield (
+            f"memory {name}, in {memory['unit']}: {memory['count']} × {memory['depth']:,} × {memory['width']} bits, "
+            f"{_per_node(memory, 'um2', ',.0f')} µm², {_per_node(memory, 'read_pj', '.1f')} pJ a read"
+        )
+    tables = [table for table in report["flop_tables"] if table["level"] == "render_unit"]
+    largest = (f"{table['name']} in {table['unit']}" for table in tables[:3])
+    yield (
+        f"tables of a render unit that are flip-flops, and counted as such: "
+        f"{sum(table['bits'] for table in tables):,} bits; the largest are {', '.join(largest)}"
+    )
+    slowest, whole = report["slowest_path"], report["render_unit_paths"]
+    if slowest["unit"]:
+        yield f"slowest path within a unit: {_path(slowest)}, in {slowest['unit']}"
+    if whole and whole["register_to_register"]:
+        yield f"slowest path of a render unit, across its units: {_path(whole['register_to_register'])}"
+    if report["opensta"]:
+        yield f"OpenSTA, on PATH, as a second opinion on these paths: {second_opinion(report['opensta'])}"
+    if report["power"]:
+        yield from power_lines(report)
+    yield ""
+    yield f"kGE: {used['gates']}. Memories: {_rates()}; in kGE as area of {CHIP_NODE}."
+    if used["liberty"]:
+        yield f"Library: {', '.join(used['liberty'])}; FO4 is {used['fo4_ns'] * 1e3:.1f} ps: {used['fo4']}."
+        yield f"Delays: {used['timing']}; target {used['delay_target_ns']:g} ns."
+    yield f"At {CHIP_NODE}: gates × {chip['um2_per_gate']} µm², no gaps; a scaling by gate count, not a synthesis."
+
+
+def second_opinion(opinion: Mapping[str, Any]) -> str:
+    """How far our paths are from OpenSTA's."""
+    return f"ours are {opinion['least']:+.1%} to {opinion['most']:+.1%} longer than its, over {opinion['units']} units"
+
+
+def _path(path: Mapping[str, Any]) -> str:
+    return f"{path['ns']:.3f} ns, {path['fo4']:.1f} FO4, {path['from']} → {path['to']} ({path['gates']} gates)"
+
+
+def _um2(area: float | None) -> str:
+    return "" if area is None else f", {area:,.0f} µm²"
+
+
+def _per_node(memory: Mapping[str, Any], key: str, form: str) -> str:
+    return ", ".join(f"{memory[key][node]:{form}} at {node}" for node in SRAM)
+
+
+def _rates() -> str:
+    def of(rates: Mapping[str, Rate]) -> str:
+        each = (f"{rate.um2_per_bit} µm² and {rate.pj_per_bit} pJ a bit at {node}" for node, rate in rates.items())
+        return "; ".join(each)
+
+    return f"SRAM {of(SRAM)}, or below {LEAST_SRAM_WORDS} words register files {of(REGISTER_FILE)}"

@@ -1,0 +1,1 @@
+"""Power: recorded traffic, its replay on gates, and the energy of each transition."""

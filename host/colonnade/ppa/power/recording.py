@@ -1,0 +1,214 @@
+"""The traffic at the ports of one module while the RTL renders a frame: what a replay on gates needs.
+
+A recorder is bound to the module in the simulation. It writes inputs and outputs, as they are just before each clock
+edge, from the cycle in which ``io_start`` begins the frame.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from colonnade.common import processes
+from colonnade.common.progress import QUIET, Progress
+from colonnade.common.temporary import temporary_folder
+from colonnade.design.frame_limits import check_size
+from colonnade.design.generator import GeneratedDesign, design_for
+from colonnade.design.manifest import Manifest
+from colonnade.design.toolchain import project_root, require_program
+from colonnade.device.simulator_build import build_simulator
+from colonnade.device.verilator import write_job
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.mesh import Mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.model import Scene
+from colonnade.scene.parser import load_scene
+from colonnade.scene_image.packer import pack
+
+#: Ports that the replay drives by itself, or that a recording begins with.
+CLOCK, RESET, START, ROW = "clock", "reset", "io_start", "io_row"
+
+#: Which of a column's units is recorded.
+CHOSEN_ROW = 0
+
+_RECORDER = """
+module ColonnadeRecorder(
+  input clock, input reset, input start, input [{inputs}:0] inputs, input [{outputs}:0] outputs
+);
+  integer file, limit, unused, left, rested;
+  initial begin
+    left = 0;
+    file = $fopen("limit", "r");
+    unused = $fscanf(file, "%d", limit);
+    $fclose(file);
+    file = $fopen("recording", "w");
+  end
+  always @(posedge clock) begin
+    rested <= reset ? 0 : rested + 1;
+    if (start) $fwrite(file, "%0d\\n", rested);
+    if (start || left != 0) $fwrite(file, "%h %h\\n", inputs, outputs);
+    if (start) left <= limit - 1;
+    else if (left != 0) left <= left - 1;
+  end
+endmodule
+bind {module} ColonnadeRecorder recorder(
+  .clock({clock}), .reset({reset}), .start({start}{chosen}), .inputs({{{input_names}}}), .outputs({{{output_names}}})
+);
+"""
+
+
+@dataclass(frozen=True)
+class Port:
+    """A port of the module."""
+
+    name: str
+    bits: int
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was seen at a module's ports, cycle by cycle.
+
+    Attributes:
+        inputs: its inputs but the clock, as they are joined: the first is the most significant.
+        outputs: the same of its outputs.
+        cycles: the joined inputs and outputs of each cycle.
+        rested: cycles between reset and the first of these.
+        scene: what was rendered, in a report.
+        counters: of the whole frame.
+    """
+
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    cycles: tuple[tuple[int, int], ...]
+    rested: int
+    scene: Mapping[str, Any]
+    counters: Mapping[str, int]
+
+    def of(self, name: str) -> list[int]:
+        """The values of one port."""
+        for index, ports in enumerate((self.inputs, self.outputs)):
+            shift = sum(port.bits for port in ports)
+            for port in ports:
+                shift -= port.bits
+                if port.name == name:
+                    mask = (1 << port.bits) - 1
+                    return [cycle[index] >> shift & mask for cycle in self.cycles]
+        raise RuntimeError(f"the recorded module has no port {name}: the power of a ray cannot be told")
+
+    def fires(self, stream: str) -> list[bool]:
+        """Whether the stream `stream` passes something on, in each cycle."""
+        pairs = zip(self.of(f"{stream}_valid"), self.of(f"{stream}_ready"), strict=True)
+        return [bool(valid and ready) for valid, ready in pairs]
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """Which frame is rendered, and how much of it is recorded.
+
+    Attributes:
+        mesh: name or file; the rest of the scene is the benchmark's.
+        size: width and height in pixels; of None see `whole_frame`.
+        cycles: at most so many, from the frame's start.
+    """
+
+    mesh: str
+    size: tuple[int, int] | None
+    cycles: int
+
+
+def whole_frame(rows: int) -> tuple[int, int]:
+    """A size at which the part of each of so many units in a column takes some ten thousand cycles."""
+    width = 4 * round(6 * rows**0.5)
+    return width, width * 3 // 4
+
+
+def require_recordable(stimulus: Stimulus, manifest: Manifest) -> tuple[Mesh, tuple[int, int]]:
+    """The mesh and the size of the frame; refuses before the work starts what could not be rendered."""
+    for program, package in (("verilator", "verilator"), ("g++", "g++"), ("make", "make")):
+        require_program(program, "power (--no-power leaves it out)", package)
+    size = stimulus.size or whole_frame(int(manifest.config["array"]["rows"]))
+    check_size(size, manifest)
+    return load_mesh(_scene(stimulus).mesh_source), size
+
+
+def _scene(stimulus: Stimulus) -> Scene:
+    return load_scene(project_root() / "scenes" / "object.toml").with_mesh(stimulus.mesh)
+
+
+def record(
+    config: str,
+    overrides: Sequence[str],
+    module: str,
+    ports: Mapping[str, Any],
+    stimulus: Stimulus,
+    progress: Progress = QUIET,
+) -> Recording:
+    """Render a frame on one column of a configuration and record one instance of a module.
+
+    Args:
+        config: name of the configuration, with `overrides` applied.
+        overrides: ``key.path=value`` changes.
+        module: name of the module.
+        ports: its ports in Yosys's JSON.
+        stimulus: which frame.
+        progress: shows the steps.
+    """
+    one_column = (*overrides, "array.columns=1")
+    design = design_for(config, one_column, progress)
+    mesh, size = require_recordable(stimulus, design.manifest)
+    with progress.step("packing the scene"):
+        image = pack(mesh, design.manifest)
+        registers = frame_registers(_scene(stimulus), image.header, design.manifest, *size)
+    joined = {
+        direction: tuple(
+            Port(name, len(port["bits"]))
+            for name, port in ports.items()
+            if port["direction"] == direction and name != CLOCK
+        )
+        for direction in ("input", "output")
+    }
+    with _with_recorder(design, module, joined["input"], joined["output"]) as recorded:
+        program = build_simulator(recorded, progress)
+    with temporary_folder() as folder:
+        (folder / "limit").write_text(f"{stimulus.cycles}\n")
+        job, _ = write_job(folder, design.manifest, image, [registers])
+        with progress.step("recording a frame"):
+            done = processes.run([program, job], cwd=folder)
+        if done.returncode != 0:
+            raise RuntimeError(f"the simulated hardware failed (status {done.returncode}): {done.stderr[-300:]}")
+        lines = (folder / "recording").read_text().split("\n")
+    values = (line.split() for line in done.stdout.splitlines() if line.startswith("value "))
+    read = {name: int(value) for _, name, value in values}
+    counters = {name.removeprefix("counters."): value for name, value in read.items() if name.startswith("counters.")}
+    cycles = tuple((int(line.split()[0], 16), int(line.split()[1], 16)) for line in lines[1:] if line)
+    facts = {"mesh": stimulus.mesh, "triangles": len(mesh.faces), "size": list(size)}
+    return Recording(joined["input"], joined["output"], cycles, int(lines[0]), facts, counters)
+
+
+@contextlib.contextmanager
+def _with_recorder(
+    design: GeneratedDesign, module: str, inputs: Sequence[Port], outputs: Sequence[Port]
+) -> Iterator[GeneratedDesign]:
+    """The design with the recorder beside it, in a temporary folder."""
+    names = {port.name for port in inputs}
+    text = _RECORDER.format(
+        module=module,
+        clock=CLOCK,
+        reset=RESET,
+        start=START,
+        chosen=f" && {ROW} == {CHOSEN_ROW}" if ROW in names else "",
+        inputs=sum(port.bits for port in inputs) - 1,
+        outputs=sum(port.bits for port in outputs) - 1,
+        input_names=", ".join(port.name for port in inputs),
+        output_names=", ".join(port.name for port in outputs),
+    )
+    with temporary_folder() as folder:
+        for file in design.sources:
+            (folder / file.name).symlink_to(file.resolve())
+        # Before the design, which binds it: files are read in the order of their names
+        (folder / "ColonnadeRecorder.sv").write_text(re.sub(r"^\n", "", text))
+        yield GeneratedDesign(folder, design.manifest)

@@ -1,0 +1,90 @@
+"""What the tree saves in cycles: reduced meshes through the RTL, with a tree and without.
+
+Without a tree every ray is tested against every triangle, so that whole meshes would take days: they are reduced by
+merging the vertices of each cell of a grid (Rossignac and Borrel 1993).
+Run as ``python -m colonnade.ppa.studies.tree_cycles CONFIG SIZE COUNT,COUNT,… FILE`` it writes the figures.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+
+from colonnade.common.atomic_files import replacing, write_json
+from colonnade.common.frame_size import parse_size
+from colonnade.common.parallel import processors
+from colonnade.common.progress import for_terminal
+from colonnade.design.toolchain import cache_directory, project_root
+from colonnade.evaluation.bench import MESHES, geometric_mean
+from colonnade.evaluation.measure import Conditions, Run, measure
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.mesh import Mesh
+
+Array = npt.NDArray[Any]
+
+#: Seven, as in the paper; the eighth is a subdivided small mesh.
+REDUCED = tuple(name for name in MESHES if name != "duck")
+
+#: How much fewer cycles the paper's tree takes.
+PAPER_GAIN = 6.3
+
+NO_TREE = "geometry.bvh=false"
+
+
+def reduced(mesh: Mesh, maximum: int) -> tuple[Array, Array]:
+    """Vertices [n, 3] and faces [m, 3] of a mesh, simplified by quadrics to at most so many faces."""
+    import fast_simplification
+
+    points, faces = fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=maximum)
+    if len(faces) > maximum:
+        raise RuntimeError(f"{mesh.name} cannot be reduced to {maximum} triangles")
+    return points, faces
+
+
+def tree_gain(config: str, counts: Sequence[int], size: tuple[int, int]) -> dict[str, Any]:
+    """Cycles of each mesh, reduced to each of `counts` triangles at most, with a tree and without; their ratios."""
+    folder = cache_directory(project_root()) / "reduced"
+    folder.mkdir(parents=True, exist_ok=True)
+    progress = for_terminal()
+    with progress.step("reducing the meshes"):
+        files = {(maximum, name): _written(load_mesh(name), maximum, folder) for maximum in counts for name in REDUCED}
+    conditions = Conditions(project_root() / "scenes" / "object.toml", size, processors(), reuse=True)
+    runs = [Run(config, overrides, str(file)) for overrides in ((), (NO_TREE,)) for file in files.values()]
+    reports = list(measure(runs, conditions, progress))
+    reductions: dict[str, dict[str, Any]] = {str(maximum): {} for maximum in counts}
+    for (maximum, name), tree, none in zip(files, reports, reports[len(files) :], strict=False):
+        reductions[str(maximum)][name] = {
+            "triangles": tree["mesh"]["triangles"],
+            "rays_in_box": tree["rays"]["in_box"],
+            "cycles": {"tree": tree["cycles"], "none": none["cycles"]},
+            "gain": none["cycles"] / tree["cycles"],
+        }
+    return {
+        "config": reports[0]["config"],
+        "size": list(size),
+        "reductions": {
+            maximum: {"meshes": meshes, "geomean_gain": geometric_mean(mesh["gain"] for mesh in meshes.values())}
+            for maximum, meshes in reductions.items()
+        },
+        "paper_gain": PAPER_GAIN,
+    }
+
+
+def _written(mesh: Mesh, maximum: int, folder: Path) -> Path:
+    """The file with the reduced mesh."""
+    vertices, faces = reduced(mesh, maximum)
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
+    lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    file = folder / f"{mesh.name}-{maximum}.obj"
+    with replacing(file) as stream:
+        stream.write(("\n".join(lines) + "\n").encode())
+    return file
+
+
+if __name__ == "__main__":
+    wanted = [int(count) for count in sys.argv[3].split(",")]
+    write_json(Path(sys.argv[4]), tree_gain(sys.argv[1], wanted, parse_size(sys.argv[2])))

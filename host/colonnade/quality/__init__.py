@@ -1,0 +1,1 @@
+"""Image quality: how far two pictures, or the hits behind them, are apart."""

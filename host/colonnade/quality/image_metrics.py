@@ -1,0 +1,114 @@
+"""How far two pictures, or the hits behind them, are apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+#: PSNR of identical pictures, decibels, and the most that any two are given: keeps the number finite.
+HIGHEST_PSNR = 100.0
+
+#: Edge of SSIM's Gaussian window in pixels (sigma 1.5), as published.
+SSIM_WINDOW = 11
+
+
+@dataclass(frozen=True)
+class PictureDifference:
+    """Two 8-bit sRGB pictures of one size compared.
+
+    Attributes:
+        identical: every pixel is the same.
+        differing_pixels: pixels in which any channel differs.
+        psnr: peak signal-to-noise ratio over all channels, decibels, at most `HIGHEST_PSNR`.
+        ssim: mean structural similarity, 1.0 for identical pictures; None for a picture of fewer than 3 pixels a side.
+        flip: mean FLIP error, 0.0 for identical pictures, at 67 pixels a degree.
+    """
+
+    identical: bool
+    differing_pixels: int
+    psnr: float
+    ssim: float | None
+    flip: float
+
+
+@dataclass(frozen=True)
+class HitDifference:
+    """Two frames' hits compared.
+
+    Attributes:
+        hit_disagreement: share of all pixels that hit in one frame and miss in the other.
+        triangle_disagreement: share of the pixels that hit in both whose triangles differ; 0.0 when none hits in both.
+    """
+
+    hit_disagreement: float
+    triangle_disagreement: float
+
+
+def compare_pictures(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> PictureDifference:
+    """Compare two pictures, uint8 [height, width, 3] sRGB each, of the same size."""
+    import numpy as np
+
+    differing = int(np.count_nonzero((reference != test).any(axis=2)))
+    return PictureDifference(
+        identical=differing == 0,
+        differing_pixels=differing,
+        psnr=psnr(reference, test),
+        ssim=ssim(reference, test),
+        flip=flip(reference, test),
+    )
+
+
+def psnr(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float:
+    """Peak signal-to-noise ratio of two 8-bit pictures, decibels, at most `HIGHEST_PSNR`."""
+    import numpy as np
+    from skimage.metrics import peak_signal_noise_ratio
+
+    with np.errstate(divide="ignore"):  # equal pictures
+        return min(HIGHEST_PSNR, float(peak_signal_noise_ratio(reference, test, data_range=255)))
+
+
+def ssim(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float | None:
+    """Mean structural similarity over the colour channels (Wang et al. 2004); a plain window for tiny pictures."""
+    from skimage.metrics import structural_similarity
+
+    side = min(reference.shape[:2])
+    if side < 3:
+        return None
+    if side >= SSIM_WINDOW:
+        window = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    else:
+        window = {"win_size": side if side % 2 else side - 1}
+    return float(structural_similarity(reference, test, channel_axis=2, data_range=255, **window))
+
+
+def flip(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float:
+    """Mean FLIP error (Andersson et al. 2020) of two sRGB pictures, at its default 67 pixels a degree."""
+    return float(flip_map(reference, test).mean(dtype="float64"))
+
+
+def flip_map(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """FLIP error of each pixel, float32 [height, width], 0 to 1."""
+    import flip_evaluator
+    import numpy as np
+
+    pictures = [picture.astype(np.float32) / np.float32(255.0) for picture in (reference, test)]
+    errors, _, _ = flip_evaluator.evaluate(*pictures, "LDR", inputsRGB=True, applyMagma=False)
+    return np.asarray(errors, dtype=np.float32).reshape(reference.shape[:2])
+
+
+def compare_hits(reference: NDArray[np.int64], test: NDArray[np.int64]) -> HitDifference:
+    """Compare two frames' hit triangles, int64 [height, width] each, -1 where the ray missed."""
+    import numpy as np
+
+    hits = reference >= 0, test >= 0
+    both = hits[0] & hits[1]
+    common = int(np.count_nonzero(both))
+    other = int(np.count_nonzero(both & (reference != test)))
+    return HitDifference(
+        hit_disagreement=float(np.mean(hits[0] != hits[1])),
+        triangle_disagreement=other / common if common else 0.0,
+    )

@@ -1,0 +1,77 @@
+"""How far two pictures are apart in parts of them: the whole frame, the object's pixels, its shadow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.quality.dists import dists_or_none
+from colonnade.quality.image_metrics import flip_map, psnr
+
+#: Pixels around a region that DISTS sees too, so that the region's outline counts.
+MARGIN = 8
+
+
+@dataclass(frozen=True)
+class RegionDifference:
+    """Two 8-bit sRGB pictures compared where a mask says.
+
+    Attributes:
+        pixels: Of the region.
+        psnr: Over the region's pixels, decibels; None for an empty region, as all that follows.
+        flip: Mean of the pixels' FLIP errors, each seen in its surroundings.
+        dists: Of the region's bounding box with a margin, where pixels outside the region are the reference's in both;
+            also None without DISTS's weights.
+    """
+
+    pixels: int
+    psnr: float | None
+    flip: float | None
+    dists: float | None
+
+
+def compare_regions(
+    reference: NDArray[np.uint8],
+    test: NDArray[np.uint8],
+    regions: Mapping[str, NDArray[np.bool_]],
+    with_dists: bool = True,
+) -> dict[str, RegionDifference]:
+    """Compare two pictures, uint8 [height, width, 3] sRGB, in each region, bool [height, width]."""
+    errors = flip_map(reference, test)
+    result = {}
+    for name, region in regions.items():
+        if not region.any():
+            result[name] = RegionDifference(0, None, None, None)
+            continue
+        result[name] = RegionDifference(
+            pixels=int(np.count_nonzero(region)),
+            psnr=psnr(reference[region], test[region]),
+            flip=float(errors[region].mean(dtype=np.float64)),
+            dists=dists_or_none(*_cut_out(reference, test, region)) if with_dists else None,
+        )
+    return result
+
+
+def frame_regions(
+    object_mask: NDArray[np.bool_], shadow_ratio: NDArray[np.float64], darkest: float = 0.97
+) -> dict[str, NDArray[np.bool_]]:
+    """The three regions of an AR frame, by the reference.
+
+    Args:
+        object_mask: bool [height, width].
+        shadow_ratio: float64 [height, width, 3].
+        darkest: A background pixel lies in the shadow where its ratio is less in any channel.
+    """
+    shadow = ~object_mask & (shadow_ratio < darkest).any(axis=2)
+    return {"frame": np.ones_like(object_mask), "object": object_mask, "shadow": shadow}
+
+
+def _cut_out(
+    reference: NDArray[np.uint8], test: NDArray[np.uint8], region: NDArray[np.bool_]
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    rows, columns = (np.flatnonzero(region.any(axis=axis)) for axis in (1, 0))
+    box = tuple(slice(max(0, int(span[0]) - MARGIN), int(span[-1]) + 1 + MARGIN) for span in (rows, columns))
+    return reference[box], np.where(region[..., None], test, reference)[box]

@@ -1,0 +1,1 @@
+"""The reference renderer: the float scene without any of the hardware's rounding."""

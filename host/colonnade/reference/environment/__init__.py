@@ -1,0 +1,1 @@
+"""The environment in floats: what rays meet that miss the object."""

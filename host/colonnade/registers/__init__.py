@@ -1,0 +1,1 @@
+"""Frame registers: their values for a scene, as docs/numbers.md defines them."""

@@ -1,0 +1,105 @@
+"""Registers of a room: how the maps are seen from object space; docs/background.md."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.environment.encoding.planes import SLOPE_PIXELS, Picture
+from colonnade.registers.shadow_window import shadow_window, whole_frame
+
+if TYPE_CHECKING:
+    from colonnade.design.manifest import Manifest
+    from colonnade.environment.encoded import EncodedEnvironment
+    from colonnade.environment.encoding.image import AttributeImage
+    from colonnade.environment.model import Environment
+    from colonnade.scene.view import View
+    from colonnade.scene_image.file import ImageHeader
+
+AXES = "xyz"
+#: Fraction bits of the maps' rotation, and those of a step beyond those of a place in the map.
+ROTATION_FRACTION = 14
+STEP_GUARD = 12
+
+
+def environment_registers(
+    view: View, held: EncodedEnvironment, header: ImageHeader, manifest: Manifest, relit: bool
+) -> dict[str, int]:
+    """Registers ``room.*`` of a frame.
+
+    Args:
+        view: With the room's pose, `View.view_to_mesh`.
+        held: The room, and its maps as the hardware holds them.
+        header: How the mesh lies in the object's cube.
+        manifest: Of the hardware.
+        relit: Render the whole room; otherwise only the pixels whose light the object may block.
+    """
+    registers = projection_registers(view, held.environment, held.image, header, manifest)
+    if relit:
+        window = whole_frame(view)
+    else:
+        depth = held.image.decoded_depth(Picture.of(held.environment, held.image.depth_unit))
+        window = shadow_window(view, held.environment, depth, header.extent)
+    return registers | dict(zip((f"room.window.{edge}" for edge in ("x0", "y0", "x1", "y1")), window, strict=True))
+
+
+def projection_registers(
+    view: View, environment: Environment, image: AttributeImage, header: ImageHeader, manifest: Manifest
+) -> dict[str, int]:
+    """Registers ``room.*`` of a frame, but for the window.
+
+    Args:
+        view: With the room's pose, `View.view_to_mesh`.
+        room: The maps' camera.
+        image: The maps as they are held.
+        header: How the mesh lies in the object's cube.
+        manifest: Of the hardware.
+
+    Raises:
+        UserError: The object is so far from the camera that the room's offset does not fit.
+    """
+    assert view.view_to_mesh is not None
+    turn, origin = view.view_to_mesh[:, :3], view.view_to_mesh[:, 3]
+    to_view = np.linalg.inv(turn)
+    step = header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
+    projection = projection_of(environment, image)
+    # p = projection · to_view · (grid / step + offset - origin)
+    matrix = projection @ to_view / step
+    offset = projection @ to_view @ (np.array(header.frame.offset) - origin)
+    registers = view_registers(matrix, offset, manifest)
+    rotation = np.rint(turn / np.linalg.norm(turn, axis=0) * 2.0**ROTATION_FRACTION).astype(np.int64)
+    registers |= {f"room.rotation[{i}].{axis}": int(rotation[i, a]) for i in range(3) for a, axis in enumerate(AXES)}
+    fraction = manifest.numbers["shadeBits"] + STEP_GUARD
+    for name, map_pixels, frame_pixels in (
+        ("X", environment.width, view.width),
+        ("Y", environment.height, view.height),
+    ):
+        registers[f"room.step{name}"] = round(map_pixels / frame_pixels / (2 * SLOPE_PIXELS) * 2.0**fraction)
+    used = int(image.planes.shell.any(axis=1).sum())
+    return registers | {"room.shellPlanes": used, "room.isThere": 1}
+
+
+def projection_of(environment: Environment, image: AttributeImage) -> Floats:
+    """From view space, metres, to what is seen at pixel 1024 · (p0, p1) / p2 with w = 1 / p2: float64 [3, 3]."""
+    camera = np.array(
+        [[environment.fx, 0.0, environment.cx], [0.0, environment.fy, environment.cy], [0.0, 0.0, SLOPE_PIXELS]]
+    )
+    return np.asarray(camera / (SLOPE_PIXELS * image.depth_unit), dtype=np.float64)
+
+
+def view_registers(matrix: Floats, offset: Floats, manifest: Manifest) -> dict[str, int]:
+    """A projection of grid positions as ``room.matrix``, ``room.offset`` and their exponents."""
+    maximum = (1 << (manifest.numbers["macBits"] - 1)) - 1
+    exponent = math.floor(math.log2(maximum / float(np.abs(matrix).max())))
+    scaled = offset * 2.0**exponent
+    shift = max(0, math.ceil(math.log2(float(np.abs(scaled).max()) / maximum + 1e-300)))
+    if shift > manifest.numbers["sceneBits"]:
+        raise UserError("the object is too small for the room: make it larger")
+    whole = np.rint(matrix * 2.0**exponent).astype(np.int64)
+    registers = {f"room.matrix[{i}].{axis}": int(whole[i, a]) for i in range(3) for a, axis in enumerate(AXES)}
+    registers |= {f"room.offset.{axis}": int(np.rint(scaled[a] / 2.0**shift)) for a, axis in enumerate(AXES)}
+    return registers | {"room.offsetShift": shift, "room.exponent": exponent}

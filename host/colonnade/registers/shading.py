@@ -1,0 +1,105 @@
+"""Registers of lights and materials: what the shader and the paths go by; docs/numbers.md, sections 5 and 6."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.design.manifest import Manifest
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.scene.view import PlacedLight, View
+from colonnade.scene_image.file import ImageHeader
+
+CHANNELS = "rgb"
+KINDS = {"diffuse": 0, "mirror": 1, "glass": 2}
+
+#: Above it the index's square does not fit its register.
+MAX_IOR = 2.8
+
+
+def check_surfaces(view: View, manifest: Manifest) -> None:
+    """Refuse lights, materials and bounces that the hardware does not have.
+
+    Raises:
+        UserError: It says how many there may be, and which setting raises that.
+    """
+    frame = manifest.config["frame"]
+    for what, count, setting in (
+        ("lights", len(view.lights), "lights"),
+        ("materials", len(view.materials), "materials"),
+    ):
+        if count > int(frame[setting]):
+            raise UserError(
+                f"the scene has {count} {what}, the hardware {frame[setting]}: leave some out or raise frame.{setting}"
+            )
+    maximum = int(frame["maxBounces"])
+    shiny = [material for material in view.materials if material.kind != "diffuse"]
+    if shiny and maximum == 0:
+        raise UserError(
+            f"the scene has {shiny[0].kind}, the hardware only diffuse surfaces: raise frame.maxBounces from 0"
+        )
+    if shiny and view.bounces > maximum:
+        raise UserError(
+            f"the scene traces {view.bounces} bounces, the hardware {maximum}: lower paths.bounces or raise"
+            " frame.maxBounces"
+        )
+    for material in shiny:
+        if material.kind == "glass" and not 1.0 <= material.ior <= MAX_IOR:
+            raise UserError(f"glass has an index of refraction of {material.ior:g}; it must be from 1 to {MAX_IOR}")
+
+
+def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
+    """Registers of lights, ambient light, background, materials and how they are shaded."""
+    numbers = manifest.numbers
+    white = (1 << numbers["colourBits"]) - 1
+    step = header.frame.scale * 2.0 ** numbers["gridFraction"]
+    maximum = min(2.0 ** (numbers["vertexBits"] - 2 + numbers["gridFraction"]), 2.0 ** (numbers["gridBits"] - 2) - 1)
+    result = {
+        "shading.offset": int(np.clip(np.rint(view.shadow_offset * step), 1, max(1.0, maximum))),
+        "shading.flat": int(view.flat),
+        "shading.shadows": int(view.shadows),
+        "shading.lights": len(view.lights),
+    }
+    one = 1 << numbers["lightFraction"]
+    max_light = (1 << numbers["lightBits"]) - 1
+    result |= _colour("ambient", view.ambient * one, max_light)
+    result |= _colour("background", view.background * white, white)
+    for index, light in enumerate(view.lights):
+        result |= _colour(f"lights[{index}].colour", light.colour * one, max_light)
+        result |= _reach(f"lights[{index}]", light, step, numbers["mantissaBits"])
+    for index, material in enumerate(view.materials):
+        result |= _colour(f"materials[{index}].albedo", np.array(material.albedo) * white, white)
+    if int(manifest.config["frame"]["maxBounces"]) > 0:
+        result["shading.bounces"] = min(view.bounces, int(manifest.config["frame"]["maxBounces"]))
+        result["shading.clearness"] = int(np.rint(view.shadow_transmittance * one))
+        for index, material in enumerate(view.materials):
+            result |= _kind(f"materials[{index}]", material, numbers["etaFraction"], one)
+    return result
+
+
+def _reach(name: str, light: PlacedLight, step: float, mantissa_bits: int) -> dict[str, int]:
+    """A light's squared reach as mantissa and exponent, in grid steps; a mantissa of 0 is a light without a falloff."""
+    if light.reach is None:
+        return {}
+    mantissa, exponent = math.frexp((light.reach * step) ** 2)
+    whole = round(math.ldexp(mantissa, mantissa_bits))
+    if whole == 1 << mantissa_bits:
+        whole, exponent = whole >> 1, exponent + 1
+    return {f"{name}.reachMantissa": whole, f"{name}.reachExponent": exponent - mantissa_bits}
+
+
+def _kind(name: str, material: MeshMaterial, fraction: int, one: int) -> dict[str, int]:
+    result = {f"{name}.kind": KINDS[material.kind]}
+    if material.kind == "glass":
+        head_on = ((material.ior - 1) / (material.ior + 1)) ** 2
+        result[f"{name}.etaFront"] = round(2**fraction / material.ior)
+        result[f"{name}.etaBack"] = round(2**fraction * material.ior)
+        result[f"{name}.reflectance"] = round(head_on * one)
+    return result
+
+
+def _colour(name: str, values: Floats, maximum: int) -> dict[str, int]:
+    return {f"{name}.{channel}": min(maximum, int(np.rint(values[c]))) for c, channel in enumerate(CHANNELS)}

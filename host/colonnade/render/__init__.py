@@ -1,0 +1,1 @@
+"""Frames of a scene through a backend, and the reports about them."""

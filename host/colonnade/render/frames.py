@@ -1,0 +1,192 @@
+"""Frames of a scene through a backend, and the reports of what they took."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from colonnade.common.errors import UserError
+from colonnade.common.framebuffer import Frame
+from colonnade.common.limits import MAX_WAVEFORM_PIXELS
+from colonnade.common.progress import QUIET, Progress
+from colonnade.design.frame_limits import check_size
+from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
+from colonnade.design.manifest import Manifest
+from colonnade.environment.encoded import EncodedEnvironment
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.render.composite import composited
+from colonnade.render.report import FrameReport, frame_report
+from colonnade.render.request import RenderRequest
+from colonnade.render.result import RenderResult
+from colonnade.scene.model import Scene
+from colonnade.scene.parser import load_scene
+from colonnade.scene.view import View, make_view, with_overrides
+from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.packer import pack
+
+
+def render(request: RenderRequest, progress: Progress = QUIET) -> RenderResult:
+    """Renders one frame: the first of `render_frames`."""
+    (result,) = render_frames(replace(request, frames=1), progress)
+    return result
+
+
+def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterator[RenderResult]:
+    """Renders the frames of a scene's motion; mesh and environment are loaded once.
+
+    Args:
+        request: What to render.
+        progress: Shows the steps.
+
+    Raises:
+        UserError: Something about the input is wrong, or the hardware flagged an error.
+    """
+    scene = load_scene(request.scene)
+    if request.background is not None:
+        scene = scene.with_environment(request.background)
+    if request.mesh is not None:
+        scene = scene.with_mesh(request.mesh)
+    width, height = request.size or (scene.frame.width, scene.frame.height)
+    manifest = manifest_for(request.config, request.overrides, progress).manifest
+    check_size((width, height), manifest)
+    if request.waveform is not None:
+        _check_waveform(request, (width, height))
+    poses = [scene.at(share) for share in scene.motion.shares(request.frames)]
+    if request.backend == "reference":
+        from colonnade.render.reference_frames import reference_frames
+
+        yield from reference_frames(poses, manifest, (width, height), progress)
+        return
+    folder = scene.background.room
+    if request.hits and request.backend == "rtl":
+        from colonnade.device.verilator import require_hits
+
+        require_hits(manifest)
+
+    begun = time.perf_counter()
+    with progress.step("packing the scene"):
+        environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
+        image = pack_scene(scene, manifest, environment)
+        shows_environment = request.relit or environment is None or environment.environment.photo is None
+        registers = [
+            frame_registers(pose, image.header, manifest, width, height, environment, shows_environment)
+            for pose in poses
+        ]
+    packed = time.perf_counter() - begun
+    seen = None if environment is None else environment.environment
+    if request.backend == "rtl":
+        design = design_for(request.config, request.overrides, progress)
+        rendered = _rtl_frames(design, image, registers, progress, request.waveform)
+    else:
+        rendered = _model_frames(manifest, image, registers, progress)
+    for pose, (frame, seconds, rate) in zip(poses, rendered, strict=True):
+        require_no_errors(frame)
+        report = replace(
+            frame_report(request.backend, manifest, image.header, frame),
+            share=pose.share,
+            seconds={"pack": packed, "build": None} | seconds,
+            simulated_cycles_per_second=rate,
+            bytes=None if environment is None else environment.image.byte_counts(),
+        )
+        view = make_view(pose, image.header.extent, width, height, image.header.materials, seen)
+        result = _result(frame, image, view, manifest, report)
+        if environment is not None and not request.relit:
+            result = replace(result, image=composited(result.image, frame, environment.environment))
+        yield result
+
+
+def _check_waveform(request: RenderRequest, size: tuple[int, int]) -> None:
+    """Refuse a waveform of what has no signals, or of so much that it would fill the disk."""
+    if request.backend != "rtl":
+        raise UserError(f"the {request.backend} backend has no signals: use --backend rtl for --waveform")
+    if request.frames != 1:
+        raise UserError("a waveform shows one frame: leave out --frames or --waveform")
+    if size[0] * size[1] > MAX_WAVEFORM_PIXELS:
+        raise UserError(
+            f"a waveform of {size[0]}x{size[1]} pixels would fill the disk: "
+            f"use a --size of at most {MAX_WAVEFORM_PIXELS:,} pixels, e.g. 8x8"
+        )
+
+
+#: A frame, the seconds it took by step, and the cycles that the RTL simulated a second.
+Rendered = tuple[Frame, dict[str, float], float | None]
+
+
+def _rtl_frames(
+    design: GeneratedDesign,
+    image: SceneImage,
+    registers: list[dict[str, int]],
+    progress: Progress,
+    waveform: Path | None = None,
+) -> Iterator[Rendered]:
+    """All frames of one run; each has its part of the seconds."""
+    from colonnade.device.simulator_build import build_simulator
+    from colonnade.device.verilator import render_rtl
+
+    begun = time.perf_counter()
+    build_simulator(design, progress, waveform=waveform is not None)
+    built = time.perf_counter()
+    simulated = render_rtl(design, image, list(registers), progress=progress, waveform=waveform)
+    run = (time.perf_counter() - built) / len(registers)
+    for frame in simulated.frames:
+        yield frame, {"build": built - begun, "run": run}, simulated.cycles_per_second
+
+
+def _model_frames(
+    manifest: Manifest, image: SceneImage, registers: list[dict[str, int]], progress: Progress
+) -> Iterator[Rendered]:
+    """Frame by frame of a model that is loaded once."""
+    from colonnade.device.bit_exact import loaded_model, model_frame
+
+    model = loaded_model(manifest, image)
+
+    def one(values: dict[str, int]) -> Rendered:
+        begun = time.perf_counter()
+        with progress.step("rendering in the model") as share:
+            frame = model_frame(model, values, lambda done, total: share(done / total))
+        return frame, {"run": time.perf_counter() - begun}, None
+
+    yield from map(one, registers)
+
+
+def pack_scene(scene: Scene, manifest: Manifest, environment: EncodedEnvironment | None = None) -> SceneImage:
+    """The scene image of a scene's mesh, made of what the scene says, and of its room."""
+    mesh = load_mesh(scene.mesh_source)
+    image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
+    if environment is None:
+        return image
+    from colonnade.scene_image.environment import with_environment
+
+    return with_environment(image, environment, manifest)
+
+
+def require_no_errors(frame: Frame) -> None:
+    """A frame with an error bit is never shown as a good one."""
+    advice = {
+        "stackOverflow": "the traversal stack overflowed: raise columnBvhMemory.stackDepth",
+        "illegalRecord": "a record was illegal, or pointed outside its section: pack the scene again",
+        "watchdog": "no pixel came for longer than any legal frame takes: the image may be corrupt, pack it again",
+    }
+    if frame.errors:
+        raise UserError("the frame failed: " + "; ".join(advice.get(error, error) for error in frame.errors))
+
+
+def _result(frame: Frame, image: SceneImage, view: View, manifest: Manifest, report: FrameReport) -> RenderResult:
+    white = (1 << manifest.numbers["colourBits"]) - 1
+    source = np.append(image.source_faces.astype(np.int64), -1)
+    x, y = np.arange(view.width)[None, :, None], np.arange(view.height)[:, None, None]
+    longest = np.abs(view.direction + x * view.step_x + y * view.step_y).max(axis=2)
+    depth = frame.distance / (image.header.frame.scale * longest)
+    return RenderResult(
+        image=frame.colour.astype(np.float64) / white,
+        object_mask=frame.is_object,
+        hit_triangles=source[np.where(frame.is_object, frame.triangle, -1)],
+        t=np.where(frame.is_object, depth, np.nan),
+        report=report,
+        ratio=frame.ratio,
+    )

@@ -1,0 +1,45 @@
+"""Frames of a scene without any of the hardware's rounding, as `colonnade render --backend reference` has them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+
+from colonnade.common.progress import Progress
+from colonnade.design.manifest import Manifest
+from colonnade.environment.load import load_environment
+from colonnade.mesh.load import load_mesh
+from colonnade.reference.environment.depth_mesh import full_backdrop
+from colonnade.reference.render import render_reference
+from colonnade.render.report import FrameReport, MeshReport
+from colonnade.render.result import RenderResult
+from colonnade.scene.model import Scene
+from colonnade.scene.view import make_view
+
+
+def reference_frames(
+    poses: Sequence[Scene], manifest: Manifest, size: tuple[int, int], progress: Progress
+) -> Iterator[RenderResult]:
+    """Frames of one scene at several shares of its motion."""
+    begun = time.perf_counter()
+    scene = poses[0]
+    mesh = load_mesh(scene.mesh_source)
+    environment = backdrop = None
+    if scene.background.room is not None:
+        environment = load_environment(scene.background.room)
+        backdrop = full_backdrop(environment)
+    views = [make_view(pose, mesh.extent, *size, mesh.materials, environment) for pose in poses]
+    packed = time.perf_counter() - begun
+    for pose, view in zip(poses, views, strict=True):
+        begun = time.perf_counter()
+        reference = render_reference(mesh, view, progress, backdrop)
+        report = FrameReport(
+            backend="reference",
+            config=manifest.config,
+            mesh=MeshReport(mesh.name, len(mesh.faces), mesh.source_count),
+            size=size,
+            rays=reference.rays,
+            share=pose.share,
+            seconds={"pack": packed, "build": None, "run": time.perf_counter() - begun},
+        )
+        yield RenderResult(reference.image, reference.object_mask, reference.hit_triangles, reference.t, report)

@@ -1,0 +1,172 @@
+"""The report of a frame, or of a sequence of frames: what ``--json`` writes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from colonnade.common.framebuffer import Frame
+from colonnade.design.manifest import Manifest
+from colonnade.scene_image.file import ImageHeader
+
+#: Kinds of rays; those in the box of the object are counted once more, as ``in_box``.
+RAY_KINDS = ("primary", "shadow", "reflection", "refraction")
+
+#: What the frames of a sequence have in common: the report of one among them leaves it out.
+_COMMON = ("backend", "config", "mesh", "size", "bytes")
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """The mesh of a frame: its triangles as packed, and as its source has them."""
+
+    name: str
+    triangles: int
+    source_triangles: int
+
+
+@dataclass(frozen=True)
+class EnvironmentReport:
+    """What the ray march through an environment took in the RTL.
+
+    Attributes:
+        look_ups: Environment lookups.
+        cycles: Of one lookup, on average.
+        steps: March steps of one lookup, on average.
+        busy: Part of the cycles in which the march of a render unit works.
+    """
+
+    look_ups: int
+    cycles: float
+    steps: float
+    busy: float
+
+
+@dataclass(frozen=True)
+class FrameReport:
+    """What there is to say about a frame, or about all frames of a sequence.
+
+    Attributes:
+        backend: rtl, model or reference.
+        config: The configuration, as in the manifest.
+        mesh: Its size.
+        size: Width and height, pixels.
+        rays: Count of each kind; None where the backend does not count it.
+        cycles: Of the RTL; None from the other backends.
+        counters: All counters of the device.
+        errors: Names of the error bits that are set.
+        room: Lookups in the environment; None without one, and from backends without counters of time.
+        share: How far along the scene's motion the frame is, 0.0 to 1.0.
+        seconds: For packing, building the simulator, and rendering.
+        simulated_cycles_per_second: Of the RTL.
+        bytes: Sizes of the encoded maps.
+        frames: The reports of a sequence's frames; none in the report of a frame.
+    """
+
+    backend: str
+    config: Mapping[str, Any]
+    mesh: MeshReport
+    size: tuple[int, int]
+    rays: Mapping[str, int | None]
+    cycles: int | None = None
+    counters: Mapping[str, int] = field(default_factory=dict)
+    errors: Sequence[str] = ()
+    room: EnvironmentReport | None = None
+    share: float | None = None
+    seconds: Mapping[str, float | None] = field(default_factory=dict)
+    simulated_cycles_per_second: float | None = None
+    bytes: Mapping[str, int] | None = None
+    frames: tuple[FrameReport, ...] = ()
+
+    @property
+    def all_rays(self) -> int:
+        """Rays of every kind."""
+        return sum(self.rays.get(kind) or 0 for kind in RAY_KINDS)
+
+    @property
+    def rays_per_cycle(self) -> float | None:
+        """Of all rays, those that miss the box included."""
+        return self.all_rays / self.cycles if self.cycles else None
+
+    @property
+    def rays_per_cycle_in_box(self) -> float | None:
+        """Of the rays that enter the object's box."""
+        return (self.rays.get("in_box") or 0) / self.cycles if self.cycles else None
+
+    def as_json(self) -> dict[str, Any]:
+        """The report as plain values."""
+        values: dict[str, Any] = {
+            "backend": self.backend,
+            "config": self.config,
+            "mesh": asdict(self.mesh),
+            "size": list(self.size),
+            "cycles": self.cycles,
+            "rays": dict(self.rays),
+            "rays_per_cycle": self.rays_per_cycle,
+            "rays_per_cycle_in_box": self.rays_per_cycle_in_box,
+        }
+        if self.frames:
+            values |= {"errors": list(self.errors), "seconds": dict(self.seconds)}
+            of_frames = [frame.as_json() for frame in self.frames]
+            values["frames"] = [
+                {key: value for key, value in frame.items() if key not in _COMMON} for frame in of_frames
+            ]
+        else:
+            values |= {"counters": dict(self.counters), "errors": list(self.errors)}
+            values["room"] = None if self.room is None else asdict(self.room)
+            optional = {
+                "share": self.share,
+                "simulated_cycles_per_second": self.simulated_cycles_per_second,
+                "seconds": dict(self.seconds) or None,
+            }
+            values |= {key: value for key, value in optional.items() if value is not None}
+        return values if self.bytes is None else values | {"bytes": dict(self.bytes)}
+
+
+def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: Frame) -> FrameReport:
+    """The report of a frame of the model or the RTL, but for the seconds it took."""
+    height, width = frame.is_object.shape
+    counters = frame.counters
+    rays = {kind: counters[f"rays{kind.capitalize()}"] for kind in RAY_KINDS} | {"in_box": counters["raysInBox"]}
+    return FrameReport(
+        backend=backend,
+        config=manifest.config,
+        mesh=mesh_report(header),
+        size=(width, height),
+        rays=rays,
+        cycles=counters.get("cycles"),
+        counters=counters,
+        errors=frame.errors,
+        room=_environment_report(manifest, counters),
+    )
+
+
+def mesh_report(header: ImageHeader) -> MeshReport:
+    """The mesh of a scene image."""
+    return MeshReport(header.mesh, header.triangles, header.source_triangles)
+
+
+def _environment_report(manifest: Manifest, counters: Mapping[str, int]) -> EnvironmentReport | None:
+    look_ups, busy = counters.get("raysRoom", 0), counters.get("busyRoom")
+    if look_ups == 0 or busy is None:
+        return None
+    array = manifest.config["array"]
+    unit_cycles = int(array["rows"]) * int(array["columns"]) * counters["cycles"]
+    return EnvironmentReport(look_ups, busy / look_ups, counters["marchSteps"] / look_ups, busy / unit_cycles)
+
+
+def sequence_report(frames: Sequence[FrameReport]) -> FrameReport:
+    """One report of all frames of a sequence, with sums of what they took."""
+    first = frames[0]
+    return FrameReport(
+        backend=first.backend,
+        config=first.config,
+        mesh=first.mesh,
+        size=first.size,
+        rays={kind: sum(frame.rays.get(kind) or 0 for frame in frames) for kind in first.rays},
+        cycles=None if first.cycles is None else sum(frame.cycles or 0 for frame in frames),
+        seconds=dict(first.seconds) | {"run": sum(frame.seconds["run"] or 0.0 for frame in frames)},
+        bytes=first.bytes,
+        frames=tuple(frames),
+    )

@@ -1,0 +1,222 @@
+"""Writes the tables of ``docs/performance.md`` from the data that `tools/performance` measured.
+
+A table stands between ``<!-- NAME -->`` and ``<!-- end -->``; everything else of the page is left alone.
+Run as ``python -m colonnade.report.performance_page DOCS``.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from colonnade.common.atomic_files import replacing
+from colonnade.common.markdown import markdown
+from colonnade.evaluation.bench import PAPER_RAYS_PER_CYCLE, geometric_mean
+from colonnade.report.sweep import LABELS
+
+Data = Mapping[str, Any]
+
+_TABLE = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def page(text: str, docs: Path) -> str:
+    """The page with its tables written anew.
+
+    Args:
+        text: of the page.
+        docs: the folder that holds it, and ``data``.
+    """
+
+    def replaced(match: re.Match[str]) -> str:
+        part, table = TABLES[match[2]]
+        file = docs / "data" / f"{part}.json"
+        body = table(json.loads(file.read_text()), docs) if file.is_file() else f"Run `tools/performance {part}`."
+        return f"{match[1]}{body}\n{match[3]}"
+
+    return _TABLE.sub(replaced, text)
+
+
+def rates(bench: Data, _: Path) -> str:
+    """The headline: rays per cycle and what bounds them."""
+    width, height = bench["size"]
+    array, memory = bench["config"]["array"], bench["config"]["columnBvhMemory"]
+    hardware = f"{array['rows']}×{array['columns']} render units of {array['contexts']} contexts"
+    kind = "snooping" if memory["snooping"] else "round-robin"
+    conditions = f"{hardware}, {memory['banks']} banks, {kind}, latency {memory['readLatency']}; {width}×{height}."
+    rows: list[tuple[str, ...]] = [
+        (
+            name,
+            f"{mesh['triangles']:,}",
+            f"{mesh['cycles']:,}",
+            f"{mesh['rays']['in_box']:,}",
+            f"**{mesh['rays_per_cycle_in_box']:.2f}**",
+            f"{mesh['rays_per_cycle']:.2f}",
+            _number(mesh["bounds"]["perfect_memory"]),
+            _number(mesh["bounds"]["perfect_units"]),
+            f"{mesh['bottleneck']}, {_percent(mesh['utilisation'][mesh['bottleneck']])}",
+        )
+        for name, mesh in bench["meshes"].items()
+    ]
+    bounds = bench["geomean_bounds"]
+    means = (bench["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])
+    in_box = f"**{bench['geomean_rays_per_cycle_in_box']:.2f}**"
+    rows.append(("geometric mean", "", "", "", in_box, *(_number(mean) for mean in means), ""))
+    titles = ["mesh", "triangles", "cycles", "in-box rays", "in-box rays per cycle", "all rays per cycle"]
+    titles += ["bound: perfect memory", "bound: perfect units", "bottleneck"]
+    ratio = f"**{bench['ratio_to_paper']:.1f} times** the chip's {PAPER_RAYS_PER_CYCLE}."
+    return f"{conditions} The geometric mean is {ratio}\n\n{markdown(titles, rows)}"
+
+
+def mirror(bench: Data, _: Path) -> str:
+    """The same meshes as mirrors."""
+    reflected = bench.get("mirror")
+    if reflected is None:
+        return "Run `tools/performance bench`."
+    rows: list[tuple[str, ...]] = [
+        (
+            name,
+            f"{mesh['cycles']:,}",
+            f"{mesh['rays']['reflection']:,}",
+            f"{mesh['rays']['shadow']:,}",
+            f"{mesh['rays']['in_box']:,}",
+            f"**{mesh['rays_per_cycle_in_box']:.2f}**",
+            f"{mesh['rays_per_cycle']:.2f}",
+            f"{mesh['bottleneck']}, {_percent(mesh['utilisation'][mesh['bottleneck']])}",
+        )
+        for name, mesh in reflected["meshes"].items()
+    ]
+    in_box = f"**{reflected['geomean_rays_per_cycle_in_box']:.2f}**"
+    rows.append(("geometric mean", "", "", "", "", in_box, _number(reflected["geomean_rays_per_cycle"]), ""))
+    titles = ["mesh", "cycles", "reflections", "shadow rays", "in-box rays", "in-box rays per cycle"]
+    titles += ["all rays per cycle", "bottleneck"]
+    ratio = f"**{reflected['ratio_to_paper']:.1f} times** the chip's {PAPER_RAYS_PER_CYCLE}."
+    return f"The geometric mean is {ratio}\n\n{markdown(titles, rows)}"
+
+
+def limits(bench: Data, _: Path) -> str:
+    """In-box rays per cycle that each unit or port alone would allow."""
+    meshes = bench["meshes"]
+    resources = list(next(iter(meshes.values()))["limits"])
+    rows = [(name, *(_number(mesh["limits"][resource]) for resource in resources)) for name, mesh in meshes.items()]
+    means = (geometric_mean(mesh["limits"][resource] or 0.0 for mesh in meshes.values()) for resource in resources)
+    rows.append(("geometric mean", *(f"**{mean:.2f}**" for mean in means)))
+    return markdown(["mesh", *resources], rows)
+
+
+def work(bench: Data, _: Path) -> str:
+    """What one in-box ray costs."""
+    titles = ["mesh", "nodes", "boxes", "triangle records", "triangles", "records taken", "records read", "snooped"]
+    rows: list[tuple[str, ...]] = [
+        (name, *(f"{value:.2f}" for value in mesh["per_ray"].values()), _percent(mesh["snoop_share"]))
+        for name, mesh in bench["meshes"].items()
+    ]
+    return markdown(titles, rows)
+
+
+def stages(bench: Data, _: Path) -> str:
+    """Where context cycles go."""
+    return _shares(bench, "stalls")
+
+
+def utilisation(bench: Data, _: Path) -> str:
+    """How busy units and ports are."""
+    return _shares(bench, "utilisation")
+
+
+def speed(bench: Data, _: Path) -> str:
+    """How fast the simulation was."""
+    titles = ["mesh", "simulated cycles", "cycles per second", "seconds, loading included"]
+    rows: list[tuple[str, ...]] = [
+        (name, f"{mesh['cycles']:,}", f"{mesh['cycles_per_second']:,.0f}", f"{mesh['seconds']['run']:.1f}")
+        for name, mesh in bench["meshes"].items()
+    ]
+    return markdown(titles, rows)
+
+
+def scaling(sweep: Data, _: Path) -> str:
+    """The picture, and one row a point."""
+    base = sweep["base"]
+    titles = ["varied", "value", *(f"{name}, in-box rays per cycle" for name in base["meshes"])]
+    titles += ["per render unit", "to the base"]
+
+    def row(name: str, value: str, point: Data) -> tuple[str, ...]:
+        meshes = (f"{mesh['rays_per_cycle_in_box']:.3f}" for mesh in point["meshes"].values())
+        return name, value, *meshes, f"{point['in_box_per_unit']:.4f}", f"{point['ratio_to_base']:.2f}"
+
+    rows = [row("base", "", base)]
+    for point in sweep["points"]:
+        key = point["varied"]
+        rows.append(row(LABELS.get(key, key), str(point["values"][key]), point))
+    picture = "![In-box rays per cycle, each field varied alone](pictures/scaling.png)"
+    return f"{picture}\n\n{markdown(titles, rows)}"
+
+
+def ablation(sweep: Data, docs: Path) -> str:
+    """Measured beside the model's figures, in box and column: a row for each number of contexts and mesh."""
+    keys = ("array.contexts", "columnBvhMemory.snooping", "columnBvhMemory.banks")
+    points = {tuple(point["values"][key] for key in keys): point for point in sweep["points"]}
+    modelled = json.loads((docs / "data" / "cycle-model.json").read_text())
+    model = {
+        (p["mesh"], p["lanes"], p["contexts"], p["snooping"], p["banks"]): p["in_box"] / modelled["columns"]
+        for p in modelled["points"]
+    }
+    columns = sweep["base"]["config"]["array"]["columns"]
+    variants = list(dict.fromkeys((snooping, banks) for _, snooping, banks in points))
+    names = [
+        f"{'snooping' if snooping else 'round-robin'}, {banks} bank{'s' * (banks > 1)}" for snooping, banks in variants
+    ]
+    rows = []
+    for mesh in sweep["base"]["meshes"]:
+        for contexts in dict.fromkeys(contexts for contexts, _, _ in points):
+            at = [(contexts, *variant) for variant in variants]
+            measured = (f"**{points[place]['meshes'][mesh]['rays_per_cycle_in_box'] / columns:.3f}**" for place in at)
+            rows.append((mesh, str(contexts), "RTL", *measured))
+            for lanes in ("6/2", "12/4"):
+                figures = [model.get((mesh, lanes, *place)) for place in at]
+                if any(figure is not None for figure in figures):
+                    rows.append(("", "", f"model, {lanes} lanes", *(_number(figure, 3) for figure in figures)))
+    return markdown(["mesh", "contexts", "", *names], rows)
+
+
+def _shares(bench: Data, key: str) -> str:
+    first = next(iter(bench["meshes"].values()))
+    rows = [(name, *(_percent(share) for share in mesh[key].values())) for name, mesh in bench["meshes"].items()]
+    return markdown(["mesh", *first[key]], rows)
+
+
+def _number(value: float | None, digits: int = 2) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
+
+
+#: Tables by the name in the page: the part of `tools/performance` whose data they show, and what writes them.
+TABLES: dict[str, tuple[str, Callable[[Data, Path], str]]] = {
+    "rates": ("bench", rates),
+    "mirror": ("bench", mirror),
+    "limits": ("bench", limits),
+    "work": ("bench", work),
+    "stages": ("bench", stages),
+    "utilisation": ("bench", utilisation),
+    "speed": ("bench", speed),
+    "scaling": ("scaling", scaling),
+    "ablation": ("ablation", ablation),
+}
+
+
+def main(docs: Path) -> None:
+    """Rewrite the tables of the page in the folder `docs`."""
+    file = docs / "performance.md"
+    text = page(file.read_text(), docs)
+    with replacing(file) as stream:
+        stream.write(text.encode())
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

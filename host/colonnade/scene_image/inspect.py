@@ -1,0 +1,127 @@
+"""What a scene image holds, for `colonnade inspect` and the report of `colonnade pack`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+from colonnade.common.terminal_text import one_line
+from colonnade.design.manifest import Manifest
+from colonnade.scene_image.file import ImageHeader, SceneImage
+
+
+def describe(image: SceneImage) -> dict[str, Any]:
+    """Mesh, memory map and tree statistics as a JSON object."""
+    header = image.header
+    return {
+        "mesh": {
+            "name": header.mesh,
+            "triangles": header.triangles,
+            "source_triangles": header.source_triangles,
+            "low": header.extent.low.tolist(),
+            "high": header.extent.high.tolist(),
+        },
+        "object": {
+            "units_per_mesh_unit": header.frame.scale,
+            "offset": list(header.frame.offset),
+            "bounds_low": list(header.bounds_low),
+            "bounds_high": list(header.bounds_high),
+        },
+        "memory": {
+            "record_bits": header.record_bits,
+            "records": header.record_count,
+            "bytes": image.records.nbytes,
+            "sections": {name: {"first": first, "records": count} for name, first, count in sections(header)},
+        },
+        "tree": asdict(header.tree) if header.tree is not None else None,
+        "room": _environment(image),
+        "format_hash": header.format_hash,
+    }
+
+
+def _environment(image: SceneImage) -> dict[str, Any] | None:
+    if image.header.room is None:
+        return None
+    from colonnade.scene_image.environment import tiles_beyond_heap
+
+    return {**asdict(image.header.room), "tiles_beyond_heap": tiles_beyond_heap(image)}
+
+
+def illegal_lines(image: SceneImage) -> list[str]:
+    """One line that says so if the room's maps have illegal tiles."""
+    from colonnade.scene_image.environment import tiles_beyond_heap
+
+    counts = [f"{count:,} of {name}" for name, count in tiles_beyond_heap(image).items() if count]
+    if not counts:
+        return []
+    return [f"warning     tiles point beyond their heap, {', '.join(counts)}: frames that show them have an error"]
+
+
+def sections(header: ImageHeader) -> list[tuple[str, int, int]]:
+    """The memory map: (name, first record, records)."""
+    return [
+        ("nodes", 0, header.triangle_base),
+        ("triangles", header.triangle_base, header.triangle_records),
+        ("attributes", header.attribute_base, header.record_count - header.attribute_base),
+    ]
+
+
+def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[str]:
+    """The description as lines of text; with a manifest also how full its memories are."""
+    dropped = header.source_triangles - header.triangles
+    lines = [
+        f"mesh        {one_line(header.mesh)}: {header.triangles:,} triangles"
+        + (f" ({dropped:,} dropped)" if dropped else "")
+    ]
+    lines.append(
+        f"box         {header.bounds_low} to {header.bounds_high} units, {header.frame.scale:.6g} units a mesh unit"
+    )
+    used = f"{header.record_count:,} records of {header.record_bits} bits"
+    if manifest is not None:
+        depth = int(manifest.memories["columnBvh"]["depth"])
+        used += f", {header.record_count / depth:.1%} of {depth:,}"
+    lines.append(f"memory      {used} ({header.record_count * header.record_bits // 8:,} bytes a column)")
+    lines += [f"  {name:<10}{count:>9,} records from {first:,}" for name, first, count in sections(header) if count]
+    return lines + _tree_lines(header, manifest) + _environment_lines(header, manifest)
+
+
+def _tree_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
+    tree = header.tree
+    if tree is None:
+        return ["tree        none: every ray tests every triangle"]
+    stack = f"{tree.stack_bound} entries"
+    if manifest is not None:
+        stack += f" of {manifest.config['columnBvhMemory']['stackDepth']}"
+    lines = [
+        f"tree        {tree.nodes:,} nodes, {tree.leaves:,} leaves, depth {tree.depth}, stack bound {stack}",
+        f"cost        {tree.cost:.2f} records for a random ray through the box",
+    ]
+    if tree.height_limit:
+        lines.append(f"            held to {tree.height_limit} binary levels so that the stack suffices")
+    return lines
+
+
+def _environment_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
+    if header.room is None:
+        return []
+    size = sum(memory.bytes for memory in header.room.memories)
+    lines = [f"room        {one_line(header.room.name)}: {size:,} bytes to load"]
+    if manifest is not None:
+        from colonnade.scene_image.environment import environment_use
+
+        for name, use in environment_use(header, manifest).items():
+            lines.append(
+                f"  {name:<10}{use['bytes']:>9,} bytes of memory, {use['ratio']:.1f} times less than the map's"
+                f" {use['source_bytes']:,}"
+            )
+    for memory in header.room.memories:
+        target = "" if manifest is None else f", load target {manifest.memories[memory.memory]['target']}"
+        lines.append(f"  {one_line(memory.memory):<19}{memory.words:>6,} words of {memory.word_bytes} bytes{target}")
+    return lines
+
+
+def print_report(header: ImageHeader, manifest: Manifest | None = None, write: Callable[[str], None] = print) -> None:
+    """Writes `report_lines`, one call a line."""
+    for line in report_lines(header, manifest):
+        write(line)

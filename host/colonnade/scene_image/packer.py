@@ -1,0 +1,243 @@
+"""The packer: from a mesh to the records of the column memory.
+
+Quantise, drop what has no area left, build the tree, fill the records by the manifest's layouts. Sections in memory
+order: nodes, triangles, attributes. Addresses in nodes are absolute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.errors import UserError
+from colonnade.common.types import Bytes
+from colonnade.common.vectors import unit_vectors
+from colonnade.design.manifest import Manifest
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.topology import drop_faces, merge_rows
+from colonnade.scene_image.bvh import LEAF, NODE, Bvh, build_bvh
+from colonnade.scene_image.file import ImageHeader, ObjectFrame, SceneImage
+
+Units = npt.NDArray[np.int32]
+AXES = "xyz"
+#: The column memory's largest configuration, records.
+DEEPEST_MEMORY = 1 << 22
+
+
+@dataclass(frozen=True)
+class QuantisedMesh:
+    """A mesh on the grid of vertex units.
+
+    Attributes:
+        vertices: int32 [n, 3], from 0 to 2^vertexBits − 1; one for each vertex of the mesh.
+        faces: int32 [m, 3], those with an area.
+        mesh_faces: int64 [m], their rows in the mesh's faces.
+        frame: How the mesh lies in the cube.
+    """
+
+    vertices: Units
+    faces: npt.NDArray[np.int32]
+    mesh_faces: npt.NDArray[np.int64]
+    frame: ObjectFrame
+
+
+def quantise(mesh: Mesh, vertex_bits: int) -> QuantisedMesh:
+    """The mesh, uniformly scaled, in the middle of the cube [0, 2^vertex_bits − 1]³, rounded to nearest.
+
+    The box's low planes are whole units, so that a flat side stays flat.
+    Faces that lose their area, or become equal to an earlier one, are dropped.
+    """
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    maximum = (1 << vertex_bits) - 1
+    edge = float((high - low).max())
+    scale = maximum / edge
+    start = np.floor((maximum - np.rint((high - low) * scale)) / 2)
+    offset = low - start / scale
+    vertices = np.clip(np.rint((mesh.vertices - low) * scale) + start, 0, maximum).astype(np.int64)
+    # Vertices that fall together count as one when faces are compared.
+    positions, index = merge_rows(vertices)
+    keep = drop_faces(positions, index[mesh.faces])
+    if len(keep) == 0:
+        raise UserError(f"mesh {mesh.name}: no triangle keeps an area at geometry.vertexBits {vertex_bits}: raise it")
+    frame = ObjectFrame(scale, (float(offset[0]), float(offset[1]), float(offset[2])))
+    return QuantisedMesh(vertices.astype(np.int32), mesh.faces[keep], keep, frame)
+
+
+def pack(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | None = None) -> SceneImage:
+    """The scene image of a mesh for the hardware of a manifest.
+
+    Args:
+        mesh: What to pack.
+        manifest: Of the hardware.
+        materials: What the mesh's materials are made of; their own unless given. Only which of them are glass is part
+            of the records.
+
+    Raises:
+        UserError: It does not fit; the message names the number and the setting.
+    """
+    geometry, memory = manifest.config["geometry"], manifest.config["columnBvhMemory"]
+    quantised = quantise(mesh, int(geometry["vertexBits"]))
+    bvh = build_bvh(
+        quantised.vertices,
+        quantised.faces,
+        triangles_per_record=int(geometry["trianglesPerRecord"]),
+        arity=int(geometry["arity"]),
+        box_bits=int(geometry["boxBits"]),
+        stack_depth=int(memory["stackDepth"]),
+    )
+    leaf_first, leaf_count = bvh.leaf_first, bvh.leaf_count
+    if not manifest.bvh:
+        leaf_first, leaf_count = _full_leaves(len(bvh.order), int(geometry["trianglesPerRecord"]))
+    faces_per_record = manifest.layouts["attributes"].count_of("faces[{}].material")
+    triangle_base = bvh.statistics.nodes if manifest.bvh else 0
+    attribute_base = triangle_base + len(leaf_first)
+    record_count = attribute_base + -(-len(bvh.order) // faces_per_record)
+    _check_fits(mesh.name, manifest, bvh, record_count)
+
+    sections = [_node_records(bvh, manifest, triangle_base)] if manifest.bvh else []
+    materials = mesh.materials if materials is None else tuple(materials)
+    is_glass = np.array([material.kind == "glass" for material in materials])
+    is_clear = is_glass[mesh.face_materials[quantised.mesh_faces]]
+    sections.append(_triangle_records(quantised, bvh.order, leaf_first, leaf_count, is_clear, manifest))
+    sections.append(_attribute_records(mesh, quantised, bvh.order, manifest, faces_per_record))
+    used = quantised.vertices[quantised.faces.reshape(-1)]
+    header = ImageHeader(
+        format_hash=manifest.format_hash,
+        mesh=mesh.name,
+        source_triangles=mesh.source_count,
+        triangles=len(bvh.order),
+        record_bits=manifest.record_bits,
+        record_count=record_count,
+        triangle_base=triangle_base,
+        triangle_records=len(leaf_first),
+        attribute_base=attribute_base,
+        bounds_low=_corner(used.min(axis=0)),
+        bounds_high=_corner(used.max(axis=0)),
+        frame=quantised.frame,
+        extent=mesh.extent,
+        materials=tuple(materials),
+        tree=bvh.statistics if manifest.bvh else None,
+    )
+    return SceneImage(header, np.concatenate(sections), mesh.source_faces[quantised.mesh_faces[bvh.order]])
+
+
+def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
+    """What an image takes of each memory, for reports: records, bytes, the stack, and a room's maps."""
+    from colonnade.scene_image.environment import environment_use
+
+    depth = int(manifest.memories["columnBvh"]["depth"])
+    use: dict[str, Any] = {
+        "columnBvhMemory": {
+            "records": header.record_count,
+            "depth": depth,
+            "share": header.record_count / depth,
+            "bytes": header.record_count * header.record_bits // 8,
+            "nodes": header.triangle_base,
+            "triangles": header.triangle_records,
+            "attributes": header.record_count - header.attribute_base,
+        }
+    }
+    if header.tree is not None:
+        stack_depth = int(manifest.config["columnBvhMemory"]["stackDepth"])
+        use["stack"] = {"bound": header.tree.stack_bound, "depth": stack_depth}
+    if header.room is not None:
+        use["physicalAttributeMemory"] = environment_use(header, manifest)
+    return use
+
+
+def _check_fits(name: str, manifest: Manifest, bvh: Bvh, record_count: int) -> None:
+    depth = int(manifest.memories["columnBvh"]["depth"])
+    if record_count > depth:
+        advice = "raise columnBvhMemory.depth" if record_count <= DEEPEST_MEMORY else "take a coarser mesh"
+        raise UserError(f"mesh {name} needs {record_count:,} records, columnBvhMemory.depth is {depth:,}: {advice}")
+    stack_depth, bound = int(manifest.config["columnBvhMemory"]["stackDepth"]), bvh.statistics.stack_bound
+    if manifest.bvh and bound > stack_depth:
+        raise UserError(
+            f"mesh {name} needs a stack of {bound} entries even with a balanced tree, columnBvhMemory.stackDepth is"
+            f" {stack_depth}: raise columnBvhMemory.stackDepth"
+        )
+    ids = 1 << manifest.layouts["triangles"].fields["firstTriangle"].width
+    if len(bvh.order) >= ids:
+        raise UserError(
+            f"mesh {name} has {len(bvh.order):,} triangles, packed ids reach {ids - 2:,}: raise columnBvhMemory.depth"
+        )
+
+
+def _full_leaves(triangles: int, per_record: int) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]:
+    """Leaves for the exhaustive baseline: every record but the last is full."""
+    first = np.arange(0, triangles, per_record, dtype=np.uint32)
+    return first, np.minimum(per_record, triangles - first).astype(np.uint32)
+
+
+def _node_records(bvh: Bvh, manifest: Manifest, triangle_base: int) -> Bytes:
+    """Node records; child addresses are absolute, 0 where a node has no child of that kind."""
+    has_nodes, has_leaves = (bvh.kinds == NODE).any(axis=1), (bvh.kinds == LEAF).any(axis=1)
+    values: dict[str, npt.NDArray[Any]] = {
+        "firstChild": np.where(has_nodes, bvh.first_child, 0),
+        "firstTriangles": np.where(has_leaves, bvh.first_triangles.astype(np.int64) + triangle_base, 0),
+    }
+    values |= _vector("origin", bvh.origin) | _vector("exponent", bvh.exponent)
+    for slot in range(bvh.kinds.shape[1]):
+        values[f"kinds[{slot}]"] = bvh.kinds[:, slot]
+        values |= _vector(f"low[{slot}]", bvh.low[:, slot]) | _vector(f"high[{slot}]", bvh.high[:, slot])
+    return manifest.layouts["node"].pack(values)
+
+
+def _triangle_records(
+    quantised: QuantisedMesh,
+    order: npt.NDArray[np.uint32],
+    leaf_first: npt.NDArray[np.uint32],
+    leaf_count: npt.NDArray[np.uint32],
+    is_clear: npt.NDArray[np.bool_],
+    manifest: Manifest,
+) -> Bytes:
+    values: dict[str, npt.NDArray[Any]] = {"firstTriangle": leaf_first, "count": leaf_count}
+    for k in range(int(manifest.config["geometry"]["trianglesPerRecord"])):
+        present = leaf_count > k
+        packed = np.minimum(leaf_first + k, len(order) - 1)
+        values[f"isClear[{k}]"] = is_clear[order[packed]] & present
+        corners = quantised.vertices[quantised.faces[order[packed]]] * present[:, None, None]
+        for j in range(3):
+            values |= _vector(f"vertices[{3 * k + j}]", corners[:, j])
+    return manifest.layouts["triangles"].pack(values)
+
+
+def _attribute_records(
+    mesh: Mesh, quantised: QuantisedMesh, order: npt.NDArray[np.uint32], manifest: Manifest, per_record: int
+) -> Bytes:
+    """Shading attributes in the order of packed ids; the last record may have empty slots."""
+    one = (1 << manifest.numbers["normalFraction"]) - 1
+    rows = quantised.mesh_faces[order]
+    count = -(-len(order) // per_record)
+    normals = np.zeros((count * per_record, 4, 3), dtype=np.int64)
+    normals[: len(order), :3] = np.rint(mesh.vertex_normals[mesh.faces[rows]] * one)
+    normals[: len(order), 3] = np.rint(geometric_normals(quantised)[order] * one)
+    materials = np.zeros(count * per_record, dtype=np.int64)
+    materials[: len(order)] = mesh.face_materials[rows]
+    values: dict[str, npt.NDArray[Any]] = {}
+    for k in range(per_record):
+        face = slice(k, None, per_record)
+        for j in range(3):
+            values |= _vector(f"faces[{k}].normals[{j}]", normals[face, j])
+        values |= _vector(f"faces[{k}].geometricNormal", normals[face, 3])
+        values[f"faces[{k}].material"] = materials[face]
+    return manifest.layouts["attributes"].pack(values)
+
+
+def geometric_normals(quantised: QuantisedMesh) -> npt.NDArray[np.float64]:
+    """Unit normals float64 [m, 3] of the quantised triangles, by their winding; the cross product is exact."""
+    corners = quantised.vertices[quantised.faces].astype(np.int64)
+    return unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).astype(np.float64))
+
+
+def _vector(name: str, values: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
+    return {f"{name}.{axis}": values[:, a] for a, axis in enumerate(AXES)}
+
+
+def _corner(values: npt.NDArray[Any]) -> tuple[int, int, int]:
+    return int(values[0]), int(values[1]), int(values[2])

@@ -1,0 +1,174 @@
+"""Mesh files that trimesh would accept in silence, or not survive."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from typing import Any
+
+import hostile
+import numpy as np
+import pytest
+from hostile import RENDER, TRIANGLE, Case, Content, fifo, link_to
+
+from colonnade.mesh.load import load_mesh
+
+OBJ, PLY, STL, OFF = (f"{RENDER} --mesh x.{suffix}" for suffix in ("obj", "ply", "stl", "off"))
+GLTF, GLB = f"{RENDER} --mesh x.gltf", f"{RENDER} --mesh x.glb"
+POINTS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+PLY_HEADER = (
+    "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
+)
+PLY_BODY = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+
+
+def with_mtl(line: str) -> dict[str, Content]:
+    return {"x.obj": f"mtllib x.mtl\nusemtl a\n{TRIANGLE}", "x.mtl": f"newmtl a\n{line}\n"}
+
+
+def gltf(**changes: Any) -> dict[str, Any]:
+    """A glTF document of one triangle, with its buffer inside."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32).tobytes()
+    data = points + np.array([0, 1, 2], np.uint16).tobytes()
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "materials": [{"name": "a", "pbrMetallicRoughness": {"metallicFactor": 0}}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 6}],
+        "buffers": [{"byteLength": 42, "uri": uri(data)}],
+    }
+    return document | changes
+
+
+def uri(data: bytes) -> str:
+    return "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+
+
+def of_gltf(**changes: Any) -> dict[str, Content]:
+    return {"x.gltf": json.dumps(gltf(**changes))}
+
+
+def glb(document: bytes, claimed: int | None = None) -> bytes:
+    document += b" " * (-len(document) % 4)
+    chunk = struct.pack("<I", len(document) if claimed is None else claimed) + b"JSON" + document
+    return b"glTF" + struct.pack("<II", 2, 12 + len(chunk)) + chunk
+
+
+def buffer(name: str) -> list[dict[str, Any]]:
+    return [{"byteLength": 42, "uri": name}]
+
+
+ACCESSORS = gltf()["accessors"]
+CASES = {
+    "obj-index-0": Case(OBJ, "names vertex 0", {"x.obj": f"{POINTS}f 0 1 2\n"}),
+    "obj-index-0-with-normal": Case(OBJ, "names vertex 0", {"x.obj": f"{POINTS}vn 0 0 1\nf 0//1 1//1 2//1\n"}),
+    "obj-index-beyond": Case(OBJ, "vertex 9, which does not exist", {"x.obj": f"{POINTS}f 1 2 9\n"}),
+    "obj-index-before": Case(OBJ, "vertex -9, which does not exist", {"x.obj": f"{POINTS}f 1 2 -9\n"}),
+    "obj-index-digits": Case(OBJ, "does not exist", {"x.obj": f"{POINTS}f 1 2 {'9' * 400}\n"}),
+    "obj-index-text": Case(OBJ, "no whole number", {"x.obj": f"{POINTS}f a b c\n"}),
+    "obj-index-float": Case(OBJ, "no whole number", {"x.obj": f"{POINTS}f 1.5 2 3\n"}),
+    "obj-index-5000-digits": Case(OBJ, "no whole number", {"x.obj": f"{POINTS}f 1 2 {'9' * 5000}\n"}),
+    "obj-two-corners": Case(OBJ, "x.obj", {"x.obj": f"{POINTS}f 1 2\n"}),
+    "obj-nan": Case(OBJ, "not a finite number", {"x.obj": "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}),
+    "obj-infinite": Case(OBJ, "not a finite number", {"x.obj": "v 1e999 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}),
+    "obj-huge": Case(OBJ, "scale it down", {"x.obj": "v 1e200 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}),
+    "obj-words": Case(OBJ, "x.obj", {"x.obj": "v a b c\nf 1 1 1\n"}),
+    "obj-nul": Case(OBJ, "x.obj", {"x.obj": b"\0" * 1000}),
+    "obj-escapes": Case(f"{RENDER} --mesh '\x1b[31m.obj'", "\\x1b[31m.obj", {"\x1b[31m.obj": "f 1 2 3\n"}),
+    "obj-named-300": Case(f"{RENDER} --mesh {'n' * 300}.obj", "File name too long"),
+    "mesh-folder": Case(f"{RENDER} --mesh room", "no mesh"),
+    "mesh-strange-suffix": Case(f"{RENDER} --mesh a.png", "ends with one of"),
+    "mtl-nan": Case(OBJ, "x.mtl, line 2: Kd nan 0 0", with_mtl("Kd nan 0 0")),
+    "mtl-infinite": Case(OBJ, "must be finite", with_mtl("Ni inf")),
+    "mtl-negative": Case(OBJ, "must be finite", with_mtl("Kd -1 0 0")),
+    "mtl-overflow": Case(OBJ, "must be finite", with_mtl("d 1e999")),
+    "mtl-escapes": Case(OBJ, "Kd nan \\x1b[31m", with_mtl("Kd nan \x1b[31m")),
+    "mtl-fifo": Case(OBJ, "a pipe", {"x.obj": f"mtllib x.mtl\n{TRIANGLE}", "x.mtl": fifo}),
+    "mtl-device": Case(OBJ, "outside", {"x.obj": f"mtllib x.mtl\n{TRIANGLE}", "x.mtl": link_to("/dev/zero")}),
+    "mtl-folder": Case(OBJ, "a folder", {"x.obj": f"mtllib room\n{TRIANGLE}"}),
+    "ply-index-beyond": Case(
+        PLY, "does not exist", {"x.ply": PLY_HEADER.format(3, 1) + PLY_BODY.replace("3 0 1 2", "3 0 1 9")}
+    ),
+    "ply-index-negative": Case(
+        PLY, "x.ply", {"x.ply": PLY_HEADER.format(3, 1) + PLY_BODY.replace("3 0 1 2", "3 0 1 -9")}
+    ),
+    "ply-many-vertices": Case(PLY, "x.ply", {"x.ply": PLY_HEADER.format(10**12, 1) + PLY_BODY}),
+    "ply-many-faces": Case(PLY, "x.ply", {"x.ply": PLY_HEADER.format(3, 10**12) + PLY_BODY}),
+    "ply-digits": Case(PLY, "x.ply", {"x.ply": PLY_HEADER.format("9" * 5000, 1) + PLY_BODY}),
+    "ply-negative": Case(PLY, "x.ply", {"x.ply": PLY_HEADER.format(-3, -1) + PLY_BODY}),
+    "ply-no-header-end": Case(PLY, "x.ply", {"x.ply": "ply\nformat ascii 1.0\n"}),
+    "ply-binary-short": Case(
+        PLY, "x.ply", {"x.ply": PLY_HEADER.format(10**9, 10**9).replace("ascii", "binary_little_endian") + "xx"}
+    ),
+    "stl-count": Case(STL, "x.stl", {"x.stl": b"\0" * 80 + struct.pack("<I", 0xFFFFFFFF) + b"\0" * 50}),
+    "stl-short": Case(STL, "x.stl", {"x.stl": b"\0" * 20}),
+    "stl-nan": Case(STL, "x.stl", {"x.stl": b"\0" * 80 + struct.pack("<I", 1) + b"\xff" * 50}),
+    "stl-text": Case(STL, "x.stl", {"x.stl": "solid x\nfacet normal a b c\nendsolid\n"}),
+    "off-index": Case(OFF, "face index outside", {"x.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"}),
+    "off-count": Case(OFF, "x.off", {"x.off": f"OFF\n{10**12} {10**12} 0\n0 0 0\n"}),
+    "off-noise": Case(OFF, "x.off", {"x.off": "OFF\n\x1b[31m\n"}),
+    "gltf-deep": Case(GLTF, "nested too deeply", {"x.gltf": "[" * 100_000}),
+    "gltf-list": Case(GLTF, "no object", {"x.gltf": "[]"}),
+    "gltf-nan": Case(GLTF, "NaN", {"x.gltf": json.dumps(gltf(extras=float("nan")))}),
+    "gltf-duplicate": Case(GLTF, "twice", {"x.gltf": '{"asset": 1, "asset": 2}'}),
+    "gltf-circle": Case(GLTF, "ancestor", of_gltf(nodes=[{"mesh": 0}, {"children": [2]}, {"children": [1]}])),
+    "gltf-own-child": Case(GLTF, "ancestor", of_gltf(nodes=[{"mesh": 0, "children": [0]}])),
+    "gltf-two-parents": Case(GLTF, "two parents", of_gltf(nodes=[{"children": [2]}, {"children": [2]}, {"mesh": 0}])),
+    "gltf-no-child": Case(GLTF, "does not exist", of_gltf(nodes=[{"mesh": 0, "children": [7]}])),
+    "gltf-nodes": Case(GLTF, "list of objects", of_gltf(nodes={"a": 1})),
+    "gltf-materials": Case(GLTF, "list of objects", of_gltf(materials=[7])),
+    "gltf-count": Case(GLTF, "sensible count", of_gltf(accessors=[ACCESSORS[0] | {"count": 10**12}, ACCESSORS[1]])),
+    "gltf-zeros": Case(
+        GLTF, "x.gltf", of_gltf(accessors=[{"componentType": 5126, "count": 10**9, "type": "VEC3"}, ACCESSORS[1]])
+    ),
+    "gltf-negative-count": Case(
+        GLTF, "sensible count", of_gltf(accessors=[ACCESSORS[0] | {"count": -3}, ACCESSORS[1]])
+    ),
+    "gltf-colour": Case(
+        GLTF, "factors", of_gltf(materials=[{"pbrMetallicRoughness": {"baseColorFactor": [-1, 0, 0, 1]}}])
+    ),
+    "gltf-no-mesh": Case(GLTF, "x.gltf", of_gltf(nodes=[{"mesh": 7}])),
+    "gltf-buffer-fifo": Case(GLTF, "a pipe", of_gltf(buffers=buffer("b.bin")) | {"b.bin": fifo}),
+    "gltf-buffer-device": Case(GLTF, "outside", of_gltf(buffers=buffer("b.bin")) | {"b.bin": link_to("/dev/zero")}),
+    "gltf-buffer-missing": Case(GLTF, "x.gltf", of_gltf(buffers=buffer("none.bin"))),
+    "gltf-buffer-above": Case(GLTF, "x.gltf", of_gltf(buffers=buffer("../../../../etc/hostname"))),
+    "gltf-buffer-absolute": Case(GLTF, "outside", of_gltf(buffers=buffer("/etc/hostname"))),
+    "gltf-buffer-named-300": Case(GLTF, "x.gltf", of_gltf(buffers=buffer("b" * 300))),
+    "gltf-buffer-is-output": Case(
+        f"{GLTF} --output b.bin", "would replace", of_gltf(buffers=buffer("b.bin")) | {"b.bin": b"\0" * 42}
+    ),
+    "glb-long": Case(GLB, "x.glb", {"x.glb": glb(b"{}", 0xFFFFFFFF)}),
+    "glb-short": Case(GLB, "x.glb", {"x.glb": b"glTF\x02"}),
+    "glb-deep": Case(GLB, "nested too deeply", {"x.glb": glb(b'{"a":' + b"[" * 50_000 + b"]" * 50_000 + b"}")}),
+    "glb-binary": Case(GLB, "x.glb", {"x.glb": glb(b"\xff" * 400)}),
+}
+
+
+@hostile.parametrised(CASES)
+def test_mesh_is_refused(case: Case, folder: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    hostile.run(case, folder, monkeypatch)
+
+
+def test_textures_are_not_opened(folder: Any) -> None:
+    """A texture may be a pipe, or a picture for which Pillow would start another program."""
+    hostile.make(folder / "x.obj", f"mtllib x.mtl\nusemtl a\n{TRIANGLE}")
+    hostile.make(folder / "x.mtl", "newmtl a\nKd 0.25 0.5 0.75\nmap_Kd pipe.png\n")
+    hostile.make(folder / "pipe.png", fifo)
+    hostile.make(folder / "x.gltf", json.dumps(gltf(images=[{"uri": "pipe.png"}], textures=[{"source": 0}])))
+    with hostile.no_longer_than(hostile.PATIENCE):
+        assert load_mesh(folder / "x.obj").materials[0].albedo == (0.25, 0.5, 0.75)
+        assert len(load_mesh(folder / "x.gltf").faces) == 1
+
+
+def test_relative_indices_of_obj_are_read(folder: Any) -> None:
+    (folder / "x.obj").write_text(f"{POINTS}v 0 0 1\nf 1 2 3\nf -4 -3 -1\n")
+    assert len(load_mesh(folder / "x.obj").faces) == 2

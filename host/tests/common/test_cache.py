@@ -1,0 +1,211 @@
+"""Entries and measurements of the cache: what is damaged is made again, once, with one line."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from colonnade.common import cache
+from colonnade.common.errors import UserError
+
+KEY = {"design": "d0", "registers": {"frame.width": 8}}
+CONTENT = {"cycles": 1234, "counters": {"hits": 5}}
+
+Damage = Callable[[Path], object]
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Where entries were made; nothing is known to be intact at first."""
+    monkeypatch.setattr(cache, "_verified", {})
+    return []
+
+
+def get(folder: Path, made: list[Path]) -> Path:
+    """The entry, as a new process would ask for it."""
+    cache._verified.clear()
+
+    def make(place: Path) -> None:
+        made.append(place)
+        (place / "deep").mkdir()
+        (place / "program").write_bytes(b"\x7fELF" * 100)
+        (place / "deep" / "a.sv").write_text("module a; endmodule\n")
+
+    return cache.entry(folder, make, "simulator")
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def alter(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def truncate(path: Path) -> None:
+    os.truncate(path, path.stat().st_size // 2)
+
+
+def test_makes_an_entry_once(tmp_path: Path, made: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "k0"
+    for _ in range(3):
+        assert get(folder, made) == folder
+    assert len(made) == 1
+    assert cache.is_intact(folder)
+    assert set(cache.digests(folder) or ()) == {"program", "deep/a.sv"}
+    assert names(tmp_path) == {"k0", "k0.lock"}
+    assert capsys.readouterr().err == ""
+
+
+DAMAGES: dict[str, Damage] = {
+    "truncated": lambda folder: truncate(folder / "program"),
+    "empty": lambda folder: (folder / "program").write_bytes(b""),
+    "altered": lambda folder: alter(folder / "deep" / "a.sv"),
+    "missing": lambda folder: (folder / "program").unlink(),
+    "additional": lambda folder: (folder / "deep" / "b.sv").write_text("module b; endmodule\n"),
+    "linked": lambda folder: (folder / "link").symlink_to("program"),
+    "seal truncated": lambda folder: truncate(folder / cache.CONTENTS),
+    "seal missing": lambda folder: (folder / cache.CONTENTS).unlink(),
+    "seal nested": lambda folder: (folder / cache.CONTENTS).write_text("[" * 100_000),
+    "seal of nothing": lambda folder: (folder / cache.CONTENTS).write_text("[]"),
+    "a file": lambda folder: (folder.rename(folder.with_name("away")), folder.write_text("")),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES.keys())
+def test_makes_a_damaged_entry_again(
+    damage: Damage, tmp_path: Path, made: list[Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "k0"
+    get(folder, made)
+    damage(folder)
+    for _ in range(2):
+        get(folder, made)
+    assert len(made) == 2
+    assert cache.is_intact(folder)
+    assert capsys.readouterr().err == "colonnade: the cached simulator was damaged and is built again\n"
+
+
+def test_takes_no_entry_of_another_key(tmp_path: Path, made: list[Path]) -> None:
+    get(tmp_path / "k0", made).rename(tmp_path / "k1")
+    get(tmp_path / "k1", made)
+    assert len(made) == 2
+
+
+def test_keeps_nothing_of_a_making_that_failed(tmp_path: Path, made: list[Path]) -> None:
+    def fail(place: Path) -> None:
+        (place / "half").write_text("")
+        raise RuntimeError("no")
+
+    with pytest.raises(RuntimeError, match="no"):
+        cache.entry(tmp_path / "k0", fail, "simulator")
+    assert names(tmp_path) == {"k0.lock"}
+
+
+def test_names_a_full_and_an_unwritable_cache(tmp_path: Path, made: list[Path]) -> None:
+    def fill(place: Path) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(UserError, match="no space left on the disk of"):
+        cache.entry(tmp_path / "k0", fill, "simulator")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written: "):
+        get(tmp_path / "file" / "k0", made)
+    with pytest.raises(UserError, match="cannot be written: "):
+        get(tmp_path / "file" / "deep" / "deeper" / "k0", made)
+
+
+def test_says_that_work_failed_for_want_of_space(
+    tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(place: Path) -> None:
+        raise errors.pop()
+
+    monkeypatch.setattr(cache, "LEAST_SPACE", 1 << 80)
+    errors = [RuntimeError("g++ failed"), shutil.Error([("from", "to", "No space left")])]
+    while errors:
+        with pytest.raises(UserError, match="no space left on the disk of the cache"):
+            cache.entry(tmp_path / "k0", fail, "simulator")
+    assert names(tmp_path) == {"k0.lock"}
+
+
+def test_threads_share_what_one_of_them_makes(tmp_path: Path, made: list[Path]) -> None:
+    def make(place: Path) -> None:
+        made.append(place)
+        time.sleep(0.05)
+
+    threads = [threading.Thread(target=cache.entry, args=(tmp_path / "k0", make, "simulator")) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 1
+
+
+def test_verifies_a_hundred_and_fifty_files_in_milliseconds(tmp_path: Path) -> None:
+    for number in range(150):
+        (tmp_path / f"{number}.sv").write_bytes(os.urandom(20_000))
+    cache.seal(tmp_path)
+    begun = time.perf_counter()
+    assert cache.is_intact(tmp_path)
+    # 15 ms alone on a core
+    assert time.perf_counter() - begun < 0.5
+
+
+def test_stores_a_measurement(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "m" / "k.json"
+    assert cache.stored(file, KEY) is None
+    cache.store(file, KEY, CONTENT)
+    assert cache.stored(file, KEY) == CONTENT
+    assert capsys.readouterr().err == ""
+
+
+def edited(change: Callable[[dict[str, object]], object]) -> Damage:
+    def edit(file: Path) -> None:
+        kept = json.loads(file.read_text())
+        change(kept)
+        file.write_text(json.dumps(kept))
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        truncate,
+        edited(lambda kept: kept["content"].update(cycles=1233)),  # type: ignore[attr-defined]
+        edited(lambda kept: kept["key"]["registers"].update({"frame.width": 9})),  # type: ignore[index]
+        edited(lambda kept: kept.pop("sha256")),
+        lambda file: file.write_text(json.dumps(CONTENT)),
+        lambda file: file.write_text("[" * 100_000),
+        lambda file: (file.unlink(), file.mkdir()),
+    ],
+    ids=["truncated", "other cycles", "other registers", "no checksum", "plain", "nested", "a folder"],
+)
+def test_believes_no_altered_measurement(damage: Damage, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "k.json"
+    cache.store(file, KEY, CONTENT)
+    damage(file)
+    assert cache.stored(file, KEY) is None
+    assert capsys.readouterr().err == "colonnade: the cached measurement k.json was damaged and is made again\n"
+
+
+def test_believes_no_measurement_of_another_key(tmp_path: Path) -> None:
+    cache.store(tmp_path / "k.json", KEY, CONTENT)
+    assert cache.stored(tmp_path / "k.json", {**KEY, "design": "d1"}) is None
+
+
+def test_loses_a_measurement_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    cache.store(tmp_path / "file" / "k.json", KEY, CONTENT)
+    assert capsys.readouterr().err.count("\n") == 1

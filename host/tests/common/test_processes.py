@@ -1,0 +1,171 @@
+"""Signals end a command line with everything it started, also when they go to its process alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from colonnade.common import processes
+from colonnade.common.parallel import in_order
+
+#: Like a sweep: two threads, each with a temporary folder and a program that stands for the simulator, and its child.
+SWEEP = """
+import sys, time
+from pathlib import Path
+from colonnade.common import processes
+from colonnade.common.parallel import in_order
+from colonnade.common.temporary import temporary_folder
+
+def one(number):
+    with temporary_folder(".job.", Path(sys.argv[1])) as place:
+        code = "import subprocess, sys; subprocess.run(['sleep', '61'])"
+        processes.run([sys.executable, "-c", code])
+
+def main():
+    if sys.argv[2] == "alone":
+        one(0)
+    elif sys.argv[2] == "busy":
+        list(in_order(lambda number: time.sleep(30), range(4), 2))
+    else:
+        for result in in_order(one, range(4), 2):
+            pass
+
+processes.guarded(main)
+"""
+
+
+def children(pid: int) -> list[int]:
+    """All processes below one, by /proc."""
+    found = []
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        for child in map(int, task.read_text().split()):
+            found += [child, *children(child)]
+    return found
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_for(condition: object, seconds: float = 10.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():  # type: ignore[operator]
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def begun() -> Iterator[list[subprocess.Popen[str]]]:
+    running: list[subprocess.Popen[str]] = []
+    yield running
+    for process in running:
+        process.kill()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(("kind", "programs"), [("pool", 4), ("alone", 2), ("busy", 0)])
+def test_a_signal_to_the_parent_ends_everything(
+    kind: str, programs: int, number: signal.Signals, tmp_path: Path, begun: list[subprocess.Popen[str]]
+) -> None:
+    command = [sys.executable, "-c", SWEEP, str(tmp_path), kind]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    begun.append(process)
+    wait_for(lambda: len(children(process.pid)) == programs)
+    if programs == 0:
+        wait_for(lambda: len(list(Path(f"/proc/{process.pid}/task").iterdir())) > 2)
+    below = children(process.pid)
+    time.sleep(0.1)
+    at = time.monotonic()
+    process.send_signal(number)
+    _, said = process.communicate(timeout=10)
+    # 1.3 seconds at most; more where the machine does something else beside
+    assert time.monotonic() - at < 4.0
+    assert process.returncode == 128 + number
+    assert said == f"colonnade: error: {'interrupted' if number == signal.SIGINT else 'terminated'}\n"
+    assert not [pid for pid in below if is_running(pid)]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_program_that_ignores_sigterm_is_killed(tmp_path: Path) -> None:
+    group = processes.Group()
+    code = (
+        "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('ready', flush=True); time.sleep(60)"
+    )
+    ended = []
+
+    def work() -> None:
+        group.join()
+        try:
+            with processes.started([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
+                assert process.stdout is not None
+                process.stdout.readline()
+                ready.set()
+        except processes.Ended:
+            ended.append(process.returncode)
+
+    ready = threading.Event()
+    thread = threading.Thread(target=work)
+    thread.start()
+    assert ready.wait(10)
+    group.end()
+    thread.join(5)
+    assert ended == [-signal.SIGKILL]
+
+
+def test_an_ended_group_starts_nothing(tmp_path: Path) -> None:
+    group = processes.Group()
+    group.end()
+    raised = []
+
+    def work() -> None:
+        group.join()
+        try:
+            processes.run(["touch", str(tmp_path / "file")])
+        except processes.Ended as ended:
+            raised.append(ended)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join(5)
+    assert raised
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_in_one_piece_of_work_ends_the_others() -> None:
+    def work(seconds: int) -> None:
+        if seconds == 0:
+            time.sleep(0.2)
+            raise ValueError("wrong")
+        processes.run(["sleep", str(seconds)])
+
+    at = time.monotonic()
+    with pytest.raises(ValueError, match="wrong"):
+        list(in_order(work, [0, 61, 61], 2))
+    assert time.monotonic() - at < 4.0
+    wait_for(lambda: not processes._running, 3.0)
+
+
+def test_runs_programs_as_subprocess_does(tmp_path: Path) -> None:
+    done = processes.run(["sh", "-c", "echo out; echo err >&2; pwd; exit 3"], cwd=tmp_path, env=os.environ)
+    assert (done.returncode, done.stdout, done.stderr) == (3, f"out\n{tmp_path}\n", "err\n")
+    with (tmp_path / "log").open("w") as log:
+        assert processes.run(["echo", "text"], stdout=log, stderr=subprocess.STDOUT).stdout is None
+    assert (tmp_path / "log").read_text() == "text\n"
+    assert processes._running == {}
+
+
+def test_a_program_ends_when_its_block_fails() -> None:
+    with pytest.raises(KeyError), processes.started(["sleep", "61"]) as process:
+        raise KeyError
+    assert process.returncode == -signal.SIGTERM

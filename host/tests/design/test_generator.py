@@ -1,0 +1,257 @@
+"""Finding, running and caching the generator; a small script stands for sbt and Java where only the plumbing counts."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from colonnade.common import cache
+from colonnade.common.errors import UserError
+from colonnade.design import generator, toolchain
+from colonnade.design.config_name import find_configuration
+from colonnade.device import compiler
+
+MANIFEST = {
+    "version": 1,
+    "config": {"array": {"rows": 1}},
+    "numbers": {},
+    "records": {"bits": 320, "layouts": {}},
+    "registers": {"dataBits": 32, "fields": []},
+    "streams": {},
+    "memories": {},
+    "formatHash": "f",
+    "configHash": "c",
+}
+
+
+def script(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("#!/bin/sh\n" + text)
+    path.chmod(0o755)
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A checkout whose sbt and Java only log that they ran; Java writes the manifest above."""
+    root = tmp_path / "checkout"
+    (root / "src" / "main").mkdir(parents=True)
+    (root / "configs").mkdir()
+    (root / "build.sbt").write_text("")
+    (root / "src" / "main" / "A.scala").write_text("object A")
+    for preset in ("tiny", "small"):
+        (root / "configs" / f"{preset}.json").write_text("{}")
+    classes = root / "target" / "classes"
+    classes.mkdir(parents=True)
+    (classes / "A.class").write_bytes(b"\xca\xfe\xba\xbe")
+    library = root / "lib" / "chisel.jar"
+    library.parent.mkdir()
+    library.write_bytes(b"PK")
+    script(root / "tools" / "sbt", f'echo sbt >>"{root}/runs"\ntouch "{library}"\necho "{classes}:{library}"\n')
+    (root / "manifest").write_text(json.dumps(MANIFEST))
+    script(
+        root / "jdk" / "bin" / "java",
+        f'if [ "$1" = -version ]; then echo \'openjdk version "17.0.1"\' >&2; exit; fi\n'
+        f'echo "java $*" >>"{root}/runs"\n'
+        'while [ $# -gt 0 ]; do if [ "$1" = --output ]; then output="$2"; fi; shift; done\n'
+        f'mkdir -p "$output"; cp "{root}/manifest" "$output/manifest.json"; echo "module top;" >"$output/Top.sv"\n',
+    )
+    monkeypatch.setenv("COLONNADE_HOME", str(root))
+    monkeypatch.setenv("JAVA_HOME", str(root / "jdk"))
+    return root
+
+
+def runs(root: Path) -> list[str]:
+    log = root / "runs"
+    return [line.split()[0] for line in log.read_text().splitlines()] if log.exists() else []
+
+
+def test_generator_runs_once_and_is_compiled_once(checkout: Path) -> None:
+    first = generator.manifest_for("tiny")
+    second = generator.manifest_for("tiny")
+    assert first.dir == second.dir
+    assert first.manifest.config["array"]["rows"] == 1
+    assert runs(checkout) == ["sbt", "java"]
+    assert generator.manifest_for("tiny", ["array.rows=2"]).dir != first.dir
+    assert runs(checkout) == ["sbt", "java", "java"]
+
+
+def test_changed_sources_are_compiled_again(checkout: Path) -> None:
+    generator.manifest_for("tiny")
+    (checkout / "src" / "main" / "A.scala").write_text("object B")
+    generator.manifest_for("tiny")
+    assert runs(checkout) == ["sbt", "java", "sbt", "java"]
+
+
+def test_changed_configuration_file_is_generated_again(checkout: Path) -> None:
+    generator.manifest_for("tiny")
+    (checkout / "configs" / "tiny.json").write_text('{"array": {}}')
+    generator.manifest_for("tiny")
+    assert runs(checkout).count("java") == 2
+
+
+def test_two_at_a_time_compile_once(checkout: Path) -> None:
+    threads = [threading.Thread(target=generator.manifest_for, args=("tiny",)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert runs(checkout) == ["sbt", "java"]
+
+
+def entry_of(design: generator.GeneratedDesign) -> Path:
+    return design.dir.parent
+
+
+def halve(path: Path) -> None:
+    os.truncate(path, path.stat().st_size // 2)
+
+
+DAMAGES: dict[str, tuple[str, Callable[[Path], object]]] = {
+    "manifest": ("design", lambda entry: halve(entry / "design" / "manifest.json")),
+    "altered manifest": (
+        "design",
+        lambda entry: (entry / "design" / "manifest.json").write_text(
+            json.dumps({**MANIFEST, "config": {"array": {"rows": 7}}})
+        ),
+    ),
+    "Verilog": ("design", lambda entry: halve(entry / "design" / "Top.sv")),
+    "seal": ("design", lambda entry: halve(entry / "contents.json")),
+    "class path": ("generator", lambda entry: halve(entry.parent / "classes" / "classpath.json")),
+    "class": ("generator", lambda entry: halve(entry.parent / "classes" / "classes0" / "A.class")),
+    "library": ("generator", lambda entry: (entry.parents[3] / "lib" / "chisel.jar").unlink()),
+}
+
+
+@pytest.mark.parametrize(("what", "damage"), DAMAGES.values(), ids=DAMAGES.keys())
+def test_a_damaged_cache_is_made_again_with_one_line(
+    what: str, damage: Callable[[Path], object], checkout: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = generator.design_for("tiny")
+    manifest, digest = first.manifest, first.digest()
+    damage(entry_of(first))
+    # The classes are asked for when something is generated
+    wanted = ["array.rows=2"] if what == "generator" else []
+    for _ in range(2):
+        cache._verified.clear()
+        again = generator.design_for("tiny", wanted)
+        assert (again.manifest, again.digest()) == (manifest, digest)
+    assert capsys.readouterr().err == f"colonnade: the cached {what} was damaged and is built again\n"
+    assert runs(checkout) == ["sbt", "java", *(["sbt"] * (what == "generator")), "java"]
+
+
+def test_an_interrupted_generator_leaves_nothing(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    state = entry_of(generator.design_for("tiny")).parent
+    before = {path.name for path in state.iterdir()}
+    monkeypatch.setattr(generator.processes, "run", interrupt)
+    monkeypatch.setattr(generator, "find_java", lambda: Path("java"))
+    with pytest.raises(KeyboardInterrupt):
+        generator.design_for("tiny", ["array.rows=2"])
+    assert {path.name for path in state.iterdir() if path.suffix != ".lock"} <= before
+
+
+def test_the_digest_of_a_kept_design_is_that_of_a_copy(checkout: Path, tmp_path: Path) -> None:
+    design = generator.design_for("tiny")
+    assert cache.digests(entry_of(design)) is not None
+    copy = generator.generate("tiny", [], tmp_path / "copy")
+    assert cache.digests(copy.dir.parent) is None
+    assert copy.digest() == design.digest()
+
+
+def test_generate_replaces_only_a_design(checkout: Path, tmp_path: Path) -> None:
+    output = tmp_path / "design"
+    generator.generate("tiny", [], output)
+    generator.generate("tiny", [], output)
+    assert sorted(path.name for path in output.iterdir()) == [".colonnade.sha256", "Top.sv", "manifest.json"]
+    (output / "notes.txt").write_text("")
+    with pytest.raises(UserError, match=r"holds notes\.txt, which colonnade generate did not write"):
+        generator.generate("tiny", [], output)
+    precious = tmp_path / "precious"
+    precious.mkdir()
+    (precious / "thesis.txt").write_text("")
+    with pytest.raises(UserError, match=r"no \.colonnade\.sha256"):
+        generator.generate("tiny", [], precious)
+    assert (precious / "thesis.txt").exists()
+
+
+def test_compile_error_is_one_line_and_names_the_log(checkout: Path) -> None:
+    script(checkout / "tools" / "sbt", "echo '[error] A.scala:1:1: expected class'\nexit 1\n")
+    with pytest.raises(UserError, match=r"does not compile: A.scala:1:1: expected class .*sbt.log"):
+        generator.manifest_for("tiny")
+
+
+def test_refusal_of_the_generator_is_passed_on(checkout: Path) -> None:
+    script(
+        checkout / "jdk" / "bin" / "java",
+        'if [ "$1" = -version ]; then echo \'java version "21"\' >&2; exit; fi\n'
+        "echo 'colonnade.Generate: error: array.rows is 0: at least 1' >&2\nexit 2\n",
+    )
+    with pytest.raises(UserError, match=r"^array.rows is 0: at least 1$"):
+        generator.manifest_for("tiny", ["array.rows=0"])
+
+
+def test_crash_of_the_generator_is_a_bug(checkout: Path) -> None:
+    script(checkout / "jdk" / "bin" / "java", "echo 'Exception in thread main' >&2\nexit 1\n")
+    with pytest.raises(RuntimeError, match="status 1"):
+        generator.manifest_for("tiny")
+
+
+def test_no_jdk_names_the_package(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("JAVA_HOME")
+    monkeypatch.setenv("PATH", str(checkout / "tools"))
+    with pytest.raises(UserError, match="openjdk-17-jdk-headless"):
+        generator.manifest_for("tiny")
+
+
+def test_old_java_is_refused(checkout: Path) -> None:
+    script(checkout / "jdk" / "bin" / "java", "echo 'java version \"11.0.2\"' >&2\n")
+    with pytest.raises(UserError, match="Java 11, too old"):
+        generator.manifest_for("tiny")
+
+
+def test_no_verilator_names_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for program in ("g++", "make"):
+        script(tmp_path / program, "")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(UserError, match=r"no verilator found.*apt-get install verilator"):
+        compiler.require_verilator("the rtl backend")
+
+
+def test_configurations_by_name_path_and_precision(checkout: Path, tmp_path: Path) -> None:
+    own = tmp_path / "own.json"
+    own.write_text("{}")
+    assert find_configuration("tiny", ["a.b=1"], checkout).overrides == ("a.b=1",)
+    assert find_configuration(str(own), [], checkout).path == own
+    precise = find_configuration("16b16s32d", ["array.rows=1"], checkout)
+    assert precise.path.name == "small.json"
+    assert precise.overrides == ("precision=16b16s32d", "array.rows=1")
+
+
+@pytest.mark.parametrize("name", ["huge", "none.json", "../configs/none.json", "32b32s"])
+def test_unknown_configuration_lists_the_presets(checkout: Path, name: str) -> None:
+    with pytest.raises(UserError, match=r"preset \(small, tiny\)"):
+        find_configuration(name, [], checkout)
+
+
+def test_malformed_override_is_refused(checkout: Path) -> None:
+    with pytest.raises(UserError, match="not of the form"):
+        find_configuration("tiny", ["array.rows"], checkout)
+
+
+def test_checkout_is_found_or_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLONNADE_HOME", str(tmp_path))
+    with pytest.raises(UserError, match="no checkout"):
+        toolchain.project_root()
+
+
+def test_cache_of_a_read_only_checkout_is_the_users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert toolchain.cache_directory(tmp_path) == tmp_path / "cache" / "colonnade"

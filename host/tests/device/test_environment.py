@@ -1,0 +1,81 @@
+"""Frames in a room: the emitted Verilog against the model, bit for bit, and where the room is rendered."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colonnade.design.generator import design_for, manifest_for
+from colonnade.device.bit_exact import render_model
+from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.environment.encoded import EncodedEnvironment
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene
+from colonnade.scene.view import with_overrides
+from colonnade.scene_image.environment import with_environment
+from colonnade.scene_image.packer import pack
+
+ROOMS = Path(__file__).parents[3] / "scenes" / "rooms"
+NEEDS_SIMULATOR = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+TABLE = Scene(
+    MeshSource(name="teapot:4"),
+    placement=Placement((322.0, 306.0), 0.58, 25.0),
+    light=Light((0.1, 2.2, 1.2), falloff=1.6),
+    ambient=Colour((0.3, 0.3, 0.3)),
+    background=Background(room=ROOMS / "living"),
+)
+SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
+
+
+@NEEDS_SIMULATOR
+@pytest.mark.parametrize("kind", ["diffuse", "mirror", "glass"])
+def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
+    """All of the room, and only where the object takes its light; both lights, one, and no bounce; a stalled sink."""
+    design = design_for("small", ())
+    held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
+    mesh = load_mesh("teapot:4")
+    material = Material(kind=kind, albedo=(0.9, 0.95, 0.9))
+    image = with_environment(
+        pack(mesh, design.manifest, with_overrides(mesh.materials, material)), held, design.manifest
+    )
+    scene = replace(TABLE, material=material, more_lights=(SECOND,))
+    views = [(scene, True), (scene, False), (replace(scene, more_lights=(), paths=Paths(bounces=0)), False)]
+    registers: list[dict[str, int]] = [
+        frame_registers(view, image.header, design.manifest, 80, 60, held, relit) for view, relit in views
+    ]
+    # Far off the surface it shows on which side of it a ray starts
+    registers.append(registers[1] | {"shading.offset": 64 * registers[1]["shading.offset"]})
+    simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
+    for frame, settings in zip(simulated.frames, registers, strict=True):
+        model = render_model(design.manifest, image, settings)
+        assert frame.errors == model.errors == []
+        np.testing.assert_array_equal(frame.colour, model.colour)
+        np.testing.assert_array_equal(frame.ratio, model.ratio)
+        np.testing.assert_array_equal(frame.triangle, model.triangle)
+        assert {name: frame.counters[name] for name in model.counters} == model.counters
+    first = simulated.frames[0]
+    assert first.is_object.any()
+    assert first.ratio is not None and first.ratio.min() < 4096, "there is a shadow"
+    assert (first.counters["marchSteps"] > 0) == (kind != "diffuse")
+
+
+@pytest.mark.parametrize("light", [TABLE.light, Light((1.2, 2.0, 2.0)), Light((0.1, 0.9, 2.4))])
+def test_the_object_takes_light_within_the_window_only(light: Light) -> None:
+    manifest = manifest_for("small").manifest
+    held = EncodedEnvironment.load(ROOMS / "living", manifest)
+    image = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest)
+    scene = replace(TABLE, light=light)
+    registers = frame_registers(scene, image.header, manifest, 320, 240, held, relit=False)
+    x0, y0, x1, y1 = (registers[f"room.window.{edge}"] for edge in ("x0", "y0", "x1", "y1"))
+    assert 0 < (x1 - x0) * (y1 - y0) < 320 * 240
+    frame = render_model(manifest, image, frame_registers(scene, image.header, manifest, 320, 240, held))
+    assert frame.ratio is not None
+    darker = (frame.ratio < 4096).any(axis=2)
+    assert darker.any()
+    darker[y0:y1, x0:x1] = False
+    assert not darker.any()

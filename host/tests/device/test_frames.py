@@ -1,0 +1,248 @@
+"""Whole frames: the emitted Verilog under Verilator against the model, bit for bit."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.common.framebuffer import Frame
+from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
+from colonnade.design.manifest import Manifest
+from colonnade.device.bit_exact import render_model
+from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.evaluation.throughput import figures, records_taken
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.render.report import frame_report
+from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
+from colonnade.scene.view import with_overrides
+from colonnade.scene_image.packer import pack
+
+pytestmark = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+
+TEAPOT = Scene(MeshSource(name="teapot:4"))
+SKY = Background(colour=(0.2, 0.3, 0.5))
+
+SECTIONS = ("scene.recordCount", "scene.triangleBase", "scene.attributeBase")
+
+#: Name, configuration, overrides, mesh, stalls of the pixel sink.
+CASES = [
+    ("tiny", "tiny", (), "teapot:4", Stalls(check_interval=1)),
+    ("small, stalled sink", "small", (), "teapot:4", Stalls(40, 7, check_interval=1)),
+    ("binary tree, one bank", "tiny", ("geometry.arity=2", "columnBvhMemory.banks=1"), "torus", Stalls(10, 3)),
+    ("no tree, slow memory", "tiny", ("geometry.bvh=false", "columnBvhMemory.readLatency=5"), "cube", Stalls()),
+    ("narrow", "16b16s32d", ("array.rows=1", "array.columns=1"), "sphere:2", Stalls()),
+]
+
+
+def assert_equal(rtl: Frame, model: Frame) -> None:
+    assert rtl.errors == model.errors == []
+    np.testing.assert_array_equal(rtl.colour, model.colour)
+    np.testing.assert_array_equal(rtl.triangle, model.triangle)
+    np.testing.assert_array_equal(rtl.distance, model.distance)
+    assert {name: rtl.counters[name] for name in model.counters} == model.counters
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
+def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str, ...], str, Stalls]) -> None:
+    """Three frames in a row, the scene loaded once: smooth, flat from another side, and from inside the object."""
+    _, config, overrides, mesh, stalls = case
+    design = design_for(config, overrides)
+    image = pack(load_mesh(mesh), design.manifest)
+    scene = replace(TEAPOT, mesh=MeshSource(name=mesh))
+    flat = replace(scene, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True))
+    inside = replace(scene, camera=Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0)), light=Light(shadows=False))
+    views = [(scene, 48, 37), (flat, 33, 20), (inside, 17, 9)]
+    registers: list[Mapping[str, int]] = [
+        frame_registers(view, image.header, design.manifest, width, height) for view, width, height in views
+    ]
+    simulated = render_rtl(design, image, registers, stalls)
+    for frame, settings in zip(simulated.frames, registers, strict=True):
+        assert_equal(frame, render_model(design.manifest, image, settings))
+    assert simulated.frames[0].is_object.any()
+
+
+@pytest.mark.parametrize("mesh", ["teapot:4", "torus"])
+def test_records_loaded_past_the_port_are_those_that_the_port_loads(mesh: str) -> None:
+    """In every counter, cycles among them: what runs freely in the hardware stands as after the load."""
+    design = design_for("tiny")
+    image = pack(load_mesh(mesh), design.manifest)
+    registers = frame_registers(replace(TEAPOT, mesh=MeshSource(name=mesh)), image.header, design.manifest, 24, 17)
+    frames = [
+        render_rtl(design, image, [registers, registers], through_port=through_port).frames
+        for through_port in (False, True)
+    ]
+    for past, through in zip(*frames, strict=True):
+        np.testing.assert_array_equal(past.colour, through.colour)
+        assert past.counters == through.counters
+
+
+#: Name, configuration, what the surface is made of, lights.
+SHINY = [
+    ("mirror", "small", Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), (Light(),)),
+    ("glass", "small", Material(kind="glass", albedo=(0.9, 1.0, 0.95), ior=1.45), (Light(),)),
+    ("two lights", "small", Material(), (Light(falloff=3.0), Light(offset=(-1.0, 0.5, 2.0), colour=(0.2, 0.4, 0.9)))),
+    ("narrow glass", "16b16s32d", Material(kind="glass", ior=2.4), (Light(falloff=0.5),)),
+]
+
+
+@pytest.mark.parametrize("case", SHINY, ids=lambda case: case[0])
+def test_mirrors_glass_and_lights_are_the_models(case: tuple[str, str, Material, tuple[Light, ...]]) -> None:
+    _, config, material, lights = case
+    design = design_for(config, ())
+    mesh = load_mesh("teapot:4")
+    image = pack(mesh, design.manifest, with_overrides(mesh.materials, material))
+    scene = replace(TEAPOT, material=material, light=lights[0], more_lights=lights[1:], background=SKY)
+    registers = [
+        frame_registers(replace(scene, paths=Paths(bounces=bounces)), image.header, design.manifest, 48, 37)
+        for bounces in (4, 1, 0)
+    ]
+    simulated = render_rtl(design, image, registers, Stalls(20, 5))
+    for frame, settings in zip(simulated.frames, registers, strict=True):
+        assert_equal(frame, render_model(design.manifest, image, settings))
+    counters = simulated.frames[0].counters
+    assert (counters["raysReflection"] > 0) == (material.kind is not None)
+    assert (counters["raysRefraction"] > 0) == (material.kind == "glass")
+
+
+@pytest.fixture(scope="module")
+def holdable() -> GeneratedDesign:
+    """Three units share two banks that can be held."""
+    return design_for("tiny", ("array.rows=3", "columnBvhMemory.holdable=true"))
+
+
+@pytest.mark.parametrize(
+    "stalls",
+    [
+        Stalls(memory_percent=30, seed=1),
+        Stalls(percent=40, memory_percent=60, seed=2),
+        Stalls(percent=10, memory_percent=50, memory_burst=1, seed=3),
+        Stalls(percent=70, memory_percent=80, memory_burst=4, seed=4),
+    ],
+    ids=str,
+)
+def test_random_memory_latency_changes_nothing_but_time(holdable: GeneratedDesign, stalls: Stalls) -> None:
+    """Banks that wait when they like, beside a sink that does: the frames are the model's, and take longer."""
+    image = pack(load_mesh("teapot:3"), holdable.manifest)
+    flat = replace(TEAPOT, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True))
+    registers: list[Mapping[str, int]] = [
+        frame_registers(view, image.header, holdable.manifest, 40, 30) for view in (TEAPOT, flat)
+    ]
+    held = render_rtl(holdable, image, registers, stalls).frames
+    free = render_rtl(holdable, image, registers, replace(stalls, memory_percent=0)).frames
+    for frame, quicker, settings in zip(held, free, registers, strict=True):
+        assert_equal(frame, render_model(holdable.manifest, image, settings))
+        assert frame.counters["cycles"] > 1.05 * quicker.counters["cycles"]
+
+
+@pytest.mark.parametrize("stalls", [Stalls(), Stalls(percent=40, memory_percent=60, seed=2)], ids=str)
+def test_counters_account_for_every_cycle_and_record(holdable: GeneratedDesign, stalls: Stalls) -> None:
+    """Contexts are in one place at a time, units are busy no longer than a frame, and records are taken for a cause."""
+    image = pack(load_mesh("teapot:3"), holdable.manifest)
+    settings = frame_registers(TEAPOT, image.header, holdable.manifest, 40, 30)
+    frame = render_rtl(holdable, image, [settings], stalls).frames[0]
+    report = frame_report("rtl", holdable.manifest, image.header, frame).as_json()
+    found, counters = figures(report), report["counters"]
+    assert all(0 < share < 1 for share in found["stalls"].values()), found["stalls"]
+    assert all(0 < share < 1 for share in found["utilisation"].values()), found["utilisation"]
+    triangle_records = records_taken(counters) - counters["nodeReads"] - counters["hits"]
+    assert triangle_records <= counters["triangleTests"] <= 2 * triangle_records
+
+
+def test_memory_that_cannot_be_held_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refused before anything is built."""
+    monkeypatch.setattr("colonnade.device.verilator.build_simulator", lambda *_: pytest.fail("a simulator is built"))
+    design = manifest_for("tiny")
+    image = pack(load_mesh("cube"), design.manifest)
+    with pytest.raises(UserError, match=r"columnBvhMemory\.holdable=true"):
+        render_rtl(design, image, [], Stalls(memory_percent=10))
+
+
+@pytest.mark.parametrize("stalls", [{"percent": 100}, {"memory_percent": 100}, {"percent": -1}, {"memory_burst": 0}])
+def test_stalls_that_never_end_are_refused(stalls: dict[str, int]) -> None:
+    with pytest.raises(ValueError, match="0 to 99"):
+        Stalls(**stalls)
+
+
+def test_single_rays_through_the_hardware_slip_through_no_edge() -> None:
+    """Frames of one pixel whose ray goes from inside a closed mesh exactly to a vertex."""
+    design = design_for("tiny")
+    numbers = design.manifest.numbers
+    image = pack(load_mesh("sphere:2"), design.manifest)
+    base = frame_registers(replace(TEAPOT, mesh=MeshSource(name="sphere:2")), image.header, design.manifest, 1, 1)
+    fields = design.manifest.layouts["triangles"].unpack(
+        image.records[image.header.triangle_base : image.header.attribute_base]
+    )
+    vertices = np.stack([fields[f"vertices[0].{axis}"] for axis in "xyz"], axis=1)[:200] << numbers["gridFraction"]
+    random = np.random.default_rng(5)
+    middle = 1 << (numbers["vertexBits"] - 1 + numbers["gridFraction"])
+    registers: list[Mapping[str, int]] = []
+    for vertex in vertices:
+        origin = middle + random.integers(-middle // 3, middle // 3, size=3)
+        view = {"camera.position": origin, "camera.direction": vertex - origin}
+        settings = {f"{name}.{axis}": int(value[a]) for name, value in view.items() for a, axis in enumerate("xyz")}
+        rectangle = {f"frame.objectRect.{edge}": int(edge[1] == "1") for edge in ("x0", "y0", "x1", "y1")}
+        outline = {name: 0 for name in base if name.startswith("frame.objectOutline")}
+        registers.append({**base, **settings, **rectangle, **outline, "frame.unitShift": 0, "camera.stepShift": 0})
+    frames = render_rtl(design, image, registers).frames
+    assert all(frame.is_object[0, 0] for frame in frames)
+
+
+def test_a_distant_camera_sees_the_object() -> None:
+    """A ray's limit is not used up by the way to the object."""
+    manifest = manifest_for("tiny").manifest
+    image = pack(load_mesh("sphere:3"), manifest)
+    for distance in (5.0, 60.0):
+        scene = Scene(
+            MeshSource(name="sphere:3"),
+            camera=Camera(position=(0.1, 0.2, distance), target=(0.0, 0.0, 0.0), fov=60.0 / distance),
+        )
+        frame = render_model(manifest, image, frame_registers(scene, image.header, manifest, 16, 16))
+        assert frame.is_object[8, 8]
+
+
+def nodes_of(manifest: Manifest, pointers: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
+    """Nodes whose boxes are the cube: of each, its firstChild and how many children of kind node it has."""
+    layout = manifest.layouts["node"]
+    fields = {name: np.zeros(len(pointers), dtype=np.int64) for name in layout.fields}
+    fields["firstChild"][:] = [first for first, _ in pointers]
+    for slot in range(layout.count_of("kinds[{}]")):
+        fields[f"kinds[{slot}]"][:] = [int(slot < count) for _, count in pointers]
+        for axis in "xyz":
+            fields[f"high[{slot}].{axis}"][:] = layout.fields[f"high[{slot}].{axis}"].range[1]
+    for axis in "xyz":
+        fields[f"exponent.{axis}"][:] = manifest.numbers["mostExponent"]
+    return layout.pack(fields)
+
+
+@pytest.mark.parametrize(
+    ("pointers", "errors"),
+    [
+        ([(0, 1)], ["illegalRecord"]),
+        ([(1, 2), (1, 1), (0, 1)], ["illegalRecord"]),
+        ([*((node + 1, 2) for node in range(40)), (0, 0), (0, 0)], ["watchdog"]),
+    ],
+    ids=["a root that is its own child", "cycles below the root", "children shared by all nodes"],
+)
+def test_a_walk_without_an_end_is_an_error(pointers: list[tuple[int, int]], errors: list[str]) -> None:
+    """A cycle ends at the first node that is not below its parent. Shared children make no cycle, but many ways."""
+    design = design_for("tiny")
+    image = pack(load_mesh("cube"), design.manifest)
+    registers = frame_registers(replace(TEAPOT, mesh=MeshSource(name="cube")), image.header, design.manifest, 16, 16)
+    nodes = nodes_of(design.manifest, pointers)
+    others = image.records[image.header.triangle_base :]
+    walk = replace(image, records=np.concatenate([nodes, others]))
+    moved = {name: registers[name] + len(nodes) - image.header.triangle_base for name in SECTIONS}
+    registers |= moved | {"frame.watchdogCycles": 20_000}
+    frame = render_rtl(design, walk, [registers]).frames[0]
+    model = render_model(design.manifest, walk, registers)
+    assert frame.errors == model.errors == errors
+    if errors == ["illegalRecord"]:
+        np.testing.assert_array_equal(frame.colour, model.colour)
+        assert {name: frame.counters[name] for name in model.counters} == model.counters

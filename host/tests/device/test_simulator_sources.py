@@ -1,0 +1,151 @@
+"""The coupling of a simulator's models: Verilog as firtool writes it, taken apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from colonnade.device.simulator_sources import (
+    both_edges,
+    coupling,
+    module_ports,
+    open_module,
+    unit_model,
+    write_sources,
+)
+
+UNIT = """\
+module RenderUnit(
+  input          clock,
+                 reset,
+  input  [31:0]  io_registers_frame_unitShift,
+  input          io_positions_valid,
+  output         io_positions_ready,
+  input  [319:0] io_broadcasts_0_bits_record,
+  output [16:0]  io_requests_bits_address,
+  input          io_requests_ready,
+  output         io_unused
+);
+
+  Queue1_Pixel outgoing (
+    .clock (clock)
+  );
+  always @(posedge clock) begin
+  end // always @(posedge)
+endmodule
+"""
+
+
+def instance(number: int) -> str:
+    suffix = f"_{number}" if number else ""
+    return f"""\
+  RenderUnit RenderUnit{suffix} (
+    .clock (clock),
+    .reset (reset),
+    .io_registers_frame_unitShift (io_registers_frame_unitShift),
+    .io_positions_valid (_walker_io_positions_{number}_valid & ~(a | b)),
+    .io_positions_ready
+      (_RenderUnit{suffix}_io_positions_ready),
+    .io_broadcasts_0_bits_record (_controller_io_broadcasts_0_bits_record),
+    .io_requests_bits_address (_RenderUnit{suffix}_io_requests_bits_address),
+    .io_requests_ready (_controller_io_requests_{number}_ready),
+    .io_unused (/* unused */)
+  );
+"""
+
+
+COLUMN = f"module Column(\n  input clock\n);\n  wire before;\n{instance(0)}{instance(1)}  wire behind;\nendmodule\n"
+
+
+def test_ports_have_direction_width_and_kind() -> None:
+    ports = {port.name: port for port in module_ports(UNIT, "RenderUnit")}
+    assert "clock" not in ports
+    assert {name: port.bits for name, port in ports.items() if port.bits > 1} == {
+        "io_registers_frame_unitShift": 32,
+        "io_broadcasts_0_bits_record": 320,
+        "io_requests_bits_address": 17,
+    }
+    kinds = {name: port.kind for name, port in ports.items()}
+    assert kinds == {
+        "reset": "DIRECT",
+        "io_registers_frame_unitShift": "REGISTERS",
+        "io_positions_valid": "INPUTS",
+        "io_positions_ready": "OUTPUTS",
+        "io_broadcasts_0_bits_record": "INPUTS",
+        "io_requests_bits_address": "OUTPUTS",
+        "io_requests_ready": "DIRECT",
+        "io_unused": "OUTPUTS",
+    }
+    assert ports["io_broadcasts_0_bits_record"].cpp_type == "VlWide<10>"
+    assert ports["io_requests_bits_address"].cpp_type == "IData"
+
+
+def test_an_unknown_port_is_an_error() -> None:
+    with pytest.raises(ValueError, match=r"a port of RenderUnit is not understood: inout x"):
+        module_ports("module RenderUnit(\n  inout x\n);\n", "RenderUnit")
+
+
+def test_registers_take_both_edges_of_any_clock() -> None:
+    text = both_edges("  always @(posedge clock) begin\n  end // always @(posedge)\n  always @(posedge RW0_clk)\n")
+    assert text == "  always @(edge clock) begin\n  end // always @(posedge)\n  always @(edge RW0_clk)\n"
+
+
+def test_the_units_model_registers_all_but_the_direct_inputs() -> None:
+    text = unit_model(module_ports(UNIT, "RenderUnit"))
+    held = {line.split()[-1].rstrip(";") for line in text.splitlines() if line.startswith("  reg ")}
+    assert held == {"held_io_registers_frame_unitShift", "held_io_positions_valid", "held_io_broadcasts_0_bits_record"}
+    assert "    .io_positions_valid(held_io_positions_valid)" in text
+    assert "    .io_requests_ready(io_requests_ready)" in text
+
+
+def test_variables_stand_for_the_ports_of_instances_that_are_taken_out() -> None:
+    opened = open_module(COLUMN, "Column", "RenderUnit", module_ports(UNIT, "RenderUnit"))
+    assert opened.count == 2
+    assert "RenderUnit RenderUnit" not in opened.verilog
+    assert opened.verilog.index("wire before") < opened.verilog.index("wire behind")
+    assert opened.shared == {"reset", "io_registers_frame_unitShift", "io_broadcasts_0_bits_record"}
+    lines = [line.strip() for line in opened.verilog.splitlines()]
+    public = "/*verilator public_flat_rd*/"
+    assert f"wire instance1_io_positions_valid {public} = _walker_io_positions_1_valid & ~(a | b);" in lines
+    assert sum("shared_io_broadcasts_0_bits_record" in line for line in lines) == 1
+    assert "reg [16:0] instance1_io_requests_bits_address /*verilator public_flat_rw*/;" in lines
+    assert "assign _RenderUnit_1_io_requests_bits_address = instance1_io_requests_bits_address;" in lines
+    assert "io_unused" not in opened.verilog
+
+
+def test_the_harness_gets_every_connected_port() -> None:
+    opened = open_module(COLUMN, "Column", "RenderUnit", module_ports(UNIT, "RenderUnit"))
+    header = coupling(opened, "RenderUnit")
+    assert "#define RenderUnit_DIRECT(DO) DO(reset) DO(io_requests_ready)\n" in header
+    assert "#define RenderUnit_REGISTERS(DO) DO(io_registers_frame_unitShift)\n" in header
+    assert header.count("&root.Column__DOT__shared_io_broadcasts_0_bits_record") == 2
+    assert "io_unused" not in header
+
+
+def test_each_model_gets_the_modules_it_holds(tmp_path: Path) -> None:
+    top = "  Column columns_0 (\n    .clock (clock)\n  );\n"
+    files = {
+        "RenderUnit": UNIT,
+        "Queue1_Pixel": "module Queue1_Pixel(\n  input clock\n);\nendmodule\n",
+        "Column": COLUMN.replace("  wire before;\n", "  ColumnBvhMemory memory (\n    .clock (clock)\n  );\n"),
+        "ColumnBvhMemory": "module ColumnBvhMemory(\n  input clock\n);\n"
+        "  records_64x320 records_ext (\n  );\n  records_64x320 records_1_ext (\n  );\nendmodule\n",
+        "records_64x320": "module records_64x320(\n  input RW0_clk\n);\n  reg [319:0] Memory[0:63];\nendmodule\n",
+        "Colonnade": f"module Colonnade(\n  input clock\n);\n{top}endmodule\n",
+        "Recorder": "bind RenderUnit ColonnadeRecorder recorder();\n",
+        "Unused": "module Unused(\n);\nendmodule\n",
+    }
+    folder, out = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    out.mkdir()
+    for name, text in files.items():
+        (folder / f"{name}.sv").write_text(text)
+    models = write_sources(sorted(folder.iterdir()), out)
+    assert {top: [path.stem for path in paths] for top, paths in models.items()} == {
+        "RenderUnitModel": ["Recorder", "Queue1_Pixel", "RenderUnit", "RenderUnitModel"],
+        "Column": ["Column", "ColumnBvhMemory", "records_64x320"],
+        "Colonnade": ["Colonnade"],
+    }
+    assert "Memory[0:63] /*verilator public_flat_rw*/;" in (out / "Column" / "records_64x320.sv").read_text()
+    assert "constexpr unsigned banksOfColumn = 2;" in (out / "coupling.hpp").read_text()

@@ -1,0 +1,241 @@
+"""Planes in the physical-attribute memory: exact bits, right geometry, and a room that is where it was."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from colonnade.common import cache
+from colonnade.common.errors import UserError
+from colonnade.environment.encoding.cache import encoded_environment
+from colonnade.environment.encoding.image import AttributeImage, encode_environment
+from colonnade.environment.encoding.layout import AttributeLayout
+from colonnade.environment.encoding.plane_encoder import encode_planes
+from colonnade.environment.encoding.plane_map import PLANE_MODES, PlaneMap
+from colonnade.environment.encoding.planes import Picture, packed_planes, unpacked_planes
+from colonnade.environment.encoding.quality import ray_errors
+from colonnade.environment.encoding.vectors import unpacked
+from colonnade.environment.load import load_environment
+from colonnade.environment.model import Environment, EnvironmentCamera
+
+ROOMS = Path(__file__).resolve().parents[4] / "scenes" / "rooms"
+LEVEL = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 1.2], [0, 0, -1.0, 0]])
+
+
+def boxes(width: int = 160, height: int = 120, steps: bool = True) -> Environment:
+    """A level camera 1.2 m above the floor of a box, 4 m deep, 3 m wide, 2.4 m high; a slanted board before it."""
+    camera = EnvironmentCamera(120.0, 120.0, width / 2 + 3, height / 2 - 2, LEVEL)
+    rays = camera.directions(width, height)
+    normals = np.array([[0.0, 0, -1], [0, -1, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0]])
+    distances = np.array([4.0, 1.2, 1.2, 1.5, 1.5])
+    along = rays @ -normals.T
+    with np.errstate(divide="ignore"):
+        depth = np.where(along > 1e-9, distances / along, np.inf)
+    which = depth.argmin(axis=2)
+    depth = depth.min(axis=2)
+    albedo = np.array([[0.5, 0.5, 0.5], [0.4, 0.2, 0.1], [0.9, 0.9, 0.9], [0.2, 0.5, 0.2], [0.2, 0.2, 0.5]])[which]
+    facing = normals[which]
+    if steps:
+        board = (np.abs(rays[..., 0]) < 0.2) & (np.abs(rays[..., 1]) < 0.15)
+        slanted = 0.8 / (0.6 * rays[..., 0] + 0.8)
+        depth, facing = np.where(board, slanted, depth), np.where(board[..., np.newaxis], [-0.6, 0.0, -0.8], facing)
+        albedo = np.where(board[..., np.newaxis], [0.9, 0.1, 0.1], albedo)
+    return Environment("boxes", albedo, facing, depth, True, camera, None)
+
+
+@settings(deadline=None)
+@given(st.tuples(*[st.floats(-4000, 4000, allow_subnormal=False)] * 3), st.integers(0, 30))
+def test_planes_take_the_least_exponent(values: tuple[float, float, float], shrink: int) -> None:
+    plane = np.ldexp(np.array([values]), -shrink)
+    words = packed_planes(plane)
+    exponent = int(words[0]) >> 60
+    assert np.abs(unpacked_planes(words) - plane).max() <= 2.0 ** (exponent - 23)
+    finer = np.rint(np.ldexp(plane, 22 - exponent + 1))
+    assert exponent == 0 or finer.max() >= 1 << 19 or finer.min() < -(1 << 19)
+
+
+def test_the_bits_of_a_plane() -> None:
+    assert int(packed_planes(np.array([[1.0, -0.5, 0.25]]))[0]) == 4 << 60 | 1 << 56 | 0xE0000 << 20 | 1 << 18
+    assert int(packed_planes(np.zeros((1, 3)))[0]) == 0
+
+
+def test_planes_of_space_and_picture() -> None:
+    environment = boxes(steps=False)
+    picture = Picture.of(environment, 0.8)
+    points = environment.points()
+    rows, columns = np.array([100, 60, 5]), np.array([80, 81, 70])
+    planes = picture.planes(environment.normals[rows, columns], points[rows, columns])
+    w = picture.basis()[rows, columns]
+    assert np.allclose(np.einsum("nc,nc->n", planes, w), 0.8 / environment.depth[rows, columns])
+    assert np.allclose(picture.normals(planes), environment.normals[rows, columns])
+    assert np.allclose(np.einsum("nc,nc->n", picture.inverse_offsets(planes), points[rows, columns]), 1.0)
+
+
+@pytest.mark.parametrize(("width", "height", "tile"), [(160, 120, 16), (170, 101, 16), (100, 90, 8), (150, 100, 32)])
+def test_flat_walls_are_where_they_were(width: int, height: int, tile: int) -> None:
+    environment = boxes(width, height)
+    layout = AttributeLayout(width, height, tile_size=tile)
+    content = encode_planes(environment, layout)
+    errors = ray_errors(environment, content.depth(layout, Picture.of(environment, content.depth_unit)))
+    # Cells of two pixels and more meet the walls' corners and the board's edge
+    assert np.median(errors) < 0.0005
+    assert np.mean(errors > 0.01) < 0.06
+    w = content.inverse_depth(layout, Picture.of(environment, content.depth_unit))
+    assert w.max() < 1.01
+
+
+def slow_id(content: PlaneMap, u: int, v: int, layout: AttributeLayout) -> int:
+    """The plane id of a pixel, from the words as the documentation tells it."""
+    descriptor = int(content.descriptors[v // layout.tile_size * layout.tile_columns + u // layout.tile_size])
+    number, pointer = descriptor % 8, descriptor // 8
+    if number == 0:
+        return pointer
+    count, cells = ((2, 4), (2, 8), (4, 4), (4, 8), (2, 16), (4, 16))[number - 1]
+    heap = [int(word) for word in content.heap]
+    ids = [heap[pointer] & 255, heap[pointer] >> 8]
+    if count == 4:
+        ids += [heap[pointer + 1] & 255, heap[pointer + 1] >> 8]
+    edge = layout.tile_size // cells
+    cell = v % layout.tile_size // edge * cells + u % layout.tile_size // edge
+    place = cell * (count // 2)
+    return ids[heap[pointer + count // 2 + place // 16] >> place % 16 & (count - 1)]
+
+
+def bumps(width: int, height: int) -> Environment:
+    """Many small steps and slopes, so that tiles of all kinds occur."""
+    environment = boxes(width, height)
+    v, u = np.mgrid[:height, :width]
+    depth = environment.depth * (1 - 0.3 * ((u // 7 + v // 5) % 3 == 0) * (u > width // 2))
+    return Environment("bumps", environment.albedo, environment.normals, depth, True, environment.camera, None)
+
+
+@pytest.mark.parametrize(("plane_bytes", "cells"), [(3000, 8), (8192, 8), (3000, 16), (8192, 16)])
+def test_random_access_follows_the_words(plane_bytes: int, cells: int) -> None:
+    layout = AttributeLayout(150, 110, plane_bytes=plane_bytes, plane_cells=cells)
+    content = encode_planes(bumps(150, 110), layout)
+    v, u = np.mgrid[:110, :150]
+    ids = content.ids_at(u, v, layout)
+    assert np.array_equal(ids.ravel(), [slow_id(content, x, y, layout) for y in range(110) for x in range(150)])
+    sizes = np.array([mode.words for mode in PLANE_MODES])
+    assert list(sizes) == [0, 2, 5, 4, 10, 17, 34]
+    assert sizes[content.descriptors & 7].sum() <= layout.plane_heap_words
+    assert int(content.planes[layout.nothing]) == 0
+    assert (content.descriptors & 7).max() > (2 if cells == 8 else 4)
+    assert (content.descriptors & 7).max() < (5 if cells == 8 else 7)
+
+
+def shell_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Planes, albedos and normals of the shell's used entries."""
+    entries = [sum(int(part) << (64 * k) for k, part in enumerate(words)) for words in content.shell if words.any()]
+    planes = unpacked_planes(np.array([entry & (1 << 64) - 1 for entry in entries], np.uint64))
+    albedos = unpacked(np.array([entry >> 64 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=False)
+    normals = unpacked(np.array([entry >> 100 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=True)
+    assert all(entry < 1 << 136 for entry in entries)
+    return planes, albedos / 4095, normals / 2047
+
+
+def test_the_shell_is_the_box_and_a_wall_behind() -> None:
+    environment = boxes(320, 240)
+    layout = AttributeLayout(320, 240)
+    content = encode_planes(environment, layout)
+    planes, albedos, normals = shell_fields(content)
+    picture = Picture.of(environment, content.depth_unit)
+    expected = {
+        (0, 0, 1): (0.5, environment.albedo.mean(axis=(0, 1))),
+        (0, 0, -1): (4.0, [0.5, 0.5, 0.5]),
+        (0, -1, 0): (1.2, [0.4, 0.2, 0.1]),
+        (0, 1, 0): (1.2, [0.9, 0.9, 0.9]),
+        (1, 0, 0): (1.5, [0.2, 0.5, 0.2]),
+        (-1, 0, 0): (1.5, [0.2, 0.2, 0.5]),
+    }
+    assert len(planes) == len(expected)
+    q = picture.inverse_offsets(planes)
+    for plane, albedo, normal in zip(q, albedos, normals, strict=True):
+        distance, colour = expected[tuple(int(x) for x in np.rint(normal))]  # type: ignore[index]
+        assert np.abs(normal - np.rint(normal)).max() < 0.01
+        assert abs(1 / np.linalg.norm(plane) - distance) < 0.02
+        assert np.abs(albedo - colour).max() < 0.02
+    # Behind the camera: w is negative where the picture is
+    assert np.allclose(planes[0], [0, 0, -content.depth_unit / 0.5], atol=1e-4)
+
+
+def test_a_shell_of_few_planes_keeps_the_largest() -> None:
+    environment = boxes(320, 240)
+    content = encode_planes(environment, AttributeLayout(320, 240, shell_planes=3))
+    _, _, normals = shell_fields(content)
+    assert len(normals) == 3
+    assert np.rint(normals[0]).tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize(("name", "mean", "p95"), [("living", 0.6, 0.55), ("office", 1.4, 1.6)])
+def test_surfaces_of_the_rooms(name: str, mean: float, p95: float) -> None:
+    environment, layout = load_environment(ROOMS / name), AttributeLayout()
+    content = encode_planes(environment, layout)
+    centimetres = 100 * ray_errors(environment, content.depth(layout, Picture.of(environment, content.depth_unit)))
+    assert centimetres.mean() < mean
+    assert np.percentile(centimetres, 95) < p95
+    planes, _, normals = shell_fields(content)
+    up = normals @ environment.camera_to_world[1, :3]
+    distance = 1 / np.linalg.norm(Picture.of(environment, content.depth_unit).inverse_offsets(planes), axis=1)
+    # The floor is as far below the camera as the pose says
+    assert abs(distance[up > 0.99][0] - environment.camera_to_world[1, 3]) < 0.02
+    assert len(planes) == 6
+
+
+def all_words(image: AttributeImage) -> list[bytes]:
+    return [memory.tobytes() for part in image.memories().values() for memory in part.values()]
+
+
+def test_a_whole_room_is_the_same_every_time() -> None:
+    environment = boxes()
+    images = [encode_environment(environment, AttributeLayout(160, 120)) for _ in range(2)]
+    assert all_words(images[0]) == all_words(images[1])
+    assert images[0].byte_counts() == {"albedo": 16384, "normals": 16384, "planes": 8192}
+    assert np.abs(images[0].decoded_albedo() - environment.albedo).mean() < 0.002
+
+
+@pytest.mark.parametrize("encoding", ["twoLevel", "slic"])
+def test_a_room_is_encoded_once(
+    encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    environment, layout = boxes(), AttributeLayout(160, 120, encoding)
+    first = encoded_environment(environment, layout, tmp_path)
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("encoded again")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("colonnade.environment.encoding.cache.encode_environment", refuse)
+        assert all_words(encoded_environment(environment, layout, tmp_path)) == all_words(first)
+        for other in (
+            replace(environment, albedo=environment.albedo * 0.5),
+            replace(environment, depth=environment.depth * 1.01),
+        ):
+            with pytest.raises(AssertionError):
+                encoded_environment(other, layout, tmp_path)
+    (kept,) = tmp_path.glob("*/room.npz")
+    kept.write_bytes(b"broken")
+    cache._verified.clear()
+    for _ in range(2):
+        assert all_words(encoded_environment(environment, layout, tmp_path)) == all_words(first)
+    assert capsys.readouterr().err == "colonnade: the cached room was damaged and is built again\n"
+
+
+@pytest.mark.parametrize(("width", "height"), [(1, 1), (5, 3), (16, 16), (33, 2)])
+def test_tiny_rooms(width: int, height: int) -> None:
+    environment = boxes(width, height, steps=False)
+    image = encode_environment(environment, AttributeLayout(width, height))
+    depth = image.decoded_depth(Picture.of(environment, image.depth_unit))
+    assert np.abs(depth / environment.depth - 1).max() < 0.02
+    assert np.abs(image.decoded_albedo() - environment.albedo).max() < 0.01
+
+
+def test_a_room_of_another_size() -> None:
+    with pytest.raises(UserError, match="are 160x120 pixels, the hardware holds 640x480"):
+        encode_environment(boxes(), AttributeLayout())

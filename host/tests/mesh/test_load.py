@@ -1,0 +1,128 @@
+"""Meshes: clean whatever the source, and bad ones refused with one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.mesh.load import clean_mesh, load_mesh
+from colonnade.mesh.topology import subdivide
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def test_vertices_merge_by_position_and_bad_faces_go() -> None:
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [2, 0, 0], [9, 9, 9], [-0.0, 0, 0]])
+    faces = np.array([[0, 1, 4], [0, 1, 2], [3, 0, 1], [2, 3, 0], [2, 1, 6]], dtype=np.int32)
+    mesh = clean_mesh(vertices, faces, "test")
+    # Without area, kept, twice, two vertices in one place, the other side of the second.
+    assert mesh.source_faces.tolist() == [1]
+    assert mesh.source_count == 5
+    assert len(mesh.vertices) == 3
+
+
+def test_normals_are_weighted_by_angle() -> None:
+    """A cube's corner normals are its diagonals however its faces are cut."""
+    mesh = load_mesh("cube")
+    np.testing.assert_allclose(mesh.vertex_normals, mesh.vertices / np.sqrt(3), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "triangles"),
+    [
+        ("cube", 12),
+        ("tetrahedron", 4),
+        ("octahedron", 8),
+        ("triangle", 1),
+        ("square", 2),
+        ("cylinder:7", 28),
+        ("cone:9", 18),
+        ("torus:12", 144),
+        ("sphere:2", 320),
+        ("sphere:1000", 980),
+        ("sphere", 5120),
+    ],
+)
+def test_solids(name: str, triangles: int) -> None:
+    mesh = load_mesh(name)
+    assert (len(mesh.faces), mesh.name) == (triangles, name)
+    assert np.abs(mesh.vertices).max() <= 1.0
+    if name not in ("triangle", "square"):
+        corners = mesh.vertices[mesh.faces]
+        volume = np.einsum("mx,mx->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+        edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        assert volume > 0 and (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+
+
+def test_midpoints_keep_the_surface() -> None:
+    vertices, faces = subdivide(
+        np.array([[0.0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0]]), np.array([[0, 1, 2], [1, 3, 2]])
+    )
+    assert (len(vertices), len(faces)) == (9, 8)
+    corners = vertices[faces]
+    np.testing.assert_allclose(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), [[0, 0, 4]] * 8)
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        ("empty.obj", b"", "is empty"),
+        ("noise.obj", bytes(range(128, 256)) * 9, "no faces|cannot be read"),
+        ("noise.ply", bytes(range(256)) * 9, "cannot be read"),
+        ("noise.stl", bytes(range(256)) * 9, "no faces|cannot be read"),
+        ("noise.glb", bytes(range(256)) * 9, "cannot be read"),
+        ("noise.off", bytes(range(256)) * 9, "cannot be read"),
+        ("nan.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 0 is not a finite number"),
+        ("inf.obj", b"v 0 0 0\nv inf 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 1 is not a finite number"),
+        ("line.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "only degenerate triangles"),
+        ("point.obj", b"v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n", "only degenerate triangles"),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
+        ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|does not exist"),
+        ("huge.obj", b"v 0 0 0\nv 1e200 0 0\nv 0 1 0\nf 1 2 3\n", "scale it down"),
+        ("picture.png", b"x", "ends with one of"),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, file: str, content: bytes, message: str) -> None:
+    path = tmp_path / file
+    path.write_bytes(content)
+    with pytest.raises(UserError, match=message) as caught:
+        load_mesh(path)
+    assert "\n" not in str(caught.value) and file in str(caught.value)
+
+
+def test_what_does_not_exist_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COLONNADE_MESHES", raising=False)
+    for name, message in (
+        (str(tmp_path / "no.obj"), "does not exist"),
+        (str(tmp_path), "is a folder"),
+        ("nothing", "there is no mesh 'nothing'"),
+        ("fandisk", "COLONNADE_MESHES"),
+        ("sphere:many", "must be from 0"),
+        ("teapot:0", "must be from 1"),
+    ):
+        with pytest.raises(UserError, match=message):
+            load_mesh(name)
+
+
+def test_names_are_found_in_the_users_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    (second / "fandisk.obj").write_text(TRIANGLE)
+    (second / "duck.obj").write_text(TRIANGLE)
+    (second / "mine.obj").write_text(TRIANGLE)
+    monkeypatch.setenv("COLONNADE_MESHES", f"{first}:{second}")
+    assert len(load_mesh("fandisk").faces) == 1
+    assert len(load_mesh("mine").faces) == 1
+    duck = load_mesh("duck")
+    assert (len(duck.faces), duck.name) == (16, "duck")
+
+
+def test_the_extents_outline_spans_the_box() -> None:
+    extent = load_mesh("teapot").extent
+    np.testing.assert_array_equal(extent.outline.min(axis=0), extent.low)
+    assert extent.edge == pytest.approx(6.434, abs=5e-3)
+    assert len(extent.outline) < 400

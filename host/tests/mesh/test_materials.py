@@ -1,0 +1,77 @@
+"""Materials of mesh files: what is a mirror, what is glass, and which face has which."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from trimesh.visual.material import PBRMaterial
+
+from colonnade.common.errors import UserError
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, from_mtl
+
+
+def test_gltf_says_what_a_surface_is() -> None:
+    surface = {"baseColorFactor": [0.5, 0.25, 0.125, 1.0], "metallicFactor": 0.2}
+    assert from_gltf({"pbrMetallicRoughness": surface}) == MeshMaterial("diffuse", (0.5, 0.25, 0.125))
+    assert from_gltf({"pbrMetallicRoughness": surface | {"metallicFactor": 0.5}}).kind == "mirror"
+    assert from_gltf({"pbrMetallicRoughness": {}}).kind == "mirror"  # metallic unless it says otherwise
+    assert from_gltf({}).kind == "diffuse"
+    textured = surface | {"metallicFactor": 1.0, "metallicRoughnessTexture": {"index": 0}}
+    assert from_gltf({"pbrMetallicRoughness": textured}).kind == "diffuse"
+    extensions = {"KHR_materials_transmission": {"transmissionFactor": 0.9}, "KHR_materials_ior": {"ior": 1.33}}
+    assert from_gltf({"pbrMetallicRoughness": surface, "extensions": extensions}) == MeshMaterial(
+        "glass", (0.5, 0.25, 0.125), 1.33
+    )
+
+
+def test_mtl_says_what_a_surface_is() -> None:
+    assert from_mtl({"kd": [0.1, 0.2, 0.3], "illum": ["2"]}) == MeshMaterial("diffuse", (0.1, 0.2, 0.3))
+    assert from_mtl({"kd": [0.1, 0.2, 0.3], "pm": ["1.0"]}).kind == "mirror"
+    assert from_mtl({"illum": ["3"]}) == MeshMaterial("mirror", PLAIN.albedo)
+    assert from_mtl({"d": ["0.1"], "ni": ["1.0"], "tf": ["1", "0.5", "2"]}) == MeshMaterial("glass", (1.0, 0.5, 1.0))
+    assert from_mtl({"tr": ["0.8"], "ni": ["1.45"]}) == MeshMaterial("glass", PLAIN.albedo, 1.45)
+    assert from_mtl({"kd": "noise", "d": ["nan"], "illum": []}) == PLAIN
+
+
+def test_a_glb_file_keeps_its_materials_apart(tmp_path: Path) -> None:
+    parts = []
+    for shape, metallic in ((trimesh.creation.icosphere(1), 0.9), (trimesh.creation.box(), 0.0)):
+        material = PBRMaterial(baseColorFactor=[0.2, 0.4, 0.6, 1.0], metallicFactor=metallic, name="same")
+        shape.visual = trimesh.visual.TextureVisuals(material=material)
+        parts.append(shape)
+    trimesh.Scene(parts).export(tmp_path / "two.glb")
+    mesh = load_mesh(tmp_path / "two.glb")
+    kinds = np.array([material.kind for material in mesh.materials])[mesh.face_materials]
+    assert len(mesh.materials) == 2 and np.count_nonzero(kinds == "mirror") == 80
+    corners = mesh.vertices[mesh.faces]
+    assert np.isin(np.abs(corners[kinds == "diffuse"]), [0.5]).all()
+    assert mesh.materials[0].albedo == pytest.approx((0.2, 0.4, 0.6), abs=1 / 255)
+
+
+def test_an_obj_file_keeps_its_materials_apart(tmp_path: Path) -> None:
+    (tmp_path / "m.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl clear\nKd 0 1 1\nd 0.2\nNi 1.4\n")
+    vertices = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    faces = "usemtl red\nf 1 2 3\nf 1 1 2\nusemtl clear\nf 1 2 4\nf 2 3 4\n"
+    (tmp_path / "m.obj").write_text(vertices + faces)
+    mesh = load_mesh(tmp_path / "m.obj")
+    # The face without area is gone, and with it its material's place in the row.
+    kinds = [mesh.materials[index] for index in mesh.face_materials]
+    assert sorted(kinds, key=str) == sorted(
+        [MeshMaterial("diffuse", (1.0, 0.0, 0.0))] + 2 * [MeshMaterial("glass", (0.0, 1.0, 1.0), 1.4)], key=str
+    )
+
+
+def test_files_without_materials_are_plain(tmp_path: Path) -> None:
+    trimesh.creation.box().export(tmp_path / "b.stl")
+    for mesh in (load_mesh(tmp_path / "b.stl"), load_mesh("cube")):
+        assert mesh.materials == (PLAIN,) and not mesh.face_materials.any()
+
+
+def test_a_broken_gltf_is_one_clear_line(tmp_path: Path) -> None:
+    (tmp_path / "b.gltf").write_text("{")
+    with pytest.raises(UserError, match="cannot be read as a mesh"):
+        load_mesh(tmp_path / "b.gltf")

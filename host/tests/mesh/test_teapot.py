@@ -1,0 +1,46 @@
+"""Newell's teapot: as many triangles as it must have, closed up along its patches, normals outward."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.teapot import patches, tessellate
+
+
+def test_it_has_32_patches() -> None:
+    assert patches().shape == (32, 4, 4, 3)
+
+
+@pytest.mark.parametrize("level", [2, 3, 10])
+def test_its_poles_leave_no_degenerate_faces(level: int) -> None:
+    _, faces = tessellate(level)
+    assert len(faces) == 64 * level * level - 8 * level
+    assert len(load_mesh(f"teapot:{level}").faces) == len(faces)
+
+
+def test_the_default_is_the_benchmarks() -> None:
+    mesh = load_mesh("teapot")
+    assert (len(mesh.faces), mesh.source_count) == (6320, 6320)
+    np.testing.assert_allclose(mesh.vertices.min(axis=0), [-3.0, 0.0, -2.0])
+    np.testing.assert_allclose(mesh.vertices.max(axis=0), [3.434, 3.15, 2.0], atol=5e-3)
+
+
+def test_patches_meet_bit_for_bit() -> None:
+    """Edges with one face are only those where a part ends: lid, rim, and the ends of handle and spout."""
+    mesh = load_mesh("teapot")
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    assert count.max() == 2
+    # Circles of 40 edges: the rim's inner edge and the lid's. Loops of 20: two ends of the handle, two of the spout.
+    assert (count == 1).sum() == 2 * 40 + 4 * 20
+
+
+def test_its_normals_point_outward() -> None:
+    """Tested where it is plain: on the body, away from handle and spout."""
+    mesh = load_mesh("teapot")
+    radius = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 2])
+    body = (np.abs(radius - 2.0) < 0.05) & (np.abs(mesh.vertices[:, 2]) > 1.0)
+    outward = np.einsum("nx,nx->n", mesh.vertex_normals[body][:, [0, 2]], mesh.vertices[body][:, [0, 2]])
+    assert body.any() and (outward > 0).all()

@@ -1,0 +1,63 @@
+"""The page: its text stays, tables say what is missing; where the gates are, and rays at equal area."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from colonnade.ppa.pages.area import equal_area, gates
+from colonnade.ppa.pages.page import page
+
+
+def report() -> dict[str, Any]:
+    """Two columns of three render units; 4 mm² of logic, 1 of it beside 6 units with 0.5 mm² and memories of 0.1."""
+    return {
+        "chip": {"kge_per_unit": 100.0, "mm2": 2.0},
+        "units": {
+            "Small": {"level": "render_unit", "kge": 10.0},
+            "Large": {"level": "render_unit", "kge": 30.0},
+            "Other": {"level": "column", "kge": 99.0},
+        },
+        "memories": {"words": {"unit": "Small", "kge": 25.0}},
+        "levels": {
+            "render_unit": {
+                "of_the_level_below": 0,
+                "logic_kge": 40.0,
+                "memory_kge": 25.0,
+                "kge": 65.0,
+                "logic_mm2_28nm": 0.5,
+                "mm2_28nm": 0.6,
+            },
+            "column": {"of_the_level_below": 3},
+            "array": {"of_the_level_below": 2, "logic_mm2_28nm": 4.0, "mm2_28nm": 8.0},
+        },
+    }
+
+
+def test_units_are_told_with_their_memories_the_largest_first() -> None:
+    lines = gates({"yosys": report()}).splitlines()
+    assert lines[2:] == [
+        "| Small | 10.0 | 25.0 | 35 % |",
+        "| Large | 30.0 | 0.0 | 30 % |",
+        "| **render unit** | 40.0 | 25.0 | 65 % |",
+    ]
+
+
+def test_rays_at_equal_area_are_fewer_by_the_area(tmp_path: Path) -> None:
+    assert equal_area({"yosys": report()}, tmp_path) == ""
+    (tmp_path / "bench.json").write_text(json.dumps({"ratio_to_paper": 12.0}))
+    rows = [line.split("|")[3:6] for line in equal_area({"yosys": report()}, tmp_path).splitlines()[2:]]
+    figures = [[float(cell) for cell in row] for row in rows]
+    assert figures == [pytest.approx(row) for row in ([4.0, 2.0, 6.0], [4.6, 2.3, 5.2], [8.0, 4.0, 3.0])]
+
+
+def test_the_page_keeps_its_text_and_names_what_is_missing(tmp_path: Path) -> None:
+    text = "# Cost\n<!-- units_32b32s64d -->\nold\n<!-- end -->\nprose\n<!-- ecp5 -->\n<!-- end -->\n"
+    missing = "Not measured: run `tools/ppa`."
+    written = (
+        f"# Cost\n<!-- units_32b32s64d -->\n{missing}\n<!-- end -->\nprose\n<!-- ecp5 -->\n{missing}\n<!-- end -->\n"
+    )
+    assert page(text, tmp_path) == written

@@ -1,0 +1,85 @@
+"""The performance page shows what its data say."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from colonnade.design import toolchain
+from colonnade.evaluation.bench import design_result
+from colonnade.report import performance_page
+
+DOCS = toolchain.project_root() / "docs"
+
+
+def test_page_is_what_its_data_say() -> None:
+    text = (DOCS / "performance.md").read_text()
+    assert performance_page.page(text, DOCS) == text, "run tools/performance page"
+
+
+@pytest.fixture
+def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
+    """A folder with data of bench, of a sweep of rows, and of an ablation with one of the model's points."""
+
+    def point(in_box: float, varied: str | None = None, **values: Any) -> dict[str, Any]:
+        whole = design_result({"bunny": rtl_report(in_box), "cube": rtl_report(in_box)})
+        return whole | {"values": values, "varied": varied, "in_box_per_unit": in_box / 6, "ratio_to_base": in_box}
+
+    base = point(1.0)
+    kinds = [(contexts, snooping) for contexts in (1, 4) for snooping in (False, True)]
+    keys = ("array.contexts", "columnBvhMemory.snooping", "columnBvhMemory.banks")
+    rates = dict(zip(kinds, (0.5, 0.75, 1.0, 1.25), strict=True))
+    data = {
+        "bench": base | {"mirror": base},
+        "scaling": {"base": base, "points": [point(2.0, "array.rows", **{"array.rows": 4})]},
+        "ablation": {
+            "base": base,
+            "points": [point(rates[kind], **dict(zip(keys, (*kind, 1), strict=True))) for kind in kinds],
+        },
+    }
+    (tmp_path / "data").mkdir()
+    shutil.copy(DOCS / "data" / "cycle-model.json", tmp_path / "data")
+    for name, content in data.items():
+        (tmp_path / "data" / f"{name}.json").write_text(json.dumps(content))
+    return tmp_path
+
+
+def table(docs: Path, name: str) -> str:
+    before, after = "before\n", "\nafter"
+    text = performance_page.page(f"{before}<!-- {name} -->\nold\n<!-- end -->{after}", docs)
+    assert text.startswith(before)
+    assert text.endswith(after)
+    assert "old" not in text
+    assert performance_page.page(text, docs) == text
+    return text
+
+
+@pytest.mark.parametrize("name", performance_page.TABLES)
+def test_every_table_is_on_the_page_and_is_even(docs: Path, name: str) -> None:
+    assert f"<!-- {name} -->" in (DOCS / "performance.md").read_text()
+    widths = {line.count("|") for line in table(docs, name).splitlines() if line.startswith("|")}
+    assert len(widths) == 1
+
+
+def test_figures_are_those_of_the_data(docs: Path) -> None:
+    rates = table(docs, "rates")
+    assert "| bunny | 12 | 100 | 50 | **1.00** | 2.00 | 1.25 | 2.00 | box unit, 80 % |" in rates
+    assert "**4.8 times** the chip's 0.208" in rates
+    assert "| rows (render units of a column) | 4 | 2.000 | 2.000 | 0.3333 | 2.00 |" in table(docs, "scaling")
+
+
+def test_ablation_stands_beside_the_model(docs: Path) -> None:
+    rows = table(docs, "ablation")
+    assert "| mesh | contexts |  | round-robin, 1 bank | snooping, 1 bank |" in rows
+    assert "| bunny | 4 | RTL | **0.333** | **0.417** |\n|  |  | model, 6/2 lanes | 0.090 | 0.165 |" in rows
+    assert "|  |  | model, 12/4 lanes | – | 0.190 |" in rows
+    assert rows.count("| cube |") == 2
+
+
+def test_a_table_without_data_says_how_to_get_it(tmp_path: Path) -> None:
+    assert "Run `tools/performance scaling`." in table(tmp_path, "scaling")

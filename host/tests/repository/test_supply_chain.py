@@ -1,0 +1,129 @@
+"""The locks are up to date, an altered package is refused, and a program that is too old is named in one line."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.device import compiler
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture
+def module(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
+    monkeypatch.syspath_prepend(str(ROOT / "tools" / "supply_chain"))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    return lambda name: __import__(name)
+
+
+def bash(script: str, *folders: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join([*map(str, folders), os.environ["PATH"]])
+    command = ["bash", "-euc", f". {ROOT}/tools/programs.sh; {script}"]
+    environment = {**os.environ, "PATH": path, **variables}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def program(folder: Path, name: str, says: str) -> None:
+    file = folder / name
+    file.write_text(f"#!/bin/sh\necho '{says}'\n")
+    file.chmod(0o755)
+
+
+def test_locks_and_bill_of_materials_are_up_to_date(module: Callable[[str], ModuleType]) -> None:
+    assert module("python_locks").check() == []
+    assert module("sbom").check() == []
+
+
+def test_a_lock_older_than_pyproject_is_named(
+    module: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locks = module("python_locks")
+    newer = tmp_path / "pyproject.toml"
+    newer.write_text(locks.PROJECT.read_text().replace('"click>=8.1,<9"', '"click>=8.1,<10"'))
+    monkeypatch.setattr(locks, "PROJECT", newer)
+    assert locks.check() == [
+        "host/locks/host.txt is older than the dependencies in host/pyproject.toml; run: tools/lock"
+    ]
+
+
+def test_a_bill_of_materials_with_another_hash_is_named(
+    module: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sbom = module("sbom")
+    data = json.loads(sbom.FILE.read_text())
+    data["components"][0]["hashes"][0]["content"] = "0" * 64
+    altered = tmp_path / "sbom.json"
+    altered.write_text(json.dumps(data))
+    monkeypatch.setattr(sbom, "FILE", altered)
+    assert sbom.check() == ["sbom.json is not true to the locks; run: tools/lock"]
+
+
+@pytest.mark.parametrize("file", ["sbom.json", "project/dependencies.sha256", *(ROOT / "host/locks").glob("*.txt")])
+def test_no_lock_names_a_host(file: str | Path) -> None:
+    assert "://" not in (ROOT / file).read_text()
+
+
+@pytest.mark.parametrize("altered", [False, True])
+def test_pip_takes_only_the_locked_file(tmp_path: Path, altered: bool) -> None:
+    wheel = tmp_path / "tiny-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        archive.writestr("tiny.py", "")
+        archive.writestr("tiny-1.0.dist-info/METADATA", "Metadata-Version: 2.1\nName: tiny\nVersion: 1.0\n")
+        archive.writestr("tiny-1.0.dist-info/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        archive.writestr("tiny-1.0.dist-info/RECORD", "")
+    locked = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    if altered:
+        wheel.write_bytes(wheel.read_bytes() + b" ")
+    locks = tmp_path / "host" / "locks"
+    locks.mkdir(parents=True)
+    (locks / "tiny.txt").write_text(f"tiny==1.0 --hash=sha256:{locked}\n")
+    target = tmp_path / "target"
+    where = {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path), "PIP_TARGET": str(target)}
+    done = bash(f"root='{tmp_path}'; install_locked '{sys.prefix}' tiny", **where)
+    assert (target / "tiny.py").is_file() is not altered
+    if altered:
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert done.stderr.startswith("colonnade: error: tiny==1.0 is not the file that host/locks/tiny.txt holds")
+    else:
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("name", "says", "line"),
+    [
+        ("verilator", "Verilator 4.038 2020-07-11 rev v4.036", "Verilator 4.038 is too old, 5.006 or newer"),
+        ("g++", "9.4.0", "g++ 9.4.0 is too old, 10 or newer"),
+        ("make", "GNU Make 3.81", "GNU Make 3.81 is too old, 4.0 or newer"),
+    ],
+)
+def test_setup_names_a_program_that_is_too_old(tmp_path: Path, name: str, says: str, line: str) -> None:
+    program(tmp_path, name, says)
+    done = bash(f"exec {ROOT}/tools/system-packages", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"colonnade: error: {line}") and done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(("version", "fits"), [("5.006", True), ("5.048", True), ("5.005", False), ("4.228", False)])
+def test_host_and_setup_agree_on_the_oldest_verilator(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: str, fits: bool
+) -> None:
+    program(tmp_path, "verilator", f"Verilator {version} 2023-01-22 rev x")
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    assert (bash("too_old", tmp_path).stdout == "") is fits
+    if fits:
+        assert compiler.require_verilator("rendering")[0] == tmp_path / "verilator"
+    else:
+        with pytest.raises(UserError, match=f"Verilator {version} .*: rendering needs 5.006 or newer"):
+            compiler.require_verilator("rendering")

@@ -1,0 +1,125 @@
+"""Scene files: defaults, the scenes that come along, and one line for whatever is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.mesh.load import load_mesh
+from colonnade.scene.model import Paths, Placement
+from colonnade.scene.parser import load_scene
+
+SCENES = Path(__file__).resolve().parents[3] / "scenes"
+
+
+def write(folder: Path, text: str) -> Path:
+    file = folder / "scene.toml"
+    file.write_text(text)
+    return file
+
+
+def test_the_benchmarks_scene() -> None:
+    scene = load_scene(SCENES / "object.toml")
+    assert scene.camera.direction == (0.45, 0.35, 1.0)
+    assert (scene.camera.framing, scene.camera.fov) == (0.7, 40.0)
+    assert scene.light.offset == (1.2, 1.6, 1.5)
+    assert scene.with_mesh("bunny").mesh_source == "bunny"
+
+
+def test_every_scene_that_comes_along_is_read() -> None:
+    files = sorted(SCENES.glob("*.toml"))
+    assert {"object.toml", "first-light.toml"} <= {file.name for file in files}
+    for file in files:
+        load_mesh(load_scene(file).mesh_source)
+
+
+def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
+    scene = load_scene(write(tmp_path, '[mesh]\npath = "parts/a.obj"'))
+    assert scene.mesh_source == tmp_path / "parts" / "a.obj"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"\[mesh\] needs a name or a path"),
+        ("mesh = 3", "mesh must be a table"),
+        ('[mesh]\nname = "a"\npath = "b"', "one of the two"),
+        ("[mesh]\nname = 3", "mesh.name must be text"),
+        ('[mesh]\nname = "a"\n[lihgt]', "unknown key lihgt; known here: mesh"),
+        ('[mesh]\nname = "a"\n[light]\ncolor = [1, 1, 1]', "unknown key light.color; known here"),
+        ('[mesh]\nname = "a"\n[light]\ncolour = [1, 1]', "light.colour must be three numbers"),
+        ('[mesh]\nname = "a"\n[light]\ncolour = [1, 1, -1]', "light.colour must be three numbers from 0"),
+        ('[mesh]\nname = "a"\n[light]\nshadows = 1', "light.shadows must be true or false"),
+        ('[mesh]\nname = "a"\n[light]\nposition = [0, 0, 1]\noffset = [0, 0, 1]', "not both"),
+        ('[mesh]\nname = "a"\n[material]\nalbedo = [2, 0, 0]', "material.albedo must be three numbers from 0 to 1"),
+        ('[mesh]\nname = "a"\n[camera]\nfov = 180', "camera.fov must be a number from 1 to 150"),
+        ('[mesh]\nname = "a"\n[camera]\nfov = true', "camera.fov must be a number"),
+        ('[mesh]\nname = "a"\n[camera]\nfov = nan', "camera.fov must be a number"),
+        ('[mesh]\nname = "a"\n[camera]\nposition = [nan, 0, 0]', "camera.position must be three finite numbers"),
+        ('[mesh]\nname = "a"\n[camera]\nposition = [1, 0, 0]\nframing = 0.5', "either placed"),
+        ('[mesh]\nname = "a"\n[camera]\ntarget = [1, 0, 0]', "needs camera.position"),
+        ('[mesh]\nname = "a"\n[camera]\ndirection = [0, 0, 0]', "camera.direction must not be zero"),
+        ('[mesh]\nname = "a"\n[transform]\nscale = 0', "transform.scale must be a number"),
+        ('[mesh]\nname = "a"\n[frame]\nwidth = 0', "frame.width must be a whole number"),
+        ('[mesh]\nname = "a"\n[material]\nkind = "wood"', "material.kind must be one of diffuse, mirror, glass"),
+        ('[mesh]\nname = "a"\n[material]\nkind = "mirror"\nior = 1.5', "material.ior belongs to glass"),
+        ('[mesh]\nname = "a"\n[material]\nior = 0.5', "material.ior must be a number from 1 to 4"),
+        ('[mesh]\nname = "a"\n[light]\nfalloff = 0', "light.falloff must be a number"),
+        ('[mesh]\nname = "a"\n[[light]]\n[[light]]\nshadows = false', "unknown key light.shadows; known here: pos"),
+        ('[mesh]\nname = "a"\n[paths]\nbounces = 16', "paths.bounces must be a whole number from 0 to 15"),
+        ('[mesh]\nname = "a"\n[paths]\nshadow_transmittance = 2', "paths.shadow_transmittance must be a number"),
+        ('[mesh]\nname = "a"\n[background]\nroom = 3', "background.room must be text"),
+        ('[mesh]\nname = "a"\n[background]\nroom = "r"\n[camera]\nfov = 30', "the camera is the room's"),
+        ('[mesh]\nname = "a"\n[object]\nsize = 1', "needs background.room"),
+        ('[mesh]\nname = "a"\n[object]\n[transform]\nscale = 2\n[background]\nroom = "r"', "leave out transform.scale"),
+        ('[mesh]\nname = "a"\n[object]\nstand_at = [1, -2]\n[background]\nroom = "r"', "object.stand_at must be two"),
+        ("[mesh", "is not TOML"),
+    ],
+)
+def test_mistakes_are_named(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(UserError, match=message) as caught:
+        load_scene(write(tmp_path, text))
+    assert "\n" not in str(caught.value) and "scene.toml" in str(caught.value)
+
+
+def test_a_room_with_several_lights_is_read(tmp_path: Path) -> None:
+    text = """
+    [mesh]
+    name = "teapot"
+    [background]
+    room = "rooms/living"
+    [object]
+    stand_at = [330, 297.5]
+    turn = -20
+    [material]
+    kind = "glass"
+    ior = 1.4
+    [paths]
+    bounces = 6
+    [[light]]
+    position = [0, 2, 0]
+    falloff = 1.5
+    shadow_offset = 0.001
+    [[light]]
+    offset = [1, 1, 0]
+    """
+    scene = load_scene(write(tmp_path, text))
+    assert scene.background.room == tmp_path / "rooms" / "living"
+    assert scene.placement == Placement((330.0, 297.5), turn=-20.0)
+    assert (scene.material.kind, scene.material.albedo, scene.material.ior) == ("glass", None, 1.4)
+    assert scene.paths == Paths(bounces=6)
+    assert [light.falloff for light in scene.lights] == [1.5, None]
+    assert scene.light.shadow_offset == 0.001 and scene.lights[1].position is None
+    assert scene.with_environment(tmp_path).background.room == tmp_path
+
+
+def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="does not exist"):
+        load_scene(tmp_path / "none.toml")
+    with pytest.raises(UserError, match="cannot read"):
+        load_scene(tmp_path)
+    (tmp_path / "noise.toml").write_bytes(bytes(range(256)))
+    with pytest.raises(UserError, match="is not TOML"):
+        load_scene(tmp_path / "noise.toml")

@@ -1,0 +1,149 @@
+"""The tree: conservative boxes, every triangle once, the same order for every arity, bounds that hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colonnade.scene_image.bvh import EMPTY, LEAF, NODE, Bvh, build_bvh
+
+Integers = npt.NDArray[np.int32]
+
+
+def build(vertices: Integers, faces: Integers, **changes: Any) -> Bvh:
+    options = {"triangles_per_record": 2, "arity": 4, "box_bits": 8, "stack_depth": 48} | changes
+    return build_bvh(vertices, faces, **options)
+
+
+def random_triangles(seed: int, count: int, spread: int, bits: int = 16) -> tuple[Integers, Integers]:
+    """Small triangles, in clusters when ``spread`` is small, so that centres coincide."""
+    generator = np.random.default_rng(seed)
+    most = (1 << bits) - 1
+    centres = generator.integers(0, most + 1, (max(1, spread), 3))
+    corners = centres[generator.integers(0, len(centres), count)][:, None] + generator.integers(-40, 41, (count, 3, 3))
+    vertices = np.clip(corners, 0, most).reshape(-1, 3).astype(np.int32)
+    return vertices, np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+
+
+def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, box_bits: int) -> None:
+    """Walks the tree with the boxes of all ancestors at hand."""
+    seen: list[int] = []
+    most = (1 << 28, -1)
+    tasks = [(0, np.full(3, -1), np.full(3, most[0]), 0, 1)]
+    deepest_stack = depth = 0
+    while tasks:
+        node, low, high, waiting, level = tasks.pop()
+        depth = max(depth, level)
+        kinds = tree.kinds[node]
+        assert (kinds != EMPTY).any()
+        waiting += int((kinds != EMPTY).sum()) - 1
+        deepest_stack = max(deepest_stack, waiting)
+        next_node, next_leaf = int(tree.first_child[node]), int(tree.first_triangles[node])
+        children = []
+        for slot, kind in enumerate(kinds):
+            if kind == EMPTY:
+                continue
+            exponent = tree.exponent[node].astype(np.int64)
+            origin = tree.origin[node].astype(np.int64)
+            child_low = origin + (tree.low[node, slot].astype(np.int64) << exponent)
+            child_high = origin + (tree.high[node, slot].astype(np.int64) << exponent)
+            assert tree.high[node, slot].max() < 1 << box_bits
+            inner_low, inner_high = np.maximum(low, child_low), np.minimum(high, child_high)
+            if kind == NODE:
+                assert next_node > node
+                children.append((next_node, inner_low, inner_high, waiting, level + 1))
+                next_node += 1
+                continue
+            assert kind == LEAF
+            first, count = int(tree.leaf_first[next_leaf]), int(tree.leaf_count[next_leaf])
+            assert 1 <= count <= per_record
+            seen += range(first, first + count)
+            points = vertices[faces[tree.order[first : first + count]]].reshape(-1, 3)
+            assert (points >= inner_low).all() and (points <= inner_high).all()
+            next_leaf += 1
+        tasks += reversed(children)
+    assert sorted(seen) == list(range(len(faces)))
+    assert sorted(tree.order.tolist()) == list(range(len(faces)))
+    statistics = tree.statistics
+    assert (statistics.stack_bound, statistics.depth) == (deepest_stack, depth)
+    assert (statistics.nodes, statistics.leaves) == (len(tree.kinds), len(tree.leaf_first))
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    count=st.integers(1, 300),
+    spread=st.sampled_from([1, 3, 1000]),
+    per_record=st.sampled_from([1, 2]),
+    box_bits=st.integers(4, 12),
+)
+def test_boxes_hold_their_triangles_and_the_order_is_the_arities(
+    seed: int, count: int, spread: int, per_record: int, box_bits: int
+) -> None:
+    vertices, faces = random_triangles(seed, count, spread)
+    trees = [
+        build(vertices, faces, arity=arity, triangles_per_record=per_record, box_bits=box_bits) for arity in (2, 4)
+    ]
+    for tree in trees:
+        check_tree(tree, vertices, faces, per_record, box_bits)
+    np.testing.assert_array_equal(trees[0].order, trees[1].order)
+    assert sorted(trees[0].leaf_first.tolist()) == sorted(trees[1].leaf_first.tolist())
+
+
+@pytest.mark.parametrize("arity", [2, 4])
+def test_one_triangle_has_a_root_with_one_leaf(arity: int) -> None:
+    vertices, faces = random_triangles(1, 1, 1)
+    tree = build(vertices, faces, arity=arity)
+    assert tree.kinds.tolist() == [[LEAF] + [EMPTY] * (arity - 1)]
+    assert tree.statistics.stack_bound == 0
+    check_tree(tree, vertices, faces, 2, 8)
+
+
+@pytest.mark.parametrize("count", [2, 3, 500, 4000])
+def test_triangles_in_one_place_are_halved(count: int) -> None:
+    """Coinciding centres leave nothing to split by; the tree stays balanced and small."""
+    vertices = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0]], dtype=np.int32)
+    faces = np.tile(np.array([[0, 1, 2]], dtype=np.int32), (count, 1))
+    tree = build(vertices, faces)
+    check_tree(tree, vertices, faces, 2, 8)
+    assert len(tree.leaf_first) == -(-count // 2)
+
+
+def one_sided(count: int = 3000) -> tuple[Integers, Integers]:
+    """Triangles whose sizes and places grow by a constant factor: good splits peel a few off at a time."""
+    at = np.unique(np.rint(1.004 ** np.arange(count)).astype(np.int64))
+    at = at[at < 60000]
+    vertices = np.stack(
+        [np.stack([at, 0 * at, 0 * at], 1), np.stack([at, at, 0 * at], 1), np.stack([at, at, at], 1)], 1
+    )
+    return vertices.reshape(-1, 3).astype(np.int32), np.arange(3 * len(at), dtype=np.int32).reshape(-1, 3)
+
+
+def test_a_tree_too_deep_for_the_stack_is_balanced() -> None:
+    vertices, faces = one_sided()
+    free = build(vertices, faces, stack_depth=256, arity=2)
+    assert free.statistics.height_limit == 0
+    short = free.statistics.stack_bound - 2
+    for arity in (2, 4):
+        tree = build(vertices, faces, stack_depth=max(short, 18), arity=arity)
+        assert tree.statistics.stack_bound <= max(short, 18)
+        check_tree(tree, vertices, faces, 2, 8)
+
+
+def test_the_order_does_not_depend_on_the_arity_when_balanced() -> None:
+    vertices, faces = one_sided()
+    for stack_depth in (12, 16, 20, 4):
+        trees = [build(vertices, faces, stack_depth=stack_depth, arity=arity) for arity in (2, 4)]
+        np.testing.assert_array_equal(trees[0].order, trees[1].order)
+        assert trees[0].statistics.height_limit == trees[1].statistics.height_limit
+
+
+def test_a_tree_that_cannot_fit_says_what_it_needs() -> None:
+    vertices, faces = random_triangles(3, 4096, 1000)
+    tree = build(vertices, faces, stack_depth=4, arity=2)
+    assert tree.statistics.stack_bound == 11  # 2,048 leaves, balanced

@@ -1,0 +1,191 @@
+"""Packing: what the records say is the mesh, for every layout; what does not fit is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colonnade.common.errors import UserError
+from colonnade.design.manifest import Manifest
+from colonnade.mesh.load import clean_mesh, load_mesh
+from colonnade.mesh.mesh import Mesh
+from colonnade.scene_image.bvh import LEAF, NODE
+from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.inspect import describe, report_lines
+from colonnade.scene_image.packer import geometric_normals, memory_use, pack, quantise
+
+MakeManifest = Callable[..., Manifest]
+
+
+def packed_triangles(image: SceneImage, manifest: Manifest) -> dict[int, list[list[int]]]:
+    """Every triangle's corners by packed id, as the records have them."""
+    header = image.header
+    section = image.records[header.triangle_base : header.triangle_base + header.triangle_records]
+    fields = manifest.layouts["triangles"].unpack(section)
+    result: dict[int, list[list[int]]] = {}
+    for row in range(len(section)):
+        for k in range(int(fields["count"][row])):
+            corners = [[int(fields[f"vertices[{3 * k + j}].{axis}"][row]) for axis in "xyz"] for j in range(3)]
+            assert int(fields["firstTriangle"][row]) + k not in result
+            result[int(fields["firstTriangle"][row]) + k] = corners
+    return result
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    count=st.integers(1, 60),
+    bits=st.sampled_from([10, 16, 24]),
+    size=st.floats(1e-6, 1e6),
+    away=st.floats(-1e6, 1e6),
+)
+def test_quantisation_is_uniform_centred_and_near(seed: int, count: int, bits: int, size: float, away: float) -> None:
+    generator = np.random.default_rng(seed)
+    vertices = generator.normal(size=(3 * count, 3)) * size + away
+    try:
+        mesh = clean_mesh(vertices, np.arange(3 * count, dtype=np.int32).reshape(-1, 3), "random")
+        result = quantise(mesh, bits)
+    except UserError:
+        return  # so small beside its distance from the origin that nothing is left of it
+    most = (1 << bits) - 1
+    assert result.vertices.min() >= 0 and result.vertices.max() <= most
+    assert np.ptp(result.vertices, axis=0).max() >= most - 1
+    exact = (mesh.vertices - np.array(result.frame.offset)) * result.frame.scale
+    rounding = np.abs(mesh.vertices).max() * result.frame.scale * 1e-15
+    assert np.abs(exact - result.vertices).max() <= 0.5 + 1e-3 + rounding
+    assert (geometric_normals(result) != 0).any(axis=1).all()
+
+
+def test_faces_that_lose_their_area_are_dropped() -> None:
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1e-9, 0, 0], [1, 1, 0]])
+    mesh = clean_mesh(vertices, np.array([[0, 3, 2], [0, 1, 2], [1, 4, 2], [3, 1, 2]], dtype=np.int32), "thin")
+    result = quantise(mesh, 16)
+    assert len(mesh.faces) == 4
+    assert result.mesh_faces.tolist() == [1, 2]
+
+
+def test_nothing_left_is_refused() -> None:
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [2, 1e-7, 0]])
+    with pytest.raises(UserError, match=r"geometry\.vertexBits"):
+        quantise(clean_mesh(vertices, np.array([[0, 1, 2]], dtype=np.int32), "needle"), 16)
+
+
+@pytest.mark.parametrize("vertex_bits", [10, 16, 24])
+@pytest.mark.parametrize("per_record", [1, 2])
+def test_records_hold_the_mesh_whatever_the_layout(
+    make_manifest: MakeManifest, vertex_bits: int, per_record: int
+) -> None:
+    """Arity 2, arity 4 and no tree at all number the triangles alike."""
+    mesh = load_mesh("sphere:3")
+    quantised = quantise(mesh, vertex_bits)
+    triangles, faces = [], []
+    for changes in ({"arity": 4}, {"arity": 2}, {"bvh": False}):
+        manifest = make_manifest(vertex_bits=vertex_bits, per_record=per_record, **changes)
+        image = pack(mesh, manifest)
+        assert image.records.shape == (image.header.record_count, manifest.record_bits // 8)
+        triangles.append(packed_triangles(image, manifest))
+        faces.append(image.source_faces)
+    assert triangles[0] == triangles[1] == triangles[2]
+    assert sorted(triangles[0]) == list(range(len(quantised.faces)))
+    for packed, face in enumerate(faces[0]):
+        expected = quantised.vertices[mesh.faces[np.flatnonzero(mesh.source_faces == face)[0]]]
+        assert triangles[0][packed] == expected.tolist()
+    np.testing.assert_array_equal(faces[0], faces[1])
+    np.testing.assert_array_equal(faces[0], faces[2])
+
+
+def test_nodes_reach_every_leaf_and_only_those(manifest: Manifest) -> None:
+    image = pack(load_mesh("teapot:4"), manifest)
+    header = image.header
+    nodes = manifest.layouts["node"].unpack(image.records[: header.triangle_base])
+    seen_nodes, seen_leaves = [0], []
+    for node in range(header.triangle_base):
+        next_node, next_leaf = int(nodes["firstChild"][node]), int(nodes["firstTriangles"][node])
+        for slot in range(4):
+            kind = int(nodes[f"kinds[{slot}]"][node])
+            if kind == NODE:
+                seen_nodes.append(next_node)
+                next_node += 1
+            elif kind == LEAF:
+                seen_leaves.append(next_leaf)
+                next_leaf += 1
+    assert sorted(seen_nodes) == list(range(header.triangle_base))
+    assert sorted(seen_leaves) == list(range(header.triangle_base, header.attribute_base))
+
+
+def test_attributes_lie_in_the_order_of_packed_ids(manifest: Manifest) -> None:
+    mesh = load_mesh("torus:15")
+    image = pack(mesh, manifest)
+    quantised = quantise(mesh, 16)
+    fields = manifest.layouts["attributes"].unpack(image.records[image.header.attribute_base :])
+    flat = geometric_normals(quantised)
+    for packed, face in enumerate(image.source_faces):
+        row, slot = divmod(packed, 2)
+        for a, axis in enumerate("xyz"):
+            for j in range(3):
+                expected = np.rint(mesh.vertex_normals[mesh.faces[face, j], a] * 2047)
+                assert fields[f"faces[{slot}].normals[{j}].{axis}"][row] == expected
+            assert fields[f"faces[{slot}].geometricNormal.{axis}"][row] == np.rint(flat[face, a] * 2047)
+        assert fields[f"faces[{slot}].material"][row] == 0
+
+
+def test_the_box_is_tight(manifest: Manifest) -> None:
+    header = pack(load_mesh("teapot"), manifest).header
+    assert header.bounds_low[0] == 0 and header.bounds_high[0] == 65535
+    assert 0 < header.bounds_low[1] < header.bounds_high[1] < 65535
+
+
+def test_one_triangle_and_a_flat_square(make_manifest: MakeManifest) -> None:
+    for name, count in (("triangle", 1), ("square", 2)):
+        for changes in ({}, {"arity": 2}, {"bvh": False}):
+            manifest = make_manifest(**changes)
+            image = pack(load_mesh(name), manifest)
+            assert image.header.triangles == count
+            assert image.header.record_count == (3 if manifest.bvh else 2)
+
+
+def test_too_many_records_are_refused(make_manifest: MakeManifest) -> None:
+    with pytest.raises(UserError, match=r"teapot needs 7,\d\d\d records, columnBvhMemory.depth is 4,096: raise"):
+        pack(load_mesh("teapot"), make_manifest(depth=4096))
+
+
+def test_too_deep_a_tree_is_refused(make_manifest: MakeManifest) -> None:
+    with pytest.raises(UserError, match=r"teapot needs a stack of \d+ entries.*stackDepth is 8: raise"):
+        pack(load_mesh("teapot"), make_manifest(stack_depth=8))
+    # The exhaustive baseline has no stack.
+    assert pack(load_mesh("teapot"), make_manifest(stack_depth=8, bvh=False)).header.tree is None
+
+
+def test_a_short_stack_gets_a_balanced_tree(make_manifest: MakeManifest) -> None:
+    mesh = load_mesh("teapot")
+    free = pack(mesh, make_manifest(arity=2)).header.tree
+    assert free is not None and free.height_limit == 0
+    tree = pack(mesh, make_manifest(arity=2, stack_depth=free.stack_bound - 1)).header.tree
+    assert tree is not None
+    assert tree.stack_bound < free.stack_bound
+    assert tree.height_limit > 0
+
+
+def test_reports(make_manifest: MakeManifest) -> None:
+    for changes in ({}, {"bvh": False}):
+        manifest = make_manifest(**changes)
+        image = pack(load_mesh("cube"), manifest)
+        use = memory_use(image.header, manifest)["columnBvhMemory"]
+        assert use["nodes"] + use["triangles"] + use["attributes"] == use["records"] == image.header.record_count
+        assert describe(image)["mesh"]["triangles"] == 12
+        assert any("tree" in line for line in report_lines(image.header, manifest))
+
+
+def two_sided(mesh: Mesh) -> Mesh:
+    """Every face once more, turned round."""
+    return clean_mesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[:, ::-1]]), mesh.name)
+
+
+def test_the_other_side_of_a_face_is_the_same_face(manifest: Manifest) -> None:
+    mesh = two_sided(load_mesh("octahedron"))
+    assert (len(mesh.faces), mesh.source_count) == (8, 16)
+    assert pack(mesh, manifest).header.triangles == 8
