@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup render test test-hardware test-host verify bench check lock format clean
+.PHONY: help setup render test test-hardware test-host verify bench check docs lock format clean
 
 venv := .venv/bin
 SCENE ?= scenes/room.toml
@@ -39,6 +39,9 @@ bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where
 check: setup ## formatters, linters, types, locks, golden manifests
 	@tools/check
 
+docs: setup ## the documentation site in out/site; fails on a broken link
+	@tools/docs
+
 lock: setup ## make host/locks, project/dependencies.sha256 and sbom.json again
 	@tools/lock
 
@@ -46,7 +49,7 @@ format: setup ## let the formatters rewrite the sources
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host
 	@$(venv)/ruff format host
-	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain
+	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain tools/site
 
 clean: ## remove everything that was built, fetched or cached
 	@rm -rf .venv .tools .cache out target project/target project/project test_run_dir build host/build
