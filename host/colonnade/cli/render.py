@@ -37,6 +37,12 @@ if TYPE_CHECKING:
 )
 @click.option("--output", type=FILE, metavar="FILE", help="Write the picture, a PNG; with --frames also one .webp.")
 @click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances, an .npz file.")
+@click.option(
+    "--waveform",
+    type=FILE,
+    metavar="FILE",
+    help="Write the signals of the device, its first column and its first render unit, a VCD; for small frames.",
+)
 @json_option
 def render(
     scene: Path,
@@ -50,6 +56,7 @@ def render(
     frames: int | None,
     output: Path | None,
     hits_file: Path | None,
+    waveform: Path | None,
     json_file: Path | None,
 ) -> None:
     """Render one frame of SCENE, a TOML file, and print what it took. With --frames the object or the light moves."""
@@ -62,7 +69,7 @@ def render(
     if frames is not None:
         pictures = picture_files(output, frames) if output is not None else []
         hits_files = numbered(hits_file, frames) if hits_file is not None else []
-    require_outputs(*pictures, *hits_files, json_file)
+    require_outputs(*pictures, *hits_files, waveform, json_file)
 
     from colonnade.common.hits import Hits, write_hits
     from colonnade.common.image_io import encode_srgb, write_png, write_webp
@@ -83,6 +90,7 @@ def render(
         background=background,
         hits=hits_file is not None,
         relit=relit,
+        waveform=waveform,
     )
     results = render_frames(request, progress)
     is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"

@@ -12,6 +12,8 @@ MAX_TEXT = 4096
 MAX_PIXELS = 2 * 4096 * 4096
 #: Frames of one command.
 MAX_FRAMES = 10_000
+#: Pixels of a frame that is written as a waveform; a pixel is some hundred kilobytes of it.
+MAX_WAVEFORM_PIXELS = 4096
 #: Designs of one sweep.
 MAX_DESIGNS = 1_000
 

@@ -33,6 +33,9 @@ VERILATOR_OPTIONS = (
     "--output-split 20000 --output-split-cfuncs 2000 -Wno-fatal"
 ).split()
 
+#: Of a simulator that writes waveforms: records are wider than Verilator would trace.
+WAVEFORM_OPTIONS = ("--trace", "--trace-max-width", "1024", "-CFLAGS", "-DWAVEFORM")
+
 #: Verilator's makefile would compile with -Os, which is a third slower.
 OPTIMISATION = ("-O2",)
 
@@ -61,8 +64,13 @@ def simulator_tools() -> Tools:
     return Tools(verilator, compiler, (verilator_version, compiler_version))
 
 
-def build_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path:
+def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, waveform: bool = False) -> Path:
     """The simulator of a design, as `cache.entry` keeps it.
+
+    Args:
+        design: What is simulated.
+        progress: Shows the build.
+        waveform: It can write waveforms; it is then slower.
 
     Raises:
         UserError: a program is missing, too old, or compiles wrongly.
@@ -73,18 +81,21 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path
     here = Path(__file__).parent
     recipe = [here / "simulator_build.py", here / "simulator_sources.py", *(harness / name for name in _HARNESS)]
     parts = [*tools.versions, *(path.read_text() for path in recipe), design.digest()]
+    parts += ["waveform"] if waveform else []
     key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
     folder = cache_directory(project_root()) / "simulator" / key
 
     def make(place: Path) -> None:
         with progress.step("building the simulator"):
             require_right_compiler(tools.compiler, (*OPTIMISATION, *SAFE))
-            _build(tools, design, harness, place, folder.with_suffix(".log"))
+            _build(tools, design, harness, place, folder.with_suffix(".log"), waveform)
 
     return cache.entry(folder, make, "simulator", progress) / PROGRAM
 
 
-def _build(tools: Tools, design: GeneratedDesign, harness: Path, place: Path, log: Path) -> None:
+def _build(
+    tools: Tools, design: GeneratedDesign, harness: Path, place: Path, log: Path, waveform: bool = False
+) -> None:
     """Put the program into the folder `place`. It is built elsewhere: make cannot work in a path with spaces."""
     with temporary_folder() as work:
         if not _PLAIN_PATH.fullmatch(str(work)):
@@ -94,6 +105,8 @@ def _build(tools: Tools, design: GeneratedDesign, harness: Path, place: Path, lo
         for name in _HARNESS:
             shutil.copy(harness / name, work / name)
         commands = [_verilate(tools, top, [path.relative_to(work) for path in paths]) for top, paths in models.items()]
+        if waveform:
+            commands = [[*command, *WAVEFORM_OPTIONS] for command in commands]
         inner = [top for top in models if top != DEVICE]
         commands[-1] += ["--exe", "-o", PROGRAM, "harness.cpp", "-CFLAGS", " ".join(f"-I../obj_{top}" for top in inner)]
         commands[-1] += ["-CFLAGS", "-I..", "-LDFLAGS", " ".join(f"../obj_{top}/V{top}__ALL.a" for top in inner)]

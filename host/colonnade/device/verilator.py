@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from collections import deque
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from colonnade.common import cache, processes
+from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
 from colonnade.common.framebuffer import Frame
 from colonnade.common.progress import QUIET, Progress, Report
@@ -23,6 +25,9 @@ from colonnade.scene_image.file import SceneImage
 
 #: The state of an array is megabytes that each cycle passes over: with small pages it misses the TLB.
 HUGE_PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
+
+#: The harness's file of signals, in the folder of its job.
+WAVEFORM = "waveform.vcd"
 
 #: One pixel as the harness writes it (``struct PixelBytes``).
 PIXEL = np.dtype(
@@ -88,6 +93,7 @@ def render_rtl(
     stalls: Stalls | None = None,
     progress: Progress = QUIET,
     through_port: bool = False,
+    waveform: Path | None = None,
 ) -> Simulated:
     """Renders frames, one for each set of registers; the image is loaded once.
 
@@ -98,6 +104,7 @@ def render_rtl(
         stalls: disturbances.
         progress: shows the steps.
         through_port: the records take the hardware's load port, cycle by cycle, and not the harness's short cut.
+        waveform: a file for the signals of the device, its first column and that column's first render unit, as VCD.
 
     Raises:
         UserError: the stalls hold banks, and the design has no input for that.
@@ -106,16 +113,21 @@ def render_rtl(
     stalls = stalls or Stalls()
     if stalls.memory_percent and not is_holdable(design.manifest):
         raise UserError("this configuration's memory cannot be held: set columnBvhMemory.holdable=true for such stalls")
-    program = build_simulator(design, progress)
+    program = build_simulator(design, progress, waveform=True) if waveform else build_simulator(design, progress)
     with temporary_folder() as place:
         job, outputs = write_job(place, design.manifest, image, registers, through_port)
         try:
             with progress.step("rendering in the simulator") as report:
-                lines = run_program([str(program), *stalls.options, job.name], place, report)
-            return _collect(design.manifest, registers, outputs, lines)
+                options = [*stalls.options, *(["--waveform", WAVEFORM] if waveform else [])]
+                lines = run_program([str(program), *options, job.name], place, report)
+            simulated = _collect(design.manifest, registers, outputs, lines)
         except RuntimeError:
             cache.discard(program.parent)
             raise
+        if waveform is not None:
+            with replacing(waveform) as stream, (place / WAVEFORM).open("rb") as written:
+                shutil.copyfileobj(written, stream)
+        return simulated
 
 
 def write_job(

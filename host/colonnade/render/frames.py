@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.framebuffer import Frame
+from colonnade.common.limits import MAX_WAVEFORM_PIXELS
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
@@ -52,6 +54,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     width, height = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size((width, height), manifest)
+    if request.waveform is not None:
+        _check_waveform(request, (width, height))
     poses = [scene.at(share) for share in scene.motion.shares(request.frames)]
     if request.backend == "reference":
         from colonnade.render.reference_frames import reference_frames
@@ -76,7 +80,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     packed = time.perf_counter() - begun
     seen = None if environment is None else environment.environment
     if request.backend == "rtl":
-        rendered = _rtl_frames(design_for(request.config, request.overrides, progress), image, registers, progress)
+        design = design_for(request.config, request.overrides, progress)
+        rendered = _rtl_frames(design, image, registers, progress, request.waveform)
     else:
         rendered = _model_frames(manifest, image, registers, progress)
     for pose, (frame, seconds, rate) in zip(poses, rendered, strict=True):
@@ -95,21 +100,38 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         yield result
 
 
+def _check_waveform(request: RenderRequest, size: tuple[int, int]) -> None:
+    """Refuse a waveform of what has no signals, or of so much that it would fill the disk."""
+    if request.backend != "rtl":
+        raise UserError(f"the {request.backend} backend has no signals: use --backend rtl for --waveform")
+    if request.frames != 1:
+        raise UserError("a waveform shows one frame: leave out --frames or --waveform")
+    if size[0] * size[1] > MAX_WAVEFORM_PIXELS:
+        raise UserError(
+            f"a waveform of {size[0]}x{size[1]} pixels would fill the disk: "
+            f"use a --size of at most {MAX_WAVEFORM_PIXELS:,} pixels, e.g. 8x8"
+        )
+
+
 #: A frame, the seconds it took by step, and the cycles that the RTL simulated a second.
 Rendered = tuple[Frame, dict[str, float], float | None]
 
 
 def _rtl_frames(
-    design: GeneratedDesign, image: SceneImage, registers: list[dict[str, int]], progress: Progress
+    design: GeneratedDesign,
+    image: SceneImage,
+    registers: list[dict[str, int]],
+    progress: Progress,
+    waveform: Path | None = None,
 ) -> Iterator[Rendered]:
     """All frames of one run; each has its part of the seconds."""
     from colonnade.device.simulator_build import build_simulator
     from colonnade.device.verilator import render_rtl
 
     begun = time.perf_counter()
-    build_simulator(design, progress)
+    build_simulator(design, progress, waveform=waveform is not None)
     built = time.perf_counter()
-    simulated = render_rtl(design, image, list(registers), progress=progress)
+    simulated = render_rtl(design, image, list(registers), progress=progress, waveform=waveform)
     run = (time.perf_counter() - built) / len(registers)
     for frame in simulated.frames:
         yield frame, {"build": built - begun, "run": run}, simulated.cycles_per_second

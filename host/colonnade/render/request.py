@@ -26,6 +26,7 @@ class RenderRequest:
         background: The folder of a room, in place of the scene's background.
         hits: The hit triangles are wanted: the hardware must be configured to deliver them.
         relit: Show the room in the scene's lights even if there is a photo of it.
+        waveform: A VCD file for the hardware's signals during the frame; of the RTL, one small frame.
     """
 
     scene: Path
@@ -38,3 +39,4 @@ class RenderRequest:
     background: Path | None = None
     hits: bool = False
     relit: bool = False
+    waveform: Path | None = None

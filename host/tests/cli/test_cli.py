@@ -106,6 +106,22 @@ def test_frame_too_large_names_the_limit(object_scene: Path, size: str) -> None:
     assert "frame.max" in line
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--backend", "model"), "the model backend has no signals"),
+        (("--frames", 2), "a waveform shows one frame"),
+        (("--size", "64x65"), "of at most 4,096 pixels"),
+    ],
+)
+def test_waveform_of_anything_but_a_small_hardware_frame_is_refused(
+    object_scene: Path, tmp_path: Path, arguments: tuple[object, ...], words: str
+) -> None:
+    waveform = ("--size", "8x8", "--waveform", tmp_path / "w.vcd")
+    assert words in refused(run("render", object_scene, "--config", "tiny", *waveform, *arguments))
+    assert not (tmp_path / "w.vcd").exists()
+
+
 @pytest.mark.parametrize("output", ["", "none/f.png"])
 def test_output_that_cannot_be_written_is_refused_before_rendering(tmp_path: Path, output: str) -> None:
     refused(run("render", "s.toml", "--output", tmp_path / output))

@@ -14,6 +14,9 @@
 #include "VColumn___024root.h"
 #include "VRenderUnitModel.h"
 #include "coupling.hpp"
+#ifdef WAVEFORM
+#include "verilated_vcd_c.h"
+#endif
 
 /// Assignments for each port of a kind between `variables` of the outer model and the ports of the `inner` one.
 #define INWARD(port) inner.port = *variables.port;
@@ -124,6 +127,21 @@ public:
             RenderUnit_REGISTERS(REQUIRE_EQUAL)
         }
     }
+
+#ifdef WAVEFORM
+    /// Adds the device, its first column and that column's first unit to a waveform that is not yet open.
+    void addTo(VerilatedVcdC& waveform) {
+        device.trace(&waveform, 99);
+        columns_.front()->trace(&waveform, 99);
+        units_.front()->trace(&waveform, 99);
+    }
+
+    /// Evaluates again what `addTo` adds: after `settle`, some of its inputs are newer than its other signals.
+    void settleTraced() {
+        columns_.front()->eval();
+        units_.front()->eval();
+    }
+#endif
 
 private:
     void intoColumns() {

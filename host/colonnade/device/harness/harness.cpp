@@ -10,7 +10,8 @@
 //
 // Options: --stall PERCENT (of the cycles in which the pixel sink does not take pixels), --seed N; where the memory can
 // be held: --memory PERCENT (of a frame's cycles in which each bank is held), --burst N (longest hold, cycles);
-// --check N: checks the coupling of the models (array.hpp) in each Nth cycle.
+// --check N: checks the coupling of the models (array.hpp) in each Nth cycle. Where compiled with WAVEFORM:
+// --waveform FILE: the signals of the frames' cycles, as VCD; a unit of its time is a cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 when the hardware misbehaves.
 #include <algorithm>
 #include <chrono>
@@ -56,6 +57,7 @@ constexpr std::uint64_t freePeriods = 840;
 
 struct Options {
     unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32, checkInterval = 64;
+    std::string waveform;
 };
 
 #ifdef MEMORY_BANKS
@@ -100,6 +102,16 @@ public:
     {
 #ifndef MEMORY_BANKS
         if (options.memoryPercent != 0) throw std::runtime_error("this hardware's memory cannot be held");
+#endif
+#ifdef WAVEFORM
+        if (!options.waveform.empty()) {
+            Verilated::traceEverOn(true);
+            array_.addTo(waveform_);
+            waveform_.open(options.waveform.c_str());
+            if (!waveform_.isOpen()) throw std::runtime_error("the waveform cannot be written");
+        }
+#else
+        if (!options.waveform.empty()) throw std::runtime_error("this simulator writes no waveforms");
 #endif
         top_.reset = 1;
         for (int i = 0; i < 8; ++i) cycle();
@@ -165,6 +177,7 @@ public:
         pixels_.assign(width * height, {});
         width_ = width;
         received_ = 0;
+        isTraced_ = true;
         write(startAddress, 1);
         const auto begun = std::chrono::steady_clock::now();
         const std::uint64_t first = cycles_;
@@ -186,6 +199,9 @@ public:
         std::memset(&top_.io_memoryHolds, 0, sizeof top_.io_memoryHolds);
 #endif
         mayChangeRegisters_ = true;
+        // The cycle in which `done` is up belongs to the waveform
+        if (traces()) cycle();
+        isTraced_ = false;
         const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
         std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(pixels_.data()), static_cast<std::streamsize>(pixels_.size() * sizeof(PixelBytes)));
         std::cout << "simulated " << cycles_ - first << ' ' << seconds.count() << '\n';
@@ -228,8 +244,23 @@ private:
         EACH_COLUMN(TAKE)
 #undef TAKE
         if (cycles_ % checkInterval_ == 0) array_.check();
+#ifdef WAVEFORM
+        if (traces()) {
+            array_.settleTraced();
+            waveform_.dump(cycles_);
+        }
+#endif
         array_.edge(mayChangeRegisters_);
         ++cycles_;
+    }
+
+    /// The cycle goes into the waveform.
+    bool traces() const {
+#ifdef WAVEFORM
+        return isTraced_ && waveform_.isOpen();
+#else
+        return false;
+#endif
     }
 
     PixelBytes& at(std::size_t x, std::size_t y) {
@@ -246,7 +277,10 @@ private:
     VColonnade& top_ = array_.device;
     std::mt19937 random_;
     unsigned stallPercent_, checkInterval_;
-    bool mayChangeRegisters_ = true;
+    bool mayChangeRegisters_ = true, isTraced_ = false;
+#ifdef WAVEFORM
+    VerilatedVcdC waveform_;
+#endif
 #ifdef MEMORY_BANKS
     BankHolds holds_;
 #endif
@@ -290,7 +324,8 @@ int main(int argc, char** argv) try {
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });
-        if (option == std::end(named)) job = argument;
+        if (argument == "--waveform" && i + 1 < argc) options.waveform = argv[++i];
+        else if (option == std::end(named)) job = argument;
         else if (++i < argc) *option->second = static_cast<unsigned>(std::stoul(argv[i]));
         else throw std::runtime_error(argument + " without a number");
     }
