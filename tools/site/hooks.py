@@ -28,6 +28,7 @@ _log = logging.getLogger("mkdocs.hooks.colonnade")
 _ROOT_PAGES = {
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
     "SECURITY.md": "security.md",
 }
 _SCALADOC = "scala"
