@@ -1,4 +1,4 @@
-"""The device's march through a rebuilt room, as a `Rebuild`: bit for bit what the hardware's numbers make of a ray."""
+"""The device's march through a rebuilt room, as a `RayMarch`: bit for bit what the hardware's numbers make of a ray."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import field_places
 from colonnade.environment.encoding.image import memory_words
-from colonnade.reference.environment.ray_march import HIDDEN, HIT, LEFT, LOST, Rebuilt
+from colonnade.reference.environment.ray_march import HIDDEN, HIT, LEFT_VIEW, LOST, MarchHits
 from colonnade.registers.environment import projection_of, view_registers
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class DeviceMarch:
         self._registers = {name.removeprefix("room."): value for name, value in registers.items()}
         self._registers["shellPlanes"] = int(image.planes.shell.any(axis=1).sum())
 
-    def __call__(self, origins: Floats, directions: Floats) -> Rebuilt:
+    def __call__(self, origins: Floats, directions: Floats) -> MarchHits:
         """Where rays of view space, float64 [n, 3] each, metres, meet the room."""
         environment, grid = self._environment, 2.0**GRID_LOG
         starts = np.rint(origins * grid).astype(np.int64)
@@ -53,11 +53,11 @@ class DeviceMarch:
         met = self._model.march(self._registers, np.ascontiguousarray(starts), np.ascontiguousarray(ways))
         points = (starts + met["travel"][:, None] * ways) / grid
         kind = np.where(met["kind"] == _MAP, np.where(met["is_hidden"], HIDDEN, HIT), LOST)
-        kind = np.where(met["kind"] == _SHELL, LEFT, kind)
+        kind = np.where(met["kind"] == _SHELL, LEFT_VIEW, kind)
         z = points[:, 2]
         seen_u, seen_v = met["x"] + 0.5, met["y"] + 0.5
         is_ahead = ((kind == HIT) | (kind == HIDDEN)) & (z > 0)
         depth = np.where(is_ahead, z, 1.0)
         u = np.where(is_ahead, points[:, 0] / depth * environment.fx + environment.cx, seen_u)
         v = np.where(is_ahead, points[:, 1] / depth * environment.fy + environment.cy, seen_v)
-        return Rebuilt(u, v, z, seen_u, seen_v, kind.astype(np.int64), met["steps"])
+        return MarchHits(u, v, z, seen_u, seen_v, kind.astype(np.int64), met["steps"])

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Mesh
-    from colonnade.reference.environment.ray_march import Rebuild
+    from colonnade.reference.environment.ray_march import RayMarch
     from colonnade.scene.view import View
 
 #: Differences by part of the picture: frame, object, shadow.
@@ -57,7 +57,7 @@ def losses(
     view: View,
     environment: Environment,
     image: AttributeImage,
-    rebuild: Rebuild,
+    rebuild: RayMarch,
     device: Floats | None = None,
     with_dists: bool = True,
     progress: Progress = QUIET,
@@ -168,7 +168,7 @@ def study_frames(
     from colonnade.environment.encoding.layout import AttributeLayout
     from colonnade.environment.load import load_environment
     from colonnade.mesh.load import load_mesh
-    from colonnade.reference.environment.decoded import plane_march
+    from colonnade.reference.environment.decoded import float_plane_march
     from colonnade.scene.view import make_view
 
     by_frame = {}
@@ -179,7 +179,7 @@ def study_frames(
         image = encoded_environment(environment, layout)
         hardware = f"physicalAttributeMemory={json.dumps(layout.to_config())}"
         manifest = manifest_for("small", (hardware,), progress).manifest
-        march = plane_march(environment, image)
+        march = float_plane_march(environment, image)
         for name, (mesh_name, material) in OBJECTS.items():
             mesh = meshes[mesh_name]
             scene = standing_scene(mesh_name, material, environment, STANDING.get(environment.name, Placement()))

@@ -32,11 +32,11 @@ from colonnade.evaluation.studies.probe_spheres import (
 )
 from colonnade.quality.image_metrics import flip_map, psnr
 from colonnade.reference.environment.depth_mesh import DepthMesh
-from colonnade.reference.environment.ray_march import HIDDEN, HIT, DepthMarch, Rebuild, Rebuilt, positions
+from colonnade.reference.environment.ray_march import HIDDEN, HIT, DepthMarch, MarchHits, RayMarch, positions
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.reference.environment.surface import Meetings
+    from colonnade.reference.environment.surface import SurfaceHits
 
 
 NEAR_PIXELS = 5.0
@@ -98,9 +98,9 @@ class _Answers:
     """Rays with the truth and what the rebuild says."""
 
     rays: Rays
-    truth: Meetings
+    truth: SurfaceHits
     nothing: NDArray[np.bool_]
-    rebuilt: Rebuilt
+    rebuilt: MarchHits
     ok: NDArray[np.bool_]
 
     @property
@@ -108,7 +108,7 @@ class _Answers:
         return _found(self.rebuilt)
 
 
-def study(environment: Environment, rebuild: Rebuild, depth: Floats | None = None, seed: int = 1) -> RebuildReport:
+def study(environment: Environment, rebuild: RayMarch, depth: Floats | None = None, seed: int = 1) -> RebuildReport:
     """Measure a rebuild.
 
     Args:
@@ -143,15 +143,15 @@ def study(environment: Environment, rebuild: Rebuild, depth: Floats | None = Non
     )
 
 
-def _asked(environment: Environment, mesh: DepthMesh, rebuild: Rebuild, rays: Rays) -> _Answers:
-    truth = mesh.meet(rays.origins, rays.directions)
+def _asked(environment: Environment, mesh: DepthMesh, rebuild: RayMarch, rays: Rays) -> _Answers:
+    truth = mesh.intersect(rays.origins, rays.directions)
     rebuilt = rebuild(rays.origins, rays.directions)
     near = np.hypot(rebuilt.seen_u - truth.u, rebuilt.seen_v - truth.v) <= NEAR_PIXELS
     near |= np.linalg.norm(positions(environment, rebuilt) - truth.position, axis=1) <= NEAR_METRES
     return _Answers(rays, truth, np.isnan(truth.u), rebuilt, near & _found(rebuilt) & ~truth.outside)
 
 
-def _found(rebuilt: Rebuilt) -> NDArray[np.bool_]:
+def _found(rebuilt: MarchHits) -> NDArray[np.bool_]:
     return np.asarray((rebuilt.kind == HIT) | (rebuilt.kind == HIDDEN), dtype=np.bool_)
 
 
@@ -236,7 +236,7 @@ def study_rooms(folders: Iterable[Path]) -> dict[str, RebuildReport]:
     from colonnade.environment.encoding.cache import encoded_environment
     from colonnade.environment.encoding.layout import AttributeLayout
     from colonnade.environment.load import load_environment
-    from colonnade.reference.environment.decoded import plane_march, rebuilt_depth
+    from colonnade.reference.environment.decoded import decoded_depth, float_plane_march
 
     reports = {}
     for folder in folders:
@@ -246,9 +246,9 @@ def study_rooms(folders: Iterable[Path]) -> dict[str, RebuildReport]:
         manifest = manifest_for("small", (f"physicalAttributeMemory={json.dumps(layout.to_config())}",)).manifest
         reports[f"{environment.name}, full maps"] = study(environment, DepthMarch(environment), environment.depth)
         reports[f"{environment.name}, planes"] = study(
-            environment, plane_march(environment, image), rebuilt_depth(environment, image)
+            environment, float_plane_march(environment, image), decoded_depth(environment, image)
         )
         reports[f"{environment.name}, device"] = study(
-            environment, DeviceMarch(environment, image, manifest), rebuilt_depth(environment, image)
+            environment, DeviceMarch(environment, image, manifest), decoded_depth(environment, image)
         )
     return reports
