@@ -3,7 +3,7 @@ package colonnade.column
 import chisel3._
 import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.{AttributePort, ColumnRoom}
+import colonnade.environment.{AttributePort, ColumnEnvironment}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{
   BackgroundWalker,
@@ -83,8 +83,8 @@ final class Column(
   memory.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
 
   // Environment: units read the column's own maps, or those that all columns share
-  private val room = config.physicalAttributeMemory.map(_ => Module(new ColumnRoom(config)).io)
-  for (maps <- room) {
+  private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(config)).io)
+  for (maps <- environment) {
     maps.load := io.load
     maps.shared.zip(io.room).foreach { case (shared, port) => port <> shared }
     maps.ports.zip(units.flatMap(_.maps)).foreach { case (port, unit) => port <> unit }
@@ -116,6 +116,6 @@ final class Column(
     enters,
     units.map(_.events),
     controller.io.events,
-    room.map(_.events)
+    environment.map(_.events)
   ))
 }

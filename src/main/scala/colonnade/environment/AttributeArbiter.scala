@@ -5,45 +5,46 @@ import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, Pipe, Queue}
 import colonnade.common.RoundRobin
 
 /** Ports of [[AttributeArbiter]]. */
-final class AttributeArbiterIO[Q <: Data, A <: Data](question: Q, answer: A, count: Int, tagBits: Int) extends Bundle {
-  val requesters = Vec(count, Flipped(new AttributeChannel(question, answer, tagBits)))
+final class AttributeArbiterIO[Q <: Data, R <: Data](request: Q, response: R, count: Int, tagBits: Int) extends Bundle {
+  val requesters = Vec(count, Flipped(new AttributeChannel(request, response, tagBits)))
 
   /** A tag here is a requester's number above its own tag. */
-  val served = new AttributeChannel(question, answer, AttributeArbiter.tagBits(count, tagBits))
+  val joined = new AttributeChannel(request, response, AttributeArbiter.tagBits(count, tagBits))
 }
 
-/** Joins the channels of several requesters, in turn; an answer goes to all and is valid for the one that asked.
+/** Joins the channels of several requesters by round-robin. A response goes to all of them and is valid for the requester
+  * that its tag names.
   *
-  * One question a cycle. Questions and answers pass a register each, so that arbiters make trees of any size.
+  * One request a cycle. Requests and responses pass one register each, so that arbiters can form trees of any size.
   */
-final class AttributeArbiter[Q <: Data, A <: Data](question: Q, answer: A, count: Int, tagBits: Int) extends Module {
-  val io = IO(new AttributeArbiterIO(question, answer, count, tagBits))
+final class AttributeArbiter[Q <: Data, R <: Data](request: Q, response: R, count: Int, tagBits: Int) extends Module {
+  val io = IO(new AttributeArbiterIO(request, response, count, tagBits))
 
-  // Choose a requester
-  private val turn   = Module(new RoundRobin(count))
-  private val asking = io.requesters.map(_.question)
-  private val chosen = Wire(Decoupled(chiselTypeOf(io.served.question.bits)))
-  private val asked  = Mux1H(turn.io.grant, asking.map(_.bits))
-  turn.io.requests    := VecInit(asking.map(_.valid)).asUInt
-  turn.io.isTaken     := chosen.fire
-  chosen.valid        := asking.map(_.valid).reduce(_ || _)
-  chosen.bits.content := asked.content
-  chosen.bits.tag     := (if (count == 1) asked.tag else OHToUInt(turn.io.grant) ## asked.tag)
-  io.served.question <> Queue(chosen)
-  asking.zip(turn.io.grant.asBools).foreach { case (question, isGranted) =>
-    question.ready := isGranted && chosen.ready
+  // Grant a requester
+  private val arbiter = Module(new RoundRobin(count))
+  private val reqs    = io.requesters.map(_.req)
+  private val granted = Wire(Decoupled(chiselTypeOf(io.joined.req.bits)))
+  private val bits    = Mux1H(arbiter.io.grant, reqs.map(_.bits))
+  arbiter.io.requests  := VecInit(reqs.map(_.valid)).asUInt
+  arbiter.io.isTaken   := granted.fire
+  granted.valid        := reqs.map(_.valid).reduce(_ || _)
+  granted.bits.content := bits.content
+  granted.bits.tag     := (if (count == 1) bits.tag else OHToUInt(arbiter.io.grant) ## bits.tag)
+  io.joined.req <> Queue(granted)
+  reqs.zip(arbiter.io.grant.asBools).foreach { case (req, isGranted) =>
+    req.ready := isGranted && granted.ready
   }
 
-  // Show the answer to everybody
-  private val shown = Pipe(io.served.answer)
+  // Broadcast the response
+  private val broadcast = Pipe(io.joined.resp)
   for ((requester, number) <- io.requesters.zipWithIndex) {
-    requester.answer.valid := shown.valid && shown.bits.tag >> tagBits === number.U
-    requester.answer.bits  := shown.bits
+    requester.resp.valid := broadcast.valid && broadcast.bits.tag >> tagBits === number.U
+    requester.resp.bits  := broadcast.bits
   }
 }
 
 object AttributeArbiter {
 
-  /** Of the joined channel. */
+  /** Bits of the joined channel's tag. */
   def tagBits(requesters: Int, tagBits: Int): Int = tagBits + log2Ceil(requesters)
 }

@@ -8,10 +8,10 @@ final class AttributeConcentratorIO(config: ColonnadeConfig, requesters: Int, ta
   private val layout = AttributeLayout.of(config)
 
   val ports  = Vec(requesters, Flipped(new AttributePort(layout, tagBits)))
-  val served = new AttributePort(layout, AttributeArbiter.tagBits(requesters, tagBits))
+  val joined = new AttributePort(layout, AttributeArbiter.tagBits(requesters, tagBits))
 }
 
-/** Makes one port of several: an [[AttributeArbiter]] for each channel. */
+/** Joins several ports into one, with an [[AttributeArbiter]] for each channel. */
 final class AttributeConcentrator(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Module {
   val io = IO(new AttributeConcentratorIO(config, requesters, tagBits))
 
@@ -20,17 +20,17 @@ final class AttributeConcentrator(config: ColonnadeConfig, requesters: Int, tagB
   join(_.cells)
   join(_.planes)
 
-  private def join[Q <: Data, A <: Data](channel: AttributePort => AttributeChannel[Q, A]): Unit = {
-    val served  = channel(io.served)
+  private def join[Q <: Data, R <: Data](channel: AttributePort => AttributeChannel[Q, R]): Unit = {
+    val joined  = channel(io.joined)
     val arbiter = Module(
       new AttributeArbiter(
-        chiselTypeOf(served.question.bits.content),
-        chiselTypeOf(served.answer.bits.content),
+        chiselTypeOf(joined.req.bits.content),
+        chiselTypeOf(joined.resp.bits.content),
         requesters,
         tagBits
       )
     )
     arbiter.io.requesters.zip(io.ports).foreach { case (requester, port) => requester <> channel(port) }
-    served <> arbiter.io.served
+    joined <> arbiter.io.joined
   }
 }

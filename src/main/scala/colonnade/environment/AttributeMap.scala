@@ -11,14 +11,14 @@ final class AttributeMapIO[T <: Data](config: ColonnadeConfig, entry: T, tagBits
   val pixels = Flipped(new AttributeChannel(new MapPixel(AttributeLayout.of(config)), entry, tagBits))
 }
 
-/** A map that knows an entry (a colour or a normal) for each pixel, in one of the encodings. */
+/** A map with an entry (a colour or a normal) for each pixel, in one of the encodings. */
 abstract class AttributeMap[T <: Data](config: ColonnadeConfig, entry: T, tagBits: Int) extends Module {
   final val io = IO(new AttributeMapIO(config, entry, tagBits))
 }
 
 object AttributeMap {
 
-  /** In the configured encoding.
+  /** A map in the configured encoding.
     *
     * @param name of the map in [[colonnade.formats.AttributeMemories]]
     */

@@ -12,12 +12,12 @@ final class AttributeStoreIO(config: ColonnadeConfig, memory: AttributeMemory) e
   val load = Flipped(Valid(new Load(config)))
   val read = Flipped(Valid(UInt(log2Ceil(memory.depth).W)))
 
-  /** What was read in the cycle before. */
+  /** The word that was read in the cycle before. */
   val word = Output(UInt(memory.bits.W))
 }
 
-/** One of the [[AttributeMemories]]. It has a single port, for reads and loads exclude each other. A load beyond its depth
-  * is dropped.
+/** One of the [[AttributeMemories]]. It has a single port, since reads and loads exclude each other. A load beyond its
+  * depth is ignored.
   */
 final class AttributeStore(config: ColonnadeConfig, memory: AttributeMemory) extends Module {
   val io = IO(new AttributeStoreIO(config, memory))
@@ -27,12 +27,12 @@ final class AttributeStore(config: ColonnadeConfig, memory: AttributeMemory) ext
   private val writes = loads && io.load.bits.address < memory.depth.U
   assert(!(loads && io.read.valid), "a load during a read")
 
-  private val place   = io.load.bits.address(log2Ceil(memory.depth) - 1, 0)
-  private val address = Mux(loads, place, io.read.bits)
+  private val target  = io.load.bits.address(log2Ceil(memory.depth) - 1, 0)
+  private val address = Mux(loads, target, io.read.bits)
   io.word := words.readWrite(address, io.load.bits.record(memory.bits - 1, 0), writes || io.read.valid, writes)
 }
 
-/** A store whose words tiles point to, from anywhere. A word beyond its end is 0.
+/** A store that tiles point into, with arbitrary pointers. A word beyond its end is 0.
   *
   * @param name of the memory
   */
@@ -41,11 +41,11 @@ final class AttributeHeap(config: ColonnadeConfig, name: String, load: Valid[Loa
   private val depth    = AttributeStore.memory(config, name).depth
   private val isBeyond = Wire(Bool())
 
-  /** What was read in the cycle before; and whether that lies beyond the end, which no legal tile's words do. */
+  /** The word that was read in the cycle before, and whether it lies beyond the end, which makes its tile illegal. */
   val isIllegal: Bool = RegNext(isBeyond, false.B)
   val word:      UInt = Mux(isIllegal, 0.U, store.word)
 
-  /** To be called once. */
+  /** Connects the read port; call it once. */
   def read(valid: Bool, address: UInt): Unit = {
     store.read.valid := valid
     store.read.bits  := address.pad(store.read.bits.getWidth)(store.read.bits.getWidth - 1, 0)
@@ -59,7 +59,7 @@ object AttributeStore {
   def memory(config: ColonnadeConfig, name: String): AttributeMemory =
     AttributeMemories(config).find(_.name == name).getOrElse(throw new NoSuchElementException(name))
 
-  /** The one of the given name, which loads fill. */
+  /** A store for the memory of the given name. */
   def apply(config: ColonnadeConfig, name: String, load: Valid[Load]): AttributeStoreIO = {
     val store = Module(new AttributeStore(config, memory(config, name)))
     store.suggestName(name.replace('.', '_'))

@@ -5,100 +5,100 @@ import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{AlbedoEntry, AttributeEvents, NormalEntry, ShellEntry}
 
-/** A question, and the word by which its requester knows the answer. */
-final class Tagged[T <: Data](private val kind: T, tagBits: Int) extends Bundle {
+/** A request with a tag, which its response carries as well. */
+final class TaggedRequest[T <: Data](private val kind: T, tagBits: Int) extends Bundle {
   val content = kind.cloneType
   val tag     = UInt(tagBits.W)
 }
 
-/** An answer, and the word by which its requester knows it. */
-final class Answered[T <: Data](private val kind: T, tagBits: Int) extends Bundle {
+/** A response with the tag of its request. */
+final class TaggedResponse[T <: Data](private val kind: T, tagBits: Int) extends Bundle {
 
-  /** A word was read beyond the map's heap; the answer is what words of 0 make of it. */
+  /** A word beyond the map's heap was read as 0. */
   val isIllegal = Bool()
   val content   = kind.cloneType
   val tag       = UInt(tagBits.W)
 }
 
-/** Questions to a map and its answers, seen by who asks. Answers come in the order of questions, at any time after them,
-  * and are always taken.
+/** Requests to a map and its responses, from the requester's side. Responses come in the order of the requests, at any
+  * time after them, and cannot be stalled.
   */
-final class AttributeChannel[Q <: Data, A <: Data](private val asked: Q, private val found: A, tagBits: Int)
+final class AttributeChannel[Q <: Data, R <: Data](private val request: Q, private val response: R, tagBits: Int)
     extends Bundle {
-  val question = Decoupled(new Tagged(asked, tagBits))
-  val answer   = Flipped(Valid(new Answered(found, tagBits)))
+  val req  = Decoupled(new TaggedRequest(request, tagBits))
+  val resp = Flipped(Valid(new TaggedResponse(response, tagBits)))
 }
 
-/** A pixel of the maps; whoever asks keeps it inside them. */
+/** A pixel of the maps. A requester must keep it inside them. */
 final class MapPixel(layout: AttributeLayout) extends Bundle {
   val x = UInt(layout.xBits.W)
   val y = UInt(layout.yBits.W)
 }
 
-/** Which planes? */
-final class CellQuestion(layout: AttributeLayout) extends Bundle {
+/** Requests the planes of a tile or a cell. */
+final class CellRequest(layout: AttributeLayout) extends Bundle {
   val pixel = new MapPixel(layout)
 
-  /** All planes of the pixel's tile; or else the one of its cell. */
+  /** All planes of the pixel's tile; otherwise the plane of its cell. */
   val wholeTile = Bool()
 }
 
-/** The planes of a tile, or that of a cell. */
-final class CellAnswer(layout: AttributeLayout) extends Bundle {
+/** The planes of a tile, or the plane of a cell. */
+final class CellResponse(layout: AttributeLayout) extends Bundle {
 
   /** Log2 of the edge of the tile's cells in pixels; a flat tile is one cell. */
-  val cellLog = UInt(CellAnswer.cellLogBits.W)
+  val cellLog = UInt(CellResponse.cellLogBits.W)
 
-  /** 1, 2 or 4; of a cell 1. */
+  /** Planes: 1, 2 or 4 of a tile, 1 of a cell. */
   val count = UInt(3.W)
 
-  /** Beyond the count 0. */
+  /** The planes; 0 beyond the count. */
   val ids = Vec(4, UInt(layout.planeIdBits.W))
 }
 
-object CellAnswer {
+object CellResponse {
 
   /** A tile's edge is 2^5 at most. */
   val cellLogBits: Int = 3
 }
 
-/** An entry of the plane table or of the shell. */
-final class PlaneQuestion(layout: AttributeLayout) extends Bundle {
-  val isShell = Bool()
-  val index   = UInt(layout.tableIndexBits.W)
+/** Requests an entry of the plane table, or a bounding plane. */
+final class PlaneRequest(layout: AttributeLayout) extends Bundle {
+  val isBoundingPlane = Bool()
+  val index           = UInt(layout.tableIndexBits.W)
 }
 
-/** All that a requester may ask. The channels are independent of each other; albedo and normal of a plane's answer say
-  * something only of a shell entry.
+/** All channels of a requester; they are independent of each other. Albedo and normal of a plane's response are valid for
+  * bounding planes only.
   */
 final class AttributePort(layout: AttributeLayout, tagBits: Int) extends Bundle {
   val albedo  = new AttributeChannel(new MapPixel(layout), new AlbedoEntry, tagBits)
   val normals = new AttributeChannel(new MapPixel(layout), new NormalEntry, tagBits)
-  val cells   = new AttributeChannel(new CellQuestion(layout), new CellAnswer(layout), tagBits)
-  val planes  = new AttributeChannel(new PlaneQuestion(layout), new ShellEntry, tagBits)
+  val cells   = new AttributeChannel(new CellRequest(layout), new CellResponse(layout), tagBits)
+  val planes  = new AttributeChannel(new PlaneRequest(layout), new ShellEntry, tagBits)
 
-  /** Questions accepted in this cycle. */
+  /** Requests accepted in this cycle. */
   def events: AttributeEvents = {
     val events = Wire(new AttributeEvents)
-    events.albedoReads := albedo.question.fire
-    events.normalReads := normals.question.fire
-    events.cellReads   := cells.question.fire
-    events.planeReads  := planes.question.fire
+    events.albedoReads := albedo.req.fire
+    events.normalReads := normals.req.fire
+    events.cellReads   := cells.req.fire
+    events.planeReads  := planes.req.fire
     events
   }
 
-  /** For a port without a requester. */
-  def asksNothing(): Unit = {
+  /** Ties off a port without a requester. */
+  def tieOff(): Unit = {
     Seq(albedo, normals, cells, planes).foreach { channel =>
-      channel.question.valid := false.B
-      channel.question.bits  := DontCare
+      channel.req.valid := false.B
+      channel.req.bits  := DontCare
     }
   }
 }
 
 object AttributePort {
 
-  /** A render unit's tag is the number of a context. */
+  /** Bits of a render unit's tag, which is a context. */
   def tagBits(config: ColonnadeConfig): Int = log2Ceil(config.array.contexts.max(2))
 
   /** The port of a column, for all of its render units. */

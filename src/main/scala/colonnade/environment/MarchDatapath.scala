@@ -1,172 +1,121 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.Cat
+import chisel3.util.{Cat, Valid}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.Plane
-import colonnade.numbers.{Divider, Normalise, Rounding}
+import colonnade.numbers.{Divider, Division, Normalise, Rounding}
 
-/** A plane along a ray: how far the ray is in front of it, value + slope · s, in steps of 2^(exponent − 22). */
-final class PlaneDepth(formats: MarchFormats) extends Bundle {
-  val id       = UInt(formats.layout.planeIdBits.W)
-  val value    = SInt(formats.valueBits.W)
-  val slope    = SInt(formats.slopeBits.W)
-  val exponent = UInt((new Plane).exponent.getWidth.W)
+/** Operands of the march's multiplier. */
+final class MarchFactors(formats: MarchFormats) extends Bundle {
+  val wide   = SInt(formats.wideBits.W)
+  val narrow = SInt(formats.narrowBits.W)
 }
 
-/** What the parts of the march's program share: one multiplier, the sum behind it, a smaller adder, one shifter and one
-  * divider. A product of one step is there to add in the next, its sum in the one after.
-  */
-final class MarchDatapath(config: ColonnadeConfig, val program: Microprogram) {
-  val formats = new MarchFormats(config)
+/** Operands of an adder: base + addend or base - addend. */
+final class MarchAddition(bits: Int) extends Bundle {
+  val base     = SInt(bits.W)
+  val addend   = SInt(bits.W)
+  val subtract = Bool()
+
+  def result: SInt =
+    Rounding.narrow(
+      base + (addend ^ Mux(subtract, (-1).S(bits.W), 0.S(bits.W))) + Cat(0.U(1.W), subtract).asSInt,
+      bits
+    )
+}
+
+/** Ports of [[MarchDatapath]]. */
+final class MarchDatapathIO(formats: MarchFormats) extends Bundle {
   import formats._
 
-  // The ray
-  /** Its direction, as long as f bits hold. */
-  val heading: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))
+  /** Latches a product. */
+  val multiply = Flipped(Valid(new MarchFactors(formats)))
+  val product  = Output(SInt(productBits.W))
 
-  /** The origin's projection; then u and v from the map's middle, and w. */
-  val place: Vec[SInt] = Reg(Vec(3, SInt(placeBits.W)))
+  /** Latches a sum. */
+  val add = Flipped(Valid(new MarchAddition(sumBits)))
+  val sum = Output(SInt(sumBits.W))
 
-  /** The direction's projection. */
-  val towards: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))
+  /** Bits of the sum without its sign, in this cycle; and as latched. */
+  val sumExponent   = Output(UInt(exponentBits.W))
+  val latchExponent = Input(Bool())
+  val exponent      = Output(UInt(exponentBits.W))
 
-  /** The direction in (u, v, w); for the shell, the direction's projection from the map's middle. */
-  val way:        Vec[SInt] = Reg(Vec(3, SInt(directionBits.W)))
-  val placeTop:   UInt      = Reg(UInt(lengthBits.W))
-  val towardsTop: UInt      = Reg(UInt(lengthBits.W))
-  val wayTop:     UInt      = Reg(UInt(lengthBits.W))
+  /** Latches the shift amount for the outputs below, which are floor(sum · 2^(f − shift)). */
+  val shift = Flipped(Valid(SInt(shiftBits.W)))
 
-  /** The origin's depth. */
-  val depthMantissa: UInt = Reg(UInt(f.W))
-  val depthLength:   UInt = Reg(UInt(lengthBits.W))
+  /** The low bits. */
+  val shifted = Output(SInt(scaledBits.W))
 
-  // Scratch
-  val axis:      UInt      = Reg(UInt(2.W))
-  val lengths:   Vec[UInt] = Reg(Vec(3, UInt(lengthBits.W)))
-  val length:    UInt      = Reg(UInt(lengthBits.W))
-  val mantissa:  UInt      = Reg(UInt(f.W))
-  val numerator: UInt      = Reg(UInt(f.W))
-  val quotient:  UInt      = Reg(UInt((f + 1).W))
+  // Saturated; the sum's exponent must be latched. The natural ones are for sums that are not negative
+  val coordinate = Output(SInt((alongBits + 1).W))
+  val summand    = Output(SInt(sceneBits.W))
+  val along      = Output(UInt(alongBits.W))
+  val distance   = Output(UInt(distanceBits.W))
 
-  /** How far the sum is shifted down, from f bits higher up. */
-  val drop: SInt = Reg(SInt(exponentBits.W))
+  /** The small adder; combinational. */
+  val combine  = Input(new MarchAddition(combineBits))
+  val combined = Output(SInt(combineBits.W))
 
-  val product: SInt = Reg(SInt(productBits.W))
-  val sum:     SInt = Reg(SInt(sumBits.W))
+  /** Starts a division of mantissas, one at a time. */
+  val divide       = Flipped(Valid(new Division(f)))
+  val quotient     = Valid(UInt((f + 1).W))
+  val takeQuotient = Input(Bool())
+}
 
-  private val wideFactor       = new Operand(program, wideBits)
-  private val narrowFactor     = new Operand(program, narrowBits)
-  private val base, addend     = new Operand(program, sumBits)
-  private val first, second    = new Operand(program, combineBits)
-  private val subtracts        = new Operand(program, 1)
-  private val combineSubtracts = new Operand(program, 1)
-  private val division         = Seq.fill(2)(new Operand(program, f + 1))
-  private val combined         = Wire(SInt(combineBits.W))
-  private val divider          = Module(new Divider(f, f))
-  divider.io.quotient.ready := false.B
+/** The arithmetic of the march: one multiplier, an accumulator with a shifter, a small adder and a divider.
+  *
+  * A product can be added one step after its factors, and the sum can be used one step later.
+  */
+final class MarchDatapath(config: ColonnadeConfig) extends Module {
+  private val formats = new MarchFormats(config)
+  import formats._
 
-  /** The product without its fraction. */
-  val share: SInt = Rounding.floor(product, f)
+  val io = IO(new MarchDatapathIO(formats))
 
-  def multiply(wide: SInt, narrow: SInt): Unit = {
-    wideFactor.choose(wide)
-    narrowFactor.choose(narrow)
+  private val product  = Reg(chiselTypeOf(io.product))
+  private val sum      = Reg(chiselTypeOf(io.sum))
+  private val exponent = Reg(chiselTypeOf(io.exponent))
+  private val shift    = Reg(chiselTypeOf(io.shift.bits))
+
+  when(io.multiply.valid)(product := io.multiply.bits.wide * io.multiply.bits.narrow)
+  when(io.add.valid)(sum          := io.add.bits.result)
+  io.product  := product
+  io.sum      := sum
+  io.combined := io.combine.result
+
+  io.sumExponent := Normalise.bitLength(Mux(sum < 0.S, ~sum, sum).asUInt)
+  io.exponent    := exponent
+  when(io.latchExponent)(exponent := io.sumExponent)
+  when(io.shift.valid)(shift      := io.shift.bits)
+
+  // The sum with f fraction bits, shifted right
+  private val amountBits = Normalise.exponentBits(sumBits + f)
+  private val isTooFar   = shift >= (sumBits + f).S
+  private val amount     = Mux(shift < 0.S, 0.U, Mux(isTooFar, (sumBits + f).U, shift.asUInt))(amountBits - 1, 0)
+  io.shifted := Rounding.narrow(Cat(sum, 0.U(f.W)).asSInt >> amount, scaledBits)
+
+  io.coordinate := saturate(alongBits)
+  io.summand    := saturate(sceneBits - 1)
+  io.along      := saturateNatural(alongBits)
+  io.distance   := saturateNatural(distanceBits)
+
+  private val divider = Module(new Divider(f, f))
+  divider.io.division.valid := io.divide.valid
+  divider.io.division.bits  := io.divide.bits
+  divider.io.quotient.ready := io.takeQuotient
+  io.quotient.valid         := divider.io.quotient.valid
+  io.quotient.bits          := divider.io.quotient.bits
+  assert(!divider.io.division.valid || divider.io.division.ready, "a division during another one")
+
+  /** The shifted sum has more than so many bits. */
+  private def exceeds(bits: Int): Bool = sum =/= 0.S && (shift < 0.S || exponent.zext +& (f - bits).S > shift)
+
+  private def saturate(bits: Int): SInt = {
+    val limit = Mux(sum < 0.S, (-(BigInt(1) << bits)).S((bits + 1).W), ((BigInt(1) << bits) - 1).S((bits + 1).W))
+    Mux(exceeds(bits), limit, Rounding.narrow(io.shifted, bits + 1))
   }
 
-  /** Adds the product to the sum, or subtracts it. */
-  def accumulate(subtract: Boolean = false): Unit = add(sum, product, subtract)
-
-  /** Adds the product to the sum that the digits before it make. */
-  def descend(): Unit = add((sum << digitBits).asSInt, product)
-
-  def load(value: SInt): Unit = base.choose(value)
-
-  /** Turns the sum's sign. */
-  def flip(condition: Bool): Unit = {
-    addend.choose(Mux(condition, sum, 0.S))
-    base.choose(Mux(condition, 0.S, sum))
-    subtracts.choose(condition.asSInt)
-  }
-
-  private def add(from: SInt, by: SInt, subtract: Boolean = false): Unit = {
-    base.choose(from)
-    addend.choose(by)
-    if (subtract) subtracts.choose((-1).S(1.W))
-  }
-
-  /** A sum, or a difference, of the smaller adder; at most one in a step. */
-  def combine(a: SInt, b: SInt, subtract: Boolean = false): SInt = {
-    first.choose(a)
-    second.choose(b)
-    if (subtract) combineSubtracts.choose((-1).S(1.W))
-    combined
-  }
-
-  /** The sum with f bits behind the point, dropped down. */
-  private val dropBits = Normalise.exponentBits(sumBits + f)
-  private val tooFar   = drop >= (sumBits + f).S
-  private val by       = Mux(drop < 0.S, 0.U, Mux(tooFar, (sumBits + f).U, drop.asUInt))(dropBits - 1, 0)
-  val shifted: SInt = Rounding.narrow(Cat(sum, 0.U(f.W)).asSInt >> by, scaledBits)
-
-  /** The sum's bit length after that is more than `bits`. The sum is measured. */
-  private def exceeds(bits: Int): Bool = sum =/= 0.S && (drop < 0.S || length.zext +& (f - bits).S > drop)
-
-  /** The nearest number of so many bits and a sign. */
-  def saturated(bits: Int): SInt = {
-    val ends = Mux(sum < 0.S, (-(BigInt(1) << bits)).S((bits + 1).W), ((BigInt(1) << bits) - 1).S((bits + 1).W))
-    Mux(exceeds(bits), ends, Rounding.narrow(shifted, bits + 1))
-  }
-
-  /** Without a sign, of a sum that is not negative. */
-  def saturatedNatural(bits: Int): UInt =
-    Mux(exceeds(bits), ((BigInt(1) << bits) - 1).U(bits.W), shifted.asUInt(bits - 1, 0))
-
-  /** Bits of the sum without its sign. */
-  val measured: UInt = Normalise.bitLength(Mux(sum < 0.S, ~sum, sum).asUInt).pad(lengthBits)
-
-  /** In a step: measures the sum. The next step finds its f highest bits, beside the sign, in [[shifted]]. */
-  def measure(): Unit = {
-    program.set(length, measured)
-    program.set(drop, measured.zext.pad(exponentBits))
-  }
-
-  /** In a step: begins ⌊numerator · 2^f / denominator⌋. One division at a time. */
-  def startDivision(numerator: UInt, denominator: UInt): Unit = {
-    division(0).choose(numerator.zext)
-    division(1).choose(denominator.zext)
-  }
-
-  /** A step: the quotient is there after it. */
-  def awaitDivision(): Unit = program.step {
-    program.set(quotient, divider.io.quotient.bits)
-    when(program.now)(divider.io.quotient.ready := true.B)
-    program.await(divider.io.quotient.valid)
-  }
-
-  /** Two steps. */
-  def divide(numerator: => UInt, denominator: => UInt): Unit = {
-    program.step(startDivision(numerator, denominator))
-    awaitDivision()
-  }
-
-  /** The value whose reciprocal is to be found is a mantissa: ⌊2^(2f − 1) / mantissa⌋. */
-  def one: UInt = (BigInt(1) << (f - 1)).U(f.W)
-
-  def constant(value: BigInt): SInt = value.S((value.bitLength + 1).W)
-
-  /** Connects the units to what the program's steps chose. */
-  def build(): Unit = {
-    def sumOf(a: SInt, b: SInt, subtract: Bool, width: Int): SInt =
-      Rounding.narrow(a + (b ^ Mux(subtract, (-1).S(width.W), 0.S(width.W))) + Cat(0.U(1.W), subtract).asSInt, width)
-
-    when(wideFactor.isChosen)(product := wideFactor.value * narrowFactor.value)
-    when(base.isChosen)(sum           := sumOf(base.value, addend.value, subtracts.value =/= 0.S, sumBits))
-    combined := sumOf(first.value, second.value, combineSubtracts.value =/= 0.S, combineBits)
-
-    divider.io.division.valid            := division(0).isChosen
-    divider.io.division.bits.numerator   := division(0).value.asUInt(f - 1, 0)
-    divider.io.division.bits.denominator := division(1).value.asUInt(f - 1, 0)
-    assert(!divider.io.division.valid || divider.io.division.ready, "a division during another one")
-  }
+  private def saturateNatural(bits: Int): UInt =
+    Mux(exceeds(bits), ((BigInt(1) << bits) - 1).U(bits.W), io.shifted.asUInt(bits - 1, 0))
 }

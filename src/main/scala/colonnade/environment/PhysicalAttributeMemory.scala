@@ -8,16 +8,16 @@ import colonnade.formats.{AlbedoEntry, AttributeEvents, Load, NormalEntry}
 /** Ports of [[PhysicalAttributeMemory]]. */
 final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Bundle {
 
-  /** Only while no question is in flight. */
+  /** Only while no request is in flight. */
   val load   = Flipped(Valid(new Load(config)))
   val ports  = Vec(requesters, Flipped(new AttributePort(AttributeLayout.of(config), tagBits)))
   val events = Output(new AttributeEvents)
 }
 
-/** The room's maps, with a port for each requester: render units, or columns where all share one memory. Each of the
-  * four channels takes one question a cycle, from the requesters in turn. A reset forgets questions, not maps.
+/** The environment's maps, with a port for each requester: render units, or columns that share one memory. Each of the
+  * four channels accepts one request a cycle, by round-robin. A reset drops requests in flight, but keeps the maps.
   *
-  * Latency: two cycles more than the map's own.
+  * Latency: that of the map and two cycles.
   */
 final class PhysicalAttributeMemory(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Module {
   val io = IO(new PhysicalAttributeMemoryIO(config, requesters, tagBits))
@@ -29,14 +29,14 @@ final class PhysicalAttributeMemory(config: ColonnadeConfig, requesters: Int, ta
   private val planes     = Module(new PlaneMap(config, joinedBits))
 
   joined.io.ports <> io.ports
-  albedo.io.pixels <> joined.io.served.albedo
-  normals.io.pixels <> joined.io.served.normals
-  planes.io.cells <> joined.io.served.cells
-  planes.io.planes <> joined.io.served.planes
+  albedo.io.pixels <> joined.io.joined.albedo
+  normals.io.pixels <> joined.io.joined.normals
+  planes.io.cells <> joined.io.joined.cells
+  planes.io.planes <> joined.io.joined.planes
 
   albedo.io.load  := io.load
   normals.io.load := io.load
   planes.io.load  := io.load
 
-  io.events := joined.io.served.events
+  io.events := joined.io.joined.events
 }

@@ -10,12 +10,12 @@ final class PlaneMapIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   private val layout = AttributeLayout.of(config)
 
   val load   = Flipped(Valid(new Load(config)))
-  val cells  = Flipped(new AttributeChannel(new CellQuestion(layout), new CellAnswer(layout), tagBits))
-  val planes = Flipped(new AttributeChannel(new PlaneQuestion(layout), new ShellEntry, tagBits))
+  val cells  = Flipped(new AttributeChannel(new CellRequest(layout), new CellResponse(layout), tagBits))
+  val planes = Flipped(new AttributeChannel(new PlaneRequest(layout), new ShellEntry, tagBits))
 }
 
-/** The room's planes: which ones a tile or a cell lies in, and what they are. The two questions have channels of their
-  * own, so that neither waits for the other.
+/** The environment's planes. One channel gives the planes of a tile or cell, the other one a plane's coefficients; neither
+  * waits for the other.
   */
 final class PlaneMap(config: ColonnadeConfig, tagBits: Int) extends Module {
   val io = IO(new PlaneMapIO(config, tagBits))

@@ -8,28 +8,28 @@ import colonnade.formats.{Load, Plane, ShellEntry}
 /** Ports of [[PlaneTable]]. */
 final class PlaneTableIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   val load   = Flipped(Valid(new Load(config)))
-  val planes = Flipped(new AttributeChannel(new PlaneQuestion(AttributeLayout.of(config)), new ShellEntry, tagBits))
+  val planes = Flipped(new AttributeChannel(new PlaneRequest(AttributeLayout.of(config)), new ShellEntry, tagBits))
 }
 
-/** The planes themselves: those that cells name, and those of the shell. Latency one cycle, one plane a cycle. */
+/** The coefficients of the map's planes and of the bounding planes. Latency one cycle, one plane a cycle. */
 final class PlaneTable(config: ColonnadeConfig, tagBits: Int) extends Module {
   val io = IO(new PlaneTableIO(config, tagBits))
 
   private val table    = AttributeStore(config, "planes.planes", io.load)
-  private val shell    = AttributeStore(config, "planes.shell", io.load)
-  private val question = io.planes.question
+  private val bounding = AttributeStore(config, "planes.shell", io.load)
+  private val req      = io.planes.req
 
-  question.ready   := true.B
-  table.read.valid := question.valid && !question.bits.content.isShell
-  table.read.bits  := question.bits.content.index
-  shell.read.valid := question.valid && question.bits.content.isShell
-  shell.read.bits  := question.bits.content.index
+  req.ready           := true.B
+  table.read.valid    := req.valid && !req.bits.content.isBoundingPlane
+  table.read.bits     := req.bits.content.index
+  bounding.read.valid := req.valid && req.bits.content.isBoundingPlane
+  bounding.read.bits  := req.bits.content.index
 
-  private val isShell = RegEnable(question.bits.content.isShell, question.valid)
-  private val entry   = shell.word.asTypeOf(new ShellEntry)
-  io.planes.answer.valid              := RegNext(question.valid, false.B)
-  io.planes.answer.bits.tag           := RegEnable(question.bits.tag, question.valid)
-  io.planes.answer.bits.isIllegal     := false.B
-  io.planes.answer.bits.content       := entry
-  io.planes.answer.bits.content.plane := Mux(isShell, entry.plane, table.word.asTypeOf(new Plane))
+  private val isBoundingPlane = RegEnable(req.bits.content.isBoundingPlane, req.valid)
+  private val entry           = bounding.word.asTypeOf(new ShellEntry)
+  io.planes.resp.valid              := RegNext(req.valid, false.B)
+  io.planes.resp.bits.tag           := RegEnable(req.bits.tag, req.valid)
+  io.planes.resp.bits.isIllegal     := false.B
+  io.planes.resp.bits.content       := entry
+  io.planes.resp.bits.content.plane := Mux(isBoundingPlane, entry.plane, table.word.asTypeOf(new Plane))
 }

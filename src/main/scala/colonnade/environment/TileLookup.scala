@@ -5,72 +5,72 @@ import chisel3.util.{log2Ceil, Cat, Decoupled, Pipe, Queue, RegEnable, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.Load
 
-/** A pixel, and what goes along with it. */
-final class RiddenPixel[T <: Data](layout: AttributeLayout, private val extra: T) extends Bundle {
-  val pixel = new MapPixel(layout)
-  val rider = extra.cloneType
+/** A pixel with sideband data. */
+final class TaggedPixel[T <: Data](layout: AttributeLayout, private val extra: T) extends Bundle {
+  val pixel    = new MapPixel(layout)
+  val sideband = extra.cloneType
 }
 
-/** A tile's descriptor and the pixel's place in the tile. */
+/** A tile's descriptor and the pixel's position in the tile. */
 final class PixelInTile[D <: Data, T <: Data](layout: AttributeLayout, private val kind: D, private val extra: T)
     extends Bundle {
   val descriptor = kind.cloneType
   val x          = UInt(layout.tileLog.W)
   val y          = UInt(layout.tileLog.W)
-  val rider      = extra.cloneType
+  val sideband   = extra.cloneType
 
   /** Index of the pixel's cell, row by row, where a tile has 2^log cells along each edge. */
-  def cell(log: Int): UInt = Cat(Seq(y, x).map(place => place(place.getWidth - 1, place.getWidth - log)))
+  def cell(log: Int): UInt = Cat(Seq(y, x).map(position => position(position.getWidth - 1, position.getWidth - log)))
 }
 
-/** Ports of [[TileLookup]]; D is the descriptor, T what goes along with a pixel. */
-final class TileLookupIO[D <: Data, T <: Data](config: ColonnadeConfig, descriptor: D, rider: T) extends Bundle {
+/** Ports of [[TileLookup]]; D is the descriptor, T the sideband data. */
+final class TileLookupIO[D <: Data, T <: Data](config: ColonnadeConfig, descriptor: D, sideband: T) extends Bundle {
   private val layout = AttributeLayout.of(config)
 
   val load  = Flipped(Valid(new Load(config)))
-  val pixel = Flipped(Decoupled(new RiddenPixel(layout, rider)))
-  val tile  = Decoupled(new PixelInTile(layout, descriptor, rider))
+  val pixel = Flipped(Decoupled(new TaggedPixel(layout, sideband)))
+  val tile  = Decoupled(new PixelInTile(layout, descriptor, sideband))
 }
 
-/** Finds the descriptor of the tile that a pixel lies in. Latency three cycles, one pixel a cycle, in order: a pixel is
-  * accepted when there is room for its tile, whoever takes tiles and when.
+/** Looks up the descriptor of a pixel's tile. Latency three cycles, one pixel a cycle, in order. A pixel is accepted only
+  * if there is space for its tile in the output queue, so a stalled output never loses one.
   *
   * @param memory name of the descriptors' memory
   */
-final class TileLookup[D <: Data, T <: Data](config: ColonnadeConfig, memory: String, descriptor: D, rider: T)
+final class TileLookup[D <: Data, T <: Data](config: ColonnadeConfig, memory: String, descriptor: D, sideband: T)
     extends Module {
-  val io = IO(new TileLookupIO(config, descriptor, rider))
+  val io = IO(new TileLookupIO(config, descriptor, sideband))
 
   private val layout      = AttributeLayout.of(config)
   private val descriptors = AttributeStore(config, memory, io.load)
   private val pixel       = io.pixel.bits.pixel
   private val found       = Wire(Decoupled(chiselTypeOf(io.tile.bits)))
 
-  // Take what there is room for
-  private val room     = TileLookup.latency + 1
-  private val inFlight = RegInit(0.U(log2Ceil(room + 1).W))
+  // Accept pixels while the output queue has space
+  private val queueDepth = TileLookup.latency + 1
+  private val inFlight   = RegInit(0.U(log2Ceil(queueDepth + 1).W))
   inFlight       := inFlight + io.pixel.fire - io.tile.fire
-  io.pixel.ready := inFlight =/= room.U
+  io.pixel.ready := inFlight =/= queueDepth.U
   assert(
     !io.pixel.fire || (pixel.x < layout.config.width.U && pixel.y < layout.config.height.U),
     "a pixel outside the map"
   )
 
   // Read its tile's descriptor
-  private val tile  = (pixel.y >> layout.tileLog) * layout.tileColumns.U + (pixel.x >> layout.tileLog)
-  private val asked = Pipe(io.pixel.fire, io.pixel.bits)
-  descriptors.read.valid := asked.valid
+  private val tile    = (pixel.y >> layout.tileLog) * layout.tileColumns.U + (pixel.x >> layout.tileLog)
+  private val request = Pipe(io.pixel.fire, io.pixel.bits)
+  descriptors.read.valid := request.valid
   descriptors.read.bits  := RegEnable(tile(layout.tileBits - 1, 0), io.pixel.fire)
 
-  // Keep it until it is taken
-  private val read = Pipe(asked)
+  // Queue it
+  private val read = Pipe(request)
   found.valid           := read.valid
   found.bits.descriptor := descriptors.word.asTypeOf(descriptor)
   found.bits.x          := read.bits.pixel.x
   found.bits.y          := read.bits.pixel.y
-  found.bits.rider      := read.bits.rider
-  assert(!read.valid || found.ready, "a tile without room")
-  io.tile <> Queue(found, room)
+  found.bits.sideband   := read.bits.sideband
+  assert(!read.valid || found.ready, "a tile without space")
+  io.tile <> Queue(found, queueDepth)
 }
 
 object TileLookup {

@@ -8,6 +8,8 @@ private[microcode] object ProgramGraph {
 
   private final case class Edge(target: String, reasons: Seq[String])
 
+  private val otherwise = "otherwise"
+
   /** The graph in Graphviz's DOT.
     *
     * @param count    steps of the program
@@ -20,24 +22,16 @@ private[microcode] object ProgramGraph {
     val nodes  = starts.zip(ends).map { case ((label, start), end) =>
       val exits  = (start until end).flatMap(branches.getOrElse(_, Nil))
       val onward = starts.collectFirst {
-        case (next, position) if position == end && !branches.get(end - 1).exists(_.lastOption.exists(isAlways)) =>
-          (next.toString, if (branches.get(end - 1).exists(_.exists(_.target.nonEmpty))) "otherwise" else "")
+        case (next, `end`) if !branches.get(end - 1).exists(_.exists(_.condition.isEmpty)) => next.toString -> otherwise
       }
       val jumps = exits.collect { case Exit(Some(target), condition, reason) =>
-        (target.toString, if (condition.isEmpty && exits.exists(_.target.exists(_ ne target))) "otherwise" else reason)
-      }
-      val targets = (jumps ++ onward).map(_._1).distinct
-      Node(
-        label.toString,
-        end - start,
-        exits.collect { case Exit(None, _, reason) => reason }.distinct,
-        targets.map(target => Edge(target, (jumps ++ onward).collect { case (`target`, why) => why }.distinct))
-      )
+        target.toString -> (if (condition.isEmpty) otherwise else reason)
+      } ++ onward
+      val edges = jumps.map(_._1).distinct.map(to => Edge(to, jumps.collect { case (`to`, why) => why }.distinct))
+      Node(label.toString, end - start, exits.collect { case Exit(None, _, reason) => reason }.distinct, edges)
     }
     render(name, nodes)
   }
-
-  private def isAlways(exit: Exit[Label]): Boolean = exit.condition.isEmpty
 
   private def render(name: String, nodes: Seq[Node]): String = {
     val shapes = nodes.map { node =>
@@ -46,8 +40,8 @@ private[microcode] object ProgramGraph {
       s"""  ${node.name} [label="${lines.mkString("\\n")}"];"""
     }
     val arrows = for (node <- nodes; edge <- node.edges) yield {
-      val text = edge.reasons.filter(_.nonEmpty).mkString(",\\n")
-      s"  ${node.name} -> ${edge.target}" + (if (text.isEmpty) ";" else s""" [label="$text"];""")
+      val isOnly = node.edges.size == 1 && edge.reasons == Seq(otherwise)
+      s"  ${node.name} -> ${edge.target}" + (if (isOnly) ";" else s""" [label="${edge.reasons.mkString(",\\n")}"];""")
     }
     val style = Seq(
       """  node [shape=box, style=rounded, fontname="Helvetica", fontsize=11];""",

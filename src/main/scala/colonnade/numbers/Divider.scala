@@ -3,7 +3,7 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled}
 
-/** Two mantissas to divide.
+/** The operands of a division: two mantissas.
   *
   * @param numerator   its top bit is set, or it is zero
   * @param denominator its top bit is set
@@ -13,6 +13,7 @@ final class Division(mantissaBits: Int) extends Bundle {
   val denominator = UInt(mantissaBits.W)
 }
 
+/** Ports of [[Divider]]. */
 final class DividerIO(mantissaBits: Int, digits: Int) extends Bundle {
   val division = Flipped(Decoupled(new Division(mantissaBits)))
 
@@ -20,13 +21,14 @@ final class DividerIO(mantissaBits: Int, digits: Int) extends Bundle {
   val quotient = Decoupled(UInt((digits + 1).W))
 }
 
-/** Divides mantissas by restoring digit recurrence in radix 4: three subtractors side by side try one, two and three
-  * times the denominator, and the largest multiple that fits gives two bits.
+/** Divides mantissas by restoring digit recurrence in radix 4. Three parallel subtractors try one, two and three times the
+  * denominator; the largest multiple that fits gives two quotient bits.
   *
-  * Latency ⌈(digits + 1) / (2 · digitsPerCycle)⌉ + 1 cycles, one division at a time; the next one enters in the cycle in
-  * which a quotient leaves. A denominator without its top bit gives a quotient that means nothing.
+  * Latency ⌈(digits + 1) / (2 · digitsPerCycle)⌉ + 1 cycles, one division at a time. The next division can enter in the
+  * cycle in which a quotient leaves. The quotient is meaningless if the denominator's top bit is clear.
   *
-  * @param digitsPerCycle radix-4 digits computed in a cycle, one after the other
+  * @param digits         fraction bits of the quotient
+  * @param digitsPerCycle radix-4 digits computed in series in one cycle
   */
 final class Divider(mantissaBits: Int, digits: Int, digitsPerCycle: Int = 1) extends Module {
   require(mantissaBits >= 1, s"a divider of $mantissaBits-bit mantissas; they must have at least 1 bit")
@@ -37,21 +39,21 @@ final class Divider(mantissaBits: Int, digits: Int, digitsPerCycle: Int = 1) ext
   private val steps        = Divider.steps(digits, digitsPerCycle)
   private val quotientBits = 2 * steps * digitsPerCycle
 
-  /** The last bits may be computed in vain. */
+  /** Bits below the quotient's last bit that the last step computes and drops. */
   private val spareBits = quotientBits - (digits + 1)
 
   private val busy      = RegInit(false.B)
   private val stepsLeft = Reg(UInt(log2Ceil(steps + 1).W))
   private val quotient  = Reg(UInt(quotientBits.W))
 
-  /** Less than four times the denominator. */
+  /** Always less than four times the denominator. */
   private val remainder = Reg(UInt((mantissaBits + 2).W))
   private val once      = Reg(UInt(mantissaBits.W))
   private val thrice    = Reg(UInt((mantissaBits + 2).W))
 
   private val finished = busy && stepsLeft === 0.U
 
-  // Try the three multiples: a borrow means that one does not fit.
+  // Try the three multiples; a borrow means that a multiple does not fit
   private def step(remainder: UInt): (UInt, UInt) = {
     val tried   = Seq(once.pad(mantissaBits + 2), Cat(0.U(1.W), once, 0.U(1.W)), thrice).map(remainder -& _)
     val fits    = tried.map(difference => !difference(mantissaBits + 2))
@@ -88,6 +90,6 @@ final class Divider(mantissaBits: Int, digits: Int, digitsPerCycle: Int = 1) ext
 
 object Divider {
 
-  /** Cycles of a division in which quotient bits come out. */
+  /** Cycles of a division that compute quotient bits. */
   def steps(digits: Int, digitsPerCycle: Int = 1): Int = digits / (2 * digitsPerCycle) + 1
 }

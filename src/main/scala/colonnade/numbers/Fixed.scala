@@ -7,13 +7,13 @@ import scala.collection.immutable.SeqMap
 /** The Q format of a number: its value is raw · 2^-fraction.
   *
   * @param width    bits, the sign included
-  * @param fraction bits behind the point; negative when one step is larger than one
+  * @param fraction bits behind the point; negative if one step is larger than one
   * @param signed   two's complement
   */
 final case class FixedPointFormat(width: Int, fraction: Int, signed: Boolean) {
   require(width >= 1, s"a number of $width bits; it must have at least 1")
 
-  /** Bits before the point, the sign not included. */
+  /** Bits before the point, without the sign. */
   def integerBits: Int = width - fraction - (if (signed) 1 else 0)
 
   def lowest: BigInt  = if (signed) -(BigInt(1) << (width - 1)) else BigInt(0)
@@ -34,18 +34,17 @@ object FixedPointFormat {
   def unsigned(width: Int, fraction: Int): FixedPointFormat = FixedPointFormat(width, fraction, signed = false)
 }
 
-/** A hardware number that carries its format: its only field is named after it, so that connecting two formats fails
-  * at elaboration. Sums, differences and products are exact and take the format that holds them; only [[Rounding]]
-  * drops bits.
+/** A hardware number with its format. Its only field is named after the format, so connecting two different formats fails
+  * at elaboration. Sums, differences and products are exact, in the format that holds them; only [[Rounding]] drops bits.
   */
 final class Fixed(val format: FixedPointFormat) extends Record {
 
-  /** The bits as declared: an `SInt` or a `UInt`. */
+  /** The raw bits: an `SInt` or a `UInt`. */
   val raw: Bits = if (format.signed) SInt(format.width.W) else UInt(format.width.W)
 
   val elements: SeqMap[String, Data] = SeqMap(format.label -> raw)
 
-  /** The raw integer; one bit wider than an unsigned format. */
+  /** The raw integer as an `SInt`; one bit wider if the format is unsigned. */
   def integer: SInt = raw match {
     case signed: SInt   => signed
     case unsigned: UInt => unsigned.zext
@@ -102,7 +101,7 @@ final class Fixed(val format: FixedPointFormat) extends Record {
 
 object Fixed {
 
-  /** A raw integer as a number; it is no wider than the format (a narrower one is extended). */
+  /** A number from its raw integer, which must not be wider than the format; a narrower one is extended. */
   def apply(format: FixedPointFormat, raw: SInt): Fixed = {
     require(format.signed, s"$format is unsigned; its raw integer is a UInt")
     require(raw.getWidth <= format.width, s"a raw integer of ${raw.getWidth} bits does not fit $format")
@@ -121,7 +120,7 @@ object Fixed {
     if (format.signed) apply(format, raw.S(format.width.W)) else apply(format, raw.U(format.width.W))
   }
 
-  /** The low bits of an integer; the caller knows that the others say nothing new. */
+  /** A number from an integer's low bits. The caller guarantees that the other bits are redundant. */
   private[numbers] def fromLowBits(format: FixedPointFormat, raw: SInt): Fixed = {
     val number = Wire(new Fixed(format))
     val bits   = raw.pad(format.width).asUInt(format.width - 1, 0)

@@ -3,9 +3,9 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.{log2Ceil, Cat}
 
-/** A number as a mantissa and an exponent: mantissa · 2^(exponent - mantissaBits), up to the bits floored away.
+/** A number as mantissa and exponent: mantissa · 2^(exponent - mantissaBits), without the bits that were floored.
   *
-  * @param mantissa its top bit is set, except for zero, where all are clear
+  * @param mantissa its top bit is set, unless the number is zero
   * @param exponent the number's bit length
   */
 final class Normalised(mantissaBits: Int, exponentBits: Int) extends Bundle {
@@ -13,10 +13,10 @@ final class Normalised(mantissaBits: Int, exponentBits: Int) extends Bundle {
   val exponent = UInt(exponentBits.W)
 }
 
-/** Combinational: counts the leading zeros in a tree, then shifts them out in log2(width) steps. */
+/** Normalisation, combinational: a tree counts the leading zeros, and log2(width) shifts remove them. */
 object Normalise {
 
-  /** Bits of the exponent that [[apply]] gives for an operand of `width` bits. */
+  /** Bits of the exponent of an operand of `width` bits. */
   def exponentBits(width: Int): Int = log2Ceil(width + 1)
 
   def apply(x: UInt, bits: Int): Normalised = {
@@ -29,16 +29,16 @@ object Normalise {
     result
   }
 
-  /** Position of the highest set bit plus one; 0 for zero. */
+  /** The position of the highest set bit plus one; 0 for zero. */
   def bitLength(x: UInt): UInt = {
     val (zero, zeros) = countLeadingZeros(x)
     Mux(zero, 0.U(exponentBits(x.getWidth).W), x.getWidth.U(exponentBits(x.getWidth).W) - zeros)
   }
 
-  /** Whether all bits are clear, and how many lead the highest set bit otherwise. */
+  /** Whether all bits are clear; and the number of zeros above the highest set bit, which is meaningless for zero. */
   def countLeadingZeros(x: UInt): (Bool, UInt) = {
     val size = 1 << log2Ceil(x.getWidth)
-    // Padding at the low end does not change the count while a bit of x is set; for zero it means nothing.
+    // Padding at the low end does not change the count if any bit of x is set
     tree(if (size == x.getWidth) x else Cat(x, 0.U((size - x.getWidth).W)))
   }
 

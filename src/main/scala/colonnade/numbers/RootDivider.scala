@@ -3,10 +3,10 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled}
 
-/** A square root to draw, or two mantissas to divide.
+/** The operands of a square root or of a division of mantissas.
   *
-  * @param operand   the radicand, or the denominator: its top bit, that of the mantissa's bits, is set
-  * @param numerator of a division: less than twice the denominator
+  * @param operand   the radicand, or the denominator, whose top bit is set within the mantissa's bits
+  * @param numerator of a division; less than twice the denominator
   */
 final class RootOrDivision(radicandBits: Int, mantissaBits: Int) extends Bundle {
   val isDivision = Bool()
@@ -14,6 +14,7 @@ final class RootOrDivision(radicandBits: Int, mantissaBits: Int) extends Bundle 
   val numerator  = UInt(mantissaBits.W)
 }
 
+/** Ports of [[RootDivider]]. */
 final class RootDividerIO(radicandBits: Int, mantissaBits: Int, digits: Int) extends Bundle {
   val operation = Flipped(Decoupled(new RootOrDivision(radicandBits, mantissaBits)))
 
@@ -21,10 +22,11 @@ final class RootDividerIO(radicandBits: Int, mantissaBits: Int, digits: Int) ext
   val result = Decoupled(UInt(RootDivider.resultBits(radicandBits, digits).W))
 }
 
-/** [[SquareRoot]] and [[Divider]] in one, around one subtractor: restoring, a bit a cycle. Half as large as both.
+/** Square root and division with one subtractor, by restoring digit recurrence: one bit a cycle. It has half the area of a
+  * [[SquareRoot]] and a [[Divider]].
   *
-  * Latency rootBits + 1 or digits + 2 cycles, one operation at a time; the next one enters in the cycle in which a
-  * result leaves.
+  * Latency rootBits + 1 or digits + 2 cycles, one operation at a time. The next operation can enter in the cycle in which
+  * a result leaves.
   */
 final class RootDivider(radicandBits: Int, mantissaBits: Int, digits: Int) extends Module {
   require(radicandBits >= 2 && radicandBits % 2 == 0, s"a square root of $radicandBits bits; they must be even")
@@ -42,7 +44,7 @@ final class RootDivider(radicandBits: Int, mantissaBits: Int, digits: Int) exten
   private val isDivision = Reg(Bool())
   private val result     = Reg(UInt(resultBits.W))
 
-  /** The radicand's bits not yet used, at the top of its bits; or the denominator. */
+  /** The radicand's unused bits, left-aligned; or the denominator. */
   private val operand = Reg(chiselTypeOf(io.operation.bits.operand))
 
   /** At most twice the root, or less than twice the denominator. */
@@ -50,7 +52,7 @@ final class RootDivider(radicandBits: Int, mantissaBits: Int, digits: Int) exten
 
   private val finished = busy && bitsLeft === 0.U
 
-  // The next bit is set if (2 root + 1)² still fits, or the denominator
+  // The next bit is set if (2 root + 1)² or the denominator fits
   private val pair       = operand(radicandBits - 1, radicandBits - 2)
   private val minuend    = Mux(isDivision, remainder, Cat(remainder(remainderBits - 3, 0), pair))
   private val subtrahend =

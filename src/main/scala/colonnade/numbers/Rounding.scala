@@ -2,7 +2,7 @@ package colonnade.numbers
 
 import chisel3._
 
-/** The only places where bits are dropped. Amounts that are zero or negative shift left, exactly. */
+/** All operations that drop bits. A negative amount shifts left, exactly. */
 object Rounding {
 
   /** Drops `bits` low bits towards minus infinity. */
@@ -13,7 +13,7 @@ object Rounding {
   def floor(x: UInt, bits: Int): UInt =
     if (bits <= 0) shiftedLeft(x, -bits) else if (bits >= x.getWidth) 0.U(1.W) else x(x.getWidth - 1, bits)
 
-  /** Drops a number of low bits that is known at run time only, towards minus infinity. */
+  /** Drops a variable number of low bits, towards minus infinity. */
   def floor(x: SInt, bits: UInt): SInt = x >> bits
 
   def floor(x: UInt, bits: UInt): UInt = x >> bits
@@ -42,13 +42,13 @@ object Rounding {
     if (x.getWidth <= width) x
     else Mux(x(x.getWidth - 1, width).orR, ((BigInt(1) << width) - 1).U(width.W), x(width - 1, 0))
 
-  /** The nearest value from `low` to `high`, as wide as these two need. */
+  /** The nearest value from `low` to `high`, with the bits that this range needs. */
   def saturate(x: SInt, low: BigInt, high: BigInt): SInt = {
     require(low <= high, s"saturation from $low to $high")
     val width = (low.bitLength.max(high.bitLength) + 1).min(x.getWidth)
-    val least = -(BigInt(1) << (x.getWidth - 1))
-    val most  = -least - 1
-    if (low <= least && high >= most) x
+    val min   = -(BigInt(1) << (x.getWidth - 1))
+    val max   = -min - 1
+    if (low <= min && high >= max) x
     else {
       val wide    = x.pad(low.bitLength.max(high.bitLength) + 1)
       val limited = Mux(wide < low.S, low.S, Mux(wide > high.S, high.S, wide))
@@ -56,28 +56,28 @@ object Rounding {
     }
   }
 
-  /** The low bits; the caller states why the others say nothing new. */
+  /** The low bits. The caller guarantees that the others are copies of the sign. */
   def narrow(x: SInt, width: Int): SInt = if (x.getWidth <= width) x else x.asUInt(width - 1, 0).asSInt
 
-  /** The low bits; the caller states why the others are zero. */
+  /** The low bits. The caller guarantees that the others are zero. */
   def narrow(x: UInt, width: Int): UInt = if (x.getWidth <= width) x else x(width - 1, 0)
 
-  /** [[floor]] to the fraction bits of a format whose range holds the number's. */
+  /** [[floor]] to the fraction bits of a format whose range includes the number's. */
   def floor(x: Fixed, to: FixedPointFormat): Fixed = fitted(floor(x.integer, x.format.fraction - to.fraction), x, to)
 
-  /** [[nearestEven]] to the fraction bits of a format whose range holds the number's. */
+  /** [[nearestEven]] to the fraction bits of a format whose range includes the number's. */
   def nearestEven(x: Fixed, to: FixedPointFormat): Fixed =
     fitted(nearestEven(x.integer, x.format.fraction - to.fraction), x, to)
 
-  /** [[floor]] to the fraction bits of a format, then the nearest value it has. */
+  /** [[floor]] to the fraction bits of a format, then the nearest value in its range. */
   def saturate(x: Fixed, to: FixedPointFormat): Fixed =
     Fixed.fromLowBits(to, saturate(floor(x.integer, x.format.fraction - to.fraction), to.lowest, to.highest))
 
   private def fitted(rounded: SInt, x: Fixed, to: FixedPointFormat): Fixed = {
-    val needed = rounded.getWidth - (if (x.format.signed) 0 else 1)
-    val room   = to.width - (if (to.signed && !x.format.signed) 1 else 0)
+    val needed    = rounded.getWidth - (if (x.format.signed) 0 else 1)
+    val available = to.width - (if (to.signed && !x.format.signed) 1 else 0)
     require(to.signed || !x.format.signed, s"a signed ${x.format} does not fit $to")
-    require(needed <= room, s"${x.format} rounded to ${to.fraction} fraction bits does not fit $to; saturate it")
+    require(needed <= available, s"${x.format} rounded to ${to.fraction} fraction bits does not fit $to; saturate it")
     Fixed.fromLowBits(to, rounded)
   }
 
@@ -85,7 +85,7 @@ object Rounding {
 
   private def shiftedLeft(x: UInt, bits: Int): UInt = if (bits == 0) x else (x << bits).asUInt
 
-  /** Above half a step, or at half with an odd floor. `x` has more than `bits` bits. */
+  /** The dropped bits are more than half a step, or exactly half a step above an odd number. */
   private def roundsUp(x: UInt, bits: Int): Bool = {
     val half   = x(bits - 1)
     val sticky = if (bits == 1) false.B else x(bits - 2, 0).orR

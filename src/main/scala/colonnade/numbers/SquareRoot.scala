@@ -3,6 +3,7 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled}
 
+/** Ports of [[SquareRoot]]. */
 final class SquareRootIO(radicandBits: Int) extends Bundle {
   val radicand = Flipped(Decoupled(UInt(radicandBits.W)))
 
@@ -10,9 +11,9 @@ final class SquareRootIO(radicandBits: Int) extends Bundle {
   val root = Decoupled(UInt(SquareRoot.rootBits(radicandBits).W))
 }
 
-/** Square root by restoring digit recurrence: two bits of the radicand, one subtraction and one bit of the root a cycle.
+/** Square root by restoring digit recurrence. Each cycle takes two bits of the radicand and gives one bit of the root.
   *
-  * Latency rootBits + 1 cycles, one root at a time; the next radicand enters in the cycle in which a root leaves.
+  * Latency rootBits + 1 cycles, one root at a time. The next radicand can enter in the cycle in which a root leaves.
   */
 final class SquareRoot(radicandBits: Int) extends Module {
   require(radicandBits >= 1, s"a square root of $radicandBits bits; there must be at least 1")
@@ -24,16 +25,16 @@ final class SquareRoot(radicandBits: Int) extends Module {
   private val busy     = RegInit(false.B)
   private val bitsLeft = Reg(UInt(log2Ceil(rootBits + 1).W))
 
-  /** Radicand bits not yet used, at the top. */
+  /** The radicand's unused bits, left-aligned. */
   private val pending = Reg(UInt((2 * rootBits).W))
   private val root    = Reg(UInt(rootBits.W))
 
-  /** At most twice the root. */
+  /** Always at most twice the root. */
   private val remainder = Reg(UInt((rootBits + 1).W))
 
   private val finished = busy && bitsLeft === 0.U
 
-  // The next bit is set if (2 root + 1)² still fits, that is if 4 root + 1 does not exceed the remainder.
+  // The next bit is set if (2 root + 1)² fits, that is if 4 root + 1 does not exceed the remainder
   private val extended   = Cat(remainder, pending(2 * rootBits - 1, 2 * rootBits - 2))
   private val difference = extended -& Cat(0.U(1.W), root, 1.U(2.W))
   private val bit        = !difference(rootBits + 3)

@@ -120,6 +120,19 @@ final class BounceStatus extends Bundle {
   val quotientIsShifted = Bool()
 }
 
+/** State of the current bounce, written by [[BounceProgram]] and its unit. */
+final class BounceState {
+  val isGlass:  Bool = Reg(Bool())
+  val isSmooth: Bool = Reg(Bool())
+  val backSide: Bool = Reg(Bool())
+
+  /** The ray is refracted, not reflected. */
+  val isRefraction: Bool = Reg(Bool())
+
+  /** The result has a Fresnel term. */
+  val hasFresnel: Bool = Reg(Bool())
+}
+
 /** Ports of [[BounceDatapath]]. */
 final class BounceDatapathIO(config: ColonnadeConfig) extends Bundle {
   val control = Input(new BounceControl(new BounceFormats(config.numbers)))

@@ -55,7 +55,9 @@ final class BounceDatapath(config: ColonnadeConfig) extends Module {
   /** Three more than the bits by which the quotient has to move down to become the cosine. */
   private val shiftRight = Reg(UInt(log2Ceil(dotBits + 5).W))
 
-  private val sum = Reg(SInt(formats.sumBits.W))
+  private val adder = Module(new BounceAdder(config))
+  private val sum   = adder.io.sum
+  private val total = adder.io.total
 
   // Scale by the normal's length. The highest bit of its square is one of a dot product's top four
   private val top         = sum.asUInt(dotBits - 1, dotBits - 4)
@@ -119,14 +121,13 @@ final class BounceDatapath(config: ColonnadeConfig) extends Module {
   private val dot       = sum.asUInt(dotBits - 1, 0)
   private val isHigh    = sum.asUInt(dotBits - 1)
   private val shiftsUp  = actions.divide && !isHigh
-  private val takesRoot = actions.subtractRoot && roots.io.isReady
   private val shiftsOut = actions.shiftQuotient && shiftRight > 3.U
   roots.io.startRoot    := actions.startRoot
   roots.io.startCosine  := actions.startCosineRoot && io.status.isPositive
   roots.io.divide       := actions.divide && isHigh
   roots.io.take         := actions.subtractRoot || actions.latchQuotient
   roots.io.discriminant := Rounding.floor(sum.asUInt(numbers.rootBits + 2, 0), 3 - formats.low)
-  roots.io.lengths      := product.asUInt(2 * shadeBits - 1, 0)
+  roots.io.normProduct  := product.asUInt(2 * shadeBits - 1, 0)
   roots.io.exponent     := exponent +& square(shadeBits)
   roots.io.dot          := dot
 
@@ -140,44 +141,16 @@ final class BounceDatapath(config: ColonnadeConfig) extends Module {
   )
 
   // Adder
-  private val floored = Rounding.floor(product, NumberFormats.etaFraction)
-  private val doubles = actions.scaleCosine.zipWithIndex.map { case (step, i) => step && exponent > i.U } ++
-    actions.scaleDiscriminant.zipWithIndex.map { case (step, i) => step && exponent <= i.U } :+ shiftsUp
-  private val double = doubles.reduce(_ || _)
-  private val left   = Mux1H(
-    Seq(
-      ((actions.accumulate && !actions.startSum) || double || actions.subtractRoot) -> sum,
-      (actions.squaredSine || actions.discriminant)                                 -> squaredLengths.zext,
-      actions.shiftInOrigin                                                         -> Rounding.floor(origin(0), 1),
-      actions.oneMinusCosine                                                        -> (1 << oneBits).S,
-      actions.addReflectance                                                        -> reflectance.zext
-    ).map { case (when, operand) => when -> operand.pad(formats.sumBits) }
-  )
-  private val right = Mux1H(
-    Seq(
-      actions.accumulate                                                      -> product,
-      (actions.loadProduct || actions.discriminant || actions.addReflectance) -> floored,
-      double                                                                  -> sum,
-      actions.squaredSine                                                     -> Rounding.floor(sum, formats.low),
-      actions.subtractRoot                                                    -> roots.io.root.zext,
-      actions.shiftInOrigin  -> Rounding.floor(sum, NumberFormats.normalFraction),
-      actions.oneMinusCosine -> cosine.zext
-    ).map { case (when, operand) => when -> Rounding.narrow(operand, formats.sumBits).pad(formats.sumBits) }
-  )
-  private val subtract = (actions.accumulate && actions.subtract) || actions.squaredSine || actions.discriminant ||
-    actions.subtractRoot || actions.oneMinusCosine
-
-  // The offset is rounded to nearest even
-  private val below   = sum.asUInt(NumberFormats.normalFraction - 1, 0)
-  private val roundUp = below.head(1).asBool &&
-    (below.tail(1).orR || sum(NumberFormats.normalFraction))
-  private val carry = subtract || (actions.shiftInOrigin && roundUp)
-  private val total =
-    (Cat(left.asUInt, true.B) + Cat(Mux(subtract, ~right, right).asUInt, carry))(formats.sumBits, 1).asSInt
-  when(
-    actions.accumulate || double || actions.loadProduct || actions.squaredSine || actions.discriminant || takesRoot ||
-      actions.oneMinusCosine || actions.addReflectance
-  )(sum := total)
+  adder.io.actions        := actions
+  adder.io.doubles        := shiftsUp
+  adder.io.takesRoot      := actions.subtractRoot && roots.io.isReady
+  adder.io.product        := product
+  adder.io.exponent       := exponent
+  adder.io.squaredLengths := squaredLengths
+  adder.io.root           := roots.io.root
+  adder.io.cosine         := cosine
+  adder.io.reflectance    := reflectance
+  adder.io.origin         := origin(0)
 
   io.status.isPositive        := !io.status.isNegative && sum =/= 0.S
   io.status.isNegative        := sum < 0.S
@@ -186,6 +159,7 @@ final class BounceDatapath(config: ColonnadeConfig) extends Module {
   io.status.quotientIsShifted := shiftRight <= 3.U
 
   // Scalars
+  private val floored = Rounding.floor(product, NumberFormats.etaFraction)
   when(actions.latchNormalSquared) {
     exponent       := topExponent
     directionScale := scaled(shadeBits - 1, 0)

@@ -2,62 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import colonnade.config.NumberFormats
-import colonnade.microcode.{Label, Microprogram, Overlap, Repeat, StepEncoding}
-
-/** Labels of [[BounceProgram]]. */
-sealed trait BounceLabel extends Label
-
-object BounceLabel {
-
-  /** Waits for a hit. */
-  case object Idle extends BounceLabel
-
-  /** Normalises the geometric normal, which takes the place of the smooth one. */
-  case object GeometricNormal extends BounceLabel
-
-  /** Computes the lengths of normal and ray, and their angle. */
-  case object DotProducts extends BounceLabel
-
-  /** Computes the reflected direction. */
-  case object Reflect extends BounceLabel
-
-  /** Computes Snell's discriminant. */
-  case object Discriminant extends BounceLabel
-
-  /** Takes the discriminant's root. */
-  case object Root extends BounceLabel
-
-  /** Computes the refracted direction. */
-  case object Refract extends BounceLabel
-
-  /** Checks on which side of the surface the ray goes on. */
-  case object HemisphereCheck extends BounceLabel
-
-  /** Moves the origin to the other side of the surface. */
-  case object Offset extends BounceLabel
-
-  /** Computes the cosine for Schlick's approximation. */
-  case object Cosine extends BounceLabel
-
-  /** Computes Schlick's approximation of the Fresnel term. */
-  case object Fresnel extends BounceLabel
-
-  /** Offers the result. */
-  case object Done extends BounceLabel
-}
-
-/** State of the current bounce, written by [[BounceProgram]] and its unit. */
-final class BounceState {
-  val isGlass:  Bool = Reg(Bool())
-  val isSmooth: Bool = Reg(Bool())
-  val backSide: Bool = Reg(Bool())
-
-  /** The ray is refracted, not reflected. */
-  val isRefraction: Bool = Reg(Bool())
-
-  /** The result has a Fresnel term. */
-  val hasFresnel: Bool = Reg(Bool())
-}
+import colonnade.microcode.{Microprogram, Overlap, Repeat, StepEncoding}
 
 /** The bounce unit's microprogram. A step takes one cycle, or one per digit if it multiplies.
   *
@@ -272,12 +217,8 @@ final class BounceProgram(
   /** With x = 1 − cosine: x², x⁴, x⁵, and that times 1 − reflectance. */
   private def fresnel(at: Overlap[BounceLabel]): Unit = {
     at(oneMinus)(raise(actions.oneMinusCosine))
-    val factors = Seq(
-      products.timesOneMinusCosine,
-      products.squarePower,
-      products.timesOneMinusCosine,
-      products.timesOneMinusReflectance
-    )
+    import products.{squarePower, timesOneMinusCosine, timesOneMinusReflectance}
+    val factors = Seq(timesOneMinusCosine, squarePower, timesOneMinusCosine, timesOneMinusReflectance)
     for ((cycle, product) <- powers.zip(factors)) at(cycle)(program.raiseEarly(product))
     powers.init.foreach(cycle => at(cycle + 1)(raise(actions.loadProduct)))
     at(powers.last + 1)(raise(actions.addReflectance))

@@ -24,8 +24,8 @@ final class BounceRootsIO(numbers: NumberFormats) extends Bundle {
   val root         = Output(UInt(formats.cosineBits.W))
 
   /** Product and exponent of the vectors' squared lengths, as in [[Angle]]. */
-  val lengths  = Input(UInt((2 * numbers.shadeBits).W))
-  val exponent = Input(UInt(3.W))
+  val normProduct = Input(UInt((2 * numbers.shadeBits).W))
+  val exponent    = Input(UInt(3.W))
 
   /** n·d, with its top bit set. */
   val dot      = Input(UInt((2 * numbers.shadeBits + 2).W))
@@ -57,9 +57,9 @@ final class BounceRoots(numbers: NumberFormats) extends Module {
   }
   when(io.startRoot)(quarters.zip(isLonger).foreach { case (quarter, isLonger) => quarter := isLonger })
 
-  // The lengths' product: one of its two top bits is set. Its exponent is made even
-  private val isLong   = io.lengths.head(1).asBool
-  private val aligned  = Mux(isLong, io.lengths, Cat(io.lengths.tail(1), 0.U(1.W)))
+  // The product of both squared lengths: one of its two top bits is set. Its exponent is made even
+  private val isLong   = io.normProduct.head(1).asBool
+  private val aligned  = Mux(isLong, io.normProduct, Cat(io.normProduct.tail(1), 0.U(1.W)))
   private val mantissa = Rounding.floor(aligned, aligned.getWidth - radicandBits)
   private val exponent = io.exponent + isLong
   private val radicand = Mux(exponent(0), mantissa, Rounding.floor(mantissa, 1))

@@ -63,10 +63,10 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
   private val isNear       = falloffShift < 0.S
 
   // The radicand: one of the product's two top bits is set, and the exponent is made even
-  private val angle    = io.angle.bits
-  private val isLong   = angle.lengths(formats.lengthsBits - 1)
-  private val aligned  = Mux(isLong, angle.lengths, Cat(angle.lengths(formats.lengthsBits - 2, 0), 0.U(1.W)))
-  private val mantissa = Rounding.floor(aligned, formats.lengthsBits - numbers.radicandBits)
+  private val angle   = io.angle.bits
+  private val isLong  = angle.normProduct(formats.normProductBits - 1)
+  private val aligned = Mux(isLong, angle.normProduct, Cat(angle.normProduct(formats.normProductBits - 2, 0), 0.U(1.W)))
+  private val mantissa = Rounding.floor(aligned, formats.normProductBits - numbers.radicandBits)
   private val exponent = angle.exponent +& isLong
 
   // While the root is computed, the dot product moves up until its top bit is set

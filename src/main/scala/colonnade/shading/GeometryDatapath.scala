@@ -210,10 +210,10 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
     context    := environment.context
   }
 
-  io.angle.isAcute  := isAcute
-  io.angle.dot      := dot
-  io.angle.lengths  := sum.asUInt(formats.lengthsBits - 1, 0)
-  io.angle.exponent := normalExponent +& lightExponent
+  io.angle.isAcute     := isAcute
+  io.angle.dot         := dot
+  io.angle.normProduct := sum.asUInt(formats.normProductBits - 1, 0)
+  io.angle.exponent    := normalExponent +& lightExponent
 
   // The light's squared distance has 2 · shadeBits - 1 + lightExponent bits, after a left shift by lightZeros
   private val scale =

@@ -47,7 +47,7 @@ final class ShaderFormats(numbers: NumberFormats) {
   val dotBits: Int = 2 * shadeBits + 2
 
   /** The product of both lengths' mantissas; one of its two highest bits is set. */
-  val lengthsBits: Int = 2 * shadeBits
+  val normProductBits: Int = 2 * shadeBits
 
   /** Log2 of a light's reference distance over its distance, both squared. */
   val falloffExponentBits: Int =
@@ -80,7 +80,7 @@ final class Angle(formats: ShaderFormats) extends Bundle {
   val dot     = UInt(formats.dotBits.W)
 
   /** The product of both mantissas u. */
-  val lengths = UInt(formats.lengthsBits.W)
+  val normProduct = UInt(formats.normProductBits.W)
 
   /** The sum of both k. */
   val exponent = UInt(3.W)

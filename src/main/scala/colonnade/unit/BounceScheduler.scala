@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.RememberedRay
+import colonnade.environment.StoredRay
 import colonnade.formats.Shading
 import colonnade.ray.RayRequest
 import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay}
@@ -20,7 +20,7 @@ final class DeferredBounceIO(config: ColonnadeConfig) extends Bundle {
   val resume            = Flipped(Decoupled(new ResumedBounce(config)))
 
   /** The Fresnel reflection, or the ray with which a path continues. */
-  val ray = Valid(new RememberedRay(config))
+  val ray = Valid(new StoredRay(config))
 }
 
 /** Ports of [[BounceScheduler]]. */
@@ -117,9 +117,9 @@ final class BounceScheduler(config: ColonnadeConfig) extends Module {
     val ray = environment.ray.bits.ray
     ray.pixel   := DontCare
     ray.origin  := Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get)
-    ray.towards := bounce.bits.dir
+    ray.dir := bounce.bits.dir
     when(!bounce.fire) {
-      ray.towards.axes.zip(result.reflection.axes).foreach { case (to, from) => to := from }
+      ray.dir.axes.zip(result.reflection.axes).foreach { case (to, from) => to := from }
     }
   }
 }

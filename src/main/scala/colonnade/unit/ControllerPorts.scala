@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.RoomQuestion
+import colonnade.environment.EnvironmentRequest
 import colonnade.shading.{Occlusion, PathTermination, ShadowRequest}
 
 /** The state of a context. */
@@ -78,7 +78,7 @@ final class EnvironmentControl(config: ColonnadeConfig) extends Bundle {
   val fresnelReflection = Flipped(Valid(Context(config)))
 
   /** A ray to march through the environment; its result. */
-  val req  = Decoupled(new RoomQuestion(config))
+  val req  = Decoupled(new EnvironmentRequest(config))
   val hit  = Flipped(Valid(Context(config)))
   val miss = Flipped(Valid(Context(config)))
 

@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Decoupled
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.environment.{AttributePort, MarchEvents, RoomStage}
+import colonnade.environment.{AttributePort, MarchEvents, EnvironmentStage}
 import colonnade.formats.{PixelPosition, RoomView}
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
@@ -32,7 +32,7 @@ final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
 final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentPortIO(config))
 
-  private val stage   = Module(new RoomStage(config))
+  private val stage   = Module(new EnvironmentStage(config))
   private val control = io.control
   control.enabled := io.view.isThere
   stage.io.view   := io.view
@@ -40,8 +40,8 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   io.events := stage.io.events
 
   // March
-  stage.io.question :<>= control.req
-  control.miss := stage.io.nothing
+  stage.io.req :<>= control.req
+  control.miss := stage.io.miss
   io.surfaces :<>= stage.io.surface
   control.hit.valid := stage.io.surface.fire
   control.hit.bits  := stage.io.surface.bits.context
@@ -62,7 +62,7 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   stage.io.ray.valid            := isBounce || io.primary.fire
   stage.io.ray.bits.context     := primary.context
   stage.io.ray.bits.ray.origin  := primary.origin
-  stage.io.ray.bits.ray.towards := primary.dir
+  stage.io.ray.bits.ray.dir := primary.dir
   for (ray <- bounceRay) when(ray.valid) { stage.io.ray.bits := ray.bits }
   stage.io.ray.bits.ray.pixel := io.pixel
 

@@ -161,11 +161,11 @@ final class RtController(config: ColonnadeConfig) extends Module {
       PopCount(state.map(at => at === ContextState.environmentPending || at === ContextState.environmentMarch))
     environment.req.valid        := pending.valid
     environment.req.bits.context := pending.bits
-    environment.req.bits.isSeen  := isPrimary(pending.bits)
-    environment.req.bits.isAside := isFresnelReflection(pending.bits)
+    environment.req.bits.isDirectView  := isPrimary(pending.bits)
+    environment.req.bits.isFresnelReflection := isFresnelReflection(pending.bits)
     when(environment.req.fire) {
       state(pending.bits)        := ContextState.environmentMarch
-      isDirectView(pending.bits) := environment.req.bits.isSeen
+      isDirectView(pending.bits) := environment.req.bits.isDirectView
       isShadow(pending.bits)     := false.B
     }
     when(environment.hit.valid) { state(environment.hit.bits) := ContextState.shading }

@@ -39,7 +39,7 @@ class FakeRenderUnit(config: ColonnadeConfig) extends Module {
   io.requests.valid        := state === asking && !isShown
   io.requests.bits.address := address
   io.pixels.valid          := state === leaving
-  io.maps.foreach(_.asksNothing())
+  io.maps.foreach(_.tieOff())
   io.pixels.bits          := 0.U.asTypeOf(new Pixel(config))
   io.pixels.bits.x        := position.x
   io.pixels.bits.y        := position.y

@@ -30,18 +30,18 @@ class AttributeMapSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for ((config, seed) <- TestConfigs.rooms.zipWithIndex) {
     val size = config.physicalAttributeMemory.get
-    it should s"answer as the model: ${size.width}x${size.height}, tiles of ${size.tileSize}, ${size.encoding.name}" in {
-      val count  = 600
-      val random = new Random(seed)
-      val room   = new RoomDialogue(config, random)
+    it should s"respond like the model: ${size.width}x${size.height}, tiles of ${size.tileSize}, ${size.encoding.name}" in {
+      val count       = 600
+      val random      = new Random(seed)
+      val environment = new EnvironmentStimulus(config, random)
       test(new MapHarness(config)).withAnnotations(Simulation.verilator) { maps =>
-        room.load(maps.load, maps.clock)
+        environment.load(maps.load, maps.clock)
         for (offered <- Seq(1.0, 0.3)) {
           def tester(name: String, channel: FlatChannel, exchanges: Seq[Exchange]) =
             new ChannelTester(name, channel, MapHarness.tagBits, exchanges, offered, random)
           val testers = Seq(
-            tester("albedo", maps.albedo, room.albedo(count)),
-            tester("normals", maps.normals, room.normals(count))
+            tester("albedo", maps.albedo, environment.albedo(count)),
+            tester("normals", maps.normals, environment.normals(count))
           )
           val cycles = ChannelTester.run(maps.clock, testers)
           // One cycle a pixel, or two where a tile has four entries; and the first one's latency

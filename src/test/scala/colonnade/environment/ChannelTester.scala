@@ -7,79 +7,78 @@ import chiseltest._
 import scala.collection.mutable
 import scala.util.Random
 
-/** A channel as one integer each way: the tag is in the low bits, an answer's `isIllegal` in the highest one. */
-final class FlatChannel(questionBits: Int, answerBits: Int, tagBits: Int) extends Bundle {
-  val question = Flipped(Decoupled(UInt((questionBits + tagBits).W)))
-  val answer   = Valid(UInt((answerBits + tagBits).W))
+/** A channel with one integer each way. The tag is in the low bits, a response's `isIllegal` in the highest bit. */
+final class FlatChannel(reqBits: Int, respBits: Int, tagBits: Int) extends Bundle {
+  val req  = Flipped(Decoupled(UInt((reqBits + tagBits).W)))
+  val resp = Valid(UInt((respBits + tagBits).W))
 }
 
 object FlatChannel {
 
   /** Ports for a channel of the unit under test. */
-  def apply[Q <: Data, A <: Data](channel: AttributeChannel[Q, A]): FlatChannel = {
-    val (question, answer) = (channel.question.bits, channel.answer.bits)
-    val flat               =
-      IO(new FlatChannel(question.content.getWidth, answer.getWidth - answer.tag.getWidth, question.tag.getWidth))
-    channel.question.valid := flat.question.valid
-    channel.question.bits  := flat.question.bits.asTypeOf(question)
-    flat.question.ready    := channel.question.ready
-    flat.answer.valid      := channel.answer.valid
-    flat.answer.bits       := answer.asUInt
+  def apply[Q <: Data, R <: Data](channel: AttributeChannel[Q, R]): FlatChannel = {
+    val (req, resp) = (channel.req.bits, channel.resp.bits)
+    val flat        = IO(new FlatChannel(req.content.getWidth, resp.getWidth - resp.tag.getWidth, req.tag.getWidth))
+    channel.req.valid := flat.req.valid
+    channel.req.bits  := flat.req.bits.asTypeOf(req)
+    flat.req.ready    := channel.req.ready
+    flat.resp.valid   := channel.resp.valid
+    flat.resp.bits    := resp.asUInt
     flat
   }
 }
 
-/** A packed question, its answer, and the bits of the answer that say something. */
-final case class Exchange(question: BigInt, answer: BigInt, mask: BigInt = -1)
+/** A packed request, its response, and a mask of the response's valid bits. */
+final case class Exchange(req: BigInt, resp: BigInt, mask: BigInt = -1)
 
-/** Asks a channel in random cycles and holds each answer, in the order of the questions, against the expected one.
+/** Sends requests to a channel in random cycles, and compares the responses, in order, with the expected ones.
   *
-  * @param offered  probability that a question is offered in a cycle; while there is none the port is noise
+  * @param offered  probability that a request is offered in a cycle; otherwise the port holds random bits
   */
 final class ChannelTester(
-    name:     String,
-    channel:  FlatChannel,
-    tagBits:  Int,
-    dialogue: Seq[Exchange],
-    offered:  Double,
-    random:   Random
+    name:      String,
+    channel:   FlatChannel,
+    tagBits:   Int,
+    exchanges: Seq[Exchange],
+    offered:   Double,
+    random:    Random
 ) {
-  private val toAsk   = mutable.Queue.from(dialogue)
-  private val awaited = mutable.Queue.empty[(Exchange, Int)] // with the cycle of the question
+  private val toSend  = mutable.Queue.from(exchanges)
+  private val pending = mutable.Queue.empty[(Exchange, Int)] // with the cycle of the request
   private var offer   = Option.empty[Exchange]               // with its tag
 
-  /** Questions accepted, and answers. */
-  var asked    = 0
-  var answered = 0
+  /** Requests accepted, and responses. */
+  var requests  = 0
+  var responses = 0
 
-  /** Least cycles from a question accepted to its answer. */
+  /** The least number of cycles from an accepted request to its response. */
   var latency = Int.MaxValue
 
   private var cycle = 0
 
-  def isDone: Boolean = answered == dialogue.size
+  def isDone: Boolean = responses == exchanges.size
 
   def before(): Unit = {
-    if (offer.isEmpty && toAsk.nonEmpty && random.nextDouble() < offered) offer = Some(tagged(toAsk.dequeue()))
-    channel.question.valid.poke(offer.nonEmpty)
-    channel.question.bits.poke(offer.fold(BigInt(channel.question.bits.getWidth, random))(_.question))
+    if (offer.isEmpty && toSend.nonEmpty && random.nextDouble() < offered) offer = Some(tagged(toSend.dequeue()))
+    channel.req.valid.poke(offer.nonEmpty)
+    channel.req.bits.poke(offer.fold(BigInt(channel.req.bits.getWidth, random))(_.req))
   }
 
   def after(): Unit = {
-    if (channel.answer.valid.peekBoolean()) {
-      assert(awaited.nonEmpty, s"$name answers without a question")
-      answered += 1
-      val found               = channel.answer.bits.peekInt()
-      val (expected, askedAt) = awaited.dequeue()
-      latency = latency.min(cycle - askedAt)
+    if (channel.resp.valid.peekBoolean()) {
+      assert(pending.nonEmpty, s"$name: a response without a request")
+      responses += 1
+      val found              = channel.resp.bits.peekInt()
+      val (expected, sentAt) = pending.dequeue()
+      latency = latency.min(cycle - sentAt)
       assert(
-        (found & expected.mask) == (expected.answer & expected.mask),
-        s"$name: answer $answered is ${found.toString(16)}, not ${expected.answer.toString(16)}"
+        (found & expected.mask) == (expected.resp & expected.mask),
+        s"$name: response $responses is ${found.toString(16)}, not ${expected.resp.toString(16)}"
       )
     }
-    for (exchange <- offer if channel.question.ready.peekBoolean()) {
-      asked += 1
-      awaited += exchange -> cycle
+    for (exchange <- offer if channel.req.ready.peekBoolean()) {
+      requests += 1
+      pending += exchange -> cycle
       offer = None
     }
     cycle += 1
@@ -88,8 +87,8 @@ final class ChannelTester(
   private def tagged(exchange: Exchange): Exchange = {
     val tag = BigInt(tagBits, random)
     Exchange(
-      exchange.question << tagBits | tag,
-      exchange.answer << tagBits | tag,
+      exchange.req << tagBits | tag,
+      exchange.resp << tagBits | tag,
       exchange.mask << tagBits | ((BigInt(1) << tagBits) - 1)
     )
   }
@@ -97,22 +96,22 @@ final class ChannelTester(
 
 object ChannelTester {
 
-  /** Steps until all have their answers, and some cycles more, in which there may be no other ones.
+  /** Steps until all responses have arrived, and some more cycles, in which no other response may arrive.
     *
     * @param watch  called in each cycle
-    * @return cycles up to the last answer
+    * @return cycles up to the last response
     */
   def run(clock: Clock, testers: Seq[ChannelTester], watch: () => Unit = () => ()): Int = {
     var cycles, quiet = 0
     def step(): Unit  = {
-      val before = testers.map(_.answered).sum
+      val before = testers.map(_.responses).sum
       testers.foreach(_.before())
       testers.foreach(_.after())
       watch()
       clock.step()
       cycles += 1
-      quiet = if (testers.map(_.answered).sum == before) quiet + 1 else 0
-      assert(quiet < 200, "no answer any more")
+      quiet = if (testers.map(_.responses).sum == before) quiet + 1 else 0
+      assert(quiet < 200, "no more responses")
     }
     clock.setTimeout(0)
     while (!testers.forall(_.isDone)) step()

@@ -10,10 +10,10 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** The maps of a device of many units, wired as there: a copy in its only column, or one that all columns share. */
-private class RoomHarness(config: ColonnadeConfig) extends Module {
+/** The maps of a device with several units: a copy in the only column, or one copy that all columns share. */
+private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
   val load    = IO(Flipped(Valid(new Load(config))))
-  val columns = Seq.fill(config.array.columns)(Module(new ColumnRoom(config)).io)
+  val columns = Seq.fill(config.array.columns)(Module(new ColumnEnvironment(config)).io)
   val events  = IO(Vec(config.array.columns, Output(new AttributeEvents)))
   columns.foreach(_.load := load)
   events.zip(columns).foreach { case (port, column) => port := column.events }
@@ -25,7 +25,7 @@ private class RoomHarness(config: ColonnadeConfig) extends Module {
     maps.io.ports.zip(columns).foreach { case (port, column) => column.shared.foreach(port <> _) }
   }
 
-  /** Of each unit, all that it may ask. */
+  /** All channels of each unit. */
   val channels = columns.flatMap(_.ports).map { port =>
     Seq(FlatChannel(port.albedo), FlatChannel(port.normals), FlatChannel(port.cells), FlatChannel(port.planes))
   }
@@ -35,8 +35,8 @@ class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester
   behavior of "PhysicalAttributeMemory"
 
   private def config(encoding: MapEncoding, rows: Int, columns: Int): ColonnadeConfig = {
-    val room = TestConfigs.withRoom(TestConfigs.room.copy(encoding = encoding, shared = columns > 1))
-    room.copy(array = room.array.copy(rows = rows, columns = columns))
+    val environment = TestConfigs.withRoom(TestConfigs.room.copy(encoding = encoding, shared = columns > 1))
+    environment.copy(array = environment.array.copy(rows = rows, columns = columns))
   }
 
   for (
@@ -46,20 +46,25 @@ class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester
       (MapEncoding.Sliding, 3, 1),
       (MapEncoding.TwoLevel, 4, 3)
     )
-  ) it should s"give each unit its own answers: $rows rows, $columns columns, ${encoding.name}" in {
-    val count  = 60
-    val random = new Random(rows)
-    val shape  = config(encoding, rows, columns)
-    val room   = new RoomDialogue(shape, random)
-    test(new RoomHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
-      room.load(dut.load, dut.clock)
+  ) it should s"give each unit its own responses: $rows rows, $columns columns, ${encoding.name}" in {
+    val count       = 60
+    val random      = new Random(rows)
+    val shape       = config(encoding, rows, columns)
+    val environment = new EnvironmentStimulus(shape, random)
+    test(new EnvironmentHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
+      environment.load(dut.load, dut.clock)
       val testers = dut.channels.zipWithIndex.map { case (channels, unit) =>
-        val dialogues = Seq(room.albedo(count), room.normals(count), room.cells(count), room.planes(count))
-        val names     = Seq("albedo", "normals", "cells", "planes")
-        channels.zip(names.zip(dialogues)).map { case (channel, (name, dialogue)) =>
-          // Some ask all the time, others now and then
+        val exchanges = Seq(
+          environment.albedo(count),
+          environment.normals(count),
+          environment.cells(count),
+          environment.planes(count)
+        )
+        val names = Seq("albedo", "normals", "cells", "planes")
+        channels.zip(names.zip(exchanges)).map { case (channel, (name, exchanges)) =>
+          // Some units send requests all the time, others now and then
           val offered = if (unit % 3 == 0) 1.0 else 0.1
-          new ChannelTester(s"$name of unit $unit", channel, AttributePort.tagBits(shape), dialogue, offered, random)
+          new ChannelTester(s"$name of unit $unit", channel, AttributePort.tagBits(shape), exchanges, offered, random)
         }
       }
       var reads            = Seq.fill(4)(0)

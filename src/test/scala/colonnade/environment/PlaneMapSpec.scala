@@ -28,16 +28,16 @@ class PlaneMapSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for ((config, seed) <- TestConfigs.rooms.filterNot(_.physicalAttributeMemory.get.layout.isSliding).zipWithIndex) {
     val size = config.physicalAttributeMemory.get
-    it should s"name tiles, cells and planes as the model does: ${size.width}x${size.height}, tiles of ${size.tileSize}" in {
-      val random = new Random(seed)
-      val room   = new RoomDialogue(config, random)
+    it should s"give the model's tiles, cells and planes: ${size.width}x${size.height}, tiles of ${size.tileSize}" in {
+      val random      = new Random(seed)
+      val environment = new EnvironmentStimulus(config, random)
       test(new PlaneMapHarness(config)).withAnnotations(Simulation.verilator) { map =>
-        room.load(map.load, map.clock)
+        environment.load(map.load, map.clock)
         for (offered <- Seq(1.0, 0.3)) {
           def tester(name: String, channel: FlatChannel, exchanges: Seq[Exchange]) =
             new ChannelTester(name, channel, PlaneMapHarness.tagBits, exchanges, offered, random)
           val (cells, planes) =
-            (tester("cells", map.cells, room.cells(500)), tester("planes", map.planes, room.planes(400)))
+            (tester("cells", map.cells, environment.cells(500)), tester("planes", map.planes, environment.planes(400)))
           val cycles = ChannelTester.run(map.clock, Seq(cells, planes))
           // Three words a cell at most.
           if (offered == 1) assert(cycles <= 3 * 500 + 8)

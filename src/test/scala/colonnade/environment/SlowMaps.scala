@@ -3,33 +3,33 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.random.LFSR
 
-/** Between one who asks for a room's maps and the maps: takes questions and gives answers later than it could. */
+/** Delays requests to an environment's maps, and their responses, at random. */
 object SlowMaps {
 
-  /** @param asks with one question in flight in each channel at most */
-  def connect(asks: AttributePort, knows: AttributePort, isSlow: Bool): Unit = {
+  /** @param requester has at most one request in flight in each channel */
+  def connect(requester: AttributePort, maps: AttributePort, isSlow: Bool): Unit = {
     val noise = LFSR(16)
-    join(asks.cells, knows.cells, isSlow && noise(0))
-    join(asks.planes, knows.planes, isSlow && noise(5))
-    join(asks.albedo, knows.albedo, isSlow && noise(9))
-    join(asks.normals, knows.normals, isSlow && noise(3))
+    join(requester.cells, maps.cells, isSlow && noise(0))
+    join(requester.planes, maps.planes, isSlow && noise(5))
+    join(requester.albedo, maps.albedo, isSlow && noise(9))
+    join(requester.normals, maps.normals, isSlow && noise(3))
   }
 
-  private def join[Q <: Data, A <: Data](
-      asks:  AttributeChannel[Q, A],
-      knows: AttributeChannel[Q, A],
-      holds: Bool
+  private def join[Q <: Data, R <: Data](
+      requester: AttributeChannel[Q, R],
+      map:       AttributeChannel[Q, R],
+      holds:     Bool
   ): Unit = {
-    knows.question.valid := asks.question.valid && !holds
-    knows.question.bits  := asks.question.bits
-    asks.question.ready  := knows.question.ready && !holds
+    map.req.valid       := requester.req.valid && !holds
+    map.req.bits        := requester.req.bits
+    requester.req.ready := map.req.ready && !holds
 
-    // An answer waits, for there is one at most
+    // At most one response waits
     val waiting = RegInit(false.B)
-    val kept    = Reg(chiselTypeOf(knows.answer.bits))
-    when(knows.answer.valid)(kept := knows.answer.bits)
-    asks.answer.valid := (knows.answer.valid || waiting) && !holds
-    asks.answer.bits := Mux(knows.answer.valid, knows.answer.bits, kept)
-    waiting := (knows.answer.valid || waiting) && holds
+    val kept    = Reg(chiselTypeOf(map.resp.bits))
+    when(map.resp.valid)(kept := map.resp.bits)
+    requester.resp.valid := (map.resp.valid || waiting) && !holds
+    requester.resp.bits := Mux(map.resp.valid, map.resp.bits, kept)
+    waiting := (map.resp.valid || waiting) && holds
   }
 }

@@ -33,7 +33,7 @@ class DividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers w
     }
 
   for ((mantissaBits, digits) <- Seq((32, 32), (32, 18), (32, 31), (8, 30), (17, 16), (24, 8)))
-    it should s"divide random and extreme $mantissaBits-bit mantissas to $digits digits, whoever stalls" in {
+    it should s"divide random and extreme $mantissaBits-bit mantissas to $digits digits, with stalls" in {
       val random   = new Random(2)
       val top      = BigInt(1) << (mantissaBits - 1)
       val extremes = Seq(top, top + 1, 2 * top - 2, 2 * top - 1)
@@ -67,7 +67,7 @@ class DividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers w
     }
   }
 
-  it should "take one division every steps + 1 cycles when nobody stalls" in {
+  it should "take one division every steps + 1 cycles without stalls" in {
     test(new Divider(32, 18)) { unit =>
       unit.io.division.valid.poke(true)
       unit.io.division.bits.numerator.poke(BigInt(1) << 31)

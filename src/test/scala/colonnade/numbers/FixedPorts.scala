@@ -3,7 +3,7 @@ package colonnade.numbers
 import chisel3._
 import chiseltest._
 
-/** Raw integers into and out of ports that are [[Fixed]]. */
+/** Raw integers for ports of type [[Fixed]]. */
 object FixedPorts {
   implicit final class FixedPort(port: Fixed) {
     def pokeRaw(raw: BigInt): Unit = port.raw match {

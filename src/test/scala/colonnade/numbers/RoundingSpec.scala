@@ -7,7 +7,7 @@ import org.scalacheck.{Gen, Prop}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
-/** All roundings of one operand, signed and unsigned, side by side. */
+/** All roundings of one operand, signed and unsigned. */
 private class RoundingHarness(width: Int, amounts: Seq[Int]) extends Module {
   val signed   = IO(Input(SInt(width.W)))
   val unsigned = IO(Input(UInt(width.W)))
@@ -98,27 +98,27 @@ private object RoundingSpec {
       (BigInt(a), BigInt(b))
     }
 
-  /** Every length, so that small numbers occur as often as large ones. */
+  /** Numbers of every length, so that small ones are as frequent as large ones. */
   def signed(width: Int): Gen[BigInt] = for {
     length <- Gen.choose(0, width - 1)
     bits   <- Gen.choose(BigInt(0), (BigInt(1) << length) - 1)
     sign   <- Gen.oneOf(true, false)
   } yield if (sign) -bits - 1 else bits
 
-  /** result ≤ x / 2^n < result + 1, both sides times what makes them whole. */
+  /** result ≤ x / 2^n < result + 1, scaled to integers. */
   def isFloor(result: BigInt, x: BigInt, n: Int): Boolean = {
     val (whole, step) = (x << (-n).max(0), BigInt(1) << n.max(0))
     result * step <= whole && whole < (result + 1) * step
   }
 
-  /** |result - x / 2^n| ≤ ½, and an even result where that is ½. */
+  /** |result - x / 2^n| ≤ ½, and the result is even if that is ½. */
   def isNearestEven(result: BigInt, x: BigInt, n: Int): Boolean = {
     val (whole, step) = (x << (-n).max(0), BigInt(1) << n.max(0))
     val twice         = 2 * (result * step - whole).abs
     twice < step || (twice == step && !result.testBit(0))
   }
 
-  /** By integer division, which truncates, made to floor. */
+  /** By integer division, corrected from truncation to floor. */
   def floor(x: BigInt, bits: Int): BigInt =
     if (bits <= 0) x << -bits
     else {

@@ -17,7 +17,7 @@ class SquareRootSpec extends AnyFlatSpec with ChiselScalatestTester with Matcher
       _.peek().litValue
     )(random, stalls)
 
-  /** The definition, not an algorithm. */
+  /** By definition, not by an algorithm. */
   private def isFloorOfRoot(root: BigInt, radicand: BigInt): Boolean =
     root * root <= radicand && radicand < (root + 1) * (root + 1)
 
@@ -31,7 +31,7 @@ class SquareRootSpec extends AnyFlatSpec with ChiselScalatestTester with Matcher
     }
 
   for (bits <- Seq(16, 32, 47, 64))
-    it should s"find the root of random $bits-bit numbers and of those next to squares, whoever stalls" in {
+    it should s"find the root of random $bits-bit numbers and of those next to squares, with stalls" in {
       val random    = new Random(4)
       val largest   = (BigInt(1) << bits) - 1
       val squares   = Seq.fill(30)(BigInt(SquareRoot.rootBits(bits), random).pow(2)).filter(_ <= largest)

@@ -7,13 +7,13 @@ import chiseltest._
 import scala.collection.mutable
 import scala.util.Random
 
-/** Drives a unit with one stream in and one out, with random stalls on both sides, and holds it to the protocol: a
-  * result that was offered stays as it is until it is taken.
+/** Drives a unit with one input and one output stream, with random stalls on both. Checks the protocol: an offered result
+  * does not change until it is taken.
   */
 object StreamTester {
 
-  /** @param stalls probability that a side is not willing in a cycle
-    * @param limit  cycles without any transfer after which the unit counts as hung
+  /** @param stalls probability of a stall in a cycle, for each stream
+    * @param limit  cycles without a transfer after which the test fails
     * @return the results in order
     */
   def exchange[I <: Data, O <: Data, X](clock: Clock, in: DecoupledIO[I], out: DecoupledIO[O], inputs: Seq[X])(

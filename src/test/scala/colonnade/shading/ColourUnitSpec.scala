@@ -40,9 +40,9 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   private def intensity(): Seq[Int] =
     xyz(if (random.nextInt(6) == 0) 65535 else random.nextInt(6) * random.nextInt(1800))
 
-  private val ambient    = intensity()
-  private val background = colour()
-  private val clearness  = random.nextInt(one + 1)
+  private val ambient             = intensity()
+  private val background          = colour()
+  private val shadowTransmittance = random.nextInt(one + 1)
 
   private var throughput = Seq.fill(contexts)(Seq.fill(3)(one))
   private var radiance   = Seq.fill(contexts)(Seq.fill(3)(0))
@@ -50,7 +50,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   def run(paths: Int): Unit = {
     poke(dut.io.ambient, ambient)
     pokeUInt(dut.io.background, background)
-    dut.io.shading.clearness.foreach(_.pokeRaw(clearness))
+    dut.io.shading.clearness.foreach(_.pokeRaw(shadowTransmittance))
     for (_ <- 0 until paths) {
       // Some contexts hit mirrors and glass, then all paths end, in any order
       (0 until contexts).foreach(begin)
@@ -124,7 +124,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     val visible = ambient.zipWithIndex.map { case (light, channel) =>
       light + surface.directLight.zip(met).map {
         case (direct, Occlusion.none)         => direct(channel)
-        case (direct, Occlusion.transmissive) => (direct(channel).toLong * clearness >> 12).toInt
+        case (direct, Occlusion.transmissive) => (direct(channel).toLong * shadowTransmittance >> 12).toInt
         case _                                => 0
       }.sum
     }

@@ -138,8 +138,8 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
     }
 
     for (environment <- dut.io.environment; index <- marched) {
-      environment.req.bits.isSeen.expect(contexts(index).isPrimary)
-      environment.req.bits.isAside.expect(contexts(index).isFresnelReflection)
+      environment.req.bits.isDirectView.expect(contexts(index).isPrimary)
+      environment.req.bits.isFresnelReflection.expect(contexts(index).isFresnelReflection)
     }
     for (environment <- dut.io.environment; index <- resumed)
       environment.resume.bits.isBackground.expect(contexts(index).isBackground)

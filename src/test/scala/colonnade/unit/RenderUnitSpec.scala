@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.Valid
 import chiseltest._
 import colonnade.config.{ColonnadeConfig, MapEncoding, UnitsConfig}
-import colonnade.environment.{AttributePort, PhysicalAttributeMemory, RoomImage, SlowMaps}
+import colonnade.environment.{AttributePort, EnvironmentImage, PhysicalAttributeMemory, SlowMaps}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.{Model, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -137,7 +137,7 @@ private class UnitColumn(
   dut.clock.setTimeout(0)
   dut.registers.poke(new Packed(new FrameRegisters(config)).pack(registers))
   dut.io.row.poke(row)
-  for (words <- maps; port <- dut.load) RoomImage.load(port, dut.clock, config, words)
+  for (words <- maps; port <- dut.load) EnvironmentImage.load(port, dut.clock, config, words)
   dut.io.start.poke(true)
   dut.clock.step()
   dut.io.start.poke(false)

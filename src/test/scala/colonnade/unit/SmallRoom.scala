@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.{RoomScene, ViewQuestion}
+import colonnade.environment.{EnvironmentScene, ViewCase}
 
 import scala.util.Random
 
@@ -18,7 +18,7 @@ final class SmallRoom(
     isThere: Boolean
 ) {
   private val numbers = config.numbers
-  private val maps    = new RoomScene(config, random)
+  private val maps    = new EnvironmentScene(config, random)
   private val sizes   = Seq(config.physicalAttributeMemory.get.width, config.physicalAttributeMemory.get.height)
 
   /** By the memory's name. */
@@ -32,14 +32,14 @@ final class SmallRoom(
     val camera    = "xyz".map(axis => scene.registers(s"camera.position.$axis") << unitShift)
     val metre     = (BigInt(1) << (numbers.vertexBits + numbers.gridFraction)).toDouble / 1.1
     val axes      = Seq(Seq(1.0, 0, 0), Seq(0, -1.0, 0), Seq(0, 0, 1.0))
-    val view      = ViewQuestion.of(
+    val view      = ViewCase.of(
       config,
       maps.focal,
       maps.middle,
       axes,
       camera,
       metre,
-      ViewQuestion.stepWidths(config, frame)
+      ViewCase.stepWidths(config, frame)
     )
     def scaled(slope: Double): BigInt = BigDecimal(slope * forwards.toDouble).toBigInt
     val steps                         = Seq(0, 1).map(axis => sizes(axis).toDouble / frame(axis) / maps.focal)

@@ -2,8 +2,8 @@ package colonnade.environment
 
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 
-/** A view's registers. */
-final case class ViewQuestion(
+/** The registers of a view. */
+final case class ViewCase(
     matrix:      Seq[BigInt],
     offset:      Seq[BigInt],
     offsetShift: Int,
@@ -23,13 +23,13 @@ final case class ViewQuestion(
       Map("offsetShift" -> BigInt(offsetShift), "exponent" -> BigInt(exponent), "shellPlanes" -> BigInt(shellPlanes))
 }
 
-object ViewQuestion {
+object ViewCase {
 
-  /** That of a camera.
+  /** The view of a camera.
     *
     * @param focal  pixels of the map, as `middle`
     * @param axes   of view space, in the scene
-    * @param camera where it is, in grid steps
+    * @param camera the camera's position, in grid steps
     * @param metre  its grid steps
     */
   def of(
@@ -40,19 +40,19 @@ object ViewQuestion {
       camera: Seq[BigInt],
       metre:  Double,
       steps:  Seq[BigInt]
-  ): ViewQuestion = {
+  ): ViewCase = {
     val numbers                                   = config.numbers
     def row(a: Double, x: Seq[Double], b: Double) =
-      x.zip(axes(2)).map { case (p, q) => (a * p + b * q) / (metre * RoomScene.depthUnit) }
-    val seen     = Seq(0, 1).map(axis => row(focal / 1024, axes(axis), middle(axis) / 1024))
-    val rows     = seen :+ row(0, axes(0), 1)
+      x.zip(axes(2)).map { case (p, q) => (a * p + b * q) / (metre * EnvironmentScene.depthUnit) }
+    val image    = Seq(0, 1).map(axis => row(focal / 1024, axes(axis), middle(axis) / 1024))
+    val rows     = image :+ row(0, axes(0), 1)
     val largest  = rows.flatten.map(_.abs).max
     val bits     = numbers.macBits.min(50) - 2
     val exponent = bits - math.getExponent(largest) - 1
     val matrix   = rows.map(_.map(value => BigDecimal(value * math.pow(2, exponent)).toBigInt))
     val offset   = matrix.map(row => -row.zip(camera).map { case (m, c) => m * c }.sum)
     val shift    = (offset.map(_.bitLength).max - numbers.macBits + 1).max(0)
-    ViewQuestion(
+    ViewCase(
       matrix.flatten,
       offset.map(_ >> shift),
       shift,
@@ -63,7 +63,7 @@ object ViewQuestion {
     )
   }
 
-  /** Pixels of the map in one of the frame, doubled, in steps of the registers. */
+  /** Pixels of the map per half pixel of the frame, in steps of the registers. */
   def stepWidths(config: ColonnadeConfig, frame: Seq[Int]): Seq[BigInt] = {
     val map = AttributeLayout.of(config).config
     Seq(map.width, map.height).zip(frame).map { case (size, pixels) =>

@@ -9,12 +9,12 @@ import colonnade.formats._
 
 import scala.util.Random
 
-/** Questions about a room's maps, some of whose tiles point beyond their heap, and what the model answers. */
-final class RoomDialogue(config: ColonnadeConfig, random: Random) {
+/** Requests to an environment's maps, with the model's responses. Some tiles point beyond their heap. */
+final class EnvironmentStimulus(config: ColonnadeConfig, random: Random) {
   private val layout = AttributeLayout.of(config)
-  private val image  = new RoomImage(config, random, illegal = 0.3)
+  private val image  = new EnvironmentImage(config, random, illegal = 0.3)
 
-  /** Fills all memories; loads for others and beyond the depths, too, which change nothing. */
+  /** Fills all memories. Adds loads to other targets and beyond the depths, which must have no effect. */
   def load(port: Valid[Load], clock: Clock): Unit = {
     def put(target: Int, address: Int, word: BigInt): Unit = {
       port.bits.target.poke(target)
@@ -42,40 +42,40 @@ final class RoomDialogue(config: ColonnadeConfig, random: Random) {
 
   /** Tiles and cells. */
   def cells(count: Int): Seq[Exchange] = {
-    val asked    = pixels(count)
-    val tiles    = ask("tile", asked)
-    val cells    = ask("cell", asked).zip(tiles).map { case (cell, tile) => Seq(tile.head, BigInt(1), cell.head) }
-    val beyond   = Seq("tile", "cell").map(kind => kind -> ask(kind, asked).map(_.last)).toMap
-    val names    = Seq("cellLog", "count", "ids[0]", "ids[1]", "ids[2]", "ids[3]")
-    val question = new Packed(new CellQuestion(layout))
-    val answer   = new Packed(new CellAnswer(layout))
-    for (((x, y), index) <- asked.zipWithIndex) yield {
+    val positions = pixels(count)
+    val tiles     = ask("tile", positions)
+    val cells     = ask("cell", positions).zip(tiles).map { case (cell, tile) => Seq(tile.head, BigInt(1), cell.head) }
+    val beyond    = Seq("tile", "cell").map(kind => kind -> ask(kind, positions).map(_.last)).toMap
+    val names     = Seq("cellLog", "count", "ids[0]", "ids[1]", "ids[2]", "ids[3]")
+    val req       = new Packed(new CellRequest(layout))
+    val resp      = new Packed(new CellResponse(layout))
+    for (((x, y), index) <- positions.zipWithIndex) yield {
       val wholeTile = random.nextBoolean()
       val isIllegal = beyond(if (wholeTile) "tile" else "cell")(index)
       Exchange(
-        question.pack(Map("pixel.x" -> x, "pixel.y" -> y, "wholeTile" -> (if (wholeTile) 1 else 0))),
-        answer.pack(names.zip(if (wholeTile) tiles(index) else cells(index)).toMap) | (isIllegal << answer.width)
+        req.pack(Map("pixel.x" -> x, "pixel.y" -> y, "wholeTile" -> (if (wholeTile) 1 else 0))),
+        resp.pack(names.zip(if (wholeTile) tiles(index) else cells(index)).toMap) | (isIllegal << resp.width)
       )
     }
   }
 
-  /** Planes of the table, whose colours and normals say nothing, and of the shell. */
+  /** Planes of the table, without colours and normals, and bounding planes. */
   def planes(count: Int): Seq[Exchange] = {
     val names     = Seq("plane.a", "plane.b", "plane.c", "plane.exponent")
     val all       = names ++ Seq("albedo.r", "albedo.g", "albedo.b", "normal.x", "normal.y", "normal.z")
-    val question  = new Packed(new PlaneQuestion(layout))
-    val answer    = new Packed(new ShellEntry)
+    val req       = new Packed(new PlaneRequest(layout))
+    val resp      = new Packed(new ShellEntry)
     val planeMask = (BigInt(1) << (new Plane).getWidth) - 1
     def known(kind: String, size: Int): Seq[Seq[BigInt]] = image.ask(kind, Seq.tabulate(size)(i => Seq(BigInt(i))))
-    val (table, shell) = (known("plane", layout.config.planes), known("shell", layout.config.shellPlanes))
+    val (table, bounding) = (known("plane", layout.config.planes), known("shell", layout.config.shellPlanes))
     Seq.fill(count) {
-      val isShell = random.nextInt(3) == 0
-      val index   = random.nextInt(if (isShell) shell.size else table.size)
-      val values  = if (isShell) all.zip(shell(index)) else names.zip(table(index))
+      val isBoundingPlane = random.nextInt(3) == 0
+      val index           = random.nextInt(if (isBoundingPlane) bounding.size else table.size)
+      val values          = if (isBoundingPlane) all.zip(bounding(index)) else names.zip(table(index))
       Exchange(
-        question.pack(Map("isShell" -> (if (isShell) 1 else 0), "index" -> index)),
-        answer.pack(values.toMap),
-        mask = if (isShell) -1 else planeMask
+        req.pack(Map("isBoundingPlane" -> (if (isBoundingPlane) 1 else 0), "index" -> index)),
+        resp.pack(values.toMap),
+        mask = if (isBoundingPlane) -1 else planeMask
       )
     }
   }
@@ -87,12 +87,12 @@ final class RoomDialogue(config: ColonnadeConfig, random: Random) {
     image.ask(kind, pixels.map { case (x, y) => Seq(BigInt(x), BigInt(y)) })
 
   private def colours(kind: String, entry: Data, components: Seq[String], count: Int): Seq[Exchange] = {
-    val asked    = pixels(count)
-    val question = new Packed(new MapPixel(layout))
-    val answer   = new Packed(entry)
-    asked.zip(ask(kind, asked)).map { case ((x, y), values) =>
-      val found = answer.pack(components.zip(values).toMap) | (values.last << answer.width)
-      Exchange(question.pack(Map("x" -> x, "y" -> y)), found)
+    val positions = pixels(count)
+    val req       = new Packed(new MapPixel(layout))
+    val resp      = new Packed(entry)
+    positions.zip(ask(kind, positions)).map { case ((x, y), values) =>
+      val found = resp.pack(components.zip(values).toMap) | (values.last << resp.width)
+      Exchange(req.pack(Map("x" -> x, "y" -> y)), found)
     }
   }
 }

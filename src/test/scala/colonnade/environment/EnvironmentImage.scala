@@ -9,11 +9,11 @@ import colonnade.{Model, Packed}
 
 import scala.util.Random
 
-/** Random contents of a room's memories: every mode, with pointers that stay inside the heap.
+/** Random contents of an environment's memories, in every mode, with pointers inside the heap.
   *
-  * @param illegal share of the tiles whose pointers are anything
+  * @param illegal share of tiles with arbitrary pointers
   */
-final class RoomImage(config: ColonnadeConfig, random: Random, illegal: Double = 0) {
+final class EnvironmentImage(config: ColonnadeConfig, random: Random, illegal: Double = 0) {
   private val layout = AttributeLayout.of(config)
 
   /** By the memory's name. */
@@ -33,7 +33,7 @@ final class RoomImage(config: ColonnadeConfig, random: Random, illegal: Double =
     x <- Seq(0, 1, layout.config.tileSize - 1, layout.config.tileSize, layout.config.width - 1)
   } yield (x, y)
 
-  /** What the model says; see environment_questions.hpp. */
+  /** The model's answers; see environment_questions.hpp. */
   def ask(kind: String, questions: Seq[Seq[BigInt]]): Seq[Seq[BigInt]] =
     Model.attributes(config, words, questions, kind)
 
@@ -66,9 +66,9 @@ final class RoomImage(config: ColonnadeConfig, random: Random, illegal: Double =
   private def randomPointer(): Int = random.nextInt(1 << AttributeLayout.pointerBits)
 }
 
-object RoomImage {
+object EnvironmentImage {
 
-  /** Fills all memories of a room. */
+  /** Fills all memories of an environment. */
   def load(port: Valid[Load], clock: Clock, config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Unit = {
     port.valid.poke(true)
     for (memory <- AttributeMemories(config); (word, address) <- words(memory.name).zipWithIndex) {

@@ -11,10 +11,10 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** A march with the maps that answer it, later than they could if `isSlow`. */
-private class RoomMarchHarness(config: ColonnadeConfig)
+/** A march with its maps; their responses are delayed if `isSlow`. */
+private class EnvironmentMarchHarness(config: ColonnadeConfig)
     extends PackedUnit(new MarchRequest(config), new MarchResult(config)) {
-  private val march = Module(new RoomMarch(config))
+  private val march = Module(new EnvironmentMarch(config))
   private val maps  = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
 
   val load   = IO(Flipped(Valid(new Load(config))))
@@ -29,18 +29,18 @@ private class RoomMarchHarness(config: ColonnadeConfig)
   events        := march.io.events
 }
 
-class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
-  behavior of "RoomMarch"
+class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "EnvironmentMarch"
 
-  private val names = MarchQuestion.answer
+  private val names = MarchCase.answer
 
-  /** Compares with the model; returns its answers. */
+  /** Compares with the model; returns the model's answers. */
   private def check(
-      unit:   RoomMarchHarness,
+      unit:   EnvironmentMarchHarness,
       config: ColonnadeConfig,
       words:  Map[String, Seq[BigInt]],
-      view:   ViewQuestion,
-      rays:   Seq[MarchQuestion],
+      view:   ViewCase,
+      rays:   Seq[MarchCase],
       random: Random,
       isSlow: Boolean
   ): Seq[Map[String, BigInt]] = {
@@ -69,41 +69,41 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     val name =
       s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a map of ${size.width}x${size.height}"
 
-    it should s"meet what the model meets with $name" in {
-      val random    = new Random(seed)
-      val questions = new MarchQuestions(config, random)
-      test(new RoomMarchHarness(config)).withAnnotations(Simulation.verilator) { unit =>
+    it should s"hit what the model hits, with $name" in {
+      val random   = new Random(seed)
+      val stimulus = new MarchStimulus(config, random)
+      test(new EnvironmentMarchHarness(config)).withAnnotations(Simulation.verilator) { unit =>
         unit.clock.setTimeout(0)
-        val scene = new RoomScene(config, random)
-        RoomImage.load(unit.load, unit.clock, config, scene.words)
-        val met = for (round <- 0 until 4) yield {
+        val scene = new EnvironmentScene(config, random)
+        EnvironmentImage.load(unit.load, unit.clock, config, scene.words)
+        val hits = for (round <- 0 until 4) yield {
           val middle = if (round == 3) Seq(0.0, 0.0) else scene.middle
-          val camera = new questions.Camera(scene.focal, middle, isTurned = round % 2 == 1)
+          val camera = new stimulus.Camera(scene.focal, middle, isTurned = round % 2 == 1)
           check(
             unit,
             config,
             scene.words,
             camera.view,
-            Seq.fill(60)(questions.inRoom(camera)) ++ Seq.fill(20)(questions.behindBox(camera)) ++
-              Seq.fill(30)(questions.fromCamera(camera)),
+            Seq.fill(60)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.behindBox(camera)) ++
+              Seq.fill(30)(stimulus.fromCamera(camera)),
             random,
             isSlow = round == 1
           )
         }
-        val kinds = met.flatten.map(_("kind").toInt)
-        assert(Seq(RoomKind.nothing, RoomKind.map, RoomKind.shell).forall(kinds.contains), "every end")
-        assert(met.flatten.exists(_("isHidden") == 1) && met.flatten.exists(_("steps") > 5))
+        val kinds = hits.flatten.map(_("kind").toInt)
+        assert(Seq(HitKind.miss, HitKind.map, HitKind.boundingPlane).forall(kinds.contains), "every kind of result")
+        assert(hits.flatten.exists(_("isHidden") == 1) && hits.flatten.exists(_("steps") > 5))
 
-        val image = new RoomImage(config, random)
-        RoomImage.load(unit.load, unit.clock, config, image.words)
+        val image = new EnvironmentImage(config, random)
+        EnvironmentImage.load(unit.load, unit.clock, config, image.words)
         for (round <- 0 until 6) {
-          val camera = new questions.Camera(scene.focal, scene.middle, isTurned = true)
+          val camera = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
           check(
             unit,
             config,
             image.words,
             camera.view,
-            Seq.fill(30)(questions.inRoom(camera)) ++ Seq.fill(20)(questions.fromCamera(camera)),
+            Seq.fill(30)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.fromCamera(camera)),
             random,
             isSlow = round == 1
           )
@@ -111,31 +111,31 @@ class RoomMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             unit,
             config,
             image.words,
-            questions.anyView(),
-            Seq.fill(20)(questions.anyRay()) ++ Seq.fill(20)(questions.anyPixel()),
+            stimulus.anyView(),
+            Seq.fill(20)(stimulus.anyRay()) ++ Seq.fill(20)(stimulus.anyPixel()),
             random,
             isSlow = round == 1
           )
         }
 
-        // Illegal maps and registers, each with legal ones and together
-        val illegal = new RoomImage(config, random, illegal = 0.3)
-        RoomImage.load(unit.load, unit.clock, config, illegal.words)
+        // Illegal maps and illegal registers, separately and together
+        val illegal = new EnvironmentImage(config, random, illegal = 0.3)
+        EnvironmentImage.load(unit.load, unit.clock, config, illegal.words)
         val answers = for (round <- 0 until 12) yield {
-          val camera = new questions.Camera(scene.focal, scene.middle, isTurned = true)
+          val camera = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
           check(
             unit,
             config,
             illegal.words,
-            if (round < 4) camera.view else questions.wildView(),
-            Seq.fill(20)(questions.inRoom(camera)) ++ Seq.fill(10)(questions.fromCamera(camera)) ++
-              Seq.fill(20)(questions.anyRay()) ++ Seq.fill(20)(questions.wildPixel()),
+            if (round < 4) camera.view else stimulus.wildView(),
+            Seq.fill(20)(stimulus.inRoom(camera)) ++ Seq.fill(10)(stimulus.fromCamera(camera)) ++
+              Seq.fill(20)(stimulus.anyRay()) ++ Seq.fill(20)(stimulus.wildPixel()),
             random,
             isSlow = round == 1
           )
         }
         val found = answers.flatten.map(_("isIllegal").toInt).toSet
-        // Of the largest heaps, too few pointers lead out
+        // Too few pointers lead out of the largest heaps
         val words  = size.layout.mapHeapWords.min(size.layout.planeHeapWords)
         val isFull = words > (1 << AttributeLayout.pointerBits) - 64
         assert(found(0) && (isFull || found(1)), "legal and illegal tiles")

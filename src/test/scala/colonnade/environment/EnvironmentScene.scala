@@ -6,12 +6,12 @@ import colonnade.formats.{AttributeMemories, Plane, PlaneDescriptor, ShellEntry}
 
 import scala.util.Random
 
-/** A room with a box in it, as planes in the tiles of a map: floor, ceiling, three walls, the box's front and top. View
-  * space, metres; tiles are flat or have cells of a quarter or an eighth of their edge, as the planes need and the heap
-  * allows.
+/** A room with a box, encoded as planes in a map's tiles: floor, ceiling, three walls, the box's front and top. View
+  * space, metres. A tile is flat, or its cells have a quarter or an eighth of its edge, as the planes need and the heap
+  * permits.
   */
-final class RoomScene(config: ColonnadeConfig, random: Random) {
-  import RoomScene._
+final class EnvironmentScene(config: ColonnadeConfig, random: Random) {
+  import EnvironmentScene._
 
   private val layout = AttributeLayout.of(config)
 
@@ -19,7 +19,7 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
   val focal:  Double      = 0.8 * layout.config.width
   val middle: Seq[Double] = Seq(layout.config.width / 2.0 + 3.2, layout.config.height / 2.0 - 1.7)
 
-  /** Inverse depth at a pixel; nothing where the plane is behind the camera. */
+  /** Inverse depth at a pixel; meaningless if the plane is behind the camera. */
   private def inverse(plane: Surface, x: Double, y: Double): Double = {
     val ray = Seq((x - middle(0)) / focal, (y - middle(1)) / focal, 1.0)
     plane.normal.zip(ray).map { case (n, r) => n * r }.sum / plane.distance
@@ -49,7 +49,7 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
 
   /** By the memory's name; albedo and normals at random. */
   val words: Map[String, Seq[BigInt]] = {
-    val others      = new RoomImage(config, random).words
+    val others      = new EnvironmentImage(config, random).words
     val heap        = scala.collection.mutable.ArrayBuffer.empty[BigInt]
     val descriptors = for {
       row    <- 0 until layout.tileRows
@@ -102,7 +102,7 @@ final class RoomScene(config: ColonnadeConfig, random: Random) {
     new Packed(new PlaneDescriptor).pack(Map("mode" -> mode, "pointer" -> pointer))
 }
 
-object RoomScene {
+object EnvironmentScene {
   private final case class Surface(normal: Seq[Double], distance: Double)
 
   /** Floor, ceiling, left, right and back wall, the box's front and top. */

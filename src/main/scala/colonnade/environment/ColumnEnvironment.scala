@@ -5,24 +5,24 @@ import chisel3.util.Valid
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{AttributeEvents, Load}
 
-/** Ports of [[ColumnRoom]]. */
-final class ColumnRoomIO(config: ColonnadeConfig) extends Bundle {
+/** Ports of [[ColumnEnvironment]]. */
+final class ColumnEnvironmentIO(config: ColonnadeConfig) extends Bundle {
   private val port = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
 
-  /** Only while no question is in flight. */
+  /** Only while no request is in flight. */
   val load = Flipped(Valid(new Load(config)))
 
   /** One for each render unit. */
   val ports = Vec(config.array.rows, Flipped(port))
 
-  /** To the maps that all columns share, if they do. */
+  /** To the maps that all columns share, if the configuration says so. */
   val shared = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
   val events = Output(new AttributeEvents)
 }
 
-/** A column's way to the maps of a room: its own copy, or a port that leads to the one copy of the device. */
-final class ColumnRoom(config: ColonnadeConfig) extends Module {
-  val io = IO(new ColumnRoomIO(config))
+/** A column's access to the environment's maps: its own copy, or a port to the device's only copy. */
+final class ColumnEnvironment(config: ColonnadeConfig) extends Module {
+  val io = IO(new ColumnEnvironmentIO(config))
 
   private val tagBits = AttributePort.tagBits(config)
 
@@ -30,7 +30,7 @@ final class ColumnRoom(config: ColonnadeConfig) extends Module {
     case Some(shared) =>
       val units = Module(new AttributeConcentrator(config, config.array.rows, tagBits))
       units.io.ports <> io.ports
-      shared <> units.io.served
+      shared <> units.io.joined
       io.events := shared.events
     case None =>
       val maps = Module(new PhysicalAttributeMemory(config, config.array.rows, tagBits))

@@ -1,0 +1,89 @@
+package colonnade.environment
+
+import chisel3._
+import colonnade.microcode.Repeat
+
+/** Steps from cell to cell through a tile of several planes. */
+final class CellProgram(
+    m:        MarchOperations,
+    stepper:  TileStepper,
+    planes:   PlaneCache,
+    dda:      DdaSetup,
+    hitPixel: HitPixel,
+    channel:  AttributeChannel[CellRequest, CellResponse]
+) {
+  import MarchLabel._
+  import m.formats._
+  import m.program._
+
+  /** Distances to the next cell edges, with guard bits. A ray may go one cell beyond the largest distance. */
+  private val edge         = Reg(Vec(2, UInt((distanceBits + 1).W)))
+  private val isSecondAxis = Reg(Bool())
+  private val firstEdge    = Reg(SInt(combineBits.W))
+
+  /** A tile has 8 or 4 cells along each edge. */
+  private val isFine = stepper.tile.cellLog === (layout.tileLog - 3).U
+
+  private def width(axis: UInt): UInt = Mux(isFine, dda.stride(axis) >> 3, dda.stride(axis) >> 2)
+
+  private val isInside = stepper.cell.map(cell => cell < Mux(isFine, 8.U, 4.U)).reduce(_ && _)
+
+  /** Steps from `Cells` on. */
+  def describe(): Unit = {
+    step(Cells) {
+      hitPixel.forCell()
+      goto(Pixel)
+    }
+    firstCell()
+    step(Cell) {
+      when(now)(channel.req.valid := isInside)
+      set(isSecondAxis, edge(0) > edge(1))
+      branch(CellsPassed.when(!isInside, "outside the tile"), Repeat.until(channel.req.ready, "cells.req is ready"))
+    }
+    step {
+      val next = edge(isSecondAxis)
+      set(stepper.tExit, Mux(next < stepper.tileExit, next, stepper.tileExit))
+      set(planes.id, channel.resp.bits.content.ids(0))
+      set(planes.purpose, planes.forCell)
+      branch(Repeat.until(channel.resp.valid, "cells.resp"), Plane.otherwise)
+    }
+    step(CellPassed) {
+      val axis = isSecondAxis.asUInt
+      set(stepper.tEnter, stepper.tExit)
+      set(edge(axis), m.combine(edge(axis).zext, width(axis).zext).asUInt)
+      set(stepper.cell(axis), Mux(dda.isNegative(axis), stepper.cell(axis) - 1.U, stepper.cell(axis) + 1.U))
+      val isOver = stepper.tExit >= stepper.tileExit || stepper.steps >= maxSteps.U
+      branch(CellsPassed.when(isOver, "end of the tile"), Cell.otherwise)
+    }
+    step(CellsPassed)(m.multiply(stepper.tileExit(distanceBits - 1, guardBits).zext, m.uvwDir(2)))
+    step {
+      set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct))
+      goto(TilePassed)
+    }
+  }
+
+  /** The cell where the ray enters, and the distances to its edges: a number of cells before the tile's edges. */
+  private def firstCell(): Unit = {
+    step(FirstCell) {
+      val inTile = Seq(hitPixel.x, hitPixel.y).map(_(layout.tileLog - 1, 0))
+      set(m.axis, 0.U)
+      for (a <- 0 to 1) {
+        val cell = Mux(isFine, inTile(a) >> (layout.tileLog - 3), inTile(a) >> (layout.tileLog - 2))
+        set(stepper.cell(a), cell)
+      }
+    }
+    step(CellEdge) {
+      val cell = stepper.cell(m.axis(0))
+      val last = Mux(isFine, 7.U, 3.U)
+      m.multiply(width(m.axis(0)).zext, Mux(dda.isNegative(m.axis), cell, last - cell).zext)
+    }
+    step(set(firstEdge, m.combine(dda.edge(m.axis(0)).zext, m.product, subtract = true)))
+    step {
+      val isAhead = firstEdge > stepper.tEnter.zext
+      val next    = Mux(isAhead, firstEdge.asUInt(distanceBits, 0), stepper.tEnter)
+      set(edge(m.axis(0)), Mux(m.uvwDir(m.axis) === 0.S, dda.maxDistance, next))
+      set(m.axis, 1.U)
+      branch(CellEdge.when(m.axis === 0.U, "second axis"), Cell.otherwise)
+    }
+  }
+}

@@ -1,0 +1,16 @@
+package colonnade.environment
+
+import chisel3._
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+
+/** A context whose ray is to be traced to the environment. */
+final class EnvironmentRequest(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+
+  /** The ray is the pixel's primary ray. */
+  val isDirectView = Bool()
+
+  /** The ray is the deferred Fresnel reflection of a path. */
+  val isFresnelReflection = Bool()
+}

@@ -1,0 +1,168 @@
+package colonnade.environment
+
+import chisel3._
+import colonnade.config.ColonnadeConfig
+import colonnade.microcode.{Microprogram, Operand, StepEncoding}
+import colonnade.numbers.Rounding
+
+/** The program of the march, the registers of its ray, and the operations that its steps have of the datapath. */
+final class MarchOperations(config: ColonnadeConfig, datapath: MarchDatapathIO) {
+  val formats = new MarchFormats(config)
+  import formats._
+
+  val program = new Microprogram[MarchLabel](StepEncoding.OneHot)
+
+  // The ray
+  /** Its direction, scaled to f bits. */
+  val dir: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))
+
+  /** The origin's projection; then u and v from the map's centre, and w. */
+  val uvwOrigin: Vec[SInt] = Reg(Vec(3, SInt(originBits.W)))
+
+  /** The direction's projection. */
+  val projectedDir: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))
+
+  /** The direction in (u, v, w). For the bounding planes, the direction's projection relative to the map's centre. */
+  val uvwDir: Vec[SInt] = Reg(Vec(3, SInt(directionBits.W)))
+
+  /** Of each vector, the largest exponent of a component. */
+  val uvwOriginExponent:    UInt = Reg(UInt(exponentBits.W))
+  val projectedDirExponent: UInt = Reg(UInt(exponentBits.W))
+  val uvwDirExponent:       UInt = Reg(UInt(exponentBits.W))
+
+  /** The origin's depth. */
+  val depthMantissa: UInt = Reg(UInt(f.W))
+  val depthExponent: UInt = Reg(UInt(exponentBits.W))
+
+  // Temporaries
+  val axis:      UInt      = Reg(UInt(2.W))
+  val exponents: Vec[UInt] = Reg(Vec(3, UInt(exponentBits.W)))
+  val mantissa:  UInt      = Reg(UInt(f.W))
+  val numerator: UInt      = Reg(UInt(f.W))
+  val quotient:  UInt      = Reg(UInt((f + 1).W))
+
+  // Outputs of the datapath
+  val product:     SInt = datapath.product
+  val sum:         SInt = datapath.sum
+  val sumExponent: UInt = datapath.sumExponent
+  val exponent:    UInt = datapath.exponent
+  val shifted:     SInt = datapath.shifted
+  val coordinate:  SInt = datapath.coordinate
+  val summand:     SInt = datapath.summand
+  val along:       UInt = datapath.along
+  val distance:    UInt = datapath.distance
+
+  /** The product without its fraction bits. */
+  val scaledProduct: SInt = Rounding.floor(product, f)
+
+  /** The shifted sum as a mantissa of f bits; its exponent was measured in the step before. */
+  val sumMantissa: UInt = shifted.asUInt(f - 1, 0)
+
+  private val wideFactor       = new Operand(program, wideBits)
+  private val narrowFactor     = new Operand(program, narrowBits)
+  private val base, addend     = new Operand(program, sumBits)
+  private val first, second    = new Operand(program, combineBits)
+  private val subtracts        = new Operand(program, 1)
+  private val combineSubtracts = new Operand(program, 1)
+  private val division         = Seq.fill(2)(new Operand(program, f + 1))
+
+  datapath.latchExponent := false.B
+  datapath.takeQuotient  := false.B
+  datapath.shift.valid   := false.B
+  datapath.shift.bits    := DontCare
+
+  def multiply(wide: SInt, narrow: SInt): Unit = {
+    wideFactor.choose(wide)
+    narrowFactor.choose(narrow)
+  }
+
+  /** Adds the product to the sum, or subtracts it. */
+  def accumulate(subtract: Boolean = false): Unit = add(sum, product, subtract)
+
+  /** Shifts the sum up by a digit and adds the product. */
+  def shiftAccumulate(): Unit = add((sum << digitBits).asSInt, product)
+
+  /** Puts a value into the sum. */
+  def load(value: SInt): Unit = base.choose(value)
+
+  /** Negates the sum if the condition holds. */
+  def negate(condition: Bool): Unit = {
+    addend.choose(Mux(condition, sum, 0.S))
+    base.choose(Mux(condition, 0.S, sum))
+    subtracts.choose(condition.asSInt)
+  }
+
+  private def add(from: SInt, by: SInt, subtract: Boolean = false): Unit = {
+    base.choose(from)
+    addend.choose(by)
+    if (subtract) subtracts.choose((-1).S(1.W))
+  }
+
+  /** A sum or a difference of the small adder. */
+  def combine(a: SInt, b: SInt, subtract: Boolean = false): SInt = {
+    first.choose(a)
+    second.choose(b)
+    if (subtract) combineSubtracts.choose((-1).S(1.W))
+    datapath.combined
+  }
+
+  /** Sets the shift of the datapath's shifted and saturated sums. */
+  def setShift(amount: SInt): Unit = when(program.now) {
+    datapath.shift.valid := true.B
+    datapath.shift.bits  := amount
+  }
+
+  /** Latches the sum's exponent. */
+  def latchExponent(): Unit = when(program.now)(datapath.latchExponent := true.B)
+
+  /** Normalises the sum: the next step finds its f highest bits and its sign in [[shifted]]. */
+  def normalise(): Unit = {
+    latchExponent()
+    setShift(sumExponent.zext)
+  }
+
+  /** Starts ⌊numerator · 2^f / denominator⌋. */
+  def startDivision(numerator: UInt, denominator: UInt): Unit = {
+    division(0).choose(numerator.zext)
+    division(1).choose(denominator.zext)
+  }
+
+  /** Adds a step after which the quotient is ready. */
+  def awaitDivision(): Unit = program.step {
+    program.set(quotient, datapath.quotient.bits)
+    when(program.now)(datapath.takeQuotient := true.B)
+    program.await(datapath.quotient.valid, "quotient")
+  }
+
+  /** Adds two steps. */
+  def divide(numerator: => UInt, denominator: => UInt): Unit = {
+    program.step(startDivision(numerator, denominator))
+    awaitDivision()
+  }
+
+  /** The numerator of a reciprocal ⌊2^(2f − 1) / mantissa⌋. */
+  def one: UInt = (BigInt(1) << (f - 1)).U(f.W)
+
+  def constant(value: BigInt): SInt = value.S((value.bitLength + 1).W)
+
+  /** Makes the steps, and connects the datapath to the operands that they choose. */
+  def build(): Unit = {
+    program.build()
+    datapath.multiply.valid       := wideFactor.isChosen
+    datapath.multiply.bits.wide   := wideFactor.value
+    datapath.multiply.bits.narrow := narrowFactor.value
+
+    datapath.add.valid         := base.isChosen
+    datapath.add.bits.base     := base.value
+    datapath.add.bits.addend   := addend.value
+    datapath.add.bits.subtract := subtracts.value =/= 0.S
+
+    datapath.combine.base     := first.value
+    datapath.combine.addend   := second.value
+    datapath.combine.subtract := combineSubtracts.value =/= 0.S
+
+    datapath.divide.valid            := division(0).isChosen
+    datapath.divide.bits.numerator   := division(0).value.asUInt(f - 1, 0)
+    datapath.divide.bits.denominator := division(1).value.asUInt(f - 1, 0)
+  }
+}

@@ -1,0 +1,118 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.{Cat, Enum, OHToUInt}
+import colonnade.formats.{Plane, ShellEntry}
+import colonnade.microcode.Repeat
+
+/** A plane's depth along a ray: the ray is value + slope · s in front of the plane, in steps of 2^(exponent − 22). */
+final class PlaneDepth(formats: MarchFormats) extends Bundle {
+  val id       = UInt(formats.layout.planeIdBits.W)
+  val value    = SInt(formats.valueBits.W)
+  val slope    = SInt(formats.slopeBits.W)
+  val exponent = UInt((new Plane).exponent.getWidth.W)
+}
+
+/** Depths of the last four planes along the current ray. A plane that is not cached is fetched. */
+final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneRequest, ShellEntry]) {
+  import MarchLabel.{PlaneDepth => DepthLabel, _}
+  import m.formats._
+  import m.program._
+
+  /** The purpose of a look-up decides where the program continues. */
+  val Seq(forTile, forNearest, forFront, forCell, forBoundingPlane, forDirectView) = Enum(6)
+  val purpose: UInt = Reg(UInt(3.W))
+
+  /** The plane to look up. */
+  val id: UInt = Reg(UInt(layout.planeIdBits.W))
+
+  private val slots   = Reg(Vec(4, new PlaneDepth(m.formats)))
+  private val isValid = RegInit(VecInit.fill(4)(false.B))
+  private val oldest  = RegInit(0.U(2.W))
+  private val slot    = Reg(UInt(2.W))
+  private val plane   = Reg(new Plane)
+  private val aligned = Reg(SInt((originBits + planeFraction - f).W))
+  private val partial = Reg(SInt(valueBits.W))
+  private val matches = VecInit(slots.zip(isValid).map { case (slot, isValid) => isValid && slot.id === id })
+  private val req     = channel.req
+
+  /** The plane that was looked up. */
+  val depth: PlaneDepth = slots(slot)
+
+  req.valid                        := false.B
+  req.bits.tag                     := 0.U
+  req.bits.content.isBoundingPlane := purpose === forBoundingPlane
+  req.bits.content.index           := id
+
+  /** In a step: invalidates the planes of the previous ray. */
+  def clear(): Unit = isValid.foreach(set(_, false.B))
+
+  /** In a step: requests a bounding plane with its texel. */
+  def requestBoundingPlane(index: UInt, condition: Bool): Unit = when(now && condition) {
+    req.valid                        := true.B
+    req.bits.content.isBoundingPlane := true.B
+    req.bits.content.index           := index
+  }
+
+  /** Steps from `Plane` on. For a bounding plane they end with its products in the sum. */
+  def describe(): Unit = {
+    step(Plane) {
+      val isFound = matches.asUInt.orR && purpose =/= forBoundingPlane
+      when(now)(req.valid := !isFound)
+      set(slot, OHToUInt(matches))
+      branch(
+        RecordFront.when(isFound && purpose === forFront, "nearest plane cached"),
+        DepthLabel.when(isFound, "cached"),
+        Repeat.until(req.ready, "planes.req is ready")
+      )
+    }
+    step {
+      set(plane, channel.resp.bits.content.plane)
+      set(slot, oldest)
+      await(channel.resp.valid, "planes.resp")
+    }
+    step {
+      m.multiply(m.uvwOrigin(0), plane.a)
+      set(oldest, oldest + 1.U)
+      set(isValid(slot), true.B)
+      set(depth.id, id)
+      set(depth.exponent, plane.exponent)
+    }
+    step {
+      m.multiply(m.uvwOrigin(1), plane.b)
+      m.load(m.product)
+    }
+    step {
+      m.multiply(m.uvwDir(0), plane.a)
+      m.accumulate()
+      alignW(m.uvwOrigin(2))
+    }
+    step {
+      m.multiply(m.uvwDir(1), plane.b)
+      m.load(m.product)
+      set(partial, m.combine(aligned, scaledSum, subtract = true))
+    }
+    step {
+      m.multiply(m.projectedDir(2), plane.c) // for a bounding plane
+      m.accumulate()
+      set(depth.value, m.combine(partial, plane.c, subtract = true))
+      alignW(m.uvwDir(2))
+    }
+    step {
+      m.accumulate()
+      set(depth.slope, m.combine(aligned, scaledSum, subtract = true))
+      branch(
+        BoundingDepth.when(purpose === forBoundingPlane, "bounding plane"),
+        DirectViewDepth.when(purpose === forDirectView, "direct view"),
+        RecordFront.when(purpose === forFront, "nearest plane"),
+        DepthLabel.otherwise
+      )
+    }
+  }
+
+  private def scaledSum: SInt = (m.sum >> f).asSInt
+
+  /** A step of w has 2^(22 − f − exponent) steps of the plane. */
+  private def alignW(w: SInt): Unit =
+    set(aligned, (Cat(w, 0.U((planeFraction - f).W)).asSInt >> plane.exponent).asSInt)
+}

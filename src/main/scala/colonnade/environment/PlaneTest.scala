@@ -1,0 +1,109 @@
+package colonnade.environment
+
+import chisel3._
+
+/** Tests a plane in an interval of the ray: the ray stays in front of it, crosses it, or is behind it. */
+final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCache) {
+  import MarchLabel._
+  import m.formats._
+  import m.program._
+
+  private val scaled = Reg(SInt(scaledBits.W))
+  private val probe  = Reg(SInt(depthBits.W))
+
+  /** The distance along the ray where it hits the environment. */
+  val hitDistance: UInt = Reg(UInt(alongBits.W))
+
+  /** Steps from `PlaneDepth` on; a hit continues at `Meets` or `Crosses`. */
+  def describe(): Unit = {
+    val isCell    = planes.purpose === planes.forCell
+    val isNearest = planes.purpose === planes.forNearest
+    step(PlaneDepth)(m.multiply(planes.depth.slope, stepper.enter.zext))
+    step {
+      m.multiply(planes.depth.slope, stepper.exit.zext)
+      set(stepper.depthEnter, m.combine(planes.depth.value, m.scaledProduct))
+    }
+    step {
+      m.multiply(stepper.exit.zext, m.uvwDir(2))
+      set(stepper.depthExit, m.combine(planes.depth.value, m.scaledProduct))
+    }
+    step {
+      set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct))
+      set(stepper.steps, stepper.steps + 1.U, !isNearest)
+      stepper.recordFront(stepper.isInFront && !isNearest)
+      val isSame = stepper.hasFront && stepper.front.id === planes.id
+      branch(
+        Cells.when(isNearest && !stepper.isInFront, "several planes, not in front"),
+        NearestPlane.when(isNearest, "several planes, in front"),
+        CellPassed.when(stepper.isInFront && isCell, "cell, in front"),
+        TilePassed.when(stepper.isInFront, "tile, in front"),
+        Behind.when(stepper.isBehind, "already behind"),
+        Crosses.when(stepper.depthEnter >= 0.S, "from front to back"),
+        Meets.when(isSame, "behind the last front plane")
+      )
+    }
+    near()
+    behind()
+    step(PlanePassed)(branch(CellPassed.when(isCell, "cell"), TilePassed.otherwise))
+  }
+
+  /** The ray enters behind the plane. If it is only slightly behind, it is on the plane. */
+  private def near(): Unit = {
+    step {
+      m.multiply(stepper.enter.zext, m.uvwDir(2))
+      m.load(stepper.depthEnter)
+      m.setShift(planeFraction.S - planes.depth.exponent.zext)
+    }
+    step {
+      set(probe, m.combine(m.uvwOrigin(2), m.scaledProduct))
+      set(scaled, m.shifted)
+    }
+    step {
+      val isNear = m.combine(scaled, (probe >> nearLog).asSInt) > 0.S
+      set(stepper.isBehind, true.B, !isNear)
+      branch(Meets.when(isNear, "slightly behind"))
+    }
+  }
+
+  /** The ray is behind what the map shows. It may cross the extension of the last front plane, or emerge again. */
+  private def behind(): Unit = {
+    step(Behind) {
+      m.multiply(stepper.front.slope, stepper.exit.zext)
+      branch(Emerge.when(!stepper.hasFront, "no front plane"))
+    }
+    step(set(probe, m.combine(stepper.front.value, m.scaledProduct)))
+    step(branch(Crosses.when(probe < 0.S, "hidden surface")))
+    step(Emerge)(stepper.recordFront(stepper.depthExit >= 0.S))
+  }
+
+  /** Steps from `Crosses` on, which find the distance where the depth becomes negative. */
+  def describeCrossing(): Unit = {
+    val depth = Mux(stepper.isBehind, stepper.front, planes.depth)
+    step(Crosses) {
+      m.load(depth.value)
+      branch(Meets.when(depth.slope >= 0.S || depth.value <= 0.S, "no crossing"))
+    }
+    step(m.normalise())
+    step {
+      set(m.numerator, m.sumMantissa)
+      set(m.exponents(0), m.exponent)
+      m.load(depth.slope)
+    }
+    step(m.negate(true.B))
+    step(m.normalise())
+    step(set(m.mantissa, m.sumMantissa))
+    m.divide(m.numerator, m.mantissa)
+    step(m.load(m.quotient.zext))
+    step {
+      m.setShift(m.exponent.zext +& f.S - m.exponents(0).zext)
+      m.latchExponent()
+    }
+    step(set(hitDistance, m.along))
+    step(set(hitDistance, stepper.exit, hitDistance > stepper.exit))
+    step {
+      set(hitDistance, stepper.enter, hitDistance < stepper.enter)
+      goto(Hit)
+    }
+    step(Meets)(set(hitDistance, stepper.enter))
+  }
+}

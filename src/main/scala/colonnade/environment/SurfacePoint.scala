@@ -1,0 +1,86 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Fill
+import colonnade.config.NumberFormats
+import colonnade.formats.RoomView
+import colonnade.microcode.Overlap
+import colonnade.numbers.{Fixed, Rounding}
+
+/** The hit point, from its distance and the ray's origin; and its normal, rotated to the object's space. */
+final class SurfacePoint(
+    m:        MarchOperations,
+    texel:    TexelFetch,
+    resolver: HitResolver,
+    view:     RoomView,
+    request:  MarchRequest
+) {
+  import MarchLabel._
+  import m.formats._
+  import m.program._
+
+  private val offset   = Reg(SInt(sceneBits.W))
+  private val position = Reg(SInt((sceneBits + 1).W))
+  private val point    = Reg(Vec(3, SInt(sceneBits.W)))
+  private val normal   = Reg(Vec(3, SInt(NumberFormats.normalBits.W)))
+
+  private val distance  = m.quotient.zext
+  private val mapNormal = Seq(texel.normal.x, texel.normal.y, texel.normal.z).map(_.integer)
+
+  /** The point is clamped to half the scene's size. */
+  private val clamped = {
+    val bits  = sceneBits - 1
+    val sign  = position(sceneBits)
+    val isFar = position(sceneBits - 1, bits - 1) =/= Fill(2, sign)
+    val max   = ((BigInt(1) << (bits - 1)) - 1).S(sceneBits.W)
+    Mux(isFar, Mux(sign, ~max, max), Rounding.narrow(position, sceneBits))
+  }
+  private val rotated = {
+    val exact = Rounding.narrow(m.sum, RoomView.rotationBits + NumberFormats.normalBits + 2)
+    Rounding.saturate(Rounding.nearestEven(exact, RoomView.rotationFraction), NumberFormats.normalBits)
+  }
+
+  /** Connects the result, which is valid in `Finish`. */
+  def result(to: MarchResult): Unit = {
+    val isHit = resolver.kind =/= HitKind.miss.U
+    to.albedo := Mux(isHit, texel.albedo, 0.U.asTypeOf(texel.albedo))
+    for (axis <- 0 until 3) {
+      to.point.axes(axis)  := Fixed(to.point.x.format, Mux(isHit, point(axis), 0.S))
+      to.normal.axes(axis) := Mux(isHit, normal(axis), 0.S)
+    }
+  }
+
+  /** Steps from `Point` to `Finish`. The normal is rotated while the distance is divided. */
+  def describe(): Unit = {
+    label(Point)
+    overlap { at =>
+      at(0)(await(texel.isReady, "texel"))
+      for (axis <- 0 until 3) rotateNormal(at, axis, begin = 3 * axis)
+    }
+    m.awaitDivision()
+    overlap(at => for (axis <- 0 until 3) hitPoint(at, axis, begin = 2 * axis))
+  }
+
+  /** Six cycles. */
+  private def hitPoint(at: Overlap[MarchLabel], axis: Int, begin: Int): Unit = {
+    at(begin)(m.multiply(distance, m.dir(axis)))
+    at(begin + 1)(m.load(m.product))
+    at(begin + 2) {
+      m.latchExponent()
+      m.setShift(f.S - resolver.exponent)
+    }
+    at(begin + 3)(set(offset, m.summand))
+    at(begin + 4)(set(position, m.combine(offset, request.ray.origin.axes(axis).integer)))
+    at(begin + 5)(set(point(axis), clamped))
+  }
+
+  /** Five cycles. */
+  private def rotateNormal(at: Overlap[MarchLabel], axis: Int, begin: Int): Unit = {
+    for (((component, factor), cycle) <- mapNormal.zip(view.rotation(axis).axes).zipWithIndex)
+      at(begin + cycle)(m.multiply(component, factor.integer))
+    at(begin + 1)(m.load(m.product))
+    at(begin + 2)(m.accumulate())
+    at(begin + 3)(m.accumulate())
+    at(begin + 4)(set(normal(axis), rotated))
+  }
+}
