@@ -54,7 +54,7 @@ final class Colonnade(
   columns.foreach(_.io.load := load)
 
   // The environment's maps, if all columns share them
-  for (ports <- Some(columns.flatMap(_.io.room)) if ports.nonEmpty) {
+  for (ports <- Some(columns.flatMap(_.io.environment)) if ports.nonEmpty) {
     val tagBits = AttributeArbiter.tagBits(config.array.rows, AttributePort.tagBits(config))
     val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, config.array.columns, tagBits)))
     maps.io.load := load

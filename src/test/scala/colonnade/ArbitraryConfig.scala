@@ -3,7 +3,7 @@ package colonnade
 import colonnade.config._
 import org.scalacheck.Gen
 
-/** Any configuration that the generator accepts. */
+/** Random legal configurations. */
 object ArbitraryConfig {
   private val flag = Gen.oneOf(true, false)
 
@@ -42,7 +42,7 @@ object ArbitraryConfig {
     holdable      <- flag
   } yield ColumnBvhMemoryConfig(depth, banks, stackDepth, snooping, recordBuffers, readLatency, holdable)
 
-  /** Maps whose bytes are between what their fixed parts need and what pointers reach. */
+  /** Maps with a legal size: at least their fixed parts, at most the reach of pointers. */
   private val physicalAttributeMemory = for {
     width       <- Gen.chooseNum(64, 1000, 640)
     height      <- Gen.chooseNum(64, 1000, 480)

@@ -8,7 +8,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** The device around its render units, which are small fakes here. */
+/** The device with fake render units. */
 class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "Colonnade"
 
@@ -86,7 +86,7 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "not count a sink that stalls as a frame that hangs, nor load while a frame runs" in {
+  it should "not abort a frame whose sink stalls, nor load while a frame runs" in {
     val configuration = config(rows = 2, columns = 1, banks = 1, latency = 1)
     test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) { dut =>
       val device = new Device(dut, configuration)

@@ -7,7 +7,7 @@ import java.nio.file.{Files, Path, Paths}
 import scala.sys.process.{Process, ProcessLogger}
 import scala.util.Try
 
-/** The C++ compiler of the simulators, held against a program with the pattern that g++ 12.2 compiles wrongly. */
+/** Tests the C++ compiler of the simulators with a pattern that g++ 12.2 miscompiles. */
 class CompilerSpec extends AnyFlatSpec with Matchers {
   behavior of "The C++ compiler"
 

@@ -5,7 +5,7 @@ import chiseltest._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{LoadTarget, RegisterMap}
 
-/** The host's side of a simulated device. */
+/** The host's ports of a simulated device. */
 class Device(dut: Colonnade, config: ColonnadeConfig) {
   private val registers = RegisterMap(config).map(register => register.name -> register).toMap
 
@@ -48,7 +48,7 @@ class Device(dut: Colonnade, config: ColonnadeConfig) {
 
   /** Runs a frame to its end; each pixel stream is ready when asked.
     *
-    * @return pixels in the order in which they left, as read by `pixel`, and the cycles from start to the last one
+    * @return pixels in order of time, read by `pixel`, and the cycles from the start to the last one
     */
   def frame[T](isReady: () => Boolean, limit: Int = 100000)(pixel: formats.Pixel => T): (Seq[T], Int) = {
     var pixels = Vector.empty[T]

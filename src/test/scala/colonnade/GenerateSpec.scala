@@ -68,7 +68,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     )("thesis.txt: there is a file")
   }
 
-  it should "know its own directories by the list of their files" in inScratch { scratch =>
+  it should "recognise its own directories by their file list" in inScratch { scratch =>
     val output        = scratch.resolve("out")
     def write(): Unit = OutputFiles.replaceDirectory(output) { fresh =>
       OutputFiles.writeFile(fresh.resolve("a"), "a\n")
@@ -82,7 +82,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
       refusal.getMessage
     }
     write()
-    // As the host's design_folder.py writes it
+    // The format of the host's design_folder.py
     Files.readString(output.resolve(DesignMarker.name)).linesIterator.toSeq shouldBe Seq(
       DesignMarker.title,
       "87428fc522803d31065e7bce3cf03fe475096631e5e07bbd7a0fde60c4cf25c7  a",
@@ -126,7 +126,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     names(scratch) shouldBe empty
   }
 
-  it should "explain itself" in {
+  it should "print its usage" in {
     val printed = new ByteArrayOutputStream
     Console.withOut(printed)(Generate.run(Seq("--help"))) shouldBe 0
     printed.toString should include("usage:")
@@ -141,7 +141,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     Files.readString(scratch.resolve("RegisterFile.sv")) should not include "RANDOM"
   }
 
-  it should "write what Verilator's linter accepts, but for bits that nobody reads" in inScratch { scratch =>
+  it should "write Verilog that passes Verilator's linter, except for unused bits" in inScratch { scratch =>
     assume(Try(Process("verilator --version").!!).isSuccess, "verilator is not installed")
     Emit(new Divider(32, 18), scratch, blackBoxMemories = false)
     val lint =

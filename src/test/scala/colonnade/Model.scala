@@ -14,21 +14,21 @@ import scala.sys.process._
 /** Expected values from the C++ model: `host/cpp/vectors.cpp`, compiled once per version of the sources. */
 object Model {
 
-  /** Answers to questions in the form that vectors.cpp documents. */
+  /** Runs the model on questions; vectors.cpp documents their format. */
   def answers(config: ColonnadeConfig, questions: Seq[Seq[BigInt]], kind: String): Seq[Seq[BigInt]] =
     answers(config, Nil, questions, kind)
 
-  /** Pixels of a scene: red, green, blue, isObject, triangle, distance, and what is left of the room's light, by channel.
+  /** Pixels of a scene: red, green, blue, isObject, triangle, distance, and the shadow ratio by channel.
     *
-    * @param registers all that the host writes, by name
-    * @param room      words of each of the room's memories, if there is one
+    * @param registers the host's registers, by name
+    * @param environment words of each memory of the environment, if there is one
     */
   def pixels(
-      config:    ColonnadeConfig,
-      registers: Map[String, BigInt],
-      records:   Seq[BigInt],
-      positions: Seq[(Int, Int)],
-      room:      Option[Map[String, Seq[BigInt]]] = None
+      config:      ColonnadeConfig,
+      registers:   Map[String, BigInt],
+      records:     Seq[BigInt],
+      positions:   Seq[(Int, Int)],
+      environment: Option[Map[String, Seq[BigInt]]] = None
   ): Seq[Seq[BigInt]] = {
     val formats = new RecordFormats(config)
     val kinds   = Seq("node" -> formats.node, "triangles" -> formats.triangles, "attributes" -> formats.attributes)
@@ -38,7 +38,7 @@ object Model {
     val scene   =
       s"records ${registers("scene.triangleBase")} ${registers("scene.attributeBase")} ${hex.mkString(" ")}"
     val written = registers.map { case (name, value) => s"$name=$value" }.mkString("registers ", " ", "")
-    val maps    = room.toSeq.flatMap(roomOf(config, _))
+    val maps    = environment.toSeq.flatMap(environmentOf(config, _))
     answers(
       config,
       layouts ++ maps ++ Seq(scene, written),
@@ -47,18 +47,18 @@ object Model {
     )
   }
 
-  /** Answers to questions about a room's maps, in the form that environment_questions.hpp documents.
+  /** Runs the model on questions about the environment's maps; environment_questions.hpp documents their format.
     *
-    * @param words of each of the room's memories
+    * @param words words of each memory of the environment
     */
   def attributes(
       config:    ColonnadeConfig,
       words:     Map[String, Seq[BigInt]],
       questions: Seq[Seq[BigInt]],
       kind:      String
-  ): Seq[Seq[BigInt]] = answers(config, roomOf(config, words), questions, kind)
+  ): Seq[Seq[BigInt]] = answers(config, environmentOf(config, words), questions, kind)
 
-  private def roomOf(config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Seq[String] = {
+  private def environmentOf(config: ColonnadeConfig, words: Map[String, Seq[BigInt]]): Seq[String] = {
     val layouts  = AttributeMemories.layouts.map { case (name, word) => layout(name, word()) }
     val sizes    = AttributeLayout.of(config).entries.map { case (key, value) => s"$key=$value" }
     val contents = AttributeMemories(config).map { memory =>

@@ -7,7 +7,7 @@ import colonnade.formats.Layout
 
 import scala.util.Random
 
-/** A payload's bits from its numbers by name, and back. */
+/** Packs a payload's numbers, given by name, into bits, and unpacks them. */
 final class Packed(payload: Data) {
   private val fields = Layout.of(payload)
 
@@ -30,7 +30,7 @@ final class Packed(payload: Data) {
   }.toMap
 }
 
-/** A unit whose streams are packed into one integer each, so that a test pokes and peeks once a cycle. */
+/** A unit with one integer per stream, so that a test pokes and peeks once per cycle. */
 abstract class PackedUnit[I <: Data, O <: Data](input: I, output: O) extends Module {
   val in  = IO(Flipped(Decoupled(UInt(input.getWidth.W))))
   val out = IO(Decoupled(UInt(output.getWidth.W)))
@@ -47,8 +47,8 @@ abstract class PackedUnit[I <: Data, O <: Data](input: I, output: O) extends Mod
 
 object PackedStreams {
 
-  /** Sends all payloads with random bubbles and takes as many results with random stalls. While nothing is offered the
-    * input is noise.
+  /** Sends all payloads with random bubbles and accepts as many results with random stalls. The input is random while no
+    * payload is offered.
     *
     * @param offered  probability that the next payload is offered in a cycle
     * @param accepted probability that a result is accepted in a cycle

@@ -10,8 +10,8 @@ import scala.util.Try
 /** Bounded model checks; a spec is cancelled where z3 is missing. */
 trait Proofs { this: TestSuite with HasTestName =>
 
-  /** Holds the module's assertions for all inputs of the first `cycles` cycles after a reset that keep its assumptions.
-    * Fails also where the proof says nothing: where assumptions contradict one another, or a `cover` can't happen.
+  /** Proves the module's assertions for the first `cycles` cycles after a reset, for all inputs that meet its assumptions.
+    * Also fails if the proof is vacuous: if assumptions contradict each other, or a `cover` cannot happen.
     */
   def prove(cycles: Int)(module: => Module): Unit = {
     if (!Proofs.hasZ3) cancel("z3 is not installed")

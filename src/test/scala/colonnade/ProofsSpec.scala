@@ -14,7 +14,7 @@ private class Counter(check: (UInt, Bool) => Unit) extends Module {
   check(count, counts)
 }
 
-/** A memory with one port, of three words; what was written first, and where, is remembered. */
+/** A single-port memory of three words; registers keep the first write and its address. */
 private class OnePort(readsAlways: Boolean) extends Module {
   val isUsed  = IO(Input(Bool()))
   val isWrite = IO(Input(Bool()))
@@ -46,7 +46,7 @@ class ProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
   private def objection(cycles: Int)(module: => Module): String =
     intercept[TestFailedException](prove(cycles)(module)).getMessage
 
-  it should "hold what is true, and see that it can happen" in {
+  it should "prove true assertions, and reach covers" in {
     prove(cycles = 5) {
       new Counter((count, _) => {
         chisel3.assert(count < 5.U)
@@ -55,7 +55,7 @@ class ProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
     }
   }
 
-  it should "name the assertion that is violated first, its cycle and its trace" in {
+  it should "name the first violated assertion, its cycle and its trace" in {
     val text = objection(cycles = 6) {
       new Counter((count, _) => {
         chisel3.assert(count < 4.U, "less than four")
@@ -67,7 +67,7 @@ class ProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
     assert(!text.contains("nine"))
   }
 
-  it should "refuse assumptions that contradict one another" in {
+  it should "refuse contradictory assumptions" in {
     val text = objection(cycles = 5) {
       new Counter((count, counts) => {
         chisel3.assume(counts)
@@ -78,7 +78,7 @@ class ProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
     assert(text.contains("the assumptions can't be kept for 5 cycles"))
   }
 
-  it should "refuse a proof in which a cover can't happen" in {
+  it should "refuse a proof with an unreachable cover" in {
     val text = objection(cycles = 5) {
       new Counter((count, _) => {
         chisel3.assert(count < 8.U)
@@ -88,11 +88,11 @@ class ProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
     assert(text.contains("can't happen within 5 cycles: src/test"))
   }
 
-  it should "refuse a proof of nothing" in {
+  it should "refuse a proof without assertions" in {
     assert(objection(cycles = 5)(new Counter((_, _) => ())).contains("nothing is asserted"))
   }
 
-  it should "know a memory with one port, and that it shows nothing certain where it was not read" in {
+  it should "model a single-port memory whose output is undefined without a read" in {
     prove(cycles = 6)(new OnePort(readsAlways = false))
     assert(objection(cycles = 6)(new OnePort(readsAlways = true)).contains("the word that was written"))
   }

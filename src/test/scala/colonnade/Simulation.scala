@@ -3,12 +3,12 @@ package colonnade
 import chiseltest.VerilatorBackendAnnotation
 import chiseltest.simulator.VerilatorCFlags
 
-/** How specs simulate a unit. */
+/** Simulation settings of specs. */
 object Simulation {
 
-  /** In each compilation of C++ that Verilator wrote: g++ 12.2 vectorises population counts wrongly. */
+  /** For all C++ of Verilator: g++ 12.2 miscompiles population counts when it vectorises them. */
   val safeFlags: Seq[String] = Seq("-fno-tree-slp-vectorize")
 
-  /** With Verilator, for units that are slow to interpret. */
+  /** Verilator, for units that are slow in the interpreter. */
   val verilator = Seq(VerilatorBackendAnnotation, VerilatorCFlags(safeFlags))
 }

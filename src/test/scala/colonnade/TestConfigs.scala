@@ -5,7 +5,7 @@ import colonnade.config._
 /** Configurations for specs. */
 object TestConfigs {
 
-  /** One render unit of the presets' formats, with a small memory. */
+  /** One render unit with the formats of the presets and a small memory. */
   val tiny: ColonnadeConfig = ColonnadeConfig(
     ArrayConfig(rows = 1, columns = 1, contexts = 4),
     PrecisionConfig(mac = 32, sqrt = 32, div = 64),
@@ -24,8 +24,8 @@ object TestConfigs {
     FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, lights = 2, maxBounces = 3, hits = true)
   )
 
-  /** Maps of a few tiles, the last ones cut, with a heap for some of them. */
-  val room: PhysicalAttributeMemoryConfig = PhysicalAttributeMemoryConfig(
+  /** Maps of a few tiles, the last ones clipped, with a heap for some of them. */
+  val environment: PhysicalAttributeMemoryConfig = PhysicalAttributeMemoryConfig(
     width = 150,
     height = 70,
     encoding = MapEncoding.TwoLevel,
@@ -38,13 +38,13 @@ object TestConfigs {
     shared = false
   )
 
-  def withRoom(room: PhysicalAttributeMemoryConfig): ColonnadeConfig =
-    tiny.copy(physicalAttributeMemory = Some(room))
+  def withEnvironment(environment: PhysicalAttributeMemoryConfig): ColonnadeConfig =
+    tiny.copy(physicalAttributeMemory = Some(environment))
 
-  /** In both encodings: small maps, and those of the room that the presets are made for. */
-  val rooms: Seq[ColonnadeConfig] = {
-    val large = room.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 8192)
-    val odd   = room.copy(
+  /** Small maps, maps of the presets' size and maps of odd sizes, in both encodings. */
+  val environments: Seq[ColonnadeConfig] = {
+    val large = environment.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 8192)
+    val odd   = environment.copy(
       width = 331,
       height = 97,
       tileSize = 32,
@@ -54,8 +54,8 @@ object TestConfigs {
       mapBytes = 16848,
       planeBytes = 16781
     )
-    Seq(room, large, odd)
-      .flatMap(size => MapEncoding.all.map(encoding => withRoom(size.copy(encoding = encoding))))
+    Seq(environment, large, odd)
+      .flatMap(size => MapEncoding.all.map(encoding => withEnvironment(size.copy(encoding = encoding))))
   }
 
   def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig =

@@ -40,7 +40,7 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   val progress = Output(new ColumnProgress)
 
   /** If the columns share the maps of the environment. */
-  val room = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
+  val environment = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
 
   /** Delayed by one cycle. */
   val events = Output(new EventSums(config, 1))
@@ -86,7 +86,7 @@ final class Column(
   private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(config)).io)
   for (maps <- environment) {
     maps.load := io.load
-    maps.shared.zip(io.room).foreach { case (shared, port) => port <> shared }
+    maps.shared.zip(io.environment).foreach { case (shared, port) => port <> shared }
     maps.ports.zip(units.flatMap(_.maps)).foreach { case (port, unit) => port <> unit }
   }
 

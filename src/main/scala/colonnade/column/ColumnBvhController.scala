@@ -35,12 +35,12 @@ final class ColumnBvhController(config: ColonnadeConfig) extends Module {
   private val readers = Seq.fill(config.columnBvhMemory.banks)(Module(new BankReader(config)))
 
   for ((request, row) <- io.requests.zipWithIndex) {
-    val ways = readers.map(_.io.requests(row))
-    ways.zipWithIndex.foreach { case (way, bank) =>
-      way.valid := request.valid && Banks.isIn(config, request.bits.address, bank)
-      way.bits  := request.bits
+    val ports = readers.map(_.io.requests(row))
+    ports.zipWithIndex.foreach { case (port, bank) =>
+      port.valid := request.valid && Banks.isIn(config, request.bits.address, bank)
+      port.bits  := request.bits
     }
-    request.ready := ways.map(way => way.valid && way.ready).reduce(_ || _)
+    request.ready := ports.map(port => port.valid && port.ready).reduce(_ || _)
   }
   for ((reader, bank) <- readers.zipWithIndex) {
     io.memory(bank) <> reader.io.memory

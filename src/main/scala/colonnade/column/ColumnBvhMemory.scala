@@ -27,23 +27,24 @@ final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
 
   private val isForUs = io.load.valid && io.load.bits.target === LoadTarget.columnBvh(config) &&
     io.load.bits.address < config.columnBvhMemory.depth.U
-  private val place = io.load.bits.address(RecordFormats.addressBits(config) - 1, 0)
+  private val loadAddress = io.load.bits.address(RecordFormats.addressBits(config) - 1, 0)
 
   for ((port, bank) <- io.banks.zipWithIndex) {
     val records = SyncReadMem(Banks.depth(config), new RecordFormats(config).record)
     val read    = Pipe(port.request.fire, port.request.bits, config.columnBvhMemory.readLatency - 1)
-    val writes  = isForUs && Banks.isIn(config, place, bank)
+    val writes  = isForUs && Banks.isIn(config, loadAddress, bank)
     assert(!(writes && read.valid), "a load during a read")
 
-    val address = Mux(writes, Banks.addressIn(config, place), read.bits)
-    val answer  = Wire(Decoupled(new RecordFormats(config).record))
-    val answers = if (config.columnBvhMemory.holdable) Queue(answer, ReadList.depth(config), flow = true) else answer
-    val isHeld  = io.holds.map(_(bank)).getOrElse(false.B)
-    answer.valid        := RegNext(read.valid, false.B)
-    answer.bits         := records.readWrite(address, io.load.bits.record, writes || read.valid, writes)
-    answers.ready       := !isHeld
+    val address   = Mux(writes, Banks.addressIn(config, loadAddress), read.bits)
+    val response  = Wire(Decoupled(new RecordFormats(config).record))
+    val responses =
+      if (config.columnBvhMemory.holdable) Queue(response, ReadList.depth(config), flow = true) else response
+    val isHeld = io.holds.map(_(bank)).getOrElse(false.B)
+    response.valid      := RegNext(read.valid, false.B)
+    response.bits       := records.readWrite(address, io.load.bits.record, writes || read.valid, writes)
+    responses.ready     := !isHeld
     port.request.ready  := !isHeld
-    port.response.valid := answers.fire
-    port.response.bits  := answers.bits
+    port.response.valid := responses.fire
+    port.response.bits  := responses.bits
   }
 }

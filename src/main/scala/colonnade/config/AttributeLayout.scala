@@ -90,10 +90,10 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
   private def heapWords(field: String, all: Int, fixed: Int, because: String, largestTile: Int): Int = {
     def bytesOf(words: Int): Int = words * heapWordBits / 8
     fits(field, all, fixed + bytesOf(largestTile), s"$because, the finest tile ${bytesOf(largestTile)}")
-    val most = fixed + bytesOf(1 << pointerBits)
-    if (all > most)
+    val max = fixed + bytesOf(1 << pointerBits)
+    if (all > max)
       throw new ConfigError(
-        s"${name(field)} is $all; it must be at most $most: $because, and tiles reach ${bytesOf(1 << pointerBits)} more"
+        s"${name(field)} is $all; it must be at most $max: $because, and tiles reach ${bytesOf(1 << pointerBits)} more"
       )
     (all - fixed) / bytesOf(1)
   }

@@ -143,5 +143,5 @@ final case class ColonnadeConfig(
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
   /** The device supports an environment. */
-  val hasRoom: Boolean = physicalAttributeMemory.nonEmpty
+  val hasEnvironment: Boolean = physicalAttributeMemory.nonEmpty
 }

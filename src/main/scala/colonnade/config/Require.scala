@@ -6,9 +6,9 @@ private[config] object Require {
   def within(field: String, value: Int, low: Int, high: Int): Unit =
     if (value < low || value > high) throw new ConfigError(s"$field is $value; it must be from $low to $high")
 
-  def product(first: String, one: Int, second: String, other: Int, most: Int): Unit =
-    if (one.toLong * other > most)
-      throw new ConfigError(s"$first times $second is ${one.toLong * other}; it must be at most $most")
+  def product(first: String, one: Int, second: String, other: Int, max: Int): Unit =
+    if (one.toLong * other > max)
+      throw new ConfigError(s"$first times $second is ${one.toLong * other}; it must be at most $max")
 
   def oneOf(field: String, value: Int, allowed: Seq[Int]): Unit =
     if (!allowed.contains(value))

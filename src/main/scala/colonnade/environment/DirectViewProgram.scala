@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import colonnade.formats.RoomView
+import colonnade.formats.EnvironmentView
 import colonnade.microcode.{Overlap, Repeat}
 import colonnade.numbers.Rounding
 
@@ -14,7 +14,7 @@ final class DirectViewProgram(
     texel:      TexelFetch,
     resolver:   HitResolver,
     channel:    AttributeChannel[CellRequest, CellResponse],
-    view:       RoomView,
+    view:       EnvironmentView,
     request:    MarchRequest
 ) {
   import MarchLabel._
@@ -103,7 +103,7 @@ final class DirectViewProgram(
     val begin          = 2 * axis
     val halfPixels     = ((pixel << 1) | 1.U).zext
     val digits         = projection.digitsOf(stepWidth.zext)
-    val coordinate     = Rounding.floor(m.sum, RoomView.stepGuard)
+    val coordinate     = Rounding.floor(m.sum, EnvironmentView.stepGuard)
     val Seq(low, high) = if (digits.size == 1) Seq(digits.head, 0.S) else digits
     at(begin)(m.multiply(halfPixels, high))
     at(begin + 1) {

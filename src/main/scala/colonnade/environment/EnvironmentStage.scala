@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.RoomView
+import colonnade.formats.EnvironmentView
 import colonnade.shading.EnvironmentSurface
 
 /** The ray of a context, for the table of [[EnvironmentStage]]. */
@@ -17,7 +17,7 @@ final class StoredRay(config: ColonnadeConfig) extends Bundle {
 final class EnvironmentStageIO(config: ColonnadeConfig) extends Bundle {
 
   /** Constant while a frame runs. */
-  val view = Input(new RoomView(config.numbers))
+  val view = Input(new EnvironmentView(config.numbers))
 
   /** Stored in place of the context's previous ray. */
   val ray = Flipped(Valid(new StoredRay(config)))

@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import colonnade.formats.RoomView
+import colonnade.formats.EnvironmentView
 import colonnade.microcode.Repeat
 
 /** The end of a march: a hit on a surface of the map, a hit on the nearest bounding plane, or a miss. */
@@ -12,7 +12,7 @@ final class HitResolver(
     hitPixel:    HitPixel,
     texel:       TexelFetch,
     hitDistance: UInt,
-    view:        RoomView
+    view:        EnvironmentView
 ) {
   import MarchLabel._
   import m.formats._

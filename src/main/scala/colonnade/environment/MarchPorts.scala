@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.Decoupled
 import colonnade.common.Context
 import colonnade.config.{AttributeLayout, ColonnadeConfig, NumberFormats}
-import colonnade.formats.{AlbedoEntry, PixelPosition, RoomView, Vec3}
+import colonnade.formats.{AlbedoEntry, EnvironmentView, PixelPosition, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
@@ -94,7 +94,7 @@ final class EnvironmentMarchIO(config: ColonnadeConfig) extends Bundle {
   private val layout = AttributeLayout.of(config)
 
   /** Constant while a ray is marched. */
-  val view    = Input(new RoomView(config.numbers))
+  val view    = Input(new EnvironmentView(config.numbers))
   val request = Flipped(Decoupled(new MarchRequest(config)))
   val result  = Decoupled(new MarchResult(config))
 

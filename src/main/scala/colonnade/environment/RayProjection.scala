@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import colonnade.formats.RoomView
+import colonnade.formats.EnvironmentView
 import colonnade.microcode.Overlap
 import colonnade.numbers.Rounding
 
@@ -11,7 +11,7 @@ import colonnade.numbers.Rounding
   * own and then aligned to the largest one; both roundings together are a single floor. A component needs the sum for
   * two cycles: in the first one it is measured, in the second one shifted.
   */
-final class RayProjection(m: MarchOperations, view: RoomView, request: MarchRequest) {
+final class RayProjection(m: MarchOperations, view: EnvironmentView, request: MarchRequest) {
   import MarchLabel._
   import m.formats._
   import m.program._

@@ -3,7 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Fill
 import colonnade.config.NumberFormats
-import colonnade.formats.RoomView
+import colonnade.formats.EnvironmentView
 import colonnade.microcode.Overlap
 import colonnade.numbers.{Fixed, Rounding}
 
@@ -12,7 +12,7 @@ final class SurfacePoint(
     m:        MarchOperations,
     texel:    TexelFetch,
     resolver: HitResolver,
-    view:     RoomView,
+    view:     EnvironmentView,
     request:  MarchRequest
 ) {
   import MarchLabel._
@@ -36,8 +36,8 @@ final class SurfacePoint(
     Mux(isFar, Mux(sign, ~max, max), Rounding.narrow(position, sceneBits))
   }
   private val rotated = {
-    val exact = Rounding.narrow(m.sum, RoomView.rotationBits + NumberFormats.normalBits + 2)
-    Rounding.saturate(Rounding.nearestEven(exact, RoomView.rotationFraction), NumberFormats.normalBits)
+    val exact = Rounding.narrow(m.sum, EnvironmentView.rotationBits + NumberFormats.normalBits + 2)
+    Rounding.saturate(Rounding.nearestEven(exact, EnvironmentView.rotationFraction), NumberFormats.normalBits)
   }
 
   /** Connects the result, which is valid in `Finish`. */

@@ -7,7 +7,7 @@ import colonnade.config.ColonnadeConfig
 /** Events of a render unit in one cycle; names as in `Counters`. */
 final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   private def contexts                               = UInt(log2Ceil(config.array.contexts + 1).W)
-  private def ifRoom[T <: Data](event: T): Option[T] = if (config.hasRoom) Some(event) else None
+  private def ifRoom[T <: Data](event: T): Option[T] = if (config.hasEnvironment) Some(event) else None
 
   val raysShadow       = Bool()
   val raysReflection   = Bool()

@@ -100,21 +100,21 @@ final class SceneMap(countBits: Int) extends Bundle {
 
 /** The registers that the host writes before a frame. Constant while a frame runs.
   *
-  * A record, not a bundle, because `room` exists only with a physical-attribute memory.
+  * A record, not a bundle, because `environment` exists only with a physical-attribute memory.
   */
 final class FrameRegisters(config: ColonnadeConfig) extends Record {
   private val numbers = config.numbers
 
-  val frame      = new FrameSettings(numbers)
-  val camera     = new Camera(numbers)
-  val lights     = Vec(config.frame.lights, new Light(numbers))
-  val ambient    = Rgb(FrameRegisters.intensity)
-  val shading    = new Shading(config)
-  val background = Rgb(FrameRegisters.colour)
-  val materials  = Vec(config.frame.materials, new Material(config))
-  val bounds     = new Bounds(numbers)
-  val scene      = new SceneMap(RecordFormats.idBits(config))
-  val room       = config.physicalAttributeMemory.map(_ => new RoomView(numbers))
+  val frame       = new FrameSettings(numbers)
+  val camera      = new Camera(numbers)
+  val lights      = Vec(config.frame.lights, new Light(numbers))
+  val ambient     = Rgb(FrameRegisters.intensity)
+  val shading     = new Shading(config)
+  val background  = Rgb(FrameRegisters.colour)
+  val materials   = Vec(config.frame.materials, new Material(config))
+  val bounds      = new Bounds(numbers)
+  val scene       = new SceneMap(RecordFormats.idBits(config))
+  val environment = config.physicalAttributeMemory.map(_ => new EnvironmentView(numbers))
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
     Seq(
@@ -127,7 +127,7 @@ final class FrameRegisters(config: ColonnadeConfig) extends Record {
       "materials"  -> materials,
       "bounds"     -> bounds,
       "scene"      -> scene
-    ) ++ room.map("room" -> _): _*
+    ) ++ environment.map("room" -> _): _*
   )
 }
 
@@ -140,10 +140,10 @@ object FrameRegisters {
   def intensity: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightBits, NumberFormats.lightFraction))
 
   /** A weight from 0 to 1: 2^fraction is 1. */
-  def share: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightFraction + 1, NumberFormats.lightFraction))
+  def weight: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightFraction + 1, NumberFormats.lightFraction))
 
   /** The weight 1. */
-  def whole: Fixed = Fixed.literal(share.format, BigInt(1) << NumberFormats.lightFraction)
+  def one: Fixed = Fixed.literal(weight.format, BigInt(1) << NumberFormats.lightFraction)
 
   /** A linear colour channel; all ones is 1.0. */
   def colour: UInt = UInt(NumberFormats.colourBits.W)

@@ -13,5 +13,5 @@ class PixelPosition(config: ColonnadeConfig) extends Bundle {
 final class UnitPosition(config: ColonnadeConfig) extends PixelPosition(config) {
 
   /** Its primary ray may hit the object; always so without an environment. */
-  val meetsObject = if (config.hasRoom) Some(Bool()) else None
+  val meetsObject = if (config.hasEnvironment) Some(Bool()) else None
 }

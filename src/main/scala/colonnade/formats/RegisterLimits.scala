@@ -11,9 +11,9 @@ object RegisterLimits {
   /** By register name; all of them are unsigned. */
   def apply(config: ColonnadeConfig): Map[String, BigInt] = {
     val numbers   = config.numbers
-    val whole     = BigInt(1) << NumberFormats.lightFraction
+    val one       = BigInt(1) << NumberFormats.lightFraction
     val materials = (0 until config.frame.materials).flatMap { index =>
-      Seq(s"materials[$index].kind" -> MaterialKind.most, s"materials[$index].reflectance" -> whole)
+      Seq(s"materials[$index].kind" -> MaterialKind.last, s"materials[$index].reflectance" -> one)
     }
     val records = Seq("recordCount", "triangleBase", "triangleRecords", "attributeBase").map(name =>
       s"scene.$name" -> BigInt(config.columnBvhMemory.depth)
@@ -23,13 +23,13 @@ object RegisterLimits {
       "camera.stepShift"  -> BigInt(numbers.coordinateBits),
       "shading.lights"    -> BigInt(config.frame.lights),
       "shading.bounces"   -> BigInt(config.frame.maxBounces),
-      "shading.clearness" -> whole
+      "shading.clearness" -> one
     ) ++ materials ++ records
-    val most = Layout.of(new FrameRegisters(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
-    limits.filter { case (name, limit) => most.get(name).exists(limit < _) }.toMap
+    val max = Layout.of(new FrameRegisters(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
+    limits.filter { case (name, limit) => max.get(name).exists(limit < _) }.toMap
   }
 
   /** The value, clamped to the limit of its register. */
   def clamp(value: UInt, limit: Option[BigInt]): UInt =
-    limit.fold(value)(most => Mux(value > most.U, most.U(value.getWidth.W), value))
+    limit.fold(value)(max => Mux(value > max.U, max.U(value.getWidth.W), value))
 }

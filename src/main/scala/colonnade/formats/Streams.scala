@@ -27,7 +27,7 @@ final class Pixel(config: ColonnadeConfig) extends Bundle {
   val isObject = Bool()
 
   /** The shadow ratio: the fraction of the light that the object leaves to a pixel of the environment; 1 for others. */
-  val ratio = if (config.hasRoom) Some(Rgb(FrameRegisters.share)) else None
+  val ratio = if (config.hasEnvironment) Some(Rgb(FrameRegisters.weight)) else None
   val hit   = if (config.frame.hits) Some(new PixelHit(config)) else None
 }
 

@@ -36,7 +36,7 @@ final class Shading(config: ColonnadeConfig) extends Record {
   val bounces = ifBounces(UInt(NumberFormats.bitLength(config.frame.maxBounces).W))
 
   /** Transmittance of transmissive triangles for shadow rays. */
-  val clearness = ifBounces(FrameRegisters.share)
+  val clearness = ifBounces(FrameRegisters.weight)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
     Seq("flat" -> flat, "shadows" -> shadows, "lights" -> lights, "offset" -> offset) ++
@@ -54,10 +54,10 @@ object MaterialKind {
   def mirror: UInt = 1.U(bits.W)
 
   /** Refracts, and reflects by Schlick's approximation. */
-  def glass: UInt = most.U(bits.W)
+  def glass: UInt = last.U(bits.W)
 
   /** The last kind. */
-  val most: BigInt = 2
+  val last: BigInt = 2
 }
 
 /** A record, not a bundle, because a material without bounces has an albedo only. */
@@ -77,7 +77,7 @@ final class Material(config: ColonnadeConfig) extends Record {
   val etaBack  = ifBounces(eta)
 
   /** Glass: reflectance at normal incidence. */
-  val reflectance = ifBounces(FrameRegisters.share)
+  val reflectance = ifBounces(FrameRegisters.weight)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
     Seq("albedo" -> albedo) ++ kind.map("kind" -> _) ++ etaFront.map("etaFront" -> _) ++ etaBack.map("etaBack" -> _) ++

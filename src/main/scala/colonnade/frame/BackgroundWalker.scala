@@ -38,7 +38,7 @@ final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   io.pixels.bits.y        := positions.io.out.bits.y
   io.pixels.bits.colour   := io.colour
   io.pixels.bits.isObject := false.B
-  io.pixels.bits.ratio.foreach(_.channels.foreach(_ := FrameRegisters.whole))
+  io.pixels.bits.ratio.foreach(_.channels.foreach(_ := FrameRegisters.one))
   io.pixels.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
   positions.io.out.ready := io.pixels.ready
   io.isIdle              := scan.io.isIdle

@@ -22,7 +22,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   private def perContext          = sum(units * config.array.contexts)
   private def perEnvironment      = ifEnvironment(sum(columns))
 
-  private def ifEnvironment[T <: Data](event: T): Option[T] = if (config.hasRoom) Some(event) else None
+  private def ifEnvironment[T <: Data](event: T): Option[T] = if (config.hasEnvironment) Some(event) else None
 
   /** Including background pixels, which bypass the units. */
   val raysPrimary      = sum(units + columns)
@@ -77,13 +77,13 @@ object EventSums {
       raysPrimary: UInt,
       units:       Seq[UnitEvents],
       controller:  ColumnBvhEvents,
-      room:        Option[AttributeEvents]
+      environment: Option[AttributeEvents]
   ): EventSums = {
     val sums = joined(new EventSums(config, 1), units.map(_.elements.toMap))
-    sums.raysPrimary                                                           := raysPrimary
-    sums.recordReads                                                           := controller.recordReads
-    sums.bankConflicts                                                         := controller.bankConflicts
-    for (events <- room; (name, event) <- events.elements) sums.elements(name) := event
+    sums.raysPrimary                                                                  := raysPrimary
+    sums.recordReads                                                                  := controller.recordReads
+    sums.bankConflicts                                                                := controller.bankConflicts
+    for (events <- environment; (name, event) <- events.elements) sums.elements(name) := event
     sums
   }
 

@@ -25,9 +25,9 @@ object EnvironmentWindow {
   /** The window in the registers. */
   def apply(config: ColonnadeConfig, registers: FrameRegisters): EnvironmentWindow = {
     val window = WireInit(0.U.asTypeOf(new EnvironmentWindow(config)))
-    for (room <- registers.room) {
-      window.enabled := room.isThere
-      window.rect    := room.window
+    for (environment <- registers.environment) {
+      window.enabled := environment.isThere
+      window.rect    := environment.window
     }
     window
   }

@@ -19,15 +19,15 @@ final class PixelCollectorIO(config: ColonnadeConfig, count: Int) extends Bundle
 final class PixelCollector(config: ColonnadeConfig, count: Int) extends Module {
   val io = IO(new PixelCollectorIO(config, count))
 
-  private val arbiter = Module(new RoundRobin(count))
-  private val chosen  = Wire(Decoupled(new Pixel(config)))
+  private val arbiter  = Module(new RoundRobin(count))
+  private val selected = Wire(Decoupled(new Pixel(config)))
   arbiter.io.requests := VecInit(io.sources.map(_.valid)).asUInt
-  arbiter.io.isTaken  := chosen.fire
+  arbiter.io.isTaken  := selected.fire
 
-  chosen.valid := arbiter.io.requests.orR
-  chosen.bits  := Mux1H(arbiter.io.grant, io.sources.map(_.bits))
+  selected.valid := arbiter.io.requests.orR
+  selected.bits  := Mux1H(arbiter.io.grant, io.sources.map(_.bits))
   io.sources.zip(arbiter.io.grant.asBools).foreach { case (source, isGranted) =>
-    source.ready := chosen.ready && isGranted
+    source.ready := selected.ready && isGranted
   }
-  io.pixels <> Queue(chosen, 2)
+  io.pixels <> Queue(selected, 2)
 }

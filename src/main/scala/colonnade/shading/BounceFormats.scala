@@ -89,7 +89,7 @@ final class BounceRequest(config: ColonnadeConfig) extends Bundle {
   val eta = new Fixed(FixedPointFormat.unsigned(NumberFormats.etaBits, NumberFormats.etaFraction))
 
   /** At normal incidence. */
-  val reflectance = FrameRegisters.share
+  val reflectance = FrameRegisters.weight
 }
 
 /** The ray that leaves a mirror or glass. */
@@ -105,5 +105,5 @@ final class BounceResult(config: ColonnadeConfig) extends Bundle {
 
   /** The direction of a refracted ray's reflection, and its Fresnel term; a term of 0: there is no reflection. */
   val reflection = Vec3(SInt(new BounceFormats(numbers).bounceBits.W))
-  val fresnel    = FrameRegisters.share
+  val fresnel    = FrameRegisters.weight
 }

@@ -83,9 +83,9 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val surface     = Reg(UInt(colourBits.W))
 
   /** Where a bounce may have a surface, it has another albedo than the bounce. */
-  private val surfaceAlbedo = if (hasBounces && config.hasRoom) Reg(Vec(3, UInt(colourBits.W))) else albedo
+  private val surfaceAlbedo = if (hasBounces && config.hasEnvironment) Reg(Vec(3, UInt(colourBits.W))) else albedo
   private val colours       = Reg(Vec(3, UInt(colourBits.W)))
-  private val ratios        = if (config.hasRoom) Some(Module(new ShadowRatioDivider(sumBits)).io) else None
+  private val ratios        = if (config.hasEnvironment) Some(Module(new ShadowRatioDivider(sumBits)).io) else None
 
   /** The shadow ratio is needed, and the light without shadows. */
   private val isDirectView = Reg(Bool())
@@ -240,7 +240,7 @@ final private class TerminalSurface(config: ColonnadeConfig) extends Bundle {
 final private class PathState extends Bundle {
 
   /** The weight of what the path still hits, by channel. */
-  val throughput = Vec(3, FrameRegisters.share)
+  val throughput = Vec(3, FrameRegisters.weight)
 
   /** The colour so far. */
   val radiance = Rgb(FrameRegisters.colour)

@@ -70,7 +70,7 @@ final class GeometryDatapathIO(config: ColonnadeConfig) extends Bundle {
 
   /** Load `environment` instead of `request`. */
   val isEnvironment = Input(Bool())
-  val environment   = if (config.hasRoom) Some(Input(new EnvironmentSurface(config))) else None
+  val environment   = if (config.hasEnvironment) Some(Input(new EnvironmentSurface(config))) else None
 
   /** Shade with the geometric normal. */
   val isFlat    = Input(Bool())

@@ -36,7 +36,7 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   private val backSide        = Reg(Bool())
   private val context         = Reg(chiselTypeOf(io.request.context))
   private val material        = Reg(chiselTypeOf(io.request.face.material))
-  private val isEnvironment   = if (config.hasRoom) Reg(Bool()) else WireInit(false.B)
+  private val isEnvironment   = if (config.hasEnvironment) Reg(Bool()) else WireInit(false.B)
 
   private val shifted      = Reg(SInt(formats.vectorBits.W))
   private val measured     = Reg(UInt((formats.vectorBits - 1).W))

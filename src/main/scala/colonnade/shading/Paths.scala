@@ -16,7 +16,7 @@ final class PathTermination(config: ColonnadeConfig) extends Bundle {
   val occlusions = Vec(config.frame.lights, Occlusion())
 
   /** The camera sees the environment's surface directly: the shadow ratio is needed as well. */
-  val isDirectView = if (config.hasRoom) Some(Bool()) else None
+  val isDirectView = if (config.hasEnvironment) Some(Bool()) else None
 }
 
 /** The change of a path's throughput at a mirror or glass. */
@@ -28,10 +28,10 @@ final class BounceUpdate(config: ColonnadeConfig) extends Bundle {
   val isTinted = Bool()
 
   /** The Fresnel term: the weight of the deferred reflection. */
-  val fresnel = FrameRegisters.share
+  val fresnel = FrameRegisters.weight
 
   /** The reflection shows the remembered surface, lit by all lights; otherwise the background's colour. */
-  val hasSurface = if (config.hasRoom) Some(Bool()) else None
+  val hasSurface = if (config.hasEnvironment) Some(Bool()) else None
 }
 
 /** The colour of a path. */
@@ -40,5 +40,5 @@ final class PathColour(config: ColonnadeConfig) extends Bundle {
   val colour  = Rgb(FrameRegisters.colour)
 
   /** Of a directly visible surface of the environment: its shadow ratio. */
-  val ratio = if (config.hasRoom) Some(Rgb(FrameRegisters.share)) else None
+  val ratio = if (config.hasEnvironment) Some(Rgb(FrameRegisters.weight)) else None
 }

@@ -18,7 +18,7 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   val request   = Flipped(Decoupled(new ShadeRequest(config)))
 
   /** Points of the environment; taken when there is no request. */
-  val environment = if (config.hasRoom) Some(Flipped(Decoupled(new EnvironmentSurface(config)))) else None
+  val environment = if (config.hasEnvironment) Some(Flipped(Decoupled(new EnvironmentSurface(config)))) else None
 
   /** `request` is ready in the next cycle. */
   val readyNext = Output(Bool())

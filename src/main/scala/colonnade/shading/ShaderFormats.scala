@@ -59,7 +59,7 @@ object ShaderFormats {
   /** Bits of a shadow ray's origin, signed: on the object or on the environment. */
   def originBits(config: ColonnadeConfig): Int = {
     val ofObject = new ShaderFormats(config.numbers).pointBits
-    if (config.hasRoom) config.numbers.sceneBits.max(ofObject) else ofObject
+    if (config.hasEnvironment) config.numbers.sceneBits.max(ofObject) else ofObject
   }
 }
 

@@ -47,5 +47,5 @@ final class BouncedRay(config: ColonnadeConfig) extends Bundle {
   val isTinted = Bool()
 
   /** Where there may be an environment: the origin of the Fresnel reflection, off the surface on the ray's side. */
-  val fresnelOrigin = if (config.hasRoom) Some(Vec3(new Fixed(new RayFormats(config.numbers).scene))) else None
+  val fresnelOrigin = if (config.hasEnvironment) Some(Vec3(new Fixed(new RayFormats(config.numbers).scene))) else None
 }

@@ -36,8 +36,8 @@ final class UnitShift(shiftRight: UInt, numbers: NumberFormats) {
   /** Barrel shifter, the largest step first, so that each step is only as wide as the later ones need. */
   private def shifted(whole: SInt): SInt =
     (log2Ceil(maxShift + 1) - 1 to 0 by -1).foldLeft(whole) { (value, step) =>
-      val needed = resultBits + (1 << step) - 1
-      val chosen = Mux(shiftRight(step), value >> (1 << step), value)
-      chosen.asUInt(needed.min(chosen.getWidth) - 1, 0).asSInt
+      val needed   = resultBits + (1 << step) - 1
+      val selected = Mux(shiftRight(step), value >> (1 << step), value)
+      selected.asUInt(needed.min(selected.getWidth) - 1, 0).asSInt
     }
 }

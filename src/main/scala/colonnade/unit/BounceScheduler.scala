@@ -38,7 +38,7 @@ final class BounceSchedulerIO(config: ColonnadeConfig) extends Bundle {
   /** A bounce that is issued. */
   val bounced      = Valid(new Bounced(config))
   val isRefraction = Output(Bool())
-  val environment  = if (config.hasRoom) Some(new DeferredBounceIO(config)) else None
+  val environment  = if (config.hasEnvironment) Some(new DeferredBounceIO(config)) else None
 }
 
 /** Issues bounces at mirrors and glass. In the same cycle, the colour unit gets the update of the path's throughput, and
@@ -115,9 +115,9 @@ final class BounceScheduler(config: ColonnadeConfig) extends Module {
     environment.ray.valid        := bounce.fire || environment.fresnelReflection.valid
     environment.ray.bits.context := Mux(bounce.fire, bounce.bits.update.context, result.context)
     val ray = environment.ray.bits.ray
-    ray.pixel   := DontCare
-    ray.origin  := Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get)
-    ray.dir := bounce.bits.dir
+    ray.pixel  := DontCare
+    ray.origin := Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get)
+    ray.dir    := bounce.bits.dir
     when(!bounce.fire) {
       ray.dir.axes.zip(result.reflection.axes).foreach { case (to, from) => to := from }
     }

@@ -133,7 +133,7 @@ final class RtControllerIO(config: ColonnadeConfig) extends Bundle {
   val trace       = Flipped(new TraceControl(config))
   val shaded      = Flipped(Valid(new Shaded(config)))
   val bounced     = Flipped(Valid(new Bounced(config)))
-  val environment = if (config.hasRoom) Some(new EnvironmentControl(config)) else None
+  val environment = if (config.hasEnvironment) Some(new EnvironmentControl(config)) else None
 
   /** A hit whose attributes have an illegal address: the path ends in the background. */
   val fetchFailed = Flipped(Valid(Context(config)))
@@ -149,5 +149,5 @@ final class RtControllerIO(config: ColonnadeConfig) extends Bundle {
   /** Numbers of contexts that are idle, in ray set-up, and waiting for the environment march or in it. */
   val idleCount        = contextCount
   val raySetupCount    = contextCount
-  val environmentCount = if (config.hasRoom) Some(contextCount) else None
+  val environmentCount = if (config.hasEnvironment) Some(contextCount) else None
 }

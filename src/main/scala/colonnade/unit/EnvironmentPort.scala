@@ -3,14 +3,14 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Decoupled
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.environment.{AttributePort, MarchEvents, EnvironmentStage}
-import colonnade.formats.{PixelPosition, RoomView}
+import colonnade.environment.{AttributePort, EnvironmentStage, MarchEvents}
+import colonnade.formats.{EnvironmentView, PixelPosition}
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
 
 /** Ports of [[EnvironmentPort]]. */
 final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
-  val view    = Input(new RoomView(config.numbers))
+  val view    = Input(new EnvironmentView(config.numbers))
   val control = Flipped(new EnvironmentControl(config))
 
   /** Primary rays, their pixels, and whether they may hit the object; those that may. */
@@ -59,10 +59,10 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   private val primary   = io.primary.bits
   private val bounceRay = io.bounces.map(_.ray)
   private val isBounce  = bounceRay.map(_.valid).getOrElse(false.B)
-  stage.io.ray.valid            := isBounce || io.primary.fire
-  stage.io.ray.bits.context     := primary.context
-  stage.io.ray.bits.ray.origin  := primary.origin
-  stage.io.ray.bits.ray.dir := primary.dir
+  stage.io.ray.valid           := isBounce || io.primary.fire
+  stage.io.ray.bits.context    := primary.context
+  stage.io.ray.bits.ray.origin := primary.origin
+  stage.io.ray.bits.ray.dir    := primary.dir
   for (ray <- bounceRay) when(ray.valid) { stage.io.ray.bits := ray.bits }
   stage.io.ray.bits.ray.pixel := io.pixel
 

@@ -65,7 +65,7 @@ final class PixelAssembler(config: ColonnadeConfig) extends Module {
   finished.bits.isObject := RegEnable(isObject(done.bits), retires)
   for (ratio <- finished.bits.ratio; shadow <- colour.ratio; channel <- 0 until 3)
     ratio.channels(channel) :=
-      Mux(hasColour && !finished.bits.isObject, shadow.channels(channel), FrameRegisters.whole)
+      Mux(hasColour && !finished.bits.isObject, shadow.channels(channel), FrameRegisters.one)
 
   // The primary ray's hit; its distance is the sum of the entry distance and t
   for (hit <- finished.bits.hit) {

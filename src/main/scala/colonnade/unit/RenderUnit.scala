@@ -32,7 +32,7 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   private val colourUnit  = Module(new ColourUnit(config)).io
   private val assembler   = Module(new PixelAssembler(config)).io
   private val bounces     = Option.when(config.frame.hasBounces)(Module(new BounceScheduler(config)).io)
-  private val environment = Option.when(config.hasRoom)(Module(new EnvironmentPort(config)).io)
+  private val environment = Option.when(config.hasEnvironment)(Module(new EnvironmentPort(config)).io)
 
   // From a position to a prepared ray; rays whose pixels are closer to their end have priority
   primaryRays.positions :<>= io.positions
@@ -127,5 +127,5 @@ final class RenderUnit(config: ColonnadeConfig) extends Module {
   colourUnit.shading           := registers.shading
   assembler.background         := registers.background
   bounces.foreach(_.shading := registers.shading)
-  environment.foreach(_.view := registers.room.get)
+  environment.foreach(_.view := registers.environment.get)
 }

@@ -18,7 +18,8 @@ final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
 
   /** To the maps of the environment. */
   val maps =
-    if (config.hasRoom) Some(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))) else None
+    if (config.hasEnvironment) Some(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config)))
+    else None
 
   /** No pixel is in flight. */
   val isIdle = Output(Bool())

@@ -34,11 +34,12 @@ final class RtController(config: ColonnadeConfig) extends Module {
   private val isBackground = Reg(Vec(contexts, Bool()))
 
   /** The camera sees the environment directly in this pixel. */
-  private val isDirectView = if (config.hasRoom) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val isDirectView = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
 
   /** The ray is a Fresnel reflection whose path's bounce is deferred. */
-  private val isFresnelReflection = if (config.hasRoom) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
-  private val hasEnvironment      = io.environment.map(_.enabled).getOrElse(false.B)
+  private val isFresnelReflection =
+    if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val hasEnvironment = io.environment.map(_.enabled).getOrElse(false.B)
 
   /** By light: a shadow ray is still to be traced; the results of those that were traced. */
   private val shadowPending = Reg(Vec(contexts, Vec(lights, Bool())))
@@ -57,7 +58,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
     isShadow(free.bits)  := false.B
     isPrimary(free.bits) := true.B
     hasColour(free.bits) := false.B
-    if (config.hasRoom) {
+    if (config.hasEnvironment) {
       isFresnelReflection(free.bits) := false.B
       isDirectView(free.bits)        := false.B
     }
@@ -159,9 +160,9 @@ final class RtController(config: ColonnadeConfig) extends Module {
     val pending = firstOf(isAt(ContextState.environmentPending))
     io.environmentCount.get :=
       PopCount(state.map(at => at === ContextState.environmentPending || at === ContextState.environmentMarch))
-    environment.req.valid        := pending.valid
-    environment.req.bits.context := pending.bits
-    environment.req.bits.isDirectView  := isPrimary(pending.bits)
+    environment.req.valid                    := pending.valid
+    environment.req.bits.context             := pending.bits
+    environment.req.bits.isDirectView        := isPrimary(pending.bits)
     environment.req.bits.isFresnelReflection := isFresnelReflection(pending.bits)
     when(environment.req.fire) {
       state(pending.bits)        := ContextState.environmentMarch

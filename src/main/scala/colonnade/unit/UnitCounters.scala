@@ -9,9 +9,9 @@ import colonnade.shading.{ShaderIO, ShadowRaysIO}
 
 /** Counts the contexts in a stage, from those that enter and leave it in each cycle. */
 object Occupancy {
-  def apply(config: ColonnadeConfig, enter: Seq[Bool], leave: Seq[Bool]): UInt = {
+  def apply(config: ColonnadeConfig, enter: Seq[Bool], exit: Seq[Bool]): UInt = {
     val count = RegInit(0.U(log2Ceil(config.array.contexts + 1).W))
-    count := count + PopCount(enter) - PopCount(leave)
+    count := count + PopCount(enter) - PopCount(exit)
     count
   }
 }

@@ -39,7 +39,7 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
   )
 
   for (snooping <- Seq(true, false))
-    it should s"lose and double no read, and starve no row, whenever two banks answer, snooping $snooping" in {
+    it should s"neither lose nor duplicate reads, and starve no row, whenever two banks respond, snooping $snooping" in {
       val shape = config(rows = 3, banks = 2, latency = 1, depth = 16)
       prove(cycles = 8)(
         new ColumnBvhControllerProof(shape.copy(columnBvhMemory = shape.columnBvhMemory.copy(snooping = snooping)))
@@ -70,14 +70,14 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
         var due      = Map.empty[Int, Seq[(Int, Int)]] // row and address by cycle
         var accepted = 0
         for (cycle <- 0 until 600) {
-          // Rows ask, and sometimes withdraw.
+          // Rows request, and sometimes withdraw.
           for (row <- 0 until rows) {
             if (cycle >= 560 || random.nextInt(12) == 0) wants(row) = None
             else if (wants(row).isEmpty && random.nextInt(3) == 0) wants(row) = Some(random.nextInt(depth))
             dut.requests(row).valid.poke(wants(row).nonEmpty)
             wants(row).foreach(dut.requests(row).bits.address.poke(_))
           }
-          // Who was accepted is shown by his bank after the latency.
+          // An accepted request is broadcast after the latency.
           val takes = (0 until rows).filter(row => wants(row).nonEmpty && dut.requests(row).ready.peekBoolean())
           assert(takes.map(row => wants(row).get % banks).distinct.size == takes.size, "one a bank")
           val isRead = (1 to latency).flatMap(later => due.getOrElse(cycle + later, Nil)).map(_._2).toSet

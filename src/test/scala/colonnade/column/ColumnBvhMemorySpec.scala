@@ -8,12 +8,12 @@ import org.scalatest.flatspec.AnyFlatSpec
 class ColumnBvhMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ColumnBvhMemory"
 
-  // The maps of the room are deeper than the memory, so the load port's addresses are wider than the memory's
+  // The environment's maps are deeper than the memory, so the load port's addresses are wider than the memory's
   for (depth <- Seq(16, 19))
     it should s"drop a load beyond a depth of $depth" in {
-      val room   = TestConfigs.withRoom(TestConfigs.room)
-      val config = room.copy(columnBvhMemory = room.columnBvhMemory.copy(depth = depth))
-      val banks  = config.columnBvhMemory.banks
+      val environment = TestConfigs.withEnvironment(TestConfigs.environment)
+      val config      = environment.copy(columnBvhMemory = environment.columnBvhMemory.copy(depth = depth))
+      val banks       = config.columnBvhMemory.banks
       test(new ColumnBvhMemory(config)) { memory =>
         for (address <- 0 until 8 * depth) {
           memory.io.load.valid.poke(true.B)

@@ -6,7 +6,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Pixel, PixelPosition, RecordFormats}
 import colonnade.unit.RenderUnitIO
 
-/** Renders a pixel by following records: the position names the first, each record the next. Takes any time between.
+/** Renders a pixel by a chain of records: the position names the first one, each record the next one, with random pauses.
   * With `shading.shadows` it hangs at [[FakeRenderUnit.hangsAt]]; with `shading.flat` it reports an illegal record
   * for each pixel of column 5.
   */
@@ -79,12 +79,12 @@ class FakeRenderUnit(config: ColonnadeConfig) extends Module {
 
 object FakeRenderUnit {
 
-  /** Records of a pixel. */
+  /** Number of records per pixel. */
   val reads: Int = 3
 
   val hangsAt: (Int, Int) = (3, 2)
 
-  /** The green that a pixel must have. */
+  /** The expected green of a pixel. */
   def colour(config: ColonnadeConfig, records: Seq[BigInt], x: Int, y: Int): Int = {
     val depth = 1 << RecordFormats.addressBits(config)
     (1 to reads)

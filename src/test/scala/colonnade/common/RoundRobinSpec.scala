@@ -6,7 +6,7 @@ import chiseltest._
 import colonnade.Proofs
 import org.scalatest.flatspec.AnyFlatSpec
 
-/** Any requests, served at any time. */
+/** Any requests, with grants accepted at any time. */
 class RoundRobinProof(count: Int) extends Module {
   val requests = IO(Input(UInt(count.W)))
   val isTaken  = IO(Input(Bool()))

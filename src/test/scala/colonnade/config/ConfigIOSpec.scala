@@ -32,7 +32,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     }
   }
 
-  it should "refuse JSON with traps" in {
+  it should "refuse duplicate keys, deep nesting and overlong numbers" in {
     def read(text: String): String =
       the[ConfigError] thrownBy StrictJson.read(text, "x.json") match { case error => error.getMessage }
     read("""{"a": {"b": 1, "b": 2}}""") shouldBe "x.json has the key b twice in an object"
@@ -76,7 +76,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     } finally Files.delete(file)
   }
 
-  it should "take the paper's notation as a name, as a value, and override a part of it" in {
+  it should "accept the paper's notation as a name and as a value, and override a part of it" in {
     val expected = PrecisionConfig(mac = 16, sqrt = 24, div = 48)
     ConfigIO.load("16b24s48d").precision shouldBe expected
     ConfigIO.load("16b24s48d").array shouldBe ConfigIO.load("small").array
@@ -122,23 +122,23 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     refusal("tiny", "frame.tileSize=5") shouldBe "frame.tileSize is 5; it must be one of 4, 8, 16, 32"
   }
 
-  private def room(changes: String*): Seq[String] =
-    s"physicalAttributeMemory=${ConfigIO.write(TestConfigs.withRoom(TestConfigs.room))("physicalAttributeMemory").render()}" +:
+  private def environment(changes: String*): Seq[String] =
+    s"physicalAttributeMemory=${ConfigIO.write(TestConfigs.withEnvironment(TestConfigs.environment))("physicalAttributeMemory").render()}" +:
       changes.map(change => s"physicalAttributeMemory.$change")
 
-  it should "read the maps of a room, or that there are none" in {
+  it should "read the maps of an environment, or none" in {
     ConfigIO.load("tiny").physicalAttributeMemory shouldBe None
-    ConfigIO.load("tiny", room()).physicalAttributeMemory shouldBe Some(TestConfigs.room)
+    ConfigIO.load("tiny", environment()).physicalAttributeMemory shouldBe Some(TestConfigs.environment)
     ConfigIO.load(
       "tiny",
-      room("encoding=slic")
+      environment("encoding=slic")
     ).physicalAttributeMemory.map(_.encoding) shouldBe Some(MapEncoding.Sliding)
-    ConfigIO.load("tiny", room() :+ "physicalAttributeMemory=null").physicalAttributeMemory shouldBe None
+    ConfigIO.load("tiny", environment() :+ "physicalAttributeMemory=null").physicalAttributeMemory shouldBe None
   }
 
-  it should "refuse maps that do not fit, with what they need" in {
+  it should "refuse maps that do not fit, with the size that they need" in {
     def refused(changes: String*): String =
-      refusal("tiny", room(changes: _*): _*).stripPrefix("physicalAttributeMemory")
+      refusal("tiny", environment(changes: _*): _*).stripPrefix("physicalAttributeMemory")
     refused(
       "mapBytes=1417"
     ) shouldBe ".mapBytes is 1417; it must be at least 1418: 50 tile descriptors take 200 bytes " +
@@ -168,7 +168,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     refusal("tiny", "=4") should include("not of the form path.to.key=value")
   }
 
-  it should "refuse what is no configuration" in {
+  it should "refuse text that is not a configuration" in {
     refusal("nowhere.json") should startWith("there is no configuration 'nowhere.json'")
     val file = Files.createTempFile("colonnade", ".json")
     try {

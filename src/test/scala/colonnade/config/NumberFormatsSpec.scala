@@ -34,7 +34,7 @@ class NumberFormatsSpec extends AnyFlatSpec with Matchers {
     }
   }
 
-  it should "pad boxes more when digits are fewer" in {
+  it should "pad boxes more with fewer digits" in {
     val pads = (64 to 16 by -4).map(bits => numbers(bits, 32, bits, 16).boxPadLog)
     pads shouldBe pads.sorted
   }

@@ -28,7 +28,7 @@ private object MapHarness {
 class AttributeMapSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "AttributeMap"
 
-  for ((config, seed) <- TestConfigs.rooms.zipWithIndex) {
+  for ((config, seed) <- TestConfigs.environments.zipWithIndex) {
     val size = config.physicalAttributeMemory.get
     it should s"respond like the model: ${size.width}x${size.height}, tiles of ${size.tileSize}, ${size.encoding.name}" in {
       val count       = 600

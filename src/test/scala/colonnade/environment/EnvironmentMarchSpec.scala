@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.Valid
 import chiseltest._
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.{Load, RoomView}
+import colonnade.formats.{EnvironmentView, Load}
 import colonnade.numbers.StreamTester
 import colonnade.{Model, Packed, PackedUnit, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -45,7 +45,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
       isSlow: Boolean
   ): Seq[Map[String, BigInt]] = {
     val (request, result) = (new Packed(new MarchRequest(config)), new Packed(new MarchResult(config)))
-    unit.view.poke(new Packed(new RoomView(config.numbers)).pack(view.fields))
+    unit.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
     val inputs = rays.map(ray => request.pack(ray.fields))
     val found  = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
@@ -60,11 +60,11 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     answers.map(names.zip(_).toMap)
   }
 
-  private def rooms: Seq[ColonnadeConfig] =
-    TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.room))) ++
-      TestConfigs.rooms.filterNot(_.physicalAttributeMemory.get.layout.isSliding).tail
+  private def environments: Seq[ColonnadeConfig] =
+    TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment))) ++
+      TestConfigs.environments.filterNot(_.physicalAttributeMemory.get.layout.isSliding).tail
 
-  for ((config, seed) <- rooms.zipWithIndex) {
+  for ((config, seed) <- environments.zipWithIndex) {
     val size = config.physicalAttributeMemory.get
     val name =
       s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a map of ${size.width}x${size.height}"

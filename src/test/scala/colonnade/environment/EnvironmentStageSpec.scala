@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.Valid
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Load, RoomView}
+import colonnade.formats.{EnvironmentView, Load}
 import colonnade.shading.EnvironmentSurface
 import colonnade.{Model, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -32,7 +32,7 @@ private class EnvironmentStageHarness(config: ColonnadeConfig) extends Module {
 class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "EnvironmentStage"
 
-  private val config = TestConfigs.withRoom(TestConfigs.room)
+  private val config = TestConfigs.withEnvironment(TestConfigs.environment)
 
   /** A request. */
   private case class Request(ray: MarchCase, isFresnelReflection: Boolean)
@@ -48,7 +48,7 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
       val contexts = config.array.contexts
       dut.clock.setTimeout(0)
       EnvironmentImage.load(dut.load, dut.clock, config, scene.words)
-      dut.view.poke(new Packed(new RoomView(config.numbers)).pack(camera.view.fields))
+      dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(camera.view.fields))
 
       var rays     = Map.empty[Int, MarchCase]
       var offered  = Option.empty[Request]

@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3.Data
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.RoomView
+import colonnade.formats.EnvironmentView
 
 import scala.util.Random
 
@@ -119,7 +119,7 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
 
   /** Random bits in all registers. */
   def wildView(): ViewCase = {
-    val view                         = new RoomView(numbers)
+    val view                         = new EnvironmentView(numbers)
     def natural(field: Data): Int    = BigInt(field.getWidth, random).toInt
     def number(bits:   Int): BigInt  = BigInt(bits, random) - (BigInt(1) << (bits - 1))
     def steps(field:   Data): BigInt = BigInt(random.nextInt(field.getWidth + 1), random)
@@ -128,7 +128,7 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
       Seq.fill(3)(number(numbers.macBits)),
       natural(view.offsetShift),
       number(view.exponent.getWidth).toInt,
-      Seq.fill(9)(number(RoomView.rotationBits)),
+      Seq.fill(9)(number(EnvironmentView.rotationBits)),
       Seq(steps(view.stepX), steps(view.stepY)),
       natural(view.shellPlanes)
     )

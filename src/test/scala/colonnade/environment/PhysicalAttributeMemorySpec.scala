@@ -35,7 +35,8 @@ class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester
   behavior of "PhysicalAttributeMemory"
 
   private def config(encoding: MapEncoding, rows: Int, columns: Int): ColonnadeConfig = {
-    val environment = TestConfigs.withRoom(TestConfigs.room.copy(encoding = encoding, shared = columns > 1))
+    val environment =
+      TestConfigs.withEnvironment(TestConfigs.environment.copy(encoding = encoding, shared = columns > 1))
     environment.copy(array = environment.array.copy(rows = rows, columns = columns))
   }
 

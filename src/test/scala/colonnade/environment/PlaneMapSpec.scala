@@ -26,7 +26,9 @@ private object PlaneMapHarness {
 class PlaneMapSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "PlaneMap"
 
-  for ((config, seed) <- TestConfigs.rooms.filterNot(_.physicalAttributeMemory.get.layout.isSliding).zipWithIndex) {
+  for (
+    (config, seed) <- TestConfigs.environments.filterNot(_.physicalAttributeMemory.get.layout.isSliding).zipWithIndex
+  ) {
     val size = config.physicalAttributeMemory.get
     it should s"give the model's tiles, cells and planes: ${size.width}x${size.height}, tiles of ${size.tileSize}" in {
       val random      = new Random(seed)

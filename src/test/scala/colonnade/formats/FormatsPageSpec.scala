@@ -9,7 +9,7 @@ import java.nio.file.{Files, Paths}
 class FormatsPageSpec extends AnyFlatSpec with Matchers {
   behavior of "FormatsPage"
 
-  it should "be the page in docs" in {
+  it should "equal the page in docs" in {
     val current = Files.readString(Paths.get("docs", "formats.md"))
     withClue("write it anew: colonnade.Generate --config small --formats-page docs/formats.md: ") {
       assert(current == FormatsPage(ConfigIO.load("small")))

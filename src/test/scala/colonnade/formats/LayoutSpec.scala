@@ -10,7 +10,7 @@ import org.scalatest.matchers.should.Matchers
 
 import scala.util.Random
 
-/** Takes records apart by Chisel's own cast, to be held against the layouts. */
+/** Splits records by Chisel's own cast, as a reference for the layouts. */
 private class CastHarness(config: ColonnadeConfig) extends Module {
   private val formats = new RecordFormats(config)
 
@@ -60,7 +60,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
     fields.map(_.name).distinct.size shouldBe fields.size
   }
 
-  it should "give back the numbers of any record that were put where it says" in holds(cases = 60) {
+  it should "read back the numbers of any record" in holds(cases = 60) {
     def number(field: Field): Gen[BigInt] = {
       val lowest = if (field.signed) -(BigInt(1) << (field.width - 1)) else BigInt(0)
       Gen.oneOf(Gen.const(lowest), Gen.choose(lowest, lowest + (BigInt(1) << field.width) - 1))
@@ -77,7 +77,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
     }
   }
 
-  it should "lay out the words of a room's maps as their encoder packs them" in {
+  it should "lay out the words of the environment's maps as their encoder packs them" in {
     def places(kind: Data): Map[String, (Int, Int)] =
       Layout.of(kind).map(field => field.name -> (field.offset, field.width)).toMap
     places(new MapDescriptor) shouldBe
@@ -109,7 +109,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
     }
   }
 
-  it should "say where Chisel finds the numbers of a record" in {
+  it should "agree with Chisel's own layout" in {
     val random = new Random(7)
     for (config <- variants) test(new CastHarness(config)) { unit =>
       for (_ <- 0 until 5) {
@@ -127,7 +127,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
 
 private object LayoutSpec {
 
-  /** The element of a flattened name, found by walking the names alone. */
+  /** The element of a flattened name. */
   def number(data: Data, name: String): Bits =
     name.split("[.\\[\\]]+").filter(_.nonEmpty).foldLeft(data) {
       case (vector: Vec[_], index) => vector(index.toInt)

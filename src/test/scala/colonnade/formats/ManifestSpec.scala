@@ -8,16 +8,16 @@ import org.scalatest.matchers.should.Matchers
 class ManifestSpec extends AnyFlatSpec with Matchers {
   behavior of "Manifest"
 
-  private val room =
-    TestConfigs.room.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 8192)
+  private val environment =
+    TestConfigs.environment.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 8192)
 
   private def manifest(settings: String*): ujson.Obj = Manifest(ConfigIO.load("tiny", settings))
 
-  it should "carry the configuration it was made from" in {
+  it should "contain its configuration" in {
     ConfigIO.read(manifest("array.rows=7")("config")) shouldBe ConfigIO.load("tiny", Seq("array.rows=7"))
   }
 
-  it should "name what the host relies on" in {
+  it should "contain the keys that the host reads" in {
     val whole = manifest()
     whole.value.keys.toSeq shouldBe
       Seq(
@@ -56,8 +56,8 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
     names should not contain "materials[8].albedo.r"
   }
 
-  it should "name the memories of a room's maps, their words and their sizes" in {
-    val whole  = Manifest(TestConfigs.withRoom(room))
+  it should "describe the memories of the environment's maps, their words and their sizes" in {
+    val whole  = Manifest(TestConfigs.withEnvironment(environment))
     val target =
       whole("memories").obj.collect { case (name, memory) if name != "columnBvh" => name -> memory("target").num }
     target shouldBe Map(
@@ -82,19 +82,20 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
     manifest()("registers")("fields").arr.map(_("name").str) should not contain "counters.cellReads"
   }
 
-  it should "hash what an image of a room depends on, and not who shares it" in {
-    def hash(room: PhysicalAttributeMemoryConfig): String = Manifest(TestConfigs.withRoom(room))("formatHash").str
-    hash(room.copy(shared = true)) shouldBe hash(room)
+  it should "hash the settings of an environment's image, and not the number of its copies" in {
+    def hash(environment: PhysicalAttributeMemoryConfig): String =
+      Manifest(TestConfigs.withEnvironment(environment))("formatHash").str
+    hash(environment.copy(shared = true)) shouldBe hash(environment)
     val others = Seq(
-      room.copy(encoding = MapEncoding.Sliding),
-      room.copy(paletteSize = 128),
-      room.copy(height = 464),
-      room.copy(planeBytes = 8190)
+      environment.copy(encoding = MapEncoding.Sliding),
+      environment.copy(paletteSize = 128),
+      environment.copy(height = 464),
+      environment.copy(planeBytes = 8190)
     )
-    (others.map(hash) :+ hash(room) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 6
+    (others.map(hash) :+ hash(environment) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 6
   }
 
-  it should "give every word of the register map to one register" in {
+  it should "assign every word of the register map to one register" in {
     for (precision <- Seq("16b16s16d", "33b32s64d", "64b64s64d")) {
       val registers = manifest(s"precision=$precision")("registers")("fields").arr.toSeq
       val words     = registers.flatMap(r => Seq.tabulate(r("words").num.toInt)(r("address").num.toInt + _))
@@ -103,7 +104,7 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
     }
   }
 
-  it should "change the format hash with what an image depends on, and only then" in {
+  it should "change the format hash with the settings of a scene image, and only then" in {
     val base    = manifest()
     val larger  = manifest("array.rows=2", "columnBvhMemory.snooping=false", "columnBvhMemory.readLatency=4")
     val narrow  = manifest("geometry.vertexBits=15")

@@ -42,7 +42,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   private def shown(unit: RegisterFile, register: Register): BigInt =
     LayoutSpec.number(unit.io.frame, register.name).peek().litValue & ones(register)
 
-  it should "hold every setting, show the hardware what is legal of it, and read it back" in {
+  it should "store every setting, clamp it for the hardware, and read it back" in {
     test(new RegisterFile(config)) { unit =>
       val random = new Random(8)
       val values = settings.map(r => r -> BigInt(r.width, random))
@@ -54,7 +54,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
-  it should "show the hardware no register above its limit, and all up to it" in {
+  it should "clamp registers above their limits only" in {
     val limited = settings.filter(_.limit.nonEmpty)
     limited.map(_.name) should contain allOf (
       "shading.lights",
@@ -74,7 +74,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
-  it should "end a section where the next one begins" in {
+  it should "end a section at the base of the next one" in {
     val Seq(count, triangles, attributes) =
       Seq("recordCount", "triangleBase", "attributeBase").map(name => settings.find(_.name == s"scene.$name").get)
     test(new RegisterFile(config)) { unit =>
@@ -93,7 +93,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
-  it should "show status, errors and counters" in {
+  it should "read status, errors and counters" in {
     test(new RegisterFile(config)) { unit =>
       val random = new Random(9)
       for (register <- registers if register.access == Access.ReadOnly) withClue(s"${register.name}: ") {
@@ -141,7 +141,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
-  it should "read 0 where there is no register, and from registers that are only written" in {
+  it should "read 0 from unknown addresses and from write-only registers" in {
     test(new RegisterFile(config)) { unit =>
       val size = RegisterMap.size(registers)
       read(unit, (1 << RegisterFile.addressBits(config)) - 1) shouldBe 0

@@ -38,7 +38,7 @@ class BackgroundWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
 
-  it should "put pixels that others sort out before those of its tile" in {
+  it should "give pixels of other tiles priority over those of its own" in {
     test(new BackgroundWalker(TileScanSpec.config(tileSize = 8))) { dut =>
       dut.io.frame.pixelsWide.poke(640)
       dut.io.frame.pixelsHigh.poke(480)
@@ -60,7 +60,7 @@ class BackgroundWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "give a pixel a cycle, and be idle before the first and after the last" in {
+  it should "give one pixel per cycle, and be idle before the first and after the last" in {
     val config = TileScanSpec.config(tileSize = 8)
     test(new BackgroundWalker(config)) { dut =>
       dut.io.frame.pixelsWide.poke(640)

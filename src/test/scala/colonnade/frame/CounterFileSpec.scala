@@ -14,7 +14,7 @@ class CounterFileSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val config  = TestConfigs.tiny.copy(array = TestConfigs.tiny.array.copy(rows = 5, columns = columns))
   private val levels  = Set("deepestStack", "stackOverflow", "illegalRecord")
 
-  it should "count what happens in the cycles that count, in all columns" in {
+  it should "count the events of counted cycles in all columns" in {
     test(new CounterFile(config)) { dut =>
       for (seed <- 1 to 3) {
         val random   = new Random(seed)
@@ -24,7 +24,7 @@ class CounterFileSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.clock.step()
         dut.io.clear.poke(false)
 
-        // Events reach the file one cycle after they happened.
+        // Events arrive one cycle late.
         var last = Seq.empty[(UInt, BigInt)]
         for (cycle <- 0 until 60 + CounterFile.settleCycles) {
           val counts = cycle >= 5 && cycle < 50
@@ -48,7 +48,7 @@ class CounterFileSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "keep the deepest stack and errors of a frame, and not those of the last one" in {
+  it should "keep the deepest stack and the errors of a frame, and clear those of the previous one" in {
     test(new CounterFile(config)) { dut =>
       def level(column: Int, deepest: Int): Unit    = dut.io.events(column).deepestStack.poke(deepest)
       def frame(deepest: Int, error: Boolean): Unit = {

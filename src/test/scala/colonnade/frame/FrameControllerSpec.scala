@@ -13,14 +13,14 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val tileSize = 8
   private val config   = TestConfigs.tiny.copy(array = TestConfigs.tiny.array.copy(columns = columns))
 
-  /** A column that takes some time for a tile; one that is stuck takes for ever. */
+  /** A model of a column with random time per tile, or one that is stuck. */
   private final class FakeColumn(dut: FrameController, index: Int, random: Random) {
     var isStuck      = false
     var tiles        = Vector.empty[(Int, Int)]
     var backgrounds  = Vector.empty[(Int, Int)]
     private var left = 0
 
-    /** Before the clock's edge: whether a pixel retires. */
+    /** Drives the ports of this cycle; returns whether a pixel retires. */
     def drive(): Boolean = {
       val port    = dut.io.tiles(index)
       val retires = left > 0 && !isStuck
@@ -52,9 +52,9 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     var running = 0
     var columns = Seq.empty[FakeColumn]
 
-    /** One frame; returns its cycles, or nothing when it does not end within `limit`.
+    /** Runs one frame; returns its cycles, or none if it does not end within `limit`.
       *
-      * @param rect the object's: x0, y0, x1, y1; the frame unless given
+      * @param rect the object's rectangle: x0, y0, x1, y1; the frame by default
       */
     def frame(
         wide:     Int,
@@ -112,7 +112,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "hand out every tile of several frames once, in Morton order" in {
+  it should "dispatch every tile of several frames once, in Morton order" in {
     test(new FrameController(config)) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
@@ -126,7 +126,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "deal tiles that the object's rectangle does not meet to the background" in {
+  it should "dispatch tiles outside the object's rectangle to the background" in {
     test(new FrameController(config)) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
@@ -141,7 +141,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "deal the tiles of the room's window to the columns, whatever the object's rectangle meets" in {
+  it should "dispatch the tiles of the environment's window to the columns, whatever the object's rectangle" in {
     test(new FrameController(config)) { dut =>
       dut.clock.setTimeout(0)
       val bench  = new Bench(dut)
@@ -169,7 +169,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "give free columns their tiles without a pause" in {
+  it should "dispatch tiles to ready columns without a pause" in {
     test(new FrameController(config)) { dut =>
       dut.io.frame.pixelsWide.poke(64)
       dut.io.frame.pixelsHigh.poke(64)
@@ -203,7 +203,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "wait for ever without a watchdog, and while the sink stalls" in {
+  it should "not end without a watchdog, or while the sink stalls" in {
     test(new FrameController(config)) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)

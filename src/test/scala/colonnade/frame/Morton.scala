@@ -3,7 +3,7 @@ package colonnade.frame
 /** Morton order, by sorting. */
 object Morton {
 
-  /** Cells of a grid, in order. */
+  /** The cells of a grid in Morton order. */
   def cells(wide: Int, high: Int): Seq[(Int, Int)] =
     (for (x <- 0 until wide; y <- 0 until high) yield (x, y)).sortBy { case (x, y) => code(x, y) }
 

@@ -10,7 +10,7 @@ import scala.util.Random
 class MortonScanSpec extends AnyFlatSpec with ChiselScalatestTester with Properties {
   behavior of "MortonScan"
 
-  /** Gives one grid after the other; returns the cells of each, and the longest time between two cells of one. */
+  /** Scans grids one after the other; returns the cells of each, and the longest time between two cells of one grid. */
   private def scan(dut: MortonScan, sizes: Seq[(Int, Int)], isReady: () => Boolean): (Seq[(Int, Int)], Int) = {
     var waiting = sizes
     var cells   = Vector.empty[(Int, Int)]
@@ -69,7 +69,7 @@ class MortonScanSpec extends AnyFlatSpec with ChiselScalatestTester with Propert
     }
   }
 
-  it should "skip what lies outside in a few steps" in {
+  it should "skip cells outside the grid in a few steps" in {
     for ((wide, high) <- Seq((120, 68), (40, 30), (1, 128), (128, 1), (65, 65))) test(new MortonScan(7)) { dut =>
       dut.clock.setTimeout(0)
       val (cells, longest) = scan(dut, Seq((wide, high)), () => true)
@@ -78,7 +78,7 @@ class MortonScanSpec extends AnyFlatSpec with ChiselScalatestTester with Propert
     }
   }
 
-  it should "follow full grids by the next one without a gap" in {
+  it should "start the next grid without a gap" in {
     test(new MortonScan(2)) { dut =>
       dut.io.size.valid.poke(true)
       dut.io.size.bits.wide.poke(4)

@@ -16,7 +16,7 @@ class OutlineTestSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private def isInside(edge: Edge)(x: Int, y: Int): Boolean = edge._1.toLong * x + edge._2.toLong * y + edge._3 >= 0
 
-  /** Whether one pixel of the square is in the rectangle's columns and rows, and one in each half-plane. */
+  /** A pixel of the square is in the rectangle, and for each half-plane one pixel is in it. */
   private def meets(rect: Seq[Int], edges: Seq[Edge], size: Int)(x: Int, y: Int): Boolean = {
     val corners             = for (cx <- Seq(x, x + size - 1); cy <- Seq(y, y + size - 1)) yield (cx, cy)
     val Seq(x0, y0, x1, y1) = rect
@@ -34,7 +34,7 @@ class OutlineTestSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  /** Sends squares with bubbles, takes answers with stalls. */
+  /** Sends squares with bubbles, accepts results with stalls. */
   private def answers(dut: OutlineTest, squares: Seq[(Int, Int)], random: Random): Seq[((Int, Int), Boolean)] = {
     var (sent, answers, cycles) = (0, Vector.empty[((Int, Int), Boolean)], 0)
     while (answers.size < squares.size) {
@@ -59,7 +59,7 @@ class OutlineTestSpec extends AnyFlatSpec with ChiselScalatestTester {
     answers
   }
 
-  for (size <- Seq(1, 8)) it should s"hold squares of $size against rectangle and outline, under stalls" in {
+  for (size <- Seq(1, 8)) it should s"test squares of $size against rectangle and outline, under stalls" in {
     val random = new Random(size)
     test(new OutlineTest(config, size)) { dut =>
       dut.clock.setTimeout(0)

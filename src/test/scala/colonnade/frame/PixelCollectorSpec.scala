@@ -8,8 +8,8 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** Two sources that offer, and a sink that takes, at any time. Follows one pixel, any that is accepted while `marks` is
-  * set, to its end.
+/** Two sources that offer and a sink that accepts at any time. It observes one pixel, any that is accepted while `marks`
+  * is set, until it leaves.
   */
 class PixelCollectorProof(config: ColonnadeConfig) extends Module {
   val offers = IO(Input(Vec(2, Bool())))
@@ -56,12 +56,12 @@ class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
 
   private val withoutHits = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(hits = false))
 
-  it should "lose and double no pixel" in {
+  it should "neither lose nor duplicate pixels" in {
     prove(cycles = 10)(new PixelCollectorProof(withoutHits))
   }
 
   for (rows <- Seq(1, 11)) {
-    it should s"join $rows streams at one pixel a cycle" in {
+    it should s"merge $rows streams at one pixel per cycle" in {
       test(new PixelCollector(withoutHits, rows)) { dut =>
         dut.io.sources.foreach(_.valid.poke(true))
         dut.io.pixels.ready.poke(true)
@@ -76,7 +76,7 @@ class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
     }
   }
 
-  it should "carry every bit under random stalls" in {
+  it should "keep every bit under random stalls" in {
     val random = new Random(1)
     test(new PixelCollector(TestConfigs.tiny, 4)) { dut =>
       val waiting = Array.fill(4)(Seq.fill(50)((random.nextInt(640), random.nextInt(480), random.nextInt(4096))))

@@ -30,7 +30,7 @@ class TileScanSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
 
-  it should "follow a full tile by the next one without a gap, and be idle after the last" in {
+  it should "start the next tile without a gap, and be idle after the last" in {
     val config = TileScanSpec.config(tileSize = 4)
     test(new TileScan(config)) { dut =>
       dut.io.frame.pixelsWide.poke(640)
@@ -69,9 +69,9 @@ private object TileScanSpec {
       .cells((size._1 - tile._1).min(tileSize), (size._2 - tile._2).min(tileSize))
       .map { case (x, y) => (tile._1 + x, tile._2 + y) }
 
-  /** Sends tiles and takes what comes, each side willing or not at random; ends when the unit is idle.
+  /** Sends tiles and accepts results with random stalls on both sides, until the unit is idle.
     *
-    * @return what came, read by `peek`
+    * @return the results, read by `peek`
     */
   def walk[O <: Data, T](clock: Clock, in: DecoupledIO[Tile], out: DecoupledIO[O], isIdle: () => Boolean)(
       tiles:     Seq[(Int, Int)],

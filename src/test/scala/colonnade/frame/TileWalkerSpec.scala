@@ -13,8 +13,8 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def config(rows: Int, tileSize: Int, base: ColonnadeConfig = TestConfigs.tiny): ColonnadeConfig =
     base.copy(array = base.array.copy(rows = rows), frame = base.frame.copy(tileSize = tileSize))
 
-  /** The positions that leave, by row and in the order of time, and the cycles that took. Those that cannot see the
-    * object have the row -1, unless render units take all; `meets` hears of each pixel that they take.
+  /** Walks tiles; returns positions with their row in order of time, and the cycles. Background pixels have row -1;
+    * `meets` is called with the flag of each pixel for the render units.
     */
   private def walk(
       dut:     TileWalker,
@@ -78,41 +78,42 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   for ((hasWindow, claim) <- Seq(false -> "sort out the pixels", true -> "give units the room's window, too,"))
-    it should s"$claim outside the outline, whoever is ready" in {
+    it should s"$claim outside the outline, whichever unit is ready" in {
       val random = new Random(3)
-      test(new TileWalker(config(rows = 3, tileSize = 8, TestConfigs.withRoom(TestConfigs.room)))) { dut =>
-        val edge = dut.io.frame.objectOutline(2)
-        edge.x.poke(3)
-        edge.y.poke(-2)
-        edge.offset.poke(-9)
-        val window = dut.io.window
-        window.enabled.poke(hasWindow)
-        Seq(window.rect.x0, window.rect.y0, window.rect.x1, window.rect.y1).zip(Seq(2, 3, 12, 15)).foreach {
-          case (port, value) => port.poke(value)
-        }
-        val inWindow = (pixel: (Int, Int)) =>
-          hasWindow && pixel._1 >= 2 && pixel._2 >= 3 && pixel._1 < 12 && pixel._2 < 15
-        var claims         = Map.empty[(Int, Int), Boolean]
-        val (positions, _) =
-          walk(
-            dut,
-            (640, 480),
-            Seq((0, 0), (8, 8)),
-            row => random.nextInt(3 + 2 * row + 2) == 0,
-            (pixel, meets) => claims += pixel -> meets
-          )
-        val (others, units)     = positions.partition(_._1 < 0)
-        val expected            = Seq((0, 0), (8, 8)).flatMap(pixels((640, 480), _, 8))
-        val sees                = (pixel: (Int, Int)) => 3 * pixel._1 - 2 * pixel._2 - 9 >= 0
-        val (isTaken, isOthers) = expected.partition(pixel => inWindow(pixel) || sees(pixel))
-        assert(units.map(_._2).sorted == isTaken.sorted)
-        assert(others.map(_._2) == isOthers)
-        assert(claims == isTaken.map(pixel => pixel -> sees(pixel)).toMap)
-        assert(expected.exists(sees) && !expected.forall(sees))
+      test(new TileWalker(config(rows = 3, tileSize = 8, TestConfigs.withEnvironment(TestConfigs.environment)))) {
+        dut =>
+          val edge = dut.io.frame.objectOutline(2)
+          edge.x.poke(3)
+          edge.y.poke(-2)
+          edge.offset.poke(-9)
+          val window = dut.io.window
+          window.enabled.poke(hasWindow)
+          Seq(window.rect.x0, window.rect.y0, window.rect.x1, window.rect.y1).zip(Seq(2, 3, 12, 15)).foreach {
+            case (port, value) => port.poke(value)
+          }
+          val inWindow = (pixel: (Int, Int)) =>
+            hasWindow && pixel._1 >= 2 && pixel._2 >= 3 && pixel._1 < 12 && pixel._2 < 15
+          var claims         = Map.empty[(Int, Int), Boolean]
+          val (positions, _) =
+            walk(
+              dut,
+              (640, 480),
+              Seq((0, 0), (8, 8)),
+              row => random.nextInt(3 + 2 * row + 2) == 0,
+              (pixel, meets) => claims += pixel -> meets
+            )
+          val (others, units)     = positions.partition(_._1 < 0)
+          val expected            = Seq((0, 0), (8, 8)).flatMap(pixels((640, 480), _, 8))
+          val sees                = (pixel: (Int, Int)) => 3 * pixel._1 - 2 * pixel._2 - 9 >= 0
+          val (isTaken, isOthers) = expected.partition(pixel => inWindow(pixel) || sees(pixel))
+          assert(units.map(_._2).sorted == isTaken.sorted)
+          assert(others.map(_._2) == isOthers)
+          assert(claims == isTaken.map(pixel => pixel -> sees(pixel)).toMap)
+          assert(expected.exists(sees) && !expected.forall(sees))
       }
     }
 
-  it should "give every pixel of clipped tiles once, whoever is ready" in {
+  it should "give every pixel of clipped tiles once, whichever unit is ready" in {
     val random = new Random(2)
     val size   = (21, 10)
     val tiles  = Seq((0, 0), (8, 0), (16, 0), (0, 8), (8, 8), (16, 8))

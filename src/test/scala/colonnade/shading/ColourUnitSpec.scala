@@ -16,7 +16,8 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ColourUnit"
 
   for {
-    (base, where)        <- Seq(TestConfigs.tiny -> "", TestConfigs.withRoom(TestConfigs.room) -> " in an environment")
+    (base, where) <-
+      Seq(TestConfigs.tiny -> "", TestConfigs.withEnvironment(TestConfigs.environment) -> " in an environment")
     (lights, maxBounces) <- Seq((1, 0), (2, 0), (1, 2), (3, 15))
   } {
     val config = base.copy(frame = base.frame.copy(lights = lights, maxBounces = maxBounces))
@@ -71,7 +72,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   /** Bounces a path. Where there is an environment, some reflections show a surface, lit by all lights. */
   private def pass(port: chisel3.util.DecoupledIO[BounceUpdate], context: Int): Unit = {
     val (albedo, isTinted, fresnel) = (colour(), random.nextBoolean(), random.nextInt(3) * random.nextInt(one / 2))
-    val surface                     = Option.when(config.hasRoom && random.nextBoolean())(remember(context))
+    val surface                     = Option.when(config.hasEnvironment && random.nextBoolean())(remember(context))
     val behind                      = surface.fold(background)(surface => reflected(surface.albedo, surface.all))
     port.bits.context.poke(context)
     pokeUInt(port.bits.albedo, albedo)
@@ -137,7 +138,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
 
     // The shadow ratio of a directly visible point of the environment
     val parts   = visible.zip(surface.all)
-    val hasPart = config.hasRoom && isDirectView && !isBackground
+    val hasPart = config.hasEnvironment && isDirectView && !isBackground
     for (ratio <- dut.io.colour.bits.ratio if hasPart)
       assert(
         ratio.channels.map(_.raw.asUInt.peekInt().toInt) ==

@@ -204,7 +204,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     (taken, results)
   }
 
-  for (config <- TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.room))))
+  for (config <- TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment))))
     it should s"light points of an environment between hits, with ${config.precision} and ${config.geometry.vertexBits}-bit vertices" in
       test(new Shader(config)).withAnnotations(verilator) { shader =>
         val random   = new Random(25)

@@ -17,22 +17,22 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   private val stackDepth = config.columnBvhMemory.stackDepth
   require(contexts == 2)
 
-  val finds     = IO(Input(Bool()))
-  val found     = IO(Input(new FoundChildren(arity)))
-  val resumes   = IO(Input(Bool()))
-  val resumed   = IO(Input(UInt(1.W)))
-  val starts    = IO(Input(Bool()))
-  val started   = IO(Input(UInt(1.W)))
-  val tMaxUnits = IO(Input(Vec(contexts, UInt(2.W))))
-  val ready     = IO(Input(Bool()))
-  val observed  = IO(Input(UInt(1.W)))
+  val resultValid = IO(Input(Bool()))
+  val found       = IO(Input(new FoundChildren(arity)))
+  val resumes     = IO(Input(Bool()))
+  val resumed     = IO(Input(UInt(1.W)))
+  val starts      = IO(Input(Bool()))
+  val started     = IO(Input(UInt(1.W)))
+  val tMaxUnits   = IO(Input(Vec(contexts, UInt(2.W))))
+  val ready       = IO(Input(Bool()))
+  val observed    = IO(Input(UInt(1.W)))
 
   private val dut     = Module(new TraversalStack(config))
   private val step    = dut.io.steps
   private val accepts = dut.io.results.fire || dut.io.resume.fire
 
   // Drive the stack
-  dut.io.results.valid        := finds
+  dut.io.results.valid        := resultValid
   dut.io.results.bits         := 0.U.asTypeOf(dut.io.results.bits)
   dut.io.results.bits.context := found.context
   dut.io.results.bits.count   := found.count
@@ -52,12 +52,14 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
 
   // The contract: one operation per context at a time, a waiting result is stable, a start without an operation
   private val underWay = RegInit(VecInit.fill(contexts)(false.B))
-  private val stays    = RegNext(finds && !dut.io.results.ready, false.B)
+  private val stays    = RegNext(resultValid && !dut.io.results.ready, false.B)
   assume(found.count <= arity.U)
-  assume(!finds || !underWay(found.context))
-  assume(!resumes || !(underWay(resumed) || (finds && found.context === resumed)))
-  assume(!starts || !(underWay(started) || (finds && found.context === started) || (resumes && resumed === started)))
-  assume(!stays || (finds && found.asUInt === RegNext(found.asUInt)))
+  assume(!resultValid || !underWay(found.context))
+  assume(!resumes || !(underWay(resumed) || (resultValid && found.context === resumed)))
+  assume(
+    !starts || !(underWay(started) || (resultValid && found.context === started) || (resumes && resumed === started))
+  )
+  assume(!stays || (resultValid && found.asUInt === RegNext(found.asUInt)))
   when(step.fire) { underWay(step.bits.context) := false.B }
   when(dut.io.results.fire) { underWay(found.context) := true.B }
   when(dut.io.resume.fire) { underWay(resumed) := true.B }
@@ -105,18 +107,18 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   // Overflows of a result
   private val overflows = RegInit(0.U(log2Ceil(arity).W))
   overflows := Mux(dut.io.results.fire, 0.U, overflows + dut.io.overflow)
-  assert(!dut.io.overflow || finds, "an overflow of nothing")
+  assert(!dut.io.overflow || resultValid, "an overflow of nothing")
   assert(
     !isFound || overflows +& dut.io.overflow === Mux(pops, 0.U, pushed.lost),
     "an overflow for each entry that does not fit, and for no other"
   )
 
   // The step
-  private val isDone   = RegEnable(pops && isEmpty, isFound || pops)
-  private val isPopped = RegEnable(pops, isFound || pops)
-  private val mark     = RegEnable(Mux(pops, entries(drops).mark, found.marks(0)), isFound || pops)
-  private val answers  = step.fire && step.bits.context === context
-  when(answers) {
+  private val isDone    = RegEnable(pops && isEmpty, isFound || pops)
+  private val isPopped  = RegEnable(pops, isFound || pops)
+  private val mark      = RegEnable(Mux(pops, entries(drops).mark, found.marks(0)), isFound || pops)
+  private val stepsHere = step.fire && step.bits.context === context
+  when(stepsHere) {
     assert(step.bits.isDone === isDone, "done when no entry within tMax is left")
     assert(isDone || step.bits.target.isLeaf === !isPopped, "the nearest child, or else an entry")
     assert(isDone || step.bits.target.address === Fill(step.bits.target.address.getWidth, mark), "the right entry")
@@ -124,11 +126,11 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
 
   // While steps are accepted, operations and steps have a bounded latency, and the arbiter is fair
   private val unanswered = RegInit(0.U(4.W))
-  private val refused    = RegInit(0.U(4.W))
-  unanswered := Mux(underWay(context) && !answers, unanswered + ready, 0.U)
-  refused    := Mux(accepts || !(finds || resumes), 0.U, refused + ready)
+  private val waiting    = RegInit(0.U(4.W))
+  unanswered := Mux(underWay(context) && !stepsHere, unanswered + ready, 0.U)
+  waiting    := Mux(accepts || !(resultValid || resumes), 0.U, waiting + ready)
   assert(unanswered <= (stackDepth + 2).U, "a step soon after each operation")
-  assert(refused <= (stackDepth + 2).U, "operations are accepted")
+  assert(waiting <= (stackDepth + 2).U, "operations are accepted")
   for ((one, other) <- Seq(dut.io.results -> dut.io.resume, dut.io.resume -> dut.io.results)) {
     val isPassedOver = RegInit(false.B)
     isPassedOver := one.valid && !one.ready && (isPassedOver || other.fire)
@@ -140,10 +142,10 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   private val ended   = RegEnable(level =/= 0.U, isFound || pops)
   private val culled  = RegEnable(drops, isFound || pops)
   when(isFound && !pops && pushed.lost =/= 0.U) { wasFull := true.B }
-  cover(answers && isPopped && !isDone && culled > 1.U, "an entry below two that are culled")
-  cover(answers && isPopped && isDone && ended, "all entries are culled")
+  cover(stepsHere && isPopped && !isDone && culled > 1.U, "an entry below two that are culled")
+  cover(stepsHere && isPopped && isDone && ended, "all entries are culled")
   cover(underWay.reduce(_ && _) && step.valid && RegNext(step.valid && !ready, false.B), "both contexts wait")
-  if (arity > 2) cover(answers && isPopped && !isDone && wasFull, "an entry after an overflow")
+  if (arity > 2) cover(stepsHere && isPopped && !isDone && wasFull, "an entry after an overflow")
 }
 
 /** A result in the proof: bit i belongs to child i. */

@@ -12,7 +12,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.collection.mutable
 import scala.util.Random
 
-/** One render unit in a column whose memory answers when it likes and whose other rows read what they like. */
+/** One render unit in a column with random memory latency and random reads of other rows. */
 class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "RenderUnit"
 
@@ -20,23 +20,26 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val names        = Seq("colour.r", "colour.g", "colour.b", "isObject", "hit.triangle", "hit.distance") ++
     Seq("r", "g", "b").map(channel => s"ratio.$channel")
 
-  /** What ports take or offer, a seed, whether there are shadow rays, and a room. */
+  /** Probability that a port is ready or valid, seed, shadow rays, and environment. */
   private val rounds = Seq((1.0, 1, true, true), (0.3, 2, true, true), (0.6, 3, false, true))
 
   private def render(config: ColonnadeConfig, name: String): Unit =
-    it should s"give every position once, with the model's pixel: $name" in
+    it should s"give each pixel once, equal to the model's: $name" in
       test(new RenderUnitHarness(config)).withAnnotations(Simulation.verilator) { dut =>
-        for ((willing, seed, shadows, hasRoom) <- if (config.hasRoom) rounds :+ ((0.6, 4, true, false)) else rounds) {
-          val scene = new SmallScene(config, seed, wide, high, triangleCount = 15, shadows)
-          val room  = Option.when(config.hasRoom)(
-            new SmallRoom(config, scene, new Random(seed), Seq(wide, high), isThere = hasRoom)
+        for (
+          (willing, seed, shadows, hasEnvironment) <-
+            if (config.hasEnvironment) rounds :+ ((0.6, 4, true, false)) else rounds
+        ) {
+          val scene       = new SmallScene(config, seed, wide, high, triangleCount = 15, shadows)
+          val environment = Option.when(config.hasEnvironment)(
+            new SmallEnvironment(config, scene, new Random(seed), Seq(wide, high), isThere = hasEnvironment)
           )
-          val registers = room.fold(scene.registers)(_.registers)
+          val registers = environment.fold(scene.registers)(_.registers)
           val positions = new Random(seed).shuffle(for (x <- 0 until wide; y <- 0 until high) yield (x, y))
-          val column    = new UnitColumn(dut, config, registers, scene.records, room.map(_.words), seed)
+          val column    = new UnitColumn(dut, config, registers, scene.records, environment.map(_.words), seed)
           val pixels    = column.run(positions, willing)
           val expected  =
-            Model.pixels(config, registers, scene.records, positions, room.map(_.words)).map(names.zip(_).toMap)
+            Model.pixels(config, registers, scene.records, positions, environment.map(_.words)).map(names.zip(_).toMap)
           val hits = expected.count(_("isObject") == 1)
 
           assert(pixels.map(_._1).sorted == positions.sorted, "every position comes out once")
@@ -52,15 +55,15 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
               (column.bouncedRays > 0) == config.frame.hasBounces,
             "there is something to see"
           )
-          if (config.hasRoom) {
+          if (config.hasEnvironment) {
             val isDarker = expected.exists(pixel => Seq("r", "g", "b").exists(c => pixel(s"ratio.$c") < 4096))
-            assert(isDarker == (hasRoom && shadows), s"the object takes light from the room, seed $seed")
-            assert(if (hasRoom) column.roomRays >= positions.size - hits else column.roomRays == 0)
+            assert(isDarker == (hasEnvironment && shadows), s"the object takes light from the room, seed $seed")
+            assert(if (hasEnvironment) column.roomRays >= positions.size - hits else column.roomRays == 0)
           }
         }
       }
 
-  render(TestConfigs.tiny, "a tree, contexts that snoop")
+  render(TestConfigs.tiny, "a tree, snooping")
   render(
     TestConfigs.tiny.copy(
       units = UnitsConfig(boxLanes = 4, triangleLanes = 2),
@@ -75,24 +78,24 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(snooping = false, banks = 1),
       frame = TestConfigs.tiny.frame.copy(hits = false)
     ),
-    "no tree, one context, nobody snoops"
+    "no tree, one context, no snooping"
   )
   render(
     TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(lights = 1, maxBounces = 0)),
-    "one light, nothing bounces"
+    "one light, no bounces"
   )
-  render(TestConfigs.withRoom(TestConfigs.room), "in a room")
+  render(TestConfigs.withEnvironment(TestConfigs.environment), "with an environment")
   render(
     TestConfigs.withPrecision(16, 16, 32).copy(
       array = TestConfigs.tiny.array.copy(contexts = 1),
       frame = TestConfigs.tiny.frame.copy(lights = 1, maxBounces = 0, hits = false),
-      physicalAttributeMemory = Some(TestConfigs.room.copy(encoding = MapEncoding.Sliding))
+      physicalAttributeMemory = Some(TestConfigs.environment.copy(encoding = MapEncoding.Sliding))
     ),
-    "in a room, one context, nothing bounces"
+    "with an environment, one context, no bounces"
   )
 }
 
-/** With the registers and each pixel in one port; with a room, with its maps, which take their time. */
+/** Packs registers and pixel into one port each; with an environment, adds its maps, with random latency. */
 private class RenderUnitHarness(config: ColonnadeConfig) extends Module {
   private val unit = Module(new RenderUnit(config))
 
@@ -103,8 +106,8 @@ private class RenderUnitHarness(config: ColonnadeConfig) extends Module {
   unit.io.registers := registers.asTypeOf(new FrameRegisters(config))
   pixel             := unit.io.pixels.bits.asUInt
 
-  /** To the maps. */
-  val load = Option.when(config.hasRoom)(IO(Flipped(Valid(new Load(config)))))
+  /** Loads of the maps. */
+  val load = Option.when(config.hasEnvironment)(IO(Flipped(Valid(new Load(config)))))
   for (asks <- unit.io.maps) {
     val maps = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
     SlowMaps.connect(asks, maps.io.ports.head, isSlow = true.B)
@@ -142,8 +145,8 @@ private class UnitColumn(
   dut.clock.step()
   dut.io.start.poke(false)
 
-  /** @param willing probability that a port takes or offers something in a cycle
-    * @return position and values of the pixels in the order of time
+  /** @param willing probability that a port is ready or valid in a cycle
+    * @return positions and values of the pixels in order of time
     */
   def run(positions: Seq[(Int, Int)], willing: Double): Seq[((Int, Int), Map[String, BigInt])] = {
     def isWilling = random.nextDouble() < willing
@@ -165,7 +168,7 @@ private class UnitColumn(
       dut.io.pixels.ready.poke(accepts)
 
       idle += 1
-      assert(idle < (if (config.hasRoom) 30000 else 5000), s"nothing happens after ${pixels.size} pixels")
+      assert(idle < (if (config.hasEnvironment) 30000 else 5000), s"nothing happens after ${pixels.size} pixels")
       dut.io.isIdle.expect(positions.size - waiting.size == pixels.size)
       dut.io.events.illegalRecord.expect(false)
       dut.io.events.stackOverflow.expect(false)
@@ -198,7 +201,7 @@ private class UnitColumn(
       registers(s"frame.objectRect.${axis}0") <= at && at < registers(s"frame.objectRect.${axis}1")
     }
 
-  /** What this row has asked for, and what others have: rows read the same scene. */
+  /** Reads of this row, and of other rows, which read the same scene. */
   private def broadcast(): Unit = for (bank <- 0 until banks) {
     val port = dut.io.broadcasts(bank)
     if (random.nextInt(5) == 0) {

@@ -21,7 +21,7 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for (contexts <- Seq(1, 3, 16))
     it should s"follow $contexts contexts with an environment, enabled or not" in
-      test(new RtController(config(contexts, TestConfigs.withRoom(TestConfigs.room)))) { dut =>
+      test(new RtController(config(contexts, TestConfigs.withEnvironment(TestConfigs.environment)))) { dut =>
         val outcomes =
           for ((eagerness, hasEnvironment, seed) <- Seq((0.9, true, 3), (0.15, true, 4), (0.5, false, 5))) yield {
             val rounds = new ControllerDriver(dut, contexts, seed, hasEnvironment)

@@ -6,8 +6,8 @@ import colonnade.formats.RecordFormats
 
 import scala.util.Random
 
-/** A few large triangles in the object's cube, seen from before it: records as the packer lays them out, and registers.
-  * Nodes hold `arity` groups of leaves, cut along x.
+/** A few large triangles in the object's cube with a camera in front of it: records in the packer's layout, and registers.
+  * Nodes hold `arity` groups of leaves, split along x.
   */
 final class SmallScene(
     config:        ColonnadeConfig,
@@ -29,7 +29,7 @@ final class SmallScene(
   private val leaves: Vector[Leaf] =
     Seq.fill(triangleCount)(triangle()).sortBy(_.map(_.head).sum).grouped(config.geometry.trianglesPerRecord).toVector
 
-  /** Nodes as groups of leaves, breadth first; without a tree there are none. Leaves in the order of their records. */
+  /** Nodes as groups of leaves, breadth first, none without a tree; leaves in the order of their records. */
   private val (nodes, ordered) = {
     var known = if (config.geometry.bvh) Vector(leaves) else Vector.empty[Vector[Leaf]]
     var found = if (config.geometry.bvh) Vector.empty[Leaf] else leaves
@@ -50,7 +50,7 @@ final class SmallScene(
       ordered.zip(ordered.scanLeft(0)(_ + _.size)).map { case (leaf, first) => triangles(leaf, first) } ++
       ordered.flatten.grouped(RecordFormats.facesPerRecord).map(attributes)
 
-  /** Everything that the host writes, by name. */
+  /** The host's registers, by name. */
   val registers: Map[String, BigInt] = {
     val cube      = BigInt(1) << (numbers.vertexBits + numbers.gridFraction) // grid steps
     val unitShift = 4
@@ -104,7 +104,7 @@ final class SmallScene(
       vector("bounds.high", "xyz", (0 until 3).map(axis => BigInt(points.map(_(axis)).max)))
   }
 
-  /** Every second light falls off: a squared distance as mantissa and exponent. */
+  /** Every second light has falloff: a squared distance as mantissa and exponent. */
   private def reach(cube: BigInt, light: Int): Map[String, BigInt] = {
     val square = if (light % 2 == 0) BigInt(0) else cube * cube * 3
     val drop   = square.bitLength - numbers.mantissaBits
@@ -114,7 +114,7 @@ final class SmallScene(
     )
   }
 
-  /** Every second one is a mirror or glass. */
+  /** Every second material is a mirror or glass. */
   private def glossy(material: Int): Map[String, BigInt] = {
     val one = BigInt(1) << NumberFormats.etaFraction
     Map[String, BigInt](

@@ -9,7 +9,7 @@ import colonnade.numbers.{Fixed, FixedPointFormat}
   * A position P in grid steps has the projection p = matrix · P + (offset << offsetShift), in steps of 2^-exponent. It
   * appears at the map's pixel 1024 · (p.x, p.y) / p.z, and its w, the plane map's unit over its depth, is 1 / p.z.
   */
-final class RoomView(numbers: NumberFormats) extends Bundle {
+final class EnvironmentView(numbers: NumberFormats) extends Bundle {
   val matrix = Vec(3, Vec3(SInt(numbers.macBits.W)))
   val offset = Vec3(SInt(numbers.macBits.W))
 
@@ -18,11 +18,12 @@ final class RoomView(numbers: NumberFormats) extends Bundle {
   val exponent    = SInt((NumberFormats.bitLength(2 * numbers.sceneBits) + 1).W)
 
   /** Rotates a normal of the maps from view space to object space. */
-  val rotation = Vec(3, Vec3(new Fixed(FixedPointFormat.signed(RoomView.rotationBits, RoomView.rotationFraction))))
+  val rotation =
+    Vec(3, Vec3(new Fixed(FixedPointFormat.signed(EnvironmentView.rotationBits, EnvironmentView.rotationFraction))))
 
   /** Half a pixel of the frame, in the map's 1024 pixels: the centre of pixel (x, y) is at (2x + 1, 2y + 1) of these. */
-  val stepX = UInt((numbers.shadeBits + RoomView.stepGuard).W)
-  val stepY = UInt((numbers.shadeBits + RoomView.stepGuard).W)
+  val stepX = UInt((numbers.shadeBits + EnvironmentView.stepGuard).W)
+  val stepY = UInt((numbers.shadeBits + EnvironmentView.stepGuard).W)
 
   /** Number of bounding planes, clamped to the size of their table. */
   val shellPlanes = UInt(8.W)
@@ -34,7 +35,7 @@ final class RoomView(numbers: NumberFormats) extends Bundle {
   val window = new PixelRect(numbers.coordinateBits)
 }
 
-object RoomView {
+object EnvironmentView {
   val rotationBits:     Int = 16
   val rotationFraction: Int = 14
 

@@ -5,12 +5,12 @@ import colonnade.environment.{EnvironmentScene, ViewCase}
 
 import scala.util.Random
 
-/** The room that a small scene stands in, seen by the camera that its maps belong to; a strip of the frame to the left
-  * and at the top is said not to see the object.
+/** The environment of a small scene, with the camera of its maps. Pixels in a strip at the left and the top of the frame
+  * are marked as unable to show the object.
   *
-  * @param isThere or else the frame is without a room, though the maps are loaded, and units get what may see the object
+  * @param isThere the frame has an environment; otherwise only the maps are loaded
   */
-final class SmallRoom(
+final class SmallEnvironment(
     config:  ColonnadeConfig,
     scene:   SmallScene,
     random:  Random,
@@ -21,10 +21,10 @@ final class SmallRoom(
   private val maps    = new EnvironmentScene(config, random)
   private val sizes   = Seq(config.physicalAttributeMemory.get.width, config.physicalAttributeMemory.get.height)
 
-  /** By the memory's name. */
+  /** Words by memory name. */
   val words: Map[String, Seq[BigInt]] = maps.words
 
-  /** Together with the scene's; the object is 1.1 m across, and as far away. */
+  /** Registers of scene and environment; the object is 1.1 m across, and as far away. */
   val registers: Map[String, BigInt] = {
     val unitShift = scene.registers("frame.unitShift").toInt
     val stepShift = scene.registers("camera.stepShift").toInt
@@ -44,7 +44,7 @@ final class SmallRoom(
     def scaled(slope: Double): BigInt = BigDecimal(slope * forwards.toDouble).toBigInt
     val steps                         = Seq(0, 1).map(axis => sizes(axis).toDouble / frame(axis) / maps.focal)
     val corner                        = Seq(0, 1).map(axis => steps(axis) / 2 - maps.middle(axis) / maps.focal)
-    // Beside the camera, so that the object's shadow falls where it is seen
+    // The light is close to the camera, so that the object's shadow is visible
     val light = "xyz".zip(camera.zip(Seq(-0.6, 0.25, 0.2))).map { case (axis, (from, by)) =>
       s"lights[0].position.$axis" -> ((from + BigDecimal(by * metre).toBigInt) >> unitShift)
     }
