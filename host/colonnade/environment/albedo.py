@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.image_io import decode_srgb
-from colonnade.common.srgb import straightened
+from colonnade.common.srgb import linear_from_srgb
 
 #: Edge of a patch, pixels, and how many patches with a pattern make a judgement.
 _PATCH = 16
@@ -20,7 +20,7 @@ _LEAST_PATCHES = 24
 
 def linear_albedo(samples: NDArray[np.float64], encoding: str) -> NDArray[np.float64]:
     """Linear albedo of samples 0.0 to 1.0 that are ``linear`` or ``srgb``."""
-    return samples if encoding == "linear" else straightened(samples)
+    return samples if encoding == "linear" else linear_from_srgb(samples)
 
 
 def judged_encoding(samples: NDArray[np.float64], photo: NDArray[np.uint8] | None) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common.array_files import array_in
+from colonnade.common.array_files import parse_npy
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import opened_picture
 from colonnade.common.input_files import exists, read_input, read_json
@@ -55,7 +55,7 @@ def read_grey(file: Path) -> NDArray[np.float64]:
 def read_array(file: Path) -> NDArray[np.float64]:
     """The numbers of a ``.npy`` file: float64 [height, width]."""
     try:
-        array = array_in(read_input(file, "the array", MAX_PICTURE_BYTES))
+        array = parse_npy(read_input(file, "the array", MAX_PICTURE_BYTES))
     except ValueError as error:
         raise UserError(f"{file} is no readable array: {error}") from None
     if array.ndim == 3 and array.shape[2] == 1:

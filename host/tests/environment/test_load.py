@@ -15,7 +15,7 @@ from PIL import Image
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
-from colonnade.common.srgb import curved
+from colonnade.common.srgb import srgb_from_linear
 from colonnade.environment.load import load_environment
 
 ROOMS = Path(__file__).resolve().parents[3] / "scenes" / "rooms"
@@ -95,7 +95,7 @@ def test_the_photo_tells_how_albedo_is_encoded(tmp_path: Path) -> None:
     change_meta(folder, albedo_encoding=None)
     linear = load_environment(folder)
     assert "taken as linear" in linear.notes[0]
-    Image.fromarray(np.rint(curved(linear.albedo) * 255).astype(np.uint8)).save(folder / "albedo.png")
+    Image.fromarray(np.rint(srgb_from_linear(linear.albedo) * 255).astype(np.uint8)).save(folder / "albedo.png")
     curve = load_environment(folder)
     assert "taken as srgb" in curve.notes[0]
     assert np.abs(curve.albedo - linear.albedo).max() < 0.005
@@ -211,7 +211,7 @@ def test_depth_pictures_that_say_nothing(environment: Path, picture: NDArray[np.
 def test_real_numbers_are_no_samples(environment: Path) -> None:
     """A picture of floats, which says nothing of what white is."""
     Image.fromarray(np.full((48, 64), 0.4, np.float32)).save(environment / "albedo.png", format="TIFF")
-    with pytest.raises(UserError, match=r"albedo\.png is no readable picture: give a PNG"):
+    with pytest.raises(UserError, match=r"albedo\.png is not a readable picture: give a PNG"):
         load_environment(environment)
 
 
@@ -231,7 +231,7 @@ def test_real_numbers_are_no_samples(environment: Path) -> None:
         (meta(albedo_encoding="gamma"), "albedo_encoding must be linear or srgb"),
         (remove("albedo.png"), "lacks albedo.png"),
         (remove("normal.png"), "lacks normal.png"),
-        (break_file("albedo.png", b"no picture"), "albedo.png is no readable picture"),
+        (break_file("albedo.png", b"no picture"), "albedo.png is not a readable picture"),
         (break_file("depth.npy", b"no array"), "depth.npy is no readable array"),
         (save("depth.npy", np.ones((48, 64, 3))), "one number for each pixel"),
         (save("depth.npy", np.ones((24, 32))), r"depth.npy is 32x24 pixels, albedo.png 64x48"),

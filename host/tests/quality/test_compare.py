@@ -16,7 +16,7 @@ from colonnade.common import image_io
 from colonnade.common.errors import UserError
 from colonnade.common.hits import Hits, read_hits, write_hits
 from colonnade.quality.compare import compare
-from colonnade.quality.image_metrics import HIGHEST_PSNR, compare_hits, compare_pictures
+from colonnade.quality.image_metrics import MAX_PSNR, compare_hits, compare_pictures
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def test_identical_pictures_are_perfect(picture: np.ndarray) -> None:
     difference = compare_pictures(picture, picture.copy())
     assert difference.identical
     assert difference.differing_pixels == 0
-    assert difference.psnr == HIGHEST_PSNR
+    assert difference.psnr == MAX_PSNR
     assert difference.ssim == pytest.approx(1.0)
     assert difference.flip == pytest.approx(0.0)
 

@@ -204,7 +204,7 @@ def test_files_of_several_frames(folder: Path, tmp_path: Path) -> None:
         (("--frames", 0), "--frames"),
         (("--frames", "many"), "--frames"),
         (("--frames", 2, "--output", "f.gif"), "FILE.png for numbered files, or FILE.webp"),
-        (("--frames", 2, "--output", "nowhere/f.png"), "nowhere is no folder"),
+        (("--frames", 2, "--output", "nowhere/f.png"), "nowhere is not a folder"),
     ],
 )
 def test_wrong_frames_are_one_line(tmp_path: Path, options: tuple[object, ...], message: str) -> None:

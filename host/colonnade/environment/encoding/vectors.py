@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common.srgb import curved, straightened
+from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 
 
 def packed(fields: NDArray[np.int64], bits: int) -> NDArray[np.uint64]:
@@ -76,11 +76,11 @@ class AlbedoSpace(VectorSpace):
 
     def spread(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """sRGB, 0 to 255."""
-        return curved(vectors) * 255.0
+        return srgb_from_linear(vectors) * 255.0
 
     def gathered(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Linear colours of points in sRGB."""
-        return straightened(np.clip(points, 0.0, 255.0) / 255.0)
+        return linear_from_srgb(np.clip(points, 0.0, 255.0) / 255.0)
 
 
 class NormalSpace(VectorSpace):
