@@ -197,7 +197,7 @@ TILTED = np.array([[-1, 0, 0, 0], [0, 2, 0, 1], [0, 0, -1, 0]])
 @pytest.mark.parametrize(
     ("picture", "message"),
     [
-        (np.full((48, 64), 90, np.uint8), "depth.png has 8 bits a pixel, too few for depth"),
+        (np.full((48, 64), 90, np.uint8), "depth.png has 8 bits per pixel, too few for depth"),
         (np.zeros((48, 64), np.uint16), "3,072 of 3,072 pixels have no depth"),
     ],
 )
