@@ -56,7 +56,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     check_size((width, height), manifest)
     if request.waveform is not None:
         _check_waveform(request, (width, height))
-    poses = [scene.at(share) for share in scene.motion.shares(request.frames)]
+    poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
     if request.backend == "reference":
         from colonnade.render.reference_frames import reference_frames
 
@@ -88,7 +88,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         require_no_errors(frame)
         report = replace(
             frame_report(request.backend, manifest, image.header, frame),
-            share=pose.share,
+            share=pose.motion_progress,
             seconds={"pack": packed, "build": None} | seconds,
             simulated_cycles_per_second=rate,
             bytes=None if environment is None else environment.image.byte_counts(),

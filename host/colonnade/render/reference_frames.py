@@ -39,7 +39,7 @@ def reference_frames(
             mesh=MeshReport(mesh.name, len(mesh.faces), mesh.source_count),
             size=size,
             rays=reference.rays,
-            share=pose.share,
+            share=pose.motion_progress,
             seconds={"pack": packed, "build": None, "run": time.perf_counter() - begun},
         )
         yield RenderResult(reference.image, reference.object_mask, reference.hit_triangles, reference.t, report)

@@ -136,12 +136,12 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path, picture: np.ndarray)
     cases: list[tuple[tuple[Path | None, ...], str]] = [
         ((a, smaller), "48x32"),
         ((a, tmp_path / "none.png"), "no picture"),
-        ((a, noise), "no readable picture"),
+        ((a, noise), "not a readable picture"),
         ((a, hits), "two pictures or two .npz"),
         ((a, a, hits, None), "both --hits-a and --hits-b"),
         ((hits, hits, hits, hits), "leave out"),
-        ((hits, wrong), "no hits file"),
-        ((hits, tmp_path / "other.npz"), "no hits file"),
+        ((hits, wrong), "not a hits file"),
+        ((hits, tmp_path / "other.npz"), "not a hits file"),
         ((hits, tmp_path / "none.npz"), "no hits file"),
     ]
     for arguments, message in cases:

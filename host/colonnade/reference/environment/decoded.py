@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.types import Floats
-from colonnade.environment.encoding.planes import SLOPE_PIXELS, Picture, unpacked_planes
+from colonnade.environment.encoding.planes import SLOPE_PIXELS, PlaneProjection, unpack_planes
 from colonnade.reference.environment.depth_mesh import DepthMesh
 from colonnade.reference.environment.ray_march import MarchedGeometry, PlaneMarch, RayMarch
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints
@@ -29,17 +29,17 @@ class BoundingPlanes:
         vector_bits = 3 * image.layout.field_bits
         high = [int(low) | int(top) << 64 for low, top in words[:, 1:]]
         albedos = np.array([entry & ((1 << vector_bits) - 1) for entry in high], dtype=np.uint64)
-        picture = Picture.of(environment, image.depth_unit)
-        planes = unpacked_planes(words[:, 0])
+        projection = PlaneProjection.of(environment, image.depth_unit)
+        planes = unpack_planes(words[:, 0])
         self._albedo = image.albedo_space.vectors(albedos)
-        self._inverse_offsets = picture.inverse_offsets(planes)
-        self._normals = picture.normals(planes)
+        self._dual_vectors = projection.dual_vectors(planes)
+        self._normals = projection.normals(planes)
 
     def intersect(self, origins: Floats, directions: Floats) -> BackdropPoints:
         """Points where rays of view space, float64 [n, 3] each, hit the planes."""
-        approach = directions @ self._inverse_offsets.T
+        approach = directions @ self._dual_vectors.T
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = (1 - origins @ self._inverse_offsets.T) / approach
+            t = (1 - origins @ self._dual_vectors.T) / approach
         t = np.where((approach > 0) & (t > 0), t, np.inf)
         nearest = t.argmin(axis=1)
         t_hit = t[np.arange(len(t)), nearest]
@@ -50,16 +50,16 @@ class BoundingPlanes:
 
 def float_plane_march(environment: Environment, image: AttributeImage) -> PlaneMarch:
     """The ray march through the planes of an attribute image, in float64, with one plane per pixel."""
-    picture = Picture.of(environment, image.depth_unit)
-    planes = unpacked_planes(image.planes.planes)[image.planes.ids(image.layout)]
-    w = image.planes.inverse_depth(image.layout, picture) / image.depth_unit
+    projection = PlaneProjection.of(environment, image.depth_unit)
+    planes = unpack_planes(image.planes.planes)[image.planes.ids(image.layout)]
+    w = image.planes.inverse_depth(image.layout, projection) / image.depth_unit
     slopes = np.moveaxis(planes[..., :2], 2, 0) / SLOPE_PIXELS / image.depth_unit
     return PlaneMarch(environment, w, slopes)
 
 
 def decoded_depth(environment: Environment, image: AttributeImage) -> Floats:
     """Depth of each pixel by its decoded plane, metres along the view, float64 [height, width]."""
-    return image.decoded_depth(Picture.of(environment, image.depth_unit))
+    return image.decoded_depth(PlaneProjection.of(environment, image.depth_unit))
 
 
 def backdrops(environment: Environment, image: AttributeImage, march: RayMarch) -> dict[str, Backdrop]:
