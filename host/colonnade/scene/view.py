@@ -41,8 +41,8 @@ class PlacedLight:
 class View:
     """The view of one frame, in mesh space.
 
-    The ray through the centre of pixel (x, y) is ``origin + t * (direction + x * step_x + y * step_y)``. Pixel (0, 0) is
-    at the top left. Directions are not normalised: one unit of t is one mesh unit of depth.
+    The ray through the centre of pixel (x, y) is ``origin + t * (direction + x * step_x + y * step_y)``. Pixel (0, 0)
+    is at the top left. Directions are not normalised: one unit of t is one mesh unit of depth.
 
     Attributes:
         width, height: Size of the frame, pixels.

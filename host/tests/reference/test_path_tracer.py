@@ -234,7 +234,7 @@ def random_bounces(front: bool, ior: float = 1.5, count: int = 2000) -> tuple[np
     directions *= -np.sign(np.einsum("ni,ni->n", normals, directions))[:, None]
     flags = np.full(count, front)
     made = bounce(directions, normals, normals, flags, np.ones(count, bool), np.full(count, ior))
-    return normals, directions, made.directions, made.refracted, made.reflections, made.shares
+    return normals, directions, made.directions, made.refracted, made.fresnel_directions, made.fresnel_weights
 
 
 def test_refraction_obeys_snell_and_total_reflection() -> None:

@@ -13,7 +13,7 @@ from colonnade.environment.encoded import EncodedEnvironment
 from colonnade.environment.encoding.image import AttributeImage, encode_environment
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.model import Environment
-from colonnade.evaluation.studies.ar_losses import Losses, device_frame, losses, standing_scene, table
+from colonnade.evaluation.studies.ar_losses import Losses, device_frame, losses, placed_scene, table
 from colonnade.evaluation.studies.synthetic_attic import attic
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import MAX_PSNR
@@ -36,7 +36,7 @@ def image(environment: Environment) -> AttributeImage:
 @pytest.fixture(scope="module")
 def measured(environment: Environment, image: AttributeImage) -> Losses:
     mesh, march = load_mesh("teapot:4"), float_plane_march(environment, image)
-    scene = standing_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
+    scene = placed_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
     view = make_view(scene, mesh.extent, 160, 120, mesh.materials, environment)
     first = losses(mesh, view, environment, image, march, with_dists=False)
     device = first.pictures["both"].image
@@ -90,7 +90,7 @@ def test_the_device_shows_the_rebuilt_room_but_for_its_rounding(
 ) -> None:
     """The rows `fixed point` and `device`: of the model's frame of the very same scene."""
     mesh = load_mesh("teapot:4")
-    scene = standing_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
+    scene = placed_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
     view = make_view(scene, mesh.extent, 160, 120, mesh.materials, environment)
     hardware = f"physicalAttributeMemory={json.dumps(image.layout.to_config())}"
     frame = device_frame(
