@@ -49,7 +49,7 @@ format: setup ## let the formatters rewrite the sources
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host
 	@$(venv)/ruff format host
-	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain tools/site tools/diagrams
+	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain tools/site tools/diagrams tools/layers-* tools/vocabulary tools/frame-digests
 
 clean: ## remove everything that was built, fetched or cached
 	@rm -rf .venv .tools .cache out target project/target project/project test_run_dir build host/build
