@@ -6,7 +6,7 @@ namespace colonnade {
 
 class Background : private MapGeometry {
 public:
-    /// Steps of a march at most: then the ray meets the shell.
+    /// Steps of a march at most: then the ray meets the bounding planes.
     static constexpr int maxSteps = 128;
 
     Background(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers, image.sizes()), n_(numbers), image_(image) {}
@@ -269,11 +269,11 @@ private:
         return static_cast<int>(clamp<std::int64_t>(along(ray, axis, s) >> (f_ - mapLog), 0, size - 1));
     }
 
-    /// The nearest of the shell's planes: it lies in front of the ray's origin, and the ray goes towards it.
+    /// The nearest of the bounding planes: it lies in front of the ray's origin, and the ray goes towards it.
     void meetBoundingPlanes(const MapRay& ray, const EnvironmentView& view, EnvironmentPoint& point) const {
         std::uint64_t bestQuotient = 0;
         int bestExponent = 0;
-        for (int i = 0; i < std::min(view.shellPlanes, sizes_.shellPlanes); ++i) {
+        for (int i = 0; i < std::min(view.boundingPlanes, sizes_.boundingPlanes); ++i) {
             const PlaneWord& plane = image_.boundingPlane(i).plane;
             const std::int64_t front = depthOf(ray, plane, i).value;
             const std::int64_t centreU = std::int64_t(sizes_.width) << (f_ - mapLog - 1), centreV = std::int64_t(sizes_.height) << (f_ - mapLog - 1);

@@ -152,7 +152,7 @@ def test_a_mirror_that_looks_out_of_the_view_is_marked() -> None:
     np.testing.assert_allclose(frame.image[frame.object_mask], [[0.3, 0.2, 0.1]] * int(frame.object_mask.sum()))
 
 
-def test_a_shell_stands_in_where_the_maps_end() -> None:
+def test_bounding_planes_stand_in_where_the_maps_end() -> None:
     class Behind:
         def intersect(self, origins: np.ndarray, directions: np.ndarray) -> BackdropPoints:
             normals = np.broadcast_to([0.0, 0.0, 1.0], origins.shape)

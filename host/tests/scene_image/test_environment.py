@@ -134,7 +134,10 @@ def test_inspect_tells_of_tiles_beyond_their_heap(tmp_path: Path, image: SceneIm
 
 def test_words_that_no_memory_holds_are_a_bug(hardware: Manifest, held: EncodedEnvironment) -> None:
     planes = held.image.planes
-    for changed in (replace(planes, heap=planes.heap[:-1]), replace(planes, shell=planes.shell | np.uint64(1 << 40))):
+    for changed in (
+        replace(planes, heap=planes.heap[:-1]),
+        replace(planes, shell=planes.bounding | np.uint64(1 << 40)),
+    ):
         wrong = EncodedEnvironment(held.environment, replace(held.image, planes=changed))
         with pytest.raises(ValueError, match="do not fit"):
             with_environment(pack(load_mesh("cube"), hardware), wrong, hardware)
@@ -146,7 +149,7 @@ def test_the_report_has_the_bytes_of_each_map(hardware: Manifest, image: SceneIm
     assert use["albedo"]["source_bytes"] == 921600 and use["albedo"]["ratio"] == pytest.approx(56.25)
     lines = "\n".join(report_lines(image.header, hardware))
     assert "16,384 bytes of memory, 56.2 times less than the map's 921,600" in lines
-    assert "planes.shell            8 words of 17 bytes, load target 10" in lines
+    assert "planes.bounding            8 words of 17 bytes, load target 10" in lines
     assert "albedo.palette" in "\n".join(report_lines(image.header))
     assert json.loads(json.dumps(describe(image)))["room"]["name"] == "attic"
 

@@ -82,13 +82,13 @@ def _inliers(
 
 
 def pack_bounding_planes(
-    shell: BoundingPlanes, projection: PlaneProjection, layout: AttributeLayout
+    bounding: BoundingPlanes, projection: PlaneProjection, layout: AttributeLayout
 ) -> NDArray[np.uint64]:
-    """Pack the entries into words, uint64 [shell_planes, 3]: bits 63 to 0, 127 to 64, 143 to 128 of each entry."""
-    planes = pack_planes(shell.planes)
-    albedos = AlbedoSpace(layout.field_bits).words(shell.albedos)
+    """Pack the entries into words, uint64 [bounding_planes, 3]: bits 63 to 0, 127 to 64, 143 to 128 of each entry."""
+    planes = pack_planes(bounding.planes)
+    albedos = AlbedoSpace(layout.field_bits).words(bounding.albedos)
     normals = NormalSpace(layout.field_bits).words(projection.normals(unpack_planes(planes)))
-    words = np.zeros((layout.shell_planes, 3), np.uint64)
+    words = np.zeros((layout.bounding_planes, 3), np.uint64)
     for k in range(len(planes)):
         entry = int(planes[k]) | (int(albedos[k]) | int(normals[k]) << layout.vector_bits) << 64
         words[k] = [entry >> (64 * part) & ((1 << 64) - 1) for part in range(3)]

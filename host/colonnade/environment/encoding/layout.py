@@ -10,7 +10,7 @@
 | plane descriptors | 16 | tiles |
 | planes | 64 | `planes` |
 | plane heap | 16 | rest of `plane_bytes` |
-| shell (bounding planes) | 144 | `shell_planes` |
+| bounding planes | 144 | `bounding_planes` |
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class AttributeLayout:
         planes: Entries of the plane table, 2 to 128; the last plane is infinitely far away.
         plane_bytes: Bytes of the plane table, the plane map and the bounding planes.
         plane_cells: Largest number of cells on a tile's edge in the plane map, 8 or 16.
-        shell_planes: Number of bounding planes, for rays that leave the view.
+        bounding_planes: Number of bounding planes, for rays that leave the view.
 
     Raises:
         UserError: A size is out of range, or the bytes are too few for the fixed tables."""
@@ -68,7 +68,7 @@ class AttributeLayout:
     planes: int = 128
     plane_bytes: int = 8192
     plane_cells: int = 8
-    shell_planes: int = 8
+    bounding_planes: int = 8
 
     def __post_init__(self) -> None:
         def within(name: str, low: int, high: int) -> None:
@@ -81,7 +81,7 @@ class AttributeLayout:
         within("palette_size", 4, 1 << INDEX_BITS)
         within("field_bits", 6, 13)
         within("planes", 2, 128)
-        within("shell_planes", 1, 16)
+        within("bounding_planes", 1, 16)
         if self.tile_size not in (8, 16, 32):
             raise UserError(f"background layout: tile_size is {self.tile_size}, it must be 8, 16 or 32")
         if self.plane_cells not in (8, 16) or self.plane_cells > self.tile_size:
@@ -107,13 +107,13 @@ class AttributeLayout:
     def from_config(section: Mapping[str, Any]) -> AttributeLayout:
         """Build the layout of a configuration's section ``physicalAttributeMemory``."""
         names = {"tileSize": "tile_size", "paletteSize": "palette_size", "mapBytes": "map_bytes"}
-        names |= {"planeBytes": "plane_bytes", "shellPlanes": "shell_planes"}
+        names |= {"planeBytes": "plane_bytes", "boundingPlanes": "bounding_planes"}
         return AttributeLayout(**{names.get(key, key): value for key, value in section.items() if key != "shared"})
 
     def to_config(self) -> dict[str, Any]:
         """The configuration section ``physicalAttributeMemory`` with these sizes."""
         names = {"tile_size": "tileSize", "palette_size": "paletteSize", "map_bytes": "mapBytes"}
-        names |= {"plane_bytes": "planeBytes", "shell_planes": "shellPlanes"}
+        names |= {"plane_bytes": "planeBytes", "bounding_planes": "boundingPlanes"}
         sizes = {names.get(name, name): value for name, value in asdict(self).items() if name not in HOST_ONLY}
         return {**sizes, "shared": False}
 
@@ -170,7 +170,7 @@ class AttributeLayout:
 
     @property
     def _fixed_plane_bits(self) -> int:
-        tables = self.planes * PLANE_BITS + self.shell_planes * SHELL_BITS
+        tables = self.planes * PLANE_BITS + self.bounding_planes * SHELL_BITS
         return self.tiles * PLANE_DESCRIPTOR_BITS + tables
 
     @property

@@ -70,10 +70,10 @@ def encode_planes(environment: Environment, layout: AttributeLayout, rounds: int
     table = np.zeros(layout.planes, np.uint64)
     table[: layout.infinite_plane] = words
     descriptors, heap = _written(modes, members, choices, layout)
-    shell = pack_bounding_planes(
-        choose_bounding_planes(environment, projection, planes, layout.shell_planes), projection, layout
+    bounding = pack_bounding_planes(
+        choose_bounding_planes(environment, projection, planes, layout.bounding_planes), projection, layout
     )
-    return PlaneMap(descriptors, table, heap, shell, projection.depth_unit)
+    return PlaneMap(descriptors, table, heap, bounding, projection.depth_unit)
 
 
 def _choices(pixels: Samples, planes: NDArray[np.float64], layout: AttributeLayout) -> _Choices:

@@ -74,19 +74,19 @@ class PlaneMap:
         descriptors: uint16 [tiles].
         planes: uint64 [planes]; the last one is 0: w = 0, at infinity.
         heap: uint16 [plane_heap_words].
-        shell: uint64 [shell_planes, 3], 144 bits each, low word first: plane, albedo, normal; all zero if unused.
+        bounding: uint64 [bounding_planes, 3], 144 bits each, low word first: plane, albedo, normal; all zero if unused.
         depth_unit: Depth of w = 1, metres: w = depth_unit / depth.
     """
 
     descriptors: NDArray[np.uint16]
     planes: NDArray[np.uint64]
     heap: NDArray[np.uint16]
-    shell: NDArray[np.uint64]
+    bounding: NDArray[np.uint64]
     depth_unit: float
 
     def memories(self) -> dict[str, NDArray[np.unsignedinteger]]:
         """Words of each memory."""
-        return {"descriptors": self.descriptors, "planes": self.planes, "heap": self.heap, "shell": self.shell}
+        return {"descriptors": self.descriptors, "planes": self.planes, "heap": self.heap, "bounding": self.bounding}
 
     def ids_at(self, u: NDArray[np.int64], v: NDArray[np.int64], layout: AttributeLayout) -> NDArray[np.int64]:
         """Plane ids of pixels (u, v) in the map; arrays of any shape."""

@@ -68,7 +68,7 @@ def measure(environment: Environment, image: AttributeImage, with_dists: bool = 
             "beyond_5_cm": float(np.mean(centimetres > 5.0)),
         },
         "depth_unit": image.depth_unit,
-        "shell": int(np.count_nonzero(image.planes.shell[:, 0])),
+        "bounding_planes": int(np.count_nonzero(image.planes.bounding[:, 0])),
     }
 
 
@@ -100,7 +100,7 @@ def report_lines(report: dict[str, Any]) -> Iterable[str]:
     yield f"surfaces    {planes['mean_cm']:.2f} cm off along the view ray, median {planes['median_cm']:.2f}," + (
         f" {planes['p95_cm']:.2f} for 5 % of the pixels; {planes['beyond_5_cm']:.1%} off by 5 cm"
     )
-    yield f"shell       {report['shell']} planes around the room"
+    yield f"bounding    {report['bounding_planes']} planes around the room"
 
 
 def _format_number(value: float | None) -> str:

@@ -25,7 +25,7 @@ class BoundingPlanes:
 
     def __init__(self, environment: Environment, image: AttributeImage) -> None:
         """Decode the bounding planes of an attribute image."""
-        words = image.planes.shell[image.planes.shell.any(axis=1)]
+        words = image.planes.bounding[image.planes.bounding.any(axis=1)]
         vector_bits = 3 * image.layout.field_bits
         high = [int(low) | int(top) << 64 for low, top in words[:, 1:]]
         albedos = np.array([entry & ((1 << vector_bits) - 1) for entry in high], dtype=np.uint64)

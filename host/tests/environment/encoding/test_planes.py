@@ -130,8 +130,8 @@ def test_random_access_follows_the_words(plane_bytes: int, cells: int) -> None:
     assert (content.descriptors & 7).max() < (5 if cells == 8 else 7)
 
 
-def shell_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Planes, albedos and normals of the shell's used entries."""
+def bounding_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Planes, albedos and normals of the bounding planes' used entries."""
     entries = [sum(int(part) << (64 * k) for k, part in enumerate(words)) for words in content.shell if words.any()]
     planes = unpack_planes(np.array([entry & (1 << 64) - 1 for entry in entries], np.uint64))
     albedos = unpack(np.array([entry >> 64 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=False)
@@ -140,11 +140,11 @@ def shell_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.flo
     return planes, albedos / 4095, normals / 2047
 
 
-def test_the_shell_is_the_box_and_a_wall_behind() -> None:
+def test_the_bounding_planes_are_the_box_and_a_wall_behind() -> None:
     environment = boxes(320, 240)
     layout = AttributeLayout(320, 240)
     content = encode_planes(environment, layout)
-    planes, albedos, normals = shell_fields(content)
+    planes, albedos, normals = bounding_fields(content)
     projection = PlaneProjection.of(environment, content.depth_unit)
     expected = {
         (0, 0, 1): (0.5, environment.albedo.mean(axis=(0, 1))),
@@ -165,10 +165,10 @@ def test_the_shell_is_the_box_and_a_wall_behind() -> None:
     assert np.allclose(planes[0], [0, 0, -content.depth_unit / 0.5], atol=1e-4)
 
 
-def test_a_shell_of_few_planes_keeps_the_largest() -> None:
+def test_few_bounding_planes_keeps_the_largest() -> None:
     environment = boxes(320, 240)
-    content = encode_planes(environment, AttributeLayout(320, 240, shell_planes=3))
-    _, _, normals = shell_fields(content)
+    content = encode_planes(environment, AttributeLayout(320, 240, bounding_planes=3))
+    _, _, normals = bounding_fields(content)
     assert len(normals) == 3
     assert np.rint(normals[0]).tolist() == [0, 0, 1]
 
@@ -182,7 +182,7 @@ def test_surfaces_of_the_rooms(name: str, mean: float, p95: float) -> None:
     )
     assert centimetres.mean() < mean
     assert np.percentile(centimetres, 95) < p95
-    planes, _, normals = shell_fields(content)
+    planes, _, normals = bounding_fields(content)
     up = normals @ environment.camera_to_world[1, :3]
     distance = 1 / np.linalg.norm(PlaneProjection.of(environment, content.depth_unit).dual_vectors(planes), axis=1)
     # The floor is as far below the camera as the pose says

@@ -1,4 +1,4 @@
-"""What an AR frame loses, part by part, and the shell around a clustered room."""
+"""What an AR frame loses, part by part, and the bounding planes around a clustered room."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ def measured(environment: Environment, image: AttributeImage) -> Losses:
     return losses(mesh, view, environment, image, march, device, with_dists=False)
 
 
-def test_the_shell_is_all_around_and_faces_inward(environment: Environment, image: AttributeImage) -> None:
-    shell = BoundingPlanes(environment, image)
+def test_the_bounding_planes_are_all_around_and_faces_inward(environment: Environment, image: AttributeImage) -> None:
+    bounding = BoundingPlanes(environment, image)
     directions = np.random.default_rng(7).normal(size=(2000, 3))
     origins = np.broadcast_to([0.0, 0.0, 1.0], directions.shape)
-    met = shell.intersect(origins, directions)
+    met = bounding.intersect(origins, directions)
     away = np.einsum("ni,ni->n", met.position - origins, directions)
-    # Where no plane of the shell stands, above and beside, a ray may leave for ever.
+    # Where no plane of the bounding planes stands, above and beside, a ray may leave for ever.
     assert met.outside.mean() < 0.4
     assert (np.einsum("ni,ni->n", met.normals, directions)[~met.outside] < 0).all()
     assert (away[~met.outside] > 0).all()
-    behind = shell.intersect(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]]))
+    behind = bounding.intersect(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]]))
     np.testing.assert_allclose(behind.position[0], [0, 0, -0.5], atol=0.01)
     np.testing.assert_allclose(behind.normals[0], [0, 0, 1], atol=1e-3)
 

@@ -96,7 +96,7 @@ object ConfigIO {
           "mapBytes",
           "planes",
           "planeBytes",
-          "shellPlanes",
+          "boundingPlanes",
           "shared"
         )
         .map(physicalAttributeMemory),
@@ -162,21 +162,21 @@ object ConfigIO {
     mapBytes = memory.int("mapBytes"),
     planes = memory.int("planes"),
     planeBytes = memory.int("planeBytes"),
-    shellPlanes = memory.int("shellPlanes"),
+    boundingPlanes = memory.int("boundingPlanes"),
     shared = memory.boolean("shared")
   )
 
   private def written(memory: PhysicalAttributeMemoryConfig) = ujson.Obj(
-    "width"       -> memory.width,
-    "height"      -> memory.height,
-    "encoding"    -> memory.encoding.name,
-    "tileSize"    -> memory.tileSize,
-    "paletteSize" -> memory.paletteSize,
-    "mapBytes"    -> memory.mapBytes,
-    "planes"      -> memory.planes,
-    "planeBytes"  -> memory.planeBytes,
-    "shellPlanes" -> memory.shellPlanes,
-    "shared"      -> memory.shared
+    "width"          -> memory.width,
+    "height"         -> memory.height,
+    "encoding"       -> memory.encoding.name,
+    "tileSize"       -> memory.tileSize,
+    "paletteSize"    -> memory.paletteSize,
+    "mapBytes"       -> memory.mapBytes,
+    "planes"         -> memory.planes,
+    "planeBytes"     -> memory.planeBytes,
+    "boundingPlanes" -> memory.boundingPlanes,
+    "shared"         -> memory.shared
   )
 
   private def precision(root: ConfigReader): PrecisionConfig = root.value("precision") match {

@@ -14,7 +14,10 @@ private[config] final class ConfigReader(path: String, json: ujson.Value, known:
 
   fields.keys
     .find(!known.contains(_))
-    .foreach(key => throw new ConfigError(s"unknown key $path$key; known here: ${known.mkString(", ")}"))
+    .foreach { key =>
+      val advice = renamed.get(key).fold(s"known here: ${known.mkString(", ")}")(name => s"it is $name now")
+      throw new ConfigError(s"unknown key $path$key; $advice")
+    }
 
   def value(key: String): ujson.Value =
     fields.getOrElse(key, throw new ConfigError(s"$path$key is missing; give it a value"))
@@ -44,6 +47,10 @@ private[config] final class ConfigReader(path: String, json: ujson.Value, known:
 }
 
 private[config] object ConfigReader {
+
+  /** Keys of earlier versions, by their present names. */
+  private val renamed = Map("shellPlanes" -> "boundingPlanes")
+
   def wrong(where: String, found: ujson.Value, rule: String): ConfigError = {
     val subject = if (where.isEmpty) "the configuration" else where
     new ConfigError(s"$subject is ${shortened(found.render())}; it must be $rule")

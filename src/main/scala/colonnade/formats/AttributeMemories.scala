@@ -23,7 +23,7 @@ object AttributeMemories {
         ("planes.descriptors", layout.tiles, (new PlaneDescriptor).getWidth),
         ("planes.heap", layout.planeHeapWords, AttributeLayout.heapWordBits),
         ("planes.planes", memory.planes, (new Plane).getWidth),
-        ("planes.shell", memory.shellPlanes, (new ShellEntry).getWidth)
+        ("planes.bounding", memory.boundingPlanes, (new BoundingPlaneEntry).getWidth)
       )
       shapes.zip(LoadTarget.firstAttributes until LoadTarget.firstAttributes + shapes.size).map {
         case ((name, depth, bits), target) => AttributeMemory(name, depth, bits, target)
@@ -32,12 +32,12 @@ object AttributeMemories {
 
   /** Types of words by their manifest key; a heap's words are plain bits. */
   val layouts: Seq[(String, () => Bundle)] = Seq(
-    "mapDescriptor"   -> (() => new MapDescriptor),
-    "albedo"          -> (() => new AlbedoEntry),
-    "normal"          -> (() => new NormalEntry),
-    "planeDescriptor" -> (() => new PlaneDescriptor),
-    "plane"           -> (() => new Plane),
-    "shellEntry"      -> (() => new ShellEntry)
+    "mapDescriptor"      -> (() => new MapDescriptor),
+    "albedo"             -> (() => new AlbedoEntry),
+    "normal"             -> (() => new NormalEntry),
+    "planeDescriptor"    -> (() => new PlaneDescriptor),
+    "plane"              -> (() => new Plane),
+    "boundingPlaneEntry" -> (() => new BoundingPlaneEntry)
   )
 
   private def map(name: String, layout: AttributeLayout): Seq[(String, Int, Int)] =

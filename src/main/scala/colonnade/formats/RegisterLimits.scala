@@ -19,11 +19,11 @@ object RegisterLimits {
       s"scene.$name" -> BigInt(config.columnBvhMemory.depth)
     )
     val limits = Seq(
-      "frame.unitShift"   -> BigInt((numbers.sceneBits - numbers.macBits).max(0)),
-      "camera.stepShift"  -> BigInt(numbers.coordinateBits),
-      "shading.lights"    -> BigInt(config.frame.lights),
-      "shading.bounces"   -> BigInt(config.frame.maxBounces),
-      "shading.clearness" -> one
+      "frame.unitShift"             -> BigInt((numbers.sceneBits - numbers.macBits).max(0)),
+      "camera.stepShift"            -> BigInt(numbers.coordinateBits),
+      "shading.lights"              -> BigInt(config.frame.lights),
+      "shading.bounces"             -> BigInt(config.frame.maxBounces),
+      "shading.shadowTransmittance" -> one
     ) ++ materials ++ records
     val max = Layout.of(new FrameRegisters(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
     limits.filter { case (name, limit) => max.get(name).exists(limit < _) }.toMap

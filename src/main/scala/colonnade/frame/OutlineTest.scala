@@ -26,7 +26,7 @@ object EnvironmentWindow {
   def apply(config: ColonnadeConfig, registers: FrameRegisters): EnvironmentWindow = {
     val window = WireInit(0.U.asTypeOf(new EnvironmentWindow(config)))
     for (environment <- registers.environment) {
-      window.enabled := environment.isThere
+      window.enabled := environment.enabled
       window.rect    := environment.window
     }
     window

@@ -126,8 +126,8 @@ final class Microprogram[L <: Label](encoding: StepEncoding) {
     def isNow(steps: Set[Int]): Bool = steps.toSeq.sorted.map(register.isNow).reduce(_ || _)
     for ((signal, groups) <- raised)
       signal := groups.map { case (condition, steps) => condition.foldLeft(isNow(steps))(_ && _) }.reduce(_ || _)
-    for ((signal, steps) <- early) signal    := isOneOf(steps)
-    for ((label, isThere) <- places) isThere := register.isNow(positionOf(label))
+    for ((signal, steps) <- early) signal      := isOneOf(steps)
+    for ((label, isActive) <- places) isActive := register.isNow(positionOf(label))
   }
 
   /** Once the program is built: the encoding's stall repeats the current step. */

@@ -34,7 +34,7 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
 
   private val stage   = Module(new EnvironmentStage(config))
   private val control = io.control
-  control.enabled := io.view.isThere
+  control.enabled := io.view.enabled
   stage.io.view   := io.view
   io.maps <> stage.io.maps
   io.events := stage.io.events
@@ -50,7 +50,7 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   control.fresnelReflection := 0.U.asTypeOf(control.fresnelReflection)
   control.resume.ready      := false.B
   for (bounces <- io.bounces) {
-    bounces.enabled           := io.view.isThere
+    bounces.enabled           := io.view.enabled
     control.fresnelReflection := bounces.fresnelReflection
     bounces.resume :<>= control.resume
   }

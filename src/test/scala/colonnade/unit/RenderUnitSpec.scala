@@ -32,7 +32,7 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
         ) {
           val scene       = new SmallScene(config, seed, wide, high, triangleCount = 15, shadows)
           val environment = Option.when(config.hasEnvironment)(
-            new SmallEnvironment(config, scene, new Random(seed), Seq(wide, high), isThere = hasEnvironment)
+            new SmallEnvironment(config, scene, new Random(seed), Seq(wide, high), hasEnvironment = hasEnvironment)
           )
           val registers = environment.fold(scene.registers)(_.registers)
           val positions = new Random(seed).shuffle(for (x <- 0 until wide; y <- 0 until high) yield (x, y))
@@ -175,7 +175,7 @@ private class UnitColumn(
       if (dut.io.events.raysShadow.peekBoolean()) shadowRays += 1
       if (dut.io.events.raysReflection.peekBoolean() || dut.io.events.raysRefraction.peekBoolean()) bouncedRays += 1
       if (dut.io.events.hits.peekBoolean()) hits += 1
-      if (dut.io.events.raysRoom.exists(_.peekBoolean())) roomRays += 1
+      if (dut.io.events.raysEnvironment.exists(_.peekBoolean())) roomRays += 1
       if (accepts && dut.io.pixels.valid.peekBoolean()) {
         pixels :+= read(dut.pixel.peekInt())
         idle = 0

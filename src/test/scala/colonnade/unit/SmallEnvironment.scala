@@ -8,14 +8,14 @@ import scala.util.Random
 /** The environment of a small scene, with the camera of its maps. Pixels in a strip at the left and the top of the frame
   * are marked as unable to show the object.
   *
-  * @param isThere the frame has an environment; otherwise only the maps are loaded
+  * @param hasEnvironment the frame has an environment; otherwise only the maps are loaded
   */
 final class SmallEnvironment(
-    config:  ColonnadeConfig,
-    scene:   SmallScene,
-    random:  Random,
-    frame:   Seq[Int],
-    isThere: Boolean
+    config:         ColonnadeConfig,
+    scene:          SmallScene,
+    random:         Random,
+    frame:          Seq[Int],
+    hasEnvironment: Boolean
 ) {
   private val numbers = config.numbers
   private val maps    = new EnvironmentScene(config, random)
@@ -48,18 +48,21 @@ final class SmallEnvironment(
     val light = "xyz".zip(camera.zip(Seq(-0.6, 0.25, 0.2))).map { case (axis, (from, by)) =>
       s"lights[0].position.$axis" -> ((from + BigDecimal(by * metre).toBigInt) >> unitShift)
     }
-    scene.registers ++ light ++ view.fields.map { case (name, value) => s"room.$name" -> value } ++ Map[String, BigInt](
-      "room.isThere"        -> (if (isThere) 1 else 0),
-      "room.window.x0"      -> 0,
-      "room.window.y0"      -> 0,
-      "room.window.x1"      -> frame(0),
-      "room.window.y1"      -> frame(1),
-      "camera.direction.x"  -> (scaled(corner(0)) >> stepShift),
-      "camera.direction.y"  -> (scaled(-corner(1)) >> stepShift),
-      "camera.stepX.x"      -> scaled(steps(0)),
-      "camera.stepY.y"      -> scaled(-steps(1)),
-      "frame.objectRect.x0" -> (if (isThere) 2 else 0),
-      "frame.objectRect.y0" -> (if (isThere) 1 else 0)
+    scene.registers ++ light ++ view.fields.map { case (name, value) => s"environment.$name" -> value } ++ Map[
+      String,
+      BigInt
+    ](
+      "environment.enabled"   -> (if (hasEnvironment) 1 else 0),
+      "environment.window.x0" -> 0,
+      "environment.window.y0" -> 0,
+      "environment.window.x1" -> frame(0),
+      "environment.window.y1" -> frame(1),
+      "camera.direction.x"    -> (scaled(corner(0)) >> stepShift),
+      "camera.direction.y"    -> (scaled(-corner(1)) >> stepShift),
+      "camera.stepX.x"        -> scaled(steps(0)),
+      "camera.stepY.y"        -> scaled(-steps(1)),
+      "frame.objectRect.x0"   -> (if (hasEnvironment) 2 else 0),
+      "frame.objectRect.y0"   -> (if (hasEnvironment) 1 else 0)
     )
   }
 }
