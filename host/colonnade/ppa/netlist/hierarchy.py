@@ -12,9 +12,9 @@ from pathlib import Path
 #: Units of a level, in the order of the data; what is left of the level's module is a unit too, named last.
 RENDER_UNIT = (
     *("RayGenerator", "RaySetup", "BoxUnit", "TraversalStack", "TriangleUnit", "Shader", "BounceUnit"),
-    *("ShadowRays", "ColourUnit", "RoomStage", "RtController", "RecordFetch", "HitTable"),
+    *("ShadowRays", "ColourUnit", "EnvironmentStage", "RtController", "RecordFetch", "HitTable"),
 )
-COLUMN = ("ColumnBvhController", "ColumnRoom", "TileWalker", "BackgroundWalker", "PixelCollector")
+COLUMN = ("ColumnBvhController", "ColumnEnvironment", "TileWalker", "BackgroundWalker", "PixelCollector")
 DEVICE = ("FrameController", "RegisterFile", "CounterFile")
 
 #: Modules within a unit that are synthesised on their own and counted in it: what divides and takes roots.
