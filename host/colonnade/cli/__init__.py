@@ -1,1 +1,1 @@
-"""The ``colonnade`` command: one subcommand a file. Heavy imports stay inside the subcommands."""
+"""The ``colonnade`` command: one subcommand per file. Heavy imports stay inside the subcommands."""

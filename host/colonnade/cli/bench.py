@@ -1,4 +1,4 @@
-"""``colonnade bench``: rays per cycle of the benchmark's meshes."""
+"""``colonnade bench``: rays per cycle of the benchmark meshes."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from colonnade.evaluation.measure import Conditions
 
 
-@click.command(short_help="Measure rays per cycle of the benchmark's meshes.")
+@click.command(short_help="Measure rays per cycle of the benchmark meshes.")
 @configuration_options
-@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Only this mesh. May be repeated.")
+@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Render only this mesh. Repeatable.")
 @measurement_options
-@click.option("--mirror/--no-mirror", default=True, help="Render the meshes as mirrors as well; by default yes.")
-@click.option("--plot", type=FILE, metavar="FILE", help="Draw where the cycles go, a PNG.")
+@click.option("--mirror/--no-mirror", default=True, show_default=True, help="Also render the meshes as mirrors.")
+@click.option("--plot", type=FILE, metavar="FILE", help="Plot the utilisation of each stage as PNG.")
 @json_option
 def bench(
     config: str,
@@ -40,13 +40,13 @@ def bench(
     plot: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Render each benchmark mesh through the RTL; print rays per cycle and what holds it back. Then, where the hardware
-    has bounces, once more as a mirror whose reflections are traced once.
+    """Render each benchmark mesh with the RTL; print rays per cycle and the bottleneck. If the hardware supports
+    bounces, render each mesh again as a mirror with one reflection.
 
-    In box counts the rays that enter the object's box, over all cycles of the frame. Busiest names the unit or port
-    with the highest utilisation. The bounds are in-box rays per cycle with the same reads and tests: with a perfect
-    memory the busiest unit is the limit, with perfect units the busiest port. Meshes that are not built in are looked
-    for in the folders of COLONNADE_MESHES.
+    "in box" counts only rays that enter the object's bounding box, over all cycles of the frame. "busiest" names the
+    unit or port with the highest utilisation. The bounds are in-box rays per cycle for the same reads and tests: with
+    a perfect memory the busiest unit is the limit, with perfect units the busiest port. Meshes that are not built in
+    come from the folders in COLONNADE_MESHES.
     """
     require_outputs(plot, json_file)
 
@@ -76,7 +76,7 @@ def bench(
         plot_stages(report, plot)
     report["mirror"] = None
     if mirror and int(manifest_for(config, overrides, shown).manifest.config["frame"]["maxBounces"]) > 0:
-        echo("\nAs mirrors, one reflection traced:")
+        echo("\nAs mirrors, with one reflection:")
         report["mirror"] = measured(mirror=True)
     finish(report, json_file)
 

@@ -1,4 +1,4 @@
-"""``colonnade compare``: how far two frames are apart."""
+"""``colonnade compare``: the differences between two frames."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import FILE, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, dists_option, echo, finish, json_option, require_outputs
 
-#: What each number is called for people, in the order they are printed.
+#: The printed label of each metric, in printing order.
 LABELS = {
     "identical": "identical",
     "differing_pixels": "differing pixels",
@@ -21,18 +21,18 @@ LABELS = {
 }
 
 
-@click.command(short_help="Compare two pictures and the hits behind them.")
+@click.command(short_help="Compare two pictures and their hits.")
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
-@click.option("--hits-a", type=FILE, metavar="FILE", help="Hits of frame A, as colonnade render --hits writes them.")
+@click.option("--hits-a", type=FILE, metavar="FILE", help="Hits of frame A, written by colonnade render --hits.")
 @click.option("--hits-b", type=FILE, metavar="FILE", help="Hits of frame B.")
-@click.option("--no-dists", is_flag=True, help="Leave out DISTS, whose weights (64 MB) are fetched at its first use.")
+@dists_option
 @json_option
 def compare(a: Path, b: Path, hits_a: Path | None, hits_b: Path | None, no_dists: bool, json_file: Path | None) -> None:
-    """Compare frame B with frame A: two pictures, or two .npz files of hits.
+    """Compare frame B with frame A. Each is a picture, or an .npz file of hits.
 
-    PSNR is in decibels over all channels, 100 for identical pictures; SSIM is 1, FLIP and DISTS are 0 for those. Hit
-    disagreement is a share of all pixels, triangle disagreement one of the pixels that hit in both frames.
+    PSNR is in decibels over all channels. Identical pictures have PSNR 100, SSIM 1, FLIP 0 and DISTS 0. "hit or miss
+    differs" is a share of all pixels, "triangle differs" a share of the pixels that hit in both frames.
     """
     require_outputs(json_file)
 
@@ -44,6 +44,6 @@ def compare(a: Path, b: Path, hits_a: Path | None, hits_b: Path | None, no_dists
     for key, label in LABELS.items():
         value = report[key]
         if value is not None:
-            shown = ("no", "yes")[value] if isinstance(value, bool) else f"{value:.6g}"
-            echo(f"{label:<20} {shown}")
+            formatted = ("no", "yes")[value] if isinstance(value, bool) else f"{value:.6g}"
+            echo(f"{label:<20} {formatted}")
     finish(report, json_file)

@@ -1,4 +1,4 @@
-"""``colonnade fuzz``: corrupt frames through the hardware and its model."""
+"""``colonnade fuzz``: corrupt frames rendered by the RTL and by its model."""
 
 from __future__ import annotations
 
@@ -13,20 +13,31 @@ if TYPE_CHECKING:
     from colonnade.evaluation.fuzz.campaign import Disagreement
 
 
-@click.command(short_help="Compare the hardware with its model on corrupt frames.")
+@click.command(short_help="Compare the RTL with its model on corrupt frames.")
 @configuration_options
 @click.option(
-    "--frames", type=click.IntRange(1, 1_000_000), default=200, show_default=True, metavar="N", help="Corrupt frames."
+    "--frames",
+    type=click.IntRange(1, 1_000_000),
+    default=200,
+    show_default=True,
+    metavar="N",
+    help="Number of corrupt frames.",
 )
 @click.option(
     "--seed",
     type=click.IntRange(0, 2**62),
     default=1,
     show_default=True,
-    metavar="S",
-    help="Of the first frame; the others follow.",
+    metavar="N",
+    help="Seed of the first frame; each later frame adds one.",
 )
-@click.option("--kind", "kinds", multiple=True, metavar="KIND", help="Only this kind. May be repeated. Default: all.")
+@click.option(
+    "--kind",
+    "kinds",
+    multiple=True,
+    metavar="KIND",
+    help="Kind of corruption: records, registers or maps. Repeatable.  [default: all]",
+)
 @json_option
 @click.pass_context
 def fuzz(
@@ -38,11 +49,11 @@ def fuzz(
     kinds: tuple[str, ...],
     json_file: Path | None,
 ) -> None:
-    """Corrupt records and registers of small legal frames, and render them through the RTL and the model.
+    """Corrupt records and registers of small legal frames, and render them with the RTL and the model.
 
-    Pixels, hits, error bits and counters must be equal, and so must the legal frame after each. Prints the frames by
-    kind and outcome: the legal picture, a changed one, an error bit, the watchdog. Exit status 1 when a frame
-    disagrees.
+    Pixels, hits, error bits and counters must be equal, also in the legal frame that follows each corrupt one. The
+    table counts frames by kind and outcome: legal picture, changed picture, error bit, watchdog. The exit status is 1
+    if any frame differs.
     """
     from colonnade.common import progress
     from colonnade.common.errors import UserError
@@ -53,7 +64,7 @@ def fuzz(
 
     for kind in kinds:
         if kind not in KINDS:
-            raise UserError(f"there is no kind of corruption {kind!r}: choose from {', '.join(KINDS)}")
+            raise UserError(f"unknown kind of corruption {kind!r}: choose from {', '.join(KINDS)}")
     require_outputs(json_file)
     shown = progress.for_terminal()
 
@@ -67,7 +78,7 @@ def fuzz(
     )
     for name, counts in report["kinds"].items():
         table.print(name, *counts.values())
-    click.echo(f"{frames:,} corrupt frames, {report['legal_failures']} legal frames after them not exact")
+    click.echo(f"{frames:,} corrupt frames; {report['legal_failures']} of the legal frames after them differ")
     finish({"config": config, "overrides": list(overrides), **report}, json_file)
     if report["disagreements"]:
         context.exit(1)

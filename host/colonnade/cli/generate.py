@@ -1,4 +1,4 @@
-"""``colonnade generate``: Verilog and manifest of a configuration."""
+"""``colonnade generate``: the Verilog and the manifest of a configuration."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from colonnade.common.errors import UserError
 
 @click.command(short_help="Write the Verilog and the manifest of a configuration.")
 @configuration_options
-@click.option("--output", type=FILE, metavar="DIR", help="Folder to write; an unchanged earlier output is replaced.")
-@click.option("--manifest-only", is_flag=True, help="Write manifest.json only: much quicker.")
-@click.option("--print", "print_manifest", is_flag=True, help="Print the manifest instead of writing it.")
-@click.option("--black-box-memories", is_flag=True, help="Leave the memories out as black boxes, for SRAM macros.")
+@click.option("--output", type=FILE, metavar="DIR", help="Output folder. An unmodified earlier output is replaced.")
+@click.option("--manifest-only", is_flag=True, help="Write only manifest.json, which is much faster.")
+@click.option("--print", "print_manifest", is_flag=True, help="Print the manifest instead of writing files.")
+@click.option("--black-box-memories", is_flag=True, help="Emit memories as black boxes, for SRAM macros.")
 @json_option
 def generate(
     config: str,
@@ -29,9 +29,8 @@ def generate(
 ) -> None:
     """Generate the accelerator: SystemVerilog files, their list filelist.f, and manifest.json.
 
-    The manifest describes the configuration, the layouts of all records, the register map and the streams. DIR also
-    gets .colonnade.sha256, a list of its files: a later run replaces DIR only if it holds these, unchanged, and no
-    others.
+    The manifest describes the configuration, the record layouts, the register map and the streams. DIR also receives
+    .colonnade.sha256, the checksums of its files. A later run replaces DIR only if its files are exactly those.
     """
     if print_manifest == (output is not None):
         raise click.UsageError("give either --output DIR or --print", click.get_current_context())
@@ -43,7 +42,7 @@ def generate(
     if output is not None:
         design_folder.check_replaceable(output)
         if json_file is not None and design_folder.holds(output, json_file):
-            raise UserError(f"{json_file} is in the folder that --output replaces: name another place for --json")
+            raise UserError(f"{json_file} is in the folder that --output replaces: choose another path for --json")
 
     shown = progress.for_terminal()
     if print_manifest or output is None:

@@ -1,4 +1,4 @@
-"""``colonnade inspect``: what a scene image holds, or what clustering does to a room."""
+"""``colonnade inspect``: the content of a scene image, or the loss of a room's encoded maps."""
 
 from __future__ import annotations
 
@@ -6,32 +6,36 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import FILE, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, dists_option, echo, finish, json_option, require_outputs
 
 
-@click.command(short_help="Show what a scene image holds, or what clustering does to a room.")
-@click.argument("directory", metavar="DIR", type=FILE, required=False)
-@click.option("--config", metavar="C", help="Hardware that the image is for: a preset, a JSON file, or a precision.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change one field of --config.")
-@click.option("--background", type=FILE, metavar="ROOM", help="A room's folder: cluster its maps and show the loss.")
+@click.command(short_help="Describe a scene image, or the encoded maps of a room.")
+@click.argument("directory", metavar="[DIR]", type=FILE, required=False)
+@click.option(
+    "--config",
+    metavar="CONFIG",
+    help="Hardware configuration to check the image against: a preset, a JSON file, or a precision.",
+)
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set one field of --config. Repeatable.")
+@click.option("--background", type=FILE, metavar="DIR", help="Encode the maps of the room in this folder.")
 @click.option(
     "--encoding",
     type=click.Choice(["twoLevel", "slic"]),
     default="twoLevel",
     show_default=True,
-    help="How the room's maps are clustered.",
+    help="Encoding of the room's albedo and normal maps.",
 )
 @click.option(
     "--plane-cells",
     type=click.Choice(["8", "16"]),
     default="8",
     show_default=True,
-    help="Most cells on a tile's edge in the plane map.",
+    help="Maximum number of cells along a tile's edge in the plane map.",
 )
 @click.option(
-    "--output", type=FILE, metavar="FOLDER", help="Write the room's maps as pictures: before, after, difference."
+    "--output", type=FILE, metavar="DIR", help="Write pictures of the room's maps: source, decoded, difference."
 )
-@click.option("--no-dists", is_flag=True, help="Leave out DISTS, whose weights (64 MB) are fetched at its first use.")
+@dists_option
 @json_option
 def inspect(
     directory: Path | None,
@@ -44,19 +48,19 @@ def inspect(
     no_dists: bool,
     json_file: Path | None,
 ) -> None:
-    """Show what a scene image holds: its tree's statistics and the map of its memory.
+    """Describe a scene image: the statistics of its BVH and its memory map.
 
-    DIR is the folder that colonnade pack wrote. With --config the image must be one for that hardware, and how full
-    its memories are is shown as well. With --background instead of DIR a room's maps are clustered, and their bytes
-    and losses are shown.
+    DIR is a folder written by colonnade pack. With --config the image must match that configuration, and the memory
+    utilisation is printed too. With --background instead of DIR the command encodes a room's maps, and prints their
+    sizes and their loss.
     """
     context = click.get_current_context()
     if overrides and config is None:
-        raise click.UsageError("--set changes a configuration: give --config as well", context)
+        raise click.UsageError("--set needs --config", context)
     if (directory is None) == (background is None):
-        raise click.UsageError("name the folder of a scene image, or --background ROOM, one of the two", context)
+        raise click.UsageError("give either the folder of a scene image or --background DIR", context)
     if output is not None and background is None:
-        raise click.UsageError("--output is for the maps of --background", context)
+        raise click.UsageError("--output needs --background", context)
     require_outputs(json_file, folders=[output])
     if background is not None:
         _inspect_environment(background, encoding, int(plane_cells), output, not no_dists, json_file)
@@ -91,7 +95,7 @@ def _inspect_environment(
     environment = load_environment(background)
     for note in environment.notes:
         echo(f"colonnade: note: {environment.name}: {note}", err=True)
-    with progress.for_terminal().step("measuring the room"):
+    with progress.for_terminal().step("encoding the room"):
         image = encoded_environment(
             environment, AttributeLayout(environment.width, environment.height, encoding, plane_cells=plane_cells)
         )

@@ -1,4 +1,4 @@
-"""The ``colonnade`` command: one subcommand a file in `colonnade.commands`."""
+"""The ``colonnade`` command: its subcommands and its error handling."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from colonnade.common.errors import UserError, reason_of
 from colonnade.common.processes import guarded
 from colonnade.common.terminal_text import one_line
 
-#: Exit status for wrong input, and for an error of Colonnade's own.
+#: Exit status for wrong input, and for an internal error.
 WRONG_INPUT = 2
 BUG = 1
-#: Set to anything but 0, it shows the traceback of an unexpected error.
+#: The environment variable that, set to anything but 0, prints the traceback of an unexpected error.
 DEBUG = "COLONNADE_DEBUG"
 
 
 class OneLineErrors(click.Group):
-    """A group whose errors are one line on standard error; a traceback is a bug."""
+    """A command group that reports each error as one line on standard error, without a traceback."""
 
     def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:  # type: ignore[override]
-        """Run a command line and exit: 0 when all is well, 2 for wrong input, 130 when interrupted; 1 for a bug."""
+        """Run a command line and exit with a status: 0 success, 1 internal error, 2 wrong input, 130 interrupted."""
         extra.pop("standalone_mode", None)
         try:
             with ledger.opened():
@@ -58,25 +58,25 @@ class OneLineErrors(click.Group):
         sys.exit(status if isinstance(status, int) else 0)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """The commands in the order of the work, not of the alphabet."""
+        """The commands in the order in which a user needs them, not alphabetically."""
         return list(self.commands)
 
 
 def _unexpected(error: Exception) -> tuple[str, int]:
-    """Message and exit status of what no command foresaw: the machine's limits, or a bug."""
+    """Message and exit status for an error that no command handles: a limit of the machine, or a bug."""
     if os.environ.get(DEBUG, "0") not in ("", "0"):
         traceback.print_exception(error)
     if isinstance(error, MemoryError):
-        return "there is not enough memory for this: use a smaller input or frame", WRONG_INPUT
+        return "out of memory: use a smaller input or frame", WRONG_INPUT
     if isinstance(error, RecursionError):
         return "the input is nested too deeply", WRONG_INPUT
     if isinstance(error, OSError):
-        places = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)]
-        return ": ".join([*places, reason_of(error)]), WRONG_INPUT
+        paths = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)]
+        return ": ".join([*paths, reason_of(error)]), WRONG_INPUT
     if isinstance(error, UnicodeError):
-        return f"the input is no text in UTF-8: {error}", WRONG_INPUT
-    said = f"{type(error).__name__}: {error}".rstrip(": ")
-    return f"{said} (an error of Colonnade's own; {DEBUG}=1 shows where)", BUG
+        return f"the input is not UTF-8 text: {error}", WRONG_INPUT
+    description = f"{type(error).__name__}: {error}".rstrip(": ")
+    return f"{description} (internal error; {DEBUG}=1 prints the traceback)", BUG
 
 
 def _fail(message: str, status: int) -> NoReturn:
@@ -84,7 +84,7 @@ def _fail(message: str, status: int) -> NoReturn:
     try:
         sys.stdout.flush()
     except (OSError, ValueError):
-        # Nobody takes the output: the interpreter must not try again when it ends
+        # The reader of the pipe is gone: keep the interpreter from flushing again at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(status)
 
@@ -93,10 +93,10 @@ def _fail(message: str, status: int) -> NoReturn:
 @click.version_option(__version__, prog_name="colonnade")
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """Generate the Colonnade ray-tracing accelerator, render with it, and compare its pictures.
+    """Generate the Colonnade ray-tracing accelerator, render scenes with it, and measure it.
 
-    An output file replaces a regular file or nothing: it is refused where there is a symbolic link, a folder, a pipe,
-    a device or a read-only file, and where it would replace an input or another output of the same command.
+    An existing output file is replaced only if it is a regular, writable file. A command never overwrites its own
+    inputs or another of its outputs.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())

@@ -23,47 +23,47 @@ else:
 
 
 class PositiveNumber(_NumberType):
-    """A finite number above zero: click's own range takes ``nan`` and ``inf``."""
+    """A finite number above zero. Click's own range type accepts ``nan`` and ``inf``."""
 
     name = "number"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number of a text."""
+        """Parse the number."""
         try:
             number = float(value)
         except ValueError:
             number = math.nan
         if not (math.isfinite(number) and number > 0):
-            self.fail(f"{value!r} is no finite number above 0", param, ctx)
+            self.fail(f"{value!r} is not a finite number above 0", param, ctx)
         return number
 
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-#: A path argument; whether it exists is checked where it is read, with a message that says what it should be.
+#: A path argument. The code that reads the file checks that it exists and names the expected content.
 FILE = click.Path(path_type=Path)
 
 
 def configuration_options(command: Command) -> Command:
-    """Add ``--config`` and ``--set``: which hardware is meant."""
+    """Add ``--config`` and ``--set``, which choose the hardware configuration."""
     command = click.option(
         "--set",
         "overrides",
         multiple=True,
         metavar="KEY=VALUE",
-        help="Change one field of the configuration, e.g. array.rows=4. May be repeated.",
+        help="Set one field of the configuration, e.g. array.rows=4. Repeatable.",
     )(command)
     return click.option(
         "--config",
         default="small",
         show_default=True,
-        metavar="C",
-        help="Hardware: a preset (tiny, small, edge), a JSON file, or a precision such as 32b32s64d.",
+        metavar="CONFIG",
+        help="Hardware configuration: a preset (tiny, small, edge), a JSON file, or a precision such as 32b32s64d.",
     )(command)
 
 
 def measurement_options(command: Command) -> Callable[..., Any]:
-    """Add ``--size``, ``--jobs`` and ``--reuse``: the command gets them as `conditions`, on the benchmark's scene."""
+    """Add ``--size``, ``--jobs`` and ``--reuse``. The command receives them as `conditions` on the benchmark scene."""
 
     @functools.wraps(command)
     def with_conditions(*, size: str | None, jobs: int | None, reuse: bool, **others: Any) -> Any:
@@ -73,17 +73,15 @@ def measurement_options(command: Command) -> Callable[..., Any]:
         "--reuse/--fresh",
         default=False,
         show_default=True,
-        help="Take the counters of a kept run of the same hardware and the same scene image.",
+        help="Reuse cached counters of an earlier run with the same hardware and scene image.",
     )(with_conditions)
     wrapped = click.option(
         "--jobs",
         type=click.IntRange(min=1),
         metavar="N",
-        help="Frames to render at a time, each on one processor. Default: the number of processors.",
+        help="Frames to render in parallel, one processor each.  [default: number of processors]",
     )(wrapped)
-    return click.option("--size", metavar="WxH", help="Size of the frames in pixels. Default: the benchmark scene's.")(
-        wrapped
-    )
+    return size_option("Frame size in pixels.  [default: that of the benchmark scene]")(wrapped)
 
 
 def _conditions(size: str | None, jobs: int | None, reuse: bool) -> Conditions:
@@ -96,13 +94,39 @@ def _conditions(size: str | None, jobs: int | None, reuse: bool) -> Conditions:
     return Conditions(project_root() / "scenes" / "object.toml", pixels, jobs or processors(), reuse)
 
 
+def size_option(text: str) -> Callable[[Command], Command]:
+    """Add ``--size`` with a help text."""
+    return click.option("--size", metavar="WxH", help=text)
+
+
+def mesh_option(command: Command) -> Command:
+    """Add ``--mesh``, which replaces the scene's mesh."""
+    return click.option("--mesh", metavar="MESH", help="Replace the scene's mesh by this one: a name or a file.")(
+        command
+    )
+
+
+def background_option(command: Command) -> Command:
+    """Add ``--background``, which replaces the scene's background by a room."""
+    return click.option(
+        "--background", type=FILE, metavar="DIR", help="Replace the scene's background by the room in this folder."
+    )(command)
+
+
+def dists_option(command: Command) -> Command:
+    """Add ``--no-dists``, which skips the metric whose weights are a download."""
+    return click.option(
+        "--no-dists", is_flag=True, help="Skip DISTS, whose weights (64 MB) are downloaded at first use."
+    )(command)
+
+
 def json_option(command: Command) -> Command:
-    """Add ``--json``: the report for machines."""
+    """Add ``--json``, the file for the machine-readable report."""
     return click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the report as JSON.")(command)
 
 
 def require_outputs(*paths: Path | None, folders: Sequence[Path | None] = ()) -> None:
-    """Refuse outputs that cannot be written, before the work starts; no file read later may be one of them."""
+    """Check, before the work starts, that outputs can be written, and declare them so that no input can be one."""
     from colonnade.common.atomic_files import check_folder, check_writable
     from colonnade.common.ledger import declare_output
 
@@ -116,12 +140,12 @@ def require_outputs(*paths: Path | None, folders: Sequence[Path | None] = ()) ->
 
 
 def echo(text: str, err: bool = False) -> None:
-    """Print a line; control characters, which files and arguments may hold, are escaped."""
+    """Print a line. Control characters, which files and arguments may contain, are escaped."""
     click.echo(plain(text), err=err)
 
 
 def finish(report: Mapping[str, Any], json_file: Path | None) -> None:
-    """Write the report where ``--json`` asks for it."""
+    """Write the report to the file of ``--json``, if there is one."""
     if json_file is not None:
         from colonnade.common.atomic_files import write_json
 

@@ -1,4 +1,4 @@
-"""``colonnade pack``: the scene image that the hardware loads."""
+"""``colonnade pack``: the scene image, which the hardware loads."""
 
 from __future__ import annotations
 
@@ -6,15 +6,26 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.cli.options import (
+    FILE,
+    background_option,
+    configuration_options,
+    echo,
+    finish,
+    json_option,
+    mesh_option,
+    require_outputs,
+)
 
 
 @click.command(short_help="Pack a scene into the image that the hardware loads.")
 @click.argument("scene", type=FILE)
 @configuration_options
-@click.option("--mesh", metavar="MESH", help="A mesh (name or file) in place of the scene's.")
-@click.option("--background", type=FILE, metavar="DIR", help="A background in place of the scene's.")
-@click.option("--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; made if missing.")
+@mesh_option
+@background_option
+@click.option(
+    "--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; created if missing."
+)
 @json_option
 def pack(
     scene: Path,
@@ -25,7 +36,7 @@ def pack(
     output: Path,
     json_file: Path | None,
 ) -> None:
-    """Pack SCENE, a TOML file, for one configuration, and print what it uses of each memory."""
+    """Pack SCENE, a TOML file, for one configuration, and print its use of each memory."""
     from colonnade.common import progress
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for

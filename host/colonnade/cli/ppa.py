@@ -1,4 +1,4 @@
-"""``colonnade ppa``: what a configuration costs."""
+"""``colonnade ppa``: power, performance (timing) and area of a configuration."""
 
 from __future__ import annotations
 
@@ -8,27 +8,37 @@ from typing import Any
 
 import click
 
-from colonnade.cli.options import PositiveNumber, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.cli.options import (
+    PositiveNumber,
+    configuration_options,
+    echo,
+    finish,
+    json_option,
+    require_outputs,
+    size_option,
+)
 
 
-@click.command(short_help="Measure gates, memories and the slowest paths of a configuration.")
+@click.command(short_help="Estimate area, timing and power of a configuration.")
 @configuration_options
 @click.option(
     "--liberty",
     "liberties",
     multiple=True,
-    metavar="F",
-    help="Standard cells: a .lib or .lib.gz, or a folder of them. May be repeated: all are one library.",
+    metavar="PATH",
+    help="Standard-cell library: a .lib or .lib.gz file, or a folder of them. Repeatable; all files form one library.",
 )
-@click.option("--delay", type=PositiveNumber(), metavar="NS", help="Delay to aim at.  [60 FO4]")
+@click.option(
+    "--delay", type=PositiveNumber(), metavar="NS", help="Target delay of technology mapping.  [default: 60 FO4]"
+)
 @click.option(
     "--target",
     type=click.Choice(("asic", "ecp5")),
     default="asic",
     show_default=True,
-    help="Standard cells, or an FPGA of the ECP5 family.",
+    help="asic: standard cells; ecp5: a Lattice ECP5 FPGA.",
 )
-@click.option("--power/--no-power", default=True, show_default=True, help="Measure power, where there is a --liberty.")
+@click.option("--power/--no-power", default=True, show_default=True, help="Estimate power; needs --liberty.")
 @click.option(
     "--clock",
     "megahertz",
@@ -36,17 +46,17 @@ from colonnade.cli.options import PositiveNumber, configuration_options, echo, f
     default=200,
     show_default=True,
     metavar="MHZ",
-    help="Clock that power is told for.",
+    help="Clock frequency for power.",
 )
-@click.option("--mesh", default="teapot", show_default=True, metavar="MESH", help="What is rendered for power.")
-@click.option("--size", metavar="WxH", help="Size of that frame in pixels. Default: small enough to be replayed whole.")
+@click.option("--mesh", default="teapot", show_default=True, metavar="MESH", help="Mesh of the power workload.")
+@size_option("Frame size of the power workload.  [default: small enough to replay the whole frame]")
 @click.option(
     "--cycles",
     type=click.IntRange(min=1),
     default=16000,
     show_default=True,
     metavar="N",
-    help="Most cycles of that frame to replay on the gates; some tens a second.",
+    help="Maximum number of cycles to replay on the gate netlist, at some tens per second.",
 )
 @json_option
 def ppa(
@@ -62,13 +72,13 @@ def ppa(
     cycles: int,
     json_file: Path | None,
 ) -> None:
-    """Synthesise every unit of a configuration on its own, with Yosys, and add them up.
+    """Synthesise each unit of a configuration separately with Yosys, and sum the units.
 
-    A render unit, a column and the array are composed: the hierarchy is kept at the units. Memories are black boxes,
-    added by an area per bit; queues are flip-flops and count as such. Without --liberty gates are Yosys's own and
-    nothing has a delay. Units are kept by content: a second run takes seconds.
+    The areas of a render unit, a column and the array are sums over their units. Memories are black boxes with an area
+    per bit; queues are flip-flops. Without --liberty the gates are Yosys's generic ones, without delays. Results are
+    cached per unit: a second run takes seconds.
 
-    For power a frame is rendered through the RTL, and what one render unit sees of it is replayed on its gates.
+    For power the RTL renders a frame, and the inputs of one render unit are replayed on its gate netlist.
     """
     from colonnade.common.frame_size import parse_size
 

@@ -1,4 +1,4 @@
-"""``colonnade render``: one frame of a scene, or those of its motion."""
+"""``colonnade render``: one frame of a scene, or the frames of its motion."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.cli.options import (
+    FILE,
+    background_option,
+    configuration_options,
+    echo,
+    finish,
+    json_option,
+    mesh_option,
+    require_outputs,
+    size_option,
+)
 from colonnade.common.limits import MAX_FRAMES
 
 if TYPE_CHECKING:
@@ -15,7 +25,7 @@ if TYPE_CHECKING:
     from colonnade.render.request import Backend
 
 
-@click.command(short_help="Render frames through the hardware, its model, or Embree.")
+@click.command(short_help="Render frames with the RTL, its model, or Embree.")
 @click.argument("scene", type=FILE)
 @configuration_options
 @click.option(
@@ -23,20 +33,20 @@ if TYPE_CHECKING:
     type=click.Choice(["rtl", "model", "reference"]),
     default="rtl",
     show_default=True,
-    help="rtl: the generated hardware in a simulator; model: its bit-exact model; reference: the unquantised scene.",
+    help="rtl: the generated Verilog in a simulator; model: its bit-exact model; reference: Embree in floating point.",
 )
-@click.option("--size", metavar="WxH", help="Size of the frame in pixels, e.g. 640x480. Default: the scene's.")
-@click.option("--mesh", metavar="MESH", help="A mesh (name or file) in place of the scene's.")
-@click.option("--background", type=FILE, metavar="DIR", help="A background in place of the scene's.")
-@click.option("--relit", is_flag=True, help="Show a room in the scene's lights, not the camera's photo of it.")
+@size_option("Frame size in pixels, e.g. 640x480.  [default: that of the scene]")
+@mesh_option
+@background_option
+@click.option("--relit", is_flag=True, help="Show the room shaded by the scene's lights instead of its photo.")
 @click.option(
     "--frames",
     type=click.IntRange(min=1, max=MAX_FRAMES),
     metavar="N",
-    help="Render N frames of the scene's [motion]; a full turn of the object without one. Files are numbered.",
+    help="Render N frames of the scene's [motion], or of one full turn of the object. Output files are numbered.",
 )
-@click.option("--output", type=FILE, metavar="FILE", help="Write the picture, a PNG; with --frames also one .webp.")
-@click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances, an .npz file.")
+@click.option("--output", type=FILE, metavar="FILE", help="Write a PNG picture, or with --frames a .webp animation.")
+@click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances as .npz.")
 @click.option(
     "--waveform",
     type=FILE,
@@ -59,7 +69,7 @@ def render(
     waveform: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Render one frame of SCENE, a TOML file, and print what it took. With --frames the object or the light moves."""
+    """Render SCENE, a TOML file, and print its rays, cycles and seconds. With --frames the object or a light moves."""
     from colonnade.common.frame_size import parse_size
     from colonnade.render.sequence import numbered, picture_files
 
@@ -112,7 +122,7 @@ def render(
 
 
 def summary(report: FrameReport) -> str:
-    """One line for people."""
+    """The report as one line of text."""
     sequence = f"{len(report.frames)} frames, " if report.frames else ""
     words = [
         f"{report.backend}: {sequence}{report.mesh.triangles:,} triangles",
@@ -123,6 +133,6 @@ def summary(report: FrameReport) -> str:
         words.append(f"{report.rays_per_cycle_in_box:.3f} rays per cycle in box")
         words.append(f"{report.rays_per_cycle:.3f} of all")
     if report.room is not None:
-        words.append(f"{report.room.look_ups:,} look-ups in the room of {report.room.cycles:.0f} cycles")
+        words.append(f"{report.room.look_ups:,} environment lookups of {report.room.cycles:.0f} cycles")
     seconds = ", ".join(f"{step} {value:.1f} s" for step, value in report.seconds.items() if value is not None)
     return ", ".join(words) + (f" ({seconds})" if seconds else "")

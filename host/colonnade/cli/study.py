@@ -1,4 +1,4 @@
-"""``colonnade study``: how right a rebuilt room is, and what frames in it lose."""
+"""``colonnade study``: the accuracy of a reconstructed room, and the quality loss of AR frames in it."""
 
 from __future__ import annotations
 
@@ -8,24 +8,25 @@ from typing import Any
 
 import click
 
-from colonnade.cli.options import FILE, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, dists_option, echo, finish, json_option, require_outputs
 
 
-@click.command(short_help="Measure a rebuilt room, or what AR frames lose in it.")
+@click.command(short_help="Measure reconstructed rooms, or AR frames in them.")
 @click.argument("rooms", type=FILE, nargs=-1, required=True)
-@click.option("--frames", is_flag=True, help="Measure frames with objects instead of the rays of spheres.")
-@click.option("--no-dists", is_flag=True, help="Leave out DISTS, whose weights (64 MB) are fetched at its first use.")
-@click.option("--output", type=FILE, metavar="FOLDER", help="With --frames: write the frames as pictures.")
+@click.option("--frames", is_flag=True, help="Measure frames with objects instead of rays from probe spheres.")
+@dists_option
+@click.option("--output", type=FILE, metavar="DIR", help="With --frames: write the frames as pictures.")
 @json_option
 def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | None, json_file: Path | None) -> None:
-    """Measure the folders ROOMS against their depth maps.
+    """Measure reconstructed rooms against their depth maps. ROOMS are folders.
 
-    Of mirror, matt and glass spheres: which rays meet the right point, with planes of the full maps and with those of
-    the attribute memory. With --frames: what clustering, the rebuild and the device's numbers each cost, as dB, FLIP
-    and DISTS of the whole frame, of the object and of its shadow. Tables are in Markdown.
+    By default the command traces rays from mirror, matt and glass spheres, and prints the share that finds the correct
+    point: with planes of the full maps, and with those of the attribute memory. With --frames it prints the loss from
+    encoding, reconstruction and fixed-point arithmetic as PSNR, FLIP and DISTS of the whole frame, the object and its
+    shadow. Tables are in Markdown.
     """
     if output is not None and not frames:
-        raise click.UsageError("--output is for the pictures of --frames", click.get_current_context())
+        raise click.UsageError("--output needs --frames", click.get_current_context())
     require_outputs(json_file, folders=[output])
 
     from colonnade.common import progress

@@ -1,4 +1,4 @@
-"""``colonnade sweep``: rays per cycle while fields of the configuration vary."""
+"""``colonnade sweep``: rays per cycle over a range of configurations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from colonnade.evaluation.measure import Conditions
 
 
-@click.command(short_help="Measure rays per cycle while fields of the configuration vary.")
+@click.command(short_help="Measure rays per cycle over a range of configurations.")
 @configuration_options
 @click.option(
     "--vary",
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     multiple=True,
     required=True,
     metavar="KEY=V,V,…",
-    help="Values of a field, e.g. array.rows=1,2,4. May be repeated: every combination.",
+    help="Values of a field, e.g. array.rows=1,2,4. Repeatable; the sweep covers all combinations.",
 )
-@click.option("--one-by-one", is_flag=True, help="Vary each field alone, the others as in --config.")
-@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Mesh. May be repeated.  [default: teapot]")
+@click.option("--one-by-one", is_flag=True, help="Vary each field alone; the others stay as in --config.")
+@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Mesh to render. Repeatable.  [default: teapot]")
 @measurement_options
-@click.option("--plot", type=FILE, metavar="FILE", help="Draw the rates, a PNG.")
+@click.option("--plot", type=FILE, metavar="FILE", help="Plot the rates as PNG.")
 @json_option
 def sweep(
     config: str,
@@ -48,10 +48,10 @@ def sweep(
     plot: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Build and run a design for each combination of values; print a row for each, the unchanged --config first.
+    """Build and run a design for each combination of values. The table starts with the unchanged --config.
 
-    Cycles are summed over the meshes, rates are geometric means. Every configuration is checked before the first frame
-    is rendered; whatever fails ends the sweep.
+    Cycles are sums over the meshes, rates are geometric means. All configurations are checked before the first frame.
+    The first failure ends the sweep.
     """
     require_outputs(plot, json_file)
 

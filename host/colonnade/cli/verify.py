@@ -1,4 +1,4 @@
-"""``colonnade verify``: is the hardware its model, and how far is the model from the float scene?"""
+"""``colonnade verify``: the RTL against its model, and the model against the floating-point reference."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ from typing import Any
 
 import click
 
-from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs, size_option
 
 
-@click.command(short_help="Compare the hardware with its model, and the model with Embree.")
+@click.command(short_help="Compare the RTL with its model, and the model with Embree.")
 @configuration_options
-@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Only this mesh. May be repeated.")
+@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Render only this mesh. Repeatable.")
 @click.option(
-    "--scene", type=FILE, metavar="FILE", help="Its surface, lights and paths. Default: the benchmark's scene."
+    "--scene",
+    type=FILE,
+    metavar="SCENE",
+    help="Scene with the material, lights and paths.  [default: that of the benchmark]",
 )
-@click.option("--size", metavar="WxH", help="Size of the frames in pixels. Default: the benchmark scene's.")
-@click.option("--rtl/--no-rtl", default=True, show_default=True, help="Render through the hardware too.")
-@click.option("--reference/--no-reference", default=True, show_default=True, help="Compare with the float scene too.")
+@size_option("Frame size in pixels.  [default: that of the scene]")
+@click.option("--rtl/--no-rtl", default=True, show_default=True, help="Compare the RTL with the model.")
+@click.option("--reference/--no-reference", default=True, show_default=True, help="Compare the model with Embree.")
 @json_option
 @click.pass_context
 def verify(
@@ -32,9 +35,9 @@ def verify(
     reference: bool,
     json_file: Path | None,
 ) -> None:
-    """Render each benchmark mesh through the RTL, the model and Embree, and print what differs.
+    """Render each benchmark mesh with the RTL, the model and Embree, and print the differences.
 
-    Exit status 1 when any pixel, hit or counter of the RTL differs from the model's.
+    The exit status is 1 if any pixel, hit or counter of the RTL differs from the model.
     """
     from colonnade.common.frame_size import parse_size
 

@@ -1,1 +1,1 @@
-"""What every layer uses: errors, files, caches, processes, progress, frames and their pixels."""
+"""The lowest layer: errors, files, caches, processes, progress display, frames and images."""

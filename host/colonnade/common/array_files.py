@@ -1,4 +1,4 @@
-"""Arrays in numpy's formats, from files that may come from anywhere: no objects, and no sizes beyond the bytes."""
+"""Reads ``.npy`` and ``.npz`` data from untrusted files: no pickled objects, no array larger than its data."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from colonnade.common.limits import MAX_PIXELS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Of an array's header.
+#: Bytes of an array's header, at most.
 _MAX_HEADER = 4096
-#: Of an element.
+#: Bytes of an array element, at most.
 _MAX_BYTES = 16
 
 
-def array_in(data: bytes) -> NDArray[Any]:
-    """The array of numbers in the bytes of a ``.npy`` file.
+def parse_npy(data: bytes) -> NDArray[Any]:
+    """Parse a ``.npy`` file: a numeric array of any shape.
 
     Raises:
-        ValueError: They hold anything else; the message says what.
+        ValueError: The data is not a numeric array; the message says why.
     """
     import numpy as np
 
@@ -31,42 +31,42 @@ def array_in(data: bytes) -> NDArray[Any]:
     try:
         version = np.lib.format.read_magic(stream)
         if version not in ((1, 0), (2, 0)):
-            raise ValueError("its version of the format is not known")
+            raise ValueError("the format version is unknown")
         read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, dtype = read_header(stream, max_header_size=_MAX_HEADER)
     except ValueError:
         raise
-    except Exception as error:  # whatever the parser of the header makes of noise
-        raise ValueError(f"its header cannot be read ({type(error).__name__})") from None
+    except Exception as error:  # the header parser raises many types on invalid data
+        raise ValueError(f"the header cannot be read ({type(error).__name__})") from None
     if dtype.hasobject or dtype.kind not in "iuf":
-        raise ValueError("it must hold an array of numbers")
+        raise ValueError("the array is not numeric")
     if math.prod(shape) * dtype.itemsize != len(data) - stream.tell():
-        raise ValueError(f"it has not the bytes of its shape {shape}")
+        raise ValueError(f"the data size does not match the shape {shape}")
     if math.prod(shape) == 0:
-        raise ValueError("it is empty")
+        raise ValueError("the array is empty")
     stream.seek(0)
     array: NDArray[Any] = np.load(stream, allow_pickle=False)
     return array
 
 
-def arrays_in(data: bytes, names: Sequence[str]) -> list[NDArray[Any]]:
-    """The named arrays of the bytes of a ``.npz`` file.
+def parse_npz(data: bytes, names: Sequence[str]) -> list[NDArray[Any]]:
+    """Parse the named arrays of a ``.npz`` file.
 
     Raises:
-        ValueError: There are no such arrays.
+        ValueError: An array is missing or is not numeric.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             found = [_member(archive, f"{name}.npy") for name in names]
     except ValueError:
         raise
-    except Exception as error:  # a broken or encrypted archive ends in many ways
+    except Exception as error:  # a corrupt or encrypted archive raises many types
         raise ValueError(f"{type(error).__name__}: {error}") from None
-    return [array_in(member) for member in found]
+    return [parse_npy(member) for member in found]
 
 
 def _member(archive: zipfile.ZipFile, name: str) -> bytes:
-    """Unpacked; no more than the largest picture may take, whatever the archive says."""
+    """Unpack one member. The size limit is that of the largest image, whatever the archive claims."""
     maximum = MAX_PIXELS * _MAX_BYTES
     too_large = ValueError(f"{name} is too large")
     if archive.getinfo(name).file_size > maximum:

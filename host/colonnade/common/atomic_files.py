@@ -1,4 +1,4 @@
-"""Files that appear complete or not at all."""
+"""Atomic file output: a file appears complete or not at all."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from colonnade.common.errors import UserError, reason_of
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[IO[bytes]]:
-    """Write ``path`` through a temporary neighbour, so that it never holds half of anything.
+    """Write ``path`` through a temporary file in the same folder, so that it is never partly written.
 
     Raises:
         UserError: ``path`` cannot be an output (see `check_writable`), is an input of this command, or the disk is
-            full. What was there is unchanged.
+            full. An existing file is then unchanged.
     """
     check_writable(path)
     ledger.check_write(path)
@@ -44,30 +44,30 @@ def replacing(path: Path) -> Iterator[IO[bytes]]:
 
 
 def check_writable(path: Path) -> None:
-    """Refuse an output path that cannot be written, before any work is done for it.
+    """Refuse an output path that cannot be written, before the work starts.
 
-    An output replaces a regular file that may be written, or nothing: no link, folder, pipe, socket or device.
+    An output may replace a writable regular file, but no link, folder, pipe, socket or device.
     """
     status = _status(path)
     if status is not None and not stat.S_ISREG(status.st_mode):
         raise UserError(f"{path} is {kind_of(status)}: name a file to write")
     if not path.parent.is_dir():
-        raise UserError(f"{path.parent} is no folder: make it before writing {path.name} there")
+        raise UserError(f"{path.parent} is not a folder: make it before writing {path.name} there")
     if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise UserError(f"{path.parent} is not writable: name another place for {path.name}")
+        raise UserError(f"{path.parent} is not writable: name another folder for {path.name}")
     if status is not None and not (status.st_mode & 0o222 and os.access(path, os.W_OK)):
         raise UserError(f"{path} is read-only: make it writable, or name another file")
 
 
 def check_folder(path: Path) -> None:
-    """Refuse an output folder that is there as something else."""
+    """Refuse an output folder whose path exists and is not a folder."""
     status = _status(path)
     if status is not None and not stat.S_ISDIR(status.st_mode):
         raise UserError(f"{path} is {kind_of(status)}: name a folder to write")
 
 
 def _status(path: Path) -> os.stat_result | None:
-    """Of the path itself, not of what it links to; None if there is nothing."""
+    """Status of the path itself, not of a link's target; None if it does not exist."""
     try:
         return path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -75,11 +75,11 @@ def _status(path: Path) -> os.stat_result | None:
     except OSError as error:
         raise UserError(f"cannot write {path}: {reason_of(error)}") from None
     except ValueError:
-        raise UserError(f"{str(path)!r} is no file name: name another output") from None
+        raise UserError(f"{str(path)!r} is not a file name: name another output") from None
 
 
 def kind_of(status: os.stat_result) -> str:
-    """What a path is, in words."""
+    """Name the type of a file, e.g. ``"a folder"``, for messages."""
     kinds = {
         stat.S_IFREG: "a file",
         stat.S_IFDIR: "a folder",
@@ -89,28 +89,28 @@ def kind_of(status: os.stat_result) -> str:
         stat.S_IFCHR: "a device",
         stat.S_IFBLK: "a device",
     }
-    return kinds.get(stat.S_IFMT(status.st_mode), "no regular file")
+    return kinds.get(stat.S_IFMT(status.st_mode), "not a regular file")
 
 
 def make_folder(path: Path) -> list[Path]:
-    """Make the folder ``path``, and those around it, unless it is there; returns those it made, outermost first."""
+    """Make the folder ``path`` and its parents where missing; returns the new folders, outermost first."""
     missing: list[Path] = []
     try:
-        place = path
-        while not place.exists() and place != place.parent:
-            missing.insert(0, place)
-            place = place.parent
+        folder = path
+        while not folder.exists() and folder != folder.parent:
+            missing.insert(0, folder)
+            folder = folder.parent
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"cannot make the folder {path}: {reason_of(error)}") from None
     except ValueError:
-        raise UserError(f"{str(path)!r} is no file name: name another folder") from None
+        raise UserError(f"{str(path)!r} is not a file name: name another folder") from None
     return missing
 
 
 @contextlib.contextmanager
 def made_folder(path: Path) -> Iterator[None]:
-    """Make the folder ``path`` unless it is there; after an error those that were made go, if they are empty."""
+    """Make the folder ``path`` and its parents; an error in the block removes the new ones that are empty."""
     made = make_folder(path)
     try:
         yield
@@ -122,7 +122,7 @@ def made_folder(path: Path) -> Iterator[None]:
 
 
 def _mode(path: Path) -> int:
-    """As the file has it that is replaced, or as a new one."""
+    """Permission bits of the file that is replaced, or those of a new file."""
     with contextlib.suppress(OSError):
         return path.lstat().st_mode & 0o777
     mask = os.umask(0)
@@ -131,16 +131,16 @@ def _mode(path: Path) -> int:
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write ``content`` as indented JSON; numbers of numpy become plain ones."""
+    """Write ``content`` as indented JSON; numpy numbers become Python numbers."""
     text = json.dumps(content, indent=2, default=_plain, allow_nan=False) + "\n"
     with replacing(path) as stream:
         stream.write(text.encode())
 
 
 def _plain(value: Any) -> Any:
-    """Numpy's numbers and arrays as Python's; a path as its text."""
+    """Convert numpy numbers and arrays to Python's, and a path to text."""
     if isinstance(value, Path):
         return str(value)
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} has no form in JSON")
+    raise TypeError(f"{type(value).__name__} is not a JSON type")

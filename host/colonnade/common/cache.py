@@ -1,7 +1,7 @@
-"""What can be made again: folders and measurements that are verified before they are used.
+"""A cache of folders and measurements, verified before use.
 
-An entry is a folder whose ``contents.json`` tells its key, and the size and SHA-256 of every other file in it. A
-measurement is a JSON file that tells its key and the SHA-256 of what it holds. What has changed since is made again.
+An entry is a folder whose ``contents.json`` states its key, and the size and SHA-256 of every other file. A measurement
+is a JSON file with its key and the SHA-256 of its content. The cache rebuilds whatever does not match.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ from colonnade.common.errors import UserError
 from colonnade.common.locks import locked
 from colonnade.common.progress import QUIET, Progress
 
-#: The file that is written last.
+#: The file list of an entry, written last.
 CONTENTS = "contents.json"
 
-#: Changes with the meaning of what is kept: part of each seal.
+#: Version of the cached formats, part of each seal.
 VERSION = 1
 
-#: Bytes on the disk below which work that fails is taken to fail for want of them.
-LEAST_SPACE = 16 << 20
+#: Free bytes below which a failure counts as a full disk.
+MIN_FREE_BYTES = 16 << 20
 
 _BLOCK = 1 << 20
 
-#: SHA-256 of each file of the entries that this process has verified or made.
+#: SHA-256 of each file, for the entries that this process verified or made.
 _verified: dict[Path, dict[str, str]] = {}
 
 
 def seal(folder: Path, key: str | None = None) -> None:
-    """Write ``contents.json``, which binds the files of a folder to its key, by default the folder's name."""
+    """Write ``contents.json``, which binds a folder's files to its key; the default key is the folder's name."""
     files = {name: [size, digest] for name, (size, digest) in _contents(folder).items()}
     write_json(folder / CONTENTS, {"version": VERSION, "key": key or folder.name, "files": files})
 
 
 def is_intact(folder: Path, key: str | None = None) -> bool:
-    """The folder is sealed and holds what it held then: no file more, none less, no byte changed."""
+    """Whether a sealed folder is unchanged: the same files with the same content."""
     return _digests(folder, key or folder.name) is not None
 
 
 def digests(folder: Path) -> dict[str, str] | None:
-    """SHA-256 of each file of an entry, by its path in there; None for a folder that `entry` did not give."""
+    """SHA-256 of each file by its path in the entry; None for a folder that `entry` did not return."""
     return _verified.get(folder)
 
 
@@ -60,17 +60,17 @@ def entry(
     progress: Progress = QUIET,
     is_usable: Callable[[Path], bool] = lambda folder: True,
 ) -> Path:
-    """The entry `folder`, intact: as it is kept, or made once by whichever process comes first.
+    """Return the intact entry `folder`; the first process that needs it makes it.
 
     Args:
-        folder: where it is kept; its name is the key, so it tells all that the content follows from.
-        make: fills an empty folder, which becomes the entry when it is complete.
+        folder: path of the entry; its name is the key, which identifies all inputs of the content.
+        make: fills an empty folder, which then becomes the entry.
         what: for messages, e.g. ``"simulator"``.
-        progress: shows that another process is waited for.
-        is_usable: what else must hold of an entry that is kept, e.g. that files outside it are still there.
+        progress: shows waiting for another process.
+        is_usable: further check of a cached entry, e.g. that files outside it still exist.
 
     Raises:
-        UserError: the cache cannot be written.
+        UserError: the cache is not writable.
     """
     if _is_known(folder) and is_usable(folder):
         return folder
@@ -79,9 +79,9 @@ def entry(
             if not (_is_known(folder) and is_usable(folder)):
                 if os.path.lexists(folder):
                     progress.note(f"the cached {what} was damaged and is built again")
-                with temporary.temporary_folder(f".{folder.name}.", folder.parent) as place:
-                    _fill(place, make, folder)
-                    temporary.replace(place, folder)
+                with temporary.temporary_folder(f".{folder.name}.", folder.parent) as content:
+                    _fill(content, make, folder)
+                    temporary.replace(content, folder)
                 _verified[folder] = _known(folder)
     except OSError as error:
         if (refusal := _unwritable(folder.parent, error)) is None:
@@ -91,30 +91,30 @@ def entry(
 
 
 def discard(folder: Path) -> None:
-    """Keep an entry no longer: what came of it is wrong. The next one who asks for it makes it again."""
+    """Invalidate an entry, e.g. because its program gives wrong results. The next use rebuilds it."""
     with contextlib.suppress(OSError):
         (folder / CONTENTS).unlink()
 
 
 def touch(path: Path) -> None:
-    """Say that an entry was used; a cache that cannot be written is as good."""
+    """Record that an entry was used; a read-only cache is not an error."""
     with contextlib.suppress(OSError):
         os.utime(path)
 
 
 def store(file: Path, key: Mapping[str, Any], content: Mapping[str, Any], progress: Progress = QUIET) -> None:
-    """Keep a measurement. What cannot be kept is told in one line and lost: the caller has it."""
+    """Cache a measurement. A failure prints one note and is otherwise ignored."""
     plain = json.loads(json.dumps(content, default=_plain, allow_nan=False))
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         write_json(file, {"version": VERSION, "key": key, "sha256": _digest(key, plain), "content": plain})
     except (OSError, UserError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        progress.note(f"the measurement is not kept in {file.parent}: {reason}")
+        progress.note(f"the measurement is not cached in {file.parent}: {reason}")
 
 
 def stored(file: Path, key: Mapping[str, Any], progress: Progress = QUIET) -> dict[str, Any] | None:
-    """A measurement that was kept under this key; None, after one line if there is something else."""
+    """Load the measurement with this key; None if there is none. A damaged file prints one note."""
     try:
         text = file.read_bytes()
     except FileNotFoundError:
@@ -122,9 +122,9 @@ def stored(file: Path, key: Mapping[str, Any], progress: Progress = QUIET) -> di
     except OSError:
         text = b""
     try:
-        kept = json.loads(text)
-        if kept["version"] == VERSION and kept["key"] == key and kept["sha256"] == _digest(key, kept["content"]):
-            content: dict[str, Any] = kept["content"]
+        document = json.loads(text)
+        content: dict[str, Any] = document["content"]
+        if (document["version"], document["key"], document["sha256"]) == (VERSION, key, _digest(key, content)):
             return content
     except (ValueError, KeyError, TypeError, RecursionError):
         pass
@@ -132,13 +132,13 @@ def stored(file: Path, key: Mapping[str, Any], progress: Progress = QUIET) -> di
     return None
 
 
-def _fill(place: Path, make: Callable[[Path], None], folder: Path) -> None:
+def _fill(content: Path, make: Callable[[Path], None], folder: Path) -> None:
     try:
-        make(place)
-        seal(place, folder.name)
+        make(content)
+        seal(content, folder.name)
     except (OSError, RuntimeError):
-        # Programs do not say in one way that the disk is full, nor does `shutil`; and soon the half-made entry is gone
-        if shutil.disk_usage(place).free < LEAST_SPACE:
+        # Programs and `shutil` report a full disk differently: measure it before the partial entry is removed
+        if shutil.disk_usage(content).free < MIN_FREE_BYTES:
             raise _full(folder.parent) from None
         raise
 
@@ -148,7 +148,7 @@ def _full(folder: Path) -> UserError:
 
 
 def _is_known(folder: Path) -> bool:
-    """The entry is intact; it is read once in a process."""
+    """Whether the entry is intact; each process verifies it once."""
     if folder not in _verified or not (folder / CONTENTS).is_file():
         found = _digests(folder, folder.name)
         if found is None:
@@ -159,7 +159,7 @@ def _is_known(folder: Path) -> bool:
 
 
 def _known(folder: Path) -> dict[str, str]:
-    """What was just sealed, without reading it again."""
+    """Digests of an entry that was just sealed, without reading its files again."""
     files = json.loads((folder / CONTENTS).read_text())["files"]
     return {name: digest for name, (_, digest) in files.items()}
 
@@ -184,12 +184,12 @@ def _contents(folder: Path) -> dict[str, tuple[int, str]]:
 
 
 def _files(folder: Path) -> Iterator[tuple[str, Path]]:
-    """The files of a folder and of those in it; a link or a device is none, and raises a ValueError."""
+    """All files below a folder, with relative names; a link or a device raises ValueError."""
     if folder.is_symlink():
         raise ValueError(f"{folder} is a link")
     for path in sorted(folder.rglob("*")):
         if path.is_symlink() or not (path.is_file() or path.is_dir()):
-            raise ValueError(f"{path} is no plain file")
+            raise ValueError(f"{path} is not a plain file")
         if path.is_file() and path != folder / CONTENTS:
             yield path.relative_to(folder).as_posix(), path
 
@@ -212,10 +212,10 @@ def _plain(value: Any) -> Any:
 
 
 def _unwritable(folder: Path, error: OSError) -> UserError | None:
-    """What to say of a cache that is full or cannot be written; None if the error is about something else."""
+    """The error for a full or read-only cache; None if the failure has another cause."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return _full(folder)
-    place = Path(os.fsdecode(error.filename or ""))
-    if not error.filename or not (place.is_relative_to(folder) or folder.is_relative_to(place)):
+    path = Path(os.fsdecode(error.filename or ""))
+    if not error.filename or not (path.is_relative_to(folder) or folder.is_relative_to(path)):
         return None
     return UserError(f"the cache {folder} cannot be written: {error.strerror}")

@@ -8,8 +8,8 @@ from colonnade.common.terminal_text import one_line
 class UserError(Exception):
     """Wrong input, or something missing on this machine.
 
-    The message is one line: what is wrong, where, and what to do. The command line prints it after
-    ``colonnade: error:`` and ends with exit status 2. Control characters are escaped, overlong names are shortened.
+    The message is one line: the problem, its place and the fix. The command line prints it after
+    ``colonnade: error:`` and exits with status 2. Control characters are escaped, long words are shortened.
     """
 
     def __init__(self, message: str) -> None:
@@ -17,5 +17,5 @@ class UserError(Exception):
 
 
 def reason_of(error: OSError) -> str:
-    """Why the system refused, in words."""
+    """The operating system's reason, as text."""
     return error.strerror or str(error) or type(error).__name__

@@ -1,4 +1,4 @@
-"""Frame sizes as users write them."""
+"""Parses frame sizes such as ``640x480``."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from colonnade.common.errors import UserError
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Read ``WIDTHxHEIGHT`` in pixels, e.g. ``640x480``."""
+    """Parse ``WIDTHxHEIGHT`` in pixels, e.g. ``640x480``.
+
+    Raises:
+        UserError: The text has another form, or a side is 0.
+    """
     match = re.fullmatch(r"(\d{1,9})[xX](\d{1,9})", text.strip(), re.ASCII)
     if not match:
         raise UserError(f"size {text} is not of the form WIDTHxHEIGHT, e.g. 640x480")
     width, height = int(match[1]), int(match[2])
     if width == 0 or height == 0:
-        raise UserError(f"size {text} holds no pixel: both numbers are at least 1, e.g. 640x480")
+        raise UserError(f"size {text} has no pixels: both numbers are at least 1, e.g. 640x480")
     return width, height

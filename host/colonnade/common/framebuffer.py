@@ -1,4 +1,4 @@
-"""A frame as the device delivers it, whichever backend rendered it."""
+"""The frame of any backend, in the device's number formats."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class Frame:
     Attributes:
         colour: uint16 [height, width, 3], linear, 12 bits.
         is_object: bool [height, width].
-        triangle: int64 [height, width]; packed id, -1 where there is no object.
+        triangle: int64 [height, width]; packed triangle id, -1 where the ray missed the object.
         distance: float64 [height, width]; t from the camera along the ray's dominant axis, vertex units.
-        counters: By the register map's names; the model has only those that do not depend on timing.
-        ratio: uint16 [height, width, 3]; light left on the room with the object there, 4096 is all of it; None
+        counters: Values by register name; the model has only those that do not depend on timing.
+        ratio: uint16 [height, width, 3]; light on the room with the object over light without it, 4096 is 1.0; None
             without a room.
         errors: Names of the sticky error bits that are set.
     """

@@ -1,4 +1,4 @@
-"""Files of hits: which triangle each pixel's ray met, and how far away (`--hits FILE.npz`)."""
+"""Hits files: the triangle and the distance that each pixel's ray hit (`--hits FILE.npz`)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colonnade.common.array_files import arrays_in
+from colonnade.common.array_files import parse_npz
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import read_input
@@ -22,8 +22,8 @@ class Hits:
     """The hits of one frame.
 
     Attributes:
-        triangle: int64 [height, width], index of the face in the mesh's file; -1 where the ray missed.
-        t: float64 [height, width], distance along the primary ray; not a number where the ray missed.
+        triangle: int64 [height, width], index of the triangle in the mesh file; -1 where the ray missed.
+        t: float64 [height, width], distance along the primary ray, NaN where the ray missed.
     """
 
     triangle: NDArray[np.int64]
@@ -39,14 +39,18 @@ def write_hits(path: Path, hits: Hits) -> None:
 
 
 def read_hits(path: Path) -> Hits:
-    """Read the hits of a frame, or say what is wrong with the file."""
+    """Read the hits of a frame.
+
+    Raises:
+        UserError: The file is missing or is not a hits file.
+    """
     import numpy as np
 
     data = read_input(path, "the hits", MAX_PICTURE_BYTES, f"no hits file {path}: check the path")
     try:
-        triangle, t = arrays_in(data, ("triangle", "t"))
+        triangle, t = parse_npz(data, ("triangle", "t"))
     except ValueError as error:
-        raise UserError(f"{path} is no hits file: write one with colonnade render --hits ({error})") from None
+        raise UserError(f"{path} is not a hits file: write one with colonnade render --hits ({error})") from None
     if triangle.ndim != 2 or t.shape != triangle.shape or triangle.dtype.kind not in "iu" or t.dtype.kind != "f":
-        raise UserError(f"{path} is no hits file: triangle and t are not two equal [height, width] arrays")
+        raise UserError(f"{path} is not a hits file: triangle and t must be two [height, width] arrays of one shape")
     return Hits(triangle.astype(np.int64), t.astype(np.float64))

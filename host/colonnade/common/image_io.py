@@ -1,4 +1,4 @@
-"""Pictures as files: linear colours to 8-bit sRGB, PNG or animated WebP, and back."""
+"""Reads and writes image files: 8-bit sRGB on disk (PNG, JPEG, WebP), linear colours in memory."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import read_input
 from colonnade.common.limits import MAX_PICTURE_BYTES, MAX_PIXELS
-from colonnade.common.srgb import curved, straightened
+from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
     from PIL.Image import Image as PillowImage
 
-#: What is read: no format that Pillow needs another program for.
+#: Formats that are read; Pillow decodes them without external programs.
 FORMATS = ("PNG", "JPEG", "WEBP")
-#: How long a frame of an animation is shown.
+#: Duration of an animation frame.
 FRAME_MILLISECONDS = 50
 
 
@@ -30,14 +30,14 @@ def encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Linear colours (any shape, 0.0 to 1.0, saturated) as 8-bit sRGB, rounded to nearest."""
     import numpy as np
 
-    return np.rint(curved(linear) * 255.0).astype(np.uint8)
+    return np.rint(srgb_from_linear(linear) * 255.0).astype(np.uint8)
 
 
 def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float64]:
     """8-bit sRGB (any shape) as linear colours, 0.0 to 1.0."""
     import numpy as np
 
-    return straightened(encoded.astype(np.float64) / 255.0)
+    return linear_from_srgb(encoded.astype(np.float64) / 255.0)
 
 
 def write_png(path: Path, linear: NDArray[np.float64]) -> None:
@@ -49,8 +49,9 @@ def write_png(path: Path, linear: NDArray[np.float64]) -> None:
 
 
 def write_webp(path: Path, frames: Iterable[NDArray[np.uint8]]) -> None:
-    """Write 8-bit sRGB pictures, uint8 [height, width, 3], as a WebP without loss, `FRAME_MILLISECONDS` each, over and
-    over.
+    """Write an endless lossless WebP animation of 8-bit sRGB pictures, uint8 [height, width, 3].
+
+    Each frame is shown for `FRAME_MILLISECONDS`.
     """
     from PIL import Image
 
@@ -69,10 +70,10 @@ def write_webp(path: Path, frames: Iterable[NDArray[np.uint8]]) -> None:
 
 @contextlib.contextmanager
 def opened_picture(path: Path, missing: str | None = None) -> Iterator[PillowImage]:
-    """A PNG, JPEG or WebP picture by its content, whatever its name says, within the limit of pixels.
+    """Open a PNG, JPEG or WebP picture; the content decides the format, not the file name.
 
     Raises:
-        UserError: It is anything else, too large, or fails while it is decoded.
+        UserError: The file has another format, too many pixels, or cannot be decoded.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -90,17 +91,17 @@ def opened_picture(path: Path, missing: str | None = None) -> Iterator[PillowIma
     except Image.DecompressionBombError:
         raise too_large from None
     except UnidentifiedImageError:
-        raise UserError(f"{path} is no readable picture: give a PNG, JPEG or WebP file") from None
-    except Exception as error:  # whatever a decoder makes of noise
-        raise UserError(f"{path} is no readable picture: {type(error).__name__}: {error}") from None
+        raise UserError(f"{path} is not a readable picture: give a PNG, JPEG or WebP file") from None
+    except Exception as error:  # decoders raise many types on invalid data
+        raise UserError(f"{path} is not a readable picture: {type(error).__name__}: {error}") from None
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:
-    """Read a picture of 8 or 16 bits as 8-bit sRGB, uint8 [height, width, 3]; transparency is dropped."""
+    """Read a picture of 8 or 16 bits per channel as 8-bit sRGB, uint8 [height, width, 3]; alpha is dropped."""
     import numpy as np
 
     with opened_picture(path, f"no picture {path}: check the path") as picture:
-        if picture.mode.startswith("I"):  # grey of 16 bits, which Pillow would cut off at 255
+        if picture.mode.startswith("I"):  # 16-bit grey, which Pillow's convert would clip at 255
             grey = np.rint(np.clip(np.asarray(picture, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
             return np.repeat(grey[..., np.newaxis], 3, axis=2)
         return np.asarray(picture.convert("RGB"))

@@ -1,4 +1,4 @@
-"""Reads input files: regular ones of a limited size, and JSON without traps."""
+"""Reads untrusted input files: regular files of limited size, and JSON of limited depth and length."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from colonnade.common.limits import MAX_DEPTH, MAX_DIGITS, MAX_TEXT, MAX_TEXT_BY
 
 
 def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: str | None = None) -> bytes:
-    """The bytes of an input file.
+    """Read an input file.
 
     Args:
         path: a regular file, or a link to one.
         what: for messages, e.g. ``"the scene"``.
-        most: bytes that it may have.
-        missing: the message where there is no such file.
+        maximum: largest size, bytes.
+        missing: the error message for a missing file.
 
     Raises:
-        UserError: It is missing, no regular file, too large, cannot be read, or a declared output.
+        UserError: The file is missing, not regular, too large, unreadable, or a declared output.
     """
     refused = require_regular(path, what, missing)
     try:
-        # A pipe that took the file's place meanwhile must not be waited for
+        # O_NONBLOCK: a pipe may have replaced the file since the check
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as stream:
             status = os.fstat(handle)
@@ -45,7 +45,7 @@ def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: st
 
 
 def require_regular(path: Path, what: str, missing: str | None = None) -> UserError:
-    """Refuse what is no regular file; the error for one that becomes something else before it is opened."""
+    """Refuse a path that is not a regular file; returns that error for a later check of the opened file."""
     try:
         status = path.stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -53,7 +53,7 @@ def require_regular(path: Path, what: str, missing: str | None = None) -> UserEr
     except OSError as error:
         raise UserError(f"cannot read {what} {path}: {reason_of(error)}") from None
     except ValueError:
-        raise UserError(f"{what} {str(path)!r} does not exist: this is no file name") from None
+        raise UserError(f"{what} {str(path)!r} does not exist: this is not a file name") from None
     refused = UserError(f"cannot read {what} {path}: it is {kind_of(status)}, name a file")
     if not stat.S_ISREG(status.st_mode):
         raise refused
@@ -61,7 +61,7 @@ def require_regular(path: Path, what: str, missing: str | None = None) -> UserEr
 
 
 def exists(path: Path) -> bool:
-    """There is something of any kind at this path."""
+    """Whether the path exists, as any type of file."""
     try:
         return os.path.lexists(path)
     except ValueError:
@@ -69,7 +69,7 @@ def exists(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether the path is a folder; names that no file can have are none."""
+    """Whether the path is a folder; False for an invalid name."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -77,7 +77,7 @@ def is_folder(path: Path) -> bool:
 
 
 def is_file(path: Path) -> bool:
-    """Whether the path is a regular file; names that no file can have are none."""
+    """Whether the path is a regular file; False for an invalid name."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -90,10 +90,10 @@ def read_json(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: str
 
 
 def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
-    """The value of a JSON text, whose texts may have ``most_text`` characters.
+    """Parse a JSON document, whose strings may have ``max_text`` characters.
 
     Raises:
-        UserError: It is no JSON in UTF-8, has a key twice in an object, a number that is too long or not finite, or is
+        UserError: The document is not JSON in UTF-8, repeats a key, has a number that is too long or not finite, or is
             nested too deeply.
     """
     try:
@@ -106,7 +106,7 @@ def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
             parse_constant=_no_constant,
         )
     except UnicodeDecodeError as error:
-        raise UserError(f"{what} is not JSON: it is no text in UTF-8 ({error.reason})") from None
+        raise UserError(f"{what} is not JSON: it is not UTF-8 text ({error.reason})") from None
     except RecursionError:
         raise UserError(f"{what} is nested too deeply: {MAX_DEPTH} levels at most") from None
     except ValueError as error:
@@ -116,7 +116,7 @@ def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
 
 
 def check_values(data: Any, what: str, max_text: int = MAX_TEXT) -> None:
-    """Refuse a parsed document that is nested too deeply, or holds overlong texts or numbers."""
+    """Refuse a parsed document with too deep nesting, or with too long strings or numbers."""
     level = [data]
     for _ in range(MAX_DEPTH + 1):
         below: list[Any] = []
@@ -139,7 +139,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
-            raise ValueError(f"the key {key} is there twice in an object")
+            raise ValueError(f"the key {key} occurs twice in an object")
         found[key] = value
     return found
 
@@ -158,4 +158,4 @@ def _real_number(text: str) -> float:
 
 
 def _no_constant(text: str) -> float:
-    raise ValueError(f"{text} is no number")
+    raise ValueError(f"{text} is not a JSON number")

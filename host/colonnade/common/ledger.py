@@ -1,7 +1,7 @@
-"""What a command reads and writes: an output never replaces an input, nor another output.
+"""Tracks a command's input and output files: an output never replaces an input or another output.
 
-The command line opens a ledger for each run. Outputs are declared before the work starts; every file that is read is
-compared with them by device and inode, so that links and other spellings of a path are found too.
+The command line opens a ledger for each run and declares the outputs before the work starts. Files are compared by
+device and inode, so links and other spellings of a path are recognised.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ class Ledger:
     """Files of one command.
 
     Attributes:
-        outputs: Declared ones, by their resolved path.
-        existing: The declared ones that exist, by identity.
-        inputs: Files that were read.
-        written: Resolved paths that were written.
+        outputs: Declared outputs by resolved path.
+        existing: Declared outputs that exist, by identity.
+        inputs: Files read so far, by identity.
+        written: Resolved paths of the outputs written so far.
     """
 
     outputs: dict[Path, Path] = field(default_factory=dict)
@@ -40,7 +40,7 @@ _current: Ledger | None = None
 
 @contextlib.contextmanager
 def opened() -> Iterator[None]:
-    """Keep a ledger meanwhile, in all threads."""
+    """Use a new ledger in the block, in all threads."""
     global _current
     before, _current = _current, Ledger()
     try:
@@ -50,22 +50,22 @@ def opened() -> Iterator[None]:
 
 
 def declare_output(path: Path) -> None:
-    """Refuse an output that is declared already, under any name."""
+    """Declare an output; refuse one that is already declared under any name, or that is an input."""
     if _current is None:
         return
-    place, identity = resolved(path), _identity(path)
-    other = _current.outputs.get(place) or (_current.existing.get(identity) if identity else None)
+    target, identity = resolved(path), _identity(path)
+    other = _current.outputs.get(target) or (_current.existing.get(identity) if identity else None)
     if other is not None:
         raise UserError(f"two outputs name the same file, {other} and {path}: name another file for one of them")
     if identity is not None and identity in _current.inputs:
         raise _replaces_input(path, _current.inputs[identity])
-    _current.outputs[place] = path
+    _current.outputs[target] = path
     if identity is not None:
         _current.existing[identity] = path
 
 
 def add_input(path: Path, status: os.stat_result) -> None:
-    """Refuse an input that a declared output would replace."""
+    """Record an input; refuse one that a declared output would replace."""
     if _current is None:
         return
     identity = status.st_dev, status.st_ino
@@ -75,25 +75,25 @@ def add_input(path: Path, status: os.stat_result) -> None:
 
 
 def check_write(path: Path) -> None:
-    """Refuse to replace an input, or a declared output that has been written."""
+    """Refuse to replace an input, or to write a declared output twice."""
     if _current is None:
         return
     identity = _identity(path)
     if identity is not None and identity in _current.inputs:
         raise _replaces_input(path, _current.inputs[identity])
-    place = resolved(path)
-    if place in _current.outputs and place in _current.written:
+    target = resolved(path)
+    if target in _current.outputs and target in _current.written:
         raise UserError(f"two outputs name the same file, {path}: name another file for one of them")
 
 
 def add_written(path: Path) -> None:
-    """The output is complete."""
+    """Record that an output is complete."""
     if _current is not None:
         _current.written.add(resolved(path))
 
 
 def resolved(path: Path) -> Path:
-    """The path without links and dots in its folders."""
+    """The absolute path with links resolved in its folders, but not in its last part."""
     try:
         return path.parent.resolve() / path.name
     except (OSError, RuntimeError, ValueError):

@@ -1,4 +1,4 @@
-"""Locks between processes."""
+"""File locks between processes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def locked(path: Path, what: str, progress: Progress = QUIET) -> Iterator[None]:
     """Hold the exclusive lock of the file ``path``; the kernel frees it if the holder dies.
 
     Args:
-        path: The lock's file; its folder is made.
+        path: The lock file; missing folders are made.
         what: The lock's purpose, for the progress display while another process holds it.
         progress: Shows that this process waits.
     """

@@ -1,4 +1,4 @@
-"""Independent pieces of work, some at a time, with their results in order."""
+"""Runs independent jobs in parallel threads and returns their results in order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Result = TypeVar("Result")
 
 
 def processors() -> int:
-    """Processors that this process may use."""
+    """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
@@ -24,16 +24,16 @@ def in_order(
     jobs: int,
     length: Callable[[Item], float] = lambda item: 0.0,
 ) -> Iterator[Result]:
-    """Results of `work` in the order of `items`, up to `jobs` of them at a time; the longest begin first.
+    """Yield the results of `work` in the order of `items`; the longest items start first.
 
-    Threads: the work is meant to wait for other programs, which it starts with `colonnade.common.processes`. After an
-    exception, or when no more results are wanted, nothing new is begun and these programs end.
+    The jobs are threads, meant to wait for programs started with `colonnade.common.processes`. After an exception, or
+    when the caller closes the iterator, no new job starts and these programs end.
 
     Args:
-        work: done for each item.
-        items: what to do.
-        jobs: at a time.
-        length: how long an item takes, in any unit; those of equal length begin in their order.
+        work: called once for each item.
+        items: the arguments of `work`.
+        jobs: number of parallel jobs.
+        length: estimated duration of an item, in any unit; items of equal length start in their order.
     """
     group = Group()
     pool = ThreadPoolExecutor(max(1, min(jobs, len(items))), thread_name_prefix="job", initializer=group.join)
@@ -46,5 +46,5 @@ def in_order(
         pool.shutdown(wait=False, cancel_futures=True)
         group.end()
         raise
-    # All results are there
+    # All jobs are done
     pool.shutdown()

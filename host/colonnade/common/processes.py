@@ -1,7 +1,7 @@
-"""Programs that the host starts, and how a signal ends all of them.
+"""Starts child programs, and ends all of them on a signal.
 
-Each program runs in a process group of its own, so that its own children end with it. SIGINT, SIGTERM and SIGHUP raise
-`Interrupted` in the main thread; `guarded` then ends every program, removes what is temporary and leaves.
+Each program runs in its own process group, so that its children end with it. SIGINT, SIGTERM and SIGHUP raise
+`Interrupted` in the main thread; `guarded` then ends every program, removes temporary files and exits.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, NoReturn
 
-#: Seconds between SIGTERM and SIGKILL for a program that is ended.
+#: Seconds between SIGTERM and SIGKILL.
 GRACE = 0.5
 
-#: Seconds that threads have to clean up after their programs have ended.
-LAST_WORDS = 0.7
+#: Seconds that threads have for cleaning up after their programs ended.
+CLEANUP_SECONDS = 0.7
 
-#: Seconds after a signal in which further ones change nothing; `timeout` and terminals may send several.
-DEAF = 3.0
+#: Seconds in which further signals are ignored, because `timeout` and terminals may send several.
+REPEAT_SECONDS = 3.0
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -32,7 +32,7 @@ _Stream = int | IO[str] | None
 
 
 class Interrupted(BaseException):
-    """A signal asks this process to end."""
+    """A signal requests the end of this process."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -40,41 +40,41 @@ class Interrupted(BaseException):
 
 
 class Ended(RuntimeError):
-    """The group of this program has ended: nothing more is started in it."""
+    """The program's group has ended: no program can start in it."""
 
 
 class Group:
-    """Programs that end together: those of one pool of threads."""
+    """Programs that end together, e.g. those of one thread pool."""
 
     def __init__(self) -> None:
         self.is_ended = False
 
     def join(self) -> None:
-        """What this thread starts from now on belongs to the group."""
-        _here.group = self
+        """Put the programs that this thread starts from now on into the group."""
+        _thread_state.group = self
 
     def end(self) -> None:
-        """End the group's programs and start no more of them."""
+        """End the group's programs; no more can start."""
         self.is_ended = True
         with _lock:
             members = [process for process, group in _running.items() if group is self]
         _end(members)
 
 
-class _Here(threading.local):
+class _ThreadState(threading.local):
     def __init__(self) -> None:
         self.group: Group | None = None
 
 
-_here = _Here()
+_thread_state = _ThreadState()
 _lock = threading.RLock()
 _running: dict[subprocess.Popen[str], Group | None] = {}
 _when_leaving: list[Callable[[], None]] = []
 
-#: The signal that came, and when; the main thread is between the start of a program and its entry in `_running`.
+#: The received signal and its time; signals are deferred while the main thread starts and registers a program.
 _signal: int | None = None
 _signal_time = 0.0
-_is_held = False
+_is_deferred = False
 _is_leaving = False
 
 
@@ -87,19 +87,19 @@ def started(
     stdout: _Stream = None,
     stderr: _Stream = None,
 ) -> Iterator[subprocess.Popen[str]]:
-    """Start a program, without standard input, and wait for it after the block; it ends if the block fails.
+    """Start a program without standard input and wait for it after the block; an error in the block ends it.
 
     Args:
         command: the program and its arguments, strings or paths.
-        cwd, env, stdout, stderr: as of `subprocess.Popen`.
+        cwd, env, stdout, stderr: see `subprocess.Popen`.
 
     Raises:
-        Ended: the group of this thread has ended, before or meanwhile.
+        Ended: this thread's group ended before or during the run.
     """
-    group = _here.group
+    group = _thread_state.group
     process: subprocess.Popen[str] | None = None
     try:
-        with _held():
+        with _signals_deferred():
             process = _start(group, command, cwd, env, stdout, stderr)
         yield process
         process.wait()
@@ -125,7 +125,7 @@ def run(
     stdout: _Stream = subprocess.PIPE,
     stderr: _Stream = subprocess.PIPE,
 ) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end, as `subprocess.run` does; its output as text, unless it goes elsewhere."""
+    """Run a program to its end, like `subprocess.run`; captures its output as text unless redirected."""
     with started(command, cwd=cwd, env=env, stdout=stdout, stderr=stderr) as process:
         output, errors = process.communicate()
     return subprocess.CompletedProcess(list(map(str, command)), process.returncode, output, errors)
@@ -139,7 +139,7 @@ def _start(
     stdout: _Stream,
     stderr: _Stream,
 ) -> subprocess.Popen[str]:
-    # Under the lock, so that whoever ends a group finds all of its programs
+    # Under the lock, so that ending a group finds all of its programs
     with _lock:
         _refuse_ended(group)
         process = subprocess.Popen(
@@ -159,11 +159,11 @@ def _start(
 
 def _refuse_ended(group: Group | None) -> None:
     if _is_leaving or (group is not None and group.is_ended):
-        raise Ended("the work that this program belongs to has ended")
+        raise Ended("the group of this program has ended")
 
 
 def _end(processes: Iterable[subprocess.Popen[str]]) -> None:
-    """SIGTERM to the groups of these programs; SIGKILL to what is there `GRACE` seconds later."""
+    """Send SIGTERM to these programs' process groups, and SIGKILL to those left after `GRACE` seconds."""
     left = [process for process in processes if _send(process, signal.SIGTERM)]
     deadline = time.monotonic() + GRACE
     while left and time.monotonic() < deadline:
@@ -175,7 +175,7 @@ def _end(processes: Iterable[subprocess.Popen[str]]) -> None:
 
 
 def _send(process: subprocess.Popen[str], number: int) -> bool:
-    """Send a signal to a program's group; False if nothing of it is left."""
+    """Send a signal to a program's process group; False if the group is gone."""
     process.poll()
     try:
         os.killpg(process.pid, number)
@@ -185,30 +185,30 @@ def _send(process: subprocess.Popen[str], number: int) -> bool:
 
 
 @contextlib.contextmanager
-def _held() -> Iterator[None]:
-    """A signal waits for the end of the block: a program that has just been started must not get lost."""
-    global _is_held
+def _signals_deferred() -> Iterator[None]:
+    """Defer signals to the end of the block, so that a new program is always registered."""
+    global _is_deferred
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    _is_held = True
+    _is_deferred = True
     try:
         yield
     finally:
-        _is_held = False
+        _is_deferred = False
     if _signal is not None:
         raise Interrupted(_signal)
 
 
 def when_leaving(function: Callable[[], None]) -> None:
-    """Call `function` when a signal ends the process, after its programs have ended."""
+    """Register a function that runs when a signal ends the process, after its programs ended."""
     _when_leaving.append(function)
 
 
 def guarded(program: Callable[[], object]) -> NoReturn:
-    """Run the main program of a command line and exit; by a signal with one line and 128 plus its number."""
+    """Run a command line's main program and exit; a signal gives one error line and status 128 plus its number."""
     for number in SIGNALS:
-        # nohup
+        # nohup ignores SIGHUP: keep it so
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _receive)
     try:
@@ -216,7 +216,7 @@ def guarded(program: Callable[[], object]) -> NoReturn:
     except Interrupted as interrupted:
         _leave(interrupted.number)
     except BaseException:
-        # What fails after a signal fails because of it
+        # A failure after a signal is a consequence of the signal
         if _signal is None:
             raise
     if _signal is not None:
@@ -228,24 +228,24 @@ def _receive(number: int, frame: object) -> None:
     global _signal, _signal_time
     now = time.monotonic()
     if _signal is not None:
-        if now - _signal_time > DEAF:
+        if now - _signal_time > REPEAT_SECONDS:
             for process in list(_running):
                 _send(process, signal.SIGKILL)
             os._exit(128 + number)
         return
     _signal, _signal_time = number, now
-    if not _is_held:
+    if not _is_deferred:
         raise Interrupted(number)
 
 
 def _leave(number: int) -> NoReturn:
-    """End all programs, give the threads some time, clean up, and exit without waiting for anything else."""
+    """End all programs, give the threads time to clean up, run the exit functions, and exit."""
     global _is_leaving
     with _lock:
         _is_leaving = True
         members = list(_running)
     _end(members)
-    deadline = time.monotonic() + LAST_WORDS
+    deadline = time.monotonic() + CLEANUP_SECONDS
     for thread in threading.enumerate():
         if thread is not threading.current_thread() and not thread.daemon:
             thread.join(max(0.0, deadline - time.monotonic()))

@@ -1,4 +1,4 @@
-"""Long work shows itself: as bars on a terminal, as lines in a pipe; both on standard error."""
+"""Progress display of long work on standard error: bars on a terminal, lines in a pipe."""
 
 from __future__ import annotations
 
@@ -18,37 +18,37 @@ from colonnade.common.errors import UserError
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
-#: Reports the share of a step that is done, 0.0 to 1.0.
+#: Reports the completed fraction of a step, 0.0 to 1.0.
 Report = Callable[[float], None]
 
-#: Seconds until the first line in a pipe; the time to the next doubles, up to a limit.
+#: Seconds until the first line in a pipe. The interval then doubles up to the maximum.
 FIRST_LINE = 10.0
-LONGEST_SILENCE = 60.0
+MAX_INTERVAL = 60.0
 
-#: Seconds for which a step runs at least before a line names it.
-SETTLING = 1.0
+#: Seconds that a step runs before a line names it.
+MIN_STEP_SECONDS = 1.0
 
-#: Steps at a time that a line has room for.
+#: Steps that a line names at most.
 MAX_STEPS = 4
 
 
 class Progress:
-    """Steps of a piece of work. This base class shows nothing."""
+    """Displays the steps of a task. This base class shows nothing."""
 
     def step(self, title: str) -> AbstractContextManager[Report]:
-        """Run one step, in any thread. What is yielded may be called with the share that is done, or never."""
-        return contextlib.nullcontext(lambda share: None)
+        """Run one step, in any thread. The block may call the yielded function with the completed fraction."""
+        return contextlib.nullcontext(lambda fraction: None)
 
     def paused(self) -> AbstractContextManager[None]:
-        """Nothing is shown meanwhile: other text may be printed."""
+        """Hide the display in the block, so that other text can be printed."""
         return contextlib.nullcontext()
 
     def of(self, name: str) -> Progress:
-        """The same, with `name` before each title: one of several pieces of work at a time."""
+        """The same display with `name` before each title, for one of several parallel tasks."""
         return _Named(self, name)
 
     def note(self, text: str) -> None:
-        """Print a line on standard error that is no error: what the user did not ask for and should know."""
+        """Print a line on standard error that is not an error, e.g. a damaged cache entry."""
         with self.paused():
             print(f"colonnade: {text}", file=sys.stderr, flush=True)
 
@@ -58,7 +58,7 @@ QUIET = Progress()
 
 
 class TerminalProgress(Progress):
-    """Bars on standard error, one for each step that runs, gone when their steps are done."""
+    """One bar on standard error for each running step."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -67,14 +67,14 @@ class TerminalProgress(Progress):
 
     @contextlib.contextmanager
     def step(self, title: str) -> Iterator[Report]:
-        """Show a bar for one step; it pulses until the first share is reported."""
+        """Show a bar for one step; it pulses until the first report."""
         with self._lock:
             display = self._display = self._display or _display()
             self._running += 1
             display.start()
             task = display.add_task(title, total=None)
         try:
-            yield lambda share: display.update(task, total=1.0, completed=share)
+            yield lambda fraction: display.update(task, total=1.0, completed=fraction)
         finally:
             with self._lock:
                 self._running -= 1
@@ -85,7 +85,7 @@ class TerminalProgress(Progress):
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
-        """The bars make way; steps that begin or end meanwhile wait."""
+        """Hide the bars in the block; steps that begin or end in other threads wait."""
         with self._lock:
             display = self._display
             if display is not None:
@@ -97,7 +97,7 @@ class TerminalProgress(Progress):
                     display.start()
 
     def close(self) -> None:
-        """The terminal as it was, though steps may still run."""
+        """Restore the terminal; steps may still run."""
         display = self._display
         if display is not None:
             display.stop()
@@ -107,15 +107,15 @@ class TerminalProgress(Progress):
 class _Step:
     title: str
     begun: float
-    share: float | None = None
+    fraction: float | None = None
 
     def text(self, now: float) -> str:
-        share = "" if self.share is None else f"{100 * self.share:.0f} %, "
-        return f"{self.title}: {share}{now - self.begun:.0f} s"
+        percentage = "" if self.fraction is None else f"{100 * self.fraction:.0f} %, "
+        return f"{self.title}: {percentage}{now - self.begun:.0f} s"
 
 
 class LineProgress(Progress):
-    """A line on standard error once steps have run for `FIRST_LINE` seconds, and then at growing intervals."""
+    """Lines on standard error: the first after `FIRST_LINE` seconds, then at growing intervals."""
 
     def __init__(self, first: float = FIRST_LINE) -> None:
         self._changed = threading.Condition()
@@ -126,16 +126,16 @@ class LineProgress(Progress):
 
     @contextlib.contextmanager
     def step(self, title: str) -> Iterator[Report]:
-        """Say so in the lines while the step runs, with its share and its seconds."""
+        """Name the step in the lines while it runs, with its completed fraction and its seconds."""
         step = _Step(title, time.monotonic())
 
-        def report(share: float) -> None:
-            step.share = share
+        def report(fraction: float) -> None:
+            step.fraction = fraction
 
         with self._changed:
             self._steps.append(step)
             if self._watcher is None:
-                self._due = max(self._due or step.begun + self._interval, step.begun + SETTLING)
+                self._due = max(self._due or step.begun + self._interval, step.begun + MIN_STEP_SECONDS)
                 self._watcher = threading.Thread(target=self._watch, name="progress", daemon=True)
                 self._watcher.start()
         try:
@@ -146,19 +146,19 @@ class LineProgress(Progress):
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
-        """No line is printed meanwhile."""
+        """Print no line in the block."""
         with self._changed:
             yield
 
     def _watch(self) -> None:
-        """Print what is due; end when nothing runs then, until the next step begins."""
+        """Print lines when due. The thread ends when no step runs; the next step starts another one."""
         with self._changed:
             while (now := time.monotonic()) < self._due or self._steps:
                 if now < self._due:
                     self._changed.wait(self._due - now)
                     continue
                 self._print(now)
-                self._interval = min(2 * self._interval, LONGEST_SILENCE)
+                self._interval = min(2 * self._interval, MAX_INTERVAL)
                 self._due = now + self._interval
             self._watcher = None
 
@@ -166,7 +166,7 @@ class LineProgress(Progress):
         texts = [step.text(now) for step in self._steps[:MAX_STEPS]]
         if len(self._steps) > MAX_STEPS:
             texts.append(f"{len(self._steps) - MAX_STEPS} more")
-        # A reader that has gone is no reason to stop the work
+        # A closed pipe must not stop the work
         with contextlib.suppress(OSError, ValueError):
             print(f"colonnade: {'; '.join(texts)}", file=sys.stderr, flush=True)
 
@@ -199,7 +199,7 @@ def _display() -> RichProgress:
 
 
 def for_terminal() -> Progress:
-    """Bars where standard error is a terminal, lines elsewhere; nothing with ``COLONNADE_PROGRESS=off``."""
+    """Bars if standard error is a terminal, else lines; nothing with ``COLONNADE_PROGRESS=off``."""
     chosen = os.environ.get("COLONNADE_PROGRESS", "on")
     if chosen not in ("on", "off"):
         raise UserError(f"COLONNADE_PROGRESS={chosen} is neither on nor off")

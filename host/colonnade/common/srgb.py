@@ -1,4 +1,4 @@
-"""The curve of sRGB (IEC 61966-2-1) on values from 0.0 to 1.0."""
+"""The sRGB transfer function (IEC 61966-2-1) on values from 0.0 to 1.0."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def curved(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Linear values (any shape, saturated to 0.0 to 1.0) on the curve of sRGB."""
+def srgb_from_linear(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Encode linear values (any shape, clipped to 0.0 to 1.0)."""
     import numpy as np
 
     value = np.clip(linear, 0.0, 1.0)
     return np.where(value <= 0.0031308, 12.92 * value, 1.055 * np.power(value, 1 / 2.4) - 0.055)
 
 
-def straightened(encoded: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values on the curve of sRGB (any shape, 0.0 to 1.0) as linear ones."""
+def linear_from_srgb(encoded: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Decode sRGB values (any shape, 0.0 to 1.0) to linear ones."""
     import numpy as np
 
     return np.where(encoded <= 0.04045, encoded / 12.92, np.power((encoded + 0.055) / 1.055, 2.4))

@@ -1,7 +1,7 @@
-"""Temporary folders that a later run removes when the process that made them was killed.
+"""Temporary folders, removed by a later run if their process was killed.
 
-``PREFIX…/lock`` is locked while the folder is in use, and the kernel frees the lock of a killed process. The user of
-the folder works in ``PREFIX…/content``. A folder goes away when its lock is free, and only if it holds nothing else.
+``PREFIX…/lock`` is locked while the folder is in use; the kernel frees the lock of a killed process. Callers work in
+``PREFIX…/content``. A later run removes a folder whose lock is free, if it contains only the files named here.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from pathlib import Path
 from colonnade.common import processes
 from colonnade.common.errors import UserError
 
-#: Of folders in the system's place for temporary files.
+#: Name prefix of folders in the system's temporary folder.
 PREFIX = "colonnade-"
 
-#: All that there is in such a folder: the lock; the content; what the content has replaced.
+#: The only entries of such a folder: its lock, the content, and what the content replaced.
 LOCK, CONTENT, REPLACED = "lock", "content", "replaced"
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -32,29 +32,29 @@ _in_use: set[Path] = set()
 
 @contextlib.contextmanager
 def temporary_folder(prefix: str = PREFIX, parent: Path | None = None) -> Iterator[Path]:
-    """An empty folder that is gone after the block; renaming it away keeps it.
+    """Make an empty folder and remove it after the block, unless it was renamed.
 
-    Folders of killed processes with the same prefix in the same place go away, too.
+    Folders of killed processes with the same prefix and parent are removed too.
 
     Args:
-        prefix: of its name; ``.NAME.`` for a neighbour of what it shall become.
-        parent: where it is; by default the system's place for temporary files.
+        prefix: start of the folder's name; ``.NAME.`` if it will be renamed to NAME in the same parent.
+        parent: by default the system's temporary folder.
 
     Raises:
-        UserError: there is no space for it, or no permission to make it.
+        UserError: there is no disk space or no permission.
     """
-    place = parent or Path(tempfile.gettempdir())
-    remove_abandoned(prefix, place)
+    base = parent or Path(tempfile.gettempdir())
+    remove_abandoned(prefix, base)
     try:
-        folder, lock = _made(prefix, place)
+        folder, lock = _make_locked(prefix, base)
     except OSError as error:
-        raise UserError(f"cannot make a temporary folder in {place}: {error.strerror}{_advice(parent)}") from None
+        raise UserError(f"cannot make a temporary folder in {base}: {error.strerror}{_advice(parent)}") from None
     _in_use.add(folder)
     try:
         yield folder / CONTENT
     except OSError as error:
         if error.errno in _FULL:
-            raise UserError(f"no space left on the disk of {place}: free some there{_advice(parent)}") from None
+            raise UserError(f"no space left on the disk of {base}: free some there{_advice(parent)}") from None
         raise
     finally:
         _in_use.discard(folder)
@@ -64,7 +64,7 @@ def temporary_folder(prefix: str = PREFIX, parent: Path | None = None) -> Iterat
 
 
 def replace(content: Path, target: Path) -> None:
-    """Rename the folder that `temporary_folder` gave to `target`; a file or folder that is there goes away."""
+    """Rename a folder of `temporary_folder` to `target`, replacing an existing file or folder."""
     replaced = content.with_name(REPLACED)
     with contextlib.suppress(FileNotFoundError):
         target.rename(replaced)
@@ -84,12 +84,12 @@ def remove_abandoned(prefix: str, parent: Path) -> None:
     except OSError:
         return
     for path in found:
-        # Removed by another process meanwhile, or not ours
+        # Another process may have removed it, or owns it
         with contextlib.suppress(OSError):
             _remove_if_abandoned(Path(path))
 
 
-def _made(prefix: str, parent: Path) -> tuple[Path, int]:
+def _make_locked(prefix: str, parent: Path) -> tuple[Path, int]:
     while True:
         folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
         try:
@@ -97,7 +97,7 @@ def _made(prefix: str, parent: Path) -> tuple[Path, int]:
         except OSError:
             folder.rmdir()
             raise
-        # Where the file system knows no locks, such folders stay when their maker is killed
+        # On a file system without locks, folders of killed processes remain
         with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX)
         # Another process may have taken the lock first and removed the folder
@@ -129,7 +129,7 @@ def _remove_if_abandoned(folder: Path) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """The lock goes last: what is interrupted here is finished by a later run."""
+    """Remove the folder, its lock last: a later run can finish an interrupted removal."""
     for name in (CONTENT, REPLACED):
         path = folder / name
         if path.is_dir() and not path.is_symlink():
@@ -147,7 +147,7 @@ def _remove_all() -> None:
 
 
 def _advice(parent: Path | None) -> str:
-    return "" if parent else ", or name another place with TMPDIR"
+    return "" if parent else ", or name another folder with TMPDIR"
 
 
 processes.when_leaving(_remove_all)

@@ -1,4 +1,4 @@
-"""Text from files and arguments, fit for a terminal: no control characters, no more than a few lines."""
+"""Makes text from files and arguments safe for a terminal: no control characters, limited length."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from colonnade.common.limits import MAX_MESSAGE, MAX_WORD
 
 
 def plain(text: str) -> str:
-    """The text with all but printable characters and line ends escaped: ``\\x1b`` for an escape character."""
+    """Escape all characters but printable ones and line ends, e.g. ESC as ``\\x1b``."""
     if text.isprintable():
         return text
     return "".join(char if char.isprintable() or char == "\n" else _escaped(char) for char in text)
 
 
 def one_line(text: str) -> str:
-    """The text for a message: on one line, plain, with long words and long messages shortened."""
+    """Format a message: one line, control characters escaped, long words and long messages shortened."""
     words = (_shortened(plain(word), MAX_WORD) for word in text.split())
     return _shortened(" ".join(words), MAX_MESSAGE)
 
 
 def _shortened(text: str, maximum: int) -> str:
-    """The begin and the end of a text that is longer than ``most`` characters."""
+    """Keep the start and the end of a text longer than ``maximum`` characters."""
     if len(text) <= maximum:
         return text
     return f"{text[: maximum * 2 // 3]}…{text[-maximum // 4 :]}"

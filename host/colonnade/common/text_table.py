@@ -1,4 +1,4 @@
-"""Tables of plain text, printed row by row while the work goes on."""
+"""Plain-text tables, printed row by row."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class Column:
     """One column of a table.
 
     Attributes:
-        title: its heading; a longer one widens the column.
-        width: characters; longer cells push the row's rest to the right.
-        form: format specification of its cells, such as ``,`` or ``.3f``.
-        is_text: aligned to the left.
-        group: heading over this column and its neighbours of the same group.
+        title: heading; a long title widens the column.
+        width: characters; a longer cell shifts the rest of its row.
+        form: format specification of the cells, such as ``,`` or ``.3f``.
+        is_text: left-aligned.
+        group: heading above adjacent columns of the same group.
     """
 
     title: str
@@ -27,29 +27,29 @@ class Column:
 
     @property
     def text_width(self) -> int:
-        """Characters that the column takes."""
+        """Width of the printed column, characters."""
         return max(self.width, len(self.title))
 
     def align(self, text: str) -> str:
-        """The text in the column's width."""
+        """Pad the text to the column's width."""
         return text.ljust(self.text_width) if self.is_text else text.rjust(self.text_width)
 
     def cell(self, value: object) -> str:
-        """One cell; a dash for None."""
+        """Format one cell; None gives a dash."""
         return self.align("-" if value is None else format(value, self.form))
 
 
 class Table:
-    """Columns, two spaces apart. The heading is printed with the first row, so that a refusal stands alone."""
+    """A table of columns two spaces apart. The heading is printed with the first row, so not before an early error."""
 
     def __init__(self, columns: Sequence[Column], echo: Callable[[str], None] = print) -> None:
-        """Prepare a table whose lines are given to `echo`."""
+        """Create a table that prints its lines with `echo`."""
         self._columns = columns
         self._echo = echo
         self._is_begun = False
 
     def heading(self) -> str:
-        """The titles, below the groups where there are any."""
+        """The line of titles, below a line of groups if there are groups."""
         lines = [_joined(column.align(column.title) for column in self._columns)]
         if any(column.group for column in self._columns):
             groups = [(name, list(members)) for name, members in groupby(self._columns, lambda column: column.group)]

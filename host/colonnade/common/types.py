@@ -1,4 +1,4 @@
-"""Names for arrays of numpy."""
+"""Type aliases of numpy arrays."""
 
 from __future__ import annotations
 

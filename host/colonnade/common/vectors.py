@@ -1,4 +1,4 @@
-"""Vectors as rows of arrays."""
+"""Operations on arrays of vectors."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from colonnade.common.types import Floats
 
 
 def unit_vectors(vectors: Floats) -> Floats:
-    """Vectors [..., 3] scaled to length 1, of any length that float64 holds; zero vectors stay zero."""
+    """Scale vectors [..., 3] of any finite length to length 1; zero vectors stay zero."""
     scale = np.abs(vectors).max(axis=-1, keepdims=True)
     safe = vectors / np.where(scale > 0, scale, 1.0)
     length = np.linalg.norm(safe, axis=-1, keepdims=True)

@@ -1,1 +1,1 @@
-"""Designs: configurations, the generator that makes Verilog of them, and its manifest."""
+"""Designs: configurations, the Chisel generator, and the manifest of a generated design."""

@@ -1,4 +1,4 @@
-"""What a configuration may be called: a preset, a file, or the paper's precision notation."""
+"""Resolves configuration names: a preset, a JSON file, or the paper's precision notation."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from colonnade.common.errors import UserError
 from colonnade.common.input_files import is_file, parse_json, read_json
 from colonnade.common.limits import MAX_DIGITS, MAX_TEXT
 
-#: The preset that a bare precision such as ``32b32s64d`` changes.
+#: The preset that a precision such as ``32b32s64d`` modifies.
 PRECISION_PRESET = "small"
 
 _PRECISION = re.compile(r"\d+b\d+s\d+d", re.ASCII)
-#: Digits of one of its numbers.
+#: Digits of each number in a precision, at most.
 _PRECISION_DIGITS = 6
 
 
 @dataclass(frozen=True)
 class ConfigurationSource:
-    """A configuration as the generator takes it.
+    """A configuration as the generator's input.
 
     Attributes:
-        path: the JSON file it starts from.
+        path: the base JSON file.
         overrides: ``key.path=value`` changes, applied in order.
     """
 
@@ -36,9 +36,12 @@ def find_configuration(name: str, overrides: Sequence[str], root: Path) -> Confi
     """Resolve the name of a configuration.
 
     Args:
-        name: preset (``small``), path of a JSON file, or precision (``32b32s64d``: preset `small` with it).
+        name: a preset (``small``), a JSON file, or a precision (``32b32s64d``: preset `small` with this precision).
         overrides: ``key.path=value`` strings of ``--set``.
-        root: the checkout, whose ``configs`` folder holds the presets.
+        root: the checkout, whose ``configs`` folder contains the presets.
+
+    Raises:
+        UserError: The name or an override is invalid.
     """
     for override in overrides:
         key, equals, value = override.partition("=")
@@ -55,13 +58,13 @@ def find_configuration(name: str, overrides: Sequence[str], root: Path) -> Confi
     path = Path(name)
     known = ", ".join(sorted(preset.stem for preset in presets.glob("*.json")))
     missing = f"no configuration {name}: name a preset ({known}), a JSON file, or a precision such as 32b32s64d"
-    # The generator reads the file itself; what it makes of hostile JSON takes seconds, this takes none
+    # Refuse invalid JSON here at once: the generator, which reads the file again, takes seconds
     read_json(path, "the configuration", missing=missing)
     return ConfigurationSource(path.resolve(), tuple(overrides))
 
 
 def _check_value(override: str, value: str) -> None:
-    """Refuse values that no field takes: too long, too deep, or with a key twice."""
+    """Refuse values that are too long, too deeply nested, or repeat a key."""
     if len(override) > MAX_TEXT:
         raise UserError(f"--set {override} has {len(override):,} characters: {MAX_TEXT:,} at most")
     if value.lstrip()[:1] in ("{", "["):

@@ -1,8 +1,8 @@
-"""The folder that ``generate`` writes for the user, and how it knows its own.
+"""Writes the output folder of ``generate``, and replaces only folders that it wrote itself.
 
-``.colonnade.sha256`` lists every other file with its SHA-256, as ``sha256sum --check`` reads it. A folder is replaced
-only if it is empty, or if it holds exactly the files of that list, unchanged. The generator (`DesignMarker.scala`)
-writes and obeys the same file.
+``.colonnade.sha256`` lists the SHA-256 of every other file, in the format of ``sha256sum --check``. A folder is
+replaced only if it is empty, or if it contains exactly the listed files, unchanged. The generator
+(`DesignMarker.scala`) follows the same rule.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from colonnade.common.atomic_files import kind_of, make_folder
 from colonnade.common.errors import UserError, reason_of
 from colonnade.common.temporary import replace, temporary_folder
 
-#: The list of a folder's files.
+#: Name of the file list.
 MARKER = ".colonnade.sha256"
-#: Its first line; ``sha256sum`` skips it.
+#: First line of the file list; ``sha256sum`` skips it.
 TITLE = "# Written by colonnade generate, which replaces this folder only while its files are as listed here."
 
 _MAX_MARKER_BYTES = 1 << 24
@@ -28,40 +28,40 @@ _BLOCK = 1 << 20
 
 
 def check_replaceable(output: Path) -> None:
-    """Refuse an output that is there, unless it is empty or an unchanged design.
+    """Refuse an existing output that is neither an empty folder nor an unchanged design.
 
     Raises:
-        UserError: What is wrong, and what to do.
+        UserError: The output must not or cannot be replaced; the message says why.
     """
     try:
         status = output.lstat()
     except (FileNotFoundError, NotADirectoryError):
-        _check_place(output)
+        _check_parent(output)
         return
     except (OSError, ValueError) as error:
-        reason = reason_of(error) if isinstance(error, OSError) else "this is no file name"
+        reason = reason_of(error) if isinstance(error, OSError) else "this is not a file name"
         raise UserError(f"cannot write {str(output)!r}: {reason}") from None
     if not stat.S_ISDIR(status.st_mode):
         raise UserError(f"{output} is {kind_of(status)}: --output names a folder")
     with contextlib.suppress(OSError):
         if output.samefile(Path.cwd()):
             raise UserError(f"{output} is the working directory, which cannot be replaced: name a folder in it")
-    _check_place(output)
+    _check_parent(output)
     try:
-        foreign = _foreign(output)
+        refusal = _why_not_ours(output)
     except OSError as error:
         raise UserError(f"cannot read {output}: {reason_of(error)}") from None
-    if foreign is not None:
-        raise UserError(f"{output} {foreign}, so it is not replaced: name another --output, or delete it first")
+    if refusal is not None:
+        raise UserError(f"{output} {refusal}, so it is not replaced: name another --output, or delete it first")
 
 
 def holds(folder: Path, file: Path) -> bool:
-    """The file is, or would be, in the folder."""
+    """Whether the path of the file is below the folder; neither needs to exist."""
     return folder.resolve() in file.resolve().parents
 
 
 def listed(folder: Path) -> list[str]:
-    """Files of a folder but for the marker, relative, sorted."""
+    """Relative names of a folder's files except the marker, sorted."""
     return sorted(
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
@@ -70,13 +70,13 @@ def listed(folder: Path) -> list[str]:
 
 
 def write_marker(folder: Path) -> None:
-    """List the files of a complete folder."""
+    """Write the marker of a complete folder."""
     lines = [f"{_digest(folder / name)}  {name}" for name in listed(folder)]
     (folder / MARKER).write_text("\n".join([TITLE, *lines]) + "\n", encoding="utf-8")
 
 
 def replace_folder(source: Path, output: Path) -> None:
-    """Put a copy of the design in ``source`` in the place of ``output``; an error changes nothing.
+    """Replace ``output`` by a copy of the design in ``source``; an error changes nothing.
 
     Raises:
         UserError: ``output`` must not be replaced, or cannot be written.
@@ -87,36 +87,36 @@ def replace_folder(source: Path, output: Path) -> None:
         with temporary_folder(".colonnade.", output.parent) as fresh:
             _copy(source, fresh)
             write_marker(fresh)
-            # Once more: copying took its time
+            # The output may have changed during the copy
             check_replaceable(output)
             replace(fresh, output)
     except OSError as error:
         raise UserError(f"cannot write {output}: {reason_of(error)}") from None
 
 
-def _check_place(output: Path) -> None:
-    """The nearest folder around the output that exists must take new entries."""
-    place = output.absolute().parent
-    while not place.exists() and place != place.parent:
-        place = place.parent
-    if not place.is_dir():
-        raise UserError(f"{place} is no folder: name another --output than {output}")
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise UserError(f"{place} is not writable: name another place for {output.name}")
+def _check_parent(output: Path) -> None:
+    """The nearest existing parent of the output must be a writable folder."""
+    parent = output.absolute().parent
+    while not parent.exists() and parent != parent.parent:
+        parent = parent.parent
+    if not parent.is_dir():
+        raise UserError(f"{parent} is not a folder: name another --output than {output}")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise UserError(f"{parent} is not writable: name another folder for {output.name}")
 
 
-def _foreign(folder: Path) -> str | None:
-    """Why the folder is not an unchanged design of ours; None for one that is, or that is empty."""
-    # First of all, because a folder such as / takes minutes to walk
+def _why_not_ours(folder: Path) -> str | None:
+    """The reason why a folder is not an unchanged design; None for such a design or an empty folder."""
+    # Check the marker first: walking a folder such as / takes minutes
     if not any(folder.iterdir()):
         return None
     if not (folder / MARKER).is_file() or (folder / MARKER).is_symlink():
         return f"holds files, but no {MARKER} of colonnade generate"
     found: set[str] = set()
     folders: set[str] = set()
-    for place, inside, files in os.walk(folder):
-        for name in inside + files:
-            path = Path(place, name)
+    for parent, subfolders, files in os.walk(folder):
+        for name in subfolders + files:
+            path = Path(parent, name)
             relative = path.relative_to(folder).as_posix()
             mode = path.lstat().st_mode
             if stat.S_ISDIR(mode):
@@ -141,7 +141,7 @@ def _foreign(folder: Path) -> str | None:
 
 
 def _read_marker(file: Path) -> dict[str, str] | None:
-    """SHA-256 by name; None for a file that is no list of ours."""
+    """Parse a marker into SHA-256 by file name; None if it is invalid."""
     if file.stat().st_size > _MAX_MARKER_BYTES:
         return None
     try:
@@ -165,7 +165,7 @@ def _digest(file: Path) -> str:
 
 
 def _copy(source: Path, target: Path) -> None:
-    """The files of the generator's list, into an empty folder; all of them where there is none."""
+    """Copy the files that the generator's marker lists into an empty folder; without a marker, copy all."""
     marker = _read_marker(source / MARKER) if (source / MARKER).is_file() else None
     for name in sorted(marker) if marker is not None else listed(source):
         (target / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The largest frame that a design renders."""
+"""Checks a frame size against the design's limits."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from colonnade.design.manifest import Manifest
 
 
 def check_size(size: tuple[int, int], manifest: Manifest) -> None:
-    """Refuse a frame larger than the design holds (`frame.maxWidth`, `frame.maxHeight`)."""
+    """Refuse a frame larger than the design's maximum (`frame.maxWidth`, `frame.maxHeight`).
+
+    Raises:
+        UserError: The frame is empty or too large.
+    """
     if min(size) < 1:
         raise UserError(f"a frame of {size[0]}x{size[1]} has no pixels")
     limits = manifest.config["frame"]

@@ -1,8 +1,8 @@
-"""Runs the Chisel generator and keeps what it made, by content.
+"""Runs the Chisel generator and caches its output.
 
-The generator is compiled once per state of its sources, with sbt; every configuration after that is one run of plain
-Java. Results are entries ``generator/SOURCES/KEY`` of the cache, where SOURCES stands for the generator's sources and
-KEY for the configuration, its overrides and the kind of output; the classes are ``generator/SOURCES/classes``.
+sbt compiles the generator once for each state of its sources; after that, each configuration is one Java run. The cache
+entries are ``generator/SOURCES/KEY``, where SOURCES is the hash of the generator's sources. KEY is the hash of the
+configuration, its overrides and the kind of output. The compiled classes are ``generator/SOURCES/classes``.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from colonnade.design.design_folder import check_replaceable, replace_folder
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import cache_directory, find_java, project_root
 
-#: States of the sources whose results are kept; older ones go once they have not been used for a day.
+#: Source states to keep in the cache; older ones are removed when they were not used for a day.
 KEPT_STATES = 4
 
-#: The folders of an entry: what the generator wrote; and the file that tells the class path.
+#: Entries of the cache: the generator's output folder, and the file with the class path.
 DESIGN = "design"
 CLASSPATH = "classpath.json"
 
@@ -38,11 +38,11 @@ _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 @dataclass(frozen=True)
 class GeneratedDesign:
-    """What the generator wrote for one configuration.
+    """The generator's output for one configuration.
 
     Attributes:
-        dir: folder with ``manifest.json`` and, for a whole design, the SystemVerilog and ``filelist.f``.
-        manifest: the manifest, read.
+        dir: folder with ``manifest.json`` and, for a complete design, the SystemVerilog and ``filelist.f``.
+        manifest: the parsed manifest.
     """
 
     dir: Path
@@ -54,7 +54,7 @@ class GeneratedDesign:
         return sorted(path for path in self.dir.iterdir() if path.suffix in (".sv", ".v"))
 
     def digest(self) -> str:
-        """A SHA-256 of the SystemVerilog: two designs with the same one behave alike."""
+        """SHA-256 of the SystemVerilog: designs with equal digests behave identically."""
         known = cache.digests(self.dir.parent) or {}
         lines = []
         for path in self.sources:
@@ -64,17 +64,17 @@ class GeneratedDesign:
 
 
 def manifest_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
-    """The manifest of a configuration, without Verilog: all that packing, the model and placement need."""
+    """Generate only the manifest, enough for packing, the model and the frame registers."""
     return _cached(config, overrides, ("--manifest-only",), progress)
 
 
 def design_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
-    """The SystemVerilog and the manifest of a configuration: what a simulation is built from."""
+    """Generate the SystemVerilog and the manifest, for simulation."""
     return _cached(config, overrides, (), progress)
 
 
 def black_boxed_design_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
-    """The same with memories as black boxes, and ``memories.json`` with their shapes: what synthesis reads."""
+    """Generate with memories as black boxes and their shapes in ``memories.json``, for synthesis."""
     return _cached(config, overrides, ("--black-box-memories",), progress)
 
 
@@ -86,7 +86,7 @@ def generate(
     black_box_memories: bool = False,
     progress: Progress = QUIET,
 ) -> GeneratedDesign:
-    """Generate into ``output``, a folder of the user's: see `design_folder` for what it may replace."""
+    """Generate into the user's folder ``output``; `design_folder` defines which folders it may replace."""
     check_replaceable(output)
     options = ("--manifest-only",) * manifest_only + ("--black-box-memories",) * black_box_memories
     design = _cached(config, overrides, options, progress)
@@ -95,7 +95,7 @@ def generate(
 
 
 def source_hash(root: Path) -> str:
-    """A short hash of everything the generator is compiled from."""
+    """A short hash of the generator's source and build files."""
     sources = [*root.glob("*.sbt"), root / "project" / "build.properties", root / "project" / "dependencies.sha256"]
     sources += [*(root / "project").glob("*.sbt"), *(root / "project").glob("*.scala")]
     sources += [path for path in (root / "src" / "main").rglob("*") if path.is_file()]
@@ -112,9 +112,9 @@ def _cached(config: str, overrides: Sequence[str], options: tuple[str, ...], pro
     source = find_configuration(config, overrides, root)
     state = cache_directory(root) / "generator" / source_hash(root)
 
-    def make(place: Path) -> None:
+    def make(folder: Path) -> None:
         java = find_java()
-        _run(root, java, _compiled(root, state, progress), source, options, place / DESIGN, state, progress)
+        _run(root, java, _compiled(root, state, progress), source, options, folder / DESIGN, state, progress)
 
     entry = cache.entry(state / _key(source, options), make, "design", progress)
     cache.touch(state)
@@ -127,16 +127,16 @@ def _key(source: ConfigurationSource, options: Sequence[str]) -> str:
 
 
 def _compiled(root: Path, state: Path, progress: Progress) -> str:
-    """Compile the generator unless this state of it is compiled, and return its class path."""
+    """Return the class path of the compiled generator; compile it if this state is not cached."""
 
-    def make(place: Path) -> None:
+    def make(folder: Path) -> None:
         entries = _compile(root, state.parent / "sbt.log", progress)
-        # A later compile overwrites sbt's own folder of classes: keep those of this state
-        for index, folder in enumerate(entries):
-            if Path(folder).is_dir():
+        # A later compile overwrites sbt's class folders: copy them
+        for index, entry in enumerate(entries):
+            if Path(entry).is_dir():
                 entries[index] = f"classes{index}"
-                shutil.copytree(folder, place / entries[index])
-        (place / CLASSPATH).write_text(json.dumps(entries))
+                shutil.copytree(entry, folder / entries[index])
+        (folder / CLASSPATH).write_text(json.dumps(entries))
 
     def path(folder: Path) -> list[Path]:
         return [folder / entry for entry in json.loads((folder / CLASSPATH).read_text())]
@@ -150,7 +150,7 @@ def _compiled(root: Path, state: Path, progress: Progress) -> str:
 
 
 def _compile(root: Path, log: Path, progress: Progress) -> list[str]:
-    """Compile with sbt; the class path, its folders being sbt's own."""
+    """Compile with sbt; returns the class path, whose folders are sbt's output folders."""
     with progress.step("compiling the generator"), log.open("w") as stream:
         command = [str(root / "tools" / "sbt"), "compile", "export Runtime/fullClasspath"]
         status = processes.run(command, stdout=stream, stderr=subprocess.STDOUT).returncode
@@ -175,7 +175,7 @@ def _run(
     state: Path,
     progress: Progress,
 ) -> None:
-    """One run of the generator; its error line becomes ours."""
+    """Run the generator; status 2 becomes a UserError with the generator's message."""
     sets = [argument for override in source.overrides for argument in ("--set", override)]
     command = [str(java), *_java_options(root), "-cp", classpath, "colonnade.Generate"]
     command += ["--config", str(source.path), "--output", str(design), *sets, *options]

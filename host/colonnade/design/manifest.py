@@ -1,6 +1,6 @@
-"""The manifest: what the generator tells the host about one design.
+"""The manifest of a generated design: record layouts, registers and number formats.
 
-Nothing here knows an offset: record layouts, registers and number formats are read from ``manifest.json``.
+The generator writes ``manifest.json``; the host takes every width, offset and address from it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class Field:
-    """One field of a record or stream: ``width`` bits from bit ``offset`` (0 is the least significant)."""
+    """One field of a record or stream: ``width`` bits from bit ``offset`` (bit 0 is the least significant)."""
 
     name: str
     offset: int
@@ -31,18 +31,18 @@ class Field:
 
     @property
     def range(self) -> tuple[int, int]:
-        """Least and greatest value that fits."""
+        """The smallest and the largest value of the field."""
         return value_range(self.width, self.signed)
 
 
 def value_range(width: int, signed: bool) -> tuple[int, int]:
-    """Least and greatest integer of ``width`` bits."""
+    """The smallest and the largest integer of ``width`` bits."""
     return (-(1 << (width - 1)), (1 << (width - 1)) - 1) if signed else (0, (1 << width) - 1)
 
 
 @dataclass(frozen=True)
 class RecordLayout:
-    """Where the fields of one kind of record lie; packs and unpacks whole columns of records.
+    """The field layout of one kind of record; packs and unpacks arrays of records.
 
     A record is ``bits`` wide, a multiple of 32, stored little-endian.
     """
@@ -52,13 +52,13 @@ class RecordLayout:
     fields: Mapping[str, Field]
 
     def pack(self, values: Mapping[str, npt.ArrayLike]) -> npt.NDArray[np.uint8]:
-        """Records from integer columns: ``values`` maps a field to integers [n]; missing fields are 0.
+        """Pack records from one integer array [n] for each field name; missing fields are 0.
 
         Returns:
             uint8 [n, bits / 8].
 
         Raises:
-            ValueError: a field is unknown or a value does not fit.
+            ValueError: A field is unknown or a value does not fit its field.
         """
         columns = {name: np.asarray(column, dtype=np.int64) for name, column in values.items()}
         count = max((column.shape[0] for column in columns.values()), default=0)
@@ -78,7 +78,7 @@ class RecordLayout:
         return np.ascontiguousarray(words.T.astype("<u4")).view(np.uint8).reshape(count, self.bits // 8)
 
     def unpack(self, records: npt.NDArray[np.uint8]) -> dict[str, npt.NDArray[np.int64]]:
-        """All fields of ``records`` (uint8 [n, bits / 8]) as int64 [n]."""
+        """Unpack records, uint8 [n, bits / 8], into int64 [n] for each field name."""
         words = np.ascontiguousarray(records).view("<u4").astype(np.uint64)
         result: dict[str, npt.NDArray[np.int64]] = {}
         for field in self.fields.values():
@@ -93,7 +93,7 @@ class RecordLayout:
         return result
 
     def count_of(self, pattern: str) -> int:
-        """Elements of an array of fields: ``count_of("kinds[{}]")`` is the arity."""
+        """Length of an array of fields, e.g. ``count_of("kinds[{}]")`` for the arity."""
         count = 0
         while pattern.format(count) in self.fields:
             count += 1
@@ -104,7 +104,7 @@ class RecordLayout:
 class Register:
     """A register: ``words`` consecutive 32-bit words from word ``address``, low word first.
 
-    The device takes values above ``limit`` as ``limit``; None: it takes all that fit.
+    The device clamps larger values to ``limit``; None: no clamping.
     """
 
     name: str
@@ -116,7 +116,7 @@ class Register:
     limit: int | None = None
 
     def encode(self, value: int) -> list[tuple[int, int]]:
-        """The (address, word) writes that set it."""
+        """The (address, word) writes that set the register to a value."""
         low, high = value_range(self.width, self.signed)
         if not low <= value <= high:
             raise ValueError(f"register {self.name}: {value} does not fit {self.width} bits")
@@ -124,18 +124,18 @@ class Register:
         return [(self.address + i, (raw >> (32 * i)) & 0xFFFFFFFF) for i in range(self.words)]
 
     def decode(self, words: list[int]) -> int:
-        """The value of its words, low word first."""
+        """The register's value from its words, low word first."""
         raw = sum(word << (32 * i) for i, word in enumerate(words)) & ((1 << self.width) - 1)
         return raw - (1 << self.width) if self.signed and raw >> (self.width - 1) else raw
 
 
 @dataclass(frozen=True)
 class AttributeFormats:
-    """What the physical-attribute memory's words hold.
+    """Formats of the physical-attribute memory.
 
     Attributes:
-        sizes: Of the maps, by name.
-        layouts: Of the words, by kind.
+        sizes: Sizes of the maps, by name.
+        layouts: Layouts of the memory words, by kind.
     """
 
     sizes: Mapping[str, int]
@@ -144,7 +144,7 @@ class AttributeFormats:
 
 @dataclass(frozen=True)
 class Manifest:
-    """One generated design as the host sees it."""
+    """The manifest's content."""
 
     config: Mapping[str, Any]
     numbers: Mapping[str, int]
@@ -159,12 +159,16 @@ class Manifest:
 
     @property
     def bvh(self) -> bool:
-        """False for the exhaustive baseline, which has no nodes."""
+        """Whether the design traverses a BVH; False for the linear-scan baseline, which has no nodes."""
         return bool(self.config["geometry"]["bvh"])
 
     @staticmethod
     def load(path: str | Path) -> Manifest:
-        """Reads ``manifest.json``, or the one in a generated directory."""
+        """Read ``manifest.json``, given the file or its folder.
+
+        Raises:
+            UserError: The file is missing or is not a manifest of this version.
+        """
         file = Path(path)
         if file.is_dir():
             file = file / "manifest.json"
@@ -177,7 +181,7 @@ class Manifest:
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Manifest:
-        """A manifest from its JSON object."""
+        """Build a manifest from its JSON object."""
         if data["version"] != VERSION:
             raise UserError(f"the manifest has version {data['version']}, this host reads {VERSION}: generate it again")
         bits = int(data["records"]["bits"])

@@ -1,4 +1,4 @@
-"""Where the programs and the sources are that the host runs, and what to say when one is missing."""
+"""Locates the checkout, the cache folder, Java and other programs, with advice if one is missing."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from pathlib import Path
 from colonnade.common import processes
 from colonnade.common.errors import UserError
 
-#: The oldest Java that Chisel's compiler runs on.
+#: The oldest Java version that Chisel supports.
 MINIMUM_JAVA = 17
 
 
 def project_root() -> Path:
-    """Find the checkout: the hardware's sources and the generator are not part of the Python package.
+    """Find the checkout, which contains the hardware sources and the generator.
 
-    Looked for in this order: ``COLONNADE_HOME``, the folder that holds the ``.venv`` in use, the folders above this
-    file, the working directory and those above it.
+    The search order is ``COLONNADE_HOME``, the parent folder of the ``.venv`` in use, the folders above this
+    file, the working directory and the folders above it.
     """
     named = os.environ.get("COLONNADE_HOME")
     if named:
         home = Path(named)
         if _is_checkout(home):
             return home.resolve()
-        raise UserError(f"COLONNADE_HOME={named} is no checkout of Colonnade: it holds no build.sbt and tools/sbt")
+        raise UserError(f"COLONNADE_HOME={named} is not a checkout of Colonnade: it lacks build.sbt or tools/sbt")
     here = Path(__file__).resolve()
     for candidate in (Path(sys.prefix).parent, *here.parents, Path.cwd(), *Path.cwd().parents):
         if _is_checkout(candidate):
@@ -39,7 +39,7 @@ def _is_checkout(folder: Path) -> bool:
 
 
 def cache_directory(root: Path) -> Path:
-    """The folder for what can be made again: ``.cache`` of the checkout, or the user's where that is read-only."""
+    """The cache folder: ``.cache`` of the checkout, or the user's cache folder if the checkout is read-only."""
     local = root / ".cache"
     if os.access(local if local.exists() else root, os.W_OK):
         return local
@@ -48,7 +48,7 @@ def cache_directory(root: Path) -> Path:
 
 
 def find_java() -> Path:
-    """The ``java`` to run the generator with: of ``JAVA_HOME``, or on ``PATH``; 17 or newer."""
+    """Find ``java`` for the generator in ``JAVA_HOME`` or on ``PATH``, version `MINIMUM_JAVA` or newer."""
     advice = f"install a JDK {MINIMUM_JAVA} or newer, e.g. sudo apt-get install openjdk-{MINIMUM_JAVA}-jdk-headless"
     home = os.environ.get("JAVA_HOME")
     in_home = Path(home) / "bin" / "java" if home else None
@@ -66,18 +66,18 @@ def _java_version(java: str) -> int | None:
         command = [java, "-version"]
         answer = processes.run(command)
     except OSError as error:
-        raise UserError(f"{java} cannot be run ({error.strerror}): mend JAVA_HOME or PATH") from error
+        raise UserError(f"{java} cannot be run ({error.strerror}): fix JAVA_HOME or PATH") from error
     match = re.search(r'version "(\d+)', answer.stderr + answer.stdout)
     return int(match.group(1)) if match else None
 
 
 def require_program(name: str, purpose: str, package: str | None = None) -> Path:
-    """Find ``name`` on ``PATH``, or say which package holds it.
+    """Find a program on ``PATH``; the error names the Debian package to install.
 
     Args:
         name: the program.
         purpose: completes "which … needs", e.g. ``"the rtl backend"``.
-        package: the Debian package; the program's name unless given.
+        package: the Debian package; by default the program's name.
     """
     found = shutil.which(name)
     if found is None:

@@ -1,1 +1,1 @@
-"""The device: the bit-exact model, and the RTL under Verilator."""
+"""The backends of the device: the bit-exact model, and the RTL under Verilator."""

@@ -1,4 +1,4 @@
-"""The bit-exact model as a backend: the frame the hardware renders, without its timing."""
+"""The model backend: renders the hardware's frame bit by bit, without its timing."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from colonnade.common.framebuffer import Frame
 from colonnade.design.manifest import Manifest, RecordLayout
 from colonnade.scene_image.file import SceneImage
 
-ROWS_AT_ONCE = 16
+#: Rows rendered between two reports of progress.
+BAND_ROWS = 16
 
 
 def new_model(manifest: Manifest) -> Any:
-    """A ``colonnade._core.Model`` of the manifest's design, with empty memories."""
+    """A ``colonnade._core.Model`` of the manifest's design with empty memories."""
     from colonnade import _core
 
     config = manifest.config
@@ -31,7 +32,7 @@ def new_model(manifest: Manifest) -> Any:
 
 
 def field_places(layouts: Mapping[str, RecordLayout]) -> dict[str, dict[str, tuple[int, int, bool]]]:
-    """Where the fields of words lie: offset, width, signed; by kind of word and name."""
+    """Offset, width and signedness of each field, by layout and field name."""
     return {
         name: {field.name: (field.offset, field.width, field.signed) for field in layout.fields.values()}
         for name, layout in layouts.items()
@@ -39,12 +40,12 @@ def field_places(layouts: Mapping[str, RecordLayout]) -> dict[str, dict[str, tup
 
 
 def load_scene(model: Any, image: SceneImage) -> None:
-    """Fills the model's column memory."""
+    """Load a scene image's records into the model's column memory."""
     model.load(image.records)
 
 
 def load_environment(model: Any, image: SceneImage, manifest: Manifest) -> None:
-    """Gives the model a physical-attribute memory and fills it with the image's room."""
+    """Add a physical-attribute memory to the model and load the room of a scene image into it."""
     assert manifest.attributes is not None
     model.add_environment(dict(manifest.attributes.sizes), field_places(manifest.attributes.layouts))
     for section in image.attributes:
@@ -57,12 +58,12 @@ def render_model(
     registers: Mapping[str, int],
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Frame:
-    """Renders one frame; see `loaded_model` and `model_frame`."""
+    """Render one frame: `loaded_model`, then `model_frame`."""
     return model_frame(loaded_model(manifest, image), registers, progress)
 
 
 def loaded_model(manifest: Manifest, image: SceneImage) -> Any:
-    """A model with a scene image in its memories."""
+    """A model whose memories hold a scene image."""
     model = new_model(manifest)
     load_scene(model, image)
     if image.attributes:
@@ -75,19 +76,19 @@ def model_frame(
     registers: Mapping[str, int],
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Frame:
-    """A frame of what a model has loaded; any number may follow each other.
+    """Render a frame with a loaded model, which can render any number of frames.
 
     Args:
-        model: Of `loaded_model`.
-        registers: Every rw register by name (``placement.placement``).
-        progress: Called with (rows done, rows in all).
+        model: From `loaded_model`.
+        registers: All rw registers by name.
+        progress: Called with the number of finished rows and of all rows.
     """
     model.start(dict(registers))
     height = registers["frame.height"]
     bands = []
-    for first in range(0, height, ROWS_AT_ONCE):
-        bands.append(model.rows(first, min(first + ROWS_AT_ONCE, height)))
-        progress(min(first + ROWS_AT_ONCE, height), height)
+    for first in range(0, height, BAND_ROWS):
+        bands.append(model.rows(first, min(first + BAND_ROWS, height)))
+        progress(min(first + BAND_ROWS, height), height)
     pixels = {key: np.concatenate([band[key] for band in bands]) for key in bands[0]}
     return Frame(
         colour=pixels["colour"],

@@ -1,4 +1,4 @@
-"""Builds the simulator of a design: compiled once, kept by the content of Verilog and harness, and by the tools."""
+"""Builds the simulator of a design, cached by the content of Verilog and harness and by the tool versions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from colonnade.device.simulator_sources import DEVICE, write_sources
 
 PROGRAM = "simulator"
 
-#: Of all models. A model is flat, so that the variables of the coupling are in one structure.
+#: Options of all models. Models are flattened, so that one structure holds the variables of the coupling.
 VERILATOR_OPTIONS = (
     "--cc --build -j 0 -O3 --flatten --noassert --x-assign fast --x-initial fast --threads 1 "
     "--output-split 20000 --output-split-cfuncs 2000 -Wno-fatal"
@@ -36,12 +36,12 @@ VERILATOR_OPTIONS = (
 #: Of a simulator that writes waveforms: records are wider than Verilator would trace.
 WAVEFORM_OPTIONS = ("--trace", "--trace-max-width", "1024", "-CFLAGS", "-DWAVEFORM")
 
-#: Verilator's makefile would compile with -Os, which is a third slower.
+#: Replaces -Os of Verilator's makefile, which is a third slower.
 OPTIMISATION = ("-O2",)
 
 _HARNESS = ("harness.cpp", "array.hpp")
 
-#: What make and the shell take for one word.
+#: Paths that make and the shell take as one word.
 _PLAIN_PATH = re.compile(r"[\w/.+@%,-]+", re.ASCII)
 
 _PURPOSE = "the rtl backend (--backend model needs no simulator)"
@@ -49,7 +49,7 @@ _PURPOSE = "the rtl backend (--backend model needs no simulator)"
 
 @dataclass(frozen=True)
 class Tools:
-    """The programs that a simulator is built with, and their versions."""
+    """The programs that build a simulator, and their versions."""
 
     verilator: Path
     compiler: Path
@@ -57,7 +57,7 @@ class Tools:
 
 
 def simulator_tools() -> Tools:
-    """Check for all that building a simulator takes."""
+    """The programs that build a simulator; raises a `UserError` if one is missing or too old."""
     require_program("make", _PURPOSE)
     compiler, compiler_version = require_compiler(_PURPOSE)
     verilator, verilator_version = require_verilator(_PURPOSE)
@@ -65,7 +65,7 @@ def simulator_tools() -> Tools:
 
 
 def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, waveform: bool = False) -> Path:
-    """The simulator of a design, as `cache.entry` keeps it.
+    """The simulator of a design, built unless `cache.entry` has it.
 
     Args:
         design: What is simulated.
@@ -73,8 +73,8 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, wavefor
         waveform: It can write waveforms; it is then slower.
 
     Raises:
-        UserError: a program is missing, too old, or compiles wrongly.
-        RuntimeError: the simulator does not build.
+        UserError: A program is missing, too old, or compiles wrongly.
+        RuntimeError: The simulator does not build.
     """
     tools = simulator_tools()
     harness = Path(__file__).parent / "harness"
@@ -85,21 +85,21 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, wavefor
     key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
     folder = cache_directory(project_root()) / "simulator" / key
 
-    def make(place: Path) -> None:
+    def make(output: Path) -> None:
         with progress.step("building the simulator"):
             require_right_compiler(tools.compiler, (*OPTIMISATION, *SAFE))
-            _build(tools, design, harness, place, folder.with_suffix(".log"), waveform)
+            _build(tools, design, harness, output, folder.with_suffix(".log"), waveform)
 
     return cache.entry(folder, make, "simulator", progress) / PROGRAM
 
 
 def _build(
-    tools: Tools, design: GeneratedDesign, harness: Path, place: Path, log: Path, waveform: bool = False
+    tools: Tools, design: GeneratedDesign, harness: Path, output: Path, log: Path, waveform: bool = False
 ) -> None:
-    """Put the program into the folder `place`. It is built elsewhere: make cannot work in a path with spaces."""
+    """Build in a temporary folder, since make does not accept spaces in paths, and move the program to `output`."""
     with temporary_folder() as work:
         if not _PLAIN_PATH.fullmatch(str(work)):
-            raise UserError(f"a simulator cannot be built in {work.parent.parent}: name a plain path with TMPDIR")
+            raise UserError(f"make cannot build a simulator in {work.parent.parent}: set TMPDIR to a plain path")
         models = write_sources(design.sources, work)
         (work / "ports.hpp").write_text(_ports_header(design.manifest, design.sources))
         for name in _HARNESS:
@@ -115,12 +115,12 @@ def _build(
                 done = processes.run(command, cwd=work, env=clean_environment(), stdout=stream, stderr=stream)
                 if done.returncode != 0:
                     raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
-        shutil.move(work / f"obj_{DEVICE}" / PROGRAM, place / PROGRAM)
+        shutil.move(work / f"obj_{DEVICE}" / PROGRAM, output / PROGRAM)
     log.unlink()
 
 
 def _verilate(tools: Tools, top: str, sources: Sequence[Path]) -> list[str]:
-    """The command that verilates and compiles one model into the folder ``obj_TOP``."""
+    """The Verilator command that translates and compiles one model into the folder ``obj_TOP``."""
     flags = " ".join(OPTIMISATION)
     return [
         *(str(tools.verilator), *VERILATOR_OPTIONS, "--top-module", top, "--Mdir", f"obj_{top}"),
@@ -131,11 +131,11 @@ def _verilate(tools: Tools, top: str, sources: Sequence[Path]) -> list[str]:
 
 
 def _ports_header(manifest: Manifest, sources: Sequence[Path]) -> str:
-    """What the harness has to know of this design's ports."""
+    """``ports.hpp``: macros with the port names and counts of this design, for the harness."""
     columns = int(manifest.config["array"]["columns"])
     header = "#pragma once\n#define EACH_COLUMN(DO) " + " ".join(f"DO({column})" for column in range(columns)) + "\n"
     top = next(path for path in sources if path.stem == "Colonnade").read_text()
-    # Names of ports that end with their format
+    # These port names end with their number format
     if match := re.search(r"io_pixels_0_bits_hit_distance_(\w+)", top):
         header += f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_bits_hit_distance_{match.group(1)}\n"
     if match := re.search(r"io_pixels_0_bits_ratio_r_(\w+)", top):

@@ -1,20 +1,20 @@
 """Sources of a simulator: Verilator models of render unit, column and device, and their coupling.
 
-Verilator makes C++ for each copy of a module, some 170 MB of it for 80 render units. So render unit and column are
-models of their own, and each copy of them an object. A model that holds others is *opened*: its instances of them are
-taken out, and variables stand for their ports.
+Verilator generates C++ for each instance of a module, about 170 MB for 80 render units. So render unit and column are
+separate models, and each instance is an object. An outer model is *opened*: its inner instances are removed, and
+variables replace their ports.
 
-One evaluation of each unit and a few of columns and device make a cycle exact, because of three properties of the RTL:
+One evaluation of each unit and a few of columns and device simulate a cycle exactly, by three properties of the RTL:
 
-1. A unit's outputs depend on its inputs in the same cycle only by way of inputs that a register drives.
-2. Those are all but the *direct* ones (`DIRECT`).
-3. What a column tells the device depends on what the device tells it in the same cycle by its pixel stream alone.
+1. A unit's outputs depend combinationally only on inputs that a register drives.
+2. These are all inputs except the *direct* ones (`DIRECT`).
+3. A column's outputs to the device depend combinationally on the device's outputs only through the pixel stream.
 
-In a cycle everything settles first: device, columns, device. Then comes the clock edge of the device, of the columns,
-and of the units. The inputs of a unit that are not direct cross between the last two, into registers around the unit
-(`UNIT_MODEL`): the unit sees each of them in the cycle in which the column's register holds it. The harness checks all
-of this at run time (``Array::check``). All models clock on both edges (`both_edges`), so that a cycle takes one
-evaluation of a unit and not two.
+In each cycle all models settle first: device, columns, device. Then the clock edge of the device, the columns and the
+units follows. Between the last two, the inputs of a unit that are not direct are copied into registers around the unit
+(`UNIT_MODEL`), so the unit sees them in the same cycle as the column's registers. The harness checks the coupling at
+run time (``Array::check``). All models clock on both edges (`both_edges`): a cycle takes one evaluation of a unit, not
+two.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from pathlib import Path
 
 UNIT, COLUMN, DEVICE = "RenderUnit", "Column", "Colonnade"
 
-#: The module with registers around the unit's inputs.
+#: The wrapper with registers at the unit's inputs.
 UNIT_MODEL = "RenderUnitModel"
 
-#: Inputs of a unit that depend on its outputs, or on the device's inputs, in the same cycle.
+#: Inputs of a unit that depend combinationally on its outputs or on the device's inputs.
 DIRECT = re.compile(r"reset|io_start|io_\w*_ready")
 
-#: Inputs that the host writes while no frame runs.
+#: Prefix of the inputs that change only while no frame runs.
 FRAME_REGISTERS = "io_registers_"
 
 _PORT = re.compile(r"(?:(input|output)\s*)?(?:\[(\d+):0\])?\s*(\w+)")
@@ -48,9 +48,9 @@ class Port:
     """A port of a module.
 
     Attributes:
-        name: In Verilog.
-        is_input: Its direction.
-        bits: Its width.
+        name: Name in Verilog.
+        is_input: Input, not output.
+        bits: Width.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Port:
 
     @property
     def range(self) -> str:
-        """In a Verilog declaration."""
+        """The range in a Verilog declaration."""
         return f"[{self.bits - 1}:0] " if self.bits > 1 else ""
 
     @property
@@ -72,7 +72,7 @@ class Port:
 
     @property
     def kind(self) -> str:
-        """The list of the coupling that it belongs to."""
+        """The port list of the coupling that the port belongs to."""
         if not self.is_input:
             return "OUTPUTS"
         if self.name.startswith(FRAME_REGISTERS):
@@ -81,12 +81,12 @@ class Port:
 
 
 def both_edges(verilog: str) -> str:
-    """The same modules with all their registers clocked by both edges: a change of the clock is a cycle."""
+    """The same modules with registers clocked on both edges: each change of the clock is a cycle."""
     return re.sub(r"@\(posedge (\w+)\)", r"@(edge \1)", verilog)
 
 
 def module_ports(verilog: str, module: str) -> list[Port]:
-    """The ports of a module as firtool writes them, but for its clock."""
+    """The ports of a module as firtool writes them, without the clock."""
     header = re.search(rf"^module {module}\((.*?)\n\);", verilog, re.DOTALL | re.MULTILINE)
     if header is None:
         raise ValueError(f"the Verilog has no module {module} with ports")
@@ -95,7 +95,7 @@ def module_ports(verilog: str, module: str) -> list[Port]:
     for text in header.group(1).split(","):
         match = _PORT.fullmatch(text.strip())
         if match is None:
-            raise ValueError(f"a port of {module} is not understood: {text.strip()}")
+            raise ValueError(f"cannot parse a port of {module}: {text.strip()}")
         direction, top_bit, name = match.groups()
         is_input = is_input if direction is None else direction == "input"
         if direction is not None or top_bit is not None:
@@ -120,14 +120,14 @@ def unit_model(ports: Iterable[Port]) -> str:
 
 @dataclass(frozen=True)
 class Opened:
-    """A module whose instances of another one are taken out: variables stand for their ports.
+    """An outer module whose inner instances are removed; variables replace their ports.
 
     Attributes:
-        verilog: Of the module.
-        module: Its name.
-        ports: Of the instances; those that are connected to anything.
-        count: How many instances it had.
-        shared: Inputs that all instances have in common; they have one variable.
+        verilog: Verilog of the outer module.
+        module: Name of the outer module.
+        ports: Connected ports of an instance.
+        count: Number of instances.
+        shared: Inputs with the same connection at all instances; they share one variable.
     """
 
     verilog: str
@@ -137,7 +137,7 @@ class Opened:
     shared: frozenset[str]
 
     def variable(self, instance: int, port: Port) -> str:
-        """The variable in Verilog that stands for a port of an instance."""
+        """The Verilog variable that replaces a port of an instance."""
         return _variable(self.shared, instance, port)
 
 
@@ -146,10 +146,10 @@ def _variable(shared: frozenset[str], instance: int, port: Port) -> str:
 
 
 def open_module(verilog: str, module: str, inner: str, ports: Sequence[Port]) -> Opened:
-    """Take the instances of `inner`, which has these ports, out of a module's Verilog."""
+    """Remove the instances of `inner`, which has these ports, from a module's Verilog."""
     instances = list(re.finditer(rf"^  {inner} \w+ \((.*?)\n  \);\n", verilog, re.DOTALL | re.MULTILINE))
     if not instances:
-        raise ValueError(f"module {module} holds no {inner}")
+        raise ValueError(f"module {module} has no instance of {inner}")
     connections = [{n: e.strip() for n, e in _CONNECTION.findall(instance.group(1))} for instance in instances]
     wired = tuple(port for port in ports if not connections[0][port.name].startswith("/*"))
     shared = frozenset(
@@ -172,10 +172,10 @@ def open_module(verilog: str, module: str, inner: str, ports: Sequence[Port]) ->
 
 
 def coupling(opened: Opened, inner: str) -> str:
-    """C++ that gives the harness the variables of an opened module.
+    """C++ code that gives the harness access to the variables of an opened module.
 
-    ``INNER_OUTPUTS(DO)``, ``_DIRECT``, ``_INPUTS`` and ``_REGISTERS`` expand ``DO(port)`` for each port of the kind;
-    ``INNERVariables`` has a pointer for each port, and ``bindINNER(root)`` gives those of all instances.
+    ``INNER_OUTPUTS(DO)``, ``_DIRECT``, ``_INPUTS`` and ``_REGISTERS`` expand ``DO(port)`` for each port of the kind.
+    ``INNERVariables`` has a pointer for each port, and ``bindINNER(root)`` returns one per instance.
     """
     lines = [
         f"#define {inner}_{kind}(DO) " + " ".join(f"DO({port.name})" for port in opened.ports if port.kind == kind)
@@ -192,7 +192,7 @@ def coupling(opened: Opened, inner: str) -> str:
 
 
 def record_banks(verilog: str) -> str:
-    """``RECORD_BANKS(DO)``, which expands ``DO(memory)`` for each bank of a column's memory, in order."""
+    """C++ macro ``RECORD_BANKS(DO)``, which expands ``DO(memory)`` for each bank of a column's memory, in order."""
     banks = [f"DO({COLUMN}__DOT__memory__DOT__{bank}__DOT__Memory)" for bank in _RECORDS.findall(verilog)]
     return f"constexpr unsigned banksOfColumn = {len(banks)};\n#define RECORD_BANKS(DO) {' '.join(banks)}\n"
 
@@ -201,7 +201,7 @@ def write_sources(sources: Iterable[Path], folder: Path) -> dict[str, list[Path]
     """Write the Verilog of the models and their ``coupling.hpp`` into a folder.
 
     Returns:
-        The files of each model, by its top module: `UNIT_MODEL`, `COLUMN`, `DEVICE`.
+        The files of each model by top module: `UNIT_MODEL`, `COLUMN`, `DEVICE`.
     """
     verilog = {path.stem: both_edges(path.read_text()) for path in sources}
     ports = {module: module_ports(verilog[module], module) for module in (UNIT, COLUMN)}
@@ -217,7 +217,7 @@ def write_sources(sources: Iterable[Path], folder: Path) -> dict[str, list[Path]
 
 
 def _written(verilog: dict[str, str], top: str, folder: Path) -> Iterator[Path]:
-    """Write the file of a module and those of all that it instantiates."""
+    """Write the files of a module and of all modules below it."""
     folder.mkdir()
     found, pending = set[str](), [top]
     while pending:
@@ -226,7 +226,7 @@ def _written(verilog: dict[str, str], top: str, folder: Path) -> Iterator[Path]:
             continue
         found.add(module)
         pending += _INSTANCE.findall(verilog[module])
-    # What is bound to a module comes before it: see ppa.recording
+    # Bound modules must come before the module they are bound to: see ppa.power.recording
     binders = {name for name, text in verilog.items() if {module for module, _ in _BIND.findall(text)} & found}
     for module in sorted(binders | found, key=lambda name: (name not in binders, name)):
         (folder / f"{module}.sv").write_text(verilog[module])

@@ -1,8 +1,8 @@
-"""Whether an albedo map holds linear reflectance or the curve of sRGB.
+"""Detects whether an albedo map is linear or sRGB-encoded.
 
-Files do not say. A photograph of the same view does: under smooth light its linear colours follow the linear albedo,
-so over a patch with a pattern the slope of log photo over log albedo is 1 when the albedo was read rightly. Read as
-sRGB, linear values give a slope of about 1/2.2.
+Image files do not state it, but a photo of the same view shows it. Under smooth light the photo's linear colours are
+proportional to the linear albedo. Over a textured patch, log photo against log sample therefore has a slope of 1 for
+linear samples, and of about 2.2 for sRGB samples.
 """
 
 from __future__ import annotations
@@ -11,36 +11,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.image_io import decode_srgb
-from colonnade.common.srgb import straightened
+from colonnade.common.srgb import linear_from_srgb
 
-#: Edge of a patch, pixels, and how many patches with a pattern make a judgement.
+#: Edge of a patch, pixels, and the smallest number of textured patches for a decision.
 _PATCH = 16
 _LEAST_PATCHES = 24
 
 
 def linear_albedo(samples: NDArray[np.float64], encoding: str) -> NDArray[np.float64]:
-    """Linear albedo of samples 0.0 to 1.0 that are ``linear`` or ``srgb``."""
-    return samples if encoding == "linear" else straightened(samples)
+    """Convert albedo samples, 0.0 to 1.0, in the encoding ``linear`` or ``srgb``, to linear albedo."""
+    return samples if encoding == "linear" else linear_from_srgb(samples)
 
 
-def judged_encoding(samples: NDArray[np.float64], photo: NDArray[np.uint8] | None) -> tuple[str, str]:
-    """``linear`` or ``srgb`` for an albedo map's samples, float64 [height, width, 3], and a note of why."""
-    advice = "albedo_encoding in meta.json decides it"
+def detect_encoding(samples: NDArray[np.float64], photo: NDArray[np.uint8] | None) -> tuple[str, str]:
+    """Detect the encoding of albedo samples, float64 [height, width, 3].
+
+    Returns:
+        ``linear`` or ``srgb``, and a note for the user.
+    """
+    advice = "set albedo_encoding in meta.json to override"
     if photo is None:
         return "srgb", f"the albedo map was taken as sRGB; {advice}"
     slopes = _slopes(samples[..., 1], decode_srgb(photo[..., 1]))
     if slopes.size < _LEAST_PATCHES:
-        return "srgb", f"the albedo map was taken as sRGB, the photo shows too few patterns to tell; {advice}"
+        return "srgb", f"the albedo map was taken as sRGB, because the photo has too little texture to decide; {advice}"
     slope = float(np.median(slopes))
     encoding = "linear" if slope < 1.5 else "srgb"
     return (
         encoding,
-        f"the albedo map was taken as {encoding}: over it the photo has an exponent of {slope:.2f}; {advice}",
+        f"the albedo map was taken as {encoding}: the photo follows it with an exponent of {slope:.2f}; {advice}",
     )
 
 
 def _slopes(albedo: NDArray[np.float64], light: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of log photo over log sample, for each patch where the two go together; 1 for linear samples, 2.2 for sRGB."""
+    """Slope of log photo over log sample for each patch where they correlate: 1 for linear samples, 2.2 for sRGB."""
     rows, columns = albedo.shape[0] // _PATCH, albedo.shape[1] // _PATCH
     if rows == 0 or columns == 0:
         return np.empty(0)
@@ -55,6 +59,6 @@ def _slopes(albedo: NDArray[np.float64], light: NDArray[np.float64]) -> NDArray[
     x -= x.mean(axis=1, keepdims=True)
     y -= y.mean(axis=1, keepdims=True)
     xy, xx, yy = (x * y).sum(axis=1), (x * x).sum(axis=1), (y * y).sum(axis=1)
-    together = xy > 0.9 * np.sqrt(xx * yy)
-    slopes: NDArray[np.float64] = xy[together] / xx[together]
+    correlated = xy > 0.9 * np.sqrt(xx * yy)
+    slopes: NDArray[np.float64] = xy[correlated] / xx[correlated]
     return slopes

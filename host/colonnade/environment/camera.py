@@ -1,4 +1,4 @@
-"""The camera of a room, from its ``meta.json``."""
+"""Reads a room's camera from ``meta.json``."""
 
 from __future__ import annotations
 
@@ -11,34 +11,37 @@ from numpy.typing import NDArray
 from colonnade.common.errors import UserError
 from colonnade.environment.model import EnvironmentCamera
 
-#: Pixels that a principal point or a focal length may have, and a focal length must have.
+#: Largest principal point or focal length, and smallest focal length, pixels.
 _MAX_PIXELS = 1e6
-_LEAST_FOCAL = 1.0
-#: Metres that the camera may be away from the world's origin.
+_MIN_FOCAL = 1.0
+#: Largest distance of the camera from the world's origin on an axis, metres.
 _MAX_METRES = 1e6
-#: How far the axes of a pose may be from unit and at right angles.
+#: Tolerance of a pose's axes: unit length and right angles.
 _AXES_TOLERANCE = 1e-3
 
 
 def read_camera(data: dict[str, Any], file: Path) -> EnvironmentCamera:
-    """Focal lengths, principal point and pose.
+    """Read focal lengths, principal point and pose.
 
-    ``cam_to_world`` is the 4x4 (or 3x4) pose of a camera with x left, y up, z forward, as Mitsuba writes it; view
-    space turns its first two axes round.
+    ``cam_to_world`` is the 4x4 or 3x4 pose of a camera with x left, y up, z forward, as in Mitsuba; view space negates
+    the first two axes.
+
+    Raises:
+        UserError: A value is missing or invalid.
     """
     values = {key: _number(data, key, file) for key in ("fx", "fy", "cx", "cy")}
     for key in ("fx", "fy"):
         if values[key] <= 0:
             raise UserError(f"{file}: {key} is {values[key]:g}, a focal length must be more than 0 pixels")
-        if values[key] < _LEAST_FOCAL:
-            raise UserError(f"{file}: {key} is {values[key]:g}, a focal length must be at least {_LEAST_FOCAL:g}")
+        if values[key] < _MIN_FOCAL:
+            raise UserError(f"{file}: {key} is {values[key]:g}, a focal length must be at least {_MIN_FOCAL:g}")
     pose = _pose(data, file)
     to_world = pose[:3] * np.array([-1.0, -1.0, 1.0, 1.0])
     return EnvironmentCamera(values["fx"], values["fy"], values["cx"], values["cy"], to_world)
 
 
 def check_size(data: dict[str, Any], size: tuple[int, int], file: Path, map_file: Path) -> None:
-    """Refuse maps of another size than the camera's: its focal lengths would be wrong for them."""
+    """Refuse maps whose size differs from the camera's, because its focal lengths would be wrong."""
     for key, pixels in zip(("width", "height"), size, strict=True):
         if key in data and data[key] != pixels:
             raise UserError(
@@ -57,7 +60,7 @@ def _number(data: dict[str, Any], key: str, file: Path) -> float:
 
 
 def _pose(data: dict[str, Any], file: Path) -> NDArray[np.float64]:
-    """float64 [3 or 4, 4]: a right-handed frame and a place."""
+    """Read and check the pose, float64 [3 or 4, 4]: a right-handed rotation and a position."""
     if "cam_to_world" not in data:
         raise UserError(f"{file} lacks cam_to_world: the camera's 4x4 pose, x left, y up, z forward")
     try:

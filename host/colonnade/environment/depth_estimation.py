@@ -1,10 +1,10 @@
-"""Depth of a room that came without a depth map: from its normals and its floor.
+"""Estimates depth from normals and the floor, for a room without a depth map.
 
-On a smooth surface the normal says how depth changes from a pixel to the next: with the view ray d = (x, y, 1),
-``grad log z = -(n_x / fx, n_y / fy) / (n . d)``. Log depth is the least-squares solution of that over all pairs of
-neighbours; pairs that contradict it on one side only (an edge before something farther) lose weight in a few rounds, as
-in Cao et al., "Bilateral Normal Integration", ECCV 2022. The floor is the lowest level surface; it lies a known height
-below the camera, which gives the scale, and after the first rounds holds its pixels where they belong.
+On a smooth surface the normal gives the depth gradient: with the view ray d = (x, y, 1),
+``grad log z = -(n_x / fx, n_y / fy) / (n . d)``. Log depth is the weighted least-squares solution over all pairs of
+adjacent pixels. At a depth discontinuity only one of a pixel's two neighbours fits, so a few rounds reduce the other's
+weight (Cao et al., "Bilateral Normal Integration", ECCV 2022). The floor is the lowest horizontal surface; its known
+distance below the camera gives the scale. After the first rounds, floor pixels are also constrained to this height.
 """
 
 from __future__ import annotations
@@ -19,33 +19,33 @@ from scipy.sparse.linalg import splu
 from colonnade.common.errors import UserError
 from colonnade.environment.model import EnvironmentCamera
 
-#: Metres above the floor of a camera whose pose does not say.
+#: Default height of the camera above the floor, metres.
 DEFAULT_CAMERA_HEIGHT = 1.5
-#: Pixels of the grid that is solved; larger maps are thinned out to it.
+#: Largest number of unknowns; larger maps are subsampled.
 _GRID_PIXELS = 40_000
-#: Rounds, and how many of them without the floor.
+#: Number of rounds, and of those before the floor constraint.
 _ROUNDS = 12
 _FREE_ROUNDS = 4
-#: Steepness of the choice between a pixel's two neighbours.
+#: Steepness of the weighting between a pixel's two neighbours.
 _STEEPNESS = 4.0
-#: A surface that is level to within this cosine may be floor; it is if its height fits to within this share.
+#: A floor pixel's normal has at least this cosine with up, and its height at most this relative error.
 _LEVEL = 0.96
 _FLOOR_TOLERANCE = 0.12
-#: The share of the pixels that must be level for a floor to be seen.
-_LEAST_FLOOR = 0.005
-#: Weight of a floor pixel's depth beside that of a pair of neighbours.
-_ANCHOR = 0.05
+#: The fraction of horizontal pixels from which the floor counts as visible.
+_MIN_FLOOR_FRACTION = 0.005
+#: Weight of the floor constraint relative to a pair of neighbours.
+_FLOOR_WEIGHT = 0.05
 
 
 @dataclass(frozen=True)
 class _Grid:
-    """The pixels that are solved for.
+    """The subsampled pixels of the linear system.
 
     Attributes:
         normals, directions: float64 [rows, columns, 3], view space; directions have z = 1.
-        down: float64 [rows, columns], how far below the camera the point at depth 1 lies.
-        level: bool [rows, columns], whether it may be floor.
-        steps: A grid step across and down, in focal lengths.
+        down: float64 [rows, columns], drop below the camera of the view ray's point at depth 1.
+        level: bool [rows, columns], whether the pixel may be floor.
+        steps: Horizontal and vertical grid step, in focal lengths.
     """
 
     normals: NDArray[np.float64]
@@ -56,20 +56,32 @@ class _Grid:
 
 
 @dataclass(frozen=True)
-class _Side:
-    """One-sided equations ``z[there] - z[here] = slope`` in log depth, one for each pixel with that neighbour."""
+class _Differences:
+    """Difference equations ``z[neighbour] - z[pixel] = slope`` in log depth, towards one side."""
 
-    here: NDArray[np.intp]
-    there: NDArray[np.intp]
+    pixel: NDArray[np.intp]
+    neighbour: NDArray[np.intp]
     slope: NDArray[np.float64]
 
 
 def depth_from_normals(
     normals: NDArray[np.float64], camera: EnvironmentCamera, camera_height: float
 ) -> tuple[NDArray[np.float64], str]:
-    """Depth in metres, float64 [height, width], and a note of how it came about."""
+    """Estimate depth.
+
+    Args:
+        normals: float64 [height, width, 3], unit, view space.
+        camera: The maps' camera.
+        camera_height: Height above the floor, metres.
+
+    Returns:
+        Depth in metres, float64 [height, width], and a note for the user.
+
+    Raises:
+        UserError: The height is not positive, or no pixel is below the camera.
+    """
     if not np.isfinite(camera_height) or camera_height <= 0:
-        raise UserError(f"the camera's height is {camera_height:g} m: it must be above the floor")
+        raise UserError(f"the camera's height is {camera_height:g} m: it must be more than 0")
     height, width = normals.shape[:2]
     thin = max(1, int(np.ceil(np.sqrt(height * width / _GRID_PIXELS))))
     directions = camera.directions(width, height)
@@ -79,18 +91,18 @@ def depth_from_normals(
     down = -(directions[chosen] @ up)
     level = (normals[chosen] @ up > _LEVEL) & (down > 0)
     grid = _Grid(normals[chosen], directions[chosen], down, level, (thin / camera.fx, thin / camera.fy))
-    sees_floor = np.count_nonzero(level) >= max(4, _LEAST_FLOOR * level.size)
+    sees_floor = np.count_nonzero(level) >= max(4, _MIN_FLOOR_FRACTION * level.size)
     solved = _integrate(grid, camera_height if sees_floor else None)
     if sees_floor:
         how = "the floor"
     else:
         lowest = float(np.percentile(np.exp(solved) * down, 99))
         if lowest <= 0:
-            raise UserError("depth cannot be estimated: the camera sees no floor; give the room a depth map")
+            raise UserError("depth cannot be estimated: the camera sees nothing below it; add a depth map to the room")
         solved += np.log(camera_height / lowest)
         how = "its lowest point"
 
-    # A pixel lies in the plane through its grid point with its own normal, unless that takes it far from there
+    # Place each pixel on the plane of its own normal through its grid point, within limits
     nearest = np.ix_(*(np.minimum(np.arange(n) // thin, k.size - 1) for n, k in ((height, rows), (width, columns))))
     base = np.exp(solved)
     anchors = (directions[chosen] * base[..., np.newaxis])[nearest]
@@ -102,30 +114,30 @@ def depth_from_normals(
 
 
 def _integrate(grid: _Grid, camera_height: float | None) -> NDArray[np.float64]:
-    """Log depth: of metres if there is a floor ``camera_height`` below, else with the mean 0."""
+    """Solve for log depth: in metres with a floor ``camera_height`` below, else with mean 0."""
     shape = grid.down.shape
     sides = _sides(grid)
-    weights = [np.full(side.here.size, 0.5) for side in sides]
-    target, hold = np.zeros(grid.down.size), np.full(grid.down.size, 1e-9)
+    weights = [np.full(side.pixel.size, 0.5) for side in sides]
+    target, target_weight = np.zeros(grid.down.size), np.full(grid.down.size, 1e-9)
     solution = np.zeros(grid.down.size)
     spread = sum(grid.steps) / 2
-    for turn in range(_ROUNDS):
-        solution = _solve(sides, weights, target, hold)
+    for completed_rounds in range(_ROUNDS):
+        solution = _solve(sides, weights, target, target_weight)
         if camera_height is not None:
             below = (np.exp(solution).reshape(shape) * grid.down)[grid.level]
             floor = float(np.percentile(below, 85))
             solution += np.log(camera_height / floor)
-            if turn >= _FREE_ROUNDS:
+            if completed_rounds >= _FREE_ROUNDS:
                 height = np.exp(solution).reshape(shape) * grid.down
                 floor_pixels = grid.level & (np.abs(height / camera_height - 1.0) < _FLOOR_TOLERANCE)
-                hold = np.where(floor_pixels, _ANCHOR, 1e-9).ravel()
+                target_weight = np.where(floor_pixels, _FLOOR_WEIGHT, 1e-9).ravel()
                 target = np.where(floor_pixels, np.log(camera_height / np.maximum(grid.down, 1e-6)), 0.0).ravel()
         weights = _weights(sides, solution, spread)
     return solution.reshape(shape) if camera_height is not None else solution.reshape(shape) - solution.mean()
 
 
-def _sides(grid: _Grid) -> list[_Side]:
-    """Equations to the right, to the left, downwards, upwards."""
+def _sides(grid: _Grid) -> list[_Differences]:
+    """Difference equations towards the right, the left, below and above."""
     facing = np.minimum(np.einsum("yxc,yxc->yx", grid.normals, grid.directions), -0.05)
     index = np.arange(facing.size).reshape(facing.shape)
     sides = []
@@ -133,36 +145,37 @@ def _sides(grid: _Grid) -> list[_Side]:
         slope = (-grid.normals[..., component] * grid.steps[component] / facing).ravel()
         size = index.shape[axis]
         first, second = (np.take(index, span, axis=axis).ravel() for span in (np.arange(size - 1), np.arange(1, size)))
-        sides += [_Side(first, second, slope[first]), _Side(second, first, -slope[second])]
+        sides += [_Differences(first, second, slope[first]), _Differences(second, first, -slope[second])]
     return sides
 
 
-def _weights(sides: list[_Side], solution: NDArray[np.float64], spread: float) -> list[NDArray[np.float64]]:
-    """Of each equation: of a pixel's two neighbours along an axis the one that fits it gets more."""
+def _weights(sides: list[_Differences], solution: NDArray[np.float64], spread: float) -> list[NDArray[np.float64]]:
+    """Weights of the equations: of a pixel's two neighbours on an axis, the better fitting one gets more."""
     misfits = np.full((len(sides), solution.size), np.inf)
     for misfit, side in zip(misfits, sides, strict=True):
-        misfit[side.here] = ((solution[side.there] - solution[side.here] - side.slope) / spread) ** 2
+        misfit[side.pixel] = ((solution[side.neighbour] - solution[side.pixel] - side.slope) / spread) ** 2
     weights = []
     for k, side in enumerate(sides):
-        own, other = misfits[k][side.here], misfits[k ^ 1][side.here]
+        own, other = misfits[k][side.pixel], misfits[k ^ 1][side.pixel]
         weights.append(1.0 / (1.0 + np.exp(-np.clip(_STEEPNESS * (other - own), -60, 60))) + 1e-5)
     return weights
 
 
 def _solve(
-    sides: list[_Side],
+    sides: list[_Differences],
     weights: list[NDArray[np.float64]],
     target: NDArray[np.float64],
-    hold: NDArray[np.float64],
+    target_weight: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Weighted least squares of differences, and of values' distance from ``target`` with the weight ``hold``."""
+    """Solve weighted least squares of the differences, and of ``target`` with the weights ``target_weight``."""
     unknowns = target.size
-    here, there = (np.concatenate([getattr(side, end) for side in sides]) for end in ("here", "there"))
+    pixel = np.concatenate([side.pixel for side in sides])
+    neighbour = np.concatenate([side.neighbour for side in sides])
     slope, weight = np.concatenate([side.slope for side in sides]), np.concatenate(weights)
-    diagonal = hold + np.bincount(here, weight, unknowns) + np.bincount(there, weight, unknowns)
-    across = sparse.coo_matrix((-weight, (here, there)), (unknowns, unknowns))
-    matrix = sparse.diags(diagonal) + across + across.T
-    pull = np.bincount(there, weight * slope, unknowns) - np.bincount(here, weight * slope, unknowns)
+    diagonal = target_weight + np.bincount(pixel, weight, unknowns) + np.bincount(neighbour, weight, unknowns)
+    off_diagonal = sparse.coo_matrix((-weight, (pixel, neighbour)), (unknowns, unknowns))
+    matrix = sparse.diags(diagonal) + off_diagonal + off_diagonal.T
+    right_side = np.bincount(neighbour, weight * slope, unknowns) - np.bincount(pixel, weight * slope, unknowns)
     factors = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    solution: NDArray[np.float64] = factors.solve(pull + hold * target)
+    solution: NDArray[np.float64] = factors.solve(right_side + target_weight * target)
     return solution

@@ -1,4 +1,4 @@
-"""An environment together with its maps as the physical-attribute memory holds them."""
+"""An environment with its encoded maps, the contents of the physical-attribute memory."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from colonnade.environment.model import Environment
 
 @dataclass(frozen=True)
 class EncodedEnvironment:
-    """A room, and its maps as the physical-attribute memory holds them."""
+    """An environment and its encoded maps."""
 
     environment: Environment
     image: AttributeImage
 
     @staticmethod
     def load(folder: Path, manifest: Manifest) -> EncodedEnvironment:
-        """A room's folder, for the hardware of a manifest.
+        """Load a room's folder and encode its maps for a design.
 
         Raises:
-            UserError: The folder is no room, the hardware holds none, or maps of another size.
+            UserError: The folder is not a room, or the design has no memory for maps of this size.
         """
         layout, environment = layout_of(manifest), load_environment(folder)
         if (environment.width, environment.height) != (layout.width, layout.height):
@@ -38,10 +38,10 @@ class EncodedEnvironment:
 
 
 def layout_of(manifest: Manifest) -> AttributeLayout:
-    """What the hardware's physical-attribute memory holds.
+    """The layout of a design's physical-attribute memory.
 
     Raises:
-        UserError: It has none.
+        UserError: The design has no such memory.
     """
     sizes = manifest.config["physicalAttributeMemory"]
     if sizes is None:

@@ -1,12 +1,12 @@
-"""Loads a room from its folder.
+"""Loads an environment from the folder of a room.
 
-| file | holds |
+| file | content |
 |---|---|
-| ``meta.json`` | ``fx fy cx cy`` in pixels, ``cam_to_world``; or also ``width height albedo_encoding depth_step`` |
+| ``meta.json`` | ``fx fy cx cy`` in pixels, ``cam_to_world``; optionally ``width height albedo_encoding depth_step`` |
 | ``albedo.png`` | reflectance, grey or colour |
 | ``normal.png`` | n * 0.5 + 0.5 in camera space: x right, y up, z towards the viewer |
-| ``depth.npy`` or ``depth.png`` | metres along z, or grey of 16 bits in steps of ``depth_step`` metres; optional |
-| ``photo.png`` or ``render.png`` | the room as the camera saw it, sRGB; optional |
+| ``depth.npy`` or ``depth.png`` | metres along z, or 16-bit grey in steps of ``depth_step`` metres; optional |
+| ``photo.png`` or ``render.png`` | the camera's picture of the room, sRGB; optional |
 """
 
 from __future__ import annotations
@@ -21,25 +21,28 @@ from colonnade.common.errors import UserError
 from colonnade.common.image_io import read_picture
 from colonnade.common.input_files import exists, is_folder
 from colonnade.environment import files
-from colonnade.environment.albedo import judged_encoding, linear_albedo
+from colonnade.environment.albedo import detect_encoding, linear_albedo
 from colonnade.environment.camera import check_size, read_camera
 from colonnade.environment.depth_estimation import DEFAULT_CAMERA_HEIGHT, depth_from_normals
 from colonnade.environment.model import Environment
-from colonnade.environment.repair import mended_depth, mended_normals
+from colonnade.environment.repair import repair_depth, repair_normals
 
-#: Metres a step of a 16-bit depth picture stands for unless ``depth_step`` says otherwise, as depth cameras have it.
+#: Default metres per step of a 16-bit depth picture, as in common depth cameras.
 DEFAULT_DEPTH_STEP = 0.001
-#: A step of a kilometre is no depth.
-LARGEST_DEPTH_STEP = 1e3
-#: The largest edge of a map, pixels: beyond it u and v would not fit the planes' fields.
-LARGEST_EDGE = 4096
+#: Largest metres per step.
+MAX_DEPTH_STEP = 1e3
+#: Largest width or height of a map, pixels, limited by the hardware's plane coefficients.
+MAX_EDGE = 4096
 
 
 def load_environment(path: Path, camera_height: float | None = None) -> Environment:
-    """The room in the folder ``path``.
+    """Load the room in the folder ``path``.
 
-    Without a depth map the depth is estimated from the normals and the floor, ``camera_height`` metres below the
-    camera: by default the height that the camera's pose has, or 1.5 m if that is not above the floor.
+    Without a depth map, the depth is estimated from the normals and the floor, ``camera_height`` metres below the
+    camera. The default is the height of the camera's pose, or 1.5 m if the pose is not above the floor.
+
+    Raises:
+        UserError: A file is missing, unreadable or inconsistent with the others.
     """
     folder = Path(path)
     if not is_folder(folder):
@@ -53,15 +56,15 @@ def load_environment(path: Path, camera_height: float | None = None) -> Environm
 
     samples = files.read_colour(albedo_file)
     height, width = samples.shape[:2]
-    if max(width, height) > LARGEST_EDGE:
-        raise UserError(f"{albedo_file} is {width}x{height} pixels: maps may have {LARGEST_EDGE} a side at most")
+    if max(width, height) > MAX_EDGE:
+        raise UserError(f"{albedo_file} is {width}x{height} pixels: maps may have at most {MAX_EDGE} a side")
     check_size(meta, (width, height), meta_file, albedo_file)
 
     def same_size(array: NDArray[Any], file: Path) -> None:
         if array.shape[:2] != (height, width):
             raise UserError(
-                f"{file} is {array.shape[1]}x{array.shape[0]} pixels, {albedo_file.name} {width}x{height}: all maps"
-                " of a room need one size"
+                f"{file} is {array.shape[1]}x{array.shape[0]} pixels, but {albedo_file.name} is {width}x{height}:"
+                " all maps of a room must have the same size"
             )
 
     coded = files.read_colour(normal_file) * 2.0 - 1.0
@@ -73,17 +76,17 @@ def load_environment(path: Path, camera_height: float | None = None) -> Environm
     notes: list[str] = []
     encoding = meta.get("albedo_encoding")
     if encoding is None:
-        encoding, note = judged_encoding(samples, photo)
+        encoding, note = detect_encoding(samples, photo)
         notes.append(note)
     elif encoding not in ("linear", "srgb"):
         raise UserError(f"{meta_file}: albedo_encoding must be linear or srgb")
     directions = camera.directions(width, height)
-    normals, repaired = mended_normals(coded * np.array([1.0, -1.0, -1.0]), directions, normal_file)
+    normals, repaired = repair_normals(coded * np.array([1.0, -1.0, -1.0]), directions, normal_file)
     notes += repaired
     if depth_file is not None:
         depth = _depth(depth_file, meta, meta_file)
         same_size(depth, depth_file)
-        depth, repaired = mended_depth(depth, depth_file)
+        depth, repaired = repair_depth(depth, depth_file)
         notes += repaired
     else:
         if camera_height is None:
@@ -103,10 +106,10 @@ def _needed(folder: Path, name: str) -> Path:
 
 
 def _depth(file: Path, meta: dict[str, Any], meta_file: Path) -> NDArray[np.float64]:
-    """Metres, holes included: float64 [height, width]."""
+    """Read the depth map before repair, metres: float64 [height, width]."""
     if file.suffix == ".npy":
         return files.read_array(file)
     step = meta.get("depth_step", DEFAULT_DEPTH_STEP)
-    if isinstance(step, bool) or not isinstance(step, int | float) or not 0 < step <= LARGEST_DEPTH_STEP:
-        raise UserError(f"{meta_file}: depth_step must be the metres that a step of {file.name} stands for")
+    if isinstance(step, bool) or not isinstance(step, int | float) or not 0 < step <= MAX_DEPTH_STEP:
+        raise UserError(f"{meta_file}: depth_step must be the metres per step of {file.name}")
     return files.read_grey(file) * float(step)

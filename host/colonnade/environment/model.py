@@ -1,6 +1,6 @@
-"""What is known of a room: maps of its albedo, normals and depth, and the camera that saw them.
+"""The environment: maps of a room's albedo, normals and depth, and the camera of these maps.
 
-View space is x right, y down, z forward, in metres. The centre of pixel (x, y) lies at (x + 0.5, y + 0.5).
+View space is x right, y down, z forward, in metres. The centre of pixel (x, y) is at (x + 0.5, y + 0.5).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ class EnvironmentCamera:
 
     Attributes:
         fx, fy: Focal lengths in pixels.
-        cx, cy: Principal point in pixels; the map's centre for a camera that was not cropped.
-        to_world: float64 [3, 4], view space to the world; the world's y is up, its floor at 0.
+        cx, cy: Principal point in pixels; the map's centre unless the photo was cropped.
+        to_world: float64 [3, 4], view space to world space; in world space y is up and the floor is at 0.
     """
 
     fx: float
@@ -28,7 +28,7 @@ class EnvironmentCamera:
     to_world: NDArray[np.float64]
 
     def directions(self, width: int, height: int) -> NDArray[np.float64]:
-        """Through the centre of every pixel, view space, z = 1: float64 [height, width, 3]."""
+        """View rays through the pixel centres, view space, with z = 1: float64 [height, width, 3]."""
         x = (np.arange(width) + 0.5 - self.cx) / self.fx
         y = (np.arange(height) + 0.5 - self.cy) / self.fy
         rays = np.ones((height, width, 3))
@@ -39,17 +39,17 @@ class EnvironmentCamera:
 
 @dataclass(frozen=True)
 class Environment:
-    """Maps of one size and the camera that they belong to.
+    """A room as maps of one size, and their camera.
 
     Attributes:
-        name: For messages and pictures.
+        name: Name for messages and files.
         albedo: float64 [height, width, 3], linear, 0.0 to 1.0.
         normals: float64 [height, width, 3], unit, view space, towards the camera.
         depth: float64 [height, width], metres along z; an estimate unless `has_depth`.
         has_depth: Whether the room came with a depth map.
-        camera: What saw them.
+        camera: The camera of the maps.
         photo: uint8 [height, width, 3], sRGB, or None.
-        notes: What was assumed or mended, one line each.
+        notes: Assumptions and repairs of the loader, one line each.
     """
 
     name: str
@@ -63,40 +63,40 @@ class Environment:
 
     @property
     def width(self) -> int:
-        """Pixels in a row of the maps."""
+        """Width of the maps, pixels."""
         return int(self.albedo.shape[1])
 
     @property
     def height(self) -> int:
-        """Rows of the maps."""
+        """Height of the maps, pixels."""
         return int(self.albedo.shape[0])
 
     @property
     def fx(self) -> float:
-        """Focal length across, pixels."""
+        """Horizontal focal length, pixels."""
         return self.camera.fx
 
     @property
     def fy(self) -> float:
-        """Focal length down, pixels."""
+        """Vertical focal length, pixels."""
         return self.camera.fy
 
     @property
     def cx(self) -> float:
-        """Principal point across, pixels."""
+        """Horizontal principal point, pixels."""
         return self.camera.cx
 
     @property
     def cy(self) -> float:
-        """Principal point down, pixels."""
+        """Vertical principal point, pixels."""
         return self.camera.cy
 
     @property
     def camera_to_world(self) -> NDArray[np.float64]:
-        """float64 [3, 4], view space to the world."""
+        """Transform from view space to world space, float64 [3, 4]."""
         return self.camera.to_world
 
     def points(self) -> NDArray[np.float64]:
-        """What each pixel sees, view space, metres: float64 [height, width, 3]."""
+        """Surface point of each pixel, view space, metres: float64 [height, width, 3]."""
         points: NDArray[np.float64] = self.camera.directions(self.width, self.height) * self.depth[..., np.newaxis]
         return points

@@ -1,1 +1,1 @@
-"""Measurements: rays per cycle, sweeps, verification."""
+"""Benchmarks, sweeps, verification and fuzzing of designs."""

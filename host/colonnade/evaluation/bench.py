@@ -1,4 +1,4 @@
-"""Rays per cycle of the benchmark's meshes through the RTL, and what holds each of them back."""
+"""The benchmark: rays per cycle of eight meshes in the RTL, and the bottleneck of each."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.evaluation.measure import Conditions, Run, measure
 from colonnade.evaluation.throughput import figures
 
-#: The eight meshes of the benchmark.
+#: Meshes of the benchmark.
 MESHES = ("teapot", "fandisk", "cheburashka", "rocker-arm", "bunny", "armadillo", "dragon", "duck")
 
-#: What the 10x8 chip of the paper reaches: 41.6 MRay/s at 200 MHz.
+#: Rate of the paper's 10x8 chip: 41.6 MRay/s at 200 MHz.
 PAPER_RAYS_PER_CYCLE = 0.208
 
-#: Name, report of the mesh: called after each mesh.
+#: Called after each mesh with its name and its report.
 Finished = Callable[[str, Mapping[str, Any]], None]
 
 
@@ -29,16 +29,16 @@ def bench(
     finished: Finished = lambda name, result: None,
     mirror: bool = False,
 ) -> dict[str, Any]:
-    """Render every mesh once and gather the figures.
+    """Render each mesh once and collect its figures.
 
     Args:
-        config: name of the configuration, with `overrides` applied.
-        overrides: ``key.path=value`` changes.
-        meshes: names or files.
-        conditions: scene, size, and how many at a time.
-        progress: shows the steps.
-        finished: called with each mesh's name and figures as they come, in order.
-        mirror: the meshes are mirrors, whose reflections are traced once.
+        config: Configuration, before `overrides`.
+        overrides: Changes to the configuration, ``key.path=value``.
+        meshes: Names or files.
+        conditions: Scene, size and number of parallel jobs.
+        progress: Shows the steps.
+        finished: Called after each mesh, in order.
+        mirror: Render the meshes as mirrors with one reflection.
 
     Returns:
         The report that `colonnade bench --json` writes.
@@ -53,10 +53,10 @@ def bench(
 
 
 def design_result(reports: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """What several meshes say about one design.
+    """The report of one design over several meshes.
 
     Args:
-        reports: by mesh, from `measure`; at least one.
+        reports: Reports of `measure` by mesh, at least one.
     """
     first = next(iter(reports.values()))
     meshes = {name: mesh_result(report) for name, report in reports.items()}
@@ -77,12 +77,12 @@ def design_result(reports: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def mesh_result(report: Mapping[str, Any]) -> dict[str, Any]:
-    """One mesh's part of the report."""
-    kept = ("cycles", "rays", "rays_per_cycle", "rays_per_cycle_in_box", "counters", "cycles_per_second", "seconds")
-    return {"triangles": report["mesh"]["triangles"], **{key: report[key] for key in kept}, **figures(report)}
+    """The report of one mesh."""
+    keys = ("cycles", "rays", "rays_per_cycle", "rays_per_cycle_in_box", "counters", "cycles_per_second", "seconds")
+    return {"triangles": report["mesh"]["triangles"], **{key: report[key] for key in keys}, **figures(report)}
 
 
 def geometric_mean(values: Iterable[float]) -> float:
-    """Geometric mean; 0.0 when any value is zero."""
-    listed = list(values)
-    return math.exp(sum(map(math.log, listed)) / len(listed)) if listed and min(listed) > 0 else 0.0
+    """The geometric mean; 0.0 if there is no value or any value is zero."""
+    factors = list(values)
+    return math.exp(sum(map(math.log, factors)) / len(factors)) if factors and min(factors) > 0 else 0.0

@@ -1,4 +1,4 @@
-"""Frames through the RTL for the sake of their counters: some at a time, and none twice where that is wanted."""
+"""Measures the counters of RTL frames, in parallel and with a cache."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from colonnade.scene.view import with_overrides
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
-#: A build takes all processors by itself.
-_BUILDING = threading.Lock()
+#: Serialises builds, since each uses all processors.
+_BUILD_LOCK = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class Run:
     """One frame to render.
 
     Attributes:
-        config: name of the configuration, with `overrides` applied.
-        overrides: ``key.path=value`` changes.
-        mesh: name or file.
-        mirror: its surface is a mirror, whose reflections are traced once, in place of the scene's material.
+        config: Configuration, before `overrides`.
+        overrides: Changes to the configuration, ``key.path=value``.
+        mesh: Name or file.
+        mirror: Replace the scene's material by a mirror with one reflection.
     """
 
     config: str
@@ -54,11 +54,11 @@ class Run:
 
     @property
     def title(self) -> str:
-        """For progress."""
+        """The title of its progress."""
         return " ".join((self.mesh, *("mirror" for _ in range(self.mirror)), *self.overrides))
 
     def scene(self, scene: Scene) -> Scene:
-        """The benchmark's scene with this mesh and its surface."""
+        """The benchmark scene with this run's mesh and material."""
         scene = scene.with_mesh(self.mesh)
         if not self.mirror:
             return scene
@@ -67,13 +67,13 @@ class Run:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What the runs of one measurement have in common.
+    """The common settings of all runs of a measurement.
 
     Attributes:
-        scene: the benchmark's scene; its mesh is replaced.
-        size: width and height in pixels; the scene's unless given.
-        jobs: frames at a time.
-        reuse: take the report of a run of the same hardware and the same scene image, where one was kept.
+        scene: The benchmark scene; each run replaces its mesh.
+        size: Width and height, pixels; None: those of the scene.
+        jobs: Number of frames in parallel.
+        reuse: Use the cached report of an earlier run with the same hardware and scene image.
     """
 
     scene: Path
@@ -83,9 +83,9 @@ class Conditions:
 
 
 def measure(runs: Sequence[Run], conditions: Conditions, progress: Progress = QUIET) -> Iterator[dict[str, Any]]:
-    """Reports of the runs, in their order: those of `frame_report`, with ``cycles_per_second`` and ``seconds``.
+    """Reports of the runs in order: `frame_report` with ``cycles_per_second`` and ``seconds``.
 
-    All meshes are loaded before the first frame is rendered.
+    All meshes are loaded before the first frame.
     """
     scene = load_scene(conditions.scene)
     meshes: dict[str, Mesh] = {}
@@ -96,24 +96,25 @@ def measure(runs: Sequence[Run], conditions: Conditions, progress: Progress = QU
     def prepare(run: Run) -> _Prepared:
         return _prepared(run, scene, meshes[run.mesh], conditions, progress.of(run.title))
 
-    def one(frame: _Prepared) -> dict[str, Any]:
-        return frame.known or _measured(frame, progress.of(frame.run.title))
+    def render(frame: _Prepared) -> dict[str, Any]:
+        return frame.cached or _measured(frame, progress.of(frame.run.title))
 
     prepared = list(in_order(prepare, runs, conditions.jobs))
-    return in_order(one, prepared, conditions.jobs, length=lambda frame: frame.visits)
+    return in_order(render, prepared, conditions.jobs, length=lambda frame: frame.work)
 
 
 @dataclass(frozen=True)
 class _Prepared:
-    """A frame that is ready to be rendered.
+    """A frame that is ready to render.
 
     Attributes:
-        run: what it belongs to.
-        design, image, registers: what it is rendered with.
-        key, kept: of its measurement in the cache.
-        known: the report of an earlier run, if there is one and it may be used.
-        visits: records that its rays visit, by the model of a small frame: the time it takes goes with them.
-        seconds: that packing took.
+        run: The run.
+        design, image, registers: The inputs of the simulation.
+        key: Cache key of the measurement.
+        cache_file: Cache file of the measurement.
+        cached: The report of an earlier run; None if there is none or it must not be used.
+        work: Estimate of the simulation time: record visits of a small frame in the model.
+        seconds: Seconds of packing.
     """
 
     run: Run
@@ -121,15 +122,15 @@ class _Prepared:
     image: SceneImage
     registers: dict[str, int]
     key: dict[str, Any]
-    kept: Path
-    known: dict[str, Any] | None
-    visits: int
+    cache_file: Path
+    cached: dict[str, Any] | None
+    work: int
     seconds: float
 
 
 def _prepared(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progress: Progress) -> _Prepared:
     scene = run.scene(scene)
-    with _BUILDING:
+    with _BUILD_LOCK:
         design = design_for(run.config, run.overrides, progress)
     manifest = design.manifest
     width, height = conditions.size or (scene.frame.width, scene.frame.height)
@@ -144,11 +145,11 @@ def _prepared(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
     seconds = time.perf_counter() - begun
     key = _key(design, image, registers)
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
-    kept = cache_directory(project_root()) / "measurements" / f"{name}.json"
-    known = cache.stored(kept, key, progress) if conditions.reuse else None
-    visits = 0
-    if known is not None:
-        known |= {
+    cache_file = cache_directory(project_root()) / "measurements" / f"{name}.json"
+    cached = cache.stored(cache_file, key, progress) if conditions.reuse else None
+    work = 0
+    if cached is not None:
+        cached |= {
             "config": manifest.config,
             "config_hash": manifest.config_hash,
             "mesh": asdict(mesh_report(image.header)),
@@ -156,13 +157,13 @@ def _prepared(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
     elif conditions.jobs > 1:
         small = frame_registers(scene, image.header, manifest, max(1, width // 8), max(1, height // 8))
         counters = model_frame(loaded_model(manifest, image), small).counters
-        visits = counters["nodeReads"] + counters["triangleTests"]
-    return _Prepared(run, design, image, registers, key, kept, known, visits, seconds)
+        work = counters["nodeReads"] + counters["triangleTests"]
+    return _Prepared(run, design, image, registers, key, cache_file, cached, work, seconds)
 
 
 def _measured(frame: _Prepared, progress: Progress) -> dict[str, Any]:
     design, image = frame.design, frame.image
-    with _BUILDING:
+    with _BUILD_LOCK:
         build_simulator(design, progress)
     begun = time.perf_counter()
     simulated = render_rtl(design, image, [frame.registers], progress=progress)
@@ -175,12 +176,12 @@ def _measured(frame: _Prepared, progress: Progress) -> dict[str, Any]:
         "cycles_per_second": simulated.cycles_per_second,
         "seconds": {"pack": frame.seconds, "run": run_seconds},
     }
-    cache.store(frame.kept, frame.key, report, progress)
+    cache.store(frame.cache_file, frame.key, report, progress)
     return report
 
 
 def _key(design: GeneratedDesign, image: SceneImage, registers: Mapping[str, int]) -> dict[str, Any]:
-    """All that a frame's counters follow from."""
+    """The cache key: all inputs that determine a frame's counters."""
     digest = hashlib.sha256()
     for words in (image.records, *(section.words for section in image.attributes)):
         digest.update(f"{words.shape} {words.dtype}\n".encode() + words.tobytes())

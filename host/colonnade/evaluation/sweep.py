@@ -1,4 +1,4 @@
-"""Rays per cycle while fields of a configuration vary."""
+"""Sweeps: rays per cycle over combinations of configuration fields."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from colonnade.evaluation.measure import Conditions, Run, measure
 
 @dataclass(frozen=True)
 class Variation:
-    """A field and the values it takes, as they are written on the command line."""
+    """A configuration field and its values, as written on the command line."""
 
     key: str
     values: tuple[str, ...]
@@ -30,9 +30,9 @@ class Point:
     """One design of a sweep.
 
     Attributes:
-        overrides: its ``key.path=value`` changes, those of the base first.
-        varied: the field that this point is about; None for the base and in a cross product.
-        manifest: of the design.
+        overrides: Its changes to the configuration, ``key.path=value``, those of the base first.
+        varied: The varied field; None for the base and in a cross product.
+        manifest: The manifest of the design.
     """
 
     overrides: tuple[str, ...]
@@ -40,16 +40,20 @@ class Point:
     manifest: Manifest
 
 
-#: Result of a point, as in the report: called after each point; the base comes first.
+#: Called after each point, the base first, with its part of the report.
 Finished = Callable[[Mapping[str, Any]], None]
 
 
 def parse_variations(texts: Sequence[str]) -> list[Variation]:
-    """Read ``key.path=value,value,…``, one text a field."""
+    """Parse texts ``key.path=value,value,…``, one per field.
+
+    Raises:
+        UserError: A text is malformed, a value or field occurs twice, or there are too many combinations.
+    """
     variations: list[Variation] = []
     for text in texts:
-        key, equals, listed = (part.strip() for part in text.partition("="))
-        values = tuple(value.strip() for value in listed.split(","))
+        key, equals, rest = (part.strip() for part in text.partition("="))
+        values = tuple(value.strip() for value in rest.split(","))
         if not key or not equals or not all(values):
             raise UserError(f"--vary {text} is not of the form key.path=value,value, e.g. --vary array.rows=1,2,4")
         if len(set(values)) < len(values):
@@ -72,17 +76,17 @@ def sweep(
     progress: Progress = QUIET,
     finished: Finished = lambda point: None,
 ) -> dict[str, Any]:
-    """Measure the base and every point. All configurations are checked before the first frame is rendered.
+    """Measure the base and all points. All configurations are checked before the first frame.
 
     Args:
-        config: name of the base, with `overrides` applied.
-        overrides: ``key.path=value`` changes.
-        variations: what varies.
-        meshes: names or files; rates are geometric means over them.
-        conditions: scene, size, and how many frames at a time.
-        one_by_one: vary each field alone, all others as in the base; else the cross product.
-        progress: shows the steps.
-        finished: called with each point's part of the report, in order.
+        config: Configuration of the base, before `overrides`.
+        overrides: Changes to the configuration, ``key.path=value``.
+        variations: The fields to vary.
+        meshes: Names or files; rates are geometric means over them.
+        conditions: Scene, size and number of parallel jobs.
+        one_by_one: Vary each field alone and keep the others as in the base; else the cross product.
+        progress: Shows the steps.
+        finished: Called after each point, in order.
 
     Returns:
         The report that `colonnade sweep --json` writes.
@@ -116,15 +120,15 @@ def sweep(
 def _points(
     config: str, base: tuple[str, ...], variations: Sequence[Variation], one_by_one: bool, progress: Progress
 ) -> list[Point]:
-    """The base, then the points in their order."""
-    chosen: list[tuple[str | None, tuple[str, ...]]] = [(None, ())]
+    """The base, then the points in order."""
+    combinations: list[tuple[str | None, tuple[str, ...]]] = [(None, ())]
     if one_by_one:
-        chosen += [(vary.key, (f"{vary.key}={value}",)) for vary in variations for value in vary.values]
+        combinations += [(vary.key, (f"{vary.key}={value}",)) for vary in variations for value in vary.values]
     else:
-        ways = [[f"{vary.key}={value}" for value in vary.values] for vary in variations]
-        chosen += [(None, changes) for changes in itertools.product(*ways)]
+        by_field = [[f"{vary.key}={value}" for value in vary.values] for vary in variations]
+        combinations += [(None, changes) for changes in itertools.product(*by_field)]
     points = []
-    for varied, changes in chosen:
+    for varied, changes in combinations:
         overrides = (*base, *changes)
         points.append(Point(overrides, varied, manifest_for(config, overrides, progress).manifest))
     return points
@@ -151,7 +155,7 @@ def _result(
 
 
 def value_of(manifest: Manifest, key: str) -> Any:
-    """A field of the configuration by its path."""
+    """The value of a configuration field ``key.path``."""
     value: Any = manifest.config
     for part in key.split("."):
         value = value[part]

@@ -1,5 +1,4 @@
-"""What the counters of a frame say about its speed: which unit or port is busiest, where context cycles go, and what
-better memory or better units could buy."""
+"""Throughput analysis of a frame's counters: utilisation, bottleneck, stalls of the contexts, and upper bounds."""
 
 from __future__ import annotations
 
@@ -7,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-#: Counters of busy cycles by the unit's name: cycles in which its narrowest stage holds work, summed over all of them.
+#: Counters of busy cycles by unit: cycles in which the unit's narrowest stage holds work, summed over all instances.
 UNITS = {
     "ray set-up": "busyRaySetup",
     "box unit": "busyBoxUnit",
@@ -15,37 +14,37 @@ UNITS = {
     "shader": "busyShader",
 }
 
-#: Counters of context cycles by what the context did, summed over all render units; what is left is `LEAVING`.
+#: Counters of context cycles by the context's state, summed over all render units. The remainder is `COMPLETION`.
 CONTEXT_CYCLES = {
-    "no pixel": "idleContexts",
-    "set-up": "contextsSetUp",
-    "waits for a record": "waitRecord",
-    "waits for a unit": "waitUnit",
+    "idle": "idleContexts",
+    "ray set-up": "contextsSetUp",
+    "record stall": "waitRecord",
+    "unit stall": "waitUnit",
     "box unit and stack": "contextsBox",
     "triangle unit": "contextsTriangles",
     "shader": "contextsShading",
 }
 
-#: Context cycles from the end of a ray to the pixel's departure, or to the next ray.
-LEAVING = "leaving"
+#: Context cycles from the end of a ray to the output of its pixel, or to the next ray.
+COMPLETION = "completion"
 
-#: Ports of the column: one read a cycle and bank, one pixel a cycle and stream.
+#: Ports of a column: each bank reads one record per cycle, each stream delivers one pixel per cycle.
 PORTS = ("memory banks", "pixel streams")
 
-#: Share of the context cycles in which the context has a pixel. Contexts are no bottleneck of their own.
+#: Share of the context cycles in which the context has a pixel. It is never reported as the bottleneck.
 RENDER_UNIT = "render unit"
 
 
 @dataclass(frozen=True)
 class Shape:
-    """How much of everything a design has.
+    """Number of instances in a whole design.
 
     Attributes:
-        units: render units.
-        triangle_units: triangle tests beside each other, of all render units.
-        contexts: of all render units.
-        columns: columns, each with a pixel stream.
-        banks: of all columns.
+        units: Render units.
+        triangle_units: Triangle units.
+        contexts: Contexts.
+        columns: Columns, each with a pixel stream.
+        banks: Memory banks.
     """
 
     units: int
@@ -65,16 +64,16 @@ class Shape:
 
 
 def figures(report: Mapping[str, Any]) -> dict[str, Any]:
-    """The figures of one frame.
+    """The throughput figures of one frame.
 
     Args:
-        report: of `colonnade.render.frames.frame_report`, from the RTL.
+        report: An RTL report of `colonnade.render.report.frame_report`.
 
     Returns:
-        ``utilisation``, by unit and port, 0 to 1; ``bottleneck``, the busiest of them; ``stalls``, shares of all
-        context cycles that add up to 1; ``per_ray``, for each in-box ray; ``snoop_share``, of the records that contexts
-        took; ``limits``, in-box rays per cycle that each unit or port alone would allow; ``bounds``, the least of those
-        of the units and of the ports.
+        ``utilisation``: busy share of each unit and port, 0 to 1. ``bottleneck``: the busiest of them. ``stalls``:
+        shares of all context cycles, with sum 1. ``per_ray``: work per in-box ray. ``snoop_share``: snooped share of
+        the records taken. ``limits``: in-box rays per cycle at full utilisation of each unit or port. ``bounds``: the
+        lowest limit of the units, and of the ports.
     """
     counters, cycles = report["counters"], report["cycles"]
     shape = Shape.of(report["config"])
@@ -96,7 +95,7 @@ def figures(report: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def utilisation(counters: Mapping[str, int], cycles: int, shape: Shape) -> dict[str, float]:
-    """Share of the frame's cycles in which each kind of unit or port was busy, averaged over all of its kind."""
+    """Busy share of the frame's cycles for each kind of unit or port, averaged over its instances, 0 to 1."""
     instances = {unit: shape.triangle_units if unit == "triangle unit" else shape.units for unit in UNITS}
     return {
         RENDER_UNIT: 1.0 - _ratio(counters["idleContexts"], cycles * shape.contexts),
@@ -107,26 +106,26 @@ def utilisation(counters: Mapping[str, int], cycles: int, shape: Shape) -> dict[
 
 
 def stalls(counters: Mapping[str, int], cycles: int, shape: Shape) -> dict[str, float]:
-    """Where the contexts were: shares of contexts × render units × cycles, which add up to 1."""
+    """Shares of all context cycles (contexts × cycles) by state, with sum 1."""
     everything = cycles * shape.contexts
     shares = {name: _ratio(counters[counter], everything) for name, counter in CONTEXT_CYCLES.items()}
     known = sum(counters[counter] for counter in CONTEXT_CYCLES.values())
-    return shares | {LEAVING: _ratio(everything - known, everything)}
+    return shares | {COMPLETION: _ratio(everything - known, everything)}
 
 
 def records_taken(counters: Mapping[str, int]) -> int:
-    """Records that contexts took, by own reads or another's.
+    """Records that contexts took, from their own reads or from reads of others.
 
-    Every accepted read was asked for by one context, which takes its record and counts no snoop hit for it; every other
-    record taken is a snoop hit. So the sum of both counters is exact.
+    The sum is exact: each accepted read belongs to one context, which counts no snoop hit for it. Each other record
+    taken is a snoop hit.
     """
     return counters["recordReads"] + counters["snoopHits"]
 
 
 def per_ray(counters: Mapping[str, int]) -> dict[str, float]:
-    """Work for each in-box ray, shadow rays and the attributes of hits included.
+    """Work per in-box ray, including shadow rays and the attributes of hits.
 
-    Each record taken is a node, the attributes of a hit, or a record of triangles: what is left of the first two.
+    Each record taken is a node, the attributes of a hit, or a triangle record; the counters give the first two.
     """
     rays = counters["raysInBox"]
     triangle_records = records_taken(counters) - counters["nodeReads"] - counters["hits"]
@@ -141,7 +140,7 @@ def per_ray(counters: Mapping[str, int]) -> dict[str, float]:
 
 
 def _bound(rate: float, shares: Iterable[float]) -> float | None:
-    """The rate at which the busiest of some resources would be busy all the time; None when none was used."""
+    """The rate at which the busiest of some resources reaches full utilisation; None if none was used."""
     busiest = max(shares)
     return rate / busiest if busiest > 0 else None
 

@@ -1,4 +1,4 @@
-"""The hardware against its model, bit for bit, and the model against the float scene: one row of figures a mesh."""
+"""Verification of whole frames: the RTL against its bit-exact model, and the model against the float reference."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from colonnade.render.result import RenderResult
 
 @dataclass(frozen=True)
 class Equality:
-    """The RTL's frame against the model's; zero everywhere, or the hardware is wrong.
+    """Differences between a frame of the RTL and one of the model. Correct hardware has none.
 
     Attributes:
-        pixels: Pixels whose 12-bit colours differ, or the parts of the light that are left to the room.
-        triangles: Pixels whose hit triangles or distances differ.
-        counters: Counters independent of timing that differ.
+        pixels: Pixels with different 12-bit colours or shadow ratios.
+        triangles: Pixels with different hit triangles or distances.
+        counters: Timing-independent counters that differ.
     """
 
     pixels: int
@@ -33,18 +33,18 @@ class Equality:
 
     @property
     def holds(self) -> bool:
-        """Nothing differs."""
+        """Whether nothing differs."""
         return self.pixels == self.triangles == self.counters == 0
 
 
 @dataclass(frozen=True)
 class Fidelity:
-    """The model's frame against the float reference's.
+    """Differences between a frame of the model and one of the float reference.
 
     Attributes:
-        hit_disagreement: Share of the pixels that hit in one and miss in the other.
-        triangle_disagreement: Share of the common hits that meet another triangle.
-        psnr: Of the sRGB pictures, decibels.
+        hit_disagreement: Share of pixels that hit in one frame and miss in the other.
+        triangle_disagreement: Share of common hits with different triangles.
+        psnr: PSNR of the sRGB pictures, decibels.
     """
 
     hit_disagreement: float
@@ -53,9 +53,8 @@ class Fidelity:
 
 
 def equality(rtl: RenderResult, model: RenderResult) -> Equality:
-    """How the RTL's frame differs from the model's."""
+    """Compare a frame of the RTL with one of the model."""
     same_t = (rtl.t == model.t) | (np.isnan(rtl.t) & np.isnan(model.t))
-    theirs = model.report.counters
     differs = (rtl.image != model.image).any(axis=2)
     if model.ratio is not None:
         assert rtl.ratio is not None
@@ -63,12 +62,12 @@ def equality(rtl: RenderResult, model: RenderResult) -> Equality:
     return Equality(
         pixels=int(differs.sum()),
         triangles=int(((rtl.hit_triangles != model.hit_triangles) | ~same_t).sum()),
-        counters=sum(rtl.report.counters[name] != value for name, value in theirs.items()),
+        counters=sum(rtl.report.counters[name] != value for name, value in model.report.counters.items()),
     )
 
 
 def fidelity(model: RenderResult, reference: RenderResult) -> Fidelity:
-    """How the model's frame differs from the reference's."""
+    """Compare a frame of the model with one of the reference."""
     hits = compare_hits(reference.hit_triangles, model.hit_triangles)
     return Fidelity(
         hit_disagreement=hits.hit_disagreement,
@@ -88,11 +87,21 @@ def verify(
     progress: Progress = QUIET,
     finished: Callable[[str, dict[str, Any]], None] = lambda name, result: None,
 ) -> dict[str, Any]:
-    """Renders every mesh through the backends and compares them.
+    """Render each mesh with the backends and compare the frames.
+
+    Args:
+        scene: Scene file; its mesh is replaced.
+        config: Configuration, before `overrides`.
+        overrides: Changes to the configuration, ``key.path=value``.
+        meshes: Names or files.
+        size: Width and height, pixels; None: those of the scene.
+        with_rtl: Compare the RTL with the model.
+        with_reference: Compare the model with the reference.
+        progress: Shows the steps.
+        finished: Called after each mesh with its name and result.
 
     Returns:
-        ``{"config", "equal", "meshes": {name: {"triangles", "rtl", "reference"}}}``; a comparison that was not asked
-        for is None.
+        ``{"config", "equal", "meshes": {name: {"triangles", "rtl", "reference"}}}``; a skipped comparison is None.
     """
     results: dict[str, dict[str, Any]] = {}
     equal = True
@@ -106,9 +115,9 @@ def verify(
         model = frame("model")
         result: dict[str, Any] = {"triangles": model.report.mesh.triangles, "rtl": None, "reference": None}
         if with_rtl:
-            found = equality(frame("rtl"), model)
-            equal = equal and found.holds
-            result["rtl"] = asdict(found)
+            differences = equality(frame("rtl"), model)
+            equal = equal and differences.holds
+            result["rtl"] = asdict(differences)
         if with_reference:
             result["reference"] = asdict(fidelity(model, frame("reference")))
         results[name] = result

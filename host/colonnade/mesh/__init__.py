@@ -1,1 +1,1 @@
-"""Triangle meshes: files, the catalog of named meshes, made-up solids, materials."""
+"""Triangle meshes: mesh files, the catalog of named meshes, generated solids, and materials."""

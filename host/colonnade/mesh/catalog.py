@@ -1,7 +1,7 @@
-"""Meshes by name: found in the user's folders, or fetched from where their makers publish them.
+"""Finds well-known meshes by name, in the user's folders or as downloads from their publishers.
 
-The folders are those of the environment variable COLONNADE_MESHES. None of these meshes is part of Colonnade; see
-the pages of their makers for what may be done with them.
+The folders are those of the environment variable COLONNADE_MESHES. None of these meshes is part of Colonnade; their
+publishers' pages state the terms of use.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import errno
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from colonnade.common.errors import UserError, reason_of
 from colonnade.mesh import primitives
@@ -18,16 +17,16 @@ from colonnade.mesh.formats import SUFFIXES
 
 VARIABLE = "COLONNADE_MESHES"
 
-#: Bytes of a file's name.
+#: Longest file name, bytes.
 _MAX_NAME = 255
 
 
 @dataclass(frozen=True)
 class Download:
-    """An archive with a public home.
+    """A published archive.
 
     Attributes:
-        member: The file in a tar archive; None where the archive is one compressed PLY file.
+        member: Path of the mesh in a tar archive; None for a compressed PLY file.
     """
 
     url: str
@@ -37,7 +36,7 @@ class Download:
 
 @dataclass(frozen=True)
 class KnownMesh:
-    """A well-known mesh: names of its file without suffix, the best first, and how often it is subdivided."""
+    """A well-known mesh: its file names without suffix, in order of preference, and its subdivisions."""
 
     stems: tuple[str, ...]
     download: Download | None = None
@@ -63,7 +62,7 @@ KNOWN: dict[str, KnownMesh] = {
             "bunny/reconstruction/bun_zipper.ply",
         ),
     ),
-    # Downloaded it has all its 345,944 triangles; the reduced one of 86,482 comes from a folder only.
+    # The download has all 345,944 triangles; the reduced mesh of 86,482 must be in a folder
     "armadillo": KnownMesh(
         ("armadillo", "Armadillo"),
         Download(
@@ -88,15 +87,15 @@ KNOWN: dict[str, KnownMesh] = {
 
 
 def names() -> list[str]:
-    """All names but the sizes: for messages."""
+    """All mesh names without sizes, for messages."""
     return ["teapot", *primitives.SIZED, *primitives.PLAIN, *KNOWN]
 
 
 def find(name: str) -> Found:
-    """The file of a mesh name.
+    """Find the file of a named mesh, downloading it if needed.
 
     Raises:
-        UserError: No folder has it and it cannot be fetched; the message says what to put where.
+        UserError: The mesh is in no folder and cannot be downloaded; the message says which file to add.
     """
     known = KNOWN.get(name)
     stems = known.stems if known else (name,)
@@ -109,7 +108,7 @@ def find(name: str) -> Found:
     if known is None:
         raise UserError(f"there is no mesh {name!r}: give a file that exists, or one of {', '.join(names())}")
     if known.download is None:
-        raise UserError(f"mesh {name} is in no folder of {VARIABLE}: {_advice(stems[0])}")
+        raise UserError(f"mesh {name} is not in the folders of {VARIABLE}: {_advice(stems[0])}")
     return Found(_fetch(name, known.download), known.subdivisions)
 
 
@@ -118,7 +117,7 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG and len(os.fsencode(path.name)) > _MAX_NAME:
-            return False  # a name that no file has
+            return False  # no file can have such a long name
         raise UserError(f"cannot search {path.parent}, a folder of {VARIABLE}: {reason_of(error)}") from None
     except ValueError:
         return False
@@ -129,10 +128,10 @@ def _advice(stem: str) -> str:
 
 
 def _fetch(name: str, download: Download) -> Path:
-    """The mesh file of a download, from the user's cache if it was fetched before."""
+    """Download a mesh file, or take it from the user's cache."""
     import pooch
 
-    processor: Any
+    processor: pooch.Decompress | pooch.Untar
     if download.member is None:
         processor = pooch.Decompress(name=f"{name}.ply")
     else:
@@ -146,7 +145,7 @@ def _fetch(name: str, download: Download) -> Path:
             processor=processor,
             downloader=pooch.HTTPDownloader(timeout=30),
         )
-    except Exception as error:  # network, disk, hash: all end in the same advice
+    except Exception as error:  # network, disk, hash: the advice is the same
         raise UserError(
             f"mesh {name} could not be downloaded from {download.url} ({type(error).__name__}): {_advice(name)}"
         ) from None

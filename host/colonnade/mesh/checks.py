@@ -1,9 +1,9 @@
-"""Checks of mesh files before trimesh reads them: what it would accept in silence, or not survive."""
+"""Checks mesh files for errors that trimesh would accept silently or crash on."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,48 +11,48 @@ from colonnade.common.errors import UserError
 
 _FACE = re.compile(rb"(?m)^[ \t]*f[ \t]+([^\r\n#]*)")
 _VERTEX = re.compile(rb"(?m)^[ \t]*v[ \t]")
-#: Of an accessor.
+#: Elements of an accessor, at most.
 _MAX_ELEMENTS = 100_000_000
 
 
 def check_obj(data: bytes, path: Path) -> None:
-    """Refuse faces of an OBJ file that name vertex 0, or one that does not exist."""
+    """Refuse an OBJ file whose faces name vertex 0 or a missing vertex."""
     joined = re.sub(rb"\\\r?\n", b" ", data)
     vertices = sum(1 for _ in _VERTEX.finditer(joined))
     corners = re.sub(rb"/\S*", b"", b" ".join(face[1] for face in _FACE.finditer(joined))).split()
     try:
         indices = [int(corner) for corner in corners]
     except ValueError:
-        raise UserError(f"mesh {path}: a face names a vertex that is no whole number") from None
+        raise UserError(f"mesh {path}: a vertex index of a face is not an integer") from None
     if not indices:
         return
     if 0 in indices:
-        raise UserError(f"mesh {path}: a face names vertex 0; vertices of OBJ files count from 1")
+        raise UserError(f"mesh {path}: a face names vertex 0; OBJ files number vertices from 1")
     for worst in (min(indices), max(indices)):
         if abs(worst) > vertices:
-            raise UserError(f"mesh {path}: a face names vertex {worst}, which does not exist: it has {vertices:,}")
+            raise UserError(f"mesh {path}: a face names vertex {worst}, but the file has {vertices:,} vertices")
 
 
 def check_ply(data: bytes, path: Path) -> None:
-    """Refuse a PLY file that holds less than its header says."""
+    """Refuse a PLY file with fewer elements than its header states."""
     header, mark, body = data.partition(b"end_header")
     counts = [int(count) for count in re.findall(rb"(?m)^element[ \t]+\S+[ \t]+(\d{1,18})[ \t]*\r?$", header)]
-    # Elements take a line each, or at least a byte
-    held = len(body.split(b"\n")) if re.search(rb"(?m)^format[ \t]+ascii", header) else len(body)
+    # An element takes one line in ASCII, and at least one byte in binary
+    capacity = len(body.split(b"\n")) if re.search(rb"(?m)^format[ \t]+ascii", header) else len(body)
     if not mark:
-        raise UserError(f"{path} cannot be read as a mesh: its PLY header does not end")
-    if sum(counts) > held:
-        raise UserError(f"mesh {path} is truncated: its header names {sum(counts):,} elements")
+        raise UserError(f"{path} cannot be read as a mesh: its PLY header has no end")
+    if sum(counts) > capacity:
+        raise UserError(f"mesh {path} is truncated: its header states {sum(counts):,} elements")
 
 
 def check_gltf(document: Any, path: Path) -> None:
-    """Refuse a glTF document whose nodes are no trees, or whose accessors cannot be."""
+    """Refuse a glTF document with invalid accessors or materials, or whose nodes are not trees."""
 
     def fail(reason: str) -> UserError:
         return UserError(f"mesh {path}: {reason}: export it again")
 
     if not isinstance(document, Mapping):
-        raise fail("its JSON is no object")
+        raise fail("its JSON is not an object")
     for key in ("nodes", "meshes", "accessors", "bufferViews", "buffers", "materials", "scenes"):
         entries = document.get(key, [])
         if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
@@ -60,15 +60,15 @@ def check_gltf(document: Any, path: Path) -> None:
     for number, accessor in enumerate(document.get("accessors", [])):
         count = accessor.get("count")
         if not isinstance(count, int) or isinstance(count, bool) or not 0 < count <= _MAX_ELEMENTS:
-            raise fail(f"accessor {number} has no sensible count")
+            raise fail(f"accessor {number} has an invalid count")
     for number, material in enumerate(document.get("materials", [])):
-        if not _is_sensible(material):
-            raise fail(f"material {number} has factors that are no numbers from 0")
+        if not _has_valid_factors(material):
+            raise fail(f"material {number} has a factor that is negative or not a number")
     _check_nodes(document.get("nodes", []), fail)
 
 
-def _is_sensible(material: Mapping[str, Any]) -> bool:
-    """The numbers that are used are numbers from 0."""
+def _has_valid_factors(material: Mapping[str, Any]) -> bool:
+    """Whether all used factors are non-negative numbers."""
     surface, extensions = material.get("pbrMetallicRoughness", {}), material.get("extensions", {})
     if not isinstance(surface, Mapping) or not isinstance(extensions, Mapping):
         return False
@@ -81,8 +81,8 @@ def _is_sensible(material: Mapping[str, Any]) -> bool:
     return all(isinstance(value, int | float) and not isinstance(value, bool) and value >= 0 for value in values)
 
 
-def _check_nodes(nodes: list[Mapping[str, Any]], fail: Any) -> None:
-    """Each node has one parent at most, and none is its own ancestor."""
+def _check_nodes(nodes: list[Mapping[str, Any]], fail: Callable[[str], UserError]) -> None:
+    """Refuse nodes with two parents or in a cycle."""
     parents: dict[int, int] = {}
     for number, node in enumerate(nodes):
         children = node.get("children", [])
@@ -96,11 +96,11 @@ def _check_nodes(nodes: list[Mapping[str, Any]], fail: Any) -> None:
             parents[child] = number
     is_rooted: dict[int, bool] = {}
     for number in range(len(nodes)):
-        path, place = [], number
-        while place in parents and place not in is_rooted:
-            path.append(place)
-            is_rooted[place] = False
-            place = parents[place]
-        if not is_rooted.get(place, True):
-            raise fail(f"node {place} is its own ancestor")
+        path, ancestor = [], number
+        while ancestor in parents and ancestor not in is_rooted:
+            path.append(ancestor)
+            is_rooted[ancestor] = False
+            ancestor = parents[ancestor]
+        if not is_rooted.get(ancestor, True):
+            raise fail(f"node {ancestor} is its own ancestor")
         is_rooted.update(dict.fromkeys(path, True))

@@ -1,4 +1,4 @@
-"""Mesh files as trimesh reads them: vertices, triangles, and the material of each."""
+"""Reads mesh files with trimesh: vertices, triangles, and a material for each triangle."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, from_mtl
 #: Suffixes of mesh files.
 SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
 
-#: As many as a face's material index can tell apart.
+#: Limit of the 8-bit material index of a face.
 MAX_MATERIALS = 256
 
-#: Marks a glTF material's name with its number, since trimesh knows neither transmission nor the file's order.
+#: Prefix of glTF material names, followed by the index: trimesh keeps neither transmission nor the file's order.
 _MARK = "colonnade material "
 
 
 @dataclass(frozen=True)
 class RawSurface:
-    """What a file holds, uncleaned.
+    """The content of a mesh file, before cleaning.
 
     Attributes:
         vertices: [n, 3].
         faces: [m, 3].
-        materials: The different ones, at least one.
-        face_materials: uint8 [m].
+        materials: Distinct materials, at least one.
+        face_materials: uint8 [m], index into `materials`.
     """
 
     vertices: npt.NDArray[Any]
@@ -46,7 +46,11 @@ class RawSurface:
 
 
 def read_surface(path: Path) -> RawSurface:
-    """All parts of a mesh file, joined."""
+    """Read a mesh file and join its parts.
+
+    Raises:
+        UserError: The file is invalid, or has no faces or too many materials.
+    """
     import logging
 
     import trimesh
@@ -73,8 +77,8 @@ def read_surface(path: Path) -> RawSurface:
     if not parts:
         raise UserError(f"mesh {path} has no faces")
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
-    own = [_material_of(part, materials) for part in parts]
-    used = tuple(dict.fromkeys(own))
+    part_materials = [_material_of(part, materials) for part in parts]
+    used = tuple(dict.fromkeys(part_materials))
     if len(used) > MAX_MATERIALS:
         raise UserError(f"mesh {path} has {len(used):,} materials: use at most {MAX_MATERIALS}")
     return RawSurface(
@@ -84,7 +88,7 @@ def read_surface(path: Path) -> RawSurface:
         face_materials=np.concatenate(
             [
                 np.full(len(part.faces), used.index(material), dtype=np.uint8)
-                for part, material in zip(parts, own, strict=True)
+                for part, material in zip(parts, part_materials, strict=True)
             ]
         ),
     )
@@ -100,7 +104,7 @@ def _material_of(part: Any, materials: list[MeshMaterial]) -> MeshMaterial:
 
 
 def _marked_gltf(data: bytes, path: Path) -> tuple[bytes, list[MeshMaterial]]:
-    """A glTF file whose materials are numbers and which has no textures, and its materials."""
+    """Replace a glTF file's materials by numbered names and remove its textures; also returns the materials."""
     binary = data[:4] == b"glTF"
     length = struct.unpack_from("<I", data, 12)[0] if binary else len(data)
     first = 20 if binary else 0

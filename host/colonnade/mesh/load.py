@@ -1,7 +1,7 @@
-"""Triangle meshes: by name, or from a file that trimesh reads (OBJ, PLY, STL, OFF, GLB).
+"""Loads triangle meshes by name, or from a file that trimesh reads (OBJ, PLY, STL, OFF, glTF).
 
-Whatever the source, a mesh leaves here clean: vertices merged by position, no face without area, none twice, no
-vertex unused. Normals of the file are not used: smooth ones are made anew from the merged faces, weighted by angle.
+Every loaded mesh is clean: vertices are merged by position, and degenerate faces, duplicate faces and unused vertices
+are removed. Smooth normals are computed from the merged faces, weighted by angle; the file's normals are ignored.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ TEAPOT_LIMIT = 200
 
 
 def load_mesh(name_or_path: str | Path) -> Mesh:
-    """The mesh of that name, or in that file.
+    """Load the mesh of a name or a file.
 
     Names are ``teapot`` and ``teapot:LEVEL``, the solids (``sphere:TRIANGLES``, ``cube`` …), the well-known meshes
-    (``bunny`` …), and the files in the folders of the environment variable COLONNADE_MESHES without their suffix.
+    (``bunny`` …), and the files without their suffix in the folders of the environment variable COLONNADE_MESHES.
 
     Raises:
-        UserError: There is no such mesh, or it cannot be rendered.
+        UserError: The mesh does not exist or cannot be rendered.
     """
     text = str(name_or_path)
     if isinstance(name_or_path, str) and (built := _built_in(text)) is not None:
@@ -48,7 +48,7 @@ def load_mesh(name_or_path: str | Path) -> Mesh:
 
 
 def _built_in(name: str) -> tuple[Floats, Faces] | None:
-    """Teapot and solids; None for other names."""
+    """Make the teapot or a solid; None for other names."""
     base, colon, argument = name.partition(":")
     if base in primitives.PLAIN and not colon:
         return primitives.PLAIN[base]()
@@ -69,10 +69,10 @@ def _size(name: str, argument: str, default: int, minimum: int, maximum: int, gi
 
 
 def _read(path: Path, subdivisions: int) -> Mesh:
-    """A mesh file, with each triangle cut into four at its midpoints ``subdivisions`` times."""
+    """Read a mesh file and split each triangle into four ``subdivisions`` times."""
     require_regular(path, "mesh file")
     if path.suffix.lower() not in SUFFIXES:
-        raise UserError(f"{path}: a mesh file ends with one of {', '.join(SUFFIXES)}")
+        raise UserError(f"{path}: the suffix of a mesh file must be one of {', '.join(SUFFIXES)}")
     if path.stat().st_size == 0:
         raise UserError(f"mesh file {path} is empty")
     try:
@@ -80,8 +80,8 @@ def _read(path: Path, subdivisions: int) -> Mesh:
     except (UserError, ImportError, MemoryError):
         raise
     except IndexError:
-        raise UserError(f"mesh {path}: a face names a vertex, or a part another, that does not exist") from None
-    except Exception as error:  # whatever a reader makes of noise
+        raise UserError(f"mesh {path}: a face names a vertex, or a node another part, that does not exist") from None
+    except Exception as error:  # readers raise many types on invalid data
         raise UserError(f"{path} cannot be read as a mesh: {type(error).__name__}: {error}") from None
     vertices, faces = surface.vertices, surface.faces
     if len(faces) == 0:
@@ -111,9 +111,12 @@ def clean_mesh(
     materials: tuple[MeshMaterial, ...] = (PLAIN,),
     face_materials: npt.NDArray[np.uint8] | None = None,
 ) -> Mesh:
-    """A mesh from raw vertices [n, 3] and faces [m, 3]; ``where`` names the source in errors.
+    """Clean raw vertices [n, 3] and faces [m, 3]; ``where`` names the source in errors.
 
     Without ``face_materials``, uint8 [m], all faces have the first material.
+
+    Raises:
+        UserError: A vertex is not finite, the size is out of range, or no face has an area.
     """
     label = f"mesh {where or name}"
     if len(faces) == 0:
@@ -132,11 +135,11 @@ def clean_mesh(
     if edge > 0:
         keep = drop_faces((merged - merged.min(axis=0)) / edge, corners)
     if edge == 0 or len(keep) == 0:
-        raise UserError(f"{label} has only degenerate triangles ({source_count:,}, none with an area)")
+        raise UserError(f"{label} has only degenerate triangles ({source_count:,}, all without area)")
     if edge < 1e-100:
         raise UserError(f"{label} is smaller than 1e-100: scale it up")
-    used, kept = np.unique(corners[keep], return_inverse=True)
-    vertices, faces = merged[used], kept.reshape(-1, 3).astype(np.int32)
+    used, renumbered = np.unique(corners[keep], return_inverse=True)
+    vertices, faces = merged[used], renumbered.reshape(-1, 3).astype(np.int32)
     return Mesh(
         vertices=vertices,
         faces=faces,

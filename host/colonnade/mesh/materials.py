@@ -1,8 +1,8 @@
-"""What a mesh file says of its surfaces, in the device's three kinds: diffuse, mirror, glass.
+"""Maps the materials of mesh files to the device's three kinds: diffuse, mirror and glass.
 
 | | glTF | MTL |
 |---|---|---|
-| albedo | base colour factor, linear | `Kd`, taken as linear; `Tf` for glass where given |
+| albedo | base colour factor, linear | `Kd`, taken as linear; for glass `Tf` if given |
 | mirror | metallic factor of at least ½, without a texture | `Pm` of at least ½, or `illum` 3 or 5 |
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | index of refraction | `KHR_materials_ior` | `Ni` |
@@ -19,21 +19,21 @@ from typing import Any, Literal, get_args
 
 Vector = tuple[float, float, float]
 
-#: The device's kinds of surfaces.
+#: Surface kinds of the device.
 Kind = Literal["diffuse", "mirror", "glass"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-#: Index of refraction of glass that does not say; also glTF's.
+#: Default index of refraction of glass, as in glTF.
 GLASS_IOR = 1.5
 
 
 @dataclass(frozen=True)
 class MeshMaterial:
-    """One surface.
+    """A surface material.
 
     Attributes:
         kind: diffuse, mirror or glass.
-        albedo: Linear, 0 to 1: reflected, or tint of what is mirrored or let through.
+        albedo: Linear, 0 to 1: diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
     """
 
@@ -42,12 +42,12 @@ class MeshMaterial:
     ior: float = GLASS_IOR
 
 
-#: Of meshes that do not say.
+#: Material of meshes without one.
 PLAIN = MeshMaterial()
 
 
 def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
-    """A material of a glTF file's JSON."""
+    """Convert a material from a glTF file's JSON."""
     surface = material.get("pbrMetallicRoughness")
     extensions = material.get("extensions", {})
     transmission = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0)
@@ -61,7 +61,7 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
 
 
 def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
-    """A material of an MTL file: values by keyword in lower case, as lists or numbers."""
+    """Convert a material of an MTL file, given its values by lower-case keyword, as lists or numbers."""
 
     def first(key: str, default: float) -> float:
         value = entries.get(key)
@@ -75,7 +75,7 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
 
 
 def _ior(value: float) -> float:
-    """1 and less is what exporters write that do not know."""
+    """Replace values up to 1, which exporters write for an unknown index, by the default."""
     return min(value, 4.0) if value > 1.0 else GLASS_IOR
 
 

@@ -1,4 +1,4 @@
-"""A clean triangle mesh: what `colonnade.mesh.load.load_mesh` returns."""
+"""The clean triangle mesh, made by `colonnade.mesh.load`."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from colonnade.mesh.topology import Faces
 
 @dataclass(frozen=True)
 class Extent:
-    """What framing needs of a mesh: its box and the vertices that lie outermost.
+    """The bounds of a mesh, for framing the camera.
 
     Attributes:
-        low, high: The box, float64 [3], mesh space.
-        outline: Vertices that are outermost in one of many directions, float64 [k, 3], mesh space.
+        low, high: The bounding box, float64 [3], mesh space.
+        outline: The extreme vertices along many directions, float64 [k, 3], mesh space.
     """
 
     low: Floats
@@ -29,28 +29,28 @@ class Extent:
 
     @property
     def edge(self) -> float:
-        """Edge of the bounding cube, mesh units."""
+        """Edge length of the bounding cube, mesh units."""
         return float((self.high - self.low).max())
 
     @property
     def centre(self) -> Floats:
-        """Centre of box and cube, float64 [3]."""
+        """Centre of the bounding box, float64 [3]."""
         return (self.low + self.high) / 2
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """A clean triangle mesh.
+    """A clean triangle mesh: no duplicate vertices, no degenerate or duplicate triangles.
 
     Attributes:
         vertices: float64 [n, 3], mesh space.
         faces: int32 [m, 3], counter-clockwise seen from outside.
-        vertex_normals: float64 [n, 3], unit length, or 0 where the faces cancel.
-        materials: What its surfaces are made of, as its file says; at least one.
+        vertex_normals: float64 [n, 3], unit length, or 0 where the adjacent faces' normals cancel.
+        materials: Materials of the mesh file; at least one.
         face_materials: uint8 [m], index into `materials`.
-        source_faces: int32 [m], the face's number in the source, where dropped faces count too.
-        source_count: Faces of the source.
-        name: For reports.
+        source_faces: int32 [m], the face's index in the source, which includes dropped faces.
+        source_count: Number of faces in the source.
+        name: Name for reports.
     """
 
     vertices: Floats
@@ -64,11 +64,11 @@ class Mesh:
 
     @cached_property
     def extent(self) -> Extent:
-        """Box and outline."""
+        """The bounding box and the outline."""
         points, _ = primitives.sphere(720)
         directions = np.unique(points, axis=0)
         outermost: set[int] = set()
         for direction in directions[directions[:, 0] >= 0]:
-            reach = self.vertices @ direction
-            outermost |= {int(reach.argmax()), int(reach.argmin())}
+            height = self.vertices @ direction
+            outermost |= {int(height.argmax()), int(height.argmin())}
         return Extent(self.vertices.min(axis=0), self.vertices.max(axis=0), self.vertices[sorted(outermost)])

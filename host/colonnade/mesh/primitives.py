@@ -1,4 +1,9 @@
-"""Simple solids, made where they are asked for: closed, normals outward, within a cube of edge 2 about the origin."""
+"""Generated solids within the cube from -1 to 1, counter-clockwise seen from outside.
+
+They are our own code and not `trimesh.creation`'s for three reasons. The sphere takes a number of triangles, not only
+powers of four. Coordinates on shared edges are bit-equal, so the mesh closes without tolerances. And the vertices stay
+the same when a library changes, as tests and benchmarks compare exact counters.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +16,11 @@ Geometry = tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]
 
 
 def sphere(size: int = 4) -> Geometry:
-    """A geodesic sphere: each face of an icosahedron cut into f² triangles.
+    """A geodesic unit sphere: each face of an icosahedron is split into f² triangles.
 
     Args:
-        size: Up to 10 a level of subdivision, f = 2^size; more is a number of triangles, of which the nearest 20·f²
-            is made.
+        size: Up to 10, the subdivision level, f = 2^size. Above 10, the number of triangles, rounded to a
+            near 20·f².
     """
     frequency = 2**size if size <= 10 else max(1, round((size / 20) ** 0.5))
     golden = (1 + 5**0.5) / 2
@@ -33,7 +38,7 @@ def sphere(size: int = 4) -> Geometry:
             [8, 6, 7], [9, 8, 1],
         ]
     )  # fmt: skip
-    # Row i of a triangle has i + 1 points; the sums are exact alike on both sides of an edge.
+    # Row i of a triangle has i + 1 points; both triangles at an edge compute equal sums
     i = np.repeat(np.arange(frequency + 1), np.arange(1, frequency + 2))
     j = np.concatenate([np.arange(n) for n in range(1, frequency + 2)])
     a, b, c = (corners[triangles[:, k]][:, None, :] for k in range(3))
@@ -46,8 +51,8 @@ def sphere(size: int = 4) -> Geometry:
     below = start + i + 1
     upward = np.stack([start[up], below[up], below[up] + 1], axis=1)
     downward = np.stack([start[down], start[down] - 1, below[down]], axis=1)
-    one = np.concatenate([upward, downward])
-    faces = (one[None] + (np.arange(20) * len(i))[:, None, None]).reshape(-1, 3)
+    face_triangles = np.concatenate([upward, downward])
+    faces = (face_triangles[None] + (np.arange(20) * len(i))[:, None, None]).reshape(-1, 3)
     return vertices, faces.astype(np.int32)
 
 
@@ -59,7 +64,7 @@ def cube() -> Geometry:
 
 
 def torus(size: int = 48) -> Geometry:
-    """A ring about y: ``size`` segments around, half as many across, radii 0.7 and 0.3."""
+    """A torus about y, radii 0.7 and 0.3, of ``size`` segments around the axis and half as many around the tube."""
     across = max(3, size // 2)
     u = 2 * np.pi * np.arange(size) / size
     v = 2 * np.pi * np.arange(across) / across
@@ -83,7 +88,7 @@ def cone(size: int = 64) -> Geometry:
 
 
 def _turned(profile: list[tuple[float, float]], size: int) -> Geometry:
-    """Two rings (radius, height), the lower first, closed by fans."""
+    """A surface of revolution about y from two rings (radius, height), the lower first, closed by fans."""
     angle = 2 * np.pi * np.arange(size) / size
     rings = [np.stack([r * np.cos(angle), np.full(size, h), r * np.sin(angle)], axis=1) for r, h in profile]
     centres = np.array([[0.0, h, 0.0] for _, h in profile])
@@ -102,13 +107,13 @@ def _turned(profile: list[tuple[float, float]], size: int) -> Geometry:
 
 
 def tetrahedron() -> Geometry:
-    """Four corners of the cube: 4 triangles."""
+    """The tetrahedron on four corners of the cube: 4 triangles."""
     vertices = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
     return vertices, np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], dtype=np.int32)
 
 
 def octahedron() -> Geometry:
-    """The ends of the axes: 8 triangles."""
+    """The octahedron on the axes' unit points: 8 triangles."""
     vertices = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
     faces = [[2, 4, 0], [2, 0, 5], [2, 5, 1], [2, 1, 4], [3, 0, 4], [3, 5, 0], [3, 1, 5], [3, 4, 1]]
     return vertices, np.array(faces, dtype=np.int32)
@@ -125,14 +130,14 @@ def square() -> Geometry:
     return vertices, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
 
 
-#: Solids that take a size, ``name:SIZE``, with the least and greatest size.
+#: Solids with a size, ``name:SIZE``: function, default, smallest and largest size.
 SIZED: dict[str, tuple[Callable[[int], Geometry], int, int, int]] = {
     "sphere": (sphere, 4, 0, 4_000_000),
     "torus": (torus, 48, 3, 2000),
     "cylinder": (cylinder, 64, 3, 1_000_000),
     "cone": (cone, 64, 3, 1_000_000),
 }
-#: Solids that are what they are.
+#: Solids without a size.
 PLAIN: dict[str, Callable[[], Geometry]] = {
     "cube": cube,
     "tetrahedron": tetrahedron,

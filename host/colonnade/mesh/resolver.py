@@ -1,4 +1,4 @@
-"""Files that a mesh file refers to: an OBJ file's MTL, a glTF file's buffers. Textures are not read."""
+"""Reads the files that a mesh file references: an OBJ file's MTL, a glTF file's buffers, but no textures."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from colonnade.common.limits import MAX_MESH_BYTES, MAX_TEXT_BYTES
 
 #: A line of an MTL file that names a texture.
 _TEXTURE = re.compile(rb"(?im)^[ \t]*(map_\w+|bump|disp|decal|refl|norm)[ \t].*$")
-#: A line of one that holds numbers, which must be finite.
+#: A line of an MTL file with numbers, which must be finite.
 _NUMBERS = re.compile(rb"(?im)^[ \t]*(k[asde]|tf|ni|ns|d|tr|illum|p[rmsc]\w*)[ \t]+(.*)$")
 
 
 class MeshResolver(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
-    """Reads regular files in the mesh's folder and those below.
+    """Reads regular files in the mesh's folder and its subfolders.
 
     Attributes:
-        refused: Why a file could not be read: trimesh itself goes on without it.
+        refused: The first error. trimesh would ignore a missing file, so the caller must raise it.
     """
 
     def __init__(self, mesh: Path) -> None:
@@ -32,7 +32,7 @@ class MeshResolver(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
         self._suffix = mesh.suffix.lower()
 
     def get(self, name: str) -> bytes:
-        """The content of the file ``name``."""
+        """The content of the file ``name``, for trimesh."""
         if self._suffix not in (".obj", ".gltf", ".glb"):
             raise FileNotFoundError(name)
         path = self._find(name)
@@ -45,7 +45,7 @@ class MeshResolver(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
             raise FileNotFoundError(name) from None
 
     def namespaced(self, namespace: str) -> Any:
-        """No other folders."""
+        """Refuse other folders."""
         raise FileNotFoundError(namespace)
 
     def _find(self, name: str) -> Path:
@@ -59,16 +59,16 @@ class MeshResolver(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
                 continue
             if path.is_relative_to(parent):
                 return path
-            outside = UserError(f"{name}, which a mesh names, is outside of its folder {parent}: copy it there")
+            outside = UserError(f"{name}, which a mesh references, is outside its folder {parent}: copy it there")
             self.refused = self.refused or outside
         raise FileNotFoundError(name)
 
 
 def _checked_mtl(data: bytes, path: Path) -> bytes:
-    """The materials without their textures.
+    """Remove the textures from an MTL file and check its numbers.
 
     Raises:
-        UserError: A number is not finite or negative.
+        UserError: A number is negative or not finite.
     """
     for line in _NUMBERS.finditer(data):
         for word in line[2].split():
@@ -78,6 +78,6 @@ def _checked_mtl(data: bytes, path: Path) -> bytes:
                 break
             if not math.isfinite(number) or number < 0:
                 row = data.count(b"\n", 0, line.start()) + 1
-                said = line[0].decode("latin-1").strip()
-                raise UserError(f"{path}, line {row}: {said}: numbers of a material must be finite and from 0")
+                text = line[0].decode("latin-1").strip()
+                raise UserError(f"{path}, line {row}: {text}: a material's numbers must be finite and not negative")
     return _TEXTURE.sub(b"", data)

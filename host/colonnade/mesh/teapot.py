@@ -1,7 +1,10 @@
-"""Newell's teapot of 1975: 28 published patches and the bottom that was added later, from their control points.
+"""Newell's teapot of 1975, tessellated from its control points: 28 published Bézier patches and the later bottom.
 
-The pot, its lid and its bottom are turned: a profile and the quarter circle of Newell's cubic (which is no exact
-circle) give all their control points. Handle and spout are halves, mirrored.
+Body, lid and bottom are surfaces of revolution: a profile and Newell's cubic quarter circle (an approximation) give
+their control points. Handle and spout are mirrored halves.
+
+This is our own code because no library that we use contains the teapot, and the default scene needs a mesh without a
+download. Adjacent patches share their edges bit for bit, so the mesh is closed without a merging tolerance.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ import numpy.typing as npt
 
 from colonnade.common.types import Floats
 
-# Profiles of the turned parts: (radius, height), from the outside of the rim inward and down.
+# Profiles of the surfaces of revolution: (radius, height), starting at the rim.
 _PROFILES: tuple[tuple[tuple[float, float], ...], ...] = (
     ((1.4, 2.4), (1.3375, 2.53125), (1.4375, 2.53125), (1.5, 2.4)),  # rim
     ((1.5, 2.4), (1.75, 1.875), (2.0, 1.35), (2.0, 0.9)),  # upper body
@@ -20,11 +23,11 @@ _PROFILES: tuple[tuple[tuple[float, float], ...], ...] = (
     ((0.2, 2.7), (0.4, 2.55), (1.3, 2.55), (1.3, 2.4)),  # lid
     ((1.5, 0.15), (1.5, 0.075), (1.425, 0.0), (0.0, 0.0)),  # bottom
 )
-# Control points of a quarter turn, for radius 1. The original data rounds 0.448, that of radius 0.8, to 0.45.
+# Control point of the quarter circle of radius 1. The original data rounds 0.448, for radius 0.8, to 0.45.
 _QUARTER = 0.56
 _ROUNDED = {0.8: 0.5625}
 
-# Handle and spout: four rows of (x, half width, height) from the plane of symmetry to the plane of symmetry.
+# Handle and spout: rows of four points (x, half width, height), from symmetry plane to symmetry plane.
 _HALVES: tuple[tuple[tuple[tuple[float, float, float], ...], ...], ...] = (
     (  # upper handle
         ((-1.6, 0.0, 2.025), (-1.6, 0.3, 2.025), (-1.5, 0.3, 2.25), (-1.5, 0.0, 2.25)),
@@ -54,11 +57,11 @@ _HALVES: tuple[tuple[tuple[tuple[float, float, float], ...], ...], ...] = (
 
 
 def patches() -> Floats:
-    """Control points of the 32 bicubic patches: float64 [32, 4, 4, 3], y up, normals outward."""
+    """Control points of the 32 bicubic Bézier patches: float64 [32, 4, 4, 3], y up, normals outward."""
     result: list[Floats] = []
     for profile in _PROFILES:
         patch = np.array([_quarter_turn(radius, height) for radius, height in profile])
-        result.extend(_turned(patch, quadrant) for quadrant in range(4))
+        result.extend(_rotated(patch, quadrant) for quadrant in range(4))
     for half in _HALVES:
         patch = np.array([[[x, height, width] for x, width, height in row] for row in half])
         result.append(patch)
@@ -67,28 +70,28 @@ def patches() -> Floats:
 
 
 def _quarter_turn(radius: float, height: float) -> list[tuple[float, float, float]]:
-    """Four control points from +x to +z."""
+    """Four control points of the quarter circle from +x to +z."""
     flat = radius * _ROUNDED.get(radius, _QUARTER)
     return [(radius, height, 0.0), (radius, height, flat), (flat, height, radius), (0.0, height, radius)]
 
 
-def _turned(patch: Floats, quarters: int) -> Floats:
-    """The patch turned about y by whole quarters: exact, so that neighbours share their edges bit for bit."""
+def _rotated(patch: Floats, quarters: int) -> Floats:
+    """Rotate a patch about y by exact quarter turns, so that adjacent patches share their edges bit for bit."""
     for _ in range(quarters):
         patch = np.stack([-patch[..., 2], patch[..., 1], patch[..., 0]], axis=-1)
     return patch
 
 
 def tessellate(level: int) -> tuple[Floats, npt.NDArray[np.int32]]:
-    """Two triangles for each of level × level cells of every patch; those at the poles that have no area are left out.
+    """Tessellate each patch into level × level cells of two triangles, without the degenerate ones at the poles.
 
     Returns:
-        Vertices float64 [n, 3], not yet merged between patches, and faces int32 [32·2·level² − 8·level, 3].
+        Vertices float64 [n, 3], not merged between patches, and faces int32 [32·2·level² − 8·level, 3].
     """
     t = np.arange(level + 1) / level
     basis = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
     control = patches()
-    # Sums in a fixed order: on a common edge all other terms are exactly 0, and neighbours agree to the last bit.
+    # Sum in a fixed order: on a shared edge all other terms are exactly 0, so adjacent patches agree bit for bit
     rows = np.zeros((len(control), level + 1, 4, 3))
     grid = np.zeros((len(control), level + 1, level + 1, 3))
     for i in range(4):

@@ -1,4 +1,4 @@
-"""Operations on raw triangle surfaces: arrays of vertices and of faces that name them."""
+"""Operations on indexed triangle meshes: subdivision, merging, cleaning and vertex normals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ Faces = npt.NDArray[np.int32]
 
 
 def subdivide(vertices: Floats, faces: npt.NDArray[np.int64]) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Each triangle cut into four at its edges' midpoints: the surface stays the same."""
+    """Split each triangle into four at its edge midpoints; the surface does not change.
+
+    Args:
+        vertices: float64 [n, 3].
+        faces: int64 [m, 3].
+
+    Returns:
+        All vertices, the old ones first, and faces int64 [4·m, 3]; the four of a triangle are consecutive.
+    """
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     middle = inverse.reshape(-1, 3) + len(vertices)
@@ -25,7 +33,7 @@ def subdivide(vertices: Floats, faces: npt.NDArray[np.int64]) -> tuple[Floats, n
 
 
 def merge_rows(rows: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
-    """The different rows [k, 3] in ascending order, and for each row [n] which one it is."""
+    """The distinct rows [k, 3] in ascending order, and each row's index among them, int64 [n]."""
     order = np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))
     ordered = rows[order]
     first = np.ones(len(rows), dtype=bool)
@@ -36,7 +44,7 @@ def merge_rows(rows: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[np
 
 
 def drop_faces(vertices: npt.NDArray[Any], faces: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """Numbers of the faces to keep, ascending: those with an area, and of equal vertex sets only the first."""
+    """Indices of the faces to keep, ascending: with an area, and the first of each vertex set."""
     corners = vertices[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any(axis=1)
     candidates = np.flatnonzero(area)
@@ -48,7 +56,7 @@ def drop_faces(vertices: npt.NDArray[Any], faces: npt.NDArray[Any]) -> npt.NDArr
 
 
 def vertex_normals(vertices: Floats, faces: Faces) -> Floats:
-    """Unit normals float64 [n, 3]: the faces' normals weighted by their angle at the vertex."""
+    """Unit normals float64 [n, 3]: the face normals weighted by their angle at the vertex; 0 where they cancel."""
     corners = vertices[faces] / float((vertices.max(axis=0) - vertices.min(axis=0)).max())
     sides = np.roll(corners, -1, axis=1) - corners
     normals = unit_vectors(np.cross(sides[:, 0], -sides[:, 2]).astype(np.float64))

@@ -1,1 +1,1 @@
-"""Image quality: how far two pictures, or the hits behind them, are apart."""
+"""Image quality: metrics that compare two pictures, or the hits of two frames."""

@@ -1,4 +1,4 @@
-"""Compares two pictures, two files of hits, or both: what `colonnade compare` reports."""
+"""Compares two pictures, two hits files, or both, for `colonnade compare`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from colonnade.common.image_io import read_picture
 from colonnade.quality.dists import dists_or_none
 from colonnade.quality.image_metrics import compare_hits, compare_pictures
 
-#: Keys of a comparison that need pictures, and those that need hits; null where there are none.
+#: Keys of a comparison that need pictures, and keys that need hits.
 PICTURE_KEYS = ("identical", "differing_pixels", "psnr", "ssim", "flip", "dists")
 HIT_KEYS = ("hit_disagreement", "triangle_disagreement")
 
@@ -26,24 +26,27 @@ def compare(
     """Compare two frames.
 
     Args:
-        first: picture to compare against, or a hits file (`.npz`).
-        second: picture to judge, or a hits file.
+        first: reference picture, or a hits file (`.npz`).
+        second: test picture, or a hits file.
         first_hits: hits file of the first frame.
         second_hits: hits file of the second frame.
-        with_dists: judge by DISTS too, whose weights are fetched at its first use.
+        with_dists: compute DISTS too; its weights are downloaded at the first use.
 
     Returns:
-        The keys `PICTURE_KEYS` and `HIT_KEYS`, None where nothing to compare was given.
+        The values of `PICTURE_KEYS` and `HIT_KEYS`; None for those without input.
+
+    Raises:
+        UserError: The files are of different kinds or sizes, unreadable, or incomplete pairs.
     """
     are_hits = first.suffix == ".npz", second.suffix == ".npz"
     if are_hits[0] != are_hits[1]:
         raise UserError(f"{first} and {second} cannot be compared: give two pictures or two .npz files")
     if are_hits[0]:
         if first_hits or second_hits:
-            raise UserError("two .npz files are hits already: leave out --hits-a and --hits-b")
+            raise UserError("two .npz files are already hits: leave out --hits-a and --hits-b")
         first_hits, second_hits = first, second
     elif (first_hits is None) != (second_hits is None):
-        raise UserError("hits of one frame only: give both --hits-a and --hits-b")
+        raise UserError("the hits of one frame are missing: give both --hits-a and --hits-b")
 
     report: dict[str, Any] = dict.fromkeys((*PICTURE_KEYS, *HIT_KEYS))
     if not are_hits[0]:

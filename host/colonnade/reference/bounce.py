@@ -1,4 +1,4 @@
-"""Where a path goes on from a mirror or from glass: docs/shading.md, "Materials and paths", in floats."""
+"""Reflection and refraction at mirrors and glass in float64: docs/shading.md, "Materials and paths"."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from colonnade.common.vectors import unit_vectors
 
 @dataclass(frozen=True)
 class Bounces:
-    """What becomes of rays.
+    """Rays that leave specular surfaces.
 
     Attributes:
-        directions: float64 [n, 3], unit, of the rays that go on.
-        refracted: bool [n], they go on through the surface.
-        reflections: float64 [n, 3], unit: of Schlick's part, which meets the background only.
-        shares: float64 [n], how much Schlick's part takes; 0 where there is none.
+        directions: Unit directions of the next rays, float64 [n, 3].
+        refracted: The next ray passes through the surface, bool [n].
+        fresnel_directions: Unit directions of the Fresnel reflections, float64 [n, 3].
+        fresnel_weights: Schlick's reflectance where the ray is refracted at a front side, else 0, float64 [n].
     """
 
     directions: Floats
     refracted: NDArray[np.bool_]
-    reflections: Floats
-    shares: Floats
+    fresnel_directions: Floats
+    fresnel_weights: Floats
 
 
 def bounce(
@@ -33,42 +33,42 @@ def bounce(
 ) -> Bounces:
     """Reflect or refract rays.
 
-    The shading normal holds unless it turns away from the ray or would send the ray to the wrong side of the surface:
-    then the geometric one takes its place.
+    The geometric normal replaces a shading normal that faces away from the ray, or that would scatter the ray to the
+    wrong side of the surface.
 
     Args:
-        directions: float64 [n, 3], unit.
-        normals: Shading normals against the ray, float64 [n, 3], unit.
-        facing: Geometric normals against the ray, float64 [n, 3], unit.
-        front: bool [n], the ray meets the triangle's front.
-        glass: bool [n]; the others are mirrors.
+        directions: Unit directions, float64 [n, 3].
+        normals: Unit shading normals that face the ray, float64 [n, 3].
+        facing: Unit geometric normals that face the ray, float64 [n, 3].
+        front: The ray hits the triangle's front, bool [n].
+        glass: The material is glass and not a mirror, bool [n].
         ior: Index of refraction, float64 [n].
     """
     eta = np.where(front, 1 / ior, ior)
-    following, refracted = _about(normals, directions, glass, eta)
-    side = _dot(following, facing)
-    astray = (_dot(normals, directions) >= 0) | np.where(refracted, side >= 0, side <= 0)
-    about = np.where(astray[:, None], facing, normals)
-    following, refracted = _about(about, directions, glass, eta)
-    cosine = -_dot(about, directions)
-    head_on = ((ior - 1) / (ior + 1)) ** 2
-    schlick = head_on + (1 - head_on) * (1 - cosine.clip(0, 1)) ** 5
-    return Bounces(following, refracted, _reflected(about, directions), np.where(refracted & front, schlick, 0.0))
+    scattered, refracted = _scatter(normals, directions, glass, eta)
+    side = _dot(scattered, facing)
+    is_wrong = (_dot(normals, directions) >= 0) | np.where(refracted, side >= 0, side <= 0)
+    normals = np.where(is_wrong[:, None], facing, normals)
+    scattered, refracted = _scatter(normals, directions, glass, eta)
+    cosine = -_dot(normals, directions)
+    at_normal = ((ior - 1) / (ior + 1)) ** 2
+    schlick = at_normal + (1 - at_normal) * (1 - cosine.clip(0, 1)) ** 5
+    return Bounces(scattered, refracted, _reflect(normals, directions), np.where(refracted & front, schlick, 0.0))
 
 
-def _about(
+def _scatter(
     normals: Floats, directions: Floats, glass: NDArray[np.bool_], eta: Floats
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Directions after one normal, and whether they go through: mirrors and total reflection do not."""
+    """Directions after the surface, and whether they are refracted and not reflected."""
     cosine = -_dot(normals, directions)
-    rest = 1 - eta**2 * (1 - cosine**2)
-    refracted = glass & (rest >= 0) & (cosine > 0)
-    deeper = eta * cosine - np.sqrt(rest.clip(min=0))
-    through = unit_vectors(eta[:, None] * directions + deeper[:, None] * normals)
-    return np.where(refracted[:, None], through, _reflected(normals, directions)), refracted
+    discriminant = 1 - eta**2 * (1 - cosine**2)
+    refracted = glass & (discriminant >= 0) & (cosine > 0)
+    normal_scale = eta * cosine - np.sqrt(discriminant.clip(min=0))
+    transmitted = unit_vectors(eta[:, None] * directions + normal_scale[:, None] * normals)
+    return np.where(refracted[:, None], transmitted, _reflect(normals, directions)), refracted
 
 
-def _reflected(normals: Floats, directions: Floats) -> Floats:
+def _reflect(normals: Floats, directions: Floats) -> Floats:
     return unit_vectors(directions - 2 * _dot(normals, directions)[:, None] * normals)
 
 

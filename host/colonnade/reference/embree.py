@@ -1,6 +1,6 @@
-"""Rays against a float mesh with Embree, made exact where its 32 bits are not.
+"""Ray-mesh intersection with Embree, refined to float64.
 
-Embree says which triangle a ray meets first; where on it, and how far, is computed here in 64 bits.
+Embree finds the first triangle of a ray in float32. Hit point and distance are computed here in float64.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from colonnade.common.types import Floats
 
-#: Rays start this share of the box's edge before the box, so that 32-bit coordinates stay small.
-_RUN_UP = 1 / 64
+#: Rays start this share of the box's longest edge before the box, which keeps float32 coordinates small.
+_START_MARGIN = 1 / 64
 
 
 class Surface(Protocol):
-    """Triangles: vertices float64 [n, 3], faces int32 [m, 3]; a mesh is one."""
+    """A triangle surface, such as a `Mesh`: vertices float64 [n, 3], faces int32 [m, 3]."""
 
     @property
     def vertices(self) -> Floats:
@@ -31,7 +31,7 @@ class Surface(Protocol):
 
 @dataclass(frozen=True)
 class Triangles:
-    """A surface without more.
+    """A surface that is not a mesh.
 
     Attributes:
         vertices: float64 [n, 3].
@@ -44,12 +44,12 @@ class Triangles:
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Where rays meet their triangles.
+    """Hit points of rays on their triangles.
 
     Attributes:
-        position: float64 [n, 3], mesh space.
-        weights: float64 [n, 3], barycentric, none negative, their sum is 1.
-        t: float64 [n], in lengths of the ray's direction.
+        position: Mesh space, float64 [n, 3].
+        weights: Barycentric coordinates, at least 0, with sum 1, float64 [n, 3].
+        t: Distance in lengths of the ray's direction, float64 [n].
     """
 
     position: Floats
@@ -58,10 +58,10 @@ class SurfacePoints:
 
 
 class RayTracer:
-    """A mesh that rays can be aimed at. All positions and directions are in mesh space, float64 [n, 3]."""
+    """Intersects rays with a mesh. All positions and directions are in mesh space, float64 [n, 3]."""
 
     def __init__(self, mesh: Surface) -> None:
-        """Build Embree's scene of ``mesh``, in its robust (watertight) mode."""
+        """Build Embree's scene in its robust (watertight) mode."""
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
@@ -77,28 +77,28 @@ class RayTracer:
         return np.ascontiguousarray((positions - self._centre) / self._edge, dtype=np.float32)
 
     def enters_box(
-        self, origins: Floats, directions: Floats, limit: float = np.inf
+        self, origins: Floats, directions: Floats, t_max: float = np.inf
     ) -> tuple[NDArray[np.bool_], Floats]:
-        """Whether each ray meets the mesh's box before ``limit`` directions, and where it enters, float64 [n]."""
+        """Whether each ray hits the mesh's bounding box before ``t_max``, bool [n], and its entry t, float64 [n]."""
         with np.errstate(divide="ignore", invalid="ignore"):
             planes = np.stack([(plane - origins) / directions for plane in (self.low, self.high)])
-        # A ray inside a plane and along it: 0/0; that plane does not bound the ray.
-        near = np.where(np.isnan(planes).any(axis=0), -np.inf, planes.min(axis=0)).max(axis=1)
-        far = np.where(np.isnan(planes).any(axis=0), np.inf, planes.max(axis=0)).min(axis=1)
-        entry = np.maximum(near, 0.0)
-        return (entry <= far) & (entry <= limit), entry
+        # A ray that lies in a plane gives 0/0; that plane does not bound the ray.
+        t_near = np.where(np.isnan(planes).any(axis=0), -np.inf, planes.min(axis=0)).max(axis=1)
+        t_far = np.where(np.isnan(planes).any(axis=0), np.inf, planes.max(axis=0)).min(axis=1)
+        t_entry = np.maximum(t_near, 0.0)
+        return (t_entry <= t_far) & (t_entry <= t_max), t_entry
 
     def first_hits(self, origins: Floats, directions: Floats) -> NDArray[np.int64]:
-        """Row in the mesh's faces of the first triangle that each ray meets, int64 [n]; -1 where it meets none."""
+        """Index of the first face that each ray hits, -1 for a miss, int64 [n]."""
         lengths = np.linalg.norm(directions, axis=1, keepdims=True)
         unit = directions / lengths
-        _, entry = self.enters_box(origins, unit)
-        advance = np.maximum(np.where(np.isfinite(entry), entry, 0.0) - self._edge * _RUN_UP, 0.0)
+        _, t_entry = self.enters_box(origins, unit)
+        advance = np.maximum(np.where(np.isfinite(t_entry), t_entry, 0.0) - self._edge * _START_MARGIN, 0.0)
         starts = self._scaled(origins + advance[:, None] * unit)
         return np.asarray(self._scene.run(starts, np.ascontiguousarray(unit, dtype=np.float32)), dtype=np.int64)
 
     def occluded(self, origins: Floats, segments: Floats) -> NDArray[np.bool_]:
-        """Whether anything lies between each origin and origin + segment, bool [n]."""
+        """Whether a triangle lies between each origin and origin + segment, bool [n]."""
         if len(origins) == 0:
             return np.zeros(0, dtype=np.bool_)
         ends = np.ascontiguousarray(segments / self._edge, dtype=np.float32)
@@ -107,9 +107,9 @@ class RayTracer:
         return np.asarray(found) >= 0
 
     def surface_points(self, faces: NDArray[np.int64], origins: Floats, directions: Floats) -> SurfacePoints:
-        """Where each ray meets the triangle that `first_hits` named for it, in 64 bits."""
+        """Hit point of each ray on the triangle that `first_hits` returned for it, in float64."""
         relative = self.corners[faces] - origins[:, None, :]
-        # Signed volumes of the ray and each edge: the edge functions of a projection along the ray.
+        # Edge functions of the triangle projected along the ray, as signed volumes of the ray and each edge.
         following, last = np.roll(relative, -1, axis=1), np.roll(relative, -2, axis=1)
         edges = np.einsum("nij,nj->ni", np.cross(following, last), directions)
         total = edges.sum(axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""The object as the float reference sees it: its triangles, their materials, and what they let through of a light."""
+"""The object in the float reference: its triangles, materials and shadows."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _KINDS = {"diffuse": DIFFUSE, "mirror": MIRROR, "glass": GLASS}
 
 @dataclass(frozen=True)
 class ObjectPoints:
-    """Where rays meet the object, mesh space.
+    """Hit points of rays on the object, in mesh space.
 
     Attributes:
         position: float64 [n, 3].
-        facing: Geometric normals against the ray, float64 [n, 3], unit.
-        normals: Shading normals, turned as those, float64 [n, 3], unit; may still turn away from the ray.
-        front: bool [n], the ray meets the triangle's front.
-        t: float64 [n], in lengths of the ray's direction.
+        facing: Unit geometric normals that face the ray, float64 [n, 3].
+        normals: Unit shading normals, flipped as `facing`; they may still face away from the ray, float64 [n, 3].
+        front: The ray hits the triangle's front, bool [n].
+        t: Distance in lengths of the ray's direction, float64 [n].
     """
 
     position: Floats
@@ -42,7 +42,7 @@ class ObjectPoints:
 
 
 class PlacedObject:
-    """A mesh with the materials of a placement."""
+    """A mesh with the materials of a view."""
 
     def __init__(self, mesh: Mesh, view: View) -> None:
         self._mesh, self._flat = mesh, view.flat
@@ -51,39 +51,40 @@ class PlacedObject:
         self.kinds = np.array([_KINDS[material.kind] for material in view.materials])[index]
         self.albedo: Floats = np.array([material.albedo for material in view.materials])[index]
         self.ior: Floats = np.array([material.ior for material in view.materials])[index]
-        is_clear = self.kinds == GLASS
+        is_glass = self.kinds == GLASS
         self._transmittance = view.shadow_transmittance
-        self._opaque = self._tracer_of(~is_clear)
-        self._clear = self._tracer_of(is_clear)
+        self._opaque = self._tracer_of(~is_glass)
+        self._glass = self._tracer_of(is_glass)
 
-    def _tracer_of(self, chosen: NDArray[np.bool_]) -> RayTracer | None:
-        if chosen.all():
+    def _tracer_of(self, selected: NDArray[np.bool_]) -> RayTracer | None:
+        """A tracer for the selected faces; None if there are none."""
+        if selected.all():
             return self.tracer
-        if not chosen.any():
+        if not selected.any():
             return None
-        faces = self._mesh.faces[chosen]
+        faces = self._mesh.faces[selected]
         return RayTracer(Triangles(self._mesh.vertices, faces))
 
     def points(self, faces: Indices, origins: Floats, directions: Floats) -> ObjectPoints:
-        """Where rays meet the faces that they were found to meet first."""
-        met = self.tracer.surface_points(faces, origins, directions)
+        """Hit points of rays on the faces that `RayTracer.first_hits` returned for them."""
+        hits = self.tracer.surface_points(faces, origins, directions)
         corners = self.tracer.corners[faces]
         geometric = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-        back_side = np.einsum("ni,ni->n", geometric, directions) > 0
-        turned = np.where(back_side, -1.0, 1.0)[:, None]
-        facing = geometric * turned
+        is_back = np.einsum("ni,ni->n", geometric, directions) > 0
+        sign = np.where(is_back, -1.0, 1.0)[:, None]
+        facing = geometric * sign
         normals = facing
         if not self._flat:
             mesh = self._mesh
-            smooth = np.einsum("nj,njk->nk", met.weights, mesh.vertex_normals[mesh.faces[faces]]) * turned
+            smooth = np.einsum("nj,njk->nk", hits.weights, mesh.vertex_normals[mesh.faces[faces]]) * sign
             normals = np.where(smooth.any(axis=1, keepdims=True), smooth, facing)
-        return ObjectPoints(met.position, facing, unit_vectors(normals), ~back_side, met.t)
+        return ObjectPoints(hits.position, facing, unit_vectors(normals), ~is_back, hits.t)
 
-    def let_through(self, origins: Floats, to_light: Floats) -> Floats:
-        """What reaches each origin of a light at origin + ``to_light``: 0 behind something opaque; float64 [n]."""
-        share = np.ones(len(origins))
-        if self._clear is not None:
-            share[self._clear.occluded(origins, to_light)] = self._transmittance
+    def light_transmittance(self, origins: Floats, to_light: Floats) -> Floats:
+        """Transmittance from the light at origin + ``to_light`` to each origin, 0 behind opaque faces, float64 [n]."""
+        transmittance = np.ones(len(origins))
+        if self._glass is not None:
+            transmittance[self._glass.occluded(origins, to_light)] = self._transmittance
         if self._opaque is not None:
-            share[self._opaque.occluded(origins, to_light)] = 0.0
-        return share
+            transmittance[self._opaque.occluded(origins, to_light)] = 0.0
+        return transmittance

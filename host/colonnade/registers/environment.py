@@ -9,7 +9,7 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
-from colonnade.environment.encoding.planes import SLOPE_PIXELS, Picture
+from colonnade.environment.encoding.planes import SLOPE_PIXELS, PlaneProjection
 from colonnade.registers.shadow_window import shadow_window, whole_frame
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def environment_registers(
     if relit:
         window = whole_frame(view)
     else:
-        depth = held.image.decoded_depth(Picture.of(held.environment, held.image.depth_unit))
+        depth = held.image.decoded_depth(PlaneProjection.of(held.environment, held.image.depth_unit))
         window = shadow_window(view, held.environment, depth, header.extent)
     return registers | dict(zip((f"room.window.{edge}" for edge in ("x0", "y0", "x1", "y1")), window, strict=True))
 

@@ -53,15 +53,13 @@ def frame_registers(
         scene, header.extent, width, height, header.materials, None if environment is None else environment.environment
     )
     registers = registers_of(view, header, manifest)
-    return (
-        registers
-        if environment is None
-        else registers | environment_registers(view, environment, header, manifest, relit)
-    )
+    if environment is not None:
+        registers |= environment_registers(view, environment, header, manifest, relit)
+    return registers | {"frame.watchdogCycles": watchdog_cycles(registers, header, manifest)}
 
 
 def registers_of(view: View, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
-    """The registers for a frame that was placed in floats; those that say nothing here are 0.
+    """The registers for a view, without those of an environment and without a watchdog; the others are 0.
 
     Raises:
         UserError: The frame asks for more than the hardware has.
@@ -74,7 +72,7 @@ def registers_of(view: View, header: ImageHeader, manifest: Manifest) -> dict[st
     registers |= _bounds(header)
     registers |= object_screen_bounds(view, registers, manifest)
     registers |= surface_registers(view, header, manifest)
-    return registers | {"frame.watchdogCycles": watchdog_cycles(registers, header, manifest)}
+    return registers
 
 
 def _positions(view: View, header: ImageHeader, manifest: Manifest) -> dict[str, int]:

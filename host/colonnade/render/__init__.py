@@ -1,1 +1,1 @@
-"""Frames of a scene through a backend, and the reports about them."""
+"""Rendering a scene with a backend, and the reports of its frames."""

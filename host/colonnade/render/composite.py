@@ -1,4 +1,4 @@
-"""The object in the camera's photo of its room."""
+"""Compositing: the rendered object in the camera's photo of its room."""
 
 from __future__ import annotations
 
@@ -15,8 +15,15 @@ if TYPE_CHECKING:
 
 
 def composited(image: npt.NDArray[np.float64], frame: Frame, environment: Environment) -> npt.NDArray[np.float64]:
-    """The object in the room's photo, darkened where the object takes its light (differential rendering after Debevec,
-    1998); the frame as it is if there is no photo. Linear, float64 [height, width, 3].
+    """The object over the room's photo, with its shadow (differential rendering, Debevec 1998).
+
+    Args:
+        image: The rendered frame, linear, float64 [height, width, 3].
+        frame: Object mask and shadow ratios of the same frame.
+        environment: The room. Without a photo the result is `image`.
+
+    Returns:
+        Linear colours, float64 [height, width, 3].
     """
     if environment.photo is None or frame.ratio is None:
         return image

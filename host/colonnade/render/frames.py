@@ -1,4 +1,4 @@
-"""Frames of a scene through a backend, and the reports of what they took."""
+"""Renders the frames of a scene with the requested backend."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from colonnade.scene_image.packer import pack
 
 
 def render(request: RenderRequest, progress: Progress = QUIET) -> RenderResult:
-    """Renders one frame: the first of `render_frames`."""
+    """Render one frame, the first of `render_frames`."""
     (result,) = render_frames(replace(request, frames=1), progress)
     return result
 
 
 def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterator[RenderResult]:
-    """Renders the frames of a scene's motion; mesh and environment are loaded once.
+    """Render the frames of a scene's motion. Mesh and environment are loaded once.
 
     Args:
         request: What to render.
         progress: Shows the steps.
 
     Raises:
-        UserError: Something about the input is wrong, or the hardware flagged an error.
+        UserError: The input is wrong, or the hardware raised an error bit.
     """
     scene = load_scene(request.scene)
     if request.background is not None:
@@ -56,7 +56,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     check_size((width, height), manifest)
     if request.waveform is not None:
         _check_waveform(request, (width, height))
-    poses = [scene.at(share) for share in scene.motion.shares(request.frames)]
+    poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
     if request.backend == "reference":
         from colonnade.render.reference_frames import reference_frames
 
@@ -88,7 +88,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         require_no_errors(frame)
         report = replace(
             frame_report(request.backend, manifest, image.header, frame),
-            share=pose.share,
+            share=pose.motion_progress,
             seconds={"pack": packed, "build": None} | seconds,
             simulated_cycles_per_second=rate,
             bytes=None if environment is None else environment.image.byte_counts(),
@@ -113,7 +113,7 @@ def _check_waveform(request: RenderRequest, size: tuple[int, int]) -> None:
         )
 
 
-#: A frame, the seconds it took by step, and the cycles that the RTL simulated a second.
+#: A frame, its seconds by step, and the RTL's simulated cycles per second.
 Rendered = tuple[Frame, dict[str, float], float | None]
 
 
@@ -124,7 +124,7 @@ def _rtl_frames(
     progress: Progress,
     waveform: Path | None = None,
 ) -> Iterator[Rendered]:
-    """All frames of one run; each has its part of the seconds."""
+    """Render all frames in one run of the simulator. Each frame reports an equal part of the run time."""
     from colonnade.device.simulator_build import build_simulator
     from colonnade.device.verilator import render_rtl
 
@@ -140,7 +140,7 @@ def _rtl_frames(
 def _model_frames(
     manifest: Manifest, image: SceneImage, registers: list[dict[str, int]], progress: Progress
 ) -> Iterator[Rendered]:
-    """Frame by frame of a model that is loaded once."""
+    """Render frame by frame with a model that is loaded once."""
     from colonnade.device.bit_exact import loaded_model, model_frame
 
     model = loaded_model(manifest, image)
@@ -155,7 +155,7 @@ def _model_frames(
 
 
 def pack_scene(scene: Scene, manifest: Manifest, environment: EncodedEnvironment | None = None) -> SceneImage:
-    """The scene image of a scene's mesh, made of what the scene says, and of its room."""
+    """The scene image of a scene's mesh, with the scene's material and the maps of its room."""
     mesh = load_mesh(scene.mesh_source)
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     if environment is None:
@@ -166,11 +166,11 @@ def pack_scene(scene: Scene, manifest: Manifest, environment: EncodedEnvironment
 
 
 def require_no_errors(frame: Frame) -> None:
-    """A frame with an error bit is never shown as a good one."""
+    """Raise a `UserError` with advice for a frame that has an error bit."""
     advice = {
         "stackOverflow": "the traversal stack overflowed: raise columnBvhMemory.stackDepth",
-        "illegalRecord": "a record was illegal, or pointed outside its section: pack the scene again",
-        "watchdog": "no pixel came for longer than any legal frame takes: the image may be corrupt, pack it again",
+        "illegalRecord": "a record was illegal, or a pointer left its section: pack the scene again",
+        "watchdog": "the watchdog aborted the frame: the scene image may be corrupt, pack the scene again",
     }
     if frame.errors:
         raise UserError("the frame failed: " + "; ".join(advice.get(error, error) for error in frame.errors))

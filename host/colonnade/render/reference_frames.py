@@ -1,4 +1,4 @@
-"""Frames of a scene without any of the hardware's rounding, as `colonnade render --backend reference` has them."""
+"""The reference backend: frames traced by Embree in floating point, without the hardware's rounding."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from colonnade.scene.view import make_view
 def reference_frames(
     poses: Sequence[Scene], manifest: Manifest, size: tuple[int, int], progress: Progress
 ) -> Iterator[RenderResult]:
-    """Frames of one scene at several shares of its motion."""
+    """Render a scene's poses along its motion. `size` is (width, height), pixels."""
     begun = time.perf_counter()
     scene = poses[0]
     mesh = load_mesh(scene.mesh_source)
@@ -39,7 +39,7 @@ def reference_frames(
             mesh=MeshReport(mesh.name, len(mesh.faces), mesh.source_count),
             size=size,
             rays=reference.rays,
-            share=pose.share,
+            share=pose.motion_progress,
             seconds={"pack": packed, "build": None, "run": time.perf_counter() - begun},
         )
         yield RenderResult(reference.image, reference.object_mask, reference.hit_triangles, reference.t, report)

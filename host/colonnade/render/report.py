@@ -1,4 +1,4 @@
-"""The report of a frame, or of a sequence of frames: what ``--json`` writes."""
+"""The report of a frame or of a sequence of frames, which ``--json`` writes."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from colonnade.common.framebuffer import Frame
 from colonnade.design.manifest import Manifest
 from colonnade.scene_image.file import ImageHeader
 
-#: Kinds of rays; those in the box of the object are counted once more, as ``in_box``.
+#: Kinds of rays. ``in_box`` counts again those that enter the object's bounding box.
 RAY_KINDS = ("primary", "shadow", "reflection", "refraction")
 
-#: What the frames of a sequence have in common: the report of one among them leaves it out.
+#: Keys that all frames of a sequence share: its report has them once.
 _COMMON = ("backend", "config", "mesh", "size", "bytes")
 
 
 @dataclass(frozen=True)
 class MeshReport:
-    """The mesh of a frame: its triangles as packed, and as its source has them."""
+    """The mesh of a frame, with its triangle counts after packing and in the source file."""
 
     name: str
     triangles: int
@@ -28,13 +28,13 @@ class MeshReport:
 
 @dataclass(frozen=True)
 class EnvironmentReport:
-    """What the ray march through an environment took in the RTL.
+    """The environment lookups of a frame in the RTL.
 
     Attributes:
-        look_ups: Environment lookups.
-        cycles: Of one lookup, on average.
-        steps: March steps of one lookup, on average.
-        busy: Part of the cycles in which the march of a render unit works.
+        look_ups: Number of lookups.
+        cycles: Mean cycles per lookup.
+        steps: Mean march steps per lookup.
+        busy: Utilisation of a render unit's ray march, 0.0 to 1.0.
     """
 
     look_ups: int
@@ -45,23 +45,23 @@ class EnvironmentReport:
 
 @dataclass(frozen=True)
 class FrameReport:
-    """What there is to say about a frame, or about all frames of a sequence.
+    """The report of a frame, or of all frames of a sequence.
 
     Attributes:
         backend: rtl, model or reference.
         config: The configuration, as in the manifest.
-        mesh: Its size.
+        mesh: The mesh.
         size: Width and height, pixels.
-        rays: Count of each kind; None where the backend does not count it.
-        cycles: Of the RTL; None from the other backends.
+        rays: Ray count by kind; None where the backend does not count it.
+        cycles: Cycles of the RTL; None from other backends.
         counters: All counters of the device.
         errors: Names of the error bits that are set.
-        room: Lookups in the environment; None without one, and from backends without counters of time.
-        share: How far along the scene's motion the frame is, 0.0 to 1.0.
-        seconds: For packing, building the simulator, and rendering.
-        simulated_cycles_per_second: Of the RTL.
+        room: Environment lookups; None without a room, and from backends that do not count cycles.
+        share: Position along the scene's motion, 0.0 to 1.0.
+        seconds: Seconds of packing, building the simulator, and rendering.
+        simulated_cycles_per_second: Simulation speed of the RTL.
         bytes: Sizes of the encoded maps.
-        frames: The reports of a sequence's frames; none in the report of a frame.
+        frames: Reports of a sequence's frames; empty in the report of one frame.
     """
 
     backend: str
@@ -81,21 +81,21 @@ class FrameReport:
 
     @property
     def all_rays(self) -> int:
-        """Rays of every kind."""
+        """Number of rays of all kinds."""
         return sum(self.rays.get(kind) or 0 for kind in RAY_KINDS)
 
     @property
     def rays_per_cycle(self) -> float | None:
-        """Of all rays, those that miss the box included."""
+        """All rays per cycle, including those that miss the object's bounding box."""
         return self.all_rays / self.cycles if self.cycles else None
 
     @property
     def rays_per_cycle_in_box(self) -> float | None:
-        """Of the rays that enter the object's box."""
+        """Rays per cycle that enter the object's bounding box."""
         return (self.rays.get("in_box") or 0) / self.cycles if self.cycles else None
 
     def as_json(self) -> dict[str, Any]:
-        """The report as plain values."""
+        """The report as values that JSON can hold."""
         values: dict[str, Any] = {
             "backend": self.backend,
             "config": self.config,
@@ -125,7 +125,7 @@ class FrameReport:
 
 
 def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: Frame) -> FrameReport:
-    """The report of a frame of the model or the RTL, but for the seconds it took."""
+    """The report of a frame of the model or the RTL, without its seconds."""
     height, width = frame.is_object.shape
     counters = frame.counters
     rays = {kind: counters[f"rays{kind.capitalize()}"] for kind in RAY_KINDS} | {"in_box": counters["raysInBox"]}
@@ -157,7 +157,7 @@ def _environment_report(manifest: Manifest, counters: Mapping[str, int]) -> Envi
 
 
 def sequence_report(frames: Sequence[FrameReport]) -> FrameReport:
-    """One report of all frames of a sequence, with sums of what they took."""
+    """The report of a sequence: sums over its frames."""
     first = frames[0]
     return FrameReport(
         backend=first.backend,

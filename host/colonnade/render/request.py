@@ -1,4 +1,4 @@
-"""What to render, and through which backend."""
+"""The render request: scene, backend, configuration and options."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ BACKENDS: tuple[Backend, ...] = get_args(Backend)
 
 @dataclass(frozen=True)
 class RenderRequest:
-    """One frame of a scene, or the frames of its motion.
+    """A request for one frame of a scene, or for the frames of its motion.
 
     Attributes:
-        scene: TOML file.
+        scene: Scene file, TOML.
         config: Preset, path, or precision such as ``32b32s64d``.
-        overrides: Changes of the configuration, ``key=value``.
-        backend: The generated hardware in a simulator, its bit-exact model, or the unquantised scene.
-        size: (width, height), pixels; the scene's where None.
-        frames: How many, from 1: the first is the scene as it stands.
-        mesh: Replaces the scene's mesh: a name or a file.
-        background: The folder of a room, in place of the scene's background.
-        hits: The hit triangles are wanted: the hardware must be configured to deliver them.
-        relit: Show the room in the scene's lights even if there is a photo of it.
+        overrides: Changes to the configuration, ``key=value``.
+        backend: ``rtl``: the generated Verilog in a simulator; ``model``: its bit-exact model; ``reference``: Embree.
+        size: (width, height), pixels; None: that of the scene.
+        frames: Number of frames, from 1. The first shows the scene at rest.
+        mesh: Name or file of a mesh that replaces the scene's.
+        background: Folder of a room that replaces the scene's background.
+        hits: Whether the caller needs hit triangles; the configuration must then have them.
+        relit: Whether the scene's lights shade the room even if it has a photo.
         waveform: A VCD file for the hardware's signals during the frame; of the RTL, one small frame.
     """
 

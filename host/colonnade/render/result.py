@@ -15,12 +15,12 @@ class RenderResult:
     """A rendered frame.
 
     Attributes:
-        image: float64 [height, width, 3], linear, 0 to 1.
-        object_mask: bool [height, width].
-        hit_triangles: int64 [height, width]; face index in the mesh's file, -1 where the ray missed.
-        t: float64 [height, width]; depth in mesh units (lengths of the pixel's direction), not a number for a miss.
-        report: What it took.
-        ratio: uint16 [height, width, 3], see `Frame`; None without a room.
+        image: Linear colours, 0 to 1, float64 [height, width, 3].
+        object_mask: Pixels that show the object, bool [height, width].
+        hit_triangles: Face index in the mesh's file, -1 for a miss, int64 [height, width].
+        t: Depth in mesh units (lengths of the pixel's direction), NaN for a miss, float64 [height, width].
+        report: The report of the frame.
+        ratio: Shadow ratios, uint16 [height, width, 3], see `Frame`; None without a room.
     """
 
     image: npt.NDArray[np.float64]

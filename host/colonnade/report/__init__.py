@@ -1,1 +1,1 @@
-"""Plots and generated pages."""
+"""Plots, and the generated tables of docs/performance.md."""

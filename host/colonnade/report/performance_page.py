@@ -1,6 +1,6 @@
-"""Writes the tables of ``docs/performance.md`` from the data that `tools/performance` measured.
+"""Generates the tables of ``docs/performance.md`` from the data of `tools/performance`.
 
-A table stands between ``<!-- NAME -->`` and ``<!-- end -->``; everything else of the page is left alone.
+A table replaces the text between ``<!-- NAME -->`` and ``<!-- end -->``; the rest of the page stays as it is.
 Run as ``python -m colonnade.report.performance_page DOCS``.
 """
 
@@ -24,11 +24,11 @@ _TABLE = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def page(text: str, docs: Path) -> str:
-    """The page with its tables written anew.
+    """The page with new tables.
 
     Args:
-        text: of the page.
-        docs: the folder that holds it, and ``data``.
+        text: The text of the page.
+        docs: The folder of the page and of ``data``.
     """
 
     def replaced(match: re.Match[str]) -> str:
@@ -41,12 +41,13 @@ def page(text: str, docs: Path) -> str:
 
 
 def rates(bench: Data, _: Path) -> str:
-    """The headline: rays per cycle and what bounds them."""
+    """Rays per cycle, their bounds, and the bottleneck."""
     width, height = bench["size"]
     array, memory = bench["config"]["array"], bench["config"]["columnBvhMemory"]
-    hardware = f"{array['rows']}×{array['columns']} render units of {array['contexts']} contexts"
+    hardware = f"{array['rows']}×{array['columns']} render units with {array['contexts']} contexts each"
     kind = "snooping" if memory["snooping"] else "round-robin"
-    conditions = f"{hardware}, {memory['banks']} banks, {kind}, latency {memory['readLatency']}; {width}×{height}."
+    latency = f"read latency {memory['readLatency']}"
+    conditions = f"{hardware}, {memory['banks']} banks per column, {kind}, {latency}; {width}×{height} pixels."
     rows: list[tuple[str, ...]] = [
         (
             name,
@@ -66,13 +67,13 @@ def rates(bench: Data, _: Path) -> str:
     in_box = f"**{bench['geomean_rays_per_cycle_in_box']:.2f}**"
     rows.append(("geometric mean", "", "", "", in_box, *(_number(mean) for mean in means), ""))
     titles = ["mesh", "triangles", "cycles", "in-box rays", "in-box rays per cycle", "all rays per cycle"]
-    titles += ["bound: perfect memory", "bound: perfect units", "bottleneck"]
+    titles += ["bound: perfect memory", "bound: perfect units", "bottleneck, utilisation"]
     ratio = f"**{bench['ratio_to_paper']:.1f} times** the chip's {PAPER_RAYS_PER_CYCLE}."
     return f"{conditions} The geometric mean is {ratio}\n\n{markdown(titles, rows)}"
 
 
 def mirror(bench: Data, _: Path) -> str:
-    """The same meshes as mirrors."""
+    """Rays per cycle of the same meshes as mirrors."""
     reflected = bench.get("mirror")
     if reflected is None:
         return "Run `tools/performance bench`."
@@ -92,13 +93,13 @@ def mirror(bench: Data, _: Path) -> str:
     in_box = f"**{reflected['geomean_rays_per_cycle_in_box']:.2f}**"
     rows.append(("geometric mean", "", "", "", "", in_box, _number(reflected["geomean_rays_per_cycle"]), ""))
     titles = ["mesh", "cycles", "reflections", "shadow rays", "in-box rays", "in-box rays per cycle"]
-    titles += ["all rays per cycle", "bottleneck"]
+    titles += ["all rays per cycle", "bottleneck, utilisation"]
     ratio = f"**{reflected['ratio_to_paper']:.1f} times** the chip's {PAPER_RAYS_PER_CYCLE}."
     return f"The geometric mean is {ratio}\n\n{markdown(titles, rows)}"
 
 
 def limits(bench: Data, _: Path) -> str:
-    """In-box rays per cycle that each unit or port alone would allow."""
+    """In-box rays per cycle at full utilisation of each unit or port."""
     meshes = bench["meshes"]
     resources = list(next(iter(meshes.values()))["limits"])
     rows = [(name, *(_number(mesh["limits"][resource]) for resource in resources)) for name, mesh in meshes.items()]
@@ -108,8 +109,9 @@ def limits(bench: Data, _: Path) -> str:
 
 
 def work(bench: Data, _: Path) -> str:
-    """What one in-box ray costs."""
-    titles = ["mesh", "nodes", "boxes", "triangle records", "triangles", "records taken", "records read", "snooped"]
+    """Work per in-box ray."""
+    titles = ["mesh", "nodes", "box tests", "triangle records", "triangle tests", "records taken", "bank reads"]
+    titles += ["snooped"]
     rows: list[tuple[str, ...]] = [
         (name, *(f"{value:.2f}" for value in mesh["per_ray"].values()), _percent(mesh["snoop_share"]))
         for name, mesh in bench["meshes"].items()
@@ -118,18 +120,18 @@ def work(bench: Data, _: Path) -> str:
 
 
 def stages(bench: Data, _: Path) -> str:
-    """Where context cycles go."""
+    """Context cycles by state."""
     return _shares(bench, "stalls")
 
 
 def utilisation(bench: Data, _: Path) -> str:
-    """How busy units and ports are."""
+    """Utilisation of units and ports."""
     return _shares(bench, "utilisation")
 
 
 def speed(bench: Data, _: Path) -> str:
-    """How fast the simulation was."""
-    titles = ["mesh", "simulated cycles", "cycles per second", "seconds, loading included"]
+    """Simulation speed."""
+    titles = ["mesh", "simulated cycles", "cycles per second", "seconds with loading"]
     rows: list[tuple[str, ...]] = [
         (name, f"{mesh['cycles']:,}", f"{mesh['cycles_per_second']:,.0f}", f"{mesh['seconds']['run']:.1f}")
         for name, mesh in bench["meshes"].items()
@@ -138,10 +140,10 @@ def speed(bench: Data, _: Path) -> str:
 
 
 def scaling(sweep: Data, _: Path) -> str:
-    """The picture, and one row a point."""
+    """Rays per cycle of the sweep, as picture and as table."""
     base = sweep["base"]
-    titles = ["varied", "value", *(f"{name}, in-box rays per cycle" for name in base["meshes"])]
-    titles += ["per render unit", "to the base"]
+    titles = ["field", "value", *(f"{name}: in-box rays per cycle" for name in base["meshes"])]
+    titles += ["per render unit", "relative to base"]
 
     def row(name: str, value: str, point: Data) -> tuple[str, ...]:
         meshes = (f"{mesh['rays_per_cycle_in_box']:.3f}" for mesh in point["meshes"].values())
@@ -151,12 +153,12 @@ def scaling(sweep: Data, _: Path) -> str:
     for point in sweep["points"]:
         key = point["varied"]
         rows.append(row(LABELS.get(key, key), str(point["values"][key]), point))
-    picture = "![In-box rays per cycle, each field varied alone](pictures/scaling.png)"
+    picture = "![In-box rays per cycle over each field](pictures/scaling.png)"
     return f"{picture}\n\n{markdown(titles, rows)}"
 
 
 def ablation(sweep: Data, docs: Path) -> str:
-    """Measured beside the model's figures, in box and column: a row for each number of contexts and mesh."""
+    """In-box rays per cycle and column, of the RTL and of the cycle model, by mesh and number of contexts."""
     keys = ("array.contexts", "columnBvhMemory.snooping", "columnBvhMemory.banks")
     points = {tuple(point["values"][key] for key in keys): point for point in sweep["points"]}
     modelled = json.loads((docs / "data" / "cycle-model.json").read_text())
@@ -172,14 +174,16 @@ def ablation(sweep: Data, docs: Path) -> str:
     rows = []
     for mesh in sweep["base"]["meshes"]:
         for contexts in dict.fromkeys(contexts for contexts, _, _ in points):
-            at = [(contexts, *variant) for variant in variants]
-            measured = (f"**{points[place]['meshes'][mesh]['rays_per_cycle_in_box'] / columns:.3f}**" for place in at)
+            keys_of_row = [(contexts, *variant) for variant in variants]
+            measured = (
+                f"**{points[key]['meshes'][mesh]['rays_per_cycle_in_box'] / columns:.3f}**" for key in keys_of_row
+            )
             rows.append((mesh, str(contexts), "RTL", *measured))
             for lanes in ("6/2", "12/4"):
-                figures = [model.get((mesh, lanes, *place)) for place in at]
+                figures = [model.get((mesh, lanes, *key)) for key in keys_of_row]
                 if any(figure is not None for figure in figures):
-                    rows.append(("", "", f"model, {lanes} lanes", *(_number(figure, 3) for figure in figures)))
-    return markdown(["mesh", "contexts", "", *names], rows)
+                    rows.append(("", "", f"cycle model, {lanes} lanes", *(_number(figure, 3) for figure in figures)))
+    return markdown(["mesh", "contexts", "source", *names], rows)
 
 
 def _shares(bench: Data, key: str) -> str:
@@ -196,7 +200,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
-#: Tables by the name in the page: the part of `tools/performance` whose data they show, and what writes them.
+#: For each table of the page: the part of `tools/performance` that measures its data, and its generator.
 TABLES: dict[str, tuple[str, Callable[[Data, Path], str]]] = {
     "rates": ("bench", rates),
     "mirror": ("bench", mirror),
@@ -211,7 +215,7 @@ TABLES: dict[str, tuple[str, Callable[[Data, Path], str]]] = {
 
 
 def main(docs: Path) -> None:
-    """Rewrite the tables of the page in the folder `docs`."""
+    """Update the tables of ``performance.md`` in the folder `docs`."""
     file = docs / "performance.md"
     text = page(file.read_text(), docs)
     with replacing(file) as stream:

@@ -1,4 +1,4 @@
-"""How plots look, and how they become files."""
+"""The common style of plots, and their output files."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ _STYLE = {
 
 @contextmanager
 def figure(path: Path, width: float, height: float, rows: int = 1, columns: int = 1, **layout: Any) -> Iterator[Any]:
-    """Axes to draw on, an array [rows, columns]; written to `path`, a PNG, at the end.
+    """A context with an array of axes [rows, columns], which writes the figure to a PNG file at its end.
 
     Args:
-        path: the file; complete or not there at all.
-        width: inches.
-        height: inches.
-        rows: of axes.
-        columns: of axes.
-        layout: keywords of matplotlib's ``subplots``.
+        path: Output file, replaced atomically.
+        width: Inches.
+        height: Inches.
+        rows: Rows of axes.
+        columns: Columns of axes.
+        layout: Keywords of matplotlib's ``subplots``.
     """
     import matplotlib
 
@@ -62,6 +62,6 @@ def figure(path: Path, width: float, height: float, rows: int = 1, columns: int 
 
 
 def array_name(config: dict[str, Any]) -> str:
-    """An array in a few words."""
+    """The size of an array, for titles."""
     array = config["array"]
     return f"{array['rows']}×{array['columns']} render units, {array['contexts']} contexts"

@@ -1,4 +1,4 @@
-"""Rays per cycle against what was varied."""
+"""Plot of a sweep: rays per cycle over the varied fields."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from typing import Any
 
 from colonnade.report.style import COLOURS, GREY, array_name, figure
 
-#: Panels side by side.
+#: Panels per row.
 PANELS = 3
 
-#: Axes are labelled by a field's last part; these by something clearer.
+#: Axis labels of fields; other fields are labelled by their key.
 LABELS = {
-    "array.rows": "rows (render units of a column)",
+    "array.rows": "rows (render units per column)",
     "array.columns": "columns",
-    "array.contexts": "contexts of a render unit",
-    "columnBvhMemory.banks": "banks of a column's memory",
-    "columnBvhMemory.recordBuffers": "records that a render unit holds",
-    "columnBvhMemory.readLatency": "memory latency, cycles",
+    "array.contexts": "contexts per render unit",
+    "columnBvhMemory.banks": "memory banks per column",
+    "columnBvhMemory.recordBuffers": "record buffers per render unit",
+    "columnBvhMemory.readLatency": "memory read latency, cycles",
 }
 
 MARKERS = "osD^vP*X"
 
 
 def plot_sweep(report: Mapping[str, Any], path: Path) -> None:
-    """Draw a report of `colonnade.evaluation.sweep.sweep` into a PNG.
+    """Plot a report of `colonnade.evaluation.sweep.sweep` as PNG.
 
-    One by one: a panel a field, a line a mesh. Cross product: a panel a mesh, the first field along the axis, a line
-    for each combination of the others.
+    One by one: a panel per field, a line per mesh. Cross product: a panel per mesh with the first field on the x axis,
+    and a line per combination of the other fields.
     """
     panels = _panels_one_by_one(report) if report["one_by_one"] else _panels_of_meshes(report)
-    notes = 1 if len(panels) > PANELS and len(panels) % PANELS else 0
+    has_free_cell = len(panels) > PANELS and len(panels) % PANELS != 0
     columns = min(PANELS, len(panels))
     rows = math.ceil(len(panels) / columns)
     with figure(path, 3.5 * columns + 0.4, 2.9 * rows + 0.5, rows, columns, sharey=True) as axes:
@@ -49,17 +49,16 @@ def plot_sweep(report: Mapping[str, Any], path: Path) -> None:
         width, height = report["base"]["size"]
         dotted = " (dotted)" if report["one_by_one"] else ""
         title = f"base{dotted}: {array_name(report['base']['config'])}; {width}×{height}"
-        if notes:
+        if has_free_cell:
             cells[-1].legend(
                 handles, labels, loc="upper left", title=title.replace(": ", ":\n"), alignment="left", fontsize=9
             )
         else:
-            place = {"loc": "outside lower center", "ncols": min(4, len(labels))}
-            cells[0].figure.legend(handles, labels, title=title, **place)
+            cells[0].figure.legend(handles, labels, title=title, loc="outside lower center", ncols=min(4, len(labels)))
 
 
 class _Panel:
-    """Lines over one field."""
+    """A diagram with lines over one field."""
 
     def __init__(self, title: str, label: str, lines: Mapping[str, Sequence[tuple[Any, float]]], base: Any) -> None:
         self.title = title
@@ -70,16 +69,16 @@ class _Panel:
     def draw(self, axis: Any) -> None:
         values = sorted({value for line in self.lines.values() for value, _ in line}, key=_order)
         is_number = all(isinstance(value, int) and not isinstance(value, bool) and value > 0 for value in values)
-        places = {value: float(value) if is_number else float(place) for place, value in enumerate(values)}
+        positions = {value: float(value) if is_number else float(index) for index, value in enumerate(values)}
         for (name, line), colour, marker in zip(self.lines.items(), COLOURS, MARKERS, strict=False):
-            xs, ys = [places[value] for value, _ in line], [rate for _, rate in line]
+            xs, ys = [positions[value] for value, _ in line], [rate for _, rate in line]
             axis.plot(xs, ys, color=colour, marker=marker, markersize=4.5, linewidth=1.6, label=name)
         if is_number:
             axis.set_xscale("log", base=2)
             axis.minorticks_off()
-        axis.set_xticks(list(places.values()), [_text(value) for value in places])
-        if self.base in places:
-            axis.axvline(places[self.base], color=GREY, linewidth=0.8, linestyle=":", zorder=0)
+        axis.set_xticks(list(positions.values()), [_text(value) for value in positions])
+        if self.base in positions:
+            axis.axvline(positions[self.base], color=GREY, linewidth=0.8, linestyle=":", zorder=0)
         axis.grid(axis="y")
         axis.set_xlabel(self.label)
         axis.set_title(self.title)
@@ -114,7 +113,7 @@ def _panels_of_meshes(report: Mapping[str, Any]) -> list[_Panel]:
 
 
 def _phrase(key: str, value: Any) -> str:
-    """A field and its value in words: ``no snooping``, ``banks 2``."""
+    """A field and its value as text: ``no snooping``, ``banks 2``."""
     field = key.rpartition(".")[2]
     if isinstance(value, bool):
         return field if value else f"no {field}"
@@ -126,5 +125,5 @@ def _text(value: Any) -> str:
 
 
 def _order(value: Any) -> tuple[int, Any]:
-    """Numbers by size, then everything else by its text."""
+    """Sort key: numbers by size, then all other values by their text."""
     return (0, value) if isinstance(value, int | float) else (1, _text(value))

@@ -1,1 +1,1 @@
-"""Scenes: the TOML file, the pose of the object, cameras and the view."""
+"""Scenes: the TOML file, the object's pose, cameras and the view."""

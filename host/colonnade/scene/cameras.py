@@ -1,4 +1,4 @@
-"""Cameras in the world: placed, framing the object, or a room's."""
+"""World-space cameras: at a given position, framing the object, or a room's camera."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from colonnade.mesh.mesh import Extent
 
 
-#: A framed object is at most this part of the picture's width.
-WIDEST = 0.9
+#: Largest fraction of the picture's width that a framed object covers.
+MAX_WIDTH = 0.9
 
 
 @dataclass(frozen=True)
 class WorldCamera:
-    """A pinhole camera in the world; the ray of pixel (x, y) runs along ``corner + x * step_x + y * step_y``.
+    """A pinhole camera in world space; pixel (x, y) has the ray direction ``corner + x * step_x + y * step_y``.
 
     Attributes:
         position, corner, step_x, step_y: float64 [3].
-        axes: float64 [3, 3], rows: right, up and towards the viewer, unit.
+        axes: float64 [3, 3], unit rows: right, up and towards the viewer.
     """
 
     position: Floats
@@ -39,7 +39,11 @@ class WorldCamera:
 
 
 def scene_camera(camera: Camera, pose: Pose, extent: Extent, width: int, height: int) -> WorldCamera:
-    """The camera that a scene places or frames."""
+    """The camera of a scene without a room, for a frame of ``width`` by ``height`` pixels.
+
+    Raises:
+        UserError: The camera's position equals its target.
+    """
     centre, edge = pose.to_world(extent.centre), extent.edge * pose.scale
     slope = math.tan(math.radians(camera.fov) / 2)
     if camera.position is not None:
@@ -51,35 +55,39 @@ def scene_camera(camera: Camera, pose: Pose, extent: Extent, width: int, height:
     else:
         right, up, toward = camera_axes(np.array(camera.direction), camera.up)
         outline = pose.to_world(extent.outline) - centre
-        across, along = camera.framing * 2 * slope, WIDEST * 2 * slope * width / height
-        aside, above, distance = _frame(outline @ right, outline @ up, outline @ toward, along, across, edge)
-        position = centre + aside * right + above * up + distance * toward
+        max_height, max_width = camera.framing * 2 * slope, MAX_WIDTH * 2 * slope * width / height
+        x, y, distance = _frame(outline @ right, outline @ up, outline @ toward, max_width, max_height, edge)
+        position = centre + x * right + y * up + distance * toward
     pixel = 2 * slope / height
     corner = -toward + (0.5 - width / 2) * pixel * right + (height / 2 - 0.5) * pixel * up
     return WorldCamera(position, corner, pixel * right, -pixel * up, np.stack([right, up, toward]))
 
 
 def environment_camera(environment: Environment, width: int, height: int) -> WorldCamera:
-    """The camera that saw the room, for a frame of any size in the maps' proportions."""
+    """The camera of a room's maps, for a frame with the maps' aspect ratio.
+
+    Raises:
+        UserError: The frame has another aspect ratio.
+    """
     if abs(width * environment.height - height * environment.width) >= max(environment.width, environment.height):
         raise UserError(
-            f"a frame of {width}x{height} pixels is not in the proportions of room {environment.name},"
-            f" {environment.width}x{environment.height}: give a size that is"
+            f"a frame of {width}x{height} pixels does not have the proportions of room {environment.name},"
+            f" {environment.width}x{environment.height}: give another size"
         )
     axes, position = environment.camera_to_world[:, :3], environment.camera_to_world[:, 3]
     right, down, forward = axes.T
-    across, along = environment.width / width, environment.height / height
-    step_x, step_y = across / environment.fx * right, along / environment.fy * down
+    scale_x, scale_y = environment.width / width, environment.height / height
+    step_x, step_y = scale_x / environment.fx * right, scale_y / environment.fy * down
     corner = (
         forward
-        + (0.5 * across - environment.cx) / environment.fx * right
-        + (0.5 * along - environment.cy) / environment.fy * down
+        + (0.5 * scale_x - environment.cx) / environment.fx * right
+        + (0.5 * scale_y - environment.cy) / environment.fy * down
     )
     return WorldCamera(position, corner, step_x, step_y, np.stack([right, -down, -forward]))
 
 
 def camera_axes(toward: Floats, up: Vector) -> tuple[Floats, Floats, Floats]:
-    """Unit vectors right, up and towards the viewer; where ``up`` is along the view another axis takes its place."""
+    """Unit vectors right, up and towards the viewer; another axis replaces an ``up`` parallel to the view."""
     back = toward / np.linalg.norm(toward)
     for candidate in (up, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)):
         right = np.cross(candidate, back)
@@ -91,26 +99,35 @@ def camera_axes(toward: Floats, up: Vector) -> tuple[Floats, Floats, Floats]:
 
 
 def _frame(x: Floats, y: Floats, z: Floats, width: float, height: float, edge: float) -> tuple[float, float, float]:
-    """Where the camera stands, from the cube's centre: right, up and back.
+    """Find the camera position at which the outline fits the picture, centred.
 
-    The outline's points are [k] right, up and towards the camera; ``width`` and ``height`` are what they may span at a
-    distance of 1. The spans shrink with the distance, so halving an interval finds where they just fit; the outline is
-    in the middle of the picture.
+    The spans decrease with the distance, so bisection finds the smallest distance.
+
+    Args:
+        x: float64 [k], the outline's points, right of the cube's centre.
+        y: float64 [k], above the centre.
+        z: float64 [k], from the centre towards the camera.
+        width: Largest span at distance 1.
+        height: Largest span at distance 1.
+        edge: Edge of the object's cube.
+
+    Returns:
+        The camera's position from the cube's centre: right, up and towards the viewer.
     """
     near = float(z.max()) + 1e-3 * edge
     far = near + 1e4 * edge
     for _ in range(64):
         depth = (near + far) / 2 - z
-        spans = [np.ptp((across - _middle(across, depth)) / depth) for across in (x, y)]
+        spans = [np.ptp((values - _middle(values, depth)) / depth) for values in (x, y)]
         near, far = (near, (near + far) / 2) if spans[0] <= width and spans[1] <= height else ((near + far) / 2, far)
     return _middle(x, far - z), _middle(y, far - z), far
 
 
-def _middle(across: Floats, depth: Floats) -> float:
-    """The camera's shift for which (across − shift) / depth is as far to either side: the outline is in the middle."""
-    low, high = float(across.min()), float(across.max())
+def _middle(values: Floats, depth: Floats) -> float:
+    """The shift at which (values − shift) / depth has equal extent on both sides, by bisection."""
+    low, high = float(values.min()), float(values.max())
     for _ in range(52):
         shift = (low + high) / 2
-        seen = (across - shift) / depth
-        low, high = (shift, high) if seen.max() + seen.min() > 0 else (low, shift)
+        projected = (values - shift) / depth
+        low, high = (shift, high) if projected.max() + projected.min() > 0 else (low, shift)
     return (low + high) / 2

@@ -1,7 +1,7 @@
-"""Scenes: what to render. These classes are the schema of the scene file: its keys, ranges and defaults.
+"""The scene model, which is also the schema of the scene file: its keys, ranges and defaults.
 
-Colours and intensities are linear. Lengths are in world units, those of the mesh unless ``[transform]`` says otherwise.
-Values are checked when a scene is made, by a file or by code; an unknown key is refused.
+Colours and intensities are linear. Lengths are in world units, which are the mesh's units unless ``[transform]`` scales
+them. Values are checked when a scene is constructed, from a file or in code; unknown keys are refused.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from colonnade.mesh.materials import Kind
 
 _STRICT = ConfigDict(extra="forbid")
 
-#: The largest edge of a room's maps, pixels.
+#: Largest width or height of a room's maps, pixels.
 MAX_EDGE = 4096
-#: More would be refused by any configuration.
+#: The most bounces that any configuration supports.
 MAX_BOUNCES = 15
 
 
@@ -33,10 +33,10 @@ def _require_text(value: object) -> object:
     return value
 
 
-# Numbers are strict: no text and no Boolean stands for one.
+# Numbers are strict: text and Booleans are not converted.
 _Float = Annotated[float, Strict()]
 _Coordinate = Annotated[_Float, Interval(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
-_Share = Annotated[_Float, Interval(ge=0.0, le=1.0)]
+_Fraction = Annotated[_Float, Interval(ge=0.0, le=1.0)]
 _Intensity = Annotated[_Float, Interval(ge=0.0, le=15.0)]
 _MapPixel = Annotated[_Float, Interval(ge=0.0, le=MAX_EDGE)]
 _Text = Annotated[str, Field(min_length=1)]
@@ -44,28 +44,28 @@ _File = Annotated[Path, BeforeValidator(_require_text)]
 
 Vector = tuple[float, float, float]
 _Vector = tuple[_Coordinate, _Coordinate, _Coordinate]
-_Colour = tuple[_Share, _Share, _Share]
+_Colour = tuple[_Fraction, _Fraction, _Fraction]
 _BrightColour = tuple[_Intensity, _Intensity, _Intensity]
 _Pixel = tuple[_MapPixel, _MapPixel]
 
 
 @dataclass(frozen=True, config=_STRICT)
 class MeshSource:
-    """Which mesh: a name (see `colonnade.mesh.load.load_mesh`) or a file, relative to the scene file."""
+    """The mesh: a name (see `colonnade.mesh.load.load_mesh`), or a file relative to the scene file."""
 
     name: _Text | None = None
     path: _File | None = None
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
+    def _exactly_one(self) -> Self:
         if (self.name is None) == (self.path is None):
-            raise ValueError("[mesh] needs a name or a path, one of the two")
+            raise ValueError("[mesh] needs either a name or a path")
         return self
 
 
 @dataclass(frozen=True, config=_STRICT)
 class Transform:
-    """World = rotate · scale · mesh + translate; degrees about x, then y, then z."""
+    """World = rotate · scale · mesh + translate; ``rotate`` is in degrees about x, then y, then z."""
 
     rotate: _Vector = (0.0, 0.0, 0.0)
     scale: Annotated[_Float, Interval(ge=1e-9, le=1e9)] = 1.0
@@ -74,15 +74,14 @@ class Transform:
 
 @dataclass(frozen=True, config=_STRICT)
 class Camera:
-    """Either placed at a position, or framing the object from a direction.
+    """A camera at a position, or framing the object from a direction.
 
     Attributes:
-        position: World; None when framing.
-        target: The middle of the picture, world; None is the centre of the object's cube.
-        direction: From the centre of the object's cube towards the camera, when framing.
-        framing: Part of the picture's height that the object's outline takes, centred; less where its width would not
-            fit.
-        up: Which way is up.
+        position: World position; None for a framing camera.
+        target: World point at the picture's centre; None is the centre of the object's cube.
+        direction: From the centre of the object's cube towards a framing camera.
+        framing: Fraction of the picture's height that the object's outline covers; less if its width would not fit.
+        up: Up direction.
         fov: Vertical field of view, degrees.
     """
 
@@ -105,14 +104,14 @@ class Camera:
 
 @dataclass(frozen=True, config=_STRICT)
 class PointLight:
-    """A point light, either at a position or relative to camera and object.
+    """A point light, at a position or relative to camera and object.
 
     Attributes:
-        position: World; None when relative.
-        offset: From the centre of the object's cube, in its edges: right, up, towards the camera.
-        colour: Intensity a channel; 1 lights a surface that faces the light with its albedo.
-        falloff: Distance at which it has that intensity, world units; nearer it is brighter, up to four times, farther
-            darker, with the squared distance. None: equally bright everywhere.
+        position: World position; None for a relative light.
+        offset: From the centre of the object's cube, in edges of the cube: right, up, towards the camera.
+        colour: Intensity per channel; at 1 a surface that faces the light has its albedo as colour.
+        falloff: Distance of that intensity, world units. The intensity falls with the squared distance, up to four
+            times brighter when nearer. None: constant intensity.
     """
 
     position: _Vector | None = None
@@ -123,11 +122,11 @@ class PointLight:
 
 @dataclass(frozen=True, config=_STRICT)
 class Light(PointLight):
-    """The first light, with the settings that all lights share.
+    """The first light, with the settings of all lights.
 
     Attributes:
         shadows: Whether lights cast shadows.
-        shadow_offset: How far from the surface secondary rays start, in edges of the object's cube.
+        shadow_offset: Distance of secondary rays' origins from the surface, in edges of the object's cube.
     """
 
     shadows: StrictBool = True
@@ -136,13 +135,13 @@ class Light(PointLight):
 
 @dataclass(frozen=True, config=_STRICT)
 class Material:
-    """What the object is made of; where None, the mesh's own materials say.
+    """Overrides of the mesh's materials; None keeps the mesh's value.
 
     Attributes:
         kind: diffuse, mirror or glass.
-        albedo: Reflected, or tint of what is mirrored or transmitted.
+        albedo: Diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
-        flat: Geometric normals instead of the vertices'.
+        flat: Use geometric normals instead of smooth ones.
     """
 
     kind: Kind | None = None
@@ -153,19 +152,19 @@ class Material:
     @model_validator(mode="after")
     def _ior_is_of_glass(self) -> Self:
         if self.ior is not None and self.kind not in (None, "glass"):
-            raise ValueError(f"material.ior belongs to glass, not to a {self.kind} material")
+            raise ValueError(f"material.ior is for glass, not for a {self.kind} material")
         return self
 
 
 @dataclass(frozen=True, config=_STRICT)
 class Placement:
-    """Where in a room the object stands, in place of scale and translation: the file's table ``[object]``.
+    """The object's place in a room, instead of scale and translation: the file's table ``[object]``.
 
     Attributes:
-        stand_at: Pixel (u, v) of the room's maps: the object stands on what is seen there, the world's y up; None is
-            the middle of the picture, 0.7 of its height down.
-        size: The longest edge of the mesh's box, metres.
-        turn: About the vertical, degrees, after the transform's rotation.
+        stand_at: Pixel (u, v) of the room's maps; the object stands on its surface point, with the world's y up. None
+            is the middle column, at 0.7 of the height.
+        size: Longest edge of the mesh's bounding box, metres.
+        turn: Rotation about the vertical, degrees, after the transform's rotation.
     """
 
     stand_at: _Pixel | None = None
@@ -175,13 +174,13 @@ class Placement:
 
 @dataclass(frozen=True, config=_STRICT)
 class Motion:
-    """How an object and a light move while frames are rendered, from where the scene has them.
+    """The motion of the object and the first light over a sequence of frames, starting at the scene's values.
 
     Attributes:
-        turn: Of the object about the vertical through its middle, degrees.
-        stand_at: Pixel of the room's maps where an object that stands there ends; it goes straight to that point.
-        translate: What ``transform.translate`` ends as, where the object does not stand in a room.
-        light: World position where the first light ends.
+        turn: Rotation of the object about the vertical through its centre, degrees.
+        stand_at: Last value of ``object.stand_at``; the object moves straight to that surface point.
+        translate: Last value of ``transform.translate``, for an object that does not stand in a room.
+        light: Last world position of the first light.
     """
 
     turn: Annotated[_Float, Interval(ge=-36000.0, le=36000.0)] = 360.0
@@ -191,12 +190,13 @@ class Motion:
 
     @property
     def is_closed(self) -> bool:
-        """It ends as it began."""
+        """Whether the last state equals the first."""
         return self.turn % 360.0 == 0.0 and self.stand_at is None and self.translate is None and self.light is None
 
-    def shares(self, frames: int) -> list[float]:
-        """How far along the motion each frame is, 0.0 to 1.0: evenly spaced from the beginning to the end. The end of
-        a closed motion is left out, so that the frames repeat without a pause.
+    def frame_progress(self, frames: int) -> list[float]:
+        """Progress of each frame along the motion, evenly spaced from 0.0 to 1.0.
+
+        A closed motion leaves out 1.0, so that an animation repeats without a pause.
         """
         steps = frames if self.is_closed else frames - 1
         return [frame / max(steps, 1) for frame in range(frames)]
@@ -204,15 +204,15 @@ class Motion:
 
 @dataclass(frozen=True, config=_STRICT)
 class Paths:
-    """How rays continue from mirrors and glass.
+    """Settings of paths over mirrors and glass.
 
     Attributes:
-        bounces: Reflections and refractions of a path that are traced; the ray after them meets the background only.
-        shadow_transmittance: Part of a light that glass transmits to a shadow.
+        bounces: Traced reflections and refractions of a path; the ray after them sees the background only.
+        shadow_transmittance: Fraction of light that a glass occluder transmits.
     """
 
     bounces: Annotated[int, Strict(), Interval(ge=0, le=MAX_BOUNCES)] = 4
-    shadow_transmittance: _Share = 0.6
+    shadow_transmittance: _Fraction = 0.6
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -224,7 +224,7 @@ class Colour:
 
 @dataclass(frozen=True, config=_STRICT)
 class Background:
-    """What rays meet that miss the object: a room, or one linear colour.
+    """What rays see that miss the object: a room or one colour.
 
     Attributes:
         colour: Linear.
@@ -237,7 +237,7 @@ class Background:
 
 @dataclass(frozen=True, config=_STRICT)
 class FrameSize:
-    """The picture's size unless the command line gives one, pixels."""
+    """Default size of the frame, pixels."""
 
     width: Annotated[int, Strict(), Ge(1)] = 640
     height: Annotated[int, Strict(), Ge(1)] = 480
@@ -247,8 +247,8 @@ class FrameSize:
 class Scene:
     """One object, one camera, at least one light.
 
-    With a room the camera is the room's, and the world is the room's world, in metres. ``share`` is how far along its
-    motion the scene is, 0.0 to 1.0.
+    With a room, the camera is the room's, and the world is the room's world, in metres. ``motion_progress`` is the
+    progress along the motion, 0.0 to 1.0.
     """
 
     mesh: MeshSource
@@ -263,38 +263,38 @@ class Scene:
     paths: Paths = field(default_factory=Paths)
     frame: FrameSize = field(default_factory=FrameSize)
     motion: Motion = field(default_factory=Motion)
-    share: float = 0.0
+    motion_progress: float = 0.0
 
-    def at(self, share: float) -> Scene:
-        """The scene so far along its motion."""
-        return replace(self, share=share)
+    def at(self, progress: float) -> Scene:
+        """The scene at a progress along its motion."""
+        return replace(self, motion_progress=progress)
 
     def with_mesh(self, name_or_path: str) -> Scene:
-        """The scene with another mesh: a name, or a path relative to the working directory."""
+        """The scene with another mesh, a name or a path relative to the working directory."""
         return replace(self, mesh=MeshSource(name=name_or_path))
 
     def with_environment(self, folder: Path) -> Scene:
-        """The scene in a room, a folder of maps."""
+        """The scene in the room of a folder."""
         return replace(self, background=replace(self.background, room=folder))
 
     @property
     def lights(self) -> tuple[PointLight, ...]:
-        """All lights, the first one first, where the motion has it."""
+        """All lights; the motion moves the first one."""
         first, end = self.light, self.motion.light
         if first.position is not None and end is not None:
-            first = replace(first, position=between(first.position, end, self.share))
+            first = replace(first, position=interpolate(first.position, end, self.motion_progress))
         return first, *self.more_lights
 
     @property
     def mesh_source(self) -> str | Path:
-        """What `colonnade.mesh.load.load_mesh` takes."""
+        """The argument for `colonnade.mesh.load.load_mesh`."""
         if self.mesh.path is not None:
             return self.mesh.path
         assert self.mesh.name is not None
         return self.mesh.name
 
 
-def between(start: Sequence[float], end: Sequence[float], share: float) -> Vector:
-    """The point at a share of the straight way; both ends are exact."""
-    x, y, z = ((1.0 - share) * a + share * b for a, b in zip(start, end, strict=True))
+def interpolate(start: Sequence[float], end: Sequence[float], fraction: float) -> Vector:
+    """Interpolate two points linearly; both ends are exact."""
+    x, y, z = ((1.0 - fraction) * a + fraction * b for a, b in zip(start, end, strict=True))
     return x, y, z

@@ -1,4 +1,4 @@
-"""Where the object is: between mesh space, the world, and a room's view space."""
+"""The object's pose: transforms between mesh space, world space and a room's view space."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
-from colonnade.scene.model import Placement, Scene, Transform, Vector, between
+from colonnade.scene.model import Placement, Scene, Transform, Vector, interpolate
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Extent
 
 
-#: Without a word in the scene the object stands in the middle of the picture, this far down.
-_STANDS_DOWN = 0.7
+#: Default row where an object stands in a room, as a fraction of the height.
+_DEFAULT_ROW = 0.7
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Pose:
 
     Attributes:
         rotation: float64 [3, 3], for column vectors.
-        scale: World units a mesh unit.
+        scale: World units per mesh unit.
         translate: float64 [3].
     """
 
@@ -36,27 +36,26 @@ class Pose:
     translate: Floats
 
     def to_world(self, points: Floats) -> Floats:
-        """Points [..., 3] of the mesh, in the world."""
+        """Transform points [..., 3] from mesh space to world space."""
         return np.asarray(points @ self.rotation.T * self.scale + self.translate, dtype=np.float64)
 
     def to_mesh(self, point: Floats) -> Floats:
-        """Points [..., 3] of the world, in mesh space."""
+        """Transform points [..., 3] from world space to mesh space."""
         return np.asarray((point - self.translate) / self.scale @ self.rotation, dtype=np.float64)
 
     def from_view(self, camera_to_world: Floats) -> Floats:
-        """From a camera's view space to mesh space, float64 [3, 4]."""
-        turn = self.rotation.T @ camera_to_world[:, :3] / self.scale
-        return np.column_stack([turn, self.to_mesh(camera_to_world[:, 3])])
+        """Transform from a camera's view space to mesh space, float64 [3, 4]."""
+        linear = self.rotation.T @ camera_to_world[:, :3] / self.scale
+        return np.column_stack([linear, self.to_mesh(camera_to_world[:, 3])])
 
 
 def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -> Pose:
-    """Where the scene puts its mesh: by its transform, or on what the room's camera sees at a pixel; and where its
-    motion has taken it from there.
+    """The pose of the scene's mesh at its motion's progress: by its transform, or standing in a room.
 
     Raises:
-        UserError: The place is outside the room's maps, or the motion is one of another kind of place.
+        UserError: A pixel is outside the room's maps, or the motion does not match the kind of pose.
     """
-    placement, motion, share = scene.placement, scene.motion, scene.share
+    placement, motion, progress = scene.placement, scene.motion, scene.motion_progress
     if placement is None and environment is not None and scene.transform == Transform():
         placement = Placement()
     rotation = rotation_matrix(scene.transform)
@@ -64,32 +63,33 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
         if motion.stand_at is not None:
             raise UserError("motion.stand_at is for an object that stands in a room: give motion.translate")
         start, scale = scene.transform.translate, scene.transform.scale
-        moved = start if motion.translate is None else between(start, motion.translate, share)
+        moved = start if motion.translate is None else interpolate(start, motion.translate, progress)
         turned = (
-            turning((0.0, 1.0, 0.0) if environment is not None else scene.camera.up, motion.turn * share) @ rotation
+            rotation_about((0.0, 1.0, 0.0) if environment is not None else scene.camera.up, motion.turn * progress)
+            @ rotation
         )
         return Pose(turned, scale, np.array(moved) + scale * (rotation - turned) @ extent.centre)
     if motion.translate is not None:
         raise UserError("motion.translate is for an object that does not stand in a room: give motion.stand_at")
-    turned = rotation_matrix(Transform(rotate=(0.0, placement.turn + motion.turn * share, 0.0))) @ rotation
+    turned = rotation_matrix(Transform(rotate=(0.0, placement.turn + motion.turn * progress, 0.0))) @ rotation
     outline = extent.outline @ turned.T
     foot = extent.centre @ turned.T
     foot[1] = outline[:, 1].min()
     scale = placement.size / extent.edge
     point = standing_point(placement, environment)
     if motion.stand_at is not None:
-        point = (1.0 - share) * point + share * _seen_at(motion.stand_at, environment, "motion.stand_at")
+        point = (1.0 - progress) * point + progress * _surface_point(motion.stand_at, environment, "motion.stand_at")
     return Pose(turned, scale, point - foot * scale)
 
 
 def standing_point(placement: Placement, environment: Environment) -> Floats:
-    """What the room's camera sees where the object stands, world, float64 [3]."""
-    return _seen_at(
-        placement.stand_at or (environment.width / 2, environment.height * _STANDS_DOWN), environment, "object.stand_at"
+    """The room's surface point under the object, world space, float64 [3]."""
+    return _surface_point(
+        placement.stand_at or (environment.width / 2, environment.height * _DEFAULT_ROW), environment, "object.stand_at"
     )
 
 
-def _seen_at(pixel: tuple[float, float], environment: Environment, key: str) -> Floats:
+def _surface_point(pixel: tuple[float, float], environment: Environment, key: str) -> Floats:
     u, v = pixel
     if u >= environment.width or v >= environment.height:
         raise UserError(
@@ -101,11 +101,13 @@ def _seen_at(pixel: tuple[float, float], environment: Environment, key: str) -> 
     return np.asarray(environment.camera_to_world[:, :3] @ seen + environment.camera_to_world[:, 3], dtype=np.float64)
 
 
-def turning(axis: Vector, degrees: float) -> Floats:
-    """Rotation about an axis through the origin, float64 [3, 3] for column vectors; Rodrigues' formula."""
+def rotation_about(axis: Vector, degrees: float) -> Floats:
+    """Rotation about an axis through the origin by Rodrigues' formula, float64 [3, 3] for column vectors."""
     x, y, z = np.array(axis) / np.linalg.norm(axis)
-    angle, across = math.radians(degrees), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across)
+    angle, cross_product = math.radians(degrees), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(
+        np.eye(3) + math.sin(angle) * cross_product + (1 - math.cos(angle)) * cross_product @ cross_product
+    )
 
 
 def rotation_matrix(transform: Transform) -> Floats:

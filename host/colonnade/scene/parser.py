@@ -1,4 +1,4 @@
-"""Reads scene files; every error names the file and the key. The schema is `colonnade.scene.model`."""
+"""Reads scene files. The schema is `colonnade.scene.model`; every error names the file and the key."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-#: Tables of the file, in the order of messages. Two have another name in `Scene`: ``light`` and ``object``.
+#: Tables of the file in the order of messages. `Scene` names ``object`` placement, and splits several ``light``.
 _TABLES = "mesh transform object camera light material paths ambient background motion frame".split()
 
 _SCHEMA = TypeAdapter(Scene)
@@ -29,10 +29,10 @@ _JSON_SCHEMA: dict[str, Any] = _SCHEMA.json_schema()
 
 
 def load_scene(path: str | Path) -> Scene:
-    """Reads a scene file; its paths are relative to its folder.
+    """Read a scene file; its paths are relative to its folder.
 
     Raises:
-        UserError: It is missing, not TOML, or says something that has no meaning.
+        UserError: The file is missing, is not TOML, or has an invalid key or value.
     """
     file = Path(path)
     content = read_input(file, "the scene", missing=f"scene file {file} does not exist")
@@ -40,7 +40,7 @@ def load_scene(path: str | Path) -> Scene:
         data = tomllib.loads(content.decode("utf-8"))
     except RecursionError:
         raise UserError(f"scene {file} is nested too deeply: {MAX_DEPTH} levels at most") from None
-    except ValueError as error:  # of TOML, UTF-8, and whole numbers with too many digits
+    except ValueError as error:  # invalid TOML or UTF-8, or too many digits
         raise UserError(f"scene {file} is not TOML: {error}") from None
     check_values(data, f"scene {file}")
     try:
@@ -59,7 +59,7 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The file's tables under the names of `Scene`: several ``[[light]]`` are the first one and `more_lights`."""
+    """Rename the file's tables to the fields of `Scene`; several ``[[light]]`` become `light` and `more_lights`."""
     tables = dict(data)
     if isinstance(light := tables.get("light"), list) and light:
         tables |= {"light": light[0], "more_lights": light[1:]}
@@ -69,10 +69,10 @@ def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_combinations(data: Mapping[str, Any]) -> None:
-    """Refuses unknown tables, and keys that contradict each other.
+    """Refuse unknown tables and contradictory keys.
 
     Raises:
-        ValueError: With the message.
+        ValueError: The message for the user.
     """
     for name, value in data.items():
         if name not in _TABLES:
@@ -85,21 +85,21 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     if "room" in background and "camera" in data:
         raise ValueError("the camera is the room's: leave out [camera], or background.room")
     if "room" not in background and "object" in data:
-        raise ValueError("[object] says where the object stands in a room: it needs background.room")
+        raise ValueError("[object] places the object in a room: it needs background.room")
     if "object" in data and ("scale" in transform or "translate" in transform):
         raise ValueError("[object] places the object: leave out transform.scale and transform.translate")
     if "position" in camera and ("direction" in camera or "framing" in camera):
-        raise ValueError("[camera] is either placed (position, target) or framed (direction, framing)")
+        raise ValueError("[camera] takes either position and target, or direction and framing")
     if any(isinstance(light, dict) and "position" in light and "offset" in light for light in lights):
-        raise ValueError("[light] has a position or an offset, not both")
+        raise ValueError("[light] takes a position or an offset, not both")
     if "motion" in data and not data["motion"]:
         raise ValueError("[motion] moves nothing: give turn, stand_at, translate or light")
     if "light" in data.get("motion", {}) and isinstance(lights[0], dict) and "position" not in lights[0]:
-        raise ValueError("motion.light moves the first light from its place: give light.position")
+        raise ValueError("motion.light starts at the first light's position: give light.position")
 
 
 def _message(error: ErrorDetails) -> str:
-    """One line about what the schema refuses: the key as the file has it, and what it must be."""
+    """Format a validation error in one line: the key as in the file, and its valid values."""
     table, *rest = (str(part) for part in error["loc"] if isinstance(part, str))
     name = {"placement": "object", "more_lights": "light"}.get(table, table)
     node = _node(table)
@@ -113,12 +113,12 @@ def _message(error: ErrorDetails) -> str:
 
 
 def _node(table: str) -> dict[str, Any]:
-    """The schema of a table, as JSON Schema."""
+    """The JSON Schema of a table."""
     return _plain(_plain(_JSON_SCHEMA["properties"][table]).get("items", _JSON_SCHEMA["properties"][table]))
 
 
 def _plain(node: dict[str, Any]) -> dict[str, Any]:
-    """A schema without references and without the alternative that the key is absent."""
+    """Resolve a schema's reference, and its alternative to null."""
     if "anyOf" in node:
         (node,) = (option for option in node["anyOf"] if option.get("type") != "null")
     if "$ref" in node:
@@ -128,7 +128,7 @@ def _plain(node: dict[str, Any]) -> dict[str, Any]:
 
 
 def _expectation(node: Mapping[str, Any]) -> str:
-    """What a value must be, in words."""
+    """Describe the valid values of a key."""
     kind = node["type"]
     if kind == "array":
         numbers = node["prefixItems"]

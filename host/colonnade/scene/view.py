@@ -1,6 +1,6 @@
-"""Camera and lights of a scene in the mesh's own space, in floats.
+"""The view: camera, lights and settings of a frame in mesh space, as floats.
 
-The reference renders this view; `colonnade.registers.frame.frame_registers` rounds it.
+The reference renderer uses it directly; `colonnade.registers.frame.frame_registers` rounds it to registers.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class PlacedLight:
     Attributes:
         position: float64 [3].
         colour: float64 [3], linear.
-        reach: Distance at which it has that colour, mesh units; None where it is equally bright everywhere.
+        reach: Distance of that intensity, mesh units; None for constant intensity.
     """
 
     position: Floats
@@ -39,23 +39,23 @@ class PlacedLight:
 
 @dataclass(frozen=True)
 class View:
-    """A frame in mesh space.
+    """The view of one frame, in mesh space.
 
-    The ray of pixel (x, y), (0, 0) at the top left, is ``origin + t * (direction + x * step_x + y * step_y)``; it goes
-    through the pixel's centre. Directions are not normalised: one unit of t is one mesh unit of depth.
+    The ray through the centre of pixel (x, y) is ``origin + t * (direction + x * step_x + y * step_y)``. Pixel (0, 0)
+    is at the top left. Directions are not normalised: one unit of t is one mesh unit of depth.
 
     Attributes:
-        width, height: Pixels.
+        width, height: Size of the frame, pixels.
         origin, direction, step_x, step_y: float64 [3].
         lights: At least one.
-        materials: Of the mesh's `face_materials`, at least one.
+        materials: Indexed by the mesh's `face_materials`; at least one.
         ambient, background: float64 [3], linear.
-        flat: Shade with geometric normals.
+        flat: Shade with geometric normals instead of smooth ones.
         shadows: Trace shadow rays.
-        shadow_offset: How far off the surface secondary rays start, mesh units.
-        shadow_transmittance: What glass lets through of a light.
-        bounces: Reflections and refractions of a path that are traced.
-        view_to_mesh: float64 [3, 4] from a room's view space, metres, to mesh space; None without a room.
+        shadow_offset: Distance of secondary rays' origins from the surface, mesh units.
+        shadow_transmittance: Fraction of light that a glass occluder transmits.
+        bounces: Traced reflections and refractions of a path.
+        view_to_mesh: Transform from a room's view space, metres, to mesh space, float64 [3, 4]; None without a room.
     """
 
     width: int
@@ -99,16 +99,17 @@ def make_view(
     materials: tuple[MeshMaterial, ...] = (PLAIN,),
     environment: Environment | None = None,
 ) -> View:
-    """The frame of a scene. What is placed relative to the object, the camera or lights, stays where it is at the
-    beginning of the scene's motion.
+    """Make the view of a scene at its motion's progress.
+
+    Cameras and lights that are relative to the object keep their positions from the start of the motion.
 
     Args:
         scene: What to render.
-        extent: Of its mesh (`Mesh.extent`, or that of an image's header).
-        width: Pixels.
-        height: Pixels.
-        materials: Of the mesh; what the scene says takes their place.
-        room: The one that `scene.background` names; then its camera sees the frame.
+        extent: Bounds of the mesh (`Mesh.extent`, or that of an image's header).
+        width: Width of the frame, pixels.
+        height: Height of the frame, pixels.
+        materials: Materials of the mesh; the scene's values override them.
+        environment: The room of `scene.background`, whose camera is then used.
     """
     pose = object_pose(scene, extent, environment)
     start = object_pose(scene.at(0.0), extent, environment)
@@ -137,10 +138,10 @@ def make_view(
     )
 
 
-def with_overrides(own: Sequence[MeshMaterial], wanted: Material) -> tuple[MeshMaterial, ...]:
-    """Materials of a mesh with what the scene says in their place."""
-    given = {key: value for key in ("kind", "albedo", "ior") if (value := getattr(wanted, key)) is not None}
-    return tuple(replace(material, **given) for material in own)
+def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tuple[MeshMaterial, ...]:
+    """Replace values of a mesh's materials by those that the scene gives."""
+    given = {key: value for key in ("kind", "albedo", "ior") if (value := getattr(overrides, key)) is not None}
+    return tuple(replace(material, **given) for material in materials)
 
 
 def _placed(light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose) -> PlacedLight:

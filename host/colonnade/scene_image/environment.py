@@ -8,7 +8,7 @@ import numpy as np
 
 from colonnade.design.manifest import Manifest
 from colonnade.environment.encoded import EncodedEnvironment, layout_of
-from colonnade.environment.encoding.image import SOURCE_BYTES_A_PIXEL, memory_words
+from colonnade.environment.encoding.image import SOURCE_BYTES_PER_PIXEL, memory_words
 from colonnade.environment.encoding.layout import POINTER_BITS
 from colonnade.environment.encoding.plane_map import PLANE_MODES
 from colonnade.environment.encoding.two_level import MODES
@@ -58,7 +58,7 @@ def environment_use(header: ImageHeader, manifest: Manifest) -> dict[str, dict[s
     if header.room is None:
         return {}
     layout = layout_of(manifest)
-    source = layout.width * layout.height * SOURCE_BYTES_A_PIXEL
+    source = layout.width * layout.height * SOURCE_BYTES_PER_PIXEL
     of_map, planes = layout.map_memory_bytes, layout.plane_memory_bytes
     counts = {"albedo": of_map, "normals": of_map, "planes": planes}
     return {name: {"bytes": count, "source_bytes": source, "ratio": source / count} for name, count in counts.items()}

@@ -71,12 +71,12 @@ ACCESSORS = gltf()["accessors"]
 CASES = {
     "obj-index-0": Case(OBJ, "names vertex 0", {"x.obj": f"{POINTS}f 0 1 2\n"}),
     "obj-index-0-with-normal": Case(OBJ, "names vertex 0", {"x.obj": f"{POINTS}vn 0 0 1\nf 0//1 1//1 2//1\n"}),
-    "obj-index-beyond": Case(OBJ, "vertex 9, which does not exist", {"x.obj": f"{POINTS}f 1 2 9\n"}),
-    "obj-index-before": Case(OBJ, "vertex -9, which does not exist", {"x.obj": f"{POINTS}f 1 2 -9\n"}),
-    "obj-index-digits": Case(OBJ, "does not exist", {"x.obj": f"{POINTS}f 1 2 {'9' * 400}\n"}),
-    "obj-index-text": Case(OBJ, "no whole number", {"x.obj": f"{POINTS}f a b c\n"}),
-    "obj-index-float": Case(OBJ, "no whole number", {"x.obj": f"{POINTS}f 1.5 2 3\n"}),
-    "obj-index-5000-digits": Case(OBJ, "no whole number", {"x.obj": f"{POINTS}f 1 2 {'9' * 5000}\n"}),
+    "obj-index-beyond": Case(OBJ, "vertex 9, but the file has", {"x.obj": f"{POINTS}f 1 2 9\n"}),
+    "obj-index-before": Case(OBJ, "vertex -9, but the file has", {"x.obj": f"{POINTS}f 1 2 -9\n"}),
+    "obj-index-digits": Case(OBJ, "but the file has", {"x.obj": f"{POINTS}f 1 2 {'9' * 400}\n"}),
+    "obj-index-text": Case(OBJ, "not an integer", {"x.obj": f"{POINTS}f a b c\n"}),
+    "obj-index-float": Case(OBJ, "not an integer", {"x.obj": f"{POINTS}f 1.5 2 3\n"}),
+    "obj-index-5000-digits": Case(OBJ, "not an integer", {"x.obj": f"{POINTS}f 1 2 {'9' * 5000}\n"}),
     "obj-two-corners": Case(OBJ, "x.obj", {"x.obj": f"{POINTS}f 1 2\n"}),
     "obj-nan": Case(OBJ, "not a finite number", {"x.obj": "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}),
     "obj-infinite": Case(OBJ, "not a finite number", {"x.obj": "v 1e999 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}),
@@ -86,7 +86,7 @@ CASES = {
     "obj-escapes": Case(f"{RENDER} --mesh '\x1b[31m.obj'", "\\x1b[31m.obj", {"\x1b[31m.obj": "f 1 2 3\n"}),
     "obj-named-300": Case(f"{RENDER} --mesh {'n' * 300}.obj", "File name too long"),
     "mesh-folder": Case(f"{RENDER} --mesh room", "no mesh"),
-    "mesh-strange-suffix": Case(f"{RENDER} --mesh a.png", "ends with one of"),
+    "mesh-strange-suffix": Case(f"{RENDER} --mesh a.png", "suffix of a mesh file"),
     "mtl-nan": Case(OBJ, "x.mtl, line 2: Kd nan 0 0", with_mtl("Kd nan 0 0")),
     "mtl-infinite": Case(OBJ, "must be finite", with_mtl("Ni inf")),
     "mtl-negative": Case(OBJ, "must be finite", with_mtl("Kd -1 0 0")),
@@ -117,7 +117,7 @@ CASES = {
     "off-count": Case(OFF, "x.off", {"x.off": f"OFF\n{10**12} {10**12} 0\n0 0 0\n"}),
     "off-noise": Case(OFF, "x.off", {"x.off": "OFF\n\x1b[31m\n"}),
     "gltf-deep": Case(GLTF, "nested too deeply", {"x.gltf": "[" * 100_000}),
-    "gltf-list": Case(GLTF, "no object", {"x.gltf": "[]"}),
+    "gltf-list": Case(GLTF, "not an object", {"x.gltf": "[]"}),
     "gltf-nan": Case(GLTF, "NaN", {"x.gltf": json.dumps(gltf(extras=float("nan")))}),
     "gltf-duplicate": Case(GLTF, "twice", {"x.gltf": '{"asset": 1, "asset": 2}'}),
     "gltf-circle": Case(GLTF, "ancestor", of_gltf(nodes=[{"mesh": 0}, {"children": [2]}, {"children": [1]}])),
@@ -126,15 +126,13 @@ CASES = {
     "gltf-no-child": Case(GLTF, "does not exist", of_gltf(nodes=[{"mesh": 0, "children": [7]}])),
     "gltf-nodes": Case(GLTF, "list of objects", of_gltf(nodes={"a": 1})),
     "gltf-materials": Case(GLTF, "list of objects", of_gltf(materials=[7])),
-    "gltf-count": Case(GLTF, "sensible count", of_gltf(accessors=[ACCESSORS[0] | {"count": 10**12}, ACCESSORS[1]])),
+    "gltf-count": Case(GLTF, "invalid count", of_gltf(accessors=[ACCESSORS[0] | {"count": 10**12}, ACCESSORS[1]])),
     "gltf-zeros": Case(
         GLTF, "x.gltf", of_gltf(accessors=[{"componentType": 5126, "count": 10**9, "type": "VEC3"}, ACCESSORS[1]])
     ),
-    "gltf-negative-count": Case(
-        GLTF, "sensible count", of_gltf(accessors=[ACCESSORS[0] | {"count": -3}, ACCESSORS[1]])
-    ),
+    "gltf-negative-count": Case(GLTF, "invalid count", of_gltf(accessors=[ACCESSORS[0] | {"count": -3}, ACCESSORS[1]])),
     "gltf-colour": Case(
-        GLTF, "factors", of_gltf(materials=[{"pbrMetallicRoughness": {"baseColorFactor": [-1, 0, 0, 1]}}])
+        GLTF, "factor", of_gltf(materials=[{"pbrMetallicRoughness": {"baseColorFactor": [-1, 0, 0, 1]}}])
     ),
     "gltf-no-mesh": Case(GLTF, "x.gltf", of_gltf(nodes=[{"mesh": 7}])),
     "gltf-buffer-fifo": Case(GLTF, "a pipe", of_gltf(buffers=buffer("b.bin")) | {"b.bin": fifo}),

@@ -154,11 +154,11 @@ def test_bytes_that_are_no_text_in_an_argument(folder: Path) -> None:
 
 
 ESCAPED = {
-    "memory": (MemoryError(), 2, "not enough memory"),
+    "memory": (MemoryError(), 2, "out of memory"),
     "recursion": (RecursionError("maximum depth"), 2, "nested too deeply"),
     "system": (OSError(5, "Input/output error", "a\x1b[31m"), 2, "a\\x1b[31m: Input/output error"),
     "text": (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid"), 2, "UTF-8"),
-    "bug": (KeyError("rows"), 1, f"{DEBUG}=1 shows where"),
+    "bug": (KeyError("rows"), 1, f"{DEBUG}=1 prints the traceback"),
 }
 
 

@@ -131,7 +131,7 @@ def test_says_that_work_failed_for_want_of_space(
     def fail(place: Path) -> None:
         raise errors.pop()
 
-    monkeypatch.setattr(cache, "LEAST_SPACE", 1 << 80)
+    monkeypatch.setattr(cache, "MIN_FREE_BYTES", 1 << 80)
     errors = [RuntimeError("g++ failed"), shutil.Error([("from", "to", "No space left")])]
     while errors:
         with pytest.raises(UserError, match="no space left on the disk of the cache"):

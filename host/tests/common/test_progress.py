@@ -14,7 +14,7 @@ from colonnade.common.progress import LineProgress, for_terminal
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(progress, "SETTLING", 0.0)
+    monkeypatch.setattr(progress, "MIN_STEP_SECONDS", 0.0)
     monkeypatch.delenv("COLONNADE_PROGRESS", raising=False)
 
 

@@ -247,7 +247,7 @@ def test_malformed_override_is_refused(checkout: Path) -> None:
 
 def test_checkout_is_found_or_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLONNADE_HOME", str(tmp_path))
-    with pytest.raises(UserError, match="no checkout"):
+    with pytest.raises(UserError, match="not a checkout"):
         toolchain.project_root()
 
 

@@ -73,7 +73,7 @@ def test_flags_of_the_environment_do_not_reach_the_compiler(monkeypatch: pytest.
 def test_an_old_verilator_is_refused(version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program(tmp_path, "verilator", f"echo '{version}'")
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    with pytest.raises(UserError, match=r"rendering needs 5.006 or newer; use Debian 12"):
+    with pytest.raises(UserError, match=r"rendering needs Verilator 5.006 or newer; use Debian 12"):
         require_verilator("rendering")
 
 

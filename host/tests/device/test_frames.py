@@ -157,7 +157,9 @@ def test_counters_account_for_every_cycle_and_record(holdable: GeneratedDesign, 
 
 def test_memory_that_cannot_be_held_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
     """Refused before anything is built."""
-    monkeypatch.setattr("colonnade.device.verilator.build_simulator", lambda *_: pytest.fail("a simulator is built"))
+    monkeypatch.setattr(
+        "colonnade.device.verilator.build_simulator", lambda *_, **__: pytest.fail("a simulator is built")
+    )
     design = manifest_for("tiny")
     image = pack(load_mesh("cube"), design.manifest)
     with pytest.raises(UserError, match=r"columnBvhMemory\.holdable=true"):

@@ -128,7 +128,7 @@ def test_a_place_that_make_cannot_work_in_is_refused(
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     tools = Tools(Path("verilator"), Path("g++"), ("", ""))
-    with pytest.raises(UserError, match=r"^a simulator cannot be built in .*: name a plain path with TMPDIR$"):
+    with pytest.raises(UserError, match=r"^make cannot build a simulator in .*: set TMPDIR to a plain path$"):
         simulator_build._build(tools, Design(), tmp_path, tmp_path, tmp_path / "log")  # type: ignore[arg-type]
     assert not any(folder.iterdir())
 

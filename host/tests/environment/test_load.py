@@ -15,7 +15,7 @@ from PIL import Image
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
-from colonnade.common.srgb import curved
+from colonnade.common.srgb import srgb_from_linear
 from colonnade.environment.load import load_environment
 
 ROOMS = Path(__file__).resolve().parents[3] / "scenes" / "rooms"
@@ -95,7 +95,7 @@ def test_the_photo_tells_how_albedo_is_encoded(tmp_path: Path) -> None:
     change_meta(folder, albedo_encoding=None)
     linear = load_environment(folder)
     assert "taken as linear" in linear.notes[0]
-    Image.fromarray(np.rint(curved(linear.albedo) * 255).astype(np.uint8)).save(folder / "albedo.png")
+    Image.fromarray(np.rint(srgb_from_linear(linear.albedo) * 255).astype(np.uint8)).save(folder / "albedo.png")
     curve = load_environment(folder)
     assert "taken as srgb" in curve.notes[0]
     assert np.abs(curve.albedo - linear.albedo).max() < 0.005
@@ -134,7 +134,7 @@ def test_holes_take_their_neighbours_depth(environment: Path) -> None:
         depth[5 + k, 7 : 7 + 3] = nothing
     np.save(environment / "depth.npy", depth)
     loaded = load_environment(environment)
-    assert loaded.notes == ("12 of 3,072 pixels had no depth and took their neighbours'",)
+    assert loaded.notes == ("12 of 3,072 pixels had no depth and were filled from their neighbours",)
     assert np.allclose(loaded.depth, corner()[0])
 
 
@@ -145,7 +145,7 @@ def test_a_few_bad_normals_are_mended(environment: Path) -> None:
     Image.fromarray(coded(np.clip(normals, -1, 1))).save(environment / "normal.png")
     loaded = load_environment(environment)
     assert np.abs(np.linalg.norm(loaded.normals, axis=2) - 1).max() < 1e-9
-    assert loaded.notes == ("5 normals were not unit and were taken from their neighbours",)
+    assert loaded.notes == ("5 normals were not unit vectors and were replaced by their neighbours'",)
     assert np.abs(loaded.normals - corner()[1]).max() < 0.01
 
 
@@ -197,7 +197,7 @@ TILTED = np.array([[-1, 0, 0, 0], [0, 2, 0, 1], [0, 0, -1, 0]])
 @pytest.mark.parametrize(
     ("picture", "message"),
     [
-        (np.full((48, 64), 90, np.uint8), "depth.png has 8 bits a pixel, too few for depth"),
+        (np.full((48, 64), 90, np.uint8), "depth.png has 8 bits per pixel, too few for depth"),
         (np.zeros((48, 64), np.uint16), "3,072 of 3,072 pixels have no depth"),
     ],
 )
@@ -211,7 +211,7 @@ def test_depth_pictures_that_say_nothing(environment: Path, picture: NDArray[np.
 def test_real_numbers_are_no_samples(environment: Path) -> None:
     """A picture of floats, which says nothing of what white is."""
     Image.fromarray(np.full((48, 64), 0.4, np.float32)).save(environment / "albedo.png", format="TIFF")
-    with pytest.raises(UserError, match=r"albedo\.png is no readable picture: give a PNG"):
+    with pytest.raises(UserError, match=r"albedo\.png is not a readable picture: give a PNG"):
         load_environment(environment)
 
 
@@ -220,7 +220,7 @@ def test_real_numbers_are_no_samples(environment: Path) -> None:
     [
         (remove("meta.json"), "there is no .*meta.json"),
         (break_file("meta.json", b"{"), "meta.json is not JSON"),
-        (break_file("meta.json", b"[]"), "must hold a JSON object"),
+        (break_file("meta.json", b"[]"), "must contain a JSON object"),
         (meta(fx=None), "lacks fx"),
         (meta(fx="wide"), "fx must be a finite number"),
         (meta(fy=0), "fy is 0, a focal length must be more than 0"),
@@ -231,14 +231,14 @@ def test_real_numbers_are_no_samples(environment: Path) -> None:
         (meta(albedo_encoding="gamma"), "albedo_encoding must be linear or srgb"),
         (remove("albedo.png"), "lacks albedo.png"),
         (remove("normal.png"), "lacks normal.png"),
-        (break_file("albedo.png", b"no picture"), "albedo.png is no readable picture"),
-        (break_file("depth.npy", b"no array"), "depth.npy is no readable array"),
-        (save("depth.npy", np.ones((48, 64, 3))), "one number for each pixel"),
-        (save("depth.npy", np.ones((24, 32))), r"depth.npy is 32x24 pixels, albedo.png 64x48"),
-        (resize("normal.png"), r"normal.png is 32x24 pixels, albedo.png 64x48"),
+        (break_file("albedo.png", b"no picture"), "albedo.png is not a readable picture"),
+        (break_file("depth.npy", b"no array"), "depth.npy is not a readable array"),
+        (save("depth.npy", np.ones((48, 64, 3))), "one number per pixel"),
+        (save("depth.npy", np.ones((24, 32))), r"depth.npy is 32x24 pixels, but albedo.png is 64x48"),
+        (resize("normal.png"), r"normal.png is 32x24 pixels, but albedo.png is 64x48"),
         (save("depth.npy", HOLES), "3,072 of 3,072 pixels have no depth"),
-        (save("normal.png", np.zeros((48, 64, 3), np.uint8)), "normals are not unit"),
-        (save("normal.png", np.full((48, 64), 128, np.uint8)), "3,072 of 3,072 normals are not unit"),
+        (save("normal.png", np.zeros((48, 64, 3), np.uint8)), "normals are not unit vectors"),
+        (save("normal.png", np.full((48, 64), 128, np.uint8)), "3,072 of 3,072 normals are not unit vectors"),
         (save("normal.png", 255 - coded(corner()[1])), "normals face away from the camera"),
     ],
 )

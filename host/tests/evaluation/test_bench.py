@@ -34,7 +34,7 @@ def test_utilisation_is_a_share_of_all_of_a_kind(rtl_report: MakeReport) -> None
 def test_stalls_are_all_context_cycles(rtl_report: MakeReport) -> None:
     stalls = throughput.figures(rtl_report(0.5))["stalls"]
     assert stalls["box unit and stack"] == pytest.approx(0.5)
-    assert stalls["leaving"] == pytest.approx(0.05)
+    assert stalls["completion"] == pytest.approx(0.05)
     assert sum(stalls.values()) == pytest.approx(1.0)
 
 
@@ -71,7 +71,7 @@ def test_a_frame_without_rays_to_the_object_has_no_bounds_of_units(rtl_report: M
     }
     figures = throughput.figures(empty)
     assert figures["bounds"] == {"perfect_memory": None, "perfect_units": 0.0}
-    assert figures["stalls"]["no pixel"] == 1.0
+    assert figures["stalls"]["idle"] == 1.0
     assert figures["bottleneck"] == "pixel streams"
 
 

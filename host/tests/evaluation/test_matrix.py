@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from colonnade.design import toolchain
-from colonnade.design.generator import design_for
+from colonnade.design.generator import design_for, manifest_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.evaluation.bench import MESHES as BENCHMARK
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
+from colonnade.registers.watchdog import TREE_VISITS
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
@@ -93,6 +95,16 @@ def test_hardware_equals_its_model_at_every_precision(precision: str, mesh: str)
 @pytest.mark.parametrize("mesh", ("teapot", "torus"))
 def test_edge_array_equals_its_model(mesh: str) -> None:
     assert_equal(frame("rtl", mesh, config="edge"), frame("model", mesh, config="edge"))
+
+
+@pytest.mark.parametrize("mesh", BENCHMARK)
+def test_no_ray_visits_as_many_nodes_as_the_watchdog_allows(mesh: str) -> None:
+    """The model sets the error bit when a ray visits more nodes than the register says."""
+    manifest = manifest_for("edge").manifest
+    scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh(mesh)
+    image = pack(load_mesh(mesh), manifest)
+    registers = frame_registers(scene, image.header, manifest, 320, 240)
+    assert render_model(manifest, image, registers | {"frame.watchdogCycles": TREE_VISITS}).errors == []
 
 
 @pytest.mark.parametrize("mesh", MESHES)

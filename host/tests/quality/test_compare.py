@@ -16,7 +16,7 @@ from colonnade.common import image_io
 from colonnade.common.errors import UserError
 from colonnade.common.hits import Hits, read_hits, write_hits
 from colonnade.quality.compare import compare
-from colonnade.quality.image_metrics import HIGHEST_PSNR, compare_hits, compare_pictures
+from colonnade.quality.image_metrics import MAX_PSNR, compare_hits, compare_pictures
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def test_identical_pictures_are_perfect(picture: np.ndarray) -> None:
     difference = compare_pictures(picture, picture.copy())
     assert difference.identical
     assert difference.differing_pixels == 0
-    assert difference.psnr == HIGHEST_PSNR
+    assert difference.psnr == MAX_PSNR
     assert difference.ssim == pytest.approx(1.0)
     assert difference.flip == pytest.approx(0.0)
 
@@ -136,12 +136,12 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path, picture: np.ndarray)
     cases: list[tuple[tuple[Path | None, ...], str]] = [
         ((a, smaller), "48x32"),
         ((a, tmp_path / "none.png"), "no picture"),
-        ((a, noise), "no readable picture"),
+        ((a, noise), "not a readable picture"),
         ((a, hits), "two pictures or two .npz"),
         ((a, a, hits, None), "both --hits-a and --hits-b"),
         ((hits, hits, hits, hits), "leave out"),
-        ((hits, wrong), "no hits file"),
-        ((hits, tmp_path / "other.npz"), "no hits file"),
+        ((hits, wrong), "not a hits file"),
+        ((hits, tmp_path / "other.npz"), "not a hits file"),
         ((hits, tmp_path / "none.npz"), "no hits file"),
     ]
     for arguments, message in cases:

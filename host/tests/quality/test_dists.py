@@ -115,7 +115,7 @@ def test_a_changed_file_is_not_read(
     monkeypatch.setattr(dists_weights, "_fetch", fetch)
     assert dists_weights._content(dists_weights.MIXTURE) == b"good"
     assert fetched == [dists_weights.MIXTURE.requirement]
-    said = "colonnade: the cached weights weights.pt were damaged and are fetched again\n"
+    said = "colonnade: the cached weights weights.pt were damaged and are downloaded again\n"
     assert capsys.readouterr().err == said
     good = dists_weights.Source("x", "", "weights.pt", hashlib.sha256(b"good").hexdigest())
     assert dists_weights._content(good) == b"good" and len(fetched) == 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from colonnade.quality import region_metrics
-from colonnade.quality.image_metrics import HIGHEST_PSNR, flip, flip_map
+from colonnade.quality.image_metrics import MAX_PSNR, flip, flip_map
 from colonnade.quality.region_metrics import compare_regions, frame_regions
 
 
@@ -22,7 +22,7 @@ def test_an_error_counts_in_its_region_alone(picture: np.ndarray) -> None:
     near[4:12, 4:12] = True
     far[20:, 40:] = True
     result = compare_regions(picture, other, {"near": near, "far": far, "none": far & near}, with_dists=False)
-    assert result["far"].psnr == HIGHEST_PSNR and result["far"].flip == pytest.approx(0, abs=1e-6)
+    assert result["far"].psnr == MAX_PSNR and result["far"].flip == pytest.approx(0, abs=1e-6)
     assert result["near"].psnr == pytest.approx(10 * np.log10(255**2 / (900 * 25 / 64)))
     assert result["near"].flip is not None and result["near"].flip > 0.02
     assert (result["none"].pixels, result["none"].psnr, result["none"].flip) == (0, None, None)

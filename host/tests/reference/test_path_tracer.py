@@ -154,14 +154,14 @@ def test_a_mirror_that_looks_out_of_the_view_is_marked() -> None:
 
 def test_a_shell_stands_in_where_the_maps_end() -> None:
     class Behind:
-        def meet(self, origins: np.ndarray, directions: np.ndarray) -> BackdropPoints:
+        def intersect(self, origins: np.ndarray, directions: np.ndarray) -> BackdropPoints:
             normals = np.broadcast_to([0.0, 0.0, 1.0], origins.shape)
             albedo = np.broadcast_to([0.1, 0.7, 0.2], origins.shape)
             position = origins + directions * ((-1.0 - origins[:, 2]) / directions[:, 2])[:, None]
             return BackdropPoints(position, normals, albedo, np.zeros(len(origins), bool))
 
     environment = wall()
-    backdrop = replace(full_backdrop(environment), shell=Behind())
+    backdrop = replace(full_backdrop(environment), bounding=Behind())
     view = placed(environment, MeshMaterial("mirror", (1.0,) * 3), lights=(replace(LIGHT, colour=np.zeros(3)),))
     frame = render_reference(quads(upright(0.0, 0.0, 2.0, 0.3)), view, backdrop=backdrop)
     assert not frame.outside.any()
@@ -205,7 +205,7 @@ def test_the_camera_of_a_room_may_be_drawn_at_another_size() -> None:
     made = attic(64, 48)
     backdrop = full_backdrop(made.environment)
     u, v = (np.mgrid[:48, :64][::-1] + 0.5).reshape(2, -1)
-    seen = backdrop.seen(u, v)
+    seen = backdrop.visible_points(u, v)
     np.testing.assert_allclose(seen.position.reshape(48, 64, 3), made.environment.points())
     np.testing.assert_allclose(seen.albedo.reshape(48, 64, 3), made.environment.albedo)
 
@@ -216,16 +216,16 @@ def test_the_depth_mesh_is_met_where_the_camera_sees_it_and_not_between_things()
     depth[8:24, 10:30] = 2.0
     stepped = replace(environment, depth=depth)
     inner = environment.camera.directions(*SIZE)[1:-1, 1:-1].reshape(-1, 3)
-    met = DepthMesh(stepped).meet(np.zeros_like(inner), inner)
-    whole = DepthMesh(stepped, split=False).meet(np.zeros_like(inner), inner)
+    met = DepthMesh(stepped).intersect(np.zeros_like(inner), inner)
+    whole = DepthMesh(stepped, split=False).intersect(np.zeros_like(inner), inner)
     assert not whole.outside.any() and not met.outside.all()
     np.testing.assert_allclose(met.position[~met.outside, 2], depth[1:-1, 1:-1].ravel()[~met.outside], rtol=1e-5)
     # A ray between plate and wall, from the side: it passes through where a sheet would join them.
     side, across = np.array([[-1.5, 0.0, 3.0]]), np.array([[1.0, 0.0, 0.02]])
-    assert DepthMesh(stepped).meet(side, across).outside.all()
-    assert np.abs(DepthMesh(stepped, split=False).meet(side, across).position[0, 2] - 3.0) < 0.1
+    assert DepthMesh(stepped).intersect(side, across).outside.all()
+    assert np.abs(DepthMesh(stepped, split=False).intersect(side, across).position[0, 2] - 3.0) < 0.1
     # The plate from behind is nothing that the map knows.
-    assert DepthMesh(stepped).meet(np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 0.0, -1.0]])).outside.all()
+    assert DepthMesh(stepped).intersect(np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 0.0, -1.0]])).outside.all()
 
 
 def random_bounces(front: bool, ior: float = 1.5, count: int = 2000) -> tuple[np.ndarray, ...]:
@@ -234,7 +234,7 @@ def random_bounces(front: bool, ior: float = 1.5, count: int = 2000) -> tuple[np
     directions *= -np.sign(np.einsum("ni,ni->n", normals, directions))[:, None]
     flags = np.full(count, front)
     made = bounce(directions, normals, normals, flags, np.ones(count, bool), np.full(count, ior))
-    return normals, directions, made.directions, made.refracted, made.reflections, made.shares
+    return normals, directions, made.directions, made.refracted, made.fresnel_directions, made.fresnel_weights
 
 
 def test_refraction_obeys_snell_and_total_reflection() -> None:

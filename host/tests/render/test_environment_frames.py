@@ -63,7 +63,7 @@ def test_the_reference_shows_object_and_room(scene: Path, make_manifest: Callabl
 
 
 def test_what_is_wrong_with_a_room_is_one_line(scene: Path, make_manifest: Callable[..., Manifest]) -> None:
-    with pytest.raises(UserError, match="64x64 pixels is not in the proportions of room attic, 64x48"):
+    with pytest.raises(UserError, match="64x64 pixels does not have the proportions of room attic, 64x48"):
         list(reference_frames([load_scene(scene)], make_manifest(), (64, 64), QUIET))
     (scene.parent / "rooms" / "attic" / "normal.png").unlink()
     with pytest.raises(UserError, match=r"lacks normal\.png"):

@@ -23,7 +23,7 @@ from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.model import Motion
-from colonnade.scene.object_pose import object_pose, turning
+from colonnade.scene.object_pose import object_pose, rotation_about
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import make_view
 
@@ -108,7 +108,7 @@ def test_the_scene_is_packed_once(folder: Path, monkeypatch: pytest.MonkeyPatch)
 
 @given(frames=st.integers(1, 200), turn=st.sampled_from([360.0, -720.0, 90.0]))
 def test_frames_are_evenly_spaced(frames: int, turn: float) -> None:
-    shares = Motion(turn=turn).shares(frames)
+    shares = Motion(turn=turn).frame_progress(frames)
     assert len(shares) == frames and shares[0] == 0.0
     np.testing.assert_allclose(np.diff(shares), shares[1] if frames > 1 else 0.0, atol=1e-12)
     if frames > 1:
@@ -126,7 +126,7 @@ def test_a_turned_object_keeps_its_middle_and_its_vertical(
     scene, extent = load_scene(file), load_mesh("teapot:2").extent
     start, turned = object_pose(scene, extent, None), object_pose(scene.at(share), extent, None)
     np.testing.assert_allclose(turned.to_world(extent.centre), start.to_world(extent.centre), atol=1e-9)
-    rotation = turning(up, degrees * share)
+    rotation = rotation_about(up, degrees * share)
     np.testing.assert_allclose(turned.rotation, rotation @ start.rotation, atol=1e-12)
     np.testing.assert_allclose(rotation @ up, up, atol=1e-12)
     assert np.isclose(np.trace(rotation), 1 + 2 * np.cos(np.radians(degrees * share)))
@@ -204,7 +204,7 @@ def test_files_of_several_frames(folder: Path, tmp_path: Path) -> None:
         (("--frames", 0), "--frames"),
         (("--frames", "many"), "--frames"),
         (("--frames", 2, "--output", "f.gif"), "FILE.png for numbered files, or FILE.webp"),
-        (("--frames", 2, "--output", "nowhere/f.png"), "nowhere is no folder"),
+        (("--frames", 2, "--output", "nowhere/f.png"), "nowhere is not a folder"),
     ],
 )
 def test_wrong_frames_are_one_line(tmp_path: Path, options: tuple[object, ...], message: str) -> None:

@@ -125,5 +125,5 @@ def test_host_and_setup_agree_on_the_oldest_verilator(
     if fits:
         assert compiler.require_verilator("rendering")[0] == tmp_path / "verilator"
     else:
-        with pytest.raises(UserError, match=f"Verilator {version} .*: rendering needs 5.006 or newer"):
+        with pytest.raises(UserError, match=f"Verilator {version} .*: rendering needs Verilator 5.006 or newer"):
             compiler.require_verilator("rendering")

@@ -88,5 +88,5 @@ def test_what_does_not_fit_the_room_is_named(environment: Environment) -> None:
     outside = Scene(MeshSource("cube"), placement=Placement((160.0, 5.0)))
     with pytest.raises(UserError, match=r"stand_at is \(160, 5\).*160x120"):
         object_pose(outside, extent, environment)
-    with pytest.raises(UserError, match="100x100 pixels is not in the proportions of room attic, 160x120"):
+    with pytest.raises(UserError, match="100x100 pixels does not have the proportions of room attic, 160x120"):
         make_view(STANDING, extent, 100, 100, environment=environment)

@@ -43,7 +43,7 @@ def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"\[mesh\] needs a name or a path"),
+        ("", r"\[mesh\] needs either a name or a path"),
         ("mesh = 3", "mesh must be a table"),
         ('[mesh]\nname = "a"\npath = "b"', "one of the two"),
         ("[mesh]\nname = 3", "mesh.name must be text"),
@@ -58,7 +58,7 @@ def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
         ('[mesh]\nname = "a"\n[camera]\nfov = true', "camera.fov must be a number"),
         ('[mesh]\nname = "a"\n[camera]\nfov = nan', "camera.fov must be a number"),
         ('[mesh]\nname = "a"\n[camera]\nposition = [nan, 0, 0]', "camera.position must be three finite numbers"),
-        ('[mesh]\nname = "a"\n[camera]\nposition = [1, 0, 0]\nframing = 0.5', "either placed"),
+        ('[mesh]\nname = "a"\n[camera]\nposition = [1, 0, 0]\nframing = 0.5', "either position and target"),
         ('[mesh]\nname = "a"\n[camera]\ntarget = [1, 0, 0]', "needs camera.position"),
         ('[mesh]\nname = "a"\n[camera]\ndirection = [0, 0, 0]', "camera.direction must not be zero"),
         ('[mesh]\nname = "a"\n[transform]\nscale = 0', "transform.scale must be a number"),

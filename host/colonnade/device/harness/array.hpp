@@ -1,5 +1,5 @@
-// The device as Verilator models of render unit, column and device, coupled cycle by cycle.
-// How, and on which properties of the RTL it rests: simulator_sources.py, which writes coupling.hpp.
+// The device as coupled Verilator models of render unit, column and device.
+// simulator_sources.py, which writes coupling.hpp, explains the coupling and the properties of the RTL that it needs.
 #pragma once
 #include <cstdint>
 #include <cstring>
@@ -18,14 +18,14 @@
 #include "verilated_vcd_c.h"
 #endif
 
-/// Assignments for each port of a kind between `variables` of the outer model and the ports of the `inner` one.
+/// Copies or compares a port between `variables` of the outer model and the `inner` model.
 #define INWARD(port) inner.port = *variables.port;
 #define OUTWARD(port) *variables.port = inner.port;
 #define REQUIRE_EQUAL(port) requireEqual(*variables.port, inner.port, #port);
 
 class Array {
 public:
-    /// The device around the columns. Set its inputs before `settle`, read its outputs after it.
+    /// The top model. Set its inputs before `settle`, read its outputs after it.
     VColonnade device;
 
     Array() : columnVariables_(bindColumn(*device.rootp)) {
@@ -45,7 +45,7 @@ public:
         device.final();
     }
 
-    /// Brings all that acts in this cycle to where it acts.
+    /// Propagates all combinational values of this cycle.
     void settle() {
         device.eval();
         for (std::size_t i = 0; i < units_.size(); ++i) {
@@ -70,20 +70,20 @@ public:
         }
     }
 
-    /// The clock edge after `settle`. The frame registers cross only while they may change.
+    /// The clock edge after `settle`. Frame registers are copied only while they may change.
     void edge(bool mayChangeRegisters) {
         outerEdge(mayChangeRegisters);
         unitsEdge(mayChangeRegisters);
     }
 
-    /// A cycle of device and columns while the units stand still: for loads, of which idle units see nothing.
+    /// A cycle of device and columns without the units: for loads, which do not affect idle units.
     void outerCycle() {
         device.eval();
         intoColumns();
         outerEdge(true);
     }
 
-    /// Cycles of the units alone, as often as device and columns have moved without them.
+    /// A clock edge of the units alone, to catch up with cycles of `outerCycle`.
     void unitsEdge(bool mayChangeRegisters) {
         for (std::size_t i = 0; i < units_.size(); ++i) {
             const RenderUnitVariables& variables = unitVariables_[i];
@@ -94,7 +94,7 @@ public:
         }
     }
 
-    /// Writes a record into the memory of each column, as the load port does; beyond the depth it is dropped.
+    /// Writes a record into the memory of each column, as the load port does. Addresses beyond the depth are ignored.
     void store(std::uint64_t address, const void* record, std::size_t bytes) {
         for (auto& column : columns_) {
             unsigned bank = 0;
@@ -104,7 +104,7 @@ public:
         }
     }
 
-    /// Throws if, after `settle`, evaluating anything once more changes what has crossed a border.
+    /// Throws if another evaluation after `settle` changes a coupled port.
     void check() {
         for (std::size_t i = 0; i < units_.size(); ++i) {
             const RenderUnitVariables& variables = unitVariables_[i];
@@ -158,7 +158,7 @@ private:
         for (std::size_t i = 0; i < columns_.size(); ++i) {
             const ColumnVariables& variables = columnVariables_[i];
             VColumn& inner = *columns_[i];
-            // Before the edge: the column hands them on to its units
+            // Before the edge: the column passes them on to its units
             if (mayChangeRegisters) { Column_REGISTERS(INWARD) }
             flip(inner);
         }
@@ -171,14 +171,14 @@ private:
 
     template <class Value> static void requireEqual(const Value& outer, const Value& inner, const char* port) {
         if (std::memcmp(&outer, &inner, sizeof outer) != 0)
-            throw std::runtime_error(std::string("the coupling of the simulator's models does not hold for port ") + port);
+            throw std::runtime_error(std::string("the simulator's models disagree on port ") + port);
     }
 
     template <class Memory>
     static void storeInBank(Memory& memory, unsigned bank, std::uint64_t address, const void* record, std::size_t bytes) {
         if (address % banksOfColumn != bank) return;
-        const std::uint64_t place = address / banksOfColumn;
-        if (place < sizeof memory / sizeof memory[0]) std::memcpy(&memory[place], record, bytes);
+        const std::uint64_t row = address / banksOfColumn;
+        if (row < sizeof memory / sizeof memory[0]) std::memcpy(&memory[row], record, bytes);
     }
 
     std::vector<std::unique_ptr<VColumn>> columns_;

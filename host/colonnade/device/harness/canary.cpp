@@ -1,5 +1,5 @@
-// A population count as Verilator writes it: sums of comparisons of bytes, kept in a byte. Exit status 0 if each sum is
-// right. g++ 12.2 vectorises such code wrongly at -O2: each comparison that is true counts -1.
+// Tests the compiler with a population count as Verilator writes it: a byte sum of byte comparisons. Exit status 0 if all
+// sums are right. g++ 12.2 vectorises such code wrongly at -O2: each true comparison counts -1.
 #include <cstdint>
 
 namespace {

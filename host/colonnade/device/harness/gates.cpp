@@ -1,24 +1,24 @@
-// Simulates a netlist of gates, each with one delay, and counts how often every net changes.
+// Event-driven simulator of a gate netlist with one delay per gate. It counts the transitions of each net.
 //
 //   gates NETLIST STIMULUS CYCLES BEGIN OUTPUTS COUNTS
 //
-// NETLIST, one item a line; nets are numbers; a table has a 0 or a 1 for each combination of inputs, the first of which
-// is the least significant; constants have become part of the tables:
+// NETLIST has one item per line. Nets are numbers. A truth table has a 0 or 1 for each combination of inputs, with the
+// first input as the least significant bit; constant inputs are folded into the tables. Delays are in ps:
 //   nets N
-//   input NET | -            the next bit of the inputs, from the least significant; "-" is a bit that nothing reads
-//   output NET | 0 | 1       the next bit of the outputs; a net is written as "n5"
+//   input NET | -            next bit of the inputs, least significant first; "-" is an unused bit
+//   output NET | 0 | 1       next bit of the outputs; a net is written as "n5"
 //   tie NET VALUE
-//   gate NET DELAY TABLE NET…        delays in ps
-//   register NET DELAY FIRST TABLE NET…   takes the table's value at each clock edge; begins with FIRST
-//   memory DEPTH WIDTH      the ports that follow are its
-//   port ADDRESS ENABLE WRITES DATA_IN DATA_OUT   comma-separated bits "n5", "0" or "1" from the least significant, or "-"
-// STIMULUS holds the inputs of each cycle, in whole bytes, least significant first. OUTPUTS receives the outputs before
-// each clock edge in the same form; COUNTS "memory READS WRITES" of each memory and "net CHANGES SETTLED HIGH" of each
-// net, in the cycles from BEGIN on: all changes, cycles whose end differs from their begin, cycles that end high.
+//   gate NET DELAY TABLE NET…
+//   register NET DELAY INITIAL TABLE NET…   loads the table's value at each clock edge
+//   memory DEPTH WIDTH       the following ports belong to it
+//   port ADDRESS ENABLE WRITES DATA_IN DATA_OUT   comma-separated bits "n5", "0" or "1", least significant first, or "-"
+// STIMULUS holds the inputs of each cycle in whole bytes, least significant first. OUTPUTS receives the outputs before
+// each clock edge in the same form. COUNTS receives "memory READS WRITES" for each memory and "net CHANGES SETTLED HIGH"
+// for each net, over the cycles from BEGIN on: all transitions, cycles with a changed final value, cycles that end high.
 //
-// A change that a gate takes back within its delay does not leave it. In each cycle registers change first, then
-// inputs; all is quiet before the next edge, however long that takes. Everything begins with zero.
-// Progress goes to standard error as "progress SHARE". Exit status 0, or 3.
+// Delays are inertial: a gate suppresses pulses shorter than its delay. In each cycle registers change first, then
+// inputs. The netlist settles before the next edge, without a time limit of the clock. All nets start at zero.
+// Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
 #include <cstdint>
 #include <fstream>
 #include <iostream>
@@ -65,7 +65,7 @@ struct Count {
     std::uint64_t changes = 0, settled = 0, high = 0;
 };
 
-/// A net takes a value; `gate` is what drives it, or -1; an event of a gate is void when its stamp has moved on.
+/// A net takes a value. `gate` drives the net, or is -1. An event is cancelled if its stamp is not the gate's stamp.
 struct Event {
     unsigned net;
     int gate;
@@ -144,7 +144,7 @@ private:
             const unsigned number = static_cast<unsigned>(gates_.size());
             unsigned net = 0, mask = 1;
             for (; words >> net; mask <<= 1) readers_.at(net).push_back({number, mask});
-            if (mask != gate.table->size()) throw std::runtime_error("a table of another size than its inputs: " + line);
+            if (mask != gate.table->size()) throw std::runtime_error("truth table and inputs differ in size: " + line);
             isRegister_.push_back(kind == "register");
             gates_.push_back(gate);
         } else if (kind == "memory") {
@@ -160,9 +160,9 @@ private:
             }
             memories_.back().ports.push_back(port);
         } else {
-            throw std::runtime_error("not an item: " + line);
+            throw std::runtime_error("unknown item: " + line);
         }
-        if (!words && !words.eof()) throw std::runtime_error("not understood: " + line);
+        if (!words && !words.eof()) throw std::runtime_error("cannot parse: " + line);
     }
 
     static Bit bitOf(const std::string& word) {
@@ -180,13 +180,13 @@ private:
     const std::vector<char>* tableOf(const std::string& word) {
         for (const auto& [text, table] : tables_)
             if (text == word) return table;
-        auto* table = new std::vector<char>; // lives as long as the program
+        auto* table = new std::vector<char>; // never freed
         for (const char digit : word) table->push_back(static_cast<char>(digit == '1'));
         tables_.emplace_back(word, table);
         return table;
     }
 
-    /// Readers of all nets in one array.
+    /// Flattens the readers of all nets into one array.
     void link() {
         for (const auto& readers : readers_) {
             begins_.push_back(static_cast<unsigned>(flat_.size()));
@@ -197,12 +197,12 @@ private:
         wheel_.resize(slots);
     }
 
-    /// From zero everywhere to what registers, constants and gates begin with.
+    /// Settles the netlist from zero with the initial values of registers, constants and gates.
     void begin() {
         for (const Event& event : firsts_)
             if (event.value) schedule(1, event);
         for (unsigned gate = 0; gate < gates_.size(); ++gate)
-            if (!isRegister_[gate]) judge(gate);
+            if (!isRegister_[gate]) evaluate(gate);
         settle();
         before_ = values_;
         for (const unsigned net : changed_) touched_[net] = 0;
@@ -215,8 +215,8 @@ private:
         ++waiting_;
     }
 
-    /// Let a gate's output follow its inputs after its delay.
-    void judge(unsigned number) {
+    /// Schedules a gate's new output after its delay, or cancels a pending event.
+    void evaluate(unsigned number) {
         Gate& gate = gates_[number];
         const char value = (*gate.table)[gate.index];
         if (value == values_[gate.output]) {
@@ -228,18 +228,18 @@ private:
         }
     }
 
-    /// Until nothing changes any more.
+    /// Processes events until none is left.
     void settle() {
         for (std::uint64_t limit = now_ + longest; waiting_ > 0; ++now_) {
             auto& slot = wheel_[now_ % slots];
-            for (std::size_t i = 0; i < slot.size(); ++i) happen(Event(slot[i]));
+            for (std::size_t i = 0; i < slot.size(); ++i) apply(Event(slot[i]));
             waiting_ -= slot.size();
             slot.clear();
             if (now_ > limit) throw std::runtime_error("the gates do not settle");
         }
     }
 
-    void happen(const Event& event) {
+    void apply(const Event& event) {
         if (event.gate >= 0) {
             Gate& gate = gates_[static_cast<unsigned>(event.gate)];
             if (!gate.isPending || gate.stamp != event.stamp) return;
@@ -255,11 +255,11 @@ private:
         if (isCounting_) ++counts_[event.net].changes;
         for (unsigned i = begins_[event.net]; i < begins_[event.net + 1]; ++i) {
             gates_[flat_[i].gate].index ^= flat_[i].mask;
-            if (!isRegister_[flat_[i].gate]) judge(flat_[i].gate);
+            if (!isRegister_[flat_[i].gate]) evaluate(flat_[i].gate);
         }
     }
 
-    /// Registers and memories take what they are offered.
+    /// Clock edge of memories and registers.
     void edge() {
         for (Memory& memory : memories_) clock(memory);
         for (unsigned number = 0; number < gates_.size(); ++number) {

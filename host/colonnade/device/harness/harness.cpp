@@ -1,18 +1,19 @@
-// Runs the generated hardware under Verilator: carries out the commands of a job file, one a line.
+// Testbench: executes the commands of a job file on the Verilated device, one command per line.
 //
-//   load FILE BYTES TARGET   words of BYTES bytes each, to consecutive addresses of a target from 0; records (target 0) go
-//                            straight into the column memories
-//   stream FILE BYTES TARGET the same, all of it through the load port and cycle by cycle
-//   write ADDRESS VALUE      one register word
-//   frame FILE WIDTH HEIGHT START WATCHDOG  starts a frame by a write to register START, waits for its end, writes its
-//                            pixels (struct PixelBytes, row by row); WATCHDOG is the frame's, cycles, 0 for none
+//   load FILE BYTES TARGET   loads words of BYTES bytes to a target, from address 0; records (target 0) are written
+//                            directly into the column memories
+//   stream FILE BYTES TARGET loads words through the load port, one per cycle
+//   write ADDRESS VALUE      writes one register word
+//   frame FILE WIDTH HEIGHT START WATCHDOG  starts a frame by a write to register START, waits for its end, and writes
+//                            its pixels (struct PixelBytes, row by row); WATCHDOG is in cycles, 0 for none;
+//                            prints "simulated CYCLES SECONDS"
 //   read NAME ADDRESS WORDS  prints "value NAME VALUE"
 //
-// Options: --stall PERCENT (of the cycles in which the pixel sink does not take pixels), --seed N; where the memory can
-// be held: --memory PERCENT (of a frame's cycles in which each bank is held), --burst N (longest hold, cycles);
-// --check N: checks the coupling of the models (array.hpp) in each Nth cycle. Where compiled with WAVEFORM:
-// --waveform FILE: the signals of the frames' cycles, as VCD; a unit of its time is a cycle.
-// Progress goes to standard error as "progress SHARE". Exit status 0, or 3 when the hardware misbehaves.
+// Options: --stall PERCENT of cycles in which the pixel sink is not ready; --seed N; for designs with memory stalls:
+// --memory PERCENT of cycles in which each bank is stalled, --burst N, the longest stall in cycles;
+// --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
+// With WAVEFORM defined, --waveform FILE: the signals of the frames as VCD; its time unit is a cycle.
+// Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -28,8 +29,9 @@
 #include <vector>
 
 #include "array.hpp"
-#include "ports.hpp" // EACH_COLUMN(DO): DO(column) for each column; HIT_DISTANCE(column) where the stream carries hits,
-                       // RATIO(column, channel) where it carries the light left to a room; MEMORY_BANKS, of all columns, where they can be held
+// EACH_COLUMN(DO): DO(column) for each column. If the design has them: HIT_DISTANCE(column) of the hit,
+// RATIO(column, channel), the shadow ratio, and MEMORY_BANKS, the number of banks of all columns.
+#include "ports.hpp"
 
 namespace {
 
@@ -49,10 +51,10 @@ template <class Port> double numberOf(const Port& port) {
     return static_cast<double>(value);
 }
 
-/// Cycles that the hardware may take to end a frame once its watchdog has fired.
+/// Maximum cycles from the watchdog's abort to the end of the frame.
 constexpr std::uint64_t watchdogMargin = 100'000;
 
-/// A multiple of the periods of whatever runs freely in the hardware, such as the beats of shared arithmetic units.
+/// A common multiple of the periods of all free-running counters, such as the beats of shared arithmetic units.
 constexpr std::uint64_t freePeriods = 840;
 
 struct Options {
@@ -61,7 +63,7 @@ struct Options {
 };
 
 #ifdef MEMORY_BANKS
-/// Holds each bank on its own: for a random number of cycles, at random, so that it is held in `percent` of all cycles.
+/// Stalls each bank independently, in bursts of random length, in `percent` of all cycles.
 class BankHolds {
 public:
     explicit BankHolds(const Options& options) : random_(options.seed), percent_(options.memoryPercent), burst_(1, options.memoryBurst) {
@@ -69,7 +71,7 @@ public:
         begins_ = std::bernoulli_distribution(percent_ == 0 ? 0.0 : 1.0 / (1.0 + length * (1.0 - held) / held));
     }
 
-    /// The bits of the next cycle.
+    /// Sets the stall bits of the next cycle.
     template <class Port> void next(Port& port) {
         if (percent_ == 0) return;
         unsigned char bits[sizeof(Port)] = {};
@@ -101,7 +103,7 @@ public:
 #endif
     {
 #ifndef MEMORY_BANKS
-        if (options.memoryPercent != 0) throw std::runtime_error("this hardware's memory cannot be held");
+        if (options.memoryPercent != 0) throw std::runtime_error("this design cannot stall its memory");
 #endif
 #ifdef WAVEFORM
         if (!options.waveform.empty()) {
@@ -119,15 +121,15 @@ public:
         cycle();
     }
 
-    /// Words of a file to consecutive addresses of a target from 0. Words for a memory other than that of the columns
-    /// (target 0) may be narrower than the port.
+    /// Loads the words of a file to consecutive addresses of a target, from 0. Words of targets other than the column
+    /// memories (target 0) may be narrower than the port.
     ///
-    /// While words are loaded the render units are idle, so either the load costs no cycles (records) or the device
-    /// moves alone. What runs freely in the hardware then stands as after a load through the port.
+    /// The render units are idle during a load. So records take no cycles, and other words only cycles of device and
+    /// columns. Extra cycles then bring free-running counters to the same state as a load through the port.
     void load(const std::string& file, std::size_t bytes, std::uint64_t target, bool throughPort) {
         const std::size_t port = sizeof top_.io_load_bits_record;
-        if (target == 0 ? bytes != port : bytes > port) throw std::runtime_error("records of another width than the load port's");
-        if (!top_.io_load_ready) throw std::runtime_error("the load port takes no records");
+        if (target == 0 ? bytes != port : bytes > port) throw std::runtime_error("the words do not have the width of the load port");
+        if (!top_.io_load_ready) throw std::runtime_error("the load port is not ready");
         std::ifstream stream(file, std::ios::binary);
         if (!stream) throw std::runtime_error("no file " + file);
         std::vector<char> word(bytes);
@@ -189,7 +191,7 @@ public:
             holds_.next(top_.io_memoryHolds);
 #endif
             cycle();
-            if (watchdog != 0 && quiet_ > watchdog + watchdogMargin) throw std::runtime_error("no pixel for longer than the watchdog waits");
+            if (watchdog != 0 && quiet_ > watchdog + watchdogMargin) throw std::runtime_error("the watchdog did not abort the frame in time");
             if ((cycles_ & 0xff) == 0 && std::chrono::steady_clock::now() - shown > std::chrono::milliseconds(250)) {
                 shown = std::chrono::steady_clock::now();
                 std::cerr << "progress " << static_cast<double>(received_) / static_cast<double>(pixels_.size()) << std::endl;
@@ -208,7 +210,7 @@ public:
     }
 
 private:
-    /// One clock cycle; takes the pixels that are offered in it.
+    /// One clock cycle; accepts the pixels that are valid in it.
     void cycle() {
         const bool takes = stallPercent_ == 0 || random_() % 100 >= stallPercent_;
 #define OFFER(column) top_.io_pixels_##column##_ready = takes;
@@ -264,9 +266,9 @@ private:
     }
 
     PixelBytes& at(std::size_t x, std::size_t y) {
-        if (x >= width_ || y * width_ + x >= pixels_.size()) throw std::runtime_error("a pixel outside the frame");
+        if (x >= width_ || y * width_ + x >= pixels_.size()) throw std::runtime_error("a pixel lies outside the frame");
         PixelBytes& pixel = pixels_[y * width_ + x];
-        if (pixel.isSeen) throw std::runtime_error("a pixel came twice");
+        if (pixel.isSeen) throw std::runtime_error("a pixel arrived twice");
         pixel.isSeen = 1;
         ++received_;
         quiet_ = 0;
@@ -285,7 +287,7 @@ private:
     BankHolds holds_;
 #endif
     std::uint64_t cycles_ = 0;
-    /// Since the last pixel, without those in which the sink took none.
+    /// Cycles since the last pixel in which the sink was ready.
     std::uint64_t quiet_ = 0;
     std::vector<PixelBytes> pixels_;
     std::size_t width_ = 0, received_ = 0;
@@ -310,7 +312,7 @@ void run(const std::string& job, const Options& options) {
         else if (command == "write" && words >> a >> b) harness.write(a, static_cast<std::uint32_t>(b));
         else if (command == "frame" && words >> name >> a >> b >> c >> d) harness.frame(name, a, b, c, d);
         else if (command == "read" && words >> name >> a >> b) std::cout << "value " << name << ' ' << decimal(harness.read(a, static_cast<unsigned>(b))) << '\n';
-        else throw std::runtime_error("not a command: " + line);
+        else throw std::runtime_error("unknown command: " + line);
     }
 }
 
@@ -327,7 +329,7 @@ int main(int argc, char** argv) try {
         if (argument == "--waveform" && i + 1 < argc) options.waveform = argv[++i];
         else if (option == std::end(named)) job = argument;
         else if (++i < argc) *option->second = static_cast<unsigned>(std::stoul(argv[i]));
-        else throw std::runtime_error(argument + " without a number");
+        else throw std::runtime_error(argument + " needs a number");
     }
     run(job, options);
     return 0;

@@ -1,1 +1,1 @@
-"""The contents of the physical-attribute memory: the maps of an environment, clustered to fit on chip."""
+"""Encodes an environment's maps into the contents of the on-chip physical-attribute memory."""

@@ -1,8 +1,8 @@
-"""The shell: planes around the whole room, for rays that leave the view.
+"""Bounding planes: the planes around the room that rays leaving the view hit.
 
-A plane is part of it when hardly any of the room's points lie beyond it, seen from the camera: floor, ceiling, walls. A
-virtual wall behind the camera closes it. An entry, low bit first: plane (64 bits), mean albedo and normal (three fields
-each), the rest zero.
+A plane bounds the room if nearly all of the room's points lie on the camera's side of it: floor, ceiling, walls. A
+virtual wall behind the camera closes the room. A memory entry holds, low bit first, the plane (64 bits), then mean
+albedo and normal (three fields each).
 """
 
 from __future__ import annotations
@@ -13,30 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.plane_fit import refitted, samples_of
-from colonnade.environment.encoding.planes import Picture, packed_planes, unpacked_planes
+from colonnade.environment.encoding.plane_fit import refit_planes, sample_pixels
+from colonnade.environment.encoding.planes import PlaneProjection, pack_planes, unpack_planes
 from colonnade.environment.encoding.vectors import AlbedoSpace, NormalSpace
 from colonnade.environment.model import Environment
 
-#: The virtual wall stands so far behind the camera, metres.
+#: Distance of the virtual wall behind the camera, metres.
 BEHIND = 0.5
-#: The share of the room's points that may lie beyond a plane of the shell, by more than a tolerance in metres.
+#: Largest fraction of points beyond a bounding plane by more than the tolerance, metres.
 _MAX_BEYOND = 0.03
 _TOLERANCE = 0.05
-#: Pixels within this distance of a plane lie on it, metres; so many of them make it worth an entry.
-_ON_IT = 0.03
-_LEAST_SHARE = 0.01
-#: Two planes whose normals differ by less than this cosine are one wall.
+#: Largest distance of a plane's inliers, metres, and the smallest fraction of inliers for an entry.
+_INLIER_DISTANCE = 0.03
+_MIN_INLIERS = 0.01
+#: Normals with a larger cosine count as parallel: two such planes are one wall.
 _SAME_DIRECTION = 0.94
 _STEP = 2
 
 
 @dataclass(frozen=True)
-class Shell:
-    """Planes and their colours.
+class BoundingPlanes:
+    """Bounding planes and their colours.
 
     Attributes:
-        planes: float64 [n, 3], A, B, C.
+        planes: float64 [n, 3], coefficients A, B, C.
         albedos: float64 [n, 3], linear.
     """
 
@@ -45,47 +45,49 @@ class Shell:
 
 
 def choose_bounding_planes(
-    environment: Environment, picture: Picture, planes: NDArray[np.float64], maximum: int
-) -> Shell:
-    """At most ``most`` planes: the virtual wall, and of ``planes`` those around the room, the largest first."""
-    samples = samples_of(environment, picture, _STEP)
+    environment: Environment, projection: PlaneProjection, planes: NDArray[np.float64], maximum: int
+) -> BoundingPlanes:
+    """Choose at most ``maximum`` planes: the virtual wall, then those of ``planes`` around the room, largest first."""
+    samples = sample_pixels(environment, projection, _STEP)
     albedo = environment.albedo[::_STEP, ::_STEP].reshape(-1, 3)
     points = environment.points()[::_STEP, ::_STEP].reshape(-1, 3)
     normals = environment.normals[::_STEP, ::_STEP].reshape(-1, 3)
-    wall = np.array([0.0, 0.0, -picture.depth_unit / BEHIND])
+    wall = np.array([0.0, 0.0, -projection.depth_unit / BEHIND])
     chosen, colours = [wall], [albedo.mean(axis=0)]
-    lying = _lying(samples.errors(planes), normals, picture.normals(planes))
-    for k in np.argsort(-lying.sum(axis=0), kind="stable"):
-        if len(chosen) == maximum or lying[:, k].mean() < _LEAST_SHARE:
+    inliers = _inliers(samples.errors(planes), normals, projection.normals(planes))
+    for k in np.argsort(-inliers.sum(axis=0), kind="stable"):
+        if len(chosen) == maximum or inliers[:, k].mean() < _MIN_INLIERS:
             break
-        mine = lying[:, k]
-        owner = np.where(mine, 0, 1).astype(np.intp)
-        plane = refitted(samples, np.stack([planes[k], wall]), owner)[0]
-        q = picture.inverse_offsets(plane[np.newaxis])[0]
+        on_plane = inliers[:, k]
+        owner = np.where(on_plane, 0, 1).astype(np.intp)
+        plane = refit_planes(samples, np.stack([planes[k], wall]), owner)[0]
+        q = projection.dual_vectors(plane[np.newaxis])[0]
         beyond = (points @ q - 1.0) / np.linalg.norm(q) > _TOLERANCE
         if beyond.mean() > _MAX_BEYOND:
             continue
-        directions = picture.normals(np.stack([*chosen[1:], plane]))
+        directions = projection.normals(np.stack([*chosen[1:], plane]))
         if (directions[:-1] @ directions[-1] > _SAME_DIRECTION).any():
             continue
         chosen.append(plane)
-        colours.append(albedo[mine].mean(axis=0))
-    return Shell(np.stack(chosen), np.stack(colours))
+        colours.append(albedo[on_plane].mean(axis=0))
+    return BoundingPlanes(np.stack(chosen), np.stack(colours))
 
 
-def _lying(
+def _inliers(
     errors: NDArray[np.float32], normals: NDArray[np.float64], directions: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Whether each sample lies on each plane: near it, and facing as it does: bool [samples, planes]."""
-    lying: NDArray[np.bool_] = (errors < _ON_IT) & (normals @ directions.T > _SAME_DIRECTION)
-    return lying
+    """Whether each sample is near each plane and has its normal: bool [samples, planes]."""
+    inliers: NDArray[np.bool_] = (errors < _INLIER_DISTANCE) & (normals @ directions.T > _SAME_DIRECTION)
+    return inliers
 
 
-def packed_shell(shell: Shell, picture: Picture, layout: AttributeLayout) -> NDArray[np.uint64]:
-    """Words uint64 [shell_planes, 3]: bits 63 to 0, 127 to 64, 143 to 128 of each entry."""
-    planes = packed_planes(shell.planes)
+def pack_bounding_planes(
+    shell: BoundingPlanes, projection: PlaneProjection, layout: AttributeLayout
+) -> NDArray[np.uint64]:
+    """Pack the entries into words, uint64 [shell_planes, 3]: bits 63 to 0, 127 to 64, 143 to 128 of each entry."""
+    planes = pack_planes(shell.planes)
     albedos = AlbedoSpace(layout.field_bits).words(shell.albedos)
-    normals = NormalSpace(layout.field_bits).words(picture.normals(unpacked_planes(planes)))
+    normals = NormalSpace(layout.field_bits).words(projection.normals(unpack_planes(planes)))
     words = np.zeros((layout.shell_planes, 3), np.uint64)
     for k in range(len(planes)):
         entry = int(planes[k]) | (int(albedos[k]) | int(normals[k]) << layout.vector_bits) << 64

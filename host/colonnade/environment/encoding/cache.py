@@ -1,4 +1,4 @@
-"""Keeps encoded rooms, because encoding one takes seconds."""
+"""Caches encoded environments, because encoding takes seconds."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from colonnade.environment.encoding.image import AttributeImage, encode_environm
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.model import Environment
 
-#: The file of an entry.
+#: File name in a cache entry.
 FILE = "room.npz"
 
 
 def encoded_environment(
     environment: Environment, layout: AttributeLayout, folder: Path | None = None
 ) -> AttributeImage:
-    """`encode_environment` with a cache: in ``folder``, by default in the project's."""
-    place = folder or cache_directory(project_root()) / "rooms"
+    """Encode an environment, or take it from the cache ``folder``, by default the project's."""
+    rooms = folder or cache_directory(project_root()) / "rooms"
 
     def make(entry: Path) -> None:
         _write(entry / FILE, encode_environment(environment, layout))
 
-    return _read(cache.entry(place / _key(environment, layout), make, "room") / FILE, layout)
+    return _read(cache.entry(rooms / _key(environment, layout), make, "room") / FILE, layout)
 
 
 def _key(environment: Environment, layout: AttributeLayout) -> str:
-    """Of all that the encoders look at, and of the encoders."""
+    """Hash of the encoders' inputs and of their source files."""
     digest = hashlib.sha256(_sources())
     camera = environment.camera
     digest.update(repr((astuple(layout), camera.fx, camera.fy, camera.cx, camera.cy)).encode())

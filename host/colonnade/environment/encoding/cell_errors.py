@@ -1,7 +1,7 @@
-"""Squared errors of a tile's cells, for whatever entries are tried.
+"""Weighted squared errors of a tile's cells for candidate entries.
 
-The error of a cell whose pixels x all take entry p is S|x|^2 - 2 p . Sx + |p|^2 S1, so three sums over the cell do.
-They are taken about the tile's mean, which keeps them small enough for 32 bits.
+If all pixels x of a cell take the entry p, the cell's error is S|x|^2 - 2 p . Sx + |p|^2 S1. Three sums over the cell
+therefore give its error for any entry. They are centred on the tile's mean, so that float32 is precise enough.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.tiles import cut, pooled, present
+from colonnade.environment.encoding.tiles import inside_mask, split_tiles, sum_cells
 
-#: A tile's error counts for 1 / (variance + this), on the scale of 8 bits: an error shows less in a busy tile.
+#: A tile's weight is 1 / (variance + this constant), on an 8-bit scale: texture masks errors.
 TEXTURE_MASKING = 58.0
 
 
@@ -34,20 +34,20 @@ class Cells:
 
 
 class TilePixels:
-    """A map as its encoder sees it.
+    """A map split into weighted tiles.
 
     Attributes:
-        layout: Its sizes.
+        layout: Sizes of the map.
         points: float64 [tiles, size, size, 3].
-        weights: float64 [tiles, size, size]: how much a pixel's error counts; 0 beyond the map's edge.
+        weights: float64 [tiles, size, size], weight of each pixel's error; 0 beyond the map's edge.
         means: float64 [tiles, 3].
     """
 
     def __init__(self, points: NDArray[np.float64], layout: AttributeLayout) -> None:
-        """Cut ``points``, float64 [height, width, 3], into tiles."""
+        """Split ``points``, float64 [height, width, 3], into tiles."""
         self.layout = layout
-        self.points: NDArray[np.float64] = cut(points, layout)
-        inside = present(layout)
+        self.points: NDArray[np.float64] = split_tiles(points, layout)
+        inside = inside_mask(layout)
         count = inside.sum(axis=(1, 2))[:, np.newaxis]
         self.means: NDArray[np.float64] = (self.points * inside[..., np.newaxis]).sum(axis=(1, 2)) / count
         centred = self.points - self.means[:, np.newaxis, np.newaxis]
@@ -57,18 +57,18 @@ class TilePixels:
         self._cells: dict[int, Cells] = {}
 
     def cells(self, cells: int) -> Cells:
-        """Sums over ``cells`` by ``cells`` cells of each tile."""
+        """Sums over the cells of each tile, ``cells`` by ``cells`` of them."""
         if cells not in self._cells:
             weighted = self._centred * self.weights[..., np.newaxis]
             squares = (self._centred * weighted).sum(axis=3)
-            parts = (pooled(values, cells).astype(np.float32) for values in (self.weights, weighted, squares))
+            parts = (sum_cells(values, cells).astype(np.float32) for values in (self.weights, weighted, squares))
             self._cells[cells] = Cells(*parts)
         return self._cells[cells]
 
     def cell_costs(
         self, cells: int, entries: NDArray[np.float64], which: NDArray[np.intp] | slice = slice(None)
     ) -> NDArray[np.float32]:
-        """Weighted errors float32 [which, cells * cells, entries] for entries float64 [which, entries, 3] of tiles."""
+        """Weighted errors float32 [which, cells * cells, entries] of tiles' entries, float64 [which, entries, 3]."""
         sums = self.cells(cells)
         centred = (entries - self.means[which][:, np.newaxis]).astype(np.float32)
         lengths = (centred * centred).sum(axis=2)

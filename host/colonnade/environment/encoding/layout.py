@@ -1,16 +1,16 @@
-"""Sizes of the physical-attribute memory: what a configuration gives each map, and what follows from it.
+"""Sizes of the physical-attribute memory: the configured ones, and those derived from them.
 
 | memory | word, bits | words |
 |---|---|---|
 | descriptors | 32 | tiles |
 | palette | three fields | `palette_size` |
-| heap | 16 | the rest of `map_bytes` |
+| heap | 16 | rest of `map_bytes` |
 | seeds (`slic`) | three fields | tiles |
 | labels (`slic`) | 16: four labels | blocks / 4 |
 | plane descriptors | 16 | tiles |
 | planes | 64 | `planes` |
-| plane heap | 16 | the rest of `plane_bytes` |
-| shell | 144 | `shell_planes` |
+| plane heap | 16 | rest of `plane_bytes` |
+| shell (bounding planes) | 144 | `shell_planes` |
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any
 
 from colonnade.common.errors import UserError
 
-#: Bits of a descriptor's pointer, in 16-bit words, and of a palette index or plane id.
+#: Bits of a pointer to 16-bit heap words, of a palette index or plane id, and of the memories' words.
 POINTER_BITS = 13
 INDEX_BITS = 8
 DESCRIPTOR_BITS = 32
@@ -29,32 +29,34 @@ PLANE_DESCRIPTOR_BITS = 16
 HEAP_WORD_BITS = 16
 PLANE_BITS = 64
 SHELL_BITS = 144
-#: Labels of `slic`: one of the 3x3 neighbouring seeds.
+#: Bits of a `slic` label, which names one of the 3x3 neighbouring seeds.
 LABEL_BITS = 4
-#: Edge of the block of pixels that shares a label: a quarter of a tile's.
-BLOCKS_A_TILE_EDGE = 4
+#: Blocks on a tile's edge; the pixels of a block share a label.
+BLOCKS_PER_TILE_EDGE = 4
 
 
-#: What the hardware has not got a choice of.
+#: Fields that are fixed in the hardware, and so not in its configuration.
 HOST_ONLY = ("field_bits", "plane_cells")
 
 
 @dataclass(frozen=True)
 class AttributeLayout:
-    """What the configuration says of the background's maps.
+    """Sizes of the maps and their memories.
 
     Attributes:
         width, height: Pixels of the maps.
-        encoding: ``twoLevel`` or ``slic``, of albedo and normals.
+        encoding: ``twoLevel`` or ``slic``, for albedo and normals.
         tile_size: Edge of a tile, pixels: 8, 16 or 32.
-        palette_size: Vectors of a map that all its tiles share, 4 to 256.
-        field_bits: Of each of the three components of a vector, 6 to 13.
-        map_bytes: For the albedo map, and as many for the normals.
-        planes: Plane table, 2 to 128; its last one is nothing, infinitely far away.
-        plane_bytes: For planes, their map and the shell.
-        plane_cells: Most cells on a tile's edge in the plane map, 8 or 16.
-        shell_planes: Planes around the room, for rays that leave the view.
-    """
+        palette_size: Entries of a map's palette, 4 to 256.
+        field_bits: Bits of a vector's component, 6 to 13.
+        map_bytes: Bytes of the albedo map, and of the normal map.
+        planes: Entries of the plane table, 2 to 128; the last plane is infinitely far away.
+        plane_bytes: Bytes of the plane table, the plane map and the bounding planes.
+        plane_cells: Largest number of cells on a tile's edge in the plane map, 8 or 16.
+        shell_planes: Number of bounding planes, for rays that leave the view.
+
+    Raises:
+        UserError: A size is out of range, or the bytes are too few for the fixed tables."""
 
     width: int = 640
     height: int = 480
@@ -98,18 +100,18 @@ class AttributeLayout:
         if available * 8 < needed_bits:
             raise UserError(
                 f"background layout: {name} is {available:,}, but {self.width}x{self.height} pixels in tiles of"
-                f" {self.tile_size} need {-(-needed_bits // 8):,} at least: raise it, or take larger tiles"
+                f" {self.tile_size} need at least {-(-needed_bits // 8):,}: raise it, or use larger tiles"
             )
 
     @staticmethod
     def from_config(section: Mapping[str, Any]) -> AttributeLayout:
-        """The layout of a configuration's section ``physicalAttributeMemory``."""
+        """Build the layout of a configuration's section ``physicalAttributeMemory``."""
         names = {"tileSize": "tile_size", "paletteSize": "palette_size", "mapBytes": "map_bytes"}
         names |= {"planeBytes": "plane_bytes", "shellPlanes": "shell_planes"}
         return AttributeLayout(**{names.get(key, key): value for key, value in section.items() if key != "shared"})
 
     def to_config(self) -> dict[str, Any]:
-        """The section ``physicalAttributeMemory`` of a configuration with these sizes."""
+        """The configuration section ``physicalAttributeMemory`` with these sizes."""
         names = {"tile_size": "tileSize", "palette_size": "paletteSize", "map_bytes": "mapBytes"}
         names |= {"plane_bytes": "planeBytes", "shell_planes": "shellPlanes"}
         sizes = {names.get(name, name): value for name, value in asdict(self).items() if name not in HOST_ONLY}
@@ -127,29 +129,29 @@ class AttributeLayout:
 
     @property
     def tiles(self) -> int:
-        """Tiles of the map; tile (x, y) has the index y * `tile_columns` + x."""
+        """Number of tiles; tile (x, y) has the index y * `tile_columns` + x."""
         return self.tile_columns * self.tile_rows
 
     @property
     def vector_bits(self) -> int:
-        """Of a palette entry or a seed."""
+        """Bits of a palette entry or a seed."""
         return 3 * self.field_bits
 
     @property
     def palette_bits(self) -> int:
-        """Of a whole palette."""
+        """Bits of a palette."""
         return self.palette_size * self.vector_bits
 
     @property
     def heap_words(self) -> int:
-        """16-bit words for masks in a `twoLevel` map: what is left, as far as a pointer reaches."""
+        """Words of a `twoLevel` map's heap: the rest of its bytes, within the pointer's range."""
         left = self.map_bytes * 8 - self.tiles * DESCRIPTOR_BITS - self.palette_bits
         return min(left // HEAP_WORD_BITS, 1 << POINTER_BITS)
 
     @property
     def block_size(self) -> int:
-        """Edge of a block of pixels with one label."""
-        return self.tile_size // BLOCKS_A_TILE_EDGE
+        """Edge of a block with one label, pixels."""
+        return self.tile_size // BLOCKS_PER_TILE_EDGE
 
     @property
     def block_columns(self) -> int:
@@ -163,7 +165,7 @@ class AttributeLayout:
 
     @property
     def label_words(self) -> int:
-        """16-bit words of labels in a `slic` map."""
+        """Words of a `slic` map's labels."""
         return -(-self.block_columns * self.block_rows * LABEL_BITS // HEAP_WORD_BITS)
 
     @property
@@ -173,12 +175,12 @@ class AttributeLayout:
 
     @property
     def plane_heap_words(self) -> int:
-        """16-bit words for plane ids and masks."""
+        """Words of the plane map's heap: the rest of its bytes, within the pointer's range."""
         return min((self.plane_bytes * 8 - self._fixed_plane_bits) // HEAP_WORD_BITS, 1 << POINTER_BITS)
 
     @property
     def map_memory_bytes(self) -> int:
-        """Bytes of a map's memories."""
+        """Size of an albedo or normal map's memories, bytes."""
         if self.encoding == "twoLevel":
             bits = self.tiles * DESCRIPTOR_BITS + self.palette_bits + self.heap_words * HEAP_WORD_BITS
         else:
@@ -187,10 +189,10 @@ class AttributeLayout:
 
     @property
     def plane_memory_bytes(self) -> int:
-        """Bytes of the planes' memories."""
+        """Size of the planes' memories, bytes."""
         return -(-(self._fixed_plane_bits + self.plane_heap_words * HEAP_WORD_BITS) // 8)
 
     @property
-    def nothing(self) -> int:
+    def infinite_plane(self) -> int:
         """Id of the plane that is infinitely far away."""
         return self.planes - 1

@@ -1,18 +1,18 @@
-"""The plane map: which of the shared planes a pixel lies on.
+"""The plane map: assigns one of the shared planes to each pixel.
 
 A descriptor, low bit first: mode (3), plane id or pointer (13).
 
-| mode | ids | cells | words in the heap |
+| mode | ids | cells | heap words |
 |---|---|---|---|
 | 0 | 1, in the descriptor | | 0 |
-| 1 | 2 | 4x4 | ids (low byte id 0, high byte id 1), mask |
-| 2 | 2 | 8x8 | ids, 4 of mask |
+| 1 | 2 | 4x4 | 1 of ids (low byte id 0, high byte id 1), 1 of mask |
+| 2 | 2 | 8x8 | 1 of ids, 4 of mask |
 | 3 | 4 | 4x4 | 2 of ids, 2 of mask |
 | 4 | 4 | 8x8 | 2 of ids, 8 of mask |
-| 5 | 2 | 16x16 | ids, 16 of mask |
+| 5 | 2 | 16x16 | 1 of ids, 16 of mask |
 | 6 | 4 | 16x16 | 2 of ids, 32 of mask |
 
-Cells are numbered, and masks filled, as in the two-level map. Modes 5 and 6 occur where `plane_cells` is 16.
+Cells and masks are ordered as in the two-level map. Modes 5 and 6 require `plane_cells` 16.
 """
 
 from __future__ import annotations
@@ -23,38 +23,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.environment.encoding.layout import POINTER_BITS, AttributeLayout
-from colonnade.environment.encoding.planes import Picture, unpacked_planes
+from colonnade.environment.encoding.planes import PlaneProjection, unpack_planes
 
 
 @dataclass(frozen=True)
 class PlaneMode:
-    """How a tile is divided.
+    """A subdivision of a tile.
 
     Attributes:
-        ids: Planes in it: 1, 2 or 4.
-        cells: Cells on its edge.
+        ids: Number of planes: 1, 2 or 4.
+        cells: Cells on the tile's edge.
     """
 
     ids: int
     cells: int
 
     @property
-    def bits_a_cell(self) -> int:
-        """Mask bits that choose a cell's plane."""
+    def bits_per_cell(self) -> int:
+        """Mask bits per cell, which choose its plane."""
         return self.ids // 2
 
     @property
     def id_words(self) -> int:
-        """Words that hold the ids."""
+        """Heap words of the ids."""
         return self.ids // 2
 
     @property
     def words(self) -> int:
-        """Words in the heap."""
-        return self.id_words + self.cells * self.cells * self.bits_a_cell // 16
+        """Heap words of the ids and the mask."""
+        return self.id_words + self.cells * self.cells * self.bits_per_cell // 16
 
 
-#: By number.
+#: Modes by number.
 PLANE_MODES = (
     PlaneMode(1, 1),
     PlaneMode(2, 4),
@@ -68,14 +68,14 @@ PLANE_MODES = (
 
 @dataclass(frozen=True)
 class PlaneMap:
-    """Memory contents of the planes.
+    """Contents of the planes' memories.
 
     Attributes:
         descriptors: uint16 [tiles].
-        planes: uint64 [planes]; the last one is 0: w = 0, infinitely far away.
+        planes: uint64 [planes]; the last one is 0: w = 0, at infinity.
         heap: uint16 [plane_heap_words].
         shell: uint64 [shell_planes, 3], 144 bits each, low word first: plane, albedo, normal; all zero if unused.
-        depth_unit: Metres: w is this divided by the depth.
+        depth_unit: Depth of w = 1, metres: w = depth_unit / depth.
     """
 
     descriptors: NDArray[np.uint16]
@@ -89,18 +89,18 @@ class PlaneMap:
         return {"descriptors": self.descriptors, "planes": self.planes, "heap": self.heap, "shell": self.shell}
 
     def ids_at(self, u: NDArray[np.int64], v: NDArray[np.int64], layout: AttributeLayout) -> NDArray[np.int64]:
-        """Plane ids of pixels (u, v), of any shape; inside the map."""
+        """Plane ids of pixels (u, v) in the map; arrays of any shape."""
         size = layout.tile_size
         descriptor = self.descriptors[(v // size) * layout.tile_columns + u // size].astype(np.int64)
         mode, pointer = descriptor & 7, (descriptor >> 3) & ((1 << POINTER_BITS) - 1)
-        kinds = np.array([[m.cells, m.bits_a_cell, m.id_words] for m in PLANE_MODES], dtype=np.int64)
+        kinds = np.array([[m.cells, m.bits_per_cell, m.id_words] for m in PLANE_MODES], dtype=np.int64)
         cells, bits, id_words = np.moveaxis(kinds[mode], -1, 0)
         edge = size // cells
-        place = ((v % size) // edge * cells + (u % size) // edge) * bits
+        bit = ((v % size) // edge * cells + (u % size) // edge) * bits
         heap = np.append(self.heap, np.uint16(0)).astype(np.int64)
         last = heap.size - 1
-        mask = heap[np.minimum(pointer + id_words + (place >> 4), last)]
-        choice = np.where(mode == 0, 0, (mask >> (place & 15)) & ((1 << bits) - 1))
+        mask = heap[np.minimum(pointer + id_words + (bit >> 4), last)]
+        choice = np.where(mode == 0, 0, (mask >> (bit & 15)) & ((1 << bits) - 1))
         ids = heap[np.minimum(pointer + (choice >> 1), last)] >> (choice & 1) * 8 & 255
         chosen: NDArray[np.int64] = np.where(mode == 0, pointer, ids)
         return chosen
@@ -110,13 +110,13 @@ class PlaneMap:
         v, u = np.mgrid[: layout.height, : layout.width]
         return self.ids_at(u, v, layout)
 
-    def inverse_depth(self, layout: AttributeLayout, picture: Picture) -> NDArray[np.float64]:
-        """w of every pixel's centre on its plane, float64 [height, width]."""
-        planes = unpacked_planes(self.planes)[self.ids(layout)]
-        w: NDArray[np.float64] = np.einsum("yxc,yxc->yx", planes, picture.basis())
+    def inverse_depth(self, layout: AttributeLayout, projection: PlaneProjection) -> NDArray[np.float64]:
+        """w of each pixel's centre on its plane, float64 [height, width]."""
+        planes = unpack_planes(self.planes)[self.ids(layout)]
+        w: NDArray[np.float64] = np.einsum("yxc,yxc->yx", planes, projection.basis())
         return w
 
-    def depth(self, layout: AttributeLayout, picture: Picture) -> NDArray[np.float64]:
-        """Metres along z of every pixel's centre; infinite where w is not positive."""
-        w = self.inverse_depth(layout, picture)
+    def depth(self, layout: AttributeLayout, projection: PlaneProjection) -> NDArray[np.float64]:
+        """Depth of each pixel's centre, metres along z: float64 [height, width]; infinite where w is not positive."""
+        w = self.inverse_depth(layout, projection)
         return np.where(w > 0, self.depth_unit / np.maximum(w, 1e-12), np.inf)

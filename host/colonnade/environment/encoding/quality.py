@@ -1,4 +1,4 @@
-"""What clustering cost: the maps as the hardware reads them against the room's own."""
+"""Quality of encoded maps: decoded against original maps."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from numpy.typing import NDArray
 
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.encoding.image import AttributeImage
-from colonnade.environment.encoding.planes import Picture
+from colonnade.environment.encoding.planes import PlaneProjection
 from colonnade.environment.model import Environment
 from colonnade.quality.image_metrics import compare_pictures
 
-#: The lamps of `relit`: towards each in view space, and its strength; the rest is ambient.
+#: Lamps of `relit`: direction to the lamp in view space, and intensity; plus ambient light.
 LAMPS = (((-0.5, -0.8, -0.4), 0.6), ((0.7, -0.3, -0.6), 0.35))
 AMBIENT = 0.3
 
 
 def relit(albedo: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Under `LAMPS`, linear, float64 [height, width, 3]: albedo * (ambient + sum of strength * max(0, n . l))."""
+    """Relight maps with `LAMPS`, linear, float64 [height, width, 3]: albedo * (ambient + sum of i * max(0, n . l))."""
     light = np.full(normals.shape[:2], AMBIENT)
-    for towards, strength in LAMPS:
-        direction = np.array(towards) / np.linalg.norm(towards)
-        light += strength * np.maximum(0.0, normals @ direction)
+    for to_lamp, intensity in LAMPS:
+        direction = np.array(to_lamp) / np.linalg.norm(to_lamp)
+        light += intensity * np.maximum(0.0, normals @ direction)
     lit: NDArray[np.float64] = albedo * light[..., np.newaxis]
     return lit
 
 
 def angles(reference: NDArray[np.float64], test: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Degrees between vectors [..., 3]."""
+    """Angles between vectors [..., 3], degrees."""
     lengths = np.linalg.norm(reference, axis=-1) * np.linalg.norm(test, axis=-1)
     cosine = np.einsum("...c,...c->...", reference, test) / np.maximum(lengths, 1e-12)
     degrees: NDArray[np.float64] = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
@@ -39,17 +39,19 @@ def angles(reference: NDArray[np.float64], test: NDArray[np.float64]) -> NDArray
 
 
 def ray_errors(environment: Environment, depth: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Metres along the view ray between a depth map and the room's, float64 [height, width]."""
+    """Distance along the view ray between a depth map and the environment's, metres: float64 [height, width]."""
     lengths = np.linalg.norm(environment.camera.directions(environment.width, environment.height), axis=2)
     errors: NDArray[np.float64] = np.abs(depth - environment.depth) * lengths
     return errors
 
 
 def measure(environment: Environment, image: AttributeImage, with_dists: bool = True) -> dict[str, Any]:
-    """Bytes and losses as a JSON object; ``dists`` is None without its weights."""
+    """Measure sizes and losses, as a JSON object; ``dists`` is None if its weights are not available."""
     albedo, normals = image.decoded_albedo(), image.decoded_normals()
     degrees = angles(environment.normals, normals)
-    centimetres = 100.0 * ray_errors(environment, image.decoded_depth(Picture.of(environment, image.depth_unit)))
+    centimetres = 100.0 * ray_errors(
+        environment, image.decoded_depth(PlaneProjection.of(environment, image.depth_unit))
+    )
     return {
         "room": environment.name,
         "encoding": image.layout.encoding,
@@ -71,7 +73,7 @@ def measure(environment: Environment, image: AttributeImage, with_dists: bool = 
 
 
 def _pictures(reference: NDArray[np.float64], test: NDArray[np.float64], with_dists: bool) -> dict[str, Any]:
-    """PSNR, SSIM, FLIP and DISTS of linear pictures."""
+    """PSNR, SSIM, FLIP and DISTS of two linear pictures."""
     from colonnade.quality.dists import dists_or_none
 
     pair = encode_srgb(reference), encode_srgb(test)
@@ -82,15 +84,16 @@ def _pictures(reference: NDArray[np.float64], test: NDArray[np.float64], with_di
 
 
 def report_lines(report: dict[str, Any]) -> Iterable[str]:
-    """The report of `measure` for people."""
+    """Format the report of `measure` as text lines."""
     width, height = report["size"]
     yield f"room        {report['room']}, {width}x{height}, {report['encoding']}"
     for name, count in report["bytes"].items():
-        yield f"{name:<12}{count:>7,} bytes, {report['ratio'][name]:.1f} times less than {width * height * 3:,}"
+        yield f"{name:<12}{count:>7,} bytes, a {report['ratio'][name]:.1f}x reduction from {width * height * 3:,}"
     for name in ("albedo", "relit"):
         loss = report[name]
-        yield f"{name:<12}PSNR {loss['psnr']:.1f} dB, SSIM {_shown(loss['ssim'])}, FLIP {loss['flip']:.3f}, DISTS" + (
-            f" {_shown(loss['dists'])}"
+        yield (
+            f"{name:<12}PSNR {loss['psnr']:.1f} dB, SSIM {_format_number(loss['ssim'])}, FLIP {loss['flip']:.3f}, DISTS"
+            + (f" {_format_number(loss['dists'])}")
         )
     degrees, planes = report["normals"], report["planes"]
     yield f"normals     {degrees['mean_degrees']:.2f} degrees off, {degrees['p95_degrees']:.1f} for 5 % of the pixels"
@@ -100,5 +103,5 @@ def report_lines(report: dict[str, Any]) -> Iterable[str]:
     yield f"shell       {report['shell']} planes around the room"
 
 
-def _shown(value: float | None) -> str:
+def _format_number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"

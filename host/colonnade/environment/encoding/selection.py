@@ -1,29 +1,29 @@
-"""Which few of many candidates serve a tile best, and which tiles deserve how much memory."""
+"""Selects the best subset of candidates for each tile, and the best choice per tile within a memory budget."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Tiles that are worked on at a time: their costs fit a cache.
+#: Tiles per batch, so that their costs fit a cache.
 _TILES = 32
 
 
 def best_subsets(
     costs: NDArray[np.float32], counts: tuple[int, ...], rounds: int
 ) -> dict[int, tuple[NDArray[np.intp], NDArray[np.float64]]]:
-    """For every tile the candidates that serve its cells best, each cell by the best one of them.
+    """Choose for each tile the subset of candidates with the lowest cost; each cell takes the best member.
 
-    Greedy: the best one, the best next to it, and so on up to the largest of ``counts``; then, for each count, every
-    member in turn is replaced by the best one beside the others, ``rounds`` times.
+    The members are added greedily, up to the largest of ``counts``. Then, for each count, each member is replaced in
+    turn by the candidate that is best together with the others, ``rounds`` times.
 
     Args:
         costs: float32 [tiles, cells, candidates].
         counts: Sizes of the subsets, ascending.
-        rounds: Of replacement.
+        rounds: Replacement rounds.
 
     Returns:
-        For each count: intp [tiles, count] candidates, float64 [tiles] costs.
+        For each count, the members, intp [tiles, count], and the costs, float64 [tiles].
     """
     tiles = costs.shape[0]
     results = {count: (np.empty((tiles, count), np.intp), np.empty(tiles)) for count in counts}
@@ -41,8 +41,8 @@ def _subsets(
     tile = np.arange(costs.shape[0])
     scratch = np.empty_like(costs)
 
-    def best_beside(reached: NDArray[np.float32] | None) -> NDArray[np.intp]:
-        """The candidate whose addition lowers the cost most."""
+    def best_addition(reached: NDArray[np.float32] | None) -> NDArray[np.intp]:
+        """The candidate with which the cost of each tile is lowest."""
         if reached is None:
             totals = costs.sum(axis=1)
         else:
@@ -51,8 +51,8 @@ def _subsets(
         best: NDArray[np.intp] = totals.argmin(axis=1)
         return best
 
-    def of(members: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Costs [tiles, cells, members]."""
+    def member_costs(members: NDArray[np.intp]) -> NDArray[np.float32]:
+        """Costs of the members: float32 [tiles, cells, members]."""
         return np.take_along_axis(costs, members[:, np.newaxis, :], axis=2)
 
     results = {}
@@ -60,33 +60,33 @@ def _subsets(
     reached: NDArray[np.float32] | None = None
     for count in counts:
         while len(chosen) < count:
-            chosen.append(best_beside(reached))
+            chosen.append(best_addition(reached))
             column = costs[tile, :, chosen[-1]]
             reached = column if reached is None else np.minimum(reached, column)
         members = np.stack(chosen, axis=1)
         if count > 1:
-            for turn in range(rounds * count):
-                place = turn % count
-                members[:, place] = best_beside(of(np.delete(members, place, axis=1)).min(axis=2))
-        results[count] = (members, of(members).min(axis=2).sum(axis=1))
-        chosen = [members[:, place] for place in range(count)]
-        reached = of(members).min(axis=2)
+            for step in range(rounds * count):
+                slot = step % count
+                members[:, slot] = best_addition(member_costs(np.delete(members, slot, axis=1)).min(axis=2))
+        results[count] = (members, member_costs(members).min(axis=2).sum(axis=1))
+        chosen = [members[:, slot] for slot in range(count)]
+        reached = member_costs(members).min(axis=2)
     return results
 
 
-def within_budget(errors: NDArray[np.float64], sizes: NDArray[np.int64], budget: int) -> NDArray[np.intp]:
-    """A choice for every tile, so that the sum of errors is small and the sum of sizes is at most ``budget``.
+def choose_within_budget(errors: NDArray[np.float64], sizes: NDArray[np.int64], budget: int) -> NDArray[np.intp]:
+    """Choose an option for each tile so that the total error is small and the total size is within ``budget``.
 
-    Lagrange: each tile takes what minimises error + price * size; the price is the least that keeps the budget. What
-    is left goes to the upgrades that gain most for a word.
+    This is Lagrangian rate allocation: each tile minimises error + price * size, with the lowest price that keeps the
+    budget. The rest of the budget goes to the upgrades with the largest gain per word.
 
     Args:
-        errors: float64 [tiles, choices].
-        sizes: int64 [choices]; some choice has the size 0.
-        budget: Of all tiles together.
+        errors: float64 [tiles, options].
+        sizes: int64 [options], words; at least one is 0.
+        budget: Words for all tiles.
 
     Returns:
-        intp [tiles].
+        The option of each tile, intp [tiles].
     """
 
     def at(price: float) -> NDArray[np.intp]:

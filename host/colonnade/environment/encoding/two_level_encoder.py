@@ -1,7 +1,7 @@
-"""Makes a two-level map: a palette for the whole map, a mode for each tile.
+"""Encodes a two-level map: a palette for the whole map and a mode for each tile.
 
-In turns: with a palette, every mode's best entries and error in every tile; the modes that minimise the weighted error
-within the heap; with these, the palette's entries as means of the pixels that they stand for.
+Each round finds every mode's best entries and error in every tile, then the modes that minimise the weighted error
+within the heap. Finally it updates the palette's entries to the means of their pixels.
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ from numpy.typing import NDArray
 
 from colonnade.environment.encoding.cell_errors import TilePixels
 from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.palette import first_palette, nearest, updated
-from colonnade.environment.encoding.selection import best_subsets, within_budget
-from colonnade.environment.encoding.tiles import pooled, spread_cells
+from colonnade.environment.encoding.palette import initial_palette, nearest, update_palette
+from colonnade.environment.encoding.selection import best_subsets, choose_within_budget
+from colonnade.environment.encoding.tiles import expand_cells, sum_cells
 from colonnade.environment.encoding.two_level import MODES, Mode, TwoLevelMap, mask_words
 from colonnade.environment.encoding.vectors import VectorSpace
 
-#: Turns of modes and palette.
-_TURNS = 6
-#: Palette entries that are tried in a tile.
+#: Alternating rounds of choosing modes and updating the palette.
+_ROUNDS = 6
+#: Candidate palette entries of a tile.
 _CANDIDATES = 32
 
 
 @dataclass(frozen=True)
 class _Choices:
-    """What a palette allows.
+    """Options of each tile with the current palette.
 
     Attributes:
-        modes: Numbers of the modes that the tile size allows.
-        errors: float64 [tiles, modes], weighted.
-        members: For each mode intp [tiles, entries], palette indices.
+        modes: Mode numbers that the tile size allows.
+        errors: float64 [tiles, modes], weighted squared errors.
+        members: For each mode the palette indices, intp [tiles, entries].
     """
 
     modes: list[int]
@@ -41,49 +41,49 @@ class _Choices:
 
 
 def encode_two_level(
-    vectors: NDArray[np.float64], space: VectorSpace, layout: AttributeLayout, turns: int = _TURNS
+    vectors: NDArray[np.float64], space: VectorSpace, layout: AttributeLayout, rounds: int = _ROUNDS
 ) -> TwoLevelMap:
-    """The map of ``vectors``, float64 [height, width, 3]."""
-    pixels = TilePixels(space.spread(vectors), layout)
+    """Encode ``vectors``, float64 [height, width, 3]."""
+    pixels = TilePixels(space.to_points(vectors), layout)
     flat = pixels.points.reshape(-1, 3)
     weights = pixels.weights.ravel()
     palette = _first_palette(pixels)
-    for turn in range(turns):
-        words = space.words(space.gathered(palette))
-        palette = space.spread(space.vectors(words))
-        last = turn == turns - 1
+    for completed_rounds in range(rounds):
+        words = space.words(space.from_points(palette))
+        palette = space.to_points(space.vectors(words))
+        last = completed_rounds == rounds - 1
         choices = _choices(pixels, palette, rounds=2 if last else 1)
         sizes = np.array([MODES[number].words for number in choices.modes])
-        chosen = within_budget(choices.errors, sizes, layout.heap_words)
+        chosen = choose_within_budget(choices.errors, sizes, layout.heap_words)
         if not last:
             index = _indices(pixels, palette, choices, chosen).ravel()
-            palette = updated(palette, flat, weights, index, ((flat - palette[index]) ** 2).sum(axis=1))
+            palette = update_palette(palette, flat, weights, index, ((flat - palette[index]) ** 2).sum(axis=1))
     return _written(pixels, words, palette, choices, chosen)
 
 
 def _first_palette(pixels: TilePixels) -> NDArray[np.float64]:
-    """From the means of every 2x2 pixels."""
+    """Fit the first palette to the means of 2x2 pixels."""
     halves = pixels.layout.tile_size // 2
-    weights = pooled(pixels.weights, halves).ravel()
-    sums = pooled(pixels.points * pixels.weights[..., np.newaxis], halves).reshape(-1, 3)
+    weights = sum_cells(pixels.weights, halves).ravel()
+    sums = sum_cells(pixels.points * pixels.weights[..., np.newaxis], halves).reshape(-1, 3)
     used = weights > 0
-    return first_palette(sums[used] / weights[used, np.newaxis], weights[used], pixels.layout.palette_size)
+    return initial_palette(sums[used] / weights[used, np.newaxis], weights[used], pixels.layout.palette_size)
 
 
 def _candidates(pixels: TilePixels, palette: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The palette entries that most pixels of each tile are nearest to: intp [tiles, candidates]."""
+    """The palette entries nearest to most pixels of each tile: intp [tiles, candidates]."""
     tiles = len(pixels.points)
     index, _ = nearest(pixels.points.reshape(-1, 3), palette)
-    place = np.arange(tiles).repeat(index.size // tiles) * len(palette) + index
-    votes = np.bincount(place, pixels.weights.ravel(), tiles * len(palette)).reshape(tiles, -1)
-    # Ties, and tiles of few colours, by the distance from the tile's mean
+    slot = np.arange(tiles).repeat(index.size // tiles) * len(palette) + index
+    votes = np.bincount(slot, pixels.weights.ravel(), tiles * len(palette)).reshape(tiles, -1)
+    # The distance from the tile's mean breaks ties, and orders entries without votes
     distance = ((pixels.means[:, np.newaxis] - palette) ** 2).sum(axis=2)
     order = np.argsort(-votes + 1e-9 * distance / (1.0 + distance), axis=1, kind="stable")
     return order[:, : min(_CANDIDATES, len(palette))]
 
 
 def _choices(pixels: TilePixels, palette: NDArray[np.float64], rounds: int) -> _Choices:
-    """Every mode's best entries in every tile."""
+    """Find every mode's best entries in every tile."""
     candidates = _candidates(pixels, palette)
     modes = [number for number, mode in enumerate(MODES) if mode.cells <= pixels.layout.tile_size]
     errors = np.empty((len(pixels.points), len(modes)))
@@ -91,16 +91,16 @@ def _choices(pixels: TilePixels, palette: NDArray[np.float64], rounds: int) -> _
     for cells in sorted({MODES[number].cells for number in modes}):
         costs = pixels.cell_costs(cells, palette[candidates])
         for entries, (subset, total) in best_subsets(costs, (2, 4), rounds).items():
-            place = modes.index(MODES.index(Mode(entries, cells)))
-            errors[:, place] = total
-            members[place] = np.take_along_axis(candidates, subset, axis=1)
+            slot = modes.index(MODES.index(Mode(entries, cells)))
+            errors[:, slot] = total
+            members[slot] = np.take_along_axis(candidates, subset, axis=1)
     return _Choices(modes, errors, members)
 
 
 def _cell_choices(
     pixels: TilePixels, palette: NDArray[np.float64], members: NDArray[np.intp], cells: int, which: NDArray[np.intp]
 ) -> NDArray[np.int64]:
-    """Which of its tile's members each cell takes: int64 [which, cells * cells]."""
+    """The best member for each cell: int64 [which, cells * cells]."""
     best: NDArray[np.int64] = pixels.cell_costs(cells, palette[members[which]], which).argmin(axis=2).astype(np.int64)
     return best
 
@@ -108,13 +108,13 @@ def _cell_choices(
 def _indices(
     pixels: TilePixels, palette: NDArray[np.float64], choices: _Choices, chosen: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """The palette index of every pixel: intp [tiles, size, size]."""
+    """The palette index of each pixel: intp [tiles, size, size]."""
     index = np.empty(pixels.weights.shape, np.intp)
     for place, number in enumerate(choices.modes):
         which = np.flatnonzero(chosen == place)
         members = choices.members[place]
         taken = _cell_choices(pixels, palette, members, MODES[number].cells, which)
-        index[which] = spread_cells(np.take_along_axis(members[which], taken, axis=1), pixels.layout.tile_size)
+        index[which] = expand_cells(np.take_along_axis(members[which], taken, axis=1), pixels.layout.tile_size)
     return index
 
 
@@ -125,14 +125,14 @@ def _written(
     choices: _Choices,
     chosen: NDArray[np.intp],
 ) -> TwoLevelMap:
-    """Descriptors and heap, filled mode by mode."""
+    """Pack descriptors and heap, mode by mode."""
     descriptors = np.zeros(len(chosen), np.uint32)
     heap = np.zeros(pixels.layout.heap_words, np.uint16)
     top = 0
     for place, number in enumerate(choices.modes):
         mode, members = MODES[number], choices.members[place]
         which = np.flatnonzero(chosen == place)
-        masks = mask_words(_cell_choices(pixels, palette, members, mode.cells, which), mode.bits_a_cell)
+        masks = mask_words(_cell_choices(pixels, palette, members, mode.cells, which), mode.bits_per_cell)
         for tile, mask in zip(which, masks, strict=True):
             own = members[tile]
             pointer = top

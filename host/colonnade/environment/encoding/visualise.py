@@ -1,4 +1,4 @@
-"""Every map of a room as pictures: before clustering, after it, and the difference."""
+"""Draws an environment's maps as pictures: before encoding, after it, and the difference."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 from colonnade.common.atomic_files import make_folder, replacing
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.encoding.image import AttributeImage
-from colonnade.environment.encoding.planes import Picture
+from colonnade.environment.encoding.planes import PlaneProjection
 from colonnade.environment.encoding.quality import angles, ray_errors, relit
 from colonnade.environment.model import Environment
 
-#: White in a difference: levels of 255, degrees, metres.
+#: Differences shown as white: 8-bit levels, degrees, metres.
 FULL_LEVELS, FULL_DEGREES, FULL_METRES = 64.0, 30.0, 0.2
 
 
 def map_pictures(environment: Environment, image: AttributeImage) -> dict[str, NDArray[np.uint8]]:
-    """By name (``albedo-before`` and so on) uint8 [height, width, 3]; differences are dark where nothing changed."""
+    """Draw the pictures by name (e.g. ``albedo-before``), uint8 [height, width, 3]; black is no difference."""
     albedo, normals = image.decoded_albedo(), image.decoded_normals()
-    depth = image.decoded_depth(Picture.of(environment, image.depth_unit))
+    depth = image.decoded_depth(PlaneProjection.of(environment, image.depth_unit))
     pictures = {}
     for name, before, after in (
         ("albedo", environment.albedo, albedo),
@@ -42,7 +42,7 @@ def map_pictures(environment: Environment, image: AttributeImage) -> dict[str, N
 
 
 def write_pictures(folder: Path, pictures: dict[str, NDArray[np.uint8]]) -> None:
-    """Write ``NAME.png`` for each into ``folder``, which is made."""
+    """Write each picture as ``NAME.png`` into ``folder``, which is created."""
     from PIL import Image
 
     make_folder(folder)
@@ -60,12 +60,12 @@ def _grey(values: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 def _normal_map(normals: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """As files have them: x right, y up, z towards the viewer."""
+    """Draw normals in the file format: x right, y up, z towards the viewer."""
     return _levels(normals * np.array([0.5, -0.5, -0.5]) + 0.5)
 
 
 def _coloured(ids: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """A colour for each plane."""
+    """Draw each plane in a random colour."""
     colours = np.random.default_rng(5).integers(40, 256, (int(ids.max()) + 1, 3), dtype=np.uint8)
     picture: NDArray[np.uint8] = colours[ids]
     return picture

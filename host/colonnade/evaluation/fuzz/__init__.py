@@ -1,1 +1,1 @@
-"""Corrupt frames: the hardware and its model must agree on them, and recover; docs/errors.md."""
+"""Fuzzing with corrupt frames: RTL and model must render them alike, and recover (docs/errors.md)."""

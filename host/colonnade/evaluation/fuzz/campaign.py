@@ -1,4 +1,4 @@
-"""Corrupt frames by seed: hardware against model, and a legal frame after each."""
+"""Fuzz campaign: renders corrupt frames, each followed by a legal one, with RTL and model, and compares them."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from colonnade.evaluation.fuzz.cases import Case, legal_cases
 from colonnade.evaluation.fuzz.compare import differences
 from colonnade.evaluation.fuzz.corruption import KINDS, Kind, corrupt_case
 from colonnade.evaluation.fuzz.environments import environment_cases
-from colonnade.evaluation.fuzz.simulator import Delivered, run_cases
+from colonnade.evaluation.fuzz.simulator import SimulatedFrame, run_cases
 
-#: Corrupt frames of one run of the simulator.
+#: Corrupt frames per simulator run.
 BATCH = 100
 
-#: What may become of a corrupt frame; the last one is a failure.
+#: Outcomes of a corrupt frame. The last one is a failure.
 OUTCOMES = ("same", "changed", "flagged", "watchdog", "disagree")
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """A corrupt frame that failed. ``colonnade fuzz --frames 1 --seed SEED --kind KIND`` repeats it.
+    """A corrupt frame that failed. ``colonnade fuzz --frames 1 --seed SEED --kind KIND`` reproduces it.
 
     Attributes:
-        seed: Of the frame.
-        kind: Of its corruption.
-        change: What was corrupted.
-        differences: Of hardware and model; or of the legal frame after it.
+        seed: Seed of the frame.
+        kind: Kind of corruption.
+        change: Description of the corruption.
+        differences: Differences between RTL and model, in this frame or in the legal frame after it.
     """
 
     seed: int
@@ -74,28 +74,29 @@ class _Campaign:
         return self._expected[legal.name]
 
     def run(self, planned: Sequence[_Planned]) -> list[tuple[str, Disagreement | None]]:
-        """Outcomes of corrupt frames, in order; a frame at which the harness gives up fails, and a new run goes on."""
+        """Outcomes of corrupt frames, in order. After a frame at which the harness fails, a new run continues."""
         results: list[tuple[str, Disagreement | None]] = []
         while len(results) < len(planned):
-            left = planned[len(results) :]
-            frames, failure = run_cases(
-                self.program, self.manifest, [case for one in left for case in (one.corrupt, one.legal)], self.rows
-            )
+            remaining = planned[len(results) :]
+            cases = [case for plan in remaining for case in (plan.corrupt, plan.legal)]
+            frames, failure = run_cases(self.program, self.manifest, cases, self.rows)
             complete = len(frames) // 2
-            for one, corrupt, legal in zip(left[:complete], frames[0::2], frames[1::2], strict=False):
-                results.append(self._outcome(one, corrupt, legal))
-            if failure is not None and complete < len(left):
-                results.append(_failed(left[complete], (failure,)))
+            for plan, corrupt, legal in zip(remaining[:complete], frames[0::2], frames[1::2], strict=False):
+                results.append(self._outcome(plan, corrupt, legal))
+            if failure is not None and complete < len(remaining):
+                results.append(_failed(remaining[complete], (failure,)))
         return results
 
-    def _outcome(self, one: _Planned, corrupt: Delivered, legal: Delivered) -> tuple[str, Disagreement | None]:
-        expected = self.expected(one.legal)
-        found = [f"the next frame: {what}" for what in differences(legal, expected)]
+    def _outcome(
+        self, plan: _Planned, corrupt: SimulatedFrame, legal: SimulatedFrame
+    ) -> tuple[str, Disagreement | None]:
+        expected = self.expected(plan.legal)
+        found = [f"the next frame: {difference}" for difference in differences(legal, expected)]
         self.legal_failures += bool(found)
         if corrupt.frame.colour.size:
-            found = differences(corrupt, self.model(one.corrupt)) + found
+            found = differences(corrupt, self.model(plan.corrupt)) + found
         if found:
-            return _failed(one, tuple(found))
+            return _failed(plan, tuple(found))
         errors = corrupt.frame.errors
         if errors:
             return ("watchdog" if "watchdog" in errors else "flagged"), None
@@ -103,8 +104,8 @@ class _Campaign:
         return ("same" if same else "changed"), None
 
 
-def _failed(one: _Planned, found: tuple[str, ...]) -> tuple[str, Disagreement]:
-    return "disagree", Disagreement(one.seed, one.kind.name, one.change, found)
+def _failed(plan: _Planned, found: tuple[str, ...]) -> tuple[str, Disagreement]:
+    return "disagree", Disagreement(plan.seed, plan.kind.name, plan.change, found)
 
 
 def fuzz(
@@ -115,14 +116,14 @@ def fuzz(
     progress: Progress = QUIET,
     found: Callable[[Disagreement], None] = lambda disagreement: None,
 ) -> dict[str, Any]:
-    """Renders corrupt frames through hardware and model.
+    """Render corrupt frames with RTL and model, and compare them.
 
     Args:
-        design: The hardware.
-        frames: Corrupt ones; each is followed by a legal one.
-        seed: Of the first; the others follow.
-        kinds: Names of `KINDS` to take in turn by the seed; all that the design has if empty.
-        progress: Shows the share done.
+        design: The design.
+        frames: Number of corrupt frames.
+        seed: Seed of the first frame; each later frame adds one.
+        kinds: Names of `KINDS`, selected by the seed in rotation; empty: all that apply to the design.
+        progress: Shows the progress.
         found: Called with each disagreement.
 
     Returns:
@@ -130,19 +131,19 @@ def fuzz(
     """
     begun = time.perf_counter()
     campaign = _Campaign(design, progress)
-    chosen = [
+    selected = [
         kind
         for name, kind in KINDS.items()
         if (not kinds or name in kinds) and any(kind.applies(case) for case in campaign.cases)
     ]
-    counts = {kind.name: Counter[str]() for kind in chosen}
+    counts = {kind.name: Counter[str]() for kind in selected}
     failed: list[Disagreement] = []
     with progress.step("rendering corrupt frames") as report:
         for first in range(seed, seed + frames, BATCH):
             seeds = range(first, min(first + BATCH, seed + frames))
-            planned = [campaign.plan(number, chosen[number % len(chosen)]) for number in seeds]
-            for one, (outcome, disagreement) in zip(planned, campaign.run(planned), strict=True):
-                counts[one.kind.name][outcome] += 1
+            planned = [campaign.plan(number, selected[number % len(selected)]) for number in seeds]
+            for plan, (outcome, disagreement) in zip(planned, campaign.run(planned), strict=True):
+                counts[plan.kind.name][outcome] += 1
                 if disagreement is not None:
                     failed.append(disagreement)
                     found(disagreement)

@@ -1,4 +1,4 @@
-"""Legal frames to corrupt: small scenes that use what a design has."""
+"""Legal frames to corrupt: small scenes that use all features of a design."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from colonnade.scene.view import with_overrides
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
-#: Pixels of a legal frame.
+#: Width and height of a legal frame, pixels.
 SIZE = (16, 12)
 
-#: A frame of that size takes a fraction of it.
+#: Far more cycles than a legal frame of this size takes.
 WATCHDOG_CYCLES = 400_000
 
 SKY = Background(colour=(0.2, 0.3, 0.5))
@@ -24,12 +24,12 @@ SKY = Background(colour=(0.2, 0.3, 0.5))
 
 @dataclass(frozen=True)
 class Case:
-    """All that a frame depends on.
+    """The inputs of a frame.
 
     Attributes:
-        name: Of the legal scene.
-        image: What is loaded.
-        registers: Every rw register by name.
+        name: Name of the legal scene.
+        image: Scene image.
+        registers: All rw registers by name.
     """
 
     name: str

@@ -1,24 +1,25 @@
-"""What differs between a frame of the hardware and one of the model, error bits included."""
+"""Differences between a frame of the RTL and one of the model, including error bits."""
 
 from __future__ import annotations
 
 from colonnade.common.framebuffer import Frame
-from colonnade.evaluation.fuzz.simulator import Delivered
+from colonnade.evaluation.fuzz.simulator import SimulatedFrame
 
 
-def differences(delivered: Delivered, model: Frame) -> list[str]:
-    """In words; empty if they are equal.
+def differences(simulated: SimulatedFrame, model: Frame) -> list[str]:
+    """A description of each difference.
 
-    A frame that the watchdog ended was cut at a moment that depends on timing: both must be, nothing else is compared.
+    The watchdog aborts a frame at a time that the model does not know. So if one frame has its error bit, the other
+    one must have it too, and nothing else is compared.
     """
-    rtl = delivered.frame
+    rtl = simulated.frame
     if "watchdog" in rtl.errors or "watchdog" in model.errors:
         return [] if "watchdog" in rtl.errors and "watchdog" in model.errors else [_errors(rtl, model)]
     found = []
     if rtl.errors != model.errors:
         found.append(_errors(rtl, model))
-    if delivered.missing:
-        found.append(f"{delivered.missing} pixels missing")
+    if simulated.missing:
+        found.append(f"{simulated.missing} pixels missing")
     planes = {
         "colours": (rtl.colour != model.colour).any(axis=2),
         "objects": rtl.is_object != model.is_object,

@@ -1,4 +1,4 @@
-"""Ways to corrupt a legal frame. A kind of corruption is one function; `KINDS` has them all."""
+"""The kinds of corruption of a legal frame, one function each."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from colonnade.evaluation.fuzz.environments import corrupt_maps
 from colonnade.evaluation.fuzz.records import corrupt_records
 from colonnade.evaluation.fuzz.registers import corrupt_registers
 
-#: Gives the corrupt case and says in a few words what was changed.
+#: Returns the corrupt case and a short description of the change.
 Corrupt = Callable[[np.random.Generator, Case, Manifest], tuple[Case, str]]
 
 
@@ -22,9 +22,9 @@ class Kind:
     """A kind of corruption.
 
     Attributes:
-        name: For ``--kind``.
-        corrupt: Changes a case at random; takes nothing from anywhere but its generator.
-        applies: Whether a legal case has something of that kind.
+        name: Name for ``--kind``.
+        corrupt: Corrupts a case; its random generator determines the result.
+        applies: Whether a legal case has data of this kind.
     """
 
     name: str
@@ -43,9 +43,9 @@ KINDS = {
 
 
 def corrupt_case(seed: int, kind: Kind, cases: tuple[Case, ...], manifest: Manifest) -> tuple[Case, Case, str]:
-    """The corrupt case of a seed: the legal one it is made of, itself, and what was changed."""
+    """The legal case and the corrupt case of a seed, and a description of the change."""
     random = np.random.default_rng(seed)
-    usable = [case for case in cases if kind.applies(case)]
-    legal = usable[int(random.integers(len(usable)))]
+    applicable = [case for case in cases if kind.applies(case)]
+    legal = applicable[int(random.integers(len(applicable)))]
     corrupt, change = kind.corrupt(random, legal, manifest)
     return legal, corrupt, f"{legal.name}: {change}"

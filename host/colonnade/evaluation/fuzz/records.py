@@ -1,4 +1,4 @@
-"""Corrupt records of the column BVH memory, and the header's account of them."""
+"""Corruption of records of the column BVH memory, and of the registers that describe their sections."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from colonnade.scene_image.file import ImageHeader
 
 
 def corrupt_records(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
-    """Flip bits, set fields, redirect pointers, overwrite records, or move the sections' borders."""
+    """Flip bits, set fields, redirect pointers, overwrite records, or move the borders of the sections."""
     if random.random() < 0.15:
         return _move_border(random, case, manifest)
     records = case.image.records.copy()
-    ways = (_flip_bits, _set_field, _set_field, _redirect, _overwrite, _copy)
+    mutations = (_flip_bits, _set_field, _set_field, _redirect, _overwrite, _copy)
     changes = []
     for _ in range(int(random.integers(1, 4))):
-        change = ways[int(random.integers(len(ways)))]
-        changes.append(change(random, records, case.image.header, manifest))
+        mutate = mutations[int(random.integers(len(mutations)))]
+        changes.append(mutate(random, records, case.image.header, manifest))
     return replace(case, image=replace(case.image, records=records)), "; ".join(changes)
 
 
@@ -36,20 +36,20 @@ def _set_field(random: np.random.Generator, records: Bytes, header: ImageHeader,
     address = int(random.integers(len(records)))
     kind = _kind(address, header)
     fields = list(manifest.layouts[kind].fields.values())
-    # Few fields decide about the walk: they come as often as all the others
-    deciding = [f for f in fields if f.name.split(".")[0].split("[")[0] in _DECIDING]
-    choice = deciding if deciding and random.random() < 0.5 else fields
-    field = choice[int(random.integers(len(choice)))]
+    # Half of the changes go to the few fields that control the traversal
+    control = [f for f in fields if f.name.split(".")[0].split("[")[0] in _CONTROL_FIELDS]
+    candidates = control if control and random.random() < 0.5 else fields
+    field = candidates[int(random.integers(len(candidates)))]
     value = random_value(random, *field.range)
     write_field(records[address], field, value)
     return f"{kind} {address}: {field.name} = {value}"
 
 
-_DECIDING = {"exponent", "firstChild", "firstTriangles", "kinds", "firstTriangle", "count", "isClear", "material"}
+_CONTROL_FIELDS = {"exponent", "firstChild", "firstTriangles", "kinds", "firstTriangle", "count", "isClear", "material"}
 
 
 def _redirect(random: np.random.Generator, records: Bytes, header: ImageHeader, manifest: Manifest) -> str:
-    """Point a node at itself, at a border of a section or just before it, or at the end of the memory."""
+    """Point a node to itself, or near a border of a section or the end of the memory."""
     address = int(random.integers(max(header.triangle_base, 1)))
     name = ("firstChild", "firstTriangles")[int(random.integers(2))]
     field = manifest.layouts["node"].fields[name]
@@ -90,8 +90,8 @@ def _kind(address: int, header: ImageHeader) -> str:
 
 
 def write_field(record: Bytes, field: Field, value: int) -> None:
-    """Sets a field of a little-endian record; a value that does not fit keeps its low bits."""
-    whole = int.from_bytes(record.tobytes(), "little")
+    """Set a field of a little-endian record to the low bits of a value."""
+    word = int.from_bytes(record.tobytes(), "little")
     mask = ((1 << field.width) - 1) << field.offset
-    whole = (whole & ~mask) | ((value << field.offset) & mask)
-    record[:] = np.frombuffer(whole.to_bytes(len(record), "little"), dtype=np.uint8)
+    word = (word & ~mask) | ((value << field.offset) & mask)
+    record[:] = np.frombuffer(word.to_bytes(len(record), "little"), dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""Corrupt frame registers; those of a room are left to the maps."""
+"""Corruption of frame registers, except those of a room, which `environments` corrupts."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from colonnade.design.manifest import Manifest, Register, value_range
 from colonnade.evaluation.fuzz.cases import Case
 from colonnade.evaluation.fuzz.values import random_value
 
-#: Widest corrupt frame in both directions: larger ones say nothing new and take long.
+#: Largest width and height of a corrupt frame, which limits the run time.
 MAX_PIXELS = 40
 
 
 def corrupt_registers(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
-    """Set one to three registers of any group to any value that fits."""
+    """Set one to three registers of random groups to any value that fits."""
     groups: dict[str, list[Register]] = {}
     for register in manifest.registers.values():
         if (
@@ -34,11 +34,11 @@ def corrupt_registers(random: np.random.Generator, case: Case, manifest: Manifes
     return replace(case, registers=values), "; ".join(changes)
 
 
-def _value(random: np.random.Generator, register: Register, now: int) -> int:
-    minimum, greatest = value_range(register.width, register.signed)
+def _value(random: np.random.Generator, register: Register, current: int) -> int:
+    minimum, maximum = value_range(register.width, register.signed)
     if register.name in ("frame.width", "frame.height"):
         return int(random.integers(MAX_PIXELS + 1))
     if random.random() < 0.25:
-        flipped = (now ^ (1 << int(random.integers(register.width)))) & ((1 << register.width) - 1)
+        flipped = (current ^ (1 << int(random.integers(register.width)))) & ((1 << register.width) - 1)
         return flipped - (1 << register.width) if register.signed and flipped >> (register.width - 1) else flipped
-    return random_value(random, minimum, greatest)
+    return random_value(random, minimum, maximum)

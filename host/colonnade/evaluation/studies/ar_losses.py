@@ -1,10 +1,9 @@
-"""What an AR frame loses on its way into the device: by clustering, by the rebuild, by fixed point.
+"""Quality loss of AR frames by source: encoded maps, reconstructed geometry, and fixed-point arithmetic.
 
-The truth is the float reference with full maps and the mesh of the depth map:
-`colonnade.reference.environment.decoded.backdrops`.
+The ground truth is the float reference with full maps and depth mesh
+(`colonnade.reference.environment.decoded.backdrops`). The bit-exact model renders the device's frames.
 
-`colonnade study --frames ROOM …` prints the losses of three objects in rooms. The device's frames are the bit-exact
-model's.
+`colonnade study --frames ROOM …` prints the losses of three objects in rooms.
 """
 
 from __future__ import annotations
@@ -30,22 +29,22 @@ if TYPE_CHECKING:
     from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Mesh
-    from colonnade.reference.environment.ray_march import Rebuild
+    from colonnade.reference.environment.ray_march import RayMarch
     from colonnade.scene.view import View
 
-#: Differences by part of the picture: frame, object, shadow.
+#: Differences by region of the picture: frame, object, shadow.
 Regions = Mapping[str, RegionDifference]
 
 
 @dataclass(frozen=True)
 class Losses:
-    """What lies between the truth and a frame.
+    """The losses of a frame against the ground truth.
 
     Attributes:
-        pictures: The frames in 64 bits by loss: `full` is the truth, `clustering` and `rebuild` have one loss each,
-            `both` has both.
-        by_loss: Each of them against the truth; with a device's frame also `fixed point`, that frame against `both`,
-            and `device`, that frame against the truth.
+        pictures: Float frames: `full` (ground truth), `clustering` (encoded maps), `rebuild` (reconstructed geometry)
+            and `both`.
+        by_loss: The other frames against `full`. With a device's frame also `fixed point`, the device against `both`,
+            and `device`, the device against `full`.
     """
 
     pictures: Mapping[str, ReferenceResult]
@@ -57,44 +56,44 @@ def losses(
     view: View,
     environment: Environment,
     image: AttributeImage,
-    rebuild: Rebuild,
+    march: RayMarch,
     device: Floats | None = None,
     with_dists: bool = True,
     progress: Progress = QUIET,
 ) -> Losses:
-    """Split the loss of a frame.
+    """Measure the loss of a frame by source.
 
     Args:
         mesh: The object.
-        view: The frame's placement in the room.
-        room: With its full maps.
-        image: Its clustered maps and planes.
-        rebuild: Where rays meet the rebuilt room.
-        device: The device's frame, linear, float64 [height, width, 3], relit as the reference.
-        with_dists: Judge by DISTS too.
+        view: Camera, lights and object in the room.
+        environment: The room with its full maps.
+        image: The encoded maps and planes.
+        march: The ray march through the reconstructed room.
+        device: The device's frame, relit, linear, float64 [height, width, 3].
+        with_dists: Compute DISTS too.
         progress: Shows the frames.
     """
     pictures = {
         name: render_reference(mesh, view, progress, backdrop)
-        for name, backdrop in backdrops(environment, image, rebuild).items()
+        for name, backdrop in backdrops(environment, image, march).items()
     }
     truth = pictures["full"]
     regions = frame_regions(truth.object_mask, truth.shadow_ratio)
     encoded = {name: encode_srgb(picture.image) for name, picture in pictures.items()}
     pairs = {name: (encoded["full"], encoded[name]) for name in encoded if name != "full"}
     if device is not None:
-        judged = encode_srgb(device)
-        pairs |= {"fixed point": (encoded["both"], judged), "device": (encoded["full"], judged)}
+        device_srgb = encode_srgb(device)
+        pairs |= {"fixed point": (encoded["both"], device_srgb), "device": (encoded["full"], device_srgb)}
     return Losses(pictures, {name: compare_regions(*pair, regions, with_dists) for name, pair in pairs.items()})
 
 
-#: Where objects stand in the rooms that come along: on the table, on the bed, on the table.
-STANDING = {
+#: Placement of the objects in the project's rooms: on the table, on the bed, on the table.
+PLACEMENTS = {
     "living": Placement((345.0, 304.0), 0.24, 25.0),
     "office": Placement((170.0, 392.0), 0.40, 25.0),
     "attic": Placement((318.0, 284.0), 0.40, 25.0),
 }
-#: Mesh and material of the frames that are measured.
+#: Mesh and material of the measured frames.
 OBJECTS = {
     "teapot, mirror": ("teapot", Material("mirror", (0.95, 0.95, 0.95))),
     "teapot, glass": ("teapot", Material("glass", (0.92, 0.97, 0.95))),
@@ -102,8 +101,8 @@ OBJECTS = {
 }
 
 
-def standing_scene(mesh: str, material: Material, environment: Environment, placement: Placement) -> Scene:
-    """An object in a room, under a lamp a metre and a half off, above it, and ambient light."""
+def placed_scene(mesh: str, material: Material, environment: Environment, placement: Placement) -> Scene:
+    """A scene with an object in a room, a lamp about 1.5 m away from it, and ambient light."""
     from colonnade.scene.object_pose import standing_point
 
     x, y, z = standing_point(placement, environment)
@@ -118,30 +117,30 @@ def standing_scene(mesh: str, material: Material, environment: Environment, plac
 
 
 def table(by_frame: Mapping[str, Mapping[str, Regions]]) -> str:
-    """Losses by frame as a table in Markdown: PSNR, FLIP and DISTS of each part."""
+    """The losses as a Markdown table: PSNR, FLIP and DISTS of each region, by frame."""
     parts = ("frame", "object", "shadow")
-    lines = [("frame", "loss", *(f"{part}: dB, FLIP, DISTS" for part in parts)), ("---",) * (2 + len(parts))]
+    lines = [("frame", "loss", *(f"{part}: PSNR dB, FLIP, DISTS" for part in parts)), ("---",) * (2 + len(parts))]
     for frame, by_loss in by_frame.items():
         for loss, regions in by_loss.items():
-            lines.append((frame, loss, *(_shown(regions[part]) for part in parts)))
+            lines.append((frame, loss, *(_format_difference(regions[part]) for part in parts)))
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _shown(difference: RegionDifference) -> str:
+def _format_difference(difference: RegionDifference) -> str:
     if difference.psnr is None or difference.flip is None:
         return "none"
     dists = "-" if difference.dists is None else f"{difference.dists:.3f}"
     return f"{difference.psnr:.1f}, {difference.flip:.3f}, {dists}"
 
 
-def device_frame(mesh: Mesh, view: View, held: EncodedEnvironment, manifest: Manifest) -> Floats:
-    """The device's frame, relit and linear: float64 [height, width, 3].
+def device_frame(mesh: Mesh, view: View, encoded: EncodedEnvironment, manifest: Manifest) -> Floats:
+    """The device's relit frame by the bit-exact model, linear, float64 [height, width, 3].
 
     Args:
         mesh: The object.
-        view: The frame's placement in the room.
-        held: The room, and its maps as the device has them.
-        manifest: Of the hardware.
+        view: Camera, lights and object in the room.
+        encoded: The room and its encoded maps.
+        manifest: The manifest of the design.
     """
     from colonnade.device.bit_exact import render_model
     from colonnade.registers.frame import registers_of
@@ -149,10 +148,10 @@ def device_frame(mesh: Mesh, view: View, held: EncodedEnvironment, manifest: Man
     from colonnade.scene_image.environment import with_environment
     from colonnade.scene_image.packer import pack
 
-    packed = with_environment(pack(mesh, manifest, view.materials), held, manifest)
+    packed = with_environment(pack(mesh, manifest, view.materials), encoded, manifest)
     registers = registers_of(view, packed.header, manifest)
     frame = render_model(
-        manifest, packed, registers | environment_registers(view, held, packed.header, manifest, relit=True)
+        manifest, packed, registers | environment_registers(view, encoded, packed.header, manifest, relit=True)
     )
     require_no_errors(frame)
     return frame.colour / float((1 << manifest.numbers["colourBits"]) - 1)
@@ -161,14 +160,14 @@ def device_frame(mesh: Mesh, view: View, held: EncodedEnvironment, manifest: Man
 def study_frames(
     folders: Iterable[Path], with_dists: bool = True, progress: Progress = QUIET, output: Path | None = None
 ) -> dict[str, Mapping[str, Regions]]:
-    """The losses of `OBJECTS` in rooms, by room and object; the pictures in the folder ``output``, if there is one."""
+    """The losses of `OBJECTS` in rooms, by room and object. ``output`` is a folder for the pictures."""
     from colonnade.design.generator import manifest_for
     from colonnade.environment.encoded import EncodedEnvironment
     from colonnade.environment.encoding.cache import encoded_environment
     from colonnade.environment.encoding.layout import AttributeLayout
     from colonnade.environment.load import load_environment
     from colonnade.mesh.load import load_mesh
-    from colonnade.reference.environment.decoded import plane_march
+    from colonnade.reference.environment.decoded import float_plane_march
     from colonnade.scene.view import make_view
 
     by_frame = {}
@@ -179,10 +178,10 @@ def study_frames(
         image = encoded_environment(environment, layout)
         hardware = f"physicalAttributeMemory={json.dumps(layout.to_config())}"
         manifest = manifest_for("small", (hardware,), progress).manifest
-        march = plane_march(environment, image)
+        march = float_plane_march(environment, image)
         for name, (mesh_name, material) in OBJECTS.items():
             mesh = meshes[mesh_name]
-            scene = standing_scene(mesh_name, material, environment, STANDING.get(environment.name, Placement()))
+            scene = placed_scene(mesh_name, material, environment, PLACEMENTS.get(environment.name, Placement()))
             view = make_view(scene, mesh.extent, environment.width, environment.height, mesh.materials, environment)
             device = device_frame(mesh, view, EncodedEnvironment(environment, image), manifest)
             measured = losses(mesh, view, environment, image, march, device, with_dists, progress)

@@ -1,4 +1,4 @@
-"""Patterns for the attic: albedo as a function of place, so that every texel has its own."""
+"""Procedural textures of the synthetic attic: albedo as a function of position."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from colonnade.common.types import Floats
 
-#: Albedo of points [n, 3] of a part, in its own coordinates: float64 [n, 3].
+#: Maps points of a part in its own coordinates, float64 [n, 3], to linear albedo, float64 [n, 3].
 Paint = Callable[[Floats], Floats]
 Rgb = tuple[float, float, float]
 
 
 def plaster(colour: Rgb) -> Paint:
-    """One colour with slow clouds."""
+    """One colour with slow variations."""
 
     def paint(points: Floats) -> Floats:
         cloud = np.sin(points @ (2.1, 1.3, 1.7)) * np.sin(points @ (-1.1, 2.9, 1.9))
@@ -24,13 +24,13 @@ def plaster(colour: Rgb) -> Paint:
 
 
 def boards(colour: Rgb, along: int, across: int, width: float) -> Paint:
-    """Boards of that width along one axis, each in its own shade, with seams and staggered ends."""
+    """Boards of a width along one axis, each with its own shade, with seams and staggered ends."""
 
     def paint(points: Floats) -> Floats:
         board = np.floor(points[:, across] / width)
-        place = points[:, along] / (7 * width) + 0.37 * board
-        shade = 0.82 + 0.30 * _noise(board * 7.0 + np.floor(place))
-        seam = (np.abs(points[:, across] / width - np.rint(points[:, across] / width)) < 0.03) | (place % 1 < 0.01)
+        lengths = points[:, along] / (7 * width) + 0.37 * board
+        shade = 0.82 + 0.30 * _noise(board * 7.0 + np.floor(lengths))
+        seam = (np.abs(points[:, across] / width - np.rint(points[:, across] / width)) < 0.03) | (lengths % 1 < 0.01)
         grain = 1 + 0.05 * np.sin(points[:, across] * 240 + 3 * np.sin(points[:, along] * 9))
         return np.asarray(np.array(colour) * (np.where(seam, 0.45, shade) * grain)[:, None])
 
@@ -38,17 +38,17 @@ def boards(colour: Rgb, along: int, across: int, width: float) -> Paint:
 
 
 def spiral(light: Rgb, dark: Rgb) -> Paint:
-    """Two stripes that wind about the vertical."""
+    """Two stripes that wind around the vertical axis."""
 
     def paint(points: Floats) -> Floats:
-        turn = np.arctan2(points[:, 2], points[:, 0]) / (2 * np.pi) + points[:, 1] * 1.5
-        return np.where((turn % 0.5 < 0.17)[:, None], np.array(dark), np.array(light))
+        phase = np.arctan2(points[:, 2], points[:, 0]) / (2 * np.pi) + points[:, 1] * 1.5
+        return np.where((phase % 0.5 < 0.17)[:, None], np.array(dark), np.array(light))
 
     return paint
 
 
 def rings(colour: Rgb, width: float) -> Paint:
-    """Rings of that width about the vertical, every second one darker."""
+    """Rings of a width around the vertical axis, alternating in brightness."""
 
     def paint(points: Floats) -> Floats:
         ring = np.floor(np.hypot(points[:, 0], points[:, 2]) / width) % 2
@@ -58,11 +58,11 @@ def rings(colour: Rgb, width: float) -> Paint:
 
 
 def stripes(points: Floats) -> Floats:
-    """A ball in gores."""
+    """The coloured gores of a beach ball."""
     gore = np.floor(np.arctan2(points[:, 2], points[:, 0]) / (2 * np.pi) * 10).astype(np.intp) % 3
     return np.array([[0.80, 0.20, 0.12], [0.85, 0.80, 0.66], [0.12, 0.30, 0.62]])[gore]
 
 
 def _noise(number: Floats) -> Floats:
-    """A share from 0 to 1 that looks random, for whole numbers."""
+    """Pseudo-random values from 0 to 1 for whole numbers."""
     return np.asarray(np.abs(np.sin(number * 12.9898) * 43758.5453) % 1, dtype=np.float64)

@@ -1,7 +1,6 @@
-"""A made-up room with known geometry: an attic, L-shaped, under a slanted roof, with columns and a ball.
+"""A synthetic room with exact geometry: an L-shaped attic with a slanted roof, columns and a ball.
 
-It is what the rebuild is tried on that nobody tuned for, and what tests stand objects in at any size. Nothing in it is
-taken from elsewhere.
+It is the held-out room of the reconstruction, which was not tuned on it, and a room of any size for tests.
 
 `python -m colonnade.evaluation.studies.synthetic_attic FOLDER [WIDTHxHEIGHT]` writes it as a room.
 """
@@ -30,7 +29,7 @@ EYE, TARGET = np.array([0.9, 1.55, 2.5]), np.array([-0.05, 0.85, -1.0])
 #: Focal length in picture widths.
 FOCAL = 0.76
 LAMP, LAMP_COLOUR, AMBIENT = np.array([0.6, 2.2, 0.6]), np.array([2.6, 2.4, 2.0]), np.array([0.20, 0.22, 0.27])
-#: A step of the depth picture, metres.
+#: Depth step of the 16-bit depth map, metres.
 DEPTH_STEP = 0.00025
 
 
@@ -39,11 +38,11 @@ class Part:
     """A piece of the room.
 
     Attributes:
-        vertices: float64 [n, 3], world, metres.
+        vertices: World space, metres, float64 [n, 3].
         faces: int32 [m, 3].
-        paint: Its albedo.
-        centre: Smooth parts turn their normals away from this point, or from the vertical line through it.
-        is_round: A ball; otherwise smooth parts are columns.
+        paint: Texture.
+        centre: Centre of a smooth part; None for a flat part.
+        is_round: A smooth part is a ball, not a column.
     """
 
     vertices: Floats
@@ -55,7 +54,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Attic:
-    """The room as its camera sees it, and what no camera sees: the surface of all of it, world."""
+    """The room's maps, and its whole surface in world space."""
 
     environment: Environment
     surface: Triangles
@@ -71,18 +70,18 @@ def attic(width: int = 640, height: int = 480) -> Attic:
     tracer = RayTracer(surface)
 
     camera = _camera(width, height)
-    turn, eye = camera.to_world[:, :3], camera.to_world[:, 3]
-    directions = camera.directions(width, height).reshape(-1, 3) @ turn.T
+    rotation, eye = camera.to_world[:, :3], camera.to_world[:, 3]
+    directions = camera.directions(width, height).reshape(-1, 3) @ rotation.T
     origins = np.broadcast_to(eye, directions.shape)
-    met = tracer.first_hits(origins, directions)
-    if (met < 0).any():
+    hit_faces = tracer.first_hits(origins, directions)
+    if (hit_faces < 0).any():
         raise ValueError("the attic has a hole")
-    points = tracer.surface_points(met, origins, directions)
-    corners = tracer.corners[met]
+    points = tracer.surface_points(hit_faces, origins, directions)
+    corners = tracer.corners[hit_faces]
     normals = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     albedo = np.empty_like(normals)
     for index, part in enumerate(parts):
-        rows = np.flatnonzero(owner[met] == index)
+        rows = np.flatnonzero(owner[hit_faces] == index)
         albedo[rows] = part.paint(points.position[rows] - np.array(part.centre or (0.0, 0.0, 0.0)))
         if part.centre is not None:
             normals[rows] = _smooth(points.position[rows], normals[rows], part)
@@ -97,7 +96,7 @@ def attic(width: int = 640, height: int = 480) -> Attic:
     environment = Environment(
         name="attic",
         albedo=albedo.reshape(shape),
-        normals=(normals @ turn).reshape(shape),
+        normals=(normals @ rotation).reshape(shape),
         depth=points.t.reshape(height, width),
         has_depth=True,
         camera=camera,
@@ -107,7 +106,7 @@ def attic(width: int = 640, height: int = 480) -> Attic:
 
 
 def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
-    """Write the attic's maps as a room."""
+    """Write the attic as the folder of a room."""
     from PIL import Image
 
     environment = attic(width, height).environment
@@ -154,17 +153,17 @@ def _parts() -> list[Part]:
         _quad([east, 0, front], [east, knee, front], [east, knee, far], [east, 0, far], walls),
         _quad([west, knee, front], [0, ridge, front], [0, ridge, far], [west, knee, far], roof),
         _quad([east, knee, front], [0, ridge, front], [0, ridge, far], [east, knee, far], roof),
-        # The L: a wall to the left of the bend, and an arm that goes on to the right of it.
+        # The L: a wall to the left of the bend, and an arm to its right.
         _quad([west, 0, back], [bend, 0, back], [bend, ridge, back], [west, ridge, back], plaster((0.35, 0.48, 0.58))),
         _quad([bend, 0, back], [bend, 0, far], [bend, ridge, far], [bend, ridge, back], walls),
         _quad([west, 0, far], [east, 0, far], [east, ridge, far], [west, ridge, far], plaster((0.66, 0.42, 0.34))),
         _quad([west, 0, front], [east, 0, front], [east, ridge, front], [west, ridge, front], walls),
-        _turned((-0.95, 1.5, -1.55), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.45, 0.20, 0.16))),
-        _turned((1.45, 1.5, -2.75), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.16, 0.30, 0.22))),
-        # A round table, a rug, a chest that stands askew.
-        _turned((0.15, 0.70, -0.35), 0.55, 0.025, rings((0.62, 0.42, 0.24), 0.055)),
-        _turned((0.15, 0.35, -0.35), 0.07, 0.35, plaster((0.30, 0.22, 0.16))),
-        _turned((-0.2, 0.004, -0.6), 1.25, 0.004, rings((0.55, 0.14, 0.16), 0.21)),
+        _cylinder((-0.95, 1.5, -1.55), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.45, 0.20, 0.16))),
+        _cylinder((1.45, 1.5, -2.75), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.16, 0.30, 0.22))),
+        # A round table, a rug and a rotated chest.
+        _cylinder((0.15, 0.70, -0.35), 0.55, 0.025, rings((0.62, 0.42, 0.24), 0.055)),
+        _cylinder((0.15, 0.35, -0.35), 0.07, 0.35, plaster((0.30, 0.22, 0.16))),
+        _cylinder((-0.2, 0.004, -0.6), 1.25, 0.004, rings((0.55, 0.14, 0.16), 0.21)),
         _box((1.6, 0.3, -0.9), (0.45, 0.3, 0.3), 32.0, boards((0.36, 0.44, 0.25), 0, 1, 0.14)),
     ]
     ball, faces = primitives.sphere(6)
@@ -178,29 +177,29 @@ def _quad(a: list[float], b: list[float], c: list[float], d: list[float], paint:
     return Part(np.array([a, b, c, d], dtype=np.float64), np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32), paint)
 
 
-def _turned(centre: tuple[float, float, float], radius: float, half: float, paint: Paint) -> Part:
-    """A cylinder that stands upright."""
+def _cylinder(centre: tuple[float, float, float], radius: float, half: float, paint: Paint) -> Part:
+    """An upright cylinder."""
     vertices, faces = primitives.cylinder(128)
     axis = int(np.argmin([len(np.unique(vertices[:, k].round(9))) for k in range(3)]))
     upright = np.roll(vertices, 1 - axis, axis=1)
     return Part(upright * (radius, half, radius) + centre, faces, paint, centre)
 
 
-def _box(centre: tuple[float, float, float], half: tuple[float, float, float], turn: float, paint: Paint) -> Part:
+def _box(centre: tuple[float, float, float], half: tuple[float, float, float], degrees: float, paint: Paint) -> Part:
     vertices, faces = primitives.cube()
-    angle = np.radians(turn)
-    about = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
-    return Part(vertices * half @ about.T + centre, faces, lambda points: paint(points @ about))
+    angle = np.radians(degrees)
+    rotation = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    return Part(vertices * half @ rotation.T + centre, faces, lambda points: paint(points @ rotation))
 
 
 def _smooth(points: Floats, flat: Floats, part: Part) -> Floats:
-    """Normals of round parts; a column's ends stay flat."""
-    away = points - np.array(part.centre)
+    """Unit normals of a ball or a column, float64 [n, 3]. A column's ends stay flat."""
+    offset = points - np.array(part.centre)
     if part.is_round:
         size = np.ptp(part.vertices, axis=0)
-        return unit_vectors(away / size**2)
-    around = unit_vectors(away * (1.0, 0.0, 1.0))
-    return np.where(np.abs(flat[:, 1:2]) > 0.9, flat, around)
+        return unit_vectors(offset / size**2)
+    radial = unit_vectors(offset * (1.0, 0.0, 1.0))
+    return np.where(np.abs(flat[:, 1:2]) > 0.9, flat, radial)
 
 
 if __name__ == "__main__":

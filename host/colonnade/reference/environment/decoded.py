@@ -1,6 +1,6 @@
-"""A clustered room in floats: what the reference can be given in place of full maps, depth mesh and nothing beyond.
+"""The decoded room in float64, which replaces the full maps and the depth mesh in the reference.
 
-Each part of the loss has its `Backdrop`: the maps clustered, the geometry rebuilt, or both, as the device has it.
+A `Backdrop` for each source of loss: encoded maps, reconstructed geometry, or both as in the device.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.types import Floats
-from colonnade.environment.encoding.planes import SLOPE_PIXELS, Picture, unpacked_planes
+from colonnade.environment.encoding.planes import SLOPE_PIXELS, PlaneProjection, unpack_planes
 from colonnade.reference.environment.depth_mesh import DepthMesh
-from colonnade.reference.environment.ray_march import PlaneMarch, Rebuild, RebuiltGeometry
+from colonnade.reference.environment.ray_march import MarchedGeometry, PlaneMarch, RayMarch
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints
 
 if TYPE_CHECKING:
@@ -20,59 +20,59 @@ if TYPE_CHECKING:
     from colonnade.environment.model import Environment
 
 
-class PlaneShell:
-    """The planes around a room, each in its mean albedo: a ray meets the nearest one that it comes to from inside."""
+class BoundingPlanes:
+    """The bounding planes of a room, each with its mean albedo. A ray hits the nearest one that it leaves through."""
 
     def __init__(self, environment: Environment, image: AttributeImage) -> None:
-        """The shell that an attribute image holds."""
+        """Decode the bounding planes of an attribute image."""
         words = image.planes.shell[image.planes.shell.any(axis=1)]
         vector_bits = 3 * image.layout.field_bits
         high = [int(low) | int(top) << 64 for low, top in words[:, 1:]]
         albedos = np.array([entry & ((1 << vector_bits) - 1) for entry in high], dtype=np.uint64)
-        picture = Picture.of(environment, image.depth_unit)
-        planes = unpacked_planes(words[:, 0])
+        projection = PlaneProjection.of(environment, image.depth_unit)
+        planes = unpack_planes(words[:, 0])
         self._albedo = image.albedo_space.vectors(albedos)
-        self._inverse_offsets = picture.inverse_offsets(planes)
-        self._normals = picture.normals(planes)
+        self._dual_vectors = projection.dual_vectors(planes)
+        self._normals = projection.normals(planes)
 
-    def meet(self, origins: Floats, directions: Floats) -> BackdropPoints:
-        """Where rays of view space, float64 [n, 3] each, meet it."""
-        against = directions @ self._inverse_offsets.T
+    def intersect(self, origins: Floats, directions: Floats) -> BackdropPoints:
+        """Points where rays of view space, float64 [n, 3] each, hit the planes."""
+        approach = directions @ self._dual_vectors.T
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = (1 - origins @ self._inverse_offsets.T) / against
-        t = np.where((against > 0) & (t > 0), t, np.inf)
+            t = (1 - origins @ self._dual_vectors.T) / approach
+        t = np.where((approach > 0) & (t > 0), t, np.inf)
         nearest = t.argmin(axis=1)
-        reach = t[np.arange(len(t)), nearest]
-        outside = ~np.isfinite(reach)
-        position = origins + np.where(outside, 0.0, reach)[:, None] * directions
+        t_hit = t[np.arange(len(t)), nearest]
+        outside = ~np.isfinite(t_hit)
+        position = origins + np.where(outside, 0.0, t_hit)[:, None] * directions
         return BackdropPoints(position, self._normals[nearest], self._albedo[nearest], outside)
 
 
-def plane_march(environment: Environment, image: AttributeImage) -> PlaneMarch:
-    """The march through the planes of an attribute image, in 64 bits and with a map of a plane for each pixel."""
-    picture = Picture.of(environment, image.depth_unit)
-    planes = unpacked_planes(image.planes.planes)[image.planes.ids(image.layout)]
-    w = image.planes.inverse_depth(image.layout, picture) / image.depth_unit
+def float_plane_march(environment: Environment, image: AttributeImage) -> PlaneMarch:
+    """The ray march through the planes of an attribute image, in float64, with one plane per pixel."""
+    projection = PlaneProjection.of(environment, image.depth_unit)
+    planes = unpack_planes(image.planes.planes)[image.planes.ids(image.layout)]
+    w = image.planes.inverse_depth(image.layout, projection) / image.depth_unit
     slopes = np.moveaxis(planes[..., :2], 2, 0) / SLOPE_PIXELS / image.depth_unit
     return PlaneMarch(environment, w, slopes)
 
 
-def rebuilt_depth(environment: Environment, image: AttributeImage) -> Floats:
-    """Metres along the view of what each pixel shows, by the planes: float64 [height, width]."""
-    return image.decoded_depth(Picture.of(environment, image.depth_unit))
+def decoded_depth(environment: Environment, image: AttributeImage) -> Floats:
+    """Depth of each pixel by its decoded plane, metres along the view, float64 [height, width]."""
+    return image.decoded_depth(PlaneProjection.of(environment, image.depth_unit))
 
 
-def backdrops(environment: Environment, image: AttributeImage, rebuild: Rebuild) -> dict[str, Backdrop]:
-    """The room as it is, and with each loss for itself: `full`, `clustering`, `rebuild`, and `both`.
+def backdrops(environment: Environment, image: AttributeImage, march: RayMarch) -> dict[str, Backdrop]:
+    """The source room (`full`), the room with one loss (`clustering`, `rebuild`), and with both losses (`both`).
 
-    All have the image's shell around them.
+    All have the bounding planes of the image.
     """
-    shell, mesh, depth = PlaneShell(environment, image), DepthMesh(environment), rebuilt_depth(environment, image)
-    albedo, normals = image.decoded_albedo(), image.decoded_normals()
-    geometry = RebuiltGeometry(environment, rebuild)
+    bounding, mesh = BoundingPlanes(environment, image), DepthMesh(environment)
+    depth, albedo, normals = decoded_depth(environment, image), image.decoded_albedo(), image.decoded_normals()
+    geometry = MarchedGeometry(environment, march)
     return {
-        "full": Backdrop(environment, mesh, environment.albedo, environment.normals, None, shell),
-        "clustering": Backdrop(environment, mesh, albedo, normals, None, shell),
-        "rebuild": Backdrop(environment, geometry, environment.albedo, environment.normals, depth, shell),
-        "both": Backdrop(environment, geometry, albedo, normals, depth, shell),
+        "full": Backdrop(environment, mesh, environment.albedo, environment.normals, None, bounding),
+        "clustering": Backdrop(environment, mesh, albedo, normals, None, bounding),
+        "rebuild": Backdrop(environment, geometry, environment.albedo, environment.normals, depth, bounding),
+        "both": Backdrop(environment, geometry, albedo, normals, depth, bounding),
     }

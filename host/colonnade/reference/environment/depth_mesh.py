@@ -1,9 +1,8 @@
-"""A room's depth map as a mesh of triangles: what the rebuilt room is measured against.
+"""The triangle mesh of a room's depth map, the ground truth for the reconstructed room.
 
-Neighbouring pixels are joined unless the depth jumps between them: then nothing is known of what lies behind, and no
-sheet is drawn from the front to the back. A jump is a ratio of depths beyond `JUMP` that not both pixels' normals
-explain: a wall seen along itself stays whole, for there both do. Triangles face the camera; whoever meets one from
-behind sees what no map knows.
+Triangles join neighbouring pixels except across a depth discontinuity: a depth ratio above `JUMP` that the normals of
+the two pixels do not explain. So a wall at a grazing angle stays whole. Triangles face the camera; a hit from behind
+is outside all maps.
 """
 
 from __future__ import annotations
@@ -15,15 +14,15 @@ from numpy.typing import NDArray
 
 from colonnade.common.types import Floats
 from colonnade.reference.embree import RayTracer, Triangles
-from colonnade.reference.environment.surface import Backdrop, Meetings
+from colonnade.reference.environment.surface import Backdrop, SurfaceHits
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
 
 
-#: Neighbours of which one is farther than this many times the other may lie on different things …
+#: Neighbouring pixels with a larger ratio of depths may lie on different surfaces.
 JUMP = 1.05
-#: … and do unless the step between them is within this sine of both pixels' tangent planes.
+#: They do if the step between them leaves a pixel's tangent plane by more than this sine.
 OFF_PLANE = 0.25
 
 
@@ -31,7 +30,7 @@ class DepthMesh:
     """The mesh of a room's depth map, in view space."""
 
     def __init__(self, environment: Environment, split: bool = True) -> None:
-        """Build it; ``split`` false joins all neighbours."""
+        """Build the mesh. With ``split`` false it joins all neighbours."""
         self._environment = environment
         points = environment.points()
         faces = _faces(points, environment.normals, split)
@@ -39,27 +38,27 @@ class DepthMesh:
         corners = self._tracer.corners
         self._normals: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
-    def meet(self, origins: Floats, directions: Floats) -> Meetings:
-        """Where rays meet it first; a triangle met from behind is outside, as is nothing at all."""
+    def intersect(self, origins: Floats, directions: Floats) -> SurfaceHits:
+        """First hits of rays. A miss, and a triangle that is hit from behind, are outside."""
         faces = self._tracer.first_hits(origins, directions)
-        met = np.flatnonzero(faces >= 0)
+        hit = np.flatnonzero(faces >= 0)
         position = np.full((len(origins), 3), np.nan)
-        position[met] = self._tracer.surface_points(faces[met], origins[met], directions[met]).position
+        position[hit] = self._tracer.surface_points(faces[hit], origins[hit], directions[hit]).position
         environment, z = self._environment, position[:, 2]
         outside = faces < 0
-        outside[met] = np.einsum("ni,ni->n", self._normals[faces[met]], directions[met]) >= 0
+        outside[hit] = np.einsum("ni,ni->n", self._normals[faces[hit]], directions[hit]) >= 0
         u = position[:, 0] / z * environment.fx + environment.cx
         v = position[:, 1] / z * environment.fy + environment.cy
-        return Meetings(position, u, v, outside)
+        return SurfaceHits(position, u, v, outside)
 
 
 def full_backdrop(environment: Environment) -> Backdrop:
-    """The room with its full maps and its depth map as geometry: the truth that everything else is held against."""
+    """The room with its full maps and its depth mesh, the ground truth."""
     return Backdrop(environment, DepthMesh(environment), environment.albedo, environment.normals)
 
 
 def _faces(points: Floats, normals: Floats, split: bool) -> NDArray[np.int32]:
-    """Two triangles for every four pixels, facing the camera, less those across a jump; int32 [m, 3]."""
+    """Two triangles for every four pixels, facing the camera, without those across a discontinuity; int32 [m, 3]."""
     height, width = points.shape[:2]
     index = np.arange(height * width, dtype=np.int32).reshape(height, width)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
@@ -75,9 +74,9 @@ def _faces(points: Floats, normals: Floats, split: bool) -> NDArray[np.int32]:
 
 
 def _joined(p: Floats, q: Floats, normals_p: Floats, normals_q: Floats) -> NDArray[np.bool_]:
-    """Whether neighbouring points lie on one surface."""
+    """Whether neighbouring points p and q, float64 [..., 3], lie on one surface, bool [...]."""
     step = q - p
     length = np.linalg.norm(step, axis=-1)
     near, far = np.minimum(p[..., 2], q[..., 2]), np.maximum(p[..., 2], q[..., 2])
-    off = np.maximum(*(np.abs(np.einsum("...i,...i->...", n, step)) for n in (normals_p, normals_q)))
-    return np.asarray((far <= JUMP * near) | (off <= OFF_PLANE * length), dtype=np.bool_)
+    off_plane = np.maximum(*(np.abs(np.einsum("...i,...i->...", n, step)) for n in (normals_p, normals_q)))
+    return np.asarray((far <= JUMP * near) | (off_plane <= OFF_PLANE * length), dtype=np.bool_)

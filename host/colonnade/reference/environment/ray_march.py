@@ -1,10 +1,10 @@
-"""A room rebuilt from what its camera saw: which background point does a ray meet?
+"""Screen-space ray marching: hits of rays on a room that is reconstructed from one camera view.
 
-A `Rebuild` answers for rays in view space. `PlaneMarch` answers from a plane for each pixel, step by step, in 64 bits;
-`DepthMarch` has the planes of the full maps: what the device's march would be with all the memory in the world.
+`PlaneMarch` marches in float64 through a plane per pixel. `DepthMarch` takes these planes from the full maps: it is the
+device's march without a memory limit.
 
-With w = 1/z a ray stays straight in (u, v, w): from (u0, v0, w0) along (Du, Dv, Dw) with Du = fx·dx − dz·(u0 − cx),
-Dv alike and Dw = −dz·w0.
+With w = 1/z a ray is a straight line in (u, v, w): from (u0, v0, w0) along (Du, Dv, Dw), with
+Du = fx·dx − dz·(u0 − cx), Dv = fy·dy − dz·(v0 − cy) and Dw = −dz·w0.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.types import Floats
-from colonnade.reference.environment.surface import Meetings
+from colonnade.reference.environment.surface import SurfaceHits
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
 
 
-#: What became of a ray: it met a surface that the camera sees, the extension of one behind another, left the view, or
-#: was given up.
-HIT, HIDDEN, LEFT, LOST = range(4)
+#: Outcome of a ray: it hit a surface that the camera sees, hit the hidden extension of a surface behind another one,
+#: left the view, or ran out of steps.
+HIT, HIDDEN, LEFT_VIEW, LOST = range(4)
 
 
 @dataclass(frozen=True)
-class Rebuilt:
-    """Where rays meet a rebuilt room.
+class MarchHits:
+    """Hits of rays on a reconstructed room.
 
     Attributes:
-        u, v: float64 [n], where the point lies in the picture, pixels, centres at halves; where the ray ended unless
-            `HIT` or `HIDDEN`.
-        z: float64 [n], metres along the view.
-        seen_u, seen_v: float64 [n], the pixel that shows the surface: for `HIDDEN` the last visible one of its plane.
-        kind: int64 [n], `HIT`, `HIDDEN`, `LEFT` or `LOST`.
-        steps: int64 [n], of the march.
+        u, v: Hit point projected to the picture, pixels with centres at halves; the last point of a ray without a hit,
+            float64 [n].
+        z: Depth, metres along the view, float64 [n].
+        seen_u, seen_v: Pixel that shows the surface; for `HIDDEN` the last visible pixel of its plane, float64 [n].
+        kind: `HIT`, `HIDDEN`, `LEFT_VIEW` or `LOST`, int64 [n].
+        steps: March steps, int64 [n].
     """
 
     u: Floats
@@ -50,71 +50,71 @@ class Rebuilt:
     steps: NDArray[np.int64]
 
 
-class Rebuild(Protocol):
-    """A way to rebuild a room. Rays are float64 [n, 3] each, view space, metres."""
+class RayMarch(Protocol):
+    """A ray march through a reconstructed room. Rays are in view space, metres, float64 [n, 3] each."""
 
-    def __call__(self, origins: Floats, directions: Floats) -> Rebuilt:
-        """Where the rays meet the room."""
+    def __call__(self, origins: Floats, directions: Floats) -> MarchHits:
+        """Hits of the rays on the room."""
 
 
-def from_march(march: Callable[[Floats, Floats], Mapping[str, Any]]) -> Rebuild:
-    """A rebuild out of a function that returns `Rebuilt`'s arrays by name; `seen_u` and `seen_v` may be missing."""
+def march_from_arrays(march: Callable[[Floats, Floats], Mapping[str, Any]]) -> RayMarch:
+    """A `RayMarch` from a function that returns the arrays of `MarchHits` by name. `seen_u`, `seen_v` are optional."""
 
-    def rebuild(origins: Floats, directions: Floats) -> Rebuilt:
+    def traced(origins: Floats, directions: Floats) -> MarchHits:
         arrays = march(np.ascontiguousarray(origins), np.ascontiguousarray(directions))
         u, v, z = (np.asarray(arrays[name], dtype=np.float64) for name in "uvz")
         seen_u, seen_v = (np.asarray(arrays.get(f"seen_{name}", arrays[name]), dtype=np.float64) for name in "uv")
         kind, steps = (np.asarray(arrays[name], dtype=np.int64) for name in ("kind", "steps"))
-        return Rebuilt(u, v, z, seen_u, seen_v, kind, steps)
+        return MarchHits(u, v, z, seen_u, seen_v, kind, steps)
 
-    return rebuild
+    return traced
 
 
 @dataclass(frozen=True)
-class RebuiltGeometry:
-    """A rebuild as the geometry of a `Backdrop`; what it does not meet is outside."""
+class MarchedGeometry:
+    """A ray march as the geometry of a `Backdrop`. Rays without a hit are outside."""
 
     environment: Environment
-    rebuild: Rebuild
+    march: RayMarch
 
-    def meet(self, origins: Floats, directions: Floats) -> Meetings:
-        """Where rays, float64 [n, 3] each, meet it."""
-        met = self.rebuild(origins, directions)
-        return Meetings(
-            positions(self.environment, met), met.seen_u, met.seen_v, (met.kind != HIT) & (met.kind != HIDDEN)
-        )
+    def intersect(self, origins: Floats, directions: Floats) -> SurfaceHits:
+        """First hits of rays, float64 [n, 3] each."""
+        hits = self.march(origins, directions)
+        outside = (hits.kind != HIT) & (hits.kind != HIDDEN)
+        return SurfaceHits(positions(self.environment, hits), hits.seen_u, hits.seen_v, outside)
 
 
-def positions(environment: Environment, met: Rebuilt) -> Floats:
-    """Where rays have ended, view space, float64 [n, 3]."""
-    across, along = (met.u - environment.cx) / environment.fx, (met.v - environment.cy) / environment.fy
-    return np.stack([across, along, np.ones_like(met.z)], axis=1) * met.z[:, None]
+def positions(environment: Environment, hits: MarchHits) -> Floats:
+    """End points of rays, view space, metres, float64 [n, 3]."""
+    x, y = (hits.u - environment.cx) / environment.fx, (hits.v - environment.cy) / environment.fy
+    return np.stack([x, y, np.ones_like(hits.z)], axis=1) * hits.z[:, None]
 
 
 class PlaneMarch:
-    """A march of at most a pixel or a fiftieth of w a step through a map of planes."""
+    """A ray march through a map of planes. A step is at most a pixel, and at most a fiftieth of w."""
 
-    #: A surface is met when the ray passes behind it and it goes on there: the planes before and after differ by less
-    #: than this share of w. Otherwise the ray has gone behind something, or into it if it is no deeper than `DEEP`.
+    #: A ray that passes behind the visible surface hits it if the surface continues there: the planes of both steps
+    #: differ by less than this share of w.
     JUMP = 0.04
+    #: Across a jump it hits only a surface that it entered by less than this share of w; else it passes behind it.
     DEEP = 0.01
-    #: A start so little behind the surface is on it.
+    #: An origin behind the surface by less than this share of w lies on the surface.
     START = 0.005
 
     def __init__(self, environment: Environment, w: Floats, slopes: Floats, max_steps: int = 2048) -> None:
-        """A room by its planes.
+        """A room as a plane per pixel.
 
         Args:
-            room: Its camera and size.
-            w: 1/metre, of each pixel's plane at the pixel's centre, float64 [height, width].
-            slopes: How w changes a pixel to the right and a pixel down, float64 [2, height, width].
-            most_steps: Then a ray is lost.
+            environment: The room, for its camera and size.
+            w: Inverse depth of each pixel's plane at the pixel's centre, 1/metre, float64 [height, width].
+            slopes: Change of w per pixel to the right and per pixel down, float64 [2, height, width].
+            max_steps: Steps after which a ray is `LOST`.
         """
-        self._environment, self._most = environment, max_steps
+        self._environment, self._max_steps = environment, max_steps
         self._w, self._slopes = w, slopes
 
-    def __call__(self, origins: Floats, directions: Floats) -> Rebuilt:
-        """Where the rays meet the room."""
+    def __call__(self, origins: Floats, directions: Floats) -> MarchHits:
+        """Hits of the rays on the room."""
         environment, count = self._environment, len(origins)
         w0 = 1 / origins[:, 2]
         start = np.stack(
@@ -133,67 +133,67 @@ class PlaneMarch:
             ],
             axis=1,
         )
-        pace = np.maximum(np.abs(slope[:, :2]).max(axis=1), 50 * np.abs(slope[:, 2]) / w0)
-        step = slope / np.where(pace > 0, pace, 1.0)[:, None]
-        kind, steps, place = np.full(count, LOST), np.zeros(count, dtype=np.int64), start.copy()
+        rate = np.maximum(np.abs(slope[:, :2]).max(axis=1), 50 * np.abs(slope[:, 2]) / w0)
+        step = slope / np.where(rate > 0, rate, 1.0)[:, None]
+        kind, steps, end = np.full(count, LOST), np.zeros(count, dtype=np.int64), start.copy()
         seen = start[:, :2].copy()
-        alive = np.arange(count)
-        height = self._above(place, place)
-        before = np.where(height > -self.START * place[:, 2], height.clip(min=1e-12), height)
-        # Of rays behind something: the place where they last were in front, whose plane goes on unseen.
-        last = np.full((count, 3), np.nan)
-        for number in range(1, self._most + 1):
-            here = start[alive] + number * step[alive]
+        active = np.arange(count)
+        height = self._height(end, end)
+        previous_height = np.where(height > -self.START * end[:, 2], height.clip(min=1e-12), height)
+        # For rays behind a surface: the last point in front of it, whose plane may continue hidden.
+        last_visible = np.full((count, 3), np.nan)
+        for number in range(1, self._max_steps + 1):
+            point = start[active] + number * step[active]
             inside = (
-                (here[:, 0] >= 0)
-                & (here[:, 0] < environment.width)
-                & (here[:, 1] >= 0)
-                & (here[:, 1] < environment.height)
+                (point[:, 0] >= 0)
+                & (point[:, 0] < environment.width)
+                & (point[:, 1] >= 0)
+                & (point[:, 1] < environment.height)
             )
-            inside &= here[:, 2] > 0
-            steps[alive] = number
-            kind[alive[~inside]] = LEFT
-            place[alive[~inside]] = here[~inside]
-            alive, here, before = alive[inside], here[inside], before[inside]
-            if len(alive) == 0:
+            inside &= point[:, 2] > 0
+            steps[active] = number
+            kind[active[~inside]] = LEFT_VIEW
+            end[active[~inside]] = point[~inside]
+            active, point, previous_height = active[inside], point[inside], previous_height[inside]
+            if len(active) == 0:
                 break
-            there, now = here - step[alive], self._above(here, here)
-            passed = (before > 0) & (now <= 0)
-            # Where the plane of the step before would be here: far from this one's, something begins or ends.
-            one_surface = np.abs(self._above(here, there) - now) < self.JUMP * here[:, 2]
-            met = passed & (one_surface | (now > -self.DEEP * here[:, 2]))
-            back = np.where(met & one_surface, now / np.where(met, now - before, 1.0), 0.0)
-            last[alive[now > 0]] = np.nan
-            last[alive[passed]] = there[passed]
-            behind, hidden = np.flatnonzero((now <= 0) & ~met & ~np.isnan(last[alive, 0])), np.zeros(len(alive), bool)
-            plane = last[alive[behind]]
-            hidden[behind] = (self._above(there[behind], plane) > 0) & (self._above(here[behind], plane) <= 0)
-            ends = met | hidden
-            place[alive[ends]] = here[ends] - back[ends, None] * step[alive[ends]]
-            kind[alive[met]], kind[alive[hidden]] = HIT, HIDDEN
-            seen[alive[met]], seen[alive[hidden]] = place[alive[met], :2], last[alive[hidden], :2]
-            alive, before = alive[~ends], now[~ends]
-        place[alive] = start[alive] + self._most * step[alive]
+            previous, height = point - step[active], self._height(point, point)
+            passed = (previous_height > 0) & (height <= 0)
+            # A large difference between the planes of both steps is the edge of a surface.
+            one_surface = np.abs(self._height(point, previous) - height) < self.JUMP * point[:, 2]
+            hit = passed & (one_surface | (height > -self.DEEP * point[:, 2]))
+            back = np.where(hit & one_surface, height / np.where(hit, height - previous_height, 1.0), 0.0)
+            last_visible[active[height > 0]] = np.nan
+            last_visible[active[passed]] = previous[passed]
+            behind = np.flatnonzero((height <= 0) & ~hit & ~np.isnan(last_visible[active, 0]))
+            plane, hidden = last_visible[active[behind]], np.zeros(len(active), bool)
+            hidden[behind] = (self._height(previous[behind], plane) > 0) & (self._height(point[behind], plane) <= 0)
+            ends = hit | hidden
+            end[active[ends]] = point[ends] - back[ends, None] * step[active[ends]]
+            kind[active[hit]], kind[active[hidden]] = HIT, HIDDEN
+            seen[active[hit]], seen[active[hidden]] = end[active[hit], :2], last_visible[active[hidden], :2]
+            active, previous_height = active[~ends], height[~ends]
+        end[active] = start[active] + self._max_steps * step[active]
         with np.errstate(divide="ignore"):
-            return Rebuilt(place[:, 0], place[:, 1], 1 / place[:, 2], seen[:, 0], seen[:, 1], kind, steps)
+            return MarchHits(end[:, 0], end[:, 1], 1 / end[:, 2], seen[:, 0], seen[:, 1], kind, steps)
 
-    def _above(self, place: Floats, of: Floats) -> Floats:
-        """How far in w places (u, v, w) lie in front of the plane that is seen at places ``of``, float64 [n]."""
-        column = np.clip(of[:, 0].astype(np.intp), 0, self._environment.width - 1)
-        row = np.clip(of[:, 1].astype(np.intp), 0, self._environment.height - 1)
-        across, along = self._slopes[:, row, column]
-        surface = self._w[row, column] + across * (place[:, 0] - column - 0.5) + along * (place[:, 1] - row - 0.5)
-        return np.asarray(place[:, 2] - surface, dtype=np.float64)
+    def _height(self, points: Floats, pixels: Floats) -> Floats:
+        """Height in w of points (u, v, w) over the planes of the pixels that contain ``pixels``, float64 [n]."""
+        column = np.clip(pixels[:, 0].astype(np.intp), 0, self._environment.width - 1)
+        row = np.clip(pixels[:, 1].astype(np.intp), 0, self._environment.height - 1)
+        u_slope, v_slope = self._slopes[:, row, column]
+        surface = self._w[row, column] + u_slope * (points[:, 0] - column - 0.5) + v_slope * (points[:, 1] - row - 0.5)
+        return np.asarray(points[:, 2] - surface, dtype=np.float64)
 
 
 class DepthMarch(PlaneMarch):
-    """A march through the full maps: depth and normal of each pixel are a plane of its own."""
+    """A ray march through the full maps: depth and normal of each pixel define its plane."""
 
-    #: No plane is steeper than this share of w a pixel: at outlines normals turn away from the camera.
+    #: Upper limit of a plane's slope, as a share of w per pixel. Normals at outlines turn away from the camera.
     STEEP = 0.05
 
     def __init__(self, environment: Environment, max_steps: int = 2048) -> None:
-        """A room by its depth and normals."""
+        """A room by its depth and normal maps."""
         w = 1.0 / environment.depth
         towards = np.einsum("hwi,hwi->hw", environment.normals, environment.points())
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,7 +1,7 @@
-"""What rays meet that miss the object, in a room's view space: surfaces to be lit, wherever they come from.
+"""Background surfaces, in a room's view space: what the reference shades where rays miss the object.
 
-The reference takes any `Geometry` and any maps: the depth map's mesh or a rebuilt room, full maps or clustered ones. So
-what each of them costs can be told apart.
+A `Backdrop` combines any `Geometry` (depth mesh or reconstructed room) with any maps (full or decoded), so a study can
+measure the loss of each separately.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Meetings:
-    """Where rays meet a room's geometry.
+class SurfaceHits:
+    """Hits of rays on a room's geometry.
 
     Attributes:
-        position: float64 [n, 3], view space, metres; anything where `outside`.
-        u, v: float64 [n], pixels of the maps, centres at halves.
-        outside: bool [n]: nothing is known of what the ray meets.
+        position: View space, metres, undefined where `outside`, float64 [n, 3].
+        u, v: Position in the maps, pixels with centres at halves, float64 [n].
+        outside: No map covers the hit, bool [n].
     """
 
     position: Floats
@@ -36,21 +36,21 @@ class Meetings:
 
 
 class Geometry(Protocol):
-    """Something that rays of a room's view space meet."""
+    """The geometry of a room in view space."""
 
-    def meet(self, origins: Floats, directions: Floats) -> Meetings:
-        """Where rays, float64 [n, 3] each, meet it first."""
+    def intersect(self, origins: Floats, directions: Floats) -> SurfaceHits:
+        """First hits of rays, float64 [n, 3] each."""
 
 
 @dataclass(frozen=True)
 class BackdropPoints:
-    """Surfaces of the background.
+    """Points on background surfaces.
 
     Attributes:
-        position: float64 [n, 3], view space, metres.
-        normals: float64 [n, 3], unit, view space.
-        albedo: float64 [n, 3], linear.
-        outside: bool [n]: nothing is known of what the ray meets.
+        position: View space, metres, float64 [n, 3].
+        normals: Unit normals, view space, float64 [n, 3].
+        albedo: Linear, float64 [n, 3].
+        outside: No map covers the point, bool [n].
     """
 
     position: Floats
@@ -59,25 +59,24 @@ class BackdropPoints:
     outside: NDArray[np.bool_]
 
 
-class Shell(Protocol):
-    """What stands for the room where no map reaches: points that are not `outside`."""
+class BoundingSurface(Protocol):
+    """A surface around a room, for rays that leave the space that its maps cover."""
 
-    def meet(self, origins: Floats, directions: Floats) -> BackdropPoints:
-        """Where rays of view space, float64 [n, 3] each, meet it."""
+    def intersect(self, origins: Floats, directions: Floats) -> BackdropPoints:
+        """Points where rays of view space, float64 [n, 3] each, hit the surface."""
 
 
 @dataclass(frozen=True)
 class Backdrop:
-    """A room that rays can meet.
+    """A room as background: geometry and maps.
 
     Attributes:
-        room: Its camera and size.
-        geometry: Where rays meet it.
-        albedo, normals: Its maps, float64 [height, width, 3], as those of `Room`.
-        depth: What it takes for the depth of pixels that are seen directly, metres, float64 [height, width]; None: the
-            room's own.
-        shell: Stands in where the geometry does not reach; None: such rays meet the scene's background colour, and
-            their pixels are marked.
+        environment: The room, for its camera and size.
+        geometry: Intersects rays with the room.
+        albedo, normals: The maps, as in `Environment`, float64 [height, width, 3].
+        depth: Depth of directly visible pixels, metres, float64 [height, width]; None: the depth map of the room.
+        bounding: Surface for rays that miss the geometry; None: they get the scene's background colour, and their
+            pixels are marked as outside.
     """
 
     environment: Environment
@@ -85,28 +84,28 @@ class Backdrop:
     albedo: Floats
     normals: Floats
     depth: Floats | None = None
-    shell: Shell | None = None
+    bounding: BoundingSurface | None = None
 
-    def seen(self, u: Floats, v: Floats) -> BackdropPoints:
-        """What the camera itself sees at pixels of the maps, float64 [n] each."""
+    def visible_points(self, u: Floats, v: Floats) -> BackdropPoints:
+        """Points that the camera sees at pixels (u, v) of the maps, float64 [n] each."""
         environment, (row, column) = self.environment, self._texels(u, v)
-        across, along = (u - environment.cx) / environment.fx, (v - environment.cy) / environment.fy
+        x, y = (u - environment.cx) / environment.fx, (v - environment.cy) / environment.fy
         depth = environment.depth if self.depth is None else self.depth
-        position = np.stack([across, along, np.ones(len(u))], axis=1) * depth[row, column, None]
+        position = np.stack([x, y, np.ones(len(u))], axis=1) * depth[row, column, None]
         return self._of_texels(position, row, column, np.zeros(len(u), dtype=np.bool_))
 
-    def meet(self, origins: Floats, directions: Floats) -> BackdropPoints:
-        """What rays of view space, float64 [n, 3] each, meet."""
-        met = self.geometry.meet(origins, directions)
-        points = self._of_texels(met.position, *self._texels(met.u, met.v), met.outside)
-        lost = np.flatnonzero(met.outside)
-        if self.shell is None or len(lost) == 0:
+    def intersect(self, origins: Floats, directions: Floats) -> BackdropPoints:
+        """Points where rays of view space, float64 [n, 3] each, hit the room."""
+        hits = self.geometry.intersect(origins, directions)
+        points = self._of_texels(hits.position, *self._texels(hits.u, hits.v), hits.outside)
+        uncovered = np.flatnonzero(hits.outside)
+        if self.bounding is None or len(uncovered) == 0:
             return points
-        beyond = self.shell.meet(origins[lost], directions[lost])
+        beyond = self.bounding.intersect(origins[uncovered], directions[uncovered])
         position, normals, albedo = points.position.copy(), points.normals.copy(), points.albedo.copy()
-        position[lost], normals[lost], albedo[lost] = beyond.position, beyond.normals, beyond.albedo
+        position[uncovered], normals[uncovered], albedo[uncovered] = beyond.position, beyond.normals, beyond.albedo
         outside = points.outside.copy()
-        outside[lost] = beyond.outside
+        outside[uncovered] = beyond.outside
         return BackdropPoints(position, normals, albedo, outside)
 
     def _texels(self, u: Floats, v: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -14,11 +14,11 @@ from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.quality import angles, relit
-from colonnade.environment.encoding.selection import best_subsets, within_budget
+from colonnade.environment.encoding.selection import best_subsets, choose_within_budget
 from colonnade.environment.encoding.slic import encode_slic
 from colonnade.environment.encoding.two_level import MODES, TwoLevelMap
 from colonnade.environment.encoding.two_level_encoder import encode_two_level
-from colonnade.environment.encoding.vectors import AlbedoSpace, NormalSpace, packed, unpacked
+from colonnade.environment.encoding.vectors import AlbedoSpace, NormalSpace, pack, unpack
 from colonnade.environment.load import load_environment
 from colonnade.quality.image_metrics import psnr, ssim
 
@@ -59,9 +59,12 @@ def test_memories_have_the_layouts_sizes(encoding: str) -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"width": 1280, "height": 960}, "map_bytes is 16,384, but 1280x960 pixels in tiles of 16 need 20,352"),
-        ({"encoding": "slic", "map_bytes": 1000}, "map_bytes is 1,000, .* need 15,000"),
-        ({"plane_bytes": 2000}, "plane_bytes is 2,000, .* need 3,568"),
+        (
+            {"width": 1280, "height": 960},
+            "map_bytes is 16,384, but 1280x960 pixels in tiles of 16 need at least 20,352",
+        ),
+        ({"encoding": "slic", "map_bytes": 1000}, "map_bytes is 1,000, .* need at least 15,000"),
+        ({"plane_bytes": 2000}, "plane_bytes is 2,000, .* need at least 3,568"),
         ({"encoding": "jpeg"}, "must be twoLevel or slic"),
         ({"tile_size": 12}, "tile_size is 12"),
         ({"palette_size": 300}, "palette_size is 300, it must be from 4 to 256"),
@@ -78,10 +81,10 @@ def test_layouts_that_cannot_be(settings: dict[str, int | str], message: str) ->
 @given(st.lists(st.tuples(*[st.integers(-2048, 2047)] * 3), min_size=1), st.booleans())
 def test_words_hold_three_fields(fields: list[tuple[int, int, int]], signed: bool) -> None:
     values = np.array(fields) if signed else np.array(fields) + 2048
-    words = packed(values, 12)
+    words = pack(values, 12)
     assert int(words.max()) < 1 << 36
     assert [int(word) & 4095 for word in words] == [int(value) & 4095 for value in values[:, 0]]
-    assert np.array_equal(unpacked(words, 12, signed), values)
+    assert np.array_equal(unpack(words, 12, signed), values)
 
 
 def test_vectors_keep_their_meaning() -> None:
@@ -174,13 +177,13 @@ def test_best_subsets_against_all_pairs() -> None:
 def test_a_budget_is_kept_and_spent_where_it_helps() -> None:
     errors = np.array([[9.0, 1.0, 0.0], [5.0, 4.9, 0.1], [1.0, 1.0, 1.0]])
     sizes = np.array([0, 1, 4])
-    assert list(within_budget(errors, sizes, 100)) == [2, 2, 0]
-    assert list(within_budget(errors, sizes, 1)) == [1, 0, 0]
-    assert list(within_budget(errors, sizes, 0)) == [0, 0, 0]
-    assert list(within_budget(errors, sizes, 5)) == [1, 2, 0]
+    assert list(choose_within_budget(errors, sizes, 100)) == [2, 2, 0]
+    assert list(choose_within_budget(errors, sizes, 1)) == [1, 0, 0]
+    assert list(choose_within_budget(errors, sizes, 0)) == [0, 0, 0]
+    assert list(choose_within_budget(errors, sizes, 5)) == [1, 2, 0]
     random = np.random.default_rng(8)
     for budget in range(60):
-        choice = within_budget(-np.sort(-random.random((12, 4)), axis=1), np.array([0, 1, 4, 16]), budget)
+        choice = choose_within_budget(-np.sort(-random.random((12, 4)), axis=1), np.array([0, 1, 4, 16]), budget)
         assert np.array([0, 1, 4, 16])[choice].sum() <= budget
 
 

@@ -18,9 +18,9 @@ from colonnade.environment.encoding.image import AttributeImage, encode_environm
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.plane_encoder import encode_planes
 from colonnade.environment.encoding.plane_map import PLANE_MODES, PlaneMap
-from colonnade.environment.encoding.planes import Picture, packed_planes, unpacked_planes
+from colonnade.environment.encoding.planes import PlaneProjection, pack_planes, unpack_planes
 from colonnade.environment.encoding.quality import ray_errors
-from colonnade.environment.encoding.vectors import unpacked
+from colonnade.environment.encoding.vectors import unpack
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment, EnvironmentCamera
 
@@ -53,28 +53,28 @@ def boxes(width: int = 160, height: int = 120, steps: bool = True) -> Environmen
 @given(st.tuples(*[st.floats(-4000, 4000, allow_subnormal=False)] * 3), st.integers(0, 30))
 def test_planes_take_the_least_exponent(values: tuple[float, float, float], shrink: int) -> None:
     plane = np.ldexp(np.array([values]), -shrink)
-    words = packed_planes(plane)
+    words = pack_planes(plane)
     exponent = int(words[0]) >> 60
-    assert np.abs(unpacked_planes(words) - plane).max() <= 2.0 ** (exponent - 23)
+    assert np.abs(unpack_planes(words) - plane).max() <= 2.0 ** (exponent - 23)
     finer = np.rint(np.ldexp(plane, 22 - exponent + 1))
     assert exponent == 0 or finer.max() >= 1 << 19 or finer.min() < -(1 << 19)
 
 
 def test_the_bits_of_a_plane() -> None:
-    assert int(packed_planes(np.array([[1.0, -0.5, 0.25]]))[0]) == 4 << 60 | 1 << 56 | 0xE0000 << 20 | 1 << 18
-    assert int(packed_planes(np.zeros((1, 3)))[0]) == 0
+    assert int(pack_planes(np.array([[1.0, -0.5, 0.25]]))[0]) == 4 << 60 | 1 << 56 | 0xE0000 << 20 | 1 << 18
+    assert int(pack_planes(np.zeros((1, 3)))[0]) == 0
 
 
 def test_planes_of_space_and_picture() -> None:
     environment = boxes(steps=False)
-    picture = Picture.of(environment, 0.8)
+    projection = PlaneProjection.of(environment, 0.8)
     points = environment.points()
     rows, columns = np.array([100, 60, 5]), np.array([80, 81, 70])
-    planes = picture.planes(environment.normals[rows, columns], points[rows, columns])
-    w = picture.basis()[rows, columns]
+    planes = projection.planes(environment.normals[rows, columns], points[rows, columns])
+    w = projection.basis()[rows, columns]
     assert np.allclose(np.einsum("nc,nc->n", planes, w), 0.8 / environment.depth[rows, columns])
-    assert np.allclose(picture.normals(planes), environment.normals[rows, columns])
-    assert np.allclose(np.einsum("nc,nc->n", picture.inverse_offsets(planes), points[rows, columns]), 1.0)
+    assert np.allclose(projection.normals(planes), environment.normals[rows, columns])
+    assert np.allclose(np.einsum("nc,nc->n", projection.dual_vectors(planes), points[rows, columns]), 1.0)
 
 
 @pytest.mark.parametrize(("width", "height", "tile"), [(160, 120, 16), (170, 101, 16), (100, 90, 8), (150, 100, 32)])
@@ -82,11 +82,11 @@ def test_flat_walls_are_where_they_were(width: int, height: int, tile: int) -> N
     environment = boxes(width, height)
     layout = AttributeLayout(width, height, tile_size=tile)
     content = encode_planes(environment, layout)
-    errors = ray_errors(environment, content.depth(layout, Picture.of(environment, content.depth_unit)))
+    errors = ray_errors(environment, content.depth(layout, PlaneProjection.of(environment, content.depth_unit)))
     # Cells of two pixels and more meet the walls' corners and the board's edge
     assert np.median(errors) < 0.0005
     assert np.mean(errors > 0.01) < 0.06
-    w = content.inverse_depth(layout, Picture.of(environment, content.depth_unit))
+    w = content.inverse_depth(layout, PlaneProjection.of(environment, content.depth_unit))
     assert w.max() < 1.01
 
 
@@ -125,7 +125,7 @@ def test_random_access_follows_the_words(plane_bytes: int, cells: int) -> None:
     sizes = np.array([mode.words for mode in PLANE_MODES])
     assert list(sizes) == [0, 2, 5, 4, 10, 17, 34]
     assert sizes[content.descriptors & 7].sum() <= layout.plane_heap_words
-    assert int(content.planes[layout.nothing]) == 0
+    assert int(content.planes[layout.infinite_plane]) == 0
     assert (content.descriptors & 7).max() > (2 if cells == 8 else 4)
     assert (content.descriptors & 7).max() < (5 if cells == 8 else 7)
 
@@ -133,9 +133,9 @@ def test_random_access_follows_the_words(plane_bytes: int, cells: int) -> None:
 def shell_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Planes, albedos and normals of the shell's used entries."""
     entries = [sum(int(part) << (64 * k) for k, part in enumerate(words)) for words in content.shell if words.any()]
-    planes = unpacked_planes(np.array([entry & (1 << 64) - 1 for entry in entries], np.uint64))
-    albedos = unpacked(np.array([entry >> 64 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=False)
-    normals = unpacked(np.array([entry >> 100 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=True)
+    planes = unpack_planes(np.array([entry & (1 << 64) - 1 for entry in entries], np.uint64))
+    albedos = unpack(np.array([entry >> 64 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=False)
+    normals = unpack(np.array([entry >> 100 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=True)
     assert all(entry < 1 << 136 for entry in entries)
     return planes, albedos / 4095, normals / 2047
 
@@ -145,7 +145,7 @@ def test_the_shell_is_the_box_and_a_wall_behind() -> None:
     layout = AttributeLayout(320, 240)
     content = encode_planes(environment, layout)
     planes, albedos, normals = shell_fields(content)
-    picture = Picture.of(environment, content.depth_unit)
+    projection = PlaneProjection.of(environment, content.depth_unit)
     expected = {
         (0, 0, 1): (0.5, environment.albedo.mean(axis=(0, 1))),
         (0, 0, -1): (4.0, [0.5, 0.5, 0.5]),
@@ -155,13 +155,13 @@ def test_the_shell_is_the_box_and_a_wall_behind() -> None:
         (-1, 0, 0): (1.5, [0.2, 0.2, 0.5]),
     }
     assert len(planes) == len(expected)
-    q = picture.inverse_offsets(planes)
+    q = projection.dual_vectors(planes)
     for plane, albedo, normal in zip(q, albedos, normals, strict=True):
         distance, colour = expected[tuple(int(x) for x in np.rint(normal))]  # type: ignore[index]
         assert np.abs(normal - np.rint(normal)).max() < 0.01
         assert abs(1 / np.linalg.norm(plane) - distance) < 0.02
         assert np.abs(albedo - colour).max() < 0.02
-    # Behind the camera: w is negative where the picture is
+    # Behind the camera: w is negative where the projection is
     assert np.allclose(planes[0], [0, 0, -content.depth_unit / 0.5], atol=1e-4)
 
 
@@ -177,12 +177,14 @@ def test_a_shell_of_few_planes_keeps_the_largest() -> None:
 def test_surfaces_of_the_rooms(name: str, mean: float, p95: float) -> None:
     environment, layout = load_environment(ROOMS / name), AttributeLayout()
     content = encode_planes(environment, layout)
-    centimetres = 100 * ray_errors(environment, content.depth(layout, Picture.of(environment, content.depth_unit)))
+    centimetres = 100 * ray_errors(
+        environment, content.depth(layout, PlaneProjection.of(environment, content.depth_unit))
+    )
     assert centimetres.mean() < mean
     assert np.percentile(centimetres, 95) < p95
     planes, _, normals = shell_fields(content)
     up = normals @ environment.camera_to_world[1, :3]
-    distance = 1 / np.linalg.norm(Picture.of(environment, content.depth_unit).inverse_offsets(planes), axis=1)
+    distance = 1 / np.linalg.norm(PlaneProjection.of(environment, content.depth_unit).dual_vectors(planes), axis=1)
     # The floor is as far below the camera as the pose says
     assert abs(distance[up > 0.99][0] - environment.camera_to_world[1, 3]) < 0.02
     assert len(planes) == 6
@@ -231,7 +233,7 @@ def test_a_room_is_encoded_once(
 def test_tiny_rooms(width: int, height: int) -> None:
     environment = boxes(width, height, steps=False)
     image = encode_environment(environment, AttributeLayout(width, height))
-    depth = image.decoded_depth(Picture.of(environment, image.depth_unit))
+    depth = image.decoded_depth(PlaneProjection.of(environment, image.depth_unit))
     assert np.abs(depth / environment.depth - 1).max() < 0.02
     assert np.abs(image.decoded_albedo() - environment.albedo).max() < 0.01
 

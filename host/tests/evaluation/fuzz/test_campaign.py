@@ -21,7 +21,7 @@ from colonnade.evaluation.fuzz import campaign
 from colonnade.evaluation.fuzz.cases import legal_cases
 from colonnade.evaluation.fuzz.compare import differences
 from colonnade.evaluation.fuzz.corruption import KINDS, corrupt_case
-from colonnade.evaluation.fuzz.simulator import Delivered
+from colonnade.evaluation.fuzz.simulator import SimulatedFrame
 
 needs_verilator = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 
@@ -76,8 +76,8 @@ def test_every_difference_is_named() -> None:
     manifest = manifest_for("tiny").manifest
     case = legal_cases(manifest)[0]
     frame = model_frame(loaded_model(manifest, case.image), case.registers)
-    assert differences(Delivered(frame, 0), frame) == []
-    assert differences(Delivered(frame, 3), frame) == ["3 pixels missing"]
+    assert differences(SimulatedFrame(frame, 0), frame) == []
+    assert differences(SimulatedFrame(frame, 3), frame) == ["3 pixels missing"]
     hits = int(frame.is_object.sum())
     changed = {
         "errors illegalRecord instead of none": replace(frame, errors=["illegalRecord"]),
@@ -87,10 +87,10 @@ def test_every_difference_is_named() -> None:
         f"hits {hits + 1} instead of {hits}": replace(frame, counters={**frame.counters, "hits": hits + 1}),
     }
     for what, other in changed.items():
-        assert differences(Delivered(other, 0), frame) == [what]
+        assert differences(SimulatedFrame(other, 0), frame) == [what]
     aborted = replace(frame, errors=["watchdog"], colour=frame.colour ^ 1)
-    assert differences(Delivered(aborted, 7), replace(frame, errors=["watchdog"])) == []
-    assert differences(Delivered(aborted, 7), frame) == ["errors watchdog instead of none"]
+    assert differences(SimulatedFrame(aborted, 7), replace(frame, errors=["watchdog"])) == []
+    assert differences(SimulatedFrame(aborted, 7), frame) == ["errors watchdog instead of none"]
 
 
 def test_the_command_reports_and_fails_on_a_disagreement(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

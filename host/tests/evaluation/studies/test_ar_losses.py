@@ -13,12 +13,12 @@ from colonnade.environment.encoded import EncodedEnvironment
 from colonnade.environment.encoding.image import AttributeImage, encode_environment
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.model import Environment
-from colonnade.evaluation.studies.ar_losses import Losses, device_frame, losses, standing_scene, table
+from colonnade.evaluation.studies.ar_losses import Losses, device_frame, losses, placed_scene, table
 from colonnade.evaluation.studies.synthetic_attic import attic
 from colonnade.mesh.load import load_mesh
-from colonnade.quality.image_metrics import HIGHEST_PSNR
+from colonnade.quality.image_metrics import MAX_PSNR
 from colonnade.quality.region_metrics import compare_regions, frame_regions
-from colonnade.reference.environment.decoded import PlaneShell, plane_march, rebuilt_depth
+from colonnade.reference.environment.decoded import BoundingPlanes, decoded_depth, float_plane_march
 from colonnade.scene.model import Material, Placement
 from colonnade.scene.view import make_view
 
@@ -35,8 +35,8 @@ def image(environment: Environment) -> AttributeImage:
 
 @pytest.fixture(scope="module")
 def measured(environment: Environment, image: AttributeImage) -> Losses:
-    mesh, march = load_mesh("teapot:4"), plane_march(environment, image)
-    scene = standing_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
+    mesh, march = load_mesh("teapot:4"), float_plane_march(environment, image)
+    scene = placed_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
     view = make_view(scene, mesh.extent, 160, 120, mesh.materials, environment)
     first = losses(mesh, view, environment, image, march, with_dists=False)
     device = first.pictures["both"].image
@@ -44,22 +44,22 @@ def measured(environment: Environment, image: AttributeImage) -> Losses:
 
 
 def test_the_shell_is_all_around_and_faces_inward(environment: Environment, image: AttributeImage) -> None:
-    shell = PlaneShell(environment, image)
+    shell = BoundingPlanes(environment, image)
     directions = np.random.default_rng(7).normal(size=(2000, 3))
     origins = np.broadcast_to([0.0, 0.0, 1.0], directions.shape)
-    met = shell.meet(origins, directions)
+    met = shell.intersect(origins, directions)
     away = np.einsum("ni,ni->n", met.position - origins, directions)
     # Where no plane of the shell stands, above and beside, a ray may leave for ever.
     assert met.outside.mean() < 0.4
     assert (np.einsum("ni,ni->n", met.normals, directions)[~met.outside] < 0).all()
     assert (away[~met.outside] > 0).all()
-    behind = shell.meet(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]]))
+    behind = shell.intersect(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]]))
     np.testing.assert_allclose(behind.position[0], [0, 0, -0.5], atol=0.01)
     np.testing.assert_allclose(behind.normals[0], [0, 0, 1], atol=1e-3)
 
 
 def test_planes_stand_where_the_room_is(environment: Environment, image: AttributeImage) -> None:
-    away = np.abs(rebuilt_depth(environment, image) - environment.depth) / environment.depth
+    away = np.abs(decoded_depth(environment, image) - environment.depth) / environment.depth
     assert np.median(away) < 0.01 and np.percentile(away, 90) < 0.05
 
 
@@ -70,7 +70,7 @@ def test_each_loss_is_seen_where_it_is(measured: Losses) -> None:
     for picture in measured.pictures.values():
         np.testing.assert_array_equal(picture.object_mask, truth.object_mask)
         np.testing.assert_array_equal(picture.hit_triangles, truth.hit_triangles)
-    assert loss["fixed point"]["frame"].psnr == HIGHEST_PSNR
+    assert loss["fixed point"]["frame"].psnr == MAX_PSNR
     assert loss["device"] == loss["both"]
     psnr = {name: loss[name]["frame"].psnr or 0 for name in loss}
     assert psnr["rebuild"] > psnr["clustering"] >= psnr["both"] - 0.5
@@ -90,7 +90,7 @@ def test_the_device_shows_the_rebuilt_room_but_for_its_rounding(
 ) -> None:
     """The rows `fixed point` and `device`: of the model's frame of the very same scene."""
     mesh = load_mesh("teapot:4")
-    scene = standing_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
+    scene = placed_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
     view = make_view(scene, mesh.extent, 160, 120, mesh.materials, environment)
     hardware = f"physicalAttributeMemory={json.dumps(image.layout.to_config())}"
     frame = device_frame(

@@ -18,12 +18,12 @@ from colonnade.reference.embree import RayTracer
 from colonnade.reference.environment.ray_march import (
     HIDDEN,
     HIT,
-    LEFT,
+    LEFT_VIEW,
     LOST,
     DepthMarch,
-    Rebuilt,
-    RebuiltGeometry,
-    from_march,
+    MarchedGeometry,
+    MarchHits,
+    march_from_arrays,
     positions,
 )
 from colonnade.reference.environment.surface import Backdrop
@@ -72,7 +72,7 @@ def test_the_march_meets_what_the_true_room_has_there(made: Attic) -> None:
     truth = tracer.surface_points(tracer.first_hits(origins, directions), origins, directions).position
     hit = met.kind == HIT
     away = np.linalg.norm(positions(environment, met) @ turn.T + world[:, 3] - truth, axis=1)[hit]
-    assert 0.2 < hit.mean() < 0.95 and set(np.unique(met.kind)) <= {HIT, HIDDEN, LEFT, LOST}
+    assert 0.2 < hit.mean() < 0.95 and set(np.unique(met.kind)) <= {HIT, HIDDEN, LEFT_VIEW, LOST}
     assert (away < 0.1).mean() > 0.9
 
 
@@ -80,13 +80,13 @@ def test_the_study_knows_a_good_rebuild_from_a_bad_one(made: Attic) -> None:
     environment = made.environment
     march = DepthMarch(environment)
 
-    def shifted(origins: np.ndarray, directions: np.ndarray) -> Rebuilt:
+    def shifted(origins: np.ndarray, directions: np.ndarray) -> MarchHits:
         met = march(origins, directions)
         return replace(met, seen_u=met.seen_u + 12, z=met.z * 1.2)
 
-    def blind(origins: np.ndarray, directions: np.ndarray) -> Rebuilt:
+    def blind(origins: np.ndarray, directions: np.ndarray) -> MarchHits:
         nothing, count = np.zeros(len(origins)), np.full(len(origins), 3)
-        return Rebuilt(*[nothing] * 2, nothing + 1, *[nothing] * 2, np.full(len(origins), LEFT), count)
+        return MarchHits(*[nothing] * 2, nothing + 1, *[nothing] * 2, np.full(len(origins), LEFT_VIEW), count)
 
     good = study(environment, march, environment.depth)
     assert good.mirror.ok > 0.85 and good.cosine.ok > 0.85 and good.mirror.missed < 0.1
@@ -105,13 +105,13 @@ def test_a_march_that_returns_arrays_is_a_rebuild_and_a_geometry(made: Attic) ->
     environment = made.environment
     march = DepthMarch(environment)
     rays = mirror_rays(standing_spheres(environment)[0])
-    rebuild = from_march(lambda origins, directions: vars(march(origins, directions)))
+    rebuild = march_from_arrays(lambda origins, directions: vars(march(origins, directions)))
     met, again = rebuild(rays.origins, rays.directions), march(rays.origins, rays.directions)
     for name in ("u", "v", "z", "seen_u", "seen_v", "kind", "steps"):
         np.testing.assert_array_equal(getattr(met, name), getattr(again, name))
-    points = Backdrop(environment, RebuiltGeometry(environment, rebuild), environment.albedo, environment.normals).meet(
-        rays.origins, rays.directions
-    )
+    points = Backdrop(
+        environment, MarchedGeometry(environment, rebuild), environment.albedo, environment.normals
+    ).intersect(rays.origins, rays.directions)
     np.testing.assert_array_equal(points.outside, (met.kind != HIT) & (met.kind != HIDDEN))
 
 
