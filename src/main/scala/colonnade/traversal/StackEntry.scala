@@ -23,7 +23,7 @@ private[traversal] object StackEntry {
 }
 
 /** A stack operation in its second cycle. */
-private[traversal] final class StackOperation(config: ColonnadeConfig) extends Bundle {
+private[traversal] final class PendingOperation(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
 
   /** An entry was read; otherwise `isDone` and `target` are the result. */

@@ -65,7 +65,7 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
 
   // Second cycle of an operation: its result, or the entry that was read
   private val isSecondCycle = RegInit(false.B)
-  private val operation     = Reg(new StackOperation(config))
+  private val operation     = Reg(new PendingOperation(config))
   private val entry         = Wire(new StackEntry(config))
   private val isDropped     = operation.isPop && entry.tNear.zext > operation.tMax
   private val popsAgain     = isSecondCycle && isDropped && operation.level =/= 0.U

@@ -6,31 +6,6 @@ import colonnade.shading.Occlusion
 
 import scala.util.Random
 
-/** The expected state of a context and of its path. */
-private class ContextModel(lights: Int) {
-  var state         = ContextState.idle
-  var isShadow      = false
-  var isPrimary     = false
-  var hasColour     = false
-  var isBackground  = false
-  var hasHit        = false
-  var occlusion     = Occlusion.none
-  var shadowPending = Seq.empty[Int]
-  var shadowLight   = 0
-  var occlusions    = Seq.fill(lights)(Occlusion.none)
-  var waited        = 0
-
-  /** The pixel shows the environment; its ray is a Fresnel reflection. */
-  var isDirectView        = false
-  var isFresnelReflection = false
-
-  /** Its primary ray cannot hit the object. */
-  var bypasses = false
-
-  /** The shader's result, if it is determined: a bounce, or a lit surface. */
-  var willBounce = Option.empty[Boolean]
-}
-
 /** A model of all contexts beside the controller; it drives random events that are legal in their states.
   *
   * @param hasEnvironment the frame has an environment, if the configuration has one
