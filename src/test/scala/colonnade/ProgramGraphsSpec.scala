@@ -10,9 +10,9 @@ import java.security.MessageDigest
 class ProgramGraphsSpec extends AnyFlatSpec {
   behavior of "ProgramGraphs"
 
-  private def inDocs(name: String): Path = Paths.get("docs", "diagrams", name)
+  private def inDocs(name: String): Path = Paths.get("docs", "diagrams", "programs", name)
 
-  it should "be the graphs in docs/diagrams" in {
+  it should "be the graphs in docs/diagrams/programs" in {
     for ((name, graph) <- ProgramGraphs(ConfigIO.load("small")))
       withClue(s"$name has changed; run tools/program-graphs: ") {
         assert(Files.readString(inDocs(name)) == graph)
