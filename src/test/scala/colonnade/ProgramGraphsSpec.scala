@@ -3,17 +3,21 @@ package colonnade
 import colonnade.config.ConfigIO
 import org.scalatest.flatspec.AnyFlatSpec
 
-import java.nio.file.{Files, Paths}
+import java.nio.charset.StandardCharsets.UTF_8
+import java.nio.file.{Files, Path, Paths}
+import java.security.MessageDigest
 
 class ProgramGraphsSpec extends AnyFlatSpec {
   behavior of "ProgramGraphs"
 
-  it should "be the graphs in docs/diagrams" in {
-    for ((name, graph) <- ProgramGraphs(ConfigIO.load("small"))) {
-      val file = Paths.get("docs", "diagrams", name)
-      withClue(s"$name has changed; write it again: colonnade.ProgramGraphs --target-dir docs/diagrams: ") {
-        assert(Files.readString(file) == graph)
+  private def inDocs(name: String): Path = Paths.get("docs", "diagrams", "programs", name)
+
+  it should "be the graphs in docs/diagrams/programs" in {
+    for ((name, graph) <- ProgramGraphs(ConfigIO.load("small")))
+      withClue(s"$name has changed; run tools/program-graphs: ") {
+        assert(Files.readString(inDocs(name)) == graph)
+        val hash = MessageDigest.getInstance("SHA-256").digest(graph.getBytes(UTF_8)).map(byte => f"$byte%02x").mkString
+        assert(Files.readString(inDocs(name.replace(".dot", ".svg"))).contains(s"$name, sha256 $hash "))
       }
-    }
   }
 }

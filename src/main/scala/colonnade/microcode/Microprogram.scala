@@ -10,6 +10,16 @@ import scala.collection.mutable
   * raises control signals, chooses operands, and has at most one [[branch]]. The program's [[graph]] is drawn from the
   * same description.
   *
+  * {{{
+  * program.step(Idle)(program.await(start, "start"))
+  * program.step(Multiply)(factor.choose(digit))
+  * program.step {
+  *   program.raise(control.accumulate)
+  *   program.branch(Multiply.when(hasDigits, "more digits"), Idle.otherwise)
+  * }
+  * program.build()
+  * }}}
+  *
   * @tparam L the program's labels
   */
 final class Microprogram[L <: Label](encoding: StepEncoding) {

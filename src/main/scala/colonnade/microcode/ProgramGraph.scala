@@ -47,7 +47,7 @@ private[microcode] object ProgramGraph {
       """  node [shape=box, style=rounded, fontname="Helvetica", fontsize=11];""",
       """  edge [fontname="Helvetica", fontsize=9];"""
     )
-    (Seq(s"""// Drawn by colonnade.ProgramGraphs from the program; do not edit.""", s"""digraph "$name" {""") ++
+    (Seq("// Drawn by tools/program-graphs from the program; do not edit.", s"""digraph "$name" {""") ++
       style ++ shapes ++ arrows :+ "}\n").mkString("\n")
   }
 }

@@ -22,18 +22,16 @@ final class BounceProgram(
     moreDigits: Bool
 ) {
   import BounceLabel._
+  import control.{actions, products}
 
   private val sumLatency = 2
-  private val products   = control.products
-  private val actions    = control.actions
 
   val program = new Microprogram[BounceLabel](StepEncoding.Binary(stall = moreDigits))
   import program.{branch, raise, set}
 
   private def xyz(first: Int): Range = first until first + 3
 
-  private def directions(first: Int): Seq[(Int, Int)] =
-    Seq(0, 1, 2).map(axis => (first + 2 * axis, first + 2 * axis + 1))
+  private def pairs(first: Int): Seq[(Int, Int)] = Seq(0, 2, 4).map(i => (first + i, first + i + 1))
 
   // The schedule, in cycles of the overlapped part: lengths and angle
   private val squareNormal       = xyz(0)
@@ -44,7 +42,8 @@ final class BounceProgram(
   private val latchRaySquared    = squareRay.last + sumLatency
   require(latchNormalSquared < latchCosine, "the angle is scaled by the normal's length")
 
-  private val reflect           = directions(squareRay.last + 1)
+  // Two products for each axis of a direction
+  private val reflect           = pairs(squareRay.last + 1)
   private val shiftInReflection = reflect.map(_._2 + sumLatency)
 
   // Snell's discriminant, |n|²·|d|² − η²·sin²
@@ -66,13 +65,13 @@ final class BounceProgram(
   private val subtractRoot        = latchDirectionScale + 1
   private val latchNormalScale    = subtractRoot + 1
 
-  private val refract           = directions(latchNormalScale + 1)
+  private val refract           = pairs(latchNormalScale + 1)
   private val shiftInRefraction = refract.map(_._2 + sumLatency)
   private val hemisphereCheck   = xyz(shiftInRefraction.last + 1)
   private val checkHemisphere   = hemisphereCheck.last + sumLatency
 
   // Sum and origin share the adder
-  private val scaleOffset   = Seq(0, 1, 2).map(checkHemisphere + 1 + 2 * _)
+  private val scaleOffset   = pairs(checkHemisphere + 1).map(_._1)
   private val shiftInOrigin = scaleOffset.map(_ + sumLatency)
 
   private val squareAgain = xyz(shiftInOrigin.last + 1)
@@ -176,10 +175,9 @@ final class BounceProgram(
   private def hemisphere(at: Overlap[BounceLabel]): Unit = {
     dot(at, hemisphereCheck, products.hemisphereCheck)
     val isWrong = Mux(state.isRefraction, !status.isNegative, !status.isPositive)
-    at(checkHemisphere)(branch(
-      startOver(isWrong, "wrong side of the surface"),
-      Done.when(!state.isRefraction, "reflection")
-    ))
+    at(checkHemisphere) {
+      branch(startOver(isWrong, "wrong side of the surface"), Done.when(!state.isRefraction, "reflection"))
+    }
   }
 
   private def offset(at: Overlap[BounceLabel]): Unit = {
@@ -237,10 +235,9 @@ final class BounceProgram(
   /** A multiple of the direction plus a multiple of the normal, for each axis. */
   private def blend(at: Overlap[BounceLabel], cycles: Seq[(Int, Int)], ofNormal: Bool): Unit =
     for ((first, second) <- cycles) {
-      at(first)(program.raiseEarly(products.directionScale))
+      dot(at, Seq(first), products.directionScale)
       at(second)(program.raiseEarly(ofNormal))
-      Seq(first, second).foreach(cycle => at(cycle + 1)(raise(actions.accumulate)))
-      at(first + 1)(raise(actions.startSum))
+      at(second + 1)(raise(actions.accumulate))
     }
 
   private def startOver(condition: Bool, reason: String) = {

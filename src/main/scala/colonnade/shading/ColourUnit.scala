@@ -82,7 +82,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val sum         = Reg(UInt(sumBits.W))
   private val surface     = Reg(UInt(colourBits.W))
 
-  /** Where a bounce may have a surface, it has another albedo than the bounce. */
+  /** The surface's albedo, in registers of its own if a bounce may have a surface. */
   private val surfaceAlbedo = if (hasBounces && config.hasEnvironment) Reg(Vec(3, UInt(colourBits.W))) else albedo
   private val colours       = Reg(Vec(3, UInt(colourBits.W)))
   private val ratios        = if (config.hasEnvironment) Some(Module(new ShadowRatioDivider(sumBits)).io) else None
@@ -111,9 +111,9 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     channel := 0.U
     isReady := false.B
     step    := 0.U
-    val meetsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
-    ofSurface  := meetsSurface
-    hasSurface := meetsSurface
+    val showsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
+    ofSurface  := showsSurface
+    hasSurface := showsSurface
     occlusions := io.end.bits.occlusions
     when(bounces) { occlusions.foreach(_ := Occlusion.none) }
     io.bounce.foreach { bounce =>
