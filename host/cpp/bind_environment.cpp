@@ -17,7 +17,7 @@ EnvironmentView viewOf(const Values& registers) {
     view.offset = vector("offset");
     view.offsetShift = static_cast<int>(lookUp(registers, "offsetShift"));
     view.exponent = static_cast<int>(lookUp(registers, "exponent"));
-    view.shellPlanes = static_cast<int>(lookUp(registers, "shellPlanes"));
+    view.boundingPlanes = static_cast<int>(lookUp(registers, "boundingPlanes"));
     return view;
 }
 
@@ -77,6 +77,6 @@ void bind_environment(nb::module_& module) {
         .def("load", &EnvironmentModel::load, "memory"_a, "words"_a, "Fills a memory by its name: uint8 [words, bytes], low byte first.")
         .def("march", &EnvironmentModel::march, "registers"_a, "origins"_a, "directions"_a,
              "Where rays meet the room. Origins int64 [n, 3], grid steps; directions int64 [n, 3], components of shadeBits bits and a sign. Registers: "
-             "matrix[0..2].{x,y,z}, offset.{x,y,z}, offsetShift, exponent, shellPlanes. Gives kind int64 [n] (0 nothing, 1 map, 2 shell), the map's pixel "
+             "matrix[0..2].{x,y,z}, offset.{x,y,z}, offsetShift, exponent, boundingPlanes. Gives kind int64 [n] (0 nothing, 1 map, 2 shell), the map's pixel "
              "x, y, the shell's entry, is_hidden bool, travel float64 (directions from the origin), steps.");
 }

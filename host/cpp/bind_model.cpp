@@ -115,7 +115,7 @@ public:
                 {"raysInBox", value(c.raysInBox)},
                 {"nodeReads", value(c.nodeReads)},     {"boxTests", value(c.boxTests)},     {"triangleTests", value(c.triangleTests)},
                 {"hits", value(c.hits)},               {"deepestStack", value(c.deepestStack)}};
-        if (environment_) values.merge(Values{{"raysRoom", value(c.raysRoom)}, {"marchSteps", value(c.marchSteps)}, {"albedoReads", value(c.albedoReads)}, {"normalReads", value(c.albedoReads)}});
+        if (environment_) values.merge(Values{{"raysEnvironment", value(c.raysEnvironment)}, {"marchSteps", value(c.marchSteps)}, {"albedoReads", value(c.albedoReads)}, {"normalReads", value(c.albedoReads)}});
         return values;
     }
 

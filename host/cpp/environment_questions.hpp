@@ -9,7 +9,7 @@
 //   cell   x y                                            -> id isIllegal
 //   plane  id                                             -> a b c exponent
 //   shell  index                                          -> a b c exponent albedo[3] normal[3]
-//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY shellPlanes isSeen pixel[2] origin[3] direction[3]
+//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY boundingPlanes isSeen pixel[2] origin[3] direction[3]
 //                                                         -> kind x y entry isHidden travel travelExponent steps point[3] albedo[3] normal[3] isIllegal
 //          the point that the ray meets, or else (isSeen) that the pixel shows; all 0 of a point that there is not
 #pragma once
@@ -46,7 +46,7 @@ public:
     const std::optional<AttributeImage>& maps() const { return image_; }
 
     bool knows(const std::string& kind) const {
-        return kind == "albedo" || kind == "normal" || kind == "tile" || kind == "cell" || kind == "plane" || kind == "shell" || kind == "march";
+        return kind == "albedo" || kind == "normal" || kind == "tile" || kind == "cell" || kind == "plane" || kind == "boundingPlane" || kind == "march";
     }
 
     Answer answer(const std::string& kind, Question& ask, const Numbers& numbers) {
@@ -54,7 +54,7 @@ public:
         const int first = static_cast<int>(ask.number());
         Answer answer;
         if (kind == "plane") return put(answer, image().planeOf(first));
-        if (kind == "shell") {
+        if (kind == "boundingPlane") {
             const BoundingPlaneEntry& entry = image().boundingPlane(first);
             put(answer, entry.plane) << entry.albedo.r << entry.albedo.g << entry.albedo.b;
             return answer << entry.normal.x << entry.normal.y << entry.normal.z;
@@ -88,7 +88,7 @@ private:
         view.exponent = static_cast<int>(ask.number());
         for (auto& row : view.rotation) row = ask.vector();
         for (auto& step : view.step) step = ask.number();
-        view.shellPlanes = static_cast<int>(ask.number());
+        view.boundingPlanes = static_cast<int>(ask.number());
         const bool isSeen = ask.number() != 0;
         const std::int64_t x = ask.number(), y = ask.number();
         const WideVector origin = ask.wideVector();

@@ -9,7 +9,7 @@
 //   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat shadows
 //          count, count * (position[3] colour[3] reachMantissa reachExponent)
 //                                                         -> origin[3], count * (direct[3] needsShadowRay)
-//   lightroom point[3] normal[3] offset shadows count, count * (position[3] colour[3] reachMantissa reachExponent)
+//   lightenvironment point[3] normal[3] offset shadows count, count * (position[3] colour[3] reachMantissa reachExponent)
 //                                                         -> as shade, for a point of a room
 //   bounce axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat kind etaFront etaBack reflectance
 //                                                         -> isRefraction origin[3] direction[3] reflection[3] share
@@ -231,7 +231,7 @@ int main() try {
         else if (kind == "box") answerBox(ask, numbers);
         else if (kind == "triangle") answerTriangle(ask, numbers);
         else if (kind == "shade") answerShade(ask, numbers);
-        else if (kind == "lightroom") answerLightEnvironment(ask, numbers);
+        else if (kind == "lightenvironment") answerLightEnvironment(ask, numbers);
         else if (kind == "bounce") answerBounce(ask, numbers);
         else if (kind == "layout") scene.readLayout(words);
         else if (kind == "records") scene.readRecords(words);

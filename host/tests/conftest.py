@@ -124,7 +124,7 @@ def _registers(vertex: int, mac: int, address: int, coordinate: int) -> list[dic
         fields += [(f"lights[{light}].colour.{c}", 16, False) for c in "rgb"]
         fields += [(f"lights[{light}].reachMantissa", 32, False), (f"lights[{light}].reachExponent", 9, True)]
     fields += [("shading.flat", 1, False), ("shading.shadows", 1, False), ("shading.lights", 2, False)]
-    fields += [("shading.offset", mac - 2, False), ("shading.bounces", 3, False), ("shading.clearness", 13, False)]
+    fields += [("shading.offset", mac - 2, False), ("shading.bounces", 3, False), ("shading.shadowTransmittance", 13, False)]
     for name, width in (("ambient", 16), ("background", 12)):
         fields += [(f"{name}.{c}", width, False) for c in "rgb"]
     for i in range(2):
@@ -189,7 +189,7 @@ COUNTERS = {
     "busyTriangleUnit": 120,
     "busyShader": 6,
     "idleContexts": 240,
-    "contextsSetUp": 480,
+    "contextsRaySetup": 480,
     "waitRecord": 120,
     "waitUnit": 60,
     "contextsBox": 1200,

@@ -97,5 +97,5 @@ def model_frame(
         distance=pixels["distance"],
         counters=model.counters(),
         errors=[name for name, is_set in model.errors().items() if is_set],
-        ratio=pixels["ratio"] if registers.get("room.isThere", 0) else None,
+        ratio=pixels["ratio"] if registers.get("environment.enabled", 0) else None,
     )

@@ -41,8 +41,8 @@ class DeviceMarch:
         self._environment = environment
         self._component = 1 << (manifest.numbers["shadeBits"] - 1)
         registers = view_registers(projection_of(environment, image) / 2.0**GRID_LOG, np.zeros(3), manifest)
-        self._registers = {name.removeprefix("room."): value for name, value in registers.items()}
-        self._registers["shellPlanes"] = int(image.planes.shell.any(axis=1).sum())
+        self._registers = {name.removeprefix("environment."): value for name, value in registers.items()}
+        self._registers["boundingPlanes"] = int(image.planes.shell.any(axis=1).sum())
 
     def __call__(self, origins: Floats, directions: Floats) -> MarchHits:
         """Hits of rays on the room. Rays are in view space, metres, float64 [n, 3] each."""

@@ -76,6 +76,6 @@ def read_frame(
         distance=pixels["distance"] * 2.0 ** -manifest.numbers["gridFraction"],
         counters={name.removeprefix("counters."): n for name, n in values.items() if name.startswith("counters.")},
         errors=[name.removeprefix("errors.") for name, bit in values.items() if name.startswith("errors.") and bit],
-        ratio=pixels["ratio"].copy() if registers.get("room.isThere", 0) else None,
+        ratio=pixels["ratio"].copy() if registers.get("environment.enabled", 0) else None,
     )
     return frame, int((pixels["is_seen"] == 0).sum())

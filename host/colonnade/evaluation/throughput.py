@@ -17,7 +17,7 @@ UNITS = {
 #: Counters of context cycles by the context's state, summed over all render units. The remainder is `COMPLETION`.
 CONTEXT_CYCLES = {
     "idle": "idleContexts",
-    "ray set-up": "contextsSetUp",
+    "ray set-up": "contextsRaySetup",
     "record stall": "waitRecord",
     "unit stall": "waitUnit",
     "box unit and stack": "contextsBox",

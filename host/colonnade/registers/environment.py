@@ -44,7 +44,7 @@ def environment_registers(
     else:
         depth = held.image.decoded_depth(PlaneProjection.of(held.environment, held.image.depth_unit))
         window = shadow_window(view, held.environment, depth, header.extent)
-    return registers | dict(zip((f"room.window.{edge}" for edge in ("x0", "y0", "x1", "y1")), window, strict=True))
+    return registers | dict(zip((f"environment.window.{edge}" for edge in ("x0", "y0", "x1", "y1")), window, strict=True))
 
 
 def projection_registers(
@@ -72,15 +72,15 @@ def projection_registers(
     offset = projection @ to_view @ (np.array(header.frame.offset) - origin)
     registers = view_registers(matrix, offset, manifest)
     rotation = np.rint(turn / np.linalg.norm(turn, axis=0) * 2.0**ROTATION_FRACTION).astype(np.int64)
-    registers |= {f"room.rotation[{i}].{axis}": int(rotation[i, a]) for i in range(3) for a, axis in enumerate(AXES)}
+    registers |= {f"environment.rotation[{i}].{axis}": int(rotation[i, a]) for i in range(3) for a, axis in enumerate(AXES)}
     fraction = manifest.numbers["shadeBits"] + STEP_GUARD
     for name, map_pixels, frame_pixels in (
         ("X", environment.width, view.width),
         ("Y", environment.height, view.height),
     ):
-        registers[f"room.step{name}"] = round(map_pixels / frame_pixels / (2 * SLOPE_PIXELS) * 2.0**fraction)
+        registers[f"environment.step{name}"] = round(map_pixels / frame_pixels / (2 * SLOPE_PIXELS) * 2.0**fraction)
     used = int(image.planes.shell.any(axis=1).sum())
-    return registers | {"room.shellPlanes": used, "room.isThere": 1}
+    return registers | {"environment.boundingPlanes": used, "environment.enabled": 1}
 
 
 def projection_of(environment: Environment, image: AttributeImage) -> Floats:
@@ -92,7 +92,7 @@ def projection_of(environment: Environment, image: AttributeImage) -> Floats:
 
 
 def view_registers(matrix: Floats, offset: Floats, manifest: Manifest) -> dict[str, int]:
-    """A projection of grid positions as ``room.matrix``, ``room.offset`` and their exponents."""
+    """A projection of grid positions as ``environment.matrix``, ``environment.offset`` and their exponents."""
     maximum = (1 << (manifest.numbers["macBits"] - 1)) - 1
     exponent = math.floor(math.log2(maximum / float(np.abs(matrix).max())))
     scaled = offset * 2.0**exponent
@@ -100,6 +100,6 @@ def view_registers(matrix: Floats, offset: Floats, manifest: Manifest) -> dict[s
     if shift > manifest.numbers["sceneBits"]:
         raise UserError("the object is too small for the room: make it larger")
     whole = np.rint(matrix * 2.0**exponent).astype(np.int64)
-    registers = {f"room.matrix[{i}].{axis}": int(whole[i, a]) for i in range(3) for a, axis in enumerate(AXES)}
-    registers |= {f"room.offset.{axis}": int(np.rint(scaled[a] / 2.0**shift)) for a, axis in enumerate(AXES)}
-    return registers | {"room.offsetShift": shift, "room.exponent": exponent}
+    registers = {f"environment.matrix[{i}].{axis}": int(whole[i, a]) for i in range(3) for a, axis in enumerate(AXES)}
+    registers |= {f"environment.offset.{axis}": int(np.rint(scaled[a] / 2.0**shift)) for a, axis in enumerate(AXES)}
+    return registers | {"environment.offsetShift": shift, "environment.exponent": exponent}

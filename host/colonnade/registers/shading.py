@@ -74,7 +74,7 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
         result |= _colour(f"materials[{index}].albedo", np.array(material.albedo) * white, white)
     if int(manifest.config["frame"]["maxBounces"]) > 0:
         result["shading.bounces"] = min(view.bounces, int(manifest.config["frame"]["maxBounces"]))
-        result["shading.clearness"] = int(np.rint(view.shadow_transmittance * one))
+        result["shading.shadowTransmittance"] = int(np.rint(view.shadow_transmittance * one))
         for index, material in enumerate(view.materials):
             result |= _kind(f"materials[{index}]", material, numbers["etaFraction"], one)
     return result

@@ -47,7 +47,7 @@ def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest:
     bounces = registers["shading.bounces"] if is_shiny else 0
     rays = 1 + bounces + lights
     # Glass looks up the environment once more at each bounce
-    march = _march(manifest) if registers.get("room.isThere", 0) else 0
+    march = _march(manifest) if registers.get("environment.enabled", 0) else 0
     cycles = contexts * (rays * (RAY_CYCLES + walk) + (rays + bounces) * march)
     return min(BASE_CYCLES + cycles, (1 << 32) - 1)
 

@@ -148,7 +148,7 @@ def mesh_report(header: ImageHeader) -> MeshReport:
 
 
 def _environment_report(manifest: Manifest, counters: Mapping[str, int]) -> EnvironmentReport | None:
-    look_ups, busy = counters.get("raysRoom", 0), counters.get("busyRoom")
+    look_ups, busy = counters.get("raysEnvironment", 0), counters.get("busyEnvironment")
     if look_ups == 0 or busy is None:
         return None
     array = manifest.config["array"]

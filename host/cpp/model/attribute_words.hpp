@@ -17,7 +17,7 @@ struct PlaneWord {
 
 /// The manifest's `attributes.sizes`.
 struct AttributeSizes {
-    int width, height, tileLog, tileColumns, tileRows, blockLog, blockColumns, blockRows, paletteSize, planes, shellPlanes;
+    int width, height, tileLog, tileColumns, tileRows, blockLog, blockColumns, blockRows, paletteSize, planes, boundingPlanes;
     /// Words of the memories that tiles or blocks point into.
     int mapHeapWords, planeHeapWords, labelWords;
     /// Labels and seeds (`slic`), not descriptors, palette and heap (`twoLevel`).
@@ -35,7 +35,7 @@ struct AttributeSizes {
         blockRows = take("blockRows");
         paletteSize = take("paletteSize");
         planes = take("planes");
-        shellPlanes = take("shellPlanes");
+        boundingPlanes = take("boundingPlanes");
         mapHeapWords = take("mapHeapWords");
         planeHeapWords = take("planeHeapWords");
         labelWords = take("labelWords");

@@ -155,7 +155,7 @@ class AttributeImage {
 public:
     /// @param layouts the manifest's `attributes.layouts`
     AttributeImage(const AttributeSizes& sizes, const std::map<std::string, Layout>& layouts)
-        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes), planes_(sizes.planes), boundingPlanes_(sizes.shellPlanes) {}
+        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes), planes_(sizes.planes), boundingPlanes_(sizes.boundingPlanes) {}
 
     /// Fills a memory from address 0, by its name in the manifest, with words of `stride` bytes, low byte first. Words beyond its depth are dropped.
     void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
@@ -169,7 +169,7 @@ public:
         else if (memory == "planes.descriptors") ids_.loadDescriptors(by("planeDescriptor"));
         else if (memory == "planes.heap") ids_.heap().load(words, count, stride);
         else if (memory == "planes.planes") loadPlanes(by("plane"));
-        else if (memory == "planes.shell") loadBoundingPlanes(by("shellEntry"));
+        else if (memory == "planes.bounding") loadBoundingPlanes(by("boundingPlaneEntry"));
         else throw std::invalid_argument("there is no attribute memory '" + memory + "'");
     }
 

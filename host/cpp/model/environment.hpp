@@ -273,7 +273,7 @@ private:
     void meetBoundingPlanes(const MapRay& ray, const EnvironmentView& view, EnvironmentPoint& point) const {
         std::uint64_t bestQuotient = 0;
         int bestExponent = 0;
-        for (int i = 0; i < std::min(view.shellPlanes, sizes_.shellPlanes); ++i) {
+        for (int i = 0; i < std::min(view.boundingPlanes, sizes_.boundingPlanes); ++i) {
             const PlaneWord& plane = image_.boundingPlane(i).plane;
             const std::int64_t front = depthOf(ray, plane, i).value;
             const std::int64_t centreU = std::int64_t(sizes_.width) << (f_ - mapLog - 1), centreV = std::int64_t(sizes_.height) << (f_ - mapLog - 1);

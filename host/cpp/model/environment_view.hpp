@@ -13,7 +13,7 @@ struct EnvironmentView {
     int offsetShift;
     int exponent;
     /// Count as all that there are above that.
-    int shellPlanes;
+    int boundingPlanes;
     std::array<std::int64_t, 2> step;
     /// Pixels that show the room itself: x0, y0, x1, y1, the latter exclusive.
     std::array<std::int64_t, 4> window;

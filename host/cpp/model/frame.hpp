@@ -12,7 +12,7 @@ namespace colonnade {
 struct Counters {
     std::uint64_t raysPrimary, raysShadow, raysReflection, raysRefraction, raysInBox, nodeReads, boxTests, triangleTests, hits, deepestStack;
     /// Of the room: rays that look for a point of it, tiles and cells that they pass, points whose pixel is looked up.
-    std::uint64_t raysRoom, marchSteps, albedoReads;
+    std::uint64_t raysEnvironment, marchSteps, albedoReads;
 };
 
 struct Errors {
@@ -188,7 +188,7 @@ private:
     }
 
     const EnvironmentPoint& count(const EnvironmentPoint& point) {
-        ++counters.raysRoom;
+        ++counters.raysEnvironment;
         counters.marchSteps += static_cast<std::uint64_t>(point.steps);
         counters.albedoReads += point.kind == EnvironmentPoint::Kind::map;
         errors.illegalRecord = errors.illegalRecord || point.isIllegal;

@@ -67,8 +67,8 @@ struct Frame {
         lighting.ambient = vector("ambient", "rgb");
         lighting.background = vector("background", "rgb");
         lighting.offset = take("shading.offset");
-        lighting.shadowTransmittance = takeIfThere("shading.clearness");
-        lighting.hasTransmittance = registers.count("shading.clearness") != 0;
+        lighting.shadowTransmittance = takeIfThere("shading.shadowTransmittance");
+        lighting.hasTransmittance = registers.count("shading.shadowTransmittance") != 0;
         lighting.flat = take("shading.flat") != 0;
         lighting.shadows = take("shading.shadows") != 0;
         lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
@@ -83,18 +83,18 @@ struct Frame {
         attributeBase = std::min(recordCount, static_cast<std::size_t>(take("scene.attributeBase")));
         triangleBase = std::min(attributeBase, static_cast<std::size_t>(take("scene.triangleBase")));
         watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
-        hasEnvironment = takeIfThere("room.isThere") != 0;
+        hasEnvironment = takeIfThere("environment.enabled") != 0;
         if (!hasEnvironment) return;
         for (int row = 0; row < 3; ++row) {
-            environment.matrix[row] = vector("room.matrix[" + std::to_string(row) + "]");
-            environment.rotation[row] = vector("room.rotation[" + std::to_string(row) + "]");
+            environment.matrix[row] = vector("environment.matrix[" + std::to_string(row) + "]");
+            environment.rotation[row] = vector("environment.rotation[" + std::to_string(row) + "]");
         }
-        environment.offset = vector("room.offset");
-        environment.offsetShift = static_cast<int>(take("room.offsetShift"));
-        environment.exponent = static_cast<int>(take("room.exponent"));
-        environment.shellPlanes = static_cast<int>(take("room.shellPlanes"));
-        environment.step = {take("room.stepX"), take("room.stepY")};
-        environment.window = {take("room.window.x0"), take("room.window.y0"), take("room.window.x1"), take("room.window.y1")};
+        environment.offset = vector("environment.offset");
+        environment.offsetShift = static_cast<int>(take("environment.offsetShift"));
+        environment.exponent = static_cast<int>(take("environment.exponent"));
+        environment.boundingPlanes = static_cast<int>(take("environment.boundingPlanes"));
+        environment.step = {take("environment.stepX"), take("environment.stepY")};
+        environment.window = {take("environment.window.x0"), take("environment.window.y0"), take("environment.window.x1"), take("environment.window.y1")};
     }
 
     /// What the names of a table's entry begin with.

@@ -71,7 +71,7 @@ def test_the_object_takes_light_within_the_window_only(light: Light) -> None:
     image = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest)
     scene = replace(TABLE, light=light)
     registers = frame_registers(scene, image.header, manifest, 320, 240, held, relit=False)
-    x0, y0, x1, y1 = (registers[f"room.window.{edge}"] for edge in ("x0", "y0", "x1", "y1"))
+    x0, y0, x1, y1 = (registers[f"environment.window.{edge}"] for edge in ("x0", "y0", "x1", "y1"))
     assert 0 < (x1 - x0) * (y1 - y0) < 320 * 240
     frame = render_model(manifest, image, frame_registers(scene, image.header, manifest, 320, 240, held))
     assert frame.ratio is not None

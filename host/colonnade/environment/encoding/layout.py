@@ -107,13 +107,13 @@ class AttributeLayout:
     def from_config(section: Mapping[str, Any]) -> AttributeLayout:
         """Build the layout of a configuration's section ``physicalAttributeMemory``."""
         names = {"tileSize": "tile_size", "paletteSize": "palette_size", "mapBytes": "map_bytes"}
-        names |= {"planeBytes": "plane_bytes", "shellPlanes": "shell_planes"}
+        names |= {"planeBytes": "plane_bytes", "boundingPlanes": "shell_planes"}
         return AttributeLayout(**{names.get(key, key): value for key, value in section.items() if key != "shared"})
 
     def to_config(self) -> dict[str, Any]:
         """The configuration section ``physicalAttributeMemory`` with these sizes."""
         names = {"tile_size": "tileSize", "palette_size": "paletteSize", "map_bytes": "mapBytes"}
-        names |= {"plane_bytes": "planeBytes", "shell_planes": "shellPlanes"}
+        names |= {"plane_bytes": "planeBytes", "shell_planes": "boundingPlanes"}
         sizes = {names.get(name, name): value for name, value in asdict(self).items() if name not in HOST_ONLY}
         return {**sizes, "shared": False}
 

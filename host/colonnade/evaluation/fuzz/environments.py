@@ -115,7 +115,7 @@ _MUTATIONS = (_pointers, _pointers, _words, _fields)
 
 def _registers(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
     """Set one to three registers of the room to any value that fits."""
-    all_of_room = [r for r in manifest.registers.values() if r.access == "rw" and r.name.startswith("room.")]
+    all_of_room = [r for r in manifest.registers.values() if r.access == "rw" and r.name.startswith("environment.")]
     scalars = [r for r in all_of_room if "[" not in r.name]
     values, changes = dict(case.registers), []
     for _ in range(int(random.integers(1, 4))):
@@ -154,5 +154,5 @@ def _layout(manifest: Manifest, memory: str) -> Mapping[str, Field]:
     part, _, name = memory.partition(".")
     entries = {"albedo": "albedo", "normals": "normal"}.get(part, "plane")
     kinds = {"descriptors": "planeDescriptor" if part == "planes" else "mapDescriptor", "planes": "plane"}
-    kinds |= {"shell": "shellEntry", "palette": entries, "seeds": entries}
+    kinds |= {"shell": "boundingPlaneEntry", "palette": entries, "seeds": entries}
     return manifest.attributes.layouts[kinds[name]].fields if name in kinds else {}

@@ -21,7 +21,7 @@ def corrupt_registers(random: np.random.Generator, case: Case, manifest: Manifes
         if (
             register.access == "rw"
             and register.name != "frame.watchdogCycles"
-            and not register.name.startswith("room.")
+            and not register.name.startswith("environment.")
         ):
             groups.setdefault(register.name.split("[")[0].rsplit(".", 1)[0], []).append(register)
     values = dict(case.registers)

@@ -85,11 +85,11 @@ def test_the_model_of_a_room_is_defined_on_all_words_and_registers(manifest: Man
     for _ in range(20):
         registers = {}
         for register in manifest.registers.values():
-            if register.name.startswith("room."):
+            if register.name.startswith("environment."):
                 least, greatest = value_range(register.width, register.signed)
-                registers[register.name.removeprefix("room.")] = int(random.integers(least, greatest, endpoint=True))
+                registers[register.name.removeprefix("environment.")] = int(random.integers(least, greatest, endpoint=True))
         scene, direction = manifest.numbers["sceneBits"] - 1, manifest.numbers["shadeBits"]
         origins = random.integers(-(1 << scene), 1 << scene, (rays, 3))
         ways = random.integers(-(1 << direction), 1 << direction, (rays, 3))
         met = model.march(registers, origins, ways)
-        assert met["steps"].max() <= 128 and met["entry"].max() < manifest.attributes.sizes["shellPlanes"]
+        assert met["steps"].max() <= 128 and met["entry"].max() < manifest.attributes.sizes["boundingPlanes"]

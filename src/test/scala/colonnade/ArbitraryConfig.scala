@@ -50,7 +50,7 @@ object ArbitraryConfig {
     tileSize    <- Gen.oneOf(16, 32)
     paletteSize <- Gen.oneOf(16, 64, 256)
     planes      <- Gen.oneOf(16, 128, 256)
-    shellPlanes <- Gen.chooseNum(2, 16)
+    boundingPlanes <- Gen.chooseNum(2, 16)
     mapHeap     <- Gen.chooseNum(66, 16384)
     planeHeap   <- Gen.chooseNum(20, 16384)
     shared      <- flag
@@ -64,7 +64,7 @@ object ArbitraryConfig {
       case MapEncoding.TwoLevel => tiles * 4 + paletteSize * 9 / 2 + mapHeap
       case MapEncoding.Sliding  => (tiles * 9 + 1) / 2 + (blocks + 3) / 4 * 2 + mapHeap
     }
-    val planeBytes = tiles * 2 + planes * 8 + shellPlanes * 18 + planeHeap
+    val planeBytes = tiles * 2 + planes * 8 + boundingPlanes * 18 + planeHeap
     PhysicalAttributeMemoryConfig(
       width,
       height,
@@ -74,7 +74,7 @@ object ArbitraryConfig {
       mapBytes,
       planes,
       planeBytes,
-      shellPlanes,
+      boundingPlanes,
       shared
     )
   }

@@ -34,7 +34,7 @@ object TestConfigs {
     mapBytes = 3000,
     planes = 128,
     planeBytes = 2000,
-    shellPlanes = 8,
+    boundingPlanes = 8,
     shared = false
   )
 
@@ -50,7 +50,7 @@ object TestConfigs {
       tileSize = 32,
       paletteSize = 64,
       planes = 32,
-      shellPlanes = 3,
+      boundingPlanes = 3,
       mapBytes = 16848,
       planeBytes = 16781
     )

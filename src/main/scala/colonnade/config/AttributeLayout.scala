@@ -27,8 +27,8 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
   val tileBits:       Int     = bitsOf(tiles)
   val paletteBits:    Int     = bitsOf(paletteSize)
   val planeIdBits:    Int     = bitsOf(planes)
-  val shellIndexBits: Int     = bitsOf(shellPlanes)
-  val tableIndexBits: Int     = planeIdBits.max(shellIndexBits)
+  val boundingPlaneIndexBits: Int     = bitsOf(boundingPlanes)
+  val tableIndexBits: Int     = planeIdBits.max(boundingPlaneIndexBits)
   val isSliding:      Boolean = encoding == MapEncoding.Sliding
 
   /** Heap words of a two-level map; 0 for a sliding map. */
@@ -52,12 +52,12 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
 
   val planeHeapWords: Int = {
     val descriptors    = tiles * planeDescriptorBits / 8
-    val (table, shell) = (planes * planeBits / 8, shellPlanes * shellEntryBytes)
+    val (table, shell) = (planes * planeBits / 8, boundingPlanes * boundingPlaneEntryBytes)
     heapWords(
       "planeBytes",
       planeBytes,
       descriptors + table + shell,
-      s"$tiles tile descriptors take $descriptors bytes, $planes planes $table and $shellPlanes shell planes $shell",
+      s"$tiles tile descriptors take $descriptors bytes, $planes planes $table and $boundingPlanes shell planes $shell",
       largestTile = 2 + 2 * (1 << 6) / heapWordBits
     )
   }
@@ -80,7 +80,7 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
     "planes"         -> planes,
     "planeHeapWords" -> planeHeapWords,
     "planeBytes"     -> planeBytes,
-    "shellPlanes"    -> shellPlanes
+    "boundingPlanes"    -> boundingPlanes
   )
 
   /** Heap words in the remaining bytes.
@@ -137,7 +137,7 @@ object AttributeLayout {
   val planeBits:       Int = 3 * coefficientBits + exponentBits
 
   /** Size of a bounding plane, rounded up to heap words. */
-  val shellEntryBytes: Int = (planeBits + 2 * entryBits + heapWordBits - 1) / heapWordBits * (heapWordBits / 8)
+  val boundingPlaneEntryBytes: Int = (planeBits + 2 * entryBits + heapWordBits - 1) / heapWordBits * (heapWordBits / 8)
 
   private val cellsPerBlockRow = 4
 

@@ -96,7 +96,7 @@ object ConfigIO {
           "mapBytes",
           "planes",
           "planeBytes",
-          "shellPlanes",
+          "boundingPlanes",
           "shared"
         )
         .map(physicalAttributeMemory),
@@ -162,7 +162,7 @@ object ConfigIO {
     mapBytes = memory.int("mapBytes"),
     planes = memory.int("planes"),
     planeBytes = memory.int("planeBytes"),
-    shellPlanes = memory.int("shellPlanes"),
+    boundingPlanes = memory.int("boundingPlanes"),
     shared = memory.boolean("shared")
   )
 
@@ -175,7 +175,7 @@ object ConfigIO {
     "mapBytes"    -> memory.mapBytes,
     "planes"      -> memory.planes,
     "planeBytes"  -> memory.planeBytes,
-    "shellPlanes" -> memory.shellPlanes,
+    "boundingPlanes" -> memory.boundingPlanes,
     "shared"      -> memory.shared
   )
 

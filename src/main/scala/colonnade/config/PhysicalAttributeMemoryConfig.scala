@@ -24,7 +24,7 @@ object MapEncoding {
   * @param mapBytes    of albedo, and of normals
   * @param planes      entries of the plane table
   * @param planeBytes  of the plane map, its table and the bounding planes
-  * @param shellPlanes bounding planes outside the view
+  * @param boundingPlanes bounding planes outside the view
   * @param shared      one memory for the device; otherwise a copy in every column
   */
 final case class PhysicalAttributeMemoryConfig(
@@ -36,7 +36,7 @@ final case class PhysicalAttributeMemoryConfig(
     mapBytes:    Int,
     planes:      Int,
     planeBytes:  Int,
-    shellPlanes: Int,
+    boundingPlanes: Int,
     shared:      Boolean
 ) {
   import PhysicalAttributeMemoryConfig._
@@ -46,7 +46,7 @@ final case class PhysicalAttributeMemoryConfig(
   Require.oneOf(s"$section.tileSize", tileSize, Seq(16, 32))
   Require.oneOf(s"$section.paletteSize", paletteSize, powers)
   Require.oneOf(s"$section.planes", planes, powers)
-  Require.within(s"$section.shellPlanes", shellPlanes, 2, 16)
+  Require.within(s"$section.boundingPlanes", boundingPlanes, 2, 16)
 
   /** All derived sizes. */
   val layout: AttributeLayout = AttributeLayout(this)

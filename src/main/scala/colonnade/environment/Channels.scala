@@ -3,7 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.{AlbedoEntry, AttributeEvents, NormalEntry, ShellEntry}
+import colonnade.formats.{AlbedoEntry, AttributeEvents, NormalEntry, BoundingPlaneEntry}
 
 /** A request with a tag, which its response carries as well. */
 final class TaggedRequest[T <: Data](private val kind: T, tagBits: Int) extends Bundle {
@@ -75,7 +75,7 @@ final class AttributePort(layout: AttributeLayout, tagBits: Int) extends Bundle 
   val albedo  = new AttributeChannel(new MapPixel(layout), new AlbedoEntry, tagBits)
   val normals = new AttributeChannel(new MapPixel(layout), new NormalEntry, tagBits)
   val cells   = new AttributeChannel(new CellRequest(layout), new CellResponse(layout), tagBits)
-  val planes  = new AttributeChannel(new PlaneRequest(layout), new ShellEntry, tagBits)
+  val planes  = new AttributeChannel(new PlaneRequest(layout), new BoundingPlaneEntry, tagBits)
 
   /** Requests accepted in this cycle. */
   def events: AttributeEvents = {

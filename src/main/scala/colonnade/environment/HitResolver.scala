@@ -19,12 +19,12 @@ final class HitResolver(
   import m.program._
 
   val kind:          UInt = Reg(UInt(HitKind.bits.W))
-  val boundingPlane: UInt = Reg(UInt(layout.shellIndexBits.W))
+  val boundingPlane: UInt = Reg(UInt(layout.boundingPlaneIndexBits.W))
 
   /** The distance is quotient · 2^exponent times the scaled direction. */
   val exponent: SInt = Reg(SInt(shiftBits.W))
 
-  private val index           = Reg(UInt(view.shellPlanes.getWidth.W))
+  private val index           = Reg(UInt(view.boundingPlanes.getWidth.W))
   private val nearestMantissa = Reg(UInt((f + 1).W))
   private val nearestExponent = Reg(SInt(shiftBits.W))
 
@@ -96,7 +96,7 @@ final class HitResolver(
     step(set(m.uvwDir(1), m.combine(m.projectedDir(1), fromCentre, subtract = true)))
     step(BoundingPlane) {
       set(planes.id, index)
-      val isOver = index === view.shellPlanes || index === layout.config.shellPlanes.U
+      val isOver = index === view.boundingPlanes || index === layout.config.boundingPlanes.U
       branch(BoundingPlanesDone.when(isOver, "no more planes"), Plane.otherwise)
     }
     step(BoundingDepth) {

@@ -55,7 +55,7 @@ final class MarchResult(config: ColonnadeConfig) extends Bundle {
   val y = UInt(layout.yBits.W)
 
   /** `boundingPlane`: the plane with the point's albedo and normal. */
-  val boundingPlane = UInt(layout.shellIndexBits.W)
+  val boundingPlane = UInt(layout.boundingPlaneIndexBits.W)
 
   /** `map`: the point is on the extension of a surface, hidden by another one. */
   val isHidden = Bool()

@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{Cat, Enum, OHToUInt}
-import colonnade.formats.{Plane, ShellEntry}
+import colonnade.formats.{Plane, BoundingPlaneEntry}
 import colonnade.microcode.Repeat
 
 /** A plane's depth along a ray: the ray is value + slope · s in front of the plane, in steps of 2^(exponent − 22). */
@@ -14,7 +14,7 @@ final class PlaneDepth(formats: MarchFormats) extends Bundle {
 }
 
 /** Depths of the last four planes along the current ray. A plane that is not cached is fetched. */
-final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneRequest, ShellEntry]) {
+final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneRequest, BoundingPlaneEntry]) {
   import MarchLabel.{PlaneDepth => DepthLabel, _}
   import m.formats._
   import m.program._

@@ -3,7 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Valid
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.{Load, ShellEntry}
+import colonnade.formats.{Load, BoundingPlaneEntry}
 
 /** Ports of [[PlaneMap]]. */
 final class PlaneMapIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
@@ -11,7 +11,7 @@ final class PlaneMapIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
 
   val load   = Flipped(Valid(new Load(config)))
   val cells  = Flipped(new AttributeChannel(new CellRequest(layout), new CellResponse(layout), tagBits))
-  val planes = Flipped(new AttributeChannel(new PlaneRequest(layout), new ShellEntry, tagBits))
+  val planes = Flipped(new AttributeChannel(new PlaneRequest(layout), new BoundingPlaneEntry, tagBits))
 }
 
 /** The environment's planes. One channel gives the planes of a tile or cell, the other one a plane's coefficients; neither

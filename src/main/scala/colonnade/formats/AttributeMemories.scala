@@ -23,7 +23,7 @@ object AttributeMemories {
         ("planes.descriptors", layout.tiles, (new PlaneDescriptor).getWidth),
         ("planes.heap", layout.planeHeapWords, AttributeLayout.heapWordBits),
         ("planes.planes", memory.planes, (new Plane).getWidth),
-        ("planes.shell", memory.shellPlanes, (new ShellEntry).getWidth)
+        ("planes.bounding", memory.boundingPlanes, (new BoundingPlaneEntry).getWidth)
       )
       shapes.zip(LoadTarget.firstAttributes until LoadTarget.firstAttributes + shapes.size).map {
         case ((name, depth, bits), target) => AttributeMemory(name, depth, bits, target)
@@ -37,7 +37,7 @@ object AttributeMemories {
     "normal"          -> (() => new NormalEntry),
     "planeDescriptor" -> (() => new PlaneDescriptor),
     "plane"           -> (() => new Plane),
-    "shellEntry"      -> (() => new ShellEntry)
+    "boundingPlaneEntry"      -> (() => new BoundingPlaneEntry)
   )
 
   private def map(name: String, layout: AttributeLayout): Seq[(String, Int, Int)] =

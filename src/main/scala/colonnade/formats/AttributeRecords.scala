@@ -57,7 +57,7 @@ final class Plane extends Bundle {
 }
 
 /** A bounding plane outside the view, with its one colour and normal. */
-final class ShellEntry extends Bundle {
+final class BoundingPlaneEntry extends Bundle {
   val normal = new NormalEntry
   val albedo = new AlbedoEntry
   val plane  = new Plane

@@ -26,7 +26,7 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
   val stepY = UInt((numbers.shadeBits + EnvironmentView.stepGuard).W)
 
   /** Number of bounding planes, clamped to the size of their table. */
-  val shellPlanes = UInt(8.W)
+  val boundingPlanes = UInt(8.W)
 
   /** Rays that miss the object meet the environment; otherwise they have the background's colour. */
   val isThere = Bool()

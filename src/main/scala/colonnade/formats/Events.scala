@@ -27,7 +27,7 @@ final class UnitEvents(config: ColonnadeConfig) extends Bundle {
     * record for a unit; in box unit and stack; in the triangle unit; in the shader. The others are in later stages.
     */
   val idleContexts      = contexts
-  val contextsSetUp     = contexts
+  val contextsRaySetup     = contexts
   val waitRecord        = contexts
   val waitUnit          = contexts
   val contextsBox       = contexts
@@ -37,10 +37,10 @@ final class UnitEvents(config: ColonnadeConfig) extends Bundle {
   /** With an environment: rays that start the march; tiles and cells that they visit; the march is busy; contexts that
     * wait for it or are in it.
     */
-  val raysRoom     = ifRoom(Bool())
+  val raysEnvironment     = ifRoom(Bool())
   val marchSteps   = ifRoom(Bool())
-  val busyRoom     = ifRoom(Bool())
-  val contextsRoom = ifRoom(contexts)
+  val busyEnvironment     = ifRoom(Bool())
+  val contextsEnvironment = ifRoom(contexts)
 
   /** The maximum number of entries of any stack of the unit since the start of the frame: a level, not an event. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)

@@ -58,7 +58,7 @@ object FormatsPage {
       table(new Plane),
       "### Shell entry",
       "A plane beyond the view, with the one albedo and normal that it has.",
-      table(new ShellEntry),
+      table(new BoundingPlaneEntry),
       "## Streams",
       "### Pixel",
       "Finished pixels leave in any order.",

@@ -205,7 +205,7 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
 
   /** Context cycles by state of the context; in the remaining cycles the context is in a later stage. */
   val idleContexts      = counter
-  val contextsSetUp     = counter
+  val contextsRaySetup     = counter
   val waitRecord        = counter
   val waitUnit          = counter
   val contextsBox       = counter
@@ -215,10 +215,10 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
   /** Environment march: rays; tiles and cells visited; cycles in which the march is busy, summed over units; context
     * cycles in which a context waits for the march or is in it.
     */
-  val raysRoom     = environmentCounter
+  val raysEnvironment     = environmentCounter
   val marchSteps   = environmentCounter
-  val busyRoom     = environmentCounter
-  val contextsRoom = environmentCounter
+  val busyEnvironment     = environmentCounter
+  val contextsEnvironment = environmentCounter
 
   /** Reads of the maps of the environment. */
   val albedoReads = environmentCounter

@@ -62,7 +62,7 @@ final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
   /** From 1 to `trianglesPerRecord`. */
   val count = UInt(NumberFormats.bitLength(geometry.trianglesPerRecord).W)
 
-  /** By triangle: its material transmits light, see `shading.clearness`. */
+  /** By triangle: its material transmits light, see `shading.shadowTransmittance`. */
   val isClear = Vec(geometry.trianglesPerRecord, Bool())
 
   /** Three per triangle, in vertex units. */

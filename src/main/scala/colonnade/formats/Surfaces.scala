@@ -36,11 +36,11 @@ final class Shading(config: ColonnadeConfig) extends Record {
   val bounces = ifBounces(UInt(NumberFormats.bitLength(config.frame.maxBounces).W))
 
   /** Transmittance of transmissive triangles for shadow rays. */
-  val clearness = ifBounces(FrameRegisters.weight)
+  val shadowTransmittance = ifBounces(FrameRegisters.weight)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
     Seq("flat" -> flat, "shadows" -> shadows, "lights" -> lights, "offset" -> offset) ++
-      bounces.map("bounces" -> _) ++ clearness.map("clearness" -> _): _*
+      bounces.map("bounces" -> _) ++ shadowTransmittance.map("shadowTransmittance" -> _): _*
   )
 }
 

@@ -43,7 +43,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val busyShader       = perUnit
 
   val idleContexts      = perContext
-  val contextsSetUp     = perContext
+  val contextsRaySetup     = perContext
   val waitRecord        = perContext
   val waitUnit          = perContext
   val contextsBox       = perContext
@@ -51,10 +51,10 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val contextsShading   = perContext
 
   /** With an environment. */
-  val raysRoom     = ifEnvironment(perUnit)
+  val raysEnvironment     = ifEnvironment(perUnit)
   val marchSteps   = ifEnvironment(perUnit)
-  val busyRoom     = ifEnvironment(perUnit)
-  val contextsRoom = ifEnvironment(perContext)
+  val busyEnvironment     = ifEnvironment(perUnit)
+  val contextsEnvironment = ifEnvironment(perContext)
 
   val albedoReads = perEnvironment
   val normalReads = perEnvironment

@@ -144,7 +144,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
 
   // One product
   private val one                               = (1 << fraction).U(weightBits.W)
-  private val shadowTransmittance               = io.shading.clearness.map(_.natural).getOrElse(one)
+  private val shadowTransmittance               = io.shading.shadowTransmittance.map(_.natural).getOrElse(one)
   private val light                             = step(log2Ceil(lights.max(2)) - 1, 0)
   private val reflectance                       = of(surfaceAlbedo)
   private def at[T <: Data](entries: Vec[T]): T = if (lights == 1) entries.head else entries(light)

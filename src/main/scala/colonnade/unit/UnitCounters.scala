@@ -41,17 +41,17 @@ object UnitCounters {
     events.busyRaySetup    := raySetup.busy
     events.busyShader      := shader.busy
     events.idleContexts    := controller.idleCount
-    events.contextsSetUp   := controller.raySetupCount
+    events.contextsRaySetup   := controller.raySetupCount
     events.contextsShading := Occupancy(
       config,
       shader.request.fire +: shader.environment.map(_.fire).toSeq,
       shader.lit.fire +: shader.bounced.map(_.fire).toSeq
     )
 
-    events.raysRoom.foreach(_ := controller.environment.get.req.fire)
-    events.contextsRoom.foreach(_ := controller.environmentCount.get)
+    events.raysEnvironment.foreach(_ := controller.environment.get.req.fire)
+    events.contextsEnvironment.foreach(_ := controller.environmentCount.get)
     events.marchSteps.foreach(_ := environment.get.events.step)
-    events.busyRoom.foreach(_ := environment.get.events.busy)
+    events.busyEnvironment.foreach(_ := environment.get.events.busy)
 
     events.illegalRecord := fetch.events.illegalRecord || intersector.events.illegalRecord ||
       environment.map(_.events.illegal).getOrElse(false.B)

@@ -2,7 +2,7 @@ package colonnade.environment
 
 import colonnade.Packed
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.{AttributeMemories, Plane, PlaneDescriptor, ShellEntry}
+import colonnade.formats.{AttributeMemories, Plane, PlaneDescriptor, BoundingPlaneEntry}
 
 import scala.util.Random
 
@@ -78,7 +78,7 @@ final class EnvironmentScene(config: ColonnadeConfig, random: Random) {
     }
     val table = surfaces.map(surface => new Packed(new Plane).pack(word(surface)))
     val shell = surfaces.take(5).map(surface =>
-      new Packed(new ShellEntry).pack(
+      new Packed(new BoundingPlaneEntry).pack(
         word(surface).map { case (name, value) => s"plane.$name" -> value } ++
           Seq("r", "g", "b").map(channel => s"albedo.$channel" -> BigInt(12, random)) ++
           Seq("x", "y", "z").map(axis => s"normal.$axis" -> (BigInt(12, random) - 2048))
@@ -88,7 +88,7 @@ final class EnvironmentScene(config: ColonnadeConfig, random: Random) {
       "planes.descriptors" -> descriptors,
       "planes.heap"        -> heap.toSeq,
       "planes.planes"      -> table,
-      "planes.shell"       -> shell
+      "planes.bounding"       -> shell
     )
     AttributeMemories(config).map { memory =>
       memory.name -> made.get(memory.name).fold(others(memory.name))(_.take(memory.depth).padTo(

@@ -64,10 +64,10 @@ final class EnvironmentStimulus(config: ColonnadeConfig, random: Random) {
     val names     = Seq("plane.a", "plane.b", "plane.c", "plane.exponent")
     val all       = names ++ Seq("albedo.r", "albedo.g", "albedo.b", "normal.x", "normal.y", "normal.z")
     val req       = new Packed(new PlaneRequest(layout))
-    val resp      = new Packed(new ShellEntry)
+    val resp      = new Packed(new BoundingPlaneEntry)
     val planeMask = (BigInt(1) << (new Plane).getWidth) - 1
     def known(kind: String, size: Int): Seq[Seq[BigInt]] = image.ask(kind, Seq.tabulate(size)(i => Seq(BigInt(i))))
-    val (table, bounding) = (known("plane", layout.config.planes), known("shell", layout.config.shellPlanes))
+    val (table, bounding) = (known("plane", layout.config.planes), known("boundingPlane", layout.config.boundingPlanes))
     Seq.fill(count) {
       val isBoundingPlane = random.nextInt(3) == 0
       val index           = random.nextInt(if (isBoundingPlane) bounding.size else table.size)

@@ -37,7 +37,7 @@ object MarchCase {
 /** Views of an environment, and rays in it. */
 final class MarchStimulus(config: ColonnadeConfig, random: Random) {
   private val numbers = config.numbers
-  private val shells  = config.physicalAttributeMemory.get.shellPlanes
+  private val shells  = config.physicalAttributeMemory.get.boundingPlanes
   private val layout  = AttributeLayout.of(config)
 
   /** Steps in a metre. */
@@ -130,7 +130,7 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
       number(view.exponent.getWidth).toInt,
       Seq.fill(9)(number(EnvironmentView.rotationBits)),
       Seq(steps(view.stepX), steps(view.stepY)),
-      natural(view.shellPlanes)
+      natural(view.boundingPlanes)
     )
   }
 

@@ -10,17 +10,17 @@ final case class ViewCase(
     exponent:    Int,
     rotation:    Seq[BigInt],
     steps:       Seq[BigInt],
-    shellPlanes: Int
+    boundingPlanes: Int
 ) {
   def words: Seq[BigInt] =
-    matrix ++ offset ++ Seq[BigInt](offsetShift, exponent) ++ rotation ++ steps :+ BigInt(shellPlanes)
+    matrix ++ offset ++ Seq[BigInt](offsetShift, exponent) ++ rotation ++ steps :+ BigInt(boundingPlanes)
 
   def fields: Map[String, BigInt] =
     matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}].${"xyz" (i % 3)}" -> value }.toMap ++
       rotation.zipWithIndex.map { case (value, i) => s"rotation[${i / 3}].${"xyz" (i % 3)}" -> value } ++
       offset.zipWithIndex.map { case (value, i) => s"offset.${"xyz" (i)}" -> value } ++
       Seq("stepX", "stepY").zip(steps) ++
-      Map("offsetShift" -> BigInt(offsetShift), "exponent" -> BigInt(exponent), "shellPlanes" -> BigInt(shellPlanes))
+      Map("offsetShift" -> BigInt(offsetShift), "exponent" -> BigInt(exponent), "boundingPlanes" -> BigInt(boundingPlanes))
 }
 
 object ViewCase {
@@ -59,7 +59,7 @@ object ViewCase {
       exponent,
       Seq.tabulate(9)(i => BigDecimal(axes(i % 3)(i / 3) * 16384).toBigInt),
       steps,
-      config.physicalAttributeMemory.get.shellPlanes.min(5)
+      config.physicalAttributeMemory.get.boundingPlanes.min(5)
     )
   }
 

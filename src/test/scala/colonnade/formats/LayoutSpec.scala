@@ -86,7 +86,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
     places(new NormalEntry) shouldBe Map("x" -> (0, 12), "y" -> (12, 12), "z" -> (24, 12))
     places(new PlaneDescriptor) shouldBe Map("mode" -> (0, 3), "pointer" -> (3, 13))
     places(new Plane) shouldBe Map("a" -> (0, 20), "b" -> (20, 20), "c" -> (40, 20), "exponent" -> (60, 4))
-    val shell = places(new ShellEntry)
+    val shell = places(new BoundingPlaneEntry)
     Seq("plane.a", "albedo.r", "normal.x").map(shell(_)._1) shouldBe Seq(0, 64, 100)
   }
 

@@ -70,14 +70,14 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
       "planes.descriptors"  -> 7,
       "planes.heap"         -> 8,
       "planes.planes"       -> 9,
-      "planes.shell"        -> 10
+      "planes.bounding"        -> 10
     )
     whole("memories")("albedo.heap") shouldBe ujson.Obj("depth" -> 5216, "bits" -> 16, "target" -> 3)
     whole("memories")("planes.heap") shouldBe ujson.Obj("depth" -> 2312, "bits" -> 16, "target" -> 8)
-    whole("memories")("planes.shell") shouldBe ujson.Obj("depth" -> 8, "bits" -> 136, "target" -> 10)
+    whole("memories")("planes.bounding") shouldBe ujson.Obj("depth" -> 8, "bits" -> 136, "target" -> 10)
     whole("attributes")("sizes")("tileColumns").num shouldBe 40
     whole("attributes")("layouts").obj.keys.toSeq shouldBe
-      Seq("mapDescriptor", "albedo", "normal", "planeDescriptor", "plane", "shellEntry")
+      Seq("mapDescriptor", "albedo", "normal", "planeDescriptor", "plane", "boundingPlaneEntry")
     whole("registers")("fields").arr.map(_("name").str) should contain("counters.cellReads")
     manifest()("registers")("fields").arr.map(_("name").str) should not contain "counters.cellReads"
   }

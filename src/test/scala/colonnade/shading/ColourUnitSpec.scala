@@ -51,7 +51,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   def run(paths: Int): Unit = {
     poke(dut.io.ambient, ambient)
     pokeUInt(dut.io.background, background)
-    dut.io.shading.clearness.foreach(_.pokeRaw(shadowTransmittance))
+    dut.io.shading.shadowTransmittance.foreach(_.pokeRaw(shadowTransmittance))
     for (_ <- 0 until paths) {
       // Some contexts hit mirrors and glass, then all paths end, in any order
       (0 until contexts).foreach(begin)

@@ -221,7 +221,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
                 Left(hit) -> expected(answer, hit, light)
             }
           val ofPoints =
-            points.zip(Model.answers(config, points.map(ShaderStimulus.words(_, light)), "lightroom")).map {
+            points.zip(Model.answers(config, points.map(ShaderStimulus.words(_, light)), "lightenvironment")).map {
               case (point, answer) => Right(point) -> expected(answer, light, point.albedo, point.context)
             }
           val answers = (ofHits ++ ofPoints).toMap[Either[HitCase, EnvironmentPointCase], Seq[BigInt]]

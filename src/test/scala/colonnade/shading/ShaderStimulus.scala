@@ -19,7 +19,7 @@ final case class HitCase(
     material:        Int
 )
 
-/** A point of an environment: the model's input for "lightroom". */
+/** A point of an environment: the model's input for "lightenvironment". */
 final case class EnvironmentPointCase(
     context: Int,
     point:   Seq[BigInt],

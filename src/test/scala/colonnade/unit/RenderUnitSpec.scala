@@ -175,7 +175,7 @@ private class UnitColumn(
       if (dut.io.events.raysShadow.peekBoolean()) shadowRays += 1
       if (dut.io.events.raysReflection.peekBoolean() || dut.io.events.raysRefraction.peekBoolean()) bouncedRays += 1
       if (dut.io.events.hits.peekBoolean()) hits += 1
-      if (dut.io.events.raysRoom.exists(_.peekBoolean())) roomRays += 1
+      if (dut.io.events.raysEnvironment.exists(_.peekBoolean())) roomRays += 1
       if (accepts && dut.io.pixels.valid.peekBoolean()) {
         pixels :+= read(dut.pixel.peekInt())
         idle = 0

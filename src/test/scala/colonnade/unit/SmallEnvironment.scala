@@ -48,12 +48,12 @@ final class SmallEnvironment(
     val light = "xyz".zip(camera.zip(Seq(-0.6, 0.25, 0.2))).map { case (axis, (from, by)) =>
       s"lights[0].position.$axis" -> ((from + BigDecimal(by * metre).toBigInt) >> unitShift)
     }
-    scene.registers ++ light ++ view.fields.map { case (name, value) => s"room.$name" -> value } ++ Map[String, BigInt](
-      "room.isThere"        -> (if (isThere) 1 else 0),
-      "room.window.x0"      -> 0,
-      "room.window.y0"      -> 0,
-      "room.window.x1"      -> frame(0),
-      "room.window.y1"      -> frame(1),
+    scene.registers ++ light ++ view.fields.map { case (name, value) => s"environment.$name" -> value } ++ Map[String, BigInt](
+      "environment.enabled"        -> (if (isThere) 1 else 0),
+      "environment.window.x0"      -> 0,
+      "environment.window.y0"      -> 0,
+      "environment.window.x1"      -> frame(0),
+      "environment.window.y1"      -> frame(1),
       "camera.direction.x"  -> (scaled(corner(0)) >> stepShift),
       "camera.direction.y"  -> (scaled(-corner(1)) >> stepShift),
       "camera.stepX.x"      -> scaled(steps(0)),

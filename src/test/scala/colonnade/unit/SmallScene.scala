@@ -74,7 +74,7 @@ final class SmallScene(
         vector(s"lights[$i].colour", "rgb", Seq(4000, 3000, 2500).map(_ / (i + 1))) ++ reach(cube, i)
     }
     val bounces =
-      if (config.frame.hasBounces) Map("bounces" -> config.frame.maxBounces, "clearness" -> 2500)
+      if (config.frame.hasBounces) Map("bounces" -> config.frame.maxBounces, "shadowTransmittance" -> 2500)
       else Map.empty[String, Int]
     Map[String, BigInt](
       "frame.width"          -> wide,
