@@ -242,5 +242,5 @@ def _vector(name: str, values: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
     return {f"{name}.{axis}": values[:, a] for a, axis in enumerate(AXES)}
 
 
-def _corner(values: npt.NDArray[Any]) -> tuple[int, int, int]:
+def _corner(values: Units) -> tuple[int, int, int]:
     return int(values[0]), int(values[1]), int(values[2])

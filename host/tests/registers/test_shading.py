@@ -57,10 +57,10 @@ def test_reach_is_a_squared_distance_in_grid_steps(make_manifest: Callable[..., 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"more_lights": (Light(), Light())}, "the scene has 3 lights, the hardware supports 2: .* raise frame.lights"),
+        ({"more_lights": (Light(), Light())}, "the scene has 3 lights, the hardware supports 2: .*frame.lights"),
         (
             {"material": Material(kind="mirror"), "paths": Paths(bounces=9)},
-            "traces 9 bounces, the hardware at most 4: .*",
+            "traces 9 bounces, the hardware at most 4",
         ),
         ({"material": Material(kind="glass", ior=2.9)}, "index of refraction of 2.9; it must be from 1 to 2.8"),
     ],
@@ -76,7 +76,7 @@ def test_mirrors_need_bounces(make_manifest: Callable[..., Manifest]) -> None:
     manifest = make_manifest()
     config = {**manifest.config, "frame": {**manifest.config["frame"], "maxBounces": 0}}
     with pytest.raises(
-        UserError, match=r"the scene has mirror, the hardware supports only diffuse .* raise frame.maxBounces"
+        UserError, match=r"the scene has mirror, the hardware supports only diffuse .* frame.maxBounces"
     ):
         registers(dataclasses.replace(manifest, config=config), material=Material(kind="mirror"))
 
@@ -86,9 +86,7 @@ def test_too_many_materials_are_refused(make_manifest: Callable[..., Manifest]) 
     mesh = load_mesh("cube")
     header = pack(mesh, manifest).header
     view = make_view(SCENE, mesh.extent, 32, 24, (MeshMaterial(),) * 3)
-    with pytest.raises(
-        UserError, match=r"the scene has 3 materials, the hardware supports 2: .* raise frame.materials"
-    ):
+    with pytest.raises(UserError, match=r"the scene has 3 materials, the hardware supports 2: .*frame.materials"):
         registers_of(view, header, manifest)
 
 
