@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// `colonnade._core.build_bvh`: the tree builder for numpy arrays.
+/// `colonnade._core.build_bvh`: the tree builder on numpy arrays.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -18,7 +18,7 @@ namespace {
 
 using Integers = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
-/// Hands a vector over to numpy without copying it.
+/// Moves a vector into a numpy array without a copy.
 template <typename T>
 nb::object array(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
     auto* owned = new std::vector<T>(std::move(values));
@@ -32,7 +32,7 @@ std::vector<bvh::Box> boxesOf(const Integers& vertices, const Integers& faces) {
     for (std::size_t i = 0; i < faces.shape(0); ++i)
         for (std::size_t corner = 0; corner < 3; ++corner) {
             const std::int32_t vertex = faces(i, corner);
-            if (vertex < 0 || static_cast<std::size_t>(vertex) >= vertices.shape(0)) throw std::invalid_argument("a face names a vertex that is not there");
+            if (vertex < 0 || static_cast<std::size_t>(vertex) >= vertices.shape(0)) throw std::invalid_argument("a face names a vertex that does not exist");
             bvh::Box point;
             for (std::size_t a = 0; a < 3; ++a) {
                 if (vertices(vertex, a) < 0 || vertices(vertex, a) > limit) throw std::invalid_argument("a coordinate is out of range");
@@ -45,7 +45,7 @@ std::vector<bvh::Box> boxesOf(const Integers& vertices, const Integers& faces) {
 
 nb::dict buildBvh(const Integers& vertices, const Integers& faces, unsigned perRecord, unsigned arity, unsigned boxBits, unsigned stackDepth) {
     if (faces.shape(0) == 0) throw std::invalid_argument("no triangles");
-    if (perRecord < 1 || (arity != 2 && arity != 4) || boxBits < 1 || boxBits > 16) throw std::invalid_argument("no such tree");
+    if (perRecord < 1 || (arity != 2 && arity != 4) || boxBits < 1 || boxBits > 16) throw std::invalid_argument("unsupported tree parameters");
     const std::vector<bvh::Box> boxes = boxesOf(vertices, faces);
     bvh::Bvh built;
     {
@@ -76,5 +76,5 @@ nb::dict buildBvh(const Integers& vertices, const Integers& faces, unsigned perR
 
 void bind_bvh(nb::module_& module) {
     module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "triangles_per_record"_a, "arity"_a, "box_bits"_a, "stack_depth"_a,
-                          "Build the tree over integer triangles: vertices int32 [n, 3] in units, faces int32 [m, 3].");
+                          "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the arrays of colonnade.scene_image.bvh.Bvh.");
 }

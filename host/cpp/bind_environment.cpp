@@ -1,8 +1,8 @@
-// colonnade._core.EnvironmentModel: the bit-exact model of a room in the physical-attribute memory (cpp/model) for Python.
+// colonnade._core.EnvironmentModel: the bit-exact model of the environment march (cpp/model) for Python.
 #include <cmath>
 
 #include "binding.hpp"
-#include "model/environment.hpp"
+#include "model/environment_march.hpp"
 
 using namespace nanobind::literals;
 using namespace colonnade;
@@ -30,7 +30,7 @@ public:
 
     nb::dict march(const Values& registers, const Vectors& origins, const Vectors& directions) {
         const EnvironmentView view = viewOf(registers);
-        const Background background(numbers_, image_);
+        const EnvironmentMarch march(numbers_, image_);
         const std::size_t count = origins.shape(0);
         std::int64_t *kind, *x, *y, *entry, *steps;
         bool* isHidden;
@@ -51,7 +51,7 @@ public:
                 origin[a] = origins(i, a);
                 direction[a] = directions(i, a);
             }
-            const EnvironmentPoint point = background.meet(origin, direction, view);
+            const EnvironmentPoint point = march.findHit(origin, direction, view);
             kind[i] = static_cast<std::int64_t>(point.kind);
             x[i] = point.x;
             y[i] = point.y;
@@ -71,12 +71,12 @@ private:
 } // namespace
 
 void bind_environment(nb::module_& module) {
-    nb::class_<EnvironmentModel>(module, "EnvironmentModel", "A room in the physical-attribute memory: rays go in, the points of the room that they meet come out.")
+    nb::class_<EnvironmentModel>(module, "EnvironmentModel", "Model of the environment march over maps in the physical-attribute memory.")
         .def(nb::init<const Values&, const Values&, const FieldTuples&>(), "numbers"_a, "sizes"_a, "layouts"_a,
-             "From the manifest's numbers and its attributes: sizes, and layouts as word -> field -> (offset, width, signed).")
-        .def("load", &EnvironmentModel::load, "memory"_a, "words"_a, "Fills a memory by its name: uint8 [words, bytes], low byte first.")
+             "From the manifest's numbers, and its attributes' sizes and layouts: word -> field -> (offset, width, signed).")
+        .def("load", &EnvironmentModel::load, "memory"_a, "words"_a, "Loads a memory, by its name in the manifest: uint8 [words, bytes], low byte first.")
         .def("march", &EnvironmentModel::march, "registers"_a, "origins"_a, "directions"_a,
-             "Where rays meet the room. Origins int64 [n, 3], grid steps; directions int64 [n, 3], components of shadeBits bits and a sign. Registers: "
-             "matrix[0..2].{x,y,z}, offset.{x,y,z}, offsetShift, exponent, boundingPlanes. Gives kind int64 [n] (0 nothing, 1 map, 2 shell), the map's pixel "
-             "x, y, the bounding plane's entry, is_hidden bool, travel float64 (directions from the origin), steps.");
+             "Finds where rays hit the environment. Origins int64 [n, 3], grid steps; directions int64 [n, 3], components of shadeBits bits and a sign. Registers: "
+             "matrix[0..2].{x,y,z}, offset.{x,y,z}, offsetShift, exponent, boundingPlanes. Returns kind int64 [n] (0 miss, 1 map, 2 bounding plane), the map's pixel "
+             "x, y, the bounding plane's entry, is_hidden bool, travel float64 (in ray directions from the origin), steps.");
 }

@@ -17,7 +17,7 @@ public:
 
     void load(const Records& records) { device_.load(records.data(), records.shape(0), records.shape(1)); }
 
-    /// Gives the device a physical-attribute memory.
+    /// Adds a physical-attribute memory to the device.
     void addEnvironment(const Values& sizes, const FieldTuples& layouts) { environment_ = std::make_unique<AttributeImage>(AttributeSizes(sizes), layoutsOf(layouts)); }
 
     void loadEnvironment(const std::string& memory, const Records& words) {
@@ -26,7 +26,7 @@ public:
         device_.load(*environment_);
     }
 
-    /// Rows [first, last) of the frame; `start` also takes the registers over.
+    /// Loads the registers and clears counters and errors.
     void start(const Values& registers) { device_.start(registers); }
 
     nb::dict rows(std::int64_t first, std::int64_t last) {
@@ -59,7 +59,7 @@ public:
         return result;
     }
 
-    /// Closest hits of rays given as scene positions (grid steps) and directions of any scale: packed ids, -1 for a miss.
+    /// Closest hits of rays with scene positions (grid steps) and directions of any scale: packed ids, -1 for a miss.
     nb::object trace(const Vectors& origins, const Vectors& directions) {
         std::int64_t* ids;
         auto result = makeArray<std::int64_t>({origins.shape(0)}, ids);
@@ -70,7 +70,7 @@ public:
         return nb::cast(result);
     }
 
-    /// Sets rays up and tests each against a box of its own; for checks against exact arithmetic.
+    /// Sets up rays and tests each against its own box, for comparison with exact arithmetic.
     nb::dict testBoxes(const Vectors& origins, const Vectors& directions, const Vectors& corners, const Vectors& exponents, const Vectors& low,
                        const Vectors& high) {
         const std::size_t count = origins.shape(0);
@@ -100,7 +100,7 @@ public:
             std::array<Entered, 4> entered;
             std::uint64_t tests = 0;
             enters[i] = ray.enters;
-            isHit[i] = ray.enters && colonnade::testBoxes(ray, node, ray.limit, numbers_, entered, tests) > 0;
+            isHit[i] = ray.enters && colonnade::testBoxes(ray, node, ray.tMax, numbers_, entered, tests) > 0;
         }
         return result;
     }
@@ -143,19 +143,19 @@ private:
 } // namespace
 
 void bind_model(nb::module_& module) {
-    nb::class_<Model>(module, "Model", "The device without time: memories and registers are loaded, pixels come out.")
+    nb::class_<Model>(module, "Model", "The untimed, bit-exact model of the device.")
         .def(nb::init<const Values&, const FieldTuples&, const Values&>(), "numbers"_a, "layouts"_a, "limits"_a,
-             "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh), its record layouts: record -> field -> (offset, width, signed), and its registers' limits.")
+             "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh), record layouts (record -> field -> (offset, width, signed)) and register limits.")
         .def("load", &Model::load, "records"_a, "Loads the column memory: uint8 [records, bytes].")
-        .def("add_environment", &Model::addEnvironment, "sizes"_a, "layouts"_a, "Gives the device a physical-attribute memory, of the manifest's attributes.")
-        .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a, "Fills one of its memories by name: uint8 [words, bytes], low byte first.")
-        .def("start", &Model::start, "registers"_a, "Takes registers over (name -> value); clears counters and errors.")
+        .def("add_environment", &Model::addEnvironment, "sizes"_a, "layouts"_a, "Adds a physical-attribute memory with the manifest's attribute sizes and layouts.")
+        .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a, "Loads one of its memories, by its name in the manifest: uint8 [words, bytes], low byte first.")
+        .def("start", &Model::start, "registers"_a, "Starts a frame: loads the registers (name -> value); clears counters and errors.")
         .def("rows", &Model::rows, "first"_a, "last"_a,
-             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light left with the object there (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
-        .def("trace", &Model::trace, "origins"_a, "directions"_a, "Packed ids int64 [n] of the closest hits, -1 for a miss; int64 [n, 3] grid steps.")
+             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
+        .def("trace", &Model::trace, "origins"_a, "directions"_a, "Packed ids of the closest hits, int64 [n], -1 for a miss. Origins and directions: int64 [n, 3], grid steps.")
         .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a, "high"_a,
-             "Each ray against one box (planes corner + (low << exponent), corner + (high << exponent), units): enters (the object's box), is_hit, "
-             "and the set-up ray: heading int64 [n, 4] (axis, three signs), origin [n, 3] and shear [n, 2] raw, in its permuted frame.")
-        .def("counters", &Model::counters, "Timing-independent counters since start.")
-        .def("errors", &Model::errors, "Sticky errors since start.");
+             "Tests each ray against one box (planes corner + (low << exponent), corner + (high << exponent), vertex units). Returns enters (the object's box), is_hit, "
+             "and the prepared ray in its permuted frame: heading int64 [n, 4] (axis, three signs), origin int64 [n, 3], shear int64 [n, 2].")
+        .def("counters", &Model::counters, "Timing-independent counters since `start`, by name.")
+        .def("errors", &Model::errors, "Sticky error bits since `start`, by name.");
 }

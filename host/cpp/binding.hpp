@@ -1,4 +1,4 @@
-// What the bindings share: words of a manifest, and numpy arrays.
+// Shared by the bindings: the manifest's values, and numpy arrays.
 #pragma once
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -21,7 +21,7 @@ using Vectors = nb::ndarray<const std::int64_t, nb::shape<-1, 3>, nb::c_contig, 
 
 template <class T> using Pixels = nb::ndarray<nb::numpy, T>;
 
-/// A new numpy array that owns its memory.
+/// Makes a numpy array that owns its memory.
 template <class T> Pixels<T> makeArray(std::initializer_list<std::size_t> shape, T*& data) {
     std::size_t size = 1;
     for (const auto extent : shape) size *= extent;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The binary tree over quantised triangles: where every layout of a scene starts.
+/// The binary tree over quantised triangles, from which every tree layout is derived.
 ///
-/// Binned surface-area splits, an exact sweep near the leaves. Every cost is an exact integer, so that a mesh gives the same
-/// tree on every machine. The order of the leaves, left first, numbers the triangles: the packed ids.
+/// Splits are binned by the surface-area heuristic, and exact sweeps near the leaves. All costs are exact integers, so a mesh
+/// gives the same tree on every machine. The order of the leaves, left first, defines the triangles' packed ids.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace colonnade::bvh {
 
 using Cost = unsigned __int128;
 
-/// A box of vertex units, both planes inclusive; empty until something was added.
+/// A box in vertex units with inclusive bounds; initially empty.
 struct Box {
     std::array<std::int32_t, 3> low{INT32_MAX, INT32_MAX, INT32_MAX};
     std::array<std::int32_t, 3> high{INT32_MIN, INT32_MIN, INT32_MIN};
@@ -28,18 +28,18 @@ struct Box {
         }
     }
 
-    /// Half the surface, in square units; 0 for an empty box.
+    /// Half the surface area, square units; 0 for an empty box.
     std::uint64_t halfArea() const {
         if (low[0] > high[0]) return 0;
         const std::uint64_t x = high[0] - low[0], y = high[1] - low[1], z = high[2] - low[2];
         return x * y + y * z + z * x;
     }
 
-    /// Twice the centre, so that it stays an integer.
+    /// Twice the centre, which is an integer.
     std::int32_t centre2(int axis) const { return low[axis] + high[axis]; }
 };
 
-/// A node over `order[begin, end)`; a leaf has no children. Children come after their parent in the array.
+/// A node over `order[begin, end)`; a leaf has no children. Children follow their parent in the array.
 struct BinaryNode {
     Box box;
     std::int32_t left = -1, right = -1;
@@ -49,13 +49,13 @@ struct BinaryNode {
 
 struct BinaryTree {
     std::vector<BinaryNode> nodes;      ///< the root is node 0
-    std::vector<std::uint32_t> order;   ///< the triangle of each packed id
+    std::vector<std::uint32_t> order;   ///< the triangle index of each packed id
 };
 
-/// Records that hold `triangles` triangles.
+/// Number of leaf records for `triangles` triangles.
 inline std::uint64_t leafRecords(std::uint64_t triangles, unsigned perRecord) { return (triangles + perRecord - 1) / perRecord; }
 
-/// The height of a balanced tree over `triangles` triangles: 0 for one leaf.
+/// Height of a balanced tree over `triangles` triangles; 0 for one leaf.
 inline unsigned balancedHeight(std::uint64_t triangles, unsigned perRecord) {
     unsigned height = 0;
     while ((leafRecords(triangles, perRecord) >> height) + ((leafRecords(triangles, perRecord) & ((1ull << height) - 1)) != 0) > 1)
@@ -63,7 +63,7 @@ inline unsigned balancedHeight(std::uint64_t triangles, unsigned perRecord) {
     return height;
 }
 
-/// Builds one binary tree. No leaf lies deeper than `heightLimit` (0: no limit), which is at least the balanced height.
+/// Builds the binary tree. No leaf is deeper than `heightLimit` (0: no limit), which must be at least the balanced height.
 class BinaryBuilder {
 public:
     BinaryBuilder(const std::vector<Box>& boxes, unsigned perRecord, unsigned heightLimit)
@@ -96,13 +96,13 @@ public:
 
 private:
     static constexpr int bins = 16;
-    static constexpr std::uint32_t sweepBelow = 33;  ///< fewer triangles than this are split by an exact sweep
+    static constexpr std::uint32_t sweepBelow = 33;  ///< ranges of fewer triangles are split by an exact sweep
     static constexpr Cost worst = ~Cost{0};
 
     struct Split {
         Cost cost = worst;
         int axis = -1;
-        std::uint32_t at = 0;  ///< last bin of the left side, or the left side's count in a sweep
+        std::uint32_t at = 0;  ///< last bin of the left side, or number of triangles on the left side of a sweep
     };
 
     std::int32_t addNode(std::uint32_t begin, std::uint32_t end) {
@@ -122,7 +122,7 @@ private:
         return balancedHeight(left, perRecord_) <= height && balancedHeight(right, perRecord_) <= height;
     }
 
-    /// Reorders `order[begin, end)` into two sides, each of which fits a tree of `height`; returns where the right one begins.
+    /// Partitions `order[begin, end)` into two sides that each fit a tree of `height`; returns the start of the right side.
     std::uint32_t partition(std::uint32_t begin, std::uint32_t end, unsigned height) {
         const std::uint32_t count = end - begin;
         if (count < sweepBelow) {
@@ -148,7 +148,7 @@ private:
             std::copy_n(scratch_.begin(), right, tree_.order.begin() + left);
             return left;
         }
-        // No split by bins exists or fits: halve the leaf records along the longest axis, by index where centres coincide.
+        // No binned split fits: halve the leaf records along the longest axis, by index where centres coincide
         int axis = 0;
         for (int a = 1; a < 3; ++a)
             if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
@@ -194,8 +194,8 @@ private:
         return best;
     }
 
-    /// The best split of a few triangles along any axis; one exists always, because the balanced one fits. The left side fills whole
-    /// records: 1 % fewer records, for half a percent more reads.
+    /// The best split of a few triangles along any axis; the balanced split always fits. The left side fills whole records,
+    /// which saves 1 % of the records for 0.5 % more reads.
     Split sweep(std::uint32_t begin, std::uint32_t end, unsigned height) {
         const std::uint32_t count = end - begin;
         std::array<std::uint64_t, sweepBelow> rightArea{};

@@ -1,4 +1,4 @@
-// colonnade._core: the compiled half of the host. Each bind_*.cpp adds one subject.
+// colonnade._core: the compiled half of the host. Each bind_*.cpp binds one part.
 #include <nanobind/nanobind.h>
 
 namespace nb = nanobind;
@@ -8,7 +8,7 @@ void bind_bvh(nb::module_& module);
 void bind_model(nb::module_& module);
 
 NB_MODULE(_core, module) {
-  module.doc() = "Bounding-volume hierarchy builder and bit-exact model of the accelerator.";
+  module.doc() = "BVH builder and bit-exact model of the device.";
   bind_environment(module);
   bind_bvh(module);
   bind_model(module);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The tree as the hardware walks it: nodes of two or four children whose boxes are small integers relative to their node.
+/// The tree in the hardware's layout: nodes of two or four children with boxes quantised relative to their node.
 ///
-/// Collapsing moves no leaf, so the packed ids are those of the binary tree whatever the arity.
+/// Collapsing the binary tree keeps the order of the leaves, so the packed ids do not depend on the arity.
 #pragma once
 
 #include "bvh.hpp"
@@ -10,21 +10,21 @@ namespace colonnade::bvh {
 
 enum class Kind : std::uint8_t { empty = 0, node = 1, leaf = 2 };
 
-/// Which child a wide node replaces by its own two children.
+/// Selects the child of a wide node that is replaced by its own two children.
 enum class PullUp { largest, tallest };
 
-/// Flat arrays, one entry a node (times the arity where it says so). `firstTriangles` counts leaf records from the first one.
+/// Flat arrays with one entry per node, times the arity where stated. `firstTriangles` counts from the first leaf record.
 struct WideTree {
     unsigned arity = 0;
-    std::vector<std::uint32_t> origin;                       ///< nodes × 3, units
+    std::vector<std::uint32_t> origin;                       ///< nodes × 3, vertex units
     std::vector<std::uint8_t> exponent;                      ///< nodes × 3
     std::vector<std::uint8_t> kinds;                         ///< nodes × arity
     std::vector<std::uint16_t> low, high;                    ///< nodes × arity × 3
-    std::vector<std::uint32_t> firstChild, firstTriangles;   ///< nodes; 0 where there is no such child
-    std::vector<std::uint32_t> leafFirst, leafCount;         ///< leaf records: packed id of triangle 0, triangles
-    unsigned depth = 0;                                      ///< nodes on the longest path
-    unsigned stackBound = 0;                                 ///< most siblings that can wait while a ray descends
-    double cost = 0;                                         ///< records that a random ray through the root box reads
+    std::vector<std::uint32_t> firstChild, firstTriangles;   ///< nodes; 0 without such a child
+    std::vector<std::uint32_t> leafFirst, leafCount;         ///< leaf records: packed id of the first triangle, number of triangles
+    unsigned depth = 0;                                      ///< nodes on the longest path from the root
+    unsigned stackBound = 0;                                 ///< largest number of stack entries that a ray can need
+    double cost = 0;                                         ///< expected record reads of a random ray through the root box
 
     std::size_t nodes() const { return firstChild.size(); }
 };
@@ -53,7 +53,7 @@ public:
             const std::vector<std::int32_t> children = childrenOf(task.binary, policy);
             quantise(wide, task.index, tree_.nodes[task.binary].box, children);
 
-            // Siblings lie side by side and a subtree's blocks follow its root: neighbours in space are neighbours in memory.
+            // Siblings are adjacent and a subtree follows its root, which keeps spatial neighbours close in memory
             std::vector<Task> pending;
             for (std::size_t slot = 0; slot < children.size(); ++slot) {
                 const BinaryNode& child = tree_.nodes[children[slot]];
@@ -87,14 +87,14 @@ private:
         wide.firstTriangles.push_back(0);
     }
 
-    /// Whether a slot before `slot` holds a child of that kind.
+    /// Whether a slot before `slot` has a child of this kind.
     bool hasKind(const WideTree& wide, std::uint32_t node, std::size_t slot, Kind kind) const {
         for (std::size_t i = 0; i < slot; ++i)
             if (wide.kinds[node * arity_ + i] == static_cast<std::uint8_t>(kind)) return true;
         return false;
     }
 
-    /// The children in the order of their leaves. A tree that is one leaf has a root with one child.
+    /// The children in the order of their leaves. A root that is a leaf gets itself as its only child.
     std::vector<std::int32_t> childrenOf(std::int32_t index, PullUp policy) const {
         const BinaryNode& node = tree_.nodes[index];
         if (node.isLeaf()) return {index};
@@ -116,7 +116,7 @@ private:
         return tree_.nodes[one].box.halfArea() > tree_.nodes[other].box.halfArea();
     }
 
-    /// Child boxes rounded outward to multiples of 2^exponent from the node's low corner.
+    /// Rounds child boxes outward to multiples of 2^exponent from the node's low corner.
     void quantise(WideTree& wide, std::uint32_t index, const Box& box, const std::vector<std::int32_t>& children) const {
         const std::int64_t maximum = (std::int64_t{1} << boxBits_) - 1;
         for (int a = 0; a < 3; ++a) {
@@ -134,7 +134,7 @@ private:
         }
     }
 
-    /// Over all paths, the sum of (children − 1): a ray that meets every box leaves that many siblings waiting.
+    /// The largest sum of (children − 1) over all paths: the siblings that a ray hitting every box pushes.
     unsigned stackBound(const WideTree& wide) const {
         std::vector<unsigned> bound(wide.nodes(), 0);
         for (std::size_t node = wide.nodes(); node-- > 0;) {
@@ -155,21 +155,21 @@ private:
     std::vector<unsigned> height_;
 };
 
-/// A wide tree with the order of its triangles.
+/// A wide tree and the order of its triangles.
 struct Bvh {
     WideTree tree;
-    std::vector<std::uint32_t> order;  ///< the triangle of each packed id
-    unsigned heightLimit = 0;          ///< 0: nothing was traded for the stack
+    std::vector<std::uint32_t> order;  ///< the triangle index of each packed id
+    unsigned heightLimit = 0;          ///< height limit that the stack required; 0 for none
 };
 
-/// Builds the tree for one arity. When the surface-area tree needs a deeper stack than there is, ever more balanced ones are
-/// tried. A tree is taken when both arities fit, so that the packed ids do not depend on the arity; whether the returned tree fits is
-/// for the caller to see.
+/// Builds the tree for one arity. If the tree of lowest cost needs a deeper stack, more balanced trees are tried. A tree is
+/// accepted if it fits with both arities, so that the packed ids do not depend on the arity. The caller must check
+/// whether the returned tree fits the stack.
 inline Bvh build(const std::vector<Box>& boxes, unsigned perRecord, unsigned arity, unsigned boxBits, unsigned stackDepth) {
-    const unsigned least = std::max(1u, balancedHeight(boxes.size(), perRecord));
+    const unsigned minimum = std::max(1u, balancedHeight(boxes.size(), perRecord));
     std::vector<unsigned> limits{0};
-    for (unsigned limit = stackDepth; limit > least; limit = limit * 3 / 4) limits.push_back(limit);
-    limits.push_back(least);
+    for (unsigned limit = stackDepth; limit > minimum; limit = limit * 3 / 4) limits.push_back(limit);
+    limits.push_back(minimum);
 
     for (const unsigned limit : limits) {
         const BinaryTree tree = BinaryBuilder(boxes, perRecord, limit).build();
@@ -182,7 +182,7 @@ inline Bvh build(const std::vector<Box>& boxes, unsigned perRecord, unsigned ari
             fits = fits && wide.stackBound <= stackDepth;
             if (width == arity) chosen = std::move(wide);
         }
-        if (fits || limit == least) return {std::move(chosen), tree.order, limit};
+        if (fits || limit == minimum) return {std::move(chosen), tree.order, limit};
     }
     return {};
 }

@@ -12,7 +12,7 @@ MAX_TEXT = 4096
 MAX_PIXELS = 2 * 4096 * 4096
 #: Frames of one command.
 MAX_FRAMES = 10_000
-#: Pixels of a frame that is written as a waveform; a pixel is some hundred kilobytes of it.
+#: Pixels of a frame that is recorded as a waveform; each takes on the order of 100 kB.
 MAX_WAVEFORM_PIXELS = 4096
 #: Designs of one sweep.
 MAX_DESIGNS = 1_000

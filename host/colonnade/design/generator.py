@@ -158,7 +158,7 @@ def _compile(root: Path, log: Path, progress: Progress) -> list[str]:
     if status != 0:
         errors = [line.removeprefix("[error]").strip() for line in lines if line.startswith("[error]")]
         first = errors[0] if errors else (lines[-1] if lines else f"sbt ended with status {status}")
-        raise UserError(f"the generator does not compile: {first} (all of it: {log})")
+        raise UserError(f"the generator does not compile: {first} (full log: {log})")
     entries = next((line for line in reversed(lines) if ".jar" in line and os.pathsep in line), "").split(os.pathsep)
     if not any(Path(entry).is_dir() for entry in entries):
         raise RuntimeError(f"sbt printed no class path: see {log}")

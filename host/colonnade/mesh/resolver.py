@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Any
+from typing import NoReturn
 
 import trimesh
 
@@ -44,7 +44,7 @@ class MeshResolver(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
             self.refused = self.refused or error
             raise FileNotFoundError(name) from None
 
-    def namespaced(self, namespace: str) -> Any:
+    def namespaced(self, namespace: str) -> NoReturn:
         """Refuse other folders."""
         raise FileNotFoundError(namespace)
 

@@ -213,9 +213,9 @@ class _TorchUnpickler(_RestrictedUnpickler):
         tensors = {("torch._utils", "_rebuild_tensor_v2"): _storage_of, ("torch", "FloatStorage"): "float32"}
         super().__init__(stream, tensors | {("collections", "OrderedDict"): OrderedDict})
 
-    def persistent_load(self, pid: Any) -> str:
+    def persistent_load(self, pid: tuple[object, ...]) -> str:
         return str(pid[2])
 
 
-def _storage_of(storage: str, *_: Any) -> str:
+def _storage_of(storage: str, *_: object) -> str:
     return storage

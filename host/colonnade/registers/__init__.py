@@ -1,1 +1,1 @@
-"""Frame registers: their values for a scene, as docs/numbers.md defines them."""
+"""Computes the frame registers of a scene, as defined in docs/numbers.md."""

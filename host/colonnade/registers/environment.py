@@ -1,4 +1,4 @@
-"""Registers of a room: how the maps are seen from object space; docs/background.md."""
+"""Registers of the environment: the projection from object space to its maps (docs/background.md)."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ if TYPE_CHECKING:
     from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
     from colonnade.scene.view import View
-    from colonnade.scene_image.file import ImageHeader
+    from colonnade.scene_image.header import ImageHeader
 
 AXES = "xyz"
-#: Fraction bits of the maps' rotation, and those of a step beyond those of a place in the map.
+#: Fraction bits of the rotation, and extra fraction bits of a step over those of a map position.
 ROTATION_FRACTION = 14
 STEP_GUARD = 12
 
 
 def environment_registers(
-    view: View, held: EncodedEnvironment, header: ImageHeader, manifest: Manifest, relit: bool
+    view: View, encoded: EncodedEnvironment, header: ImageHeader, manifest: Manifest, relit: bool
 ) -> dict[str, int]:
-    """Registers ``room.*`` of a frame.
+    """The registers ``room.*`` of a frame.
 
     Args:
         view: With the room's pose, `View.view_to_mesh`.
-        held: The room, and its maps as the hardware holds them.
-        header: How the mesh lies in the object's cube.
-        manifest: Of the hardware.
-        relit: Render the whole room; otherwise only the pixels whose light the object may block.
+        encoded: The room and its encoded maps.
+        header: Header of the mesh's scene image.
+        manifest: The design's manifest.
+        relit: Render the whole room, not only the pixels whose light the object may block.
     """
-    registers = projection_registers(view, held.environment, held.image, header, manifest)
+    registers = projection_registers(view, encoded.environment, encoded.image, header, manifest)
     if relit:
         window = whole_frame(view)
     else:
-        depth = held.image.decoded_depth(PlaneProjection.of(held.environment, held.image.depth_unit))
-        window = shadow_window(view, held.environment, depth, header.extent)
+        depth = encoded.image.decoded_depth(PlaneProjection.of(encoded.environment, encoded.image.depth_unit))
+        window = shadow_window(view, encoded.environment, depth, header.extent)
     return registers | dict(
         zip((f"environment.window.{edge}" for edge in ("x0", "y0", "x1", "y1")), window, strict=True)
     )
@@ -52,28 +52,28 @@ def environment_registers(
 def projection_registers(
     view: View, environment: Environment, image: AttributeImage, header: ImageHeader, manifest: Manifest
 ) -> dict[str, int]:
-    """Registers ``room.*`` of a frame, but for the window.
+    """The registers ``room.*`` of a frame except the window.
 
     Args:
         view: With the room's pose, `View.view_to_mesh`.
-        room: The maps' camera.
-        image: The maps as they are held.
-        header: How the mesh lies in the object's cube.
-        manifest: Of the hardware.
+        environment: The room, for its camera.
+        image: The encoded maps.
+        header: Header of the mesh's scene image.
+        manifest: The design's manifest.
 
     Raises:
-        UserError: The object is so far from the camera that the room's offset does not fit.
+        UserError: The object is so small that the room's offset does not fit its register.
     """
     assert view.view_to_mesh is not None
-    turn, origin = view.view_to_mesh[:, :3], view.view_to_mesh[:, 3]
-    to_view = np.linalg.inv(turn)
+    linear, origin = view.view_to_mesh[:, :3], view.view_to_mesh[:, 3]
+    to_view = np.linalg.inv(linear)
     step = header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
     projection = projection_of(environment, image)
     # p = projection · to_view · (grid / step + offset - origin)
     matrix = projection @ to_view / step
     offset = projection @ to_view @ (np.array(header.frame.offset) - origin)
     registers = view_registers(matrix, offset, manifest)
-    rotation = np.rint(turn / np.linalg.norm(turn, axis=0) * 2.0**ROTATION_FRACTION).astype(np.int64)
+    rotation = np.rint(linear / np.linalg.norm(linear, axis=0) * 2.0**ROTATION_FRACTION).astype(np.int64)
     registers |= {
         f"environment.rotation[{i}].{axis}": int(rotation[i, a]) for i in range(3) for a, axis in enumerate(AXES)
     }
@@ -88,7 +88,7 @@ def projection_registers(
 
 
 def projection_of(environment: Environment, image: AttributeImage) -> Floats:
-    """From view space, metres, to what is seen at pixel 1024 · (p0, p1) / p2 with w = 1 / p2: float64 [3, 3]."""
+    """Projection from view space, metres, to p with pixel 1024 · (p0, p1) / p2 and w = 1 / p2: float64 [3, 3]."""
     camera = np.array(
         [[environment.fx, 0.0, environment.cx], [0.0, environment.fy, environment.cy], [0.0, 0.0, SLOPE_PIXELS]]
     )
@@ -96,7 +96,7 @@ def projection_of(environment: Environment, image: AttributeImage) -> Floats:
 
 
 def view_registers(matrix: Floats, offset: Floats, manifest: Manifest) -> dict[str, int]:
-    """A projection of grid positions as ``environment.matrix``, ``environment.offset`` and their exponents."""
+    """Encode a projection of grid positions as ``environment.matrix``, ``environment.offset`` and their exponents."""
     maximum = (1 << (manifest.numbers["macBits"] - 1)) - 1
     exponent = math.floor(math.log2(maximum / float(np.abs(matrix).max())))
     scaled = offset * 2.0**exponent

@@ -1,6 +1,6 @@
-"""Placement: the values of the frame registers for a scene, as docs/numbers.md defines them.
+"""Computes all frame registers of a scene, as defined in docs/numbers.md.
 
-Camera and light are moved into the grid of the object's cube, so that the object itself never moves.
+Camera and lights are transformed to the object's grid, so that the object itself never moves.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from colonnade.registers.shading import check_surfaces, surface_registers
 from colonnade.registers.watchdog import watchdog_cycles
 from colonnade.scene.model import Scene
 from colonnade.scene.view import View, make_view
-from colonnade.scene_image.file import ImageHeader
+from colonnade.scene_image.header import ImageHeader
 
 AXES = "xyz"
 
@@ -34,19 +34,19 @@ def frame_registers(
     environment: EncodedEnvironment | None = None,
     relit: bool = True,
 ) -> dict[str, int]:
-    """All rw registers of a frame by name; signed ones are signed integers.
+    """Compute all rw registers of a frame by name; signed registers have signed values.
 
     Args:
-        scene: What to render.
-        header: Of its mesh, packed.
-        manifest: Of the hardware.
-        width: Pixels.
-        height: Pixels.
-        room: The scene's, and how its maps are held.
-        relit: Render all of the room, not only where the object may take its light.
+        scene: The scene.
+        header: Header of the mesh's scene image.
+        manifest: The design's manifest.
+        width: Width of the frame, pixels.
+        height: Height of the frame, pixels.
+        environment: The scene's room and its encoded maps.
+        relit: Render the whole room, not only the pixels whose light the object may block.
 
     Raises:
-        UserError: The frame, or the camera's or light's distance, is more than the hardware can hold.
+        UserError: The frame or a distance is out of the hardware's range, or the design lacks a feature.
     """
     check_size((width, height), manifest)
     view = make_view(
@@ -59,10 +59,10 @@ def frame_registers(
 
 
 def registers_of(view: View, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
-    """The registers for a view, without those of an environment and without a watchdog; the others are 0.
+    """Compute the registers of a view; those of an environment and of the watchdog are 0.
 
     Raises:
-        UserError: The frame asks for more than the hardware has.
+        UserError: A distance is out of the hardware's range, or the design lacks a feature.
     """
     check_surfaces(view, manifest)
     registers = dict.fromkeys((name for name, register in manifest.registers.items() if register.access == "rw"), 0)
@@ -76,7 +76,7 @@ def registers_of(view: View, header: ImageHeader, manifest: Manifest) -> dict[st
 
 
 def _positions(view: View, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
-    """Camera and light in grid steps, shifted right by the least `unitShift` that lets them fit."""
+    """Positions of camera and lights in grid steps, shifted right by the smallest `unitShift` that fits."""
     numbers = manifest.numbers
     reach = 1 << (numbers["sceneBits"] - 1)
     offset = np.array(header.frame.offset)
@@ -89,8 +89,8 @@ def _positions(view: View, header: ImageHeader, manifest: Manifest) -> dict[str,
             in_environment = name == "camera" and view.view_to_mesh is not None
             advice = "make the object larger" if in_environment else "move it nearer"
             raise UserError(
-                f"{_format_name(name)} is {np.abs(steps[name]).max() / edge:,.0f} object-cube edges away, the hardware"
-                f" reaches {reach / edge:,.0f}: {advice}"
+                f"{_format_name(name)} is {np.abs(steps[name]).max() / edge:,.0f} object-cube edges away, the"
+                f" hardware's range is {reach / edge:,.0f}: {advice}"
             )
     shift, limit = 0, (1 << (numbers["macBits"] - 1)) - 1
     while max(float(np.abs(np.rint(value / 2.0**shift)).max()) for value in steps.values()) > limit:
@@ -102,7 +102,7 @@ def _positions(view: View, header: ImageHeader, manifest: Manifest) -> dict[str,
 
 
 def _directions(view: View, manifest: Manifest) -> dict[str, int]:
-    """Direction and steps, scaled so that the largest component over the picture is 2^(macBits − 2)."""
+    """Ray direction and steps, scaled so that the largest component over the frame is 2^(macBits − 2)."""
     numbers = manifest.numbers
     width_bits, max_shift = numbers["macBits"], numbers["coordinateBits"]
     corners = [
@@ -133,9 +133,9 @@ def _bounds(header: ImageHeader) -> dict[str, int]:
 
 
 def object_screen_bounds(view: View, registers: dict[str, int], manifest: Manifest) -> dict[str, int]:
-    """The pixels whose rays may meet the object: its box, padded as the hardware pads it, projected by the registers.
+    """Registers of the pixels whose rays may hit the object: the projection of its padded box.
 
-    A box that reaches behind the camera takes the whole frame, one that is wholly behind it nothing.
+    A box partly behind the camera gives the whole frame, a box entirely behind it gives an empty rectangle.
     """
     pixels, depth = _projected_corners(registers, manifest)
     if (depth > 1e-6).all():
@@ -154,11 +154,11 @@ def object_screen_bounds(view: View, registers: dict[str, int], manifest: Manife
 
 
 def _projected_corners(registers: dict[str, int], manifest: Manifest) -> tuple[Floats, Floats]:
-    """Where the object's padded box lies in the picture.
+    """Project the corners of the object's padded box to the frame.
 
     Returns:
-        Pixel coordinates float64 [8, 2] of its corners, and their relative depths float64 [8], negative behind the
-        camera; pixels mean nothing where a depth is not positive.
+        Pixel coordinates of the corners, float64 [8, 2], and their relative depths, float64 [8]. Depths are negative
+        behind the camera; coordinates are valid only for positive depths.
     """
 
     def vector(name: str) -> Floats:
@@ -171,7 +171,7 @@ def _projected_corners(registers: dict[str, int], manifest: Manifest) -> tuple[F
     )
     origin = vector("camera.position") * 2.0 ** (registers["frame.unitShift"] - manifest.numbers["gridFraction"])
     first = vector("camera.direction") * 2.0 ** registers["camera.stepShift"]
-    # A corner is met at origin + depth · (first + x · stepX + y · stepY).
+    # A corner is origin + depth · (first + x · stepX + y · stepY)
     basis = np.stack([vector("camera.stepX"), vector("camera.stepY"), first], axis=1)
     solved = np.linalg.solve(basis / np.abs(first).max(), (corners - origin).T)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -179,20 +179,20 @@ def _projected_corners(registers: dict[str, int], manifest: Manifest) -> tuple[F
 
 
 def _rectangle(pixels: Floats, width: int, height: int) -> list[int]:
-    """Rectangle x0, y0, x1, y1 (exclusive) in the frame around points, a pixel wider; zeros when it is empty."""
+    """Bounding rectangle x0, y0, x1, y1 (exclusive) of points in the frame, a pixel wider; zeros if empty."""
     limits = (width, height)
     minimum = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, limits)
-    greatest = np.clip(np.ceil(pixels.max(axis=0)) + 2, 0, limits)
-    if (minimum >= greatest).any():
+    maximum = np.clip(np.ceil(pixels.max(axis=0)) + 2, 0, limits)
+    if (minimum >= maximum).any():
         return [0, 0, 0, 0]
-    return [int(value) for value in (*minimum, *greatest)]
+    return [int(value) for value in (*minimum, *maximum)]
 
 
 def _outline(pixels: Floats, manifest: Manifest) -> list[tuple[int, int, int]]:
-    """Half-planes x, y, offset around points, a pixel wider: the edges of their convex hull.
+    """Half-planes x, y, offset of the points' convex hull, a pixel wider, the longest edges first.
 
-    Only the edges' directions are rounded: each offset is the least that holds all points, so the outline is never too
-    narrow. Points that lie on a line have none.
+    Only the edges' directions are rounded. Each offset is the smallest that includes all points, so the outline is
+    conservative. Collinear points give no half-planes.
     """
     try:
         hull = ConvexHull(pixels)
@@ -213,5 +213,5 @@ def _vector(name: str, values: Floats) -> dict[str, int]:
 
 
 def _format_name(name: str) -> str:
-    """The register group's name in a message."""
+    """Format a register group's name for a message."""
     return f"light {int(name[7:-1]) + 1}" if name.startswith("lights[") else f"the {name}"

@@ -1,4 +1,4 @@
-"""Registers of lights and materials: what the shader and the paths go by; docs/numbers.md, sections 5 and 6."""
+"""Registers of lights, materials and paths (docs/numbers.md, sections 5 and 6)."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.scene.view import PlacedLight, View
-from colonnade.scene_image.file import ImageHeader
+from colonnade.scene_image.header import ImageHeader
 
 CHANNELS = "rgb"
 KINDS = {"diffuse": 0, "mirror": 1, "glass": 2}
 
-#: Above it the index's square does not fit its register.
+#: Largest index of refraction whose square fits its register.
 MAX_IOR = 2.8
 
 
 def check_surfaces(view: View, manifest: Manifest) -> None:
-    """Refuse lights, materials and bounces that the hardware does not have.
+    """Refuse more lights, materials or bounces than the design supports.
 
     Raises:
-        UserError: It says how many there may be, and which setting raises that.
+        UserError: The message names the limit and its setting.
     """
     frame = manifest.config["frame"]
     for what, count, setting in (
@@ -33,17 +33,18 @@ def check_surfaces(view: View, manifest: Manifest) -> None:
     ):
         if count > int(frame[setting]):
             raise UserError(
-                f"the scene has {count} {what}, the hardware {frame[setting]}: leave some out or raise frame.{setting}"
+                f"the scene has {count} {what}, the hardware supports {frame[setting]}:"
+                f" leave some out or raise frame.{setting}"
             )
     maximum = int(frame["maxBounces"])
     shiny = [material for material in view.materials if material.kind != "diffuse"]
     if shiny and maximum == 0:
         raise UserError(
-            f"the scene has {shiny[0].kind}, the hardware only diffuse surfaces: raise frame.maxBounces from 0"
+            f"the scene has {shiny[0].kind}, the hardware supports only diffuse surfaces: raise frame.maxBounces from 0"
         )
     if shiny and view.bounces > maximum:
         raise UserError(
-            f"the scene traces {view.bounces} bounces, the hardware {maximum}: lower paths.bounces or raise"
+            f"the scene traces {view.bounces} bounces, the hardware at most {maximum}: lower paths.bounces or raise"
             " frame.maxBounces"
         )
     for material in shiny:
@@ -52,7 +53,7 @@ def check_surfaces(view: View, manifest: Manifest) -> None:
 
 
 def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
-    """Registers of lights, ambient light, background, materials and how they are shaded."""
+    """Compute the registers of lights, ambient light, background, materials and shading."""
     numbers = manifest.numbers
     white = (1 << numbers["colourBits"]) - 1
     step = header.frame.scale * 2.0 ** numbers["gridFraction"]
@@ -81,7 +82,7 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
 
 
 def _reach(name: str, light: PlacedLight, step: float, mantissa_bits: int) -> dict[str, int]:
-    """A light's squared reach as mantissa and exponent, in grid steps; a mantissa of 0 is a light without a falloff."""
+    """A light's squared reach, grid steps, as mantissa and exponent; a zero mantissa means no falloff."""
     if light.reach is None:
         return {}
     mantissa, exponent = math.frexp((light.reach * step) ** 2)
@@ -94,10 +95,10 @@ def _reach(name: str, light: PlacedLight, step: float, mantissa_bits: int) -> di
 def _kind(name: str, material: MeshMaterial, fraction: int, one: int) -> dict[str, int]:
     result = {f"{name}.kind": KINDS[material.kind]}
     if material.kind == "glass":
-        head_on = ((material.ior - 1) / (material.ior + 1)) ** 2
+        normal_reflectance = ((material.ior - 1) / (material.ior + 1)) ** 2
         result[f"{name}.etaFront"] = round(2**fraction / material.ior)
         result[f"{name}.etaBack"] = round(2**fraction * material.ior)
-        result[f"{name}.reflectance"] = round(head_on * one)
+        result[f"{name}.reflectance"] = round(normal_reflectance * one)
     return result
 
 

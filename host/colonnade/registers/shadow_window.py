@@ -1,4 +1,4 @@
-"""Which pixels of a room's photo may the object darken? The device renders these; the others are the photo's."""
+"""The shadow window: the pixels of a room's photo that the object may darken, which the device must render."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ if TYPE_CHECKING:
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.view import View
 
-#: x0, y0, x1, y1; the latter two exclusive.
+#: x0, y0, x1, y1; x1 and y1 are exclusive.
 Window = tuple[int, int, int, int]
 
-#: The object's box grows by this share of its edge: more than any rounding of the device.
+#: Margin of the object's box, as a fraction of its edge; larger than the device's rounding errors.
 MARGIN = 0.02
 EMPTY: Window = (0, 0, 0, 0)
 
 
 def whole_frame(view: View) -> Window:
-    """Every pixel."""
+    """The window of all pixels."""
     return 0, 0, view.width, view.height
 
 
 def shadow_window(view: View, environment: Environment, depth: Floats, extent: Extent) -> Window:
-    """The least rectangle of pixels, and one more on each side, whose way to some light may meet the object's box.
+    """The smallest window of pixels whose shadow rays may hit the object's box, a pixel wider on each side.
 
     Args:
         view: The frame, with the room's pose.
-        room: The maps' camera.
-        depth: What the device takes for depth, float64 [room.height, room.width], metres along the optical axis.
-        extent: The object's box.
+        environment: The room, for its camera.
+        depth: The device's decoded depth, float64 [environment.height, environment.width], metres along z.
+        extent: Bounds of the object.
     """
     if not view.shadows:
         return EMPTY
@@ -43,7 +43,7 @@ def shadow_window(view: View, environment: Environment, depth: Floats, extent: E
     low, high = extent.low - margin, extent.high + margin
     shaded = np.zeros((view.height, view.width), dtype=bool)
     for light in view.lights:
-        shaded |= _meets_box(points, light.position - points, low, high)
+        shaded |= _hits_box(points, light.position - points, low, high)
     if not shaded.any():
         return EMPTY
     columns, rows = np.flatnonzero(shaded.any(axis=0)), np.flatnonzero(shaded.any(axis=1))
@@ -52,7 +52,7 @@ def shadow_window(view: View, environment: Environment, depth: Floats, extent: E
 
 
 def _points(view: View, environment: Environment, depth: Floats) -> Floats:
-    """The room's points in the frame's pixels, mesh space, float64 [height, width, 3]."""
+    """The room's surface points at the frame's pixels, mesh space, float64 [height, width, 3]."""
     assert view.view_to_mesh is not None
     u = (np.arange(view.width) + 0.5) * environment.width / view.width
     v = (np.arange(view.height) + 0.5) * environment.height / view.height
@@ -61,13 +61,13 @@ def _points(view: View, environment: Environment, depth: Floats) -> Floats:
     return np.stack([x, y, z], axis=2) @ view.view_to_mesh[:, :3].T + view.view_to_mesh[:, 3]
 
 
-def _meets_box(starts: Floats, ways: Floats, low: Floats, high: Floats) -> npt.NDArray[np.bool_]:
-    """Whether start + t · way lies in the box for some t from 0 to 1."""
+def _hits_box(origins: Floats, directions: Floats, low: Floats, high: Floats) -> npt.NDArray[np.bool_]:
+    """Whether origin + t · direction is in the box for some t from 0 to 1."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.stack([(low - starts) / ways, (high - starts) / ways])
-    # Along an axis that a way does not change: everything, or nothing
-    inside = (starts >= low) & (starts <= high)
-    enters = np.where(ways == 0, np.where(inside, -np.inf, np.inf), ends.min(axis=0)).max(axis=2)
-    leaves = np.where(ways == 0, np.where(inside, np.inf, -np.inf), ends.max(axis=0)).min(axis=2)
-    meets: npt.NDArray[np.bool_] = np.maximum(enters, 0.0) <= np.minimum(leaves, 1.0)
-    return meets
+        crossings = np.stack([(low - origins) / directions, (high - origins) / directions])
+    # A direction of 0 on an axis: the ray is in the slab for all t, or for none
+    inside = (origins >= low) & (origins <= high)
+    enters = np.where(directions == 0, np.where(inside, -np.inf, np.inf), crossings.min(axis=0)).max(axis=2)
+    leaves = np.where(directions == 0, np.where(inside, np.inf, -np.inf), crossings.max(axis=0)).min(axis=2)
+    hits: npt.NDArray[np.bool_] = np.maximum(enters, 0.0) <= np.minimum(leaves, 1.0)
+    return hits

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from colonnade.design.manifest import Manifest
-from colonnade.scene_image.file import ImageHeader
+from colonnade.scene_image.header import ImageHeader
 
 #: Start-up, and the longest row of tiles that no ray enters.
 BASE_CYCLES = 100_000

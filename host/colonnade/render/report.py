@@ -8,7 +8,7 @@ from typing import Any
 
 from colonnade.common.framebuffer import Frame
 from colonnade.design.manifest import Manifest
-from colonnade.scene_image.file import ImageHeader
+from colonnade.scene_image.header import ImageHeader
 
 #: Kinds of rays. ``in_box`` counts again those that enter the object's bounding box.
 RAY_KINDS = ("primary", "shadow", "reflection", "refraction")

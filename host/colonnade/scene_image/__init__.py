@@ -1,1 +1,1 @@
-"""The scene image: the records and maps that the hardware loads, in one file."""
+"""The scene image: one file with the records and maps that the hardware loads."""

@@ -1,4 +1,4 @@
-"""The acceleration structure over quantised triangles, built by the C++ half of the host."""
+"""The bounding-volume hierarchy (BVH) over quantised triangles, built by the C++ extension."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ EMPTY, NODE, LEAF = 0, 1, 2
 
 @dataclass(frozen=True)
 class TreeStatistics:
-    """What a tree costs.
+    """Size and cost of a tree.
 
     Attributes:
-        nodes, leaves: Records of either kind.
-        depth: Nodes on the longest path.
-        stack_bound: Most siblings that can wait while one ray descends: the stack it may need.
-        cost: Records that a random ray through the root box reads, by the surface-area heuristic.
-        height_limit: Binary levels to which the tree was held so that the stack suffices; 0 where it was free.
+        nodes, leaves: Number of node records and leaf records.
+        depth: Nodes on the longest path from the root.
+        stack_bound: Largest number of stack entries that a ray can need.
+        cost: Expected record reads of a random ray through the root box, by the surface-area heuristic.
+        height_limit: Limit of the binary tree's levels that keeps the stack within its depth; 0 for none.
     """
 
     nodes: int
@@ -38,15 +38,15 @@ class Bvh:
     A child's planes are ``origin + (low << exponent)`` and ``origin + (high << exponent)``, in vertex units.
 
     Attributes:
-        origin: uint32 [n, 3], units.
+        origin: uint32 [n, 3], vertex units.
         exponent: uint8 [n, 3].
         kinds: uint8 [n, arity]: EMPTY, NODE or LEAF.
         low, high: uint16 [n, arity, 3].
-        first_child: uint32 [n], the node of the first NODE child; the others follow in slot order.
-        first_triangles: uint32 [n], the leaf of the first LEAF child; the others follow in slot order.
-        leaf_first, leaf_count: uint32 [l], packed id of a leaf's first triangle, and its triangles.
-        order: uint32 [m], the triangle (row of the faces) of each packed id.
-        statistics: What the tree costs.
+        first_child: uint32 [n], node index of the first NODE child; the others follow in slot order.
+        first_triangles: uint32 [n], leaf index of the first LEAF child; the others follow in slot order.
+        leaf_first, leaf_count: uint32 [l], packed id of a leaf's first triangle, and number of its triangles.
+        order: uint32 [m], face index of each packed id.
+        statistics: Size and cost of the tree.
     """
 
     origin: npt.NDArray[np.uint32]
@@ -71,15 +71,15 @@ def build_bvh(
     box_bits: int,
     stack_depth: int,
 ) -> Bvh:
-    """The tree over triangles of integer vertices.
+    """Build the tree over triangles with integer vertices.
 
-    The order of the triangles depends on neither arity nor box bits. When the tree that is best for the rays needs more
-    than ``stack_depth`` entries, more balanced ones are tried; the caller compares ``statistics.stack_bound``.
+    The order of the triangles depends on neither arity nor box bits. If the tree of lowest cost needs more than
+    ``stack_depth`` entries, more balanced trees are tried. The caller must compare ``statistics.stack_bound``.
 
     Args:
-        vertices: int32 [n, 3], units, from 0.
+        vertices: int32 [n, 3], vertex units, from 0.
         faces: int32 [m, 3], at least one.
-        triangles_per_record: Most triangles of a leaf.
+        triangles_per_record: Largest number of triangles in a leaf.
         arity: 2 or 4.
         box_bits: Bits of a child's plane relative to its node.
         stack_depth: Entries of the traversal stack.

@@ -1,4 +1,4 @@
-"""A room as part of the scene image: what each memory of the hardware's physical-attribute memory is loaded with."""
+"""Adds a room's maps to a scene image, as contents of the physical-attribute memory."""
 
 from __future__ import annotations
 
@@ -12,21 +12,22 @@ from colonnade.environment.encoding.image import SOURCE_BYTES_PER_PIXEL, memory_
 from colonnade.environment.encoding.layout import POINTER_BITS
 from colonnade.environment.encoding.plane_map import PLANE_MODES
 from colonnade.environment.encoding.two_level import MODES
-from colonnade.scene_image.file import EnvironmentHeader, ImageHeader, LoadedMemory, LoadSection, SceneImage
+from colonnade.scene_image.file import LoadSection, SceneImage
+from colonnade.scene_image.header import EnvironmentHeader, ImageHeader, LoadedMemory
 
 
 def with_environment(image: SceneImage, environment: EncodedEnvironment, manifest: Manifest) -> SceneImage:
-    """A mesh's image with a room's maps.
+    """Add a room's maps to a mesh's image.
 
     Raises:
-        ValueError: Words do not fit the manifest's memories.
+        ValueError: The words do not fit the manifest's memories.
     """
     sections = []
     for memory, words in memory_words(environment.image):
-        place = manifest.memories[memory]
-        word_bytes = -(-int(place["bits"]) // 8)
-        if len(words) != int(place["depth"]) or words[:, word_bytes:].any():
-            raise ValueError(f"{memory}: {words.shape} bytes do not fit {place['depth']} words of {place['bits']} bits")
+        shape = manifest.memories[memory]
+        word_bytes = -(-int(shape["bits"]) // 8)
+        if len(words) != int(shape["depth"]) or words[:, word_bytes:].any():
+            raise ValueError(f"{memory}: {words.shape} bytes do not fit {shape['depth']} words of {shape['bits']} bits")
         sections.append(LoadSection(memory, np.ascontiguousarray(words[:, :word_bytes])))
     memories = tuple(LoadedMemory(section.memory, *section.words.shape) for section in sections)
     header = EnvironmentHeader(environment.environment.name, environment.image.depth_unit, memories)
@@ -34,8 +35,9 @@ def with_environment(image: SceneImage, environment: EncodedEnvironment, manifes
 
 
 def tiles_beyond_heap(image: SceneImage) -> dict[str, int]:
-    """Tiles of each map whose words do not all lie in its heap: the device reads those as 0, and reports an error if a
-    ray asks for one. None of a map without a heap.
+    """Count the tiles of each map that point beyond its heap; maps without a heap are left out.
+
+    The device reads words beyond the heap as 0, and reports an error for a ray that looks them up.
     """
     words = {section.memory: section.words for section in image.attributes}
     counts = {}
@@ -52,13 +54,11 @@ def tiles_beyond_heap(image: SceneImage) -> dict[str, int]:
 
 
 def environment_use(header: ImageHeader, manifest: Manifest) -> dict[str, dict[str, float]]:
-    """Bytes of memory that each of an image's maps takes, and how much less than the map as it comes; none without a
-    room.
-    """
+    """Memory bytes of each map, bytes of the source map, and their ratio; empty without a room."""
     if header.room is None:
         return {}
     layout = layout_of(manifest)
     source = layout.width * layout.height * SOURCE_BYTES_PER_PIXEL
-    of_map, planes = layout.map_memory_bytes, layout.plane_memory_bytes
-    counts = {"albedo": of_map, "normals": of_map, "planes": planes}
+    map_bytes, plane_bytes = layout.map_memory_bytes, layout.plane_memory_bytes
+    counts = {"albedo": map_bytes, "normals": map_bytes, "planes": plane_bytes}
     return {name: {"bytes": count, "source_bytes": source, "ratio": source / count} for name, count in counts.items()}

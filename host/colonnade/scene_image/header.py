@@ -1,93 +1,122 @@
-"""Checks the header of a scene image: the file may come from anywhere, its checksum says nothing of its sense."""
+"""The header of a scene image: what the image contains, and where."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from colonnade.mesh.materials import KINDS
+import numpy as np
 
-#: Whole numbers of the header, and how large they may be.
-_COUNTS = ("source_triangles", "triangles", "record_count", "triangle_base", "triangle_records", "attribute_base")
-_MAX = 1 << 31
-_MAX_RECORD_BITS = 1 << 16
-_MAX_WORD_BYTES = 1 << 12
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.mesh import Extent
+from colonnade.scene_image.bvh import TreeStatistics
 
 
-def check_header(header: Any) -> None:
-    """Refuse a header whose values have the wrong type or range.
+@dataclass(frozen=True)
+class ObjectFrame:
+    """The transform from mesh space to vertex units: ``unit_vertex = (vertex - offset) * scale``.
 
-    Raises:
-        ValueError, KeyError, TypeError: It cannot be used; the reader of the file says so.
+    Attributes:
+        scale: Vertex units per mesh unit.
+        offset: Mesh coordinates of vertex-unit position (0, 0, 0).
     """
-    _require(isinstance(header, Mapping))
-    for key in _COUNTS:
-        _count(header[key])
-    _require(header["triangle_base"] <= header["attribute_base"] <= header["record_count"])
-    _require(header["triangle_records"] <= header["record_count"])
-    bits = _count(header["record_bits"])
-    _require(0 < bits <= _MAX_RECORD_BITS and bits % 32 == 0)
-    for key in ("format_hash", "mesh"):
-        _require(isinstance(header[key], str))
-    for key in ("bounds_low", "bounds_high"):
-        _require(len([_count(value) for value in _list(header[key])]) == 3)
-    _numbers(header["frame"]["offset"], 3)
-    _require(_number(header["frame"]["scale"]) > 0)
-    for key in ("low", "high"):
-        _numbers(header["extent"][key], 3)
-    outline = _list(header["extent"]["outline"])
-    _require(len(outline) > 0)
-    for point in outline:
-        _numbers(point, 3)
-    _require(len(_list(header["materials"])) > 0)
-    for material in header["materials"]:
-        _require(material["kind"] in KINDS)
-        _numbers(material["albedo"], 3)
-        _number(material["ior"])
-    _check_tree(header["tree"])
-    _check_environment(header["room"])
+
+    scale: float
+    offset: tuple[float, float, float]
 
 
-def _check_tree(tree: Any) -> None:
-    if tree is None:
-        return
-    for key, value in tree.items():
-        if key == "cost":
-            _number(value)
-        else:
-            _count(value)
+@dataclass(frozen=True)
+class LoadedMemory:
+    """Number and size of the words for a memory.
+
+    Attributes:
+        memory: Its name in the manifest, e.g. ``albedo.palette``.
+        words: Number of words, from address 0.
+        word_bytes: Bytes per word, rounded up.
+    """
+
+    memory: str
+    words: int
+    word_bytes: int
+
+    @property
+    def bytes(self) -> int:
+        """Size in the file, bytes."""
+        return self.words * self.word_bytes
 
 
-def _check_environment(environment: Any) -> None:
-    if environment is None:
-        return
-    _require(isinstance(environment["name"], str) and _number(environment["depth_unit"]) > 0)
-    for memory in _list(environment["memories"]):
-        _require(isinstance(memory["memory"], str))
-        _count(memory["words"])
-        _require(0 < _count(memory["word_bytes"]) <= _MAX_WORD_BYTES)
+@dataclass(frozen=True)
+class EnvironmentHeader:
+    """The room of an image's maps.
+
+    Attributes:
+        name: Name of the room.
+        depth_unit: Depth of w = 1 in the plane map, metres: w = depth_unit / depth.
+        memories: Memories of the physical-attribute memory, in the file's order.
+    """
+
+    name: str
+    depth_unit: float
+    memories: tuple[LoadedMemory, ...]
 
 
-def _count(value: Any) -> int:
-    _require(isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= _MAX)
-    return int(value)
+@dataclass(frozen=True)
+class ImageHeader:
+    """Description of a scene image's content.
 
+    Attributes:
+        format_hash: Format hash of the manifest that it was packed for.
+        mesh: Name of the mesh.
+        source_triangles: Faces of the mesh file.
+        triangles: Packed triangles; ids start at 0.
+        record_bits, record_count: Width and number of the column memory's records.
+        triangle_base, triangle_records, attribute_base: Bounds of the sections, in records.
+        bounds_low, bounds_high: The object's bounding box, vertex units, inclusive.
+        frame: Transform from mesh space to vertex units.
+        extent: Bounds in mesh space, for framing.
+        materials: Materials by the faces' material index.
+        tree: Size and cost of the tree; None without nodes.
+        room: The room; None without a room's maps.
+    """
 
-def _number(value: Any) -> float:
-    _require(isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value))
-    return float(value)
+    format_hash: str
+    mesh: str
+    source_triangles: int
+    triangles: int
+    record_bits: int
+    record_count: int
+    triangle_base: int
+    triangle_records: int
+    attribute_base: int
+    bounds_low: tuple[int, int, int]
+    bounds_high: tuple[int, int, int]
+    frame: ObjectFrame
+    extent: Extent
+    materials: tuple[MeshMaterial, ...]
+    tree: TreeStatistics | None
+    room: EnvironmentHeader | None = None
 
+    def to_json(self) -> dict[str, Any]:
+        """Convert to a JSON object; floats keep their exact values."""
+        data = asdict(self)
+        data["extent"] = {name: np.asarray(value).tolist() for name, value in data["extent"].items()}
+        return data
 
-def _numbers(values: Any, count: int) -> None:
-    _require(len([_number(value) for value in _list(values)]) == count)
-
-
-def _list(value: Any) -> list[Any]:
-    _require(isinstance(value, list))
-    return list(value)
-
-
-def _require(is_right: bool) -> None:
-    if not is_right:
-        raise ValueError
+    @staticmethod
+    def from_json(data: dict[str, Any]) -> ImageHeader:
+        """Convert from a checked JSON object of `to_json`."""
+        values = dict(data)
+        values["bounds_low"] = tuple(values["bounds_low"])
+        values["bounds_high"] = tuple(values["bounds_high"])
+        frame = values["frame"]
+        values["frame"] = ObjectFrame(frame["scale"], tuple(frame["offset"]))
+        extent = {name: np.array(value, dtype=np.float64) for name, value in values["extent"].items()}
+        values["extent"] = Extent(**extent)
+        values["materials"] = tuple(
+            MeshMaterial(**{**material, "albedo": tuple(material["albedo"])}) for material in values["materials"]
+        )
+        values["tree"] = TreeStatistics(**values["tree"]) if values["tree"] else None
+        if environment := values["room"]:
+            memories = tuple(LoadedMemory(**memory) for memory in environment["memories"])
+            values["room"] = EnvironmentHeader(environment["name"], environment["depth_unit"], memories)
+        return ImageHeader(**values)

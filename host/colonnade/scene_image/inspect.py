@@ -1,4 +1,4 @@
-"""What a scene image holds, for `colonnade inspect` and the report of `colonnade pack`."""
+"""Describes a scene image, for `colonnade inspect` and the report of `colonnade pack`."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Any
 
 from colonnade.common.terminal_text import one_line
 from colonnade.design.manifest import Manifest
-from colonnade.scene_image.file import ImageHeader, SceneImage
+from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.header import ImageHeader
 
 
 def describe(image: SceneImage) -> dict[str, Any]:
-    """Mesh, memory map and tree statistics as a JSON object."""
+    """Describe mesh, memory map and tree as a JSON object."""
     header = image.header
     return {
         "mesh": {
@@ -49,17 +50,17 @@ def _environment(image: SceneImage) -> dict[str, Any] | None:
 
 
 def illegal_lines(image: SceneImage) -> list[str]:
-    """One line that says so if the room's maps have illegal tiles."""
+    """A warning line if the room's maps have illegal tiles, else none."""
     from colonnade.scene_image.environment import tiles_beyond_heap
 
     counts = [f"{count:,} of {name}" for name, count in tiles_beyond_heap(image).items() if count]
     if not counts:
         return []
-    return [f"warning     tiles point beyond their heap, {', '.join(counts)}: frames that show them have an error"]
+    return [f"warning     tiles point beyond their heap, {', '.join(counts)}: frames that show them report an error"]
 
 
 def sections(header: ImageHeader) -> list[tuple[str, int, int]]:
-    """The memory map: (name, first record, records)."""
+    """The memory map as (name, first record, number of records)."""
     return [
         ("nodes", 0, header.triangle_base),
         ("triangles", header.triangle_base, header.triangle_records),
@@ -68,20 +69,20 @@ def sections(header: ImageHeader) -> list[tuple[str, int, int]]:
 
 
 def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[str]:
-    """The description as lines of text; with a manifest also how full its memories are."""
+    """Describe the image in text lines; a manifest adds the use of its memories."""
     dropped = header.source_triangles - header.triangles
     lines = [
         f"mesh        {one_line(header.mesh)}: {header.triangles:,} triangles"
         + (f" ({dropped:,} dropped)" if dropped else "")
     ]
     lines.append(
-        f"box         {header.bounds_low} to {header.bounds_high} units, {header.frame.scale:.6g} units a mesh unit"
+        f"box         {header.bounds_low} to {header.bounds_high} units, {header.frame.scale:.6g} units per mesh unit"
     )
     used = f"{header.record_count:,} records of {header.record_bits} bits"
     if manifest is not None:
         depth = int(manifest.memories["columnBvh"]["depth"])
         used += f", {header.record_count / depth:.1%} of {depth:,}"
-    lines.append(f"memory      {used} ({header.record_count * header.record_bits // 8:,} bytes a column)")
+    lines.append(f"memory      {used} ({header.record_count * header.record_bits // 8:,} bytes per column)")
     lines += [f"  {name:<10}{count:>9,} records from {first:,}" for name, first, count in sections(header) if count]
     return lines + _tree_lines(header, manifest) + _environment_lines(header, manifest)
 
@@ -98,7 +99,7 @@ def _tree_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
         f"cost        {tree.cost:.2f} records for a random ray through the box",
     ]
     if tree.height_limit:
-        lines.append(f"            held to {tree.height_limit} binary levels so that the stack suffices")
+        lines.append(f"            limited to {tree.height_limit} binary levels by the stack")
     return lines
 
 
@@ -112,7 +113,7 @@ def _environment_lines(header: ImageHeader, manifest: Manifest | None) -> list[s
 
         for name, use in environment_use(header, manifest).items():
             lines.append(
-                f"  {name:<10}{use['bytes']:>9,} bytes of memory, {use['ratio']:.1f} times less than the map's"
+                f"  {name:<10}{use['bytes']:>9,} bytes of memory, a {use['ratio']:.1f}x reduction from the map's"
                 f" {use['source_bytes']:,}"
             )
     for memory in header.room.memories:
@@ -122,6 +123,6 @@ def _environment_lines(header: ImageHeader, manifest: Manifest | None) -> list[s
 
 
 def print_report(header: ImageHeader, manifest: Manifest | None = None, write: Callable[[str], None] = print) -> None:
-    """Writes `report_lines`, one call a line."""
+    """Write `report_lines`, one call per line."""
     for line in report_lines(header, manifest):
         write(line)

@@ -1,7 +1,7 @@
-"""The packer: from a mesh to the records of the column memory.
+"""The packer: converts a mesh to the records of the column memory.
 
-Quantise, drop what has no area left, build the tree, fill the records by the manifest's layouts. Sections in memory
-order: nodes, triangles, attributes. Addresses in nodes are absolute.
+It quantises the vertices, drops degenerate triangles, builds the tree and fills the records by the manifest's layouts.
+The sections are nodes, triangles and attributes, in this order. Addresses in nodes are absolute.
 """
 
 from __future__ import annotations
@@ -21,23 +21,24 @@ from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.topology import drop_faces, merge_rows
 from colonnade.scene_image.bvh import LEAF, NODE, Bvh, build_bvh
-from colonnade.scene_image.file import ImageHeader, ObjectFrame, SceneImage
+from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.header import ImageHeader, ObjectFrame
 
 Units = npt.NDArray[np.int32]
 AXES = "xyz"
-#: The column memory's largest configuration, records.
-DEEPEST_MEMORY = 1 << 22
+#: Largest configurable depth of the column memory, records.
+MAX_MEMORY_DEPTH = 1 << 22
 
 
 @dataclass(frozen=True)
 class QuantisedMesh:
-    """A mesh on the grid of vertex units.
+    """A mesh with vertices rounded to vertex units.
 
     Attributes:
-        vertices: int32 [n, 3], from 0 to 2^vertexBits − 1; one for each vertex of the mesh.
-        faces: int32 [m, 3], those with an area.
-        mesh_faces: int64 [m], their rows in the mesh's faces.
-        frame: How the mesh lies in the cube.
+        vertices: int32 [n, 3], 0 to 2^vertexBits − 1; one for each vertex of the mesh.
+        faces: int32 [m, 3], without degenerate faces.
+        mesh_faces: int64 [m], their indices in the mesh's faces.
+        frame: Transform from mesh space to vertex units.
     """
 
     vertices: Units
@@ -47,10 +48,13 @@ class QuantisedMesh:
 
 
 def quantise(mesh: Mesh, vertex_bits: int) -> QuantisedMesh:
-    """The mesh, uniformly scaled, in the middle of the cube [0, 2^vertex_bits − 1]³, rounded to nearest.
+    """Scale a mesh uniformly into the centre of the cube [0, 2^vertex_bits − 1]³ and round to nearest.
 
-    The box's low planes are whole units, so that a flat side stays flat.
-    Faces that lose their area, or become equal to an earlier one, are dropped.
+    The low planes of its box are integers, so that a flat side stays flat. Faces that become degenerate, or equal to an
+    earlier face, are dropped.
+
+    Raises:
+        UserError: All faces become degenerate.
     """
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     maximum = (1 << vertex_bits) - 1
@@ -59,7 +63,7 @@ def quantise(mesh: Mesh, vertex_bits: int) -> QuantisedMesh:
     start = np.floor((maximum - np.rint((high - low) * scale)) / 2)
     offset = low - start / scale
     vertices = np.clip(np.rint((mesh.vertices - low) * scale) + start, 0, maximum).astype(np.int64)
-    # Vertices that fall together count as one when faces are compared.
+    # Merge coincident vertices to compare faces
     positions, index = merge_rows(vertices)
     keep = drop_faces(positions, index[mesh.faces])
     if len(keep) == 0:
@@ -69,16 +73,15 @@ def quantise(mesh: Mesh, vertex_bits: int) -> QuantisedMesh:
 
 
 def pack(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | None = None) -> SceneImage:
-    """The scene image of a mesh for the hardware of a manifest.
+    """Pack a mesh into a scene image for a design.
 
     Args:
-        mesh: What to pack.
-        manifest: Of the hardware.
-        materials: What the mesh's materials are made of; their own unless given. Only which of them are glass is part
-            of the records.
+        mesh: The mesh.
+        manifest: The design's manifest.
+        materials: Materials that replace the mesh's. The records only contain which faces are glass.
 
     Raises:
-        UserError: It does not fit; the message names the number and the setting.
+        UserError: The mesh does not fit; the message names the size and the setting.
     """
     geometry, memory = manifest.config["geometry"], manifest.config["columnBvhMemory"]
     quantised = quantise(mesh, int(geometry["vertexBits"]))
@@ -127,7 +130,7 @@ def pack(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | Non
 
 
 def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
-    """What an image takes of each memory, for reports: records, bytes, the stack, and a room's maps."""
+    """Use of each memory for reports: records, bytes, stack entries, and a room's maps."""
     from colonnade.scene_image.environment import environment_use
 
     depth = int(manifest.memories["columnBvh"]["depth"])
@@ -153,7 +156,7 @@ def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
 def _check_fits(name: str, manifest: Manifest, bvh: Bvh, record_count: int) -> None:
     depth = int(manifest.memories["columnBvh"]["depth"])
     if record_count > depth:
-        advice = "raise columnBvhMemory.depth" if record_count <= DEEPEST_MEMORY else "take a coarser mesh"
+        advice = "raise columnBvhMemory.depth" if record_count <= MAX_MEMORY_DEPTH else "use a coarser mesh"
         raise UserError(f"mesh {name} needs {record_count:,} records, columnBvhMemory.depth is {depth:,}: {advice}")
     stack_depth, bound = int(manifest.config["columnBvhMemory"]["stackDepth"]), bvh.statistics.stack_bound
     if manifest.bvh and bound > stack_depth:
@@ -169,13 +172,13 @@ def _check_fits(name: str, manifest: Manifest, bvh: Bvh, record_count: int) -> N
 
 
 def _full_leaves(triangles: int, per_record: int) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]:
-    """Leaves for the exhaustive baseline: every record but the last is full."""
+    """Leaves for the linear-scan baseline: every record but the last is full."""
     first = np.arange(0, triangles, per_record, dtype=np.uint32)
     return first, np.minimum(per_record, triangles - first).astype(np.uint32)
 
 
 def _node_records(bvh: Bvh, manifest: Manifest, triangle_base: int) -> Bytes:
-    """Node records; child addresses are absolute, 0 where a node has no child of that kind."""
+    """Pack the node records; child addresses are absolute, 0 without a child of that kind."""
     has_nodes, has_leaves = (bvh.kinds == NODE).any(axis=1), (bvh.kinds == LEAF).any(axis=1)
     values: dict[str, npt.NDArray[Any]] = {
         "firstChild": np.where(has_nodes, bvh.first_child, 0),
@@ -210,7 +213,7 @@ def _triangle_records(
 def _attribute_records(
     mesh: Mesh, quantised: QuantisedMesh, order: npt.NDArray[np.uint32], manifest: Manifest, per_record: int
 ) -> Bytes:
-    """Shading attributes in the order of packed ids; the last record may have empty slots."""
+    """Pack the attribute records in the order of packed ids; the last record may have empty slots."""
     one = (1 << manifest.numbers["normalFraction"]) - 1
     rows = quantised.mesh_faces[order]
     count = -(-len(order) // per_record)
@@ -230,7 +233,7 @@ def _attribute_records(
 
 
 def geometric_normals(quantised: QuantisedMesh) -> npt.NDArray[np.float64]:
-    """Unit normals float64 [m, 3] of the quantised triangles, by their winding; the cross product is exact."""
+    """Unit normals of the quantised triangles by their winding, float64 [m, 3]; the cross product is exact."""
     corners = quantised.vertices[quantised.faces].astype(np.int64)
     return unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).astype(np.float64))
 
@@ -239,5 +242,5 @@ def _vector(name: str, values: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
     return {f"{name}.{axis}": values[:, a] for a, axis in enumerate(AXES)}
 
 
-def _corner(values: npt.NDArray[Any]) -> tuple[int, int, int]:
+def _corner(values: Units) -> tuple[int, int, int]:
     return int(values[0]), int(values[1]), int(values[2])

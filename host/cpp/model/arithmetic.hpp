@@ -1,4 +1,4 @@
-// Exact integer arithmetic of the datapaths: the rules of docs/numbers.md, "Rounding".
+// Exact integer arithmetic of the datapaths (docs/numbers.md, "Rounding").
 #pragma once
 #include <cstdint>
 #include <type_traits>
@@ -8,7 +8,7 @@ namespace colonnade {
 using Wide = __int128;
 using UnsignedWide = unsigned __int128;
 
-/// Bits needed to hold x: 0 for 0.
+/// Number of bits of x; 0 for 0.
 inline int bitLength(UnsignedWide x) {
     const auto high = static_cast<std::uint64_t>(x >> 64), low = static_cast<std::uint64_t>(x);
     return high ? 128 - __builtin_clzll(high) : low ? 64 - __builtin_clzll(low) : 0;
@@ -16,22 +16,22 @@ inline int bitLength(UnsignedWide x) {
 
 inline UnsignedWide magnitude(Wide x) { return x < 0 ? -static_cast<UnsignedWide>(x) : static_cast<UnsignedWide>(x); }
 
-/// x · 2^bits, modulo the integer's size.
+/// x · 2^bits, modulo the integer's range.
 template <class Integer> Integer shiftLeft(Integer x, int bits) {
     using Unsigned = std::conditional_t<sizeof(Integer) == sizeof(Wide), UnsignedWide, std::uint64_t>;
     return bits >= static_cast<int>(8 * sizeof(Integer)) ? Integer(0) : static_cast<Integer>(static_cast<Unsigned>(x) << bits);
 }
 
-/// The low `bits` bits of x as a signed number: what a register of that width makes of it.
+/// The low `bits` bits of x as a signed number, as in a register of that width.
 inline Wide wrapped(Wide x, int bits) { return shiftLeft<Wide>(x, 128 - bits) >> (128 - bits); }
 
-/// Drops `bits` low bits towards minus infinity; shifts left where `bits` is negative.
+/// x / 2^bits rounded towards minus infinity; a left shift for negative `bits`.
 template <class Integer> Integer floorShift(Integer x, int bits) {
     if (bits <= 0) return shiftLeft(x, -bits);
     return bits >= static_cast<int>(8 * sizeof(Integer)) ? (x < 0 ? Integer(-1) : Integer(0)) : x >> bits;
 }
 
-/// Drops `bits` low bits to nearest, ties to even; shifts left where `bits` is not positive.
+/// x / 2^bits rounded to nearest, ties to even; a left shift for negative `bits`.
 template <class Integer> Integer nearestEven(Integer x, int bits) {
     if (bits <= 0) return floorShift(x, bits);
     const Integer quotient = x >> bits, rest = x - shiftLeft(quotient, bits), half = Integer(1) << (bits - 1);
@@ -43,7 +43,7 @@ template <class Integer> Integer clamp(Integer x, Integer low, Integer high) { r
 /// Largest value of a signed number of `bits` bits.
 inline Wide largest(int bits) { return (Wide(1) << (bits - 1)) - 1; }
 
-/// x = mantissa * 2^(exponent - bits), the mantissa's top bit set (floored); both 0 for x = 0.
+/// x = mantissa * 2^(exponent - bits) with the mantissa's top bit set, rounded down; both are 0 for x = 0.
 struct Normalised {
     std::uint64_t mantissa;
     int exponent;
@@ -55,7 +55,7 @@ inline Normalised normalise(UnsignedWide x, int bits) {
     return {static_cast<std::uint64_t>(drop >= 0 ? x >> drop : x << -drop), exponent};
 }
 
-/// floor(numerator * 2^digits / denominator), of two mantissas of at most 32 bits.
+/// floor(numerator * 2^digits / denominator) for mantissas of at most 32 bits; 0 for a zero denominator.
 inline std::uint64_t divide(std::uint64_t numerator, std::uint64_t denominator, int digits) {
     if (denominator == 0) return 0;
     return (numerator << digits) / denominator;

@@ -1,4 +1,4 @@
-// The words of the physical-attribute memory and how large its maps are, by the manifest (docs/attributes.md).
+// Words and sizes of the physical-attribute memory, read by the manifest's layouts (docs/attributes.md).
 #pragma once
 #include <algorithm>
 #include <stdexcept>
@@ -9,7 +9,7 @@
 
 namespace colonnade {
 
-/// w' = (a·(u − W/2) + b·(v − H/2))/1024 + c, every coefficient its field · 2^(e − 22).
+/// w' = (a·(u − W/2) + b·(v − H/2))/1024 + c; each coefficient is its field · 2^(e − 22).
 struct PlaneWord {
     std::int64_t a, b, c;
     int e;
@@ -18,10 +18,10 @@ struct PlaneWord {
 /// The manifest's `attributes.sizes`.
 struct AttributeSizes {
     int width, height, tileLog, tileColumns, tileRows, blockLog, blockColumns, blockRows, paletteSize, planes, boundingPlanes;
-    /// Words of the memories that tiles or blocks point into.
+    /// Depth of the heaps and of the label memory, words.
     int mapHeapWords, planeHeapWords, labelWords;
-    /// Labels and seeds (`slic`), not descriptors, palette and heap (`twoLevel`).
-    bool sliding;
+    /// Whether the encoding is `slic` (labels and seeds), not `twoLevel` (descriptors, palette and heap).
+    bool isSlic;
 
     explicit AttributeSizes(const std::map<std::string, std::int64_t>& values) {
         const auto take = [&](const char* key) { return static_cast<int>(lookUp(values, key)); };
@@ -39,21 +39,21 @@ struct AttributeSizes {
         mapHeapWords = take("mapHeapWords");
         planeHeapWords = take("planeHeapWords");
         labelWords = take("labelWords");
-        sliding = take("sliding") != 0;
+        isSlic = take("sliding") != 0;
     }
 
     int tiles() const { return tileColumns * tileRows; }
     bool covers(int x, int y) const { return x >= 0 && y >= 0 && x < width && y < height; }
     int tileOf(int x, int y) const { return (y >> tileLog) * tileColumns + (x >> tileLog); }
 
-    /// The cell of a pixel in its tile, row-major, for cells of 2^cellLog pixels.
+    /// Row-major index of a pixel's cell in its tile, for cells of 2^cellLog pixels.
     int cellOf(int x, int y, int cellLog) const {
         const int inTile = (1 << tileLog) - 1;
         return (((y & inTile) >> cellLog) << (tileLog - cellLog)) + ((x & inTile) >> cellLog);
     }
 };
 
-/// 16-bit words that tiles point into. A word beyond the end is 0, and to read it is illegal; a load beyond the end is dropped.
+/// A heap of 16-bit words. Reads beyond its end are illegal and give 0; loads beyond its end are dropped.
 class AttributeHeap {
 public:
     static constexpr int wordBytes = 2;
@@ -61,7 +61,7 @@ public:
     explicit AttributeHeap(int depth) : words_(depth) {}
 
     void load(const std::uint8_t* words, std::size_t count, std::size_t stride) {
-        if (stride < wordBytes) throw std::invalid_argument("words of a heap have 16 bits");
+        if (stride < wordBytes) throw std::invalid_argument("heap words must have 16 bits");
         for (std::size_t i = 0; i < std::min(count, words_.size()); ++i)
             words_[i] = static_cast<std::uint16_t>(words[i * stride] | words[i * stride + 1] << 8);
     }
@@ -70,19 +70,19 @@ public:
     int low(int address) const { return word(address) & 255; }
     int high(int address) const { return word(address) >> 8; }
 
-    /// Element `index` of a mask of `bits` (1, 2 or 4) bits each that begins at `address`.
+    /// Element `index` of a mask at `address` with elements of `bits` (1, 2 or 4) bits.
     int select(int address, int index, int bits) const {
         return (word(wordOf(address, index, bits)) >> (index * bits % 16)) & ((1 << bits) - 1);
     }
 
-    /// Address of the word that holds it.
+    /// Address of the word with that element.
     static int wordOf(int address, int index, int bits) { return address + index * bits / 16; }
 
 private:
     std::vector<std::uint16_t> words_;
 };
 
-/// Reads words of `stride` bytes, low byte first, by their layout.
+/// Reads fields of words of `stride` bytes, low byte first, by their layout.
 class AttributeWords {
 public:
     AttributeWords(const Layout& layout, const std::uint8_t* words, std::size_t count, std::size_t stride)
@@ -92,7 +92,7 @@ public:
     }
     std::size_t count() const { return count_; }
     std::int64_t field(std::size_t index, const std::string& name) const { return layout_.at(name).read(words_ + index * stride_); }
-    std::array<int, 3> three(std::size_t index, const std::string& prefix, const char* axes) const {
+    std::array<int, 3> components(std::size_t index, const std::string& prefix, const char* axes) const {
         std::array<int, 3> values;
         for (int i = 0; i < 3; ++i) values[i] = static_cast<int>(field(index, prefix + axes[i]));
         return values;

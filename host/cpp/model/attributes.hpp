@@ -1,30 +1,30 @@
-// The physical-attribute memory's words, read pixel by pixel: what AttributeMap and PlaneMap answer (docs/attributes.md).
+// Decoders of the physical-attribute memory, as in the RTL's AttributeMap and PlaneMap (docs/attributes.md).
 #pragma once
 #include "attribute_words.hpp"
 
 namespace colonnade {
 
-/// Linear; 4095 is 1.0.
+/// Linear colour; 4095 is 1.0.
 struct Rgb12 {
     int r, g, b;
-    /// A word was read beyond the heap.
+    /// A word beyond the heap was read.
     bool isIllegal;
 };
 
-/// In view space (x right, y down, z forward); 11 fraction bits.
+/// View-space normal (x right, y down, z forward); 11 fraction bits.
 struct Normal12 {
     int x, y, z;
     bool isIllegal;
 };
 
-/// Which planes the pixels of a tile lie in.
+/// The planes of a tile.
 struct TileInfo {
-    /// Log2 of a cell's edge in pixels; of the tile's where it is flat, so that it has one cell.
+    /// Log2 of the cell's edge in pixels; for a tile with one plane, of the tile's edge.
     int cellLog2;
-    /// 1, 2 or 4; the other ids are 0.
+    /// Number of planes, 1, 2 or 4; the other ids are 0.
     int count;
     std::array<int, 4> ids;
-    /// A word was read beyond the heap.
+    /// A word beyond the heap was read.
     bool isIllegal;
 };
 
@@ -34,27 +34,27 @@ struct CellPlane {
     bool isIllegal;
 };
 
-/// The entry of a pixel in a map.
+/// Index of a pixel's palette entry or seed.
 struct MapEntry {
     int index;
     bool isIllegal;
 };
 
-/// A plane beyond the view, with the one colour and normal it has.
+/// A bounding plane with its albedo and normal.
 struct BoundingPlaneEntry {
     PlaneWord plane;
     Rgb12 albedo;
     Normal12 normal;
 };
 
-/// One map of three 12-bit components a pixel (albedo or normals), in either encoding.
+/// A map of three 12-bit components per pixel (albedo or normals), in either encoding.
 class ComponentMap {
 public:
     using Components = std::array<int, 3>;
 
     explicit ComponentMap(const AttributeSizes& sizes)
-        : sizes_(sizes), descriptors_(sizes.tiles()), entries_(sizes.sliding ? sizes.tiles() : sizes.paletteSize),
-          heap_(sizes.sliding ? sizes.labelWords : sizes.mapHeapWords) {}
+        : sizes_(sizes), descriptors_(sizes.tiles()), entries_(sizes.isSlic ? sizes.tiles() : sizes.paletteSize),
+          heap_(sizes.isSlic ? sizes.labelWords : sizes.mapHeapWords) {}
 
     void loadDescriptors(const AttributeWords& words) {
         for (std::size_t i = 0; i < std::min(words.count(), descriptors_.size()); ++i)
@@ -62,17 +62,17 @@ public:
                                {static_cast<int>(words.field(i, "entries[0]")), static_cast<int>(words.field(i, "entries[1]"))}};
     }
     void loadEntries(const AttributeWords& words, const char* axes) {
-        for (std::size_t i = 0; i < std::min(words.count(), entries_.size()); ++i) entries_[i] = words.three(i, "", axes);
+        for (std::size_t i = 0; i < std::min(words.count(), entries_.size()); ++i) entries_[i] = words.components(i, "", axes);
     }
     AttributeHeap& heap() { return heap_; }
     const AttributeHeap& heap() const { return heap_; }
 
-    /// A pixel's entry: of the palette, or its seed.
-    MapEntry entryAt(int x, int y) const { return sizes_.sliding ? MapEntry{seedAt(x, y), false} : paletteEntryAt(x, y); }
+    /// The palette entry or the seed of a pixel.
+    MapEntry entryAt(int x, int y) const { return sizes_.isSlic ? MapEntry{seedAt(x, y), false} : paletteEntryAt(x, y); }
 
     const Components& components(const MapEntry& entry) const { return entries_[entry.index]; }
 
-    /// The mask's word lies behind all others that a pixel reads: where that one is legal, they are.
+    /// The mask's word has the highest address that a pixel reads: if it is legal, all are.
     MapEntry paletteEntryAt(int x, int y) const {
         const Descriptor& tile = descriptors_.at(sizes_.tileOf(x, y));
         const int cell = sizes_.cellOf(x, y, sizes_.tileLog - 1 - (tile.mode & 3));
@@ -85,12 +85,12 @@ public:
         return {entry & known, !heap_.covers(AttributeHeap::wordOf(mask, cell, bits))};
     }
 
-    /// Index of a pixel's seed. A label that names no neighbour names the tile itself; a neighbour outside is the nearest inside.
+    /// Seed of a pixel. Labels above 8 select the tile itself; neighbours are clamped to the map.
     int seedAt(int x, int y) const {
         const int block = (y >> sizes_.blockLog) * sizes_.blockColumns + (x >> sizes_.blockLog);
-        const int label = heap_.select(0, block, 4), place = label > 8 ? 4 : label;
-        const int column = clamp((x >> sizes_.tileLog) + place % 3 - 1, 0, sizes_.tileColumns - 1);
-        const int row = clamp((y >> sizes_.tileLog) + place / 3 - 1, 0, sizes_.tileRows - 1);
+        const int label = heap_.select(0, block, 4), neighbour = label > 8 ? 4 : label;
+        const int column = clamp((x >> sizes_.tileLog) + neighbour % 3 - 1, 0, sizes_.tileColumns - 1);
+        const int row = clamp((y >> sizes_.tileLog) + neighbour / 3 - 1, 0, sizes_.tileRows - 1);
         return row * sizes_.tileColumns + column;
     }
 
@@ -101,12 +101,12 @@ private:
     };
 
     AttributeSizes sizes_;
-    std::vector<Descriptor> descriptors_; // of a two-level map
+    std::vector<Descriptor> descriptors_; // two-level encoding only
     std::vector<Components> entries_;
-    AttributeHeap heap_; // of labels, where they slide
+    AttributeHeap heap_; // of masks (two-level) or labels (SLIC)
 };
 
-/// Which plane a pixel lies in.
+/// The map from pixels to plane ids.
 class PlaneIds {
 public:
     explicit PlaneIds(const AttributeSizes& sizes) : sizes_(sizes), descriptors_(sizes.tiles()), heap_(sizes.planeHeapWords) {}
@@ -139,7 +139,7 @@ private:
     struct Descriptor {
         int mode, pointer;
 
-        /// Ids of a tile; one of an illegal mode.
+        /// Number of ids of a tile; 1 for an illegal mode.
         int count() const { return mode == 0 || mode > 4 ? 1 : mode < 3 ? 2 : 4; }
     };
 
@@ -150,14 +150,14 @@ private:
     AttributeHeap heap_;
 };
 
-/// All maps of a room, as the device holds them. Pixels outside the map are an error of the caller.
+/// All maps of an environment. Callers must not pass pixels outside the maps.
 class AttributeImage {
 public:
     /// @param layouts the manifest's `attributes.layouts`
     AttributeImage(const AttributeSizes& sizes, const std::map<std::string, Layout>& layouts)
         : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes), planes_(sizes.planes), boundingPlanes_(sizes.boundingPlanes) {}
 
-    /// Fills a memory from address 0, by its name in the manifest, with words of `stride` bytes, low byte first. Words beyond its depth are dropped.
+    /// Loads a memory, by its name in the manifest, from address 0 with words of `stride` bytes, low byte first. Words beyond its depth are dropped.
     void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
         const auto by = [&](const char* layout) { return AttributeWords(layouts_.at(layout), words, count, stride); };
         if (memory == "albedo.descriptors") albedo_.loadDescriptors(by("mapDescriptor"));
@@ -196,8 +196,8 @@ private:
     }
     void loadBoundingPlanes(const AttributeWords& words) {
         for (std::size_t i = 0; i < std::min(words.count(), boundingPlanes_.size()); ++i) {
-            const auto [r, g, b] = words.three(i, "albedo.", "rgb");
-            const auto [x, y, z] = words.three(i, "normal.", "xyz");
+            const auto [r, g, b] = words.components(i, "albedo.", "rgb");
+            const auto [x, y, z] = words.components(i, "normal.", "xyz");
             boundingPlanes_[i] = {words.plane(i, "plane."), {r, g, b, false}, {x, y, z, false}};
         }
     }

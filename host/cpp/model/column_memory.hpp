@@ -1,4 +1,4 @@
-// The column BVH memory: records as bytes, read as what the frame's sections make of them. docs/errors.md.
+// The column BVH memory: records decoded by the section that they are in (docs/errors.md).
 #pragma once
 #include <algorithm>
 
@@ -6,7 +6,7 @@
 
 namespace colonnade {
 
-/// A pointer outside the section that it is read for gives nothing. Records that were never loaded are zero.
+/// Reads outside a record's section return null. Records that were never loaded are zero.
 class ColumnMemory {
 public:
     ColumnMemory(const std::map<std::string, Layout>& layouts, const Numbers& numbers) : decoder_(layouts, numbers), unwritten_(emptyRecords()) {}
@@ -17,8 +17,8 @@ public:
         isDecoded_ = false;
     }
 
-    /// Where the sections lie: nodes from 0, triangles from `triangleBase`, attributes from `attributeBase`, nothing from `recordCount` on. Each base
-    /// is at most the next one.
+    /// Sets the sections: nodes from 0, triangles from `triangleBase`, attributes from `attributeBase` up to `recordCount`. No base may be larger
+    /// than the next one.
     void divide(std::size_t recordCount, std::size_t triangleBase, std::size_t attributeBase) {
         if (isDecoded_ && recordCount == recordCount_ && triangleBase == triangleBase_ && attributeBase == attributeBase_) return;
         recordCount_ = recordCount;

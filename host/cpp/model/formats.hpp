@@ -1,4 +1,4 @@
-// What the manifest says: number formats, record layouts, register values. Nothing here repeats a width or an offset.
+// The manifest's number formats and record layouts. No width or offset is repeated here.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -20,11 +20,11 @@ inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, co
     return found->second;
 }
 
-/// The manifest's `numbers` (docs/numbers.md), and the few configuration values a traversal depends on.
+/// The manifest's `numbers` (docs/numbers.md), and the configuration values that traversal depends on.
 struct Numbers {
     int vertexBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
         entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits,
-        boxPadLog, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, mostExponent;
+        boxPadLog, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
     int arity, trianglesPerRecord, stackDepth;
     bool bvh;
 
@@ -55,22 +55,22 @@ struct Numbers {
         lightFraction = take("lightFraction");
         etaFraction = take("etaFraction");
         rootBits = take("rootBits");
-        mostExponent = take("mostExponent");
+        maxExponent = take("mostExponent");
         arity = take("arity");
         trianglesPerRecord = take("trianglesPerRecord");
         stackDepth = take("stackDepth");
         bvh = take("bvh") != 0;
     }
 
-    /// Units by which a box is widened.
+    /// Padding of a box, vertex units.
     std::int64_t boxPad() const { return std::int64_t(1) << boxPadLog; }
-    /// The largest t of a set-up ray.
-    std::int64_t farthest() const { return static_cast<std::int64_t>(largest(gridBits)); }
-    /// The limit on t of a ray that is asked for without one: still beyond `farthest` after any entry is taken off.
+    /// The largest t of a ray after set-up.
+    std::int64_t maxT() const { return static_cast<std::int64_t>(largest(gridBits)); }
+    /// The tMax of a ray without a limit: above `maxT` even after any tEntry is subtracted.
     Wide unlimited() const { return (Wide(1) << (sceneBits + 1)) - 1; }
 };
 
-/// Where a field lies in its record.
+/// The position of a field in its record.
 struct Field {
     int offset, width;
     bool isSigned;
@@ -90,7 +90,7 @@ using Layout = std::map<std::string, Field>;
 
 enum class Child : std::uint8_t { empty = 0, node = 1, leaf = 2, illegal = 3 };
 
-/// `isLegal`: docs/errors.md. An illegal record counts as empty.
+/// A node record. Illegal records (docs/errors.md) count as empty.
 struct Node {
     bool isLegal;
     Vector origin;
@@ -104,7 +104,7 @@ struct Triangles {
     bool isLegal;
     std::uint32_t firstTriangle;
     int count;
-    std::array<bool, 2> isClear;
+    std::array<bool, 2> isTransmissive;
     std::array<std::array<Vector, 3>, 2> vertices;
 };
 
@@ -114,11 +114,11 @@ struct Face {
     int material;
 };
 
-/// Reads records by the manifest's layouts. The decoders hold resolved fields, so that a million records decode quickly.
+/// Decodes records by the manifest's layouts. The fields are resolved once, for speed.
 class RecordDecoder {
 public:
     RecordDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers)
-        : arity_(numbers.arity), trianglesPerRecord_(numbers.trianglesPerRecord), mostExponent_(numbers.mostExponent) {
+        : arity_(numbers.arity), trianglesPerRecord_(numbers.trianglesPerRecord), maxExponent_(numbers.maxExponent) {
         const Layout& node = layouts.at("node");
         origin_ = vectorOf(node, "origin");
         exponent_ = vectorOf(node, "exponent");
@@ -135,7 +135,7 @@ public:
         count_ = triangles.at("count");
         for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
             vertices_.push_back(vectorOf(triangles, "vertices[" + std::to_string(vertex) + "]"));
-        for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) isClear_.push_back(triangles.at("isClear[" + std::to_string(triangle) + "]"));
+        for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) isTransmissive_.push_back(triangles.at("isClear[" + std::to_string(triangle) + "]"));
         const Layout& attributes = layouts.at("attributes");
         for (int face = 0; attributes.count("faces[" + std::to_string(face) + "].material"); ++face) {
             const std::string prefix = "faces[" + std::to_string(face) + "].";
@@ -150,11 +150,11 @@ public:
 
     int facesPerRecord() const { return static_cast<int>(faces_.size()); }
 
-    /// All ones in the bits of a record's address, and in those of a packed triangle id.
+    /// Bit masks of a record address and of a packed triangle id.
     std::uint32_t addressMask() const { return maskOf(firstChild_); }
     std::uint32_t idMask() const { return maskOf(firstTriangle_); }
 
-    /// The node at an address.
+    /// Decodes the node at an address.
     Node node(const std::uint8_t* record, std::size_t at) const {
         Node result{};
         result.origin = read(origin_, record);
@@ -175,7 +175,7 @@ public:
             hasNodes = hasNodes || result.kinds[child] == Child::node;
             isKnown = isKnown && result.kinds[child] != Child::illegal;
         }
-        for (int axis = 0; axis < 3; ++axis) isSmall = isSmall && result.exponent[axis] <= mostExponent_;
+        for (int axis = 0; axis < 3; ++axis) isSmall = isSmall && result.exponent[axis] <= maxExponent_;
         const bool isBelow = result.firstChild > at && result.firstChild <= addressMask() - static_cast<std::uint32_t>(arity_);
         result.isLegal = isKnown && isSmall && (isBelow || !hasNodes);
         return result;
@@ -188,7 +188,7 @@ public:
         result.isLegal = result.count > 0 && result.count <= trianglesPerRecord_;
         for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
             result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
-        for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) result.isClear[triangle] = isClear_[triangle].read(record) != 0;
+        for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) result.isTransmissive[triangle] = isTransmissive_[triangle].read(record) != 0;
         return result;
     }
 
@@ -217,10 +217,10 @@ private:
         return {fields[0].read(record), fields[1].read(record), fields[2].read(record)};
     }
 
-    int arity_, trianglesPerRecord_, mostExponent_;
+    int arity_, trianglesPerRecord_, maxExponent_;
     VectorFields origin_, exponent_;
     Field firstChild_, firstTriangles_, firstTriangle_, count_;
-    std::vector<Field> kinds_, isClear_;
+    std::vector<Field> kinds_, isTransmissive_;
     std::vector<VectorFields> low_, high_, vertices_;
     std::vector<FaceFields> faces_;
 };

@@ -1,22 +1,22 @@
-// Rays and planes in the map of a room, where both are straight. docs/background.md.
+// Rays and planes in map space, where both are linear (docs/background.md).
 #pragma once
 #include "attributes.hpp"
 #include "environment_view.hpp"
 
 namespace colonnade {
 
-/// What the march knows of lengths in a map of these sizes, where a position has shadeBits bits.
+/// Geometry in map space for maps of given sizes; positions have shadeBits fraction bits.
 class MapGeometry {
 protected:
-    /// A plane along a ray: how far the ray is in front of it, value + slope · s, in steps of 2^(exponent − 22).
-    struct Depth {
+    /// Signed distance in w between a ray and a plane: value + slope · s, in units of 2^(exponent − 22); positive in front of the plane.
+    struct PlaneDistance {
         int id;
         std::int64_t value, slope;
         int exponent;
     };
 
     static constexpr int planeFraction = 22;
-    /// Log2 of the map's unit in pixels.
+    /// Log2 of the unit of u and v, pixels.
     static constexpr int mapLog = 10;
 
     MapGeometry(const Numbers& numbers, const AttributeSizes& sizes) : f_(numbers.shadeBits), sceneBits_(numbers.sceneBits), sizes_(sizes) {}
@@ -24,14 +24,14 @@ protected:
     /// The largest position, and the largest distance along a ray.
     std::int64_t maximum() const { return (std::int64_t(1) << (f_ + 3)) - 1; }
 
-    /// Modulo 2^128, which only the widest formats exceed.
+    /// Dot product modulo 2^128, which only the widest formats exceed.
     static Wide times(const Vector& row, const WideVector& v) {
         UnsignedWide sum = 0;
         for (int i = 0; i < 3; ++i) sum += UnsignedWide(Wide(row[i])) * UnsignedWide(v[i]);
         return Wide(sum);
     }
 
-    /// Of a ray whose origin is behind the camera only the projections are known.
+    /// Projects a ray. If its origin is behind the camera, only `from` and `dir` are valid.
     MapRay project(const WideVector& origin, const Vector& direction, const EnvironmentView& view) const {
         MapRay ray{};
         WideVector from, dir;
@@ -58,34 +58,34 @@ protected:
         return ray;
     }
 
-    /// A coordinate of the map: what is left without `drop` bits, or the nearest one that there is. Both are below 2^64.
+    /// value / 2^drop, saturated to the range of map positions. |value| must be below 2^64.
     std::int64_t inMap(Wide value, int drop) const {
         const Wide nearest = value < 0 ? -maximum() - 1 : maximum();
         return static_cast<std::int64_t>(drop < -32 && value != 0 ? nearest : clamp<Wide>(floorShift<Wide>(value, drop), -maximum() - 1, maximum()));
     }
 
-    /// 2^(2f - 1) / mantissa, of f bits with the top one set: f + 1 bits.
+    /// 2^(2f - 1) / mantissa for a normalised mantissa of f bits; the result has f + 1 bits.
     std::int64_t reciprocal(std::uint64_t mantissa) const { return static_cast<std::int64_t>(divide(std::uint64_t(1) << (f_ - 1), mantissa, f_)); }
 
-    /// A component of the place that is s along the ray.
-    std::int64_t along(const MapRay& ray, int axis, std::int64_t s) const {
+    /// A component of the ray's position at s.
+    std::int64_t positionAt(const MapRay& ray, int axis, std::int64_t s) const {
         return ray.position[axis] + static_cast<std::int64_t>(floorShift<Wide>(Wide(ray.direction[axis]) * s, f_));
     }
 
-    Depth depthOf(const MapRay& ray, const PlaneWord& plane, int id) const {
+    PlaneDistance planeDistance(const MapRay& ray, const PlaneWord& plane, int id) const {
         const std::int64_t du = ray.position[0] - (std::int64_t(sizes_.width) << (f_ - mapLog - 1)), dv = ray.position[1] - (std::int64_t(sizes_.height) << (f_ - mapLog - 1));
-        Depth depth{id, 0, 0, plane.e};
+        PlaneDistance depth{id, 0, 0, plane.e};
         const int up = planeFraction - f_ - plane.e;
         depth.value = floorShift<std::int64_t>(ray.position[2], -up) - floorShift<std::int64_t>(plane.a * du + plane.b * dv, f_) - plane.c;
         depth.slope = floorShift<std::int64_t>(ray.direction[2], -up) - floorShift<std::int64_t>(plane.a * ray.direction[0] + plane.b * ray.direction[1], f_);
         return depth;
     }
 
-    /// How far the ray is in front of a plane at s.
-    std::int64_t at(const Depth& depth, std::int64_t s) const { return depth.value + static_cast<std::int64_t>(floorShift<Wide>(Wide(depth.slope) * s, f_)); }
+    /// Distance of the ray from a plane at s.
+    std::int64_t distanceAt(const PlaneDistance& depth, std::int64_t s) const { return depth.value + static_cast<std::int64_t>(floorShift<Wide>(Wide(depth.slope) * s, f_)); }
 
-    /// In w's own steps.
-    std::int64_t inW(std::int64_t value, const Depth& depth) const { return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent); }
+    /// Converts a distance to w's units.
+    std::int64_t toW(std::int64_t value, const PlaneDistance& depth) const { return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent); }
 
     int f_, sceneBits_;
     const AttributeSizes& sizes_;

@@ -1,4 +1,4 @@
-// RayGenerator and RaySetup: docs/numbers.md, sections 1 and 2.
+// RayGenerator and RaySetup (docs/numbers.md, sections 1 and 2).
 #pragma once
 #include <algorithm>
 #include <utility>
@@ -9,14 +9,14 @@ namespace colonnade {
 
 using WideVector = std::array<Wide, 3>;
 
-/// A ray as it is asked for. Origin: scene position, grid steps; direction: any scale; limit: largest t, along the dominant axis, grid steps.
+/// A requested ray. The origin is a scene position in grid steps, the direction has any scale, tMax is along the dominant axis in grid steps.
 struct RayRequest {
     WideVector origin, direction;
-    Wide limit;
+    Wide tMax;
     std::uint64_t limitId;
 };
 
-/// A ray ready for traversal, in its permuted frame (x', y', then the dominant axis z'); numbers.md 2 names the fields.
+/// A prepared ray in its permuted frame (x', y', then the dominant axis z'). docs/numbers.md, section 2, defines the fields.
 struct Ray {
     bool enters;
     int axis;
@@ -25,37 +25,37 @@ struct Ray {
     Vector boxOrigin;
     std::array<std::int64_t, 2> shear, reciprocal;
     std::array<int, 2> exponent;
-    std::int64_t entry;
-    std::int64_t limit;
+    std::int64_t tEntry;
+    std::int64_t tMax;
     std::uint64_t limitId;
 
-    /// Component `axis` of the object's frame that is component `permuted` of the ray's.
+    /// The object's axis that component `permuted` of the ray's frame is on.
     int objectAxis(int permuted) const { return (axis + 1 + permuted) % 3; }
 };
 
-/// A slab's two crossings by a ray, in units.
+/// A ray's entry to and exit from a slab, vertex units.
 struct Crossing {
-    Wide near, far;
+    Wide tNear, tFar;
 };
 
-/// Crossings of the planes low..high on one axis; `pad` widens the slab on both sides. Dominant axis: no reciprocal.
+/// Intersects the slab low..high on one axis; `pad` widens it on both sides. The dominant axis needs no reciprocal.
 inline Crossing crossDominant(Wide low, Wide high, Wide origin, bool negative, Wide pad) {
     return negative ? Crossing{origin - high - pad, origin - low + pad} : Crossing{low - origin - pad, high - origin + pad};
 }
 
 inline Crossing crossSheared(Wide low, Wide high, Wide origin, bool negative, Wide pad, std::int64_t reciprocal, int drop) {
     const Crossing distance = crossDominant(low, high, origin, negative, pad);
-    return {floorShift<Wide>(distance.near * reciprocal, drop), floorShift<Wide>(distance.far * reciprocal, drop) + 1};
+    return {floorShift<Wide>(distance.tNear * reciprocal, drop), floorShift<Wide>(distance.tFar * reciprocal, drop) + 1};
 }
 
-/// The root's tight box, units.
+/// The object's bounding box, vertex units.
 struct Bounds {
     Vector low, high;
 };
 
 inline std::int64_t boxOrigin(Wide origin, const Numbers& n) { return static_cast<std::int64_t>(nearestEven(origin, n.gridFraction)); }
 
-/// Dominant axis: largest magnitude, ties to the lowest axis.
+/// The axis of largest magnitude; ties go to the lowest axis.
 inline int dominantAxis(const WideVector& direction) {
     int axis = 0;
     for (int other = 1; other < 3; ++other)
@@ -95,37 +95,37 @@ inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Num
         }
     }
 
-    // Where the ray enters the object's box
+    // Intersect the object's box
     const Wide pad = n.boxPad(), maximum = (Wide(1) << n.entryBits) - 1;
     const auto saturate = [&](Wide distance) { return clamp<Wide>(distance, -maximum, maximum); };
     const auto slack = [&](Wide distance) { return distance > 0 ? distance >> n.entrySlackShift : Wide(0); };
     const auto low = [&](int a) { return Wide(bounds.low[ray.objectAxis(a)]); };
     const auto high = [&](int a) { return Wide(bounds.high[ray.objectAxis(a)]); };
     const Crossing along = crossDominant(low(2), high(2), boxOrigin(origin[2], n), ray.negative[2], pad);
-    Wide near = std::max<Wide>(0, along.near), far = along.far;
-    const Wide sidePad = pad + (near >> n.vertexBits);
+    Wide tNear = std::max<Wide>(0, along.tNear), tFar = along.tFar;
+    const Wide sidePad = pad + (tNear >> n.vertexBits);
     for (int a = 0; a < 2; ++a) {
         const Crossing side = crossSheared(low(a), high(a), boxOrigin(origin[a], n), ray.negative[a], sidePad, ray.reciprocal[a],
                                            n.reciprocalFraction - ray.exponent[a]);
-        const Wide sideNear = saturate(side.near), sideFar = saturate(side.far);
-        near = std::max(near, sideNear - slack(sideNear));
-        far = std::min(far, saturate(sideFar + slack(sideFar)));
+        const Wide sideTNear = saturate(side.tNear), sideTFar = saturate(side.tFar);
+        tNear = std::max(tNear, sideTNear - slack(sideTNear));
+        tFar = std::min(tFar, saturate(sideTFar + slack(sideTFar)));
     }
-    ray.enters = near <= far;
+    ray.enters = tNear <= tFar;
     if (!ray.enters) return ray;
-    if (n.gridFraction < 0) near = (near >> -n.gridFraction) << -n.gridFraction;
-    ray.entry = static_cast<std::int64_t>(near);
+    if (n.gridFraction < 0) tNear = (tNear >> -n.gridFraction) << -n.gridFraction;
+    ray.tEntry = static_cast<std::int64_t>(tNear);
 
-    // Advance the origin to there
-    const Wide entrySteps = floorShift<Wide>(near, -n.gridFraction);
+    // Advance the origin to the entry point
+    const Wide entrySteps = floorShift<Wide>(tNear, -n.gridFraction);
     const auto inReach = [&](Wide position) {
         const Wide half = floorShift<Wide>(Wide(1) << (n.vertexBits - 1), -n.gridFraction);
         return static_cast<std::int64_t>(clamp<Wide>(position, -half, 3 * half));
     };
-    for (int a = 0; a < 2; ++a) ray.origin[a] = inReach(origin[a] + nearestEven<Wide>(Wide(ray.shear[a]) * near, n.vertexBits + 1));
+    for (int a = 0; a < 2; ++a) ray.origin[a] = inReach(origin[a] + nearestEven<Wide>(Wide(ray.shear[a]) * tNear, n.vertexBits + 1));
     ray.origin[2] = inReach(ray.negative[2] ? origin[2] - entrySteps : origin[2] + entrySteps);
     for (int a = 0; a < 3; ++a) ray.boxOrigin[a] = boxOrigin(ray.origin[a], n);
-    ray.limit = static_cast<std::int64_t>(clamp<Wide>(request.limit - entrySteps, 0, n.farthest()));
+    ray.tMax = static_cast<std::int64_t>(clamp<Wide>(request.tMax - entrySteps, 0, n.maxT()));
     return ray;
 }
 

@@ -1,4 +1,4 @@
-// The frame registers, decoded: what the host writes before a frame.
+// The decoded frame registers, which the host writes before a frame.
 #pragma once
 #include "environment_view.hpp"
 #include "bounce.hpp"
@@ -8,7 +8,7 @@ namespace colonnade {
 /// Register values by their flattened names.
 using Registers = std::map<std::string, std::int64_t>;
 
-/// The pixels with x · px + y · py + offset ≥ 0.
+/// A half-plane: the pixels with x · px + y · py + offset ≥ 0.
 struct HalfPlane {
     std::int64_t x, y, offset;
 };
@@ -31,7 +31,7 @@ struct Frame {
     Frame() = default;
     Frame(const Registers& registers, const Numbers& n) {
         const auto take = [&](const std::string& name) { return lookUp(registers, name); };
-        // What a design without bounces does not have is zero
+        // Registers that a design lacks, e.g. one without bounces, are 0
         const auto takeIfThere = [&](const std::string& name) { return registers.count(name) ? take(name) : 0; };
         const auto vector = [&](const std::string& name, const char* components = "xyz") {
             Vector result;
@@ -79,7 +79,7 @@ struct Frame {
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));
         triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));
-        // Sections end where the next one begins, at the latest
+        // Clamp each section's start to the next section's
         attributeBase = std::min(recordCount, static_cast<std::size_t>(take("scene.attributeBase")));
         triangleBase = std::min(attributeBase, static_cast<std::size_t>(take("scene.triangleBase")));
         watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
@@ -97,7 +97,7 @@ struct Frame {
         environment.window = {take("environment.window.x0"), take("environment.window.y0"), take("environment.window.x1"), take("environment.window.y1")};
     }
 
-    /// What the names of a table's entry begin with.
+    /// Name prefix of a table entry's registers.
     static std::string entry(const std::string& table, int index) { return table + "[" + std::to_string(index) + "]."; }
 
     bool maySeeObject(std::int64_t px, std::int64_t py) const {

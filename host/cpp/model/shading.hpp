@@ -1,4 +1,4 @@
-// Surfaces and lights: docs/numbers.md, section 5.
+// Surfaces and lights (docs/numbers.md, section 5).
 #pragma once
 #include "traversal.hpp"
 
@@ -6,10 +6,10 @@ namespace colonnade {
 
 using Colour = std::array<std::int64_t, 3>;
 
-/// What becomes of a ray that meets a surface.
+/// How a surface continues a path.
 enum class MaterialKind : std::uint8_t { diffuse = 0, mirror = 1, glass = 2 };
 
-/// `eta`: what refraction divides the sine by, on the front and on the back side; `reflectance` head-on, 12 fraction bits.
+/// A material. `eta` is the relative index of refraction on the front and the back side; `reflectance` is at normal incidence, 12 fraction bits.
 struct Material {
     Colour albedo;
     MaterialKind kind;
@@ -17,8 +17,8 @@ struct Material {
     std::int64_t reflectance;
 };
 
-/// A point light. With `reachMantissa` = 0 it is equally bright at any distance; otherwise its brightness is that of its colour where the squared
-/// distance is reachMantissa · 2^reachExponent, in grid steps.
+/// A point light. With `reachMantissa` = 0 its intensity is constant. Otherwise it has its colour where the squared distance is
+/// reachMantissa · 2^reachExponent, in grid steps.
 struct Light {
     WideVector position;
     Colour colour;
@@ -26,25 +26,25 @@ struct Light {
     int reachExponent;
 };
 
-/// What the frame registers say of lights and materials; fixed point as in docs/numbers.md.
+/// Registers of lights, materials and shading, in the fixed-point formats of docs/numbers.md.
 struct Lighting {
     std::vector<Light> lights;
     Colour ambient, background;
     std::int64_t offset, shadowTransmittance;
-    /// Clear triangles let light through; otherwise they are opaque like all others.
+    /// Whether transmissive triangles transmit light; otherwise they are opaque.
     bool hasTransmittance;
     bool flat, shadows;
     int bounces;
     std::vector<Material> materials;
 
-    /// As many low bits of the index as the table needs; entry 0 beyond it.
+    /// The material of a face: the index modulo the next power of two, or entry 0 beyond the table.
     const Material& materialOf(const Face& face) const {
         const std::size_t index = static_cast<std::size_t>(face.material) & ((std::size_t(1) << bitLength(materials.size() - 1)) - 1);
         return materials[index < materials.size() ? index : 0];
     }
 };
 
-/// Where a ray has met the object. `facing` and `smooth` are turned against the ray; `towards` is the ray's direction, its dominant component
+/// The surface at a hit. `faceForwardNormal` and `smooth` face the ray's origin. `dir` is the ray's direction, with a dominant component of
 /// ±2^(shadeBits − 1).
 struct Surface {
     WideVector point;
@@ -54,25 +54,25 @@ struct Surface {
     bool backSide;
 };
 
-/// A light as a surface sees it: the light that would fall onto it, and the shadow ray that decides.
+/// The light that an unoccluded light source gives to a surface, and the shadow ray that tests for occlusion.
 struct Illumination {
     Colour direct;
     bool needsShadowRay;
     RayRequest shadowRay;
 };
 
-/// Scales a vector so that its largest component takes `bits` magnitude bits; returns by how many bits it was shifted down.
+/// Scales a vector so that its largest component has `bits` magnitude bits; returns the right shift.
 inline int blockNormalise(const WideVector& v, int bits, Vector& scaled) {
     UnsignedWide all = 0;
     for (const Wide component : v) all = std::max(all, magnitude(component));
-    const int drop = bitLength(all) - bits;
-    for (int a = 0; a < 3; ++a) scaled[a] = static_cast<std::int64_t>(floorShift(v[a], drop));
-    return drop;
+    const int shift = bitLength(all) - bits;
+    for (int a = 0; a < 3; ++a) scaled[a] = static_cast<std::int64_t>(floorShift(v[a], shift));
+    return shift;
 }
 
 inline Wide dot(const Vector& a, const Vector& b) { return Wide(a[0]) * b[0] + Wide(a[1]) * b[1] + Wide(a[2]) * b[2]; }
 
-/// dot / sqrt(nn * ll), `cosineFraction` fraction bits, at most 1.
+/// dot / sqrt(nn * ll) with `cosineFraction` fraction bits, at most 1.
 inline std::int64_t cosineOf(Wide dotProduct, Wide nn, Wide ll, const Numbers& n) {
     if (dotProduct <= 0) return 0;
     const Normalised u = normalise(nn, n.shadeBits), v = normalise(ll, n.shadeBits);
@@ -108,7 +108,7 @@ inline Surface surfaceOf(const Ray& ray, const Hit& hit, const Face& face, const
     return surface;
 }
 
-/// A position off the surface, to the side of its facing normal or the other one.
+/// Moves a position off the surface, along the normal for a positive offset.
 inline WideVector offSurface(const WideVector& point, const Vector& faceForwardNormal, std::int64_t offset, const Numbers& n) {
     WideVector moved;
     for (int a = 0; a < 3; ++a) moved[a] = point[a] + nearestEven<Wide>(Wide(offset) * faceForwardNormal[a], n.normalFraction);
@@ -117,39 +117,39 @@ inline WideVector offSurface(const WideVector& point, const Vector& faceForwardN
 
 inline bool isZero(const WideVector& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
 
-/// The normal that light and bounces see: smooth unless that is not wanted, or is zero.
+/// The normal for lighting and bounces: the smooth one unless it is zero or `flat` is set.
 inline WideVector shadingNormal(const Surface& surface, bool flat) {
     return flat || isZero(surface.smooth) ? WideVector{surface.faceForwardNormal[0], surface.faceForwardNormal[1], surface.faceForwardNormal[2]} : surface.smooth;
 }
 
-/// What one light gives to a surface at `origin` (off the surface) with a shading normal of any length.
+/// Illumination by one light at `origin` (off the surface), for a normal of any length.
 inline Illumination illuminate(const WideVector& origin, const WideVector& normal, const Light& light, bool shadows, const Numbers& n) {
     WideVector toLight;
     for (int a = 0; a < 3; ++a) toLight[a] = light.position[a] - origin[a];
     Vector shadingNormal, shadingLight;
     blockNormalise(normal, n.shadeBits, shadingNormal);
-    const int drop = blockNormalise(toLight, n.shadeBits, shadingLight);
+    const int shift = blockNormalise(toLight, n.shadeBits, shadingLight);
     const Wide facingLight = dot(shadingNormal, shadingLight), ll = dot(shadingLight, shadingLight);
     std::int64_t cosine = cosineOf(facingLight, dot(shadingNormal, shadingNormal), ll, n);
     if (light.reachMantissa != 0 && cosine != 0) {
         const Normalised square = normalise(ll, n.shadeBits), divisor = normalise(square.mantissa, n.mantissaBits);
-        const int exponent = n.mantissaBits + light.reachExponent - square.exponent - 2 * drop;
+        const int exponent = n.mantissaBits + light.reachExponent - square.exponent - 2 * shift;
         const std::int64_t maximum = std::int64_t(4) << n.lightFraction;
         const Wide quotient = divide(static_cast<std::uint64_t>(light.reachMantissa), divisor.mantissa, n.cosineFraction);
         const std::int64_t falloff = exponent > 3 ? maximum : static_cast<std::int64_t>(std::min<Wide>(maximum, floorShift<Wide>(quotient, n.cosineFraction - n.lightFraction - exponent)));
         cosine = (cosine * falloff) >> n.lightFraction;
     }
     Illumination result{};
-    const std::int64_t brightest = (std::int64_t(1) << n.lightBits) - 1;
+    const std::int64_t maxLight = (std::int64_t(1) << n.lightBits) - 1;
     for (int channel = 0; channel < 3; ++channel)
-        result.direct[channel] = std::min(brightest, (light.colour[channel] * cosine) >> n.cosineFraction);
+        result.direct[channel] = std::min(maxLight, (light.colour[channel] * cosine) >> n.cosineFraction);
     result.needsShadowRay = shadows && facingLight > 0;
     const int dominant = dominantAxis(toLight);
     result.shadowRay = {origin, toLight, static_cast<Wide>(magnitude(toLight[dominant])), 0};
     return result;
 }
 
-/// Colour of a surface in the light that falls onto it, per channel.
+/// Reflected light of one channel.
 inline std::int64_t reflected(std::int64_t albedo, std::int64_t incoming, const Numbers& n) {
     return std::min((std::int64_t(1) << n.colourBits) - 1, (albedo * incoming) >> n.lightFraction);
 }

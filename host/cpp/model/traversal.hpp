@@ -1,10 +1,10 @@
-// BoxUnit and TriangleUnit: docs/numbers.md, sections 3 and 4.
+// BoxUnit and TriangleUnit (docs/numbers.md, sections 3 and 4).
 #pragma once
 #include "ray_setup.hpp"
 
 namespace colonnade {
 
-/// Best hit so far of a ray.
+/// The closest hit of a ray so far.
 struct Hit {
     bool found;
     std::int64_t t;
@@ -13,26 +13,26 @@ struct Hit {
     bool backSide;
 };
 
-/// Largest `near` that may still hold something: the limit on t in units, rounding included.
-inline std::int64_t limitUnits(std::int64_t limit, const Numbers& n) {
-    const Wide units = floorShift<Wide>(limit, n.gridFraction) + 1 + n.boxPad();
+/// tMax in vertex units, rounded up and padded: the largest `tNear` of a box that may contain a closer hit.
+inline std::int64_t tMaxUnits(std::int64_t tMax, const Numbers& n) {
+    const Wide units = floorShift<Wide>(tMax, n.gridFraction) + 1 + n.boxPad();
     return static_cast<std::int64_t>(std::min<Wide>(units, largest(n.boxDistanceBits)));
 }
 
-/// A child that the ray enters.
+/// A child box that the ray hits.
 struct Entered {
     int slot;
-    std::int64_t near;
+    std::int64_t tNear;
 };
 
-/// Tests a node's children; writes those entered, near to far, and returns their number. `tests` counts the children tested.
-inline int testBoxes(const Ray& ray, const Node& node, std::int64_t limit, const Numbers& n, std::array<Entered, 4>& entered, std::uint64_t& tests) {
-    const std::int64_t maximum = static_cast<std::int64_t>(largest(n.boxDistanceBits)), farthest = limitUnits(limit, n);
+/// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
+inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, 4>& entered, std::uint64_t& tests) {
+    const std::int64_t maximum = static_cast<std::int64_t>(largest(n.boxDistanceBits)), tMaxInUnits = tMaxUnits(tMax, n);
     int count = 0;
     for (int slot = 0; slot < n.arity; ++slot) {
         if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
         ++tests;
-        std::int64_t near = 0, far = maximum;
+        std::int64_t tNear = 0, tFar = maximum;
         for (int a = 0; a < 3; ++a) {
             const int axis = ray.objectAxis(a);
             const std::int64_t origin = node.origin[axis] - ray.boxOrigin[a];
@@ -44,18 +44,18 @@ inline int testBoxes(const Ray& ray, const Node& node, std::int64_t limit, const
                 first = (first * ray.reciprocal[a]) >> drop;
                 last = ((last * ray.reciprocal[a]) >> drop) + 1;
             }
-            near = std::max(near, clamp(first, -maximum - 1, maximum));
-            far = std::min(far, clamp(last, -maximum - 1, maximum));
+            tNear = std::max(tNear, clamp(first, -maximum - 1, maximum));
+            tFar = std::min(tFar, clamp(last, -maximum - 1, maximum));
         }
-        if (near > far || near > farthest) continue;
-        int place = count++;
-        for (; place > 0 && entered[place - 1].near > near; --place) entered[place] = entered[place - 1];
-        entered[place] = {slot, near};
+        if (tNear > tFar || tNear > tMaxInUnits) continue;
+        int position = count++;
+        for (; position > 0 && entered[position - 1].tNear > tNear; --position) entered[position] = entered[position - 1];
+        entered[position] = {slot, tNear};
     }
     return count;
 }
 
-/// One ray against one triangle; returns whether it is the best so far and then updates `best` (initially the ray's limits).
+/// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which initially holds the ray's limits.
 template <class Product> bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best) {
     std::array<std::int64_t, 3> x, y, z;
     for (int i = 0; i < 3; ++i) {

@@ -171,7 +171,7 @@ def test_a_camera_far_away_takes_coarser_units(manifest: Manifest, image: SceneI
 
 
 def test_a_camera_out_of_reach_is_refused(manifest: Manifest, image: SceneImage) -> None:
-    with pytest.raises(UserError, match=r"the camera is .* object-cube edges away, the hardware reaches 1,024"):
+    with pytest.raises(UserError, match=r"the camera is .* object-cube edges away, the hardware's range is 1,024"):
         frame_registers(placed((0.0, 0.0, 1e5)), image.header, manifest, 64, 48)
     far = dataclasses.replace(SCENE, light=Light(position=(1e9, 0.0, 0.0)))
     with pytest.raises(UserError, match="light 1 is"):

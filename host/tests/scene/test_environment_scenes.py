@@ -134,7 +134,7 @@ THREE = LAMP.replace("light = ", "[[light]]\n").replace("{", "").replace("}", ""
         (STANDING, ("--config", "tiny"), "no memory for a room: set physicalAttributeMemory"),
         (STANDING, ("--config", "small"), "are 96x72, physicalAttributeMemory holds 640x480: set its width and height"),
         (STANDING, ("--size", "96x96"), "96x96 pixels does not have the proportions of room attic"),
-        (STANDING + THREE, (), "the scene has 3 lights, the hardware 2: leave some out or raise frame.lights"),
+        (STANDING + THREE, (), "the scene has 3 lights, the hardware supports 2: leave some out or raise frame.lights"),
         (
             STANDING + 'material.kind = "glass"\npaths.bounces = 9\n',
             (),

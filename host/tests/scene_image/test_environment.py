@@ -19,7 +19,8 @@ from colonnade.environment.encoding.image import AttributeImage, memory_words
 from colonnade.environment.load import load_environment
 from colonnade.mesh.load import load_mesh
 from colonnade.scene_image.environment import with_environment
-from colonnade.scene_image.file import LoadedMemory, SceneImage
+from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.header import LoadedMemory
 from colonnade.scene_image.inspect import describe, report_lines
 from colonnade.scene_image.packer import memory_use, pack
 
@@ -148,7 +149,7 @@ def test_the_report_has_the_bytes_of_each_map(hardware: Manifest, image: SceneIm
     assert {name: part["bytes"] for name, part in use.items()} == {"albedo": 16384, "normals": 16384, "planes": 8192}
     assert use["albedo"]["source_bytes"] == 921600 and use["albedo"]["ratio"] == pytest.approx(56.25)
     lines = "\n".join(report_lines(image.header, hardware))
-    assert "16,384 bytes of memory, 56.2 times less than the map's 921,600" in lines
+    assert "16,384 bytes of memory, a 56.2x reduction from the map's 921,600" in lines
     assert "planes.bounding            8 words of 17 bytes, load target 10" in lines
     assert "albedo.palette" in "\n".join(report_lines(image.header))
     assert json.loads(json.dumps(describe(image)))["room"]["name"] == "attic"

@@ -110,9 +110,9 @@ def _indices(
 ) -> NDArray[np.intp]:
     """The palette index of each pixel: intp [tiles, size, size]."""
     index = np.empty(pixels.weights.shape, np.intp)
-    for place, number in enumerate(choices.modes):
-        which = np.flatnonzero(chosen == place)
-        members = choices.members[place]
+    for slot, number in enumerate(choices.modes):
+        which = np.flatnonzero(chosen == slot)
+        members = choices.members[slot]
         taken = _cell_choices(pixels, palette, members, MODES[number].cells, which)
         index[which] = expand_cells(np.take_along_axis(members[which], taken, axis=1), pixels.layout.tile_size)
     return index
@@ -129,9 +129,9 @@ def _written(
     descriptors = np.zeros(len(chosen), np.uint32)
     heap = np.zeros(pixels.layout.heap_words, np.uint16)
     top = 0
-    for place, number in enumerate(choices.modes):
-        mode, members = MODES[number], choices.members[place]
-        which = np.flatnonzero(chosen == place)
+    for slot, number in enumerate(choices.modes):
+        mode, members = MODES[number], choices.members[slot]
+        which = np.flatnonzero(chosen == slot)
         masks = mask_words(_cell_choices(pixels, palette, members, mode.cells, which), mode.bits_per_cell)
         for tile, mask in zip(which, masks, strict=True):
             own = members[tile]

@@ -10,7 +10,7 @@ from colonnade.common.types import Bytes
 from colonnade.design.manifest import Field, Manifest
 from colonnade.evaluation.fuzz.cases import Case
 from colonnade.evaluation.fuzz.values import random_value
-from colonnade.scene_image.file import ImageHeader
+from colonnade.scene_image.header import ImageHeader
 
 
 def corrupt_records(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:

@@ -47,7 +47,7 @@ object Model {
     )
   }
 
-  /** Runs the model on questions about the environment's maps; environment_questions.hpp documents their format.
+  /** Runs the model on questions about the environment's maps; environment_queries.hpp documents their format.
     *
     * @param words words of each memory of the environment
     */

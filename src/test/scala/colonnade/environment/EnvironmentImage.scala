@@ -33,7 +33,7 @@ final class EnvironmentImage(config: ColonnadeConfig, random: Random, illegal: D
     x <- Seq(0, 1, layout.config.tileSize - 1, layout.config.tileSize, layout.config.width - 1)
   } yield (x, y)
 
-  /** The model's answers; see environment_questions.hpp. */
+  /** The model's answers; see environment_queries.hpp. */
   def ask(kind: String, questions: Seq[Seq[BigInt]]): Seq[Seq[BigInt]] =
     Model.attributes(config, words, questions, kind)
 

@@ -1,4 +1,4 @@
-// A question of the RTL's specs, and its answer: integers in a line of text.
+// A query of an RTL spec and its reply: integers in a line of text.
 #pragma once
 #include <algorithm>
 #include <iostream>
@@ -9,12 +9,12 @@
 
 namespace colonnade {
 
-class Question {
+class Query {
 public:
-    explicit Question(std::istream& words) : words_(words) {}
+    explicit Query(std::istream& words) : words_(words) {}
     Wide wide() {
         std::string word;
-        if (!(words_ >> word)) throw std::invalid_argument("a question is too short");
+        if (!(words_ >> word)) throw std::invalid_argument("a query has too few values");
         const bool isNegative = word[0] == '-';
         UnsignedWide value = 0;
         for (std::size_t i = isNegative; i < word.size(); ++i) value = value * 10 + static_cast<unsigned>(word[i] - '0');
@@ -36,9 +36,9 @@ private:
     std::istream& words_;
 };
 
-class Answer {
+class Reply {
 public:
-    Answer& operator<<(Wide value) {
+    Reply& operator<<(Wide value) {
         std::string digits;
         for (UnsignedWide rest = magnitude(value); rest != 0 || digits.empty(); rest /= 10) digits += static_cast<char>('0' + static_cast<int>(rest % 10));
         if (value < 0) digits += '-';
@@ -46,7 +46,7 @@ public:
         text_ += text_.empty() ? digits : " " + digits;
         return *this;
     }
-    template <class Values> Answer& all(const Values& values) {
+    template <class Values> Reply& all(const Values& values) {
         for (const auto value : values) *this << static_cast<Wide>(value);
         return *this;
     }

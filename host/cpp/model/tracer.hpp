@@ -1,0 +1,149 @@
+// Rays through the records of the column memory: closest hits and occluders, with counters and errors.
+#pragma once
+#include "column_memory.hpp"
+#include "registers.hpp"
+
+namespace colonnade {
+
+/// Timing-independent counters, named as in the register map.
+struct Counters {
+    std::uint64_t raysPrimary, raysShadow, raysReflection, raysRefraction, raysInBox, nodeReads, boxTests, triangleTests, hits, deepestStack;
+    /// Environment lookups, march steps (tiles and cells), and hits in the maps.
+    std::uint64_t raysEnvironment, marchSteps, albedoReads;
+};
+
+struct Errors {
+    bool stackOverflow, illegalRecord, watchdog;
+};
+
+/// Result of a shadow ray, ordered by decreasing transmittance.
+enum class Occlusion { none, transmissive, opaque };
+
+/// Finds the hits of prepared rays.
+class Tracer {
+public:
+    /// The closest hit of a prepared ray.
+    Hit trace(const Ray& ray) {
+        Hit best{false, ray.tMax, ray.limitId, {}, false};
+        if (!ray.enters) return best;
+        ++counters.raysInBox;
+        TraceState state{ray, best, false, Occlusion::none};
+        run(state);
+        return state.best;
+    }
+
+    /// The occluders of a prepared shadow ray; the first opaque triangle ends the search.
+    Occlusion occlusion(const Ray& ray) {
+        if (!ray.enters) return Occlusion::none;
+        ++counters.raysInBox;
+        TraceState state{ray, {false, ray.tMax, ray.limitId, {}, false}, true, Occlusion::none};
+        run(state);
+        return state.occlusion;
+    }
+
+    Counters counters{};
+    Errors errors{};
+
+protected:
+    Tracer(const Numbers& numbers, const std::map<std::string, Layout>& layouts) : numbers_(numbers), memory_(layouts, numbers) {}
+
+    Numbers numbers_;
+    ColumnMemory memory_;
+    Frame frame_;
+
+private:
+    struct StackEntry {
+        bool isLeaf;
+        std::uint32_t address;
+        std::int64_t tNear;
+    };
+
+    /// State of a ray's traversal. A shadow ray keeps its tMax, as transmissive triangles do not end it.
+    struct TraceState {
+        const Ray& ray;
+        Hit best;
+        bool isShadow;
+        Occlusion occlusion;
+
+        bool isOver() const { return occlusion == Occlusion::opaque; }
+    };
+
+    void run(TraceState& state) {
+        if (numbers_.bvh) traverse(state);
+        else
+            for (std::size_t i = 0; (i == 0 || i < frame_.triangleRecords) && !state.isOver(); ++i) testRecord(state, frame_.triangleBase + i);
+    }
+
+    void testRecord(TraceState& state, std::size_t address) {
+        const Triangles* const found = memory_.trianglesAt(address);
+        if (!found) {
+            errors.illegalRecord = true;
+            return;
+        }
+        const Triangles& record = *found;
+        if (!record.isLegal) {
+            errors.illegalRecord = true;
+            ++counters.triangleTests; // an empty record takes as many cycles as one triangle
+            return;
+        }
+        for (int i = 0; i < record.count; ++i) {
+            ++counters.triangleTests;
+            Hit hit = state.best;
+            if (!testTriangle(state.ray, record.vertices[i], memory_.idOf(record, i), numbers_, hit)) continue;
+            if (state.isShadow) state.occlusion = std::max(state.occlusion, record.isTransmissive[i] && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
+            else state.best = hit;
+        }
+    }
+
+    void traverse(TraceState& state) {
+        const Hit& best = state.best;
+        std::array<StackEntry, 256> stack;
+        std::size_t depth = 0;
+        std::uint64_t nodeVisits = 0;
+        StackEntry next{false, 0, 0};
+        for (bool busy = !errors.watchdog; busy;) {
+            busy = false;
+            if (next.isLeaf) {
+                testRecord(state, next.address);
+                if (state.isOver()) return;
+            } else if (const Node* const found = memory_.nodeAt(next.address); !found) {
+                errors.illegalRecord = true;
+            } else {
+                // A node visit takes at least one cycle
+                if (frame_.watchdogCycles != 0 && ++nodeVisits > frame_.watchdogCycles) {
+                    errors.watchdog = true;
+                    return;
+                }
+                ++counters.nodeReads;
+                const Node& node = *found;
+                std::array<Entered, 4> entered;
+                int count = 0;
+                if (node.isLegal) count = testBoxes(state.ray, node, best.t, numbers_, entered, counters.boxTests);
+                else errors.illegalRecord = true;
+                for (int i = count - 1; i > 0; --i) {
+                    if (depth < static_cast<std::size_t>(numbers_.stackDepth)) stack[depth++] = entryOf(node, entered[i]);
+                    else errors.stackOverflow = true;
+                }
+                counters.deepestStack = std::max<std::uint64_t>(counters.deepestStack, depth);
+                if (count > 0) {
+                    next = entryOf(node, entered[0]);
+                    busy = true;
+                }
+            }
+            while (!busy && depth > 0) {
+                next = stack[--depth];
+                busy = next.tNear <= tMaxUnits(best.t, numbers_);
+            }
+        }
+    }
+
+    /// Address of a child: the nodes and the leaves of a node are each consecutive, in slot order.
+    StackEntry entryOf(const Node& node, const Entered& child) const {
+        std::uint32_t before = 0;
+        for (int slot = 0; slot < child.slot; ++slot) before += node.kinds[slot] == node.kinds[child.slot];
+        const bool isLeaf = node.kinds[child.slot] == Child::leaf;
+        return {isLeaf, ((isLeaf ? node.firstTriangles : node.firstChild) + before) & memory_.addressMask(), child.tNear};
+    }
+};
+
+} // namespace colonnade
