@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from colonnade.ppa.library import liberty
+from colonnade.ppa.library import liberty, liberty_files
 from colonnade.ppa.library.cells import Library
 from colonnade.ppa.netlist.hierarchy import Hierarchy
 from colonnade.ppa.netlist.mapped import Netlist
@@ -42,7 +42,7 @@ LIBERTY = """library (small) {
 def small_library(tmp_path: Path) -> Library:
     """The cells of `LIBERTY`, which is ``small.lib`` in the folder `tmp_path`."""
     (tmp_path / "small.lib").write_text(LIBERTY)
-    (tmp_path / "pruned.lib").write_text(liberty.pruned(tmp_path / "small.lib"))
+    (tmp_path / "pruned.lib").write_text(liberty_files.pruned(tmp_path / "small.lib"))
     return liberty.load([tmp_path / "pruned.lib"])
 
 

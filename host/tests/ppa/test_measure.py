@@ -13,10 +13,10 @@ from click.testing import CliRunner
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.ppa import measure
-from colonnade.ppa.library import liberty
+from colonnade.ppa.library import liberty, liberty_files
 from colonnade.ppa.library.cells import Library, LookupTable
 from colonnade.ppa.netlist import memories
-from colonnade.ppa.netlist.hierarchy import BORDERS, Hierarchy, Memory
+from colonnade.ppa.netlist.hierarchy import BOUNDARIES, Hierarchy, Memory
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.netlist.synthesis import Technology, count_gates
 from colonnade.ppa.studies.guard import differences, gates_of_tiny
@@ -66,7 +66,7 @@ LIBERTY = f"""/* small */ library (small) {{
 @pytest.fixture
 def small(tmp_path: Path) -> Library:
     (tmp_path / "small.lib").write_text(LIBERTY)
-    (tmp_path / "pruned.lib").write_text(liberty.pruned(tmp_path / "small.lib"))
+    (tmp_path / "pruned.lib").write_text(liberty_files.pruned(tmp_path / "small.lib"))
     return liberty.load([tmp_path / "pruned.lib"])
 
 
@@ -178,7 +178,7 @@ def test_units_are_where_synthesis_stops(tmp_path: Path) -> None:
     assert hierarchy.shape("records") == (8, 4)
     assert hierarchy.closure("Column") == (["Arbiter", "Column"], ["RenderUnit", "records"])
     assert hierarchy.count("BoxUnit", "Colonnade") == 4
-    assert hierarchy.count("BoxUnit", "Colonnade", BORDERS) == 0
+    assert hierarchy.count("BoxUnit", "Colonnade", BOUNDARIES) == 0
     assert hierarchy.header("Queue") == "module Queue(\n  input clock\n);\nendmodule\n"
     (memory,) = hierarchy.memories()
     assert (memory.level, memory.unit, memory.count, memory.bits) == ("column", "rest of Column", 1, 32)
@@ -208,7 +208,7 @@ def test_a_dozen_words_cost_more_a_bit_than_a_macro() -> None:
     small, large = (Memory("m", "render_unit", "contexts", 2, depth, 10, "write,read") for depth in (12, 576))
     assert memories.area_um2(small) == pytest.approx(2 * 120 * 1.0)
     assert memories.area_um2(large) == pytest.approx(2 * 5760 * 0.19)
-    assert memories.described(small)["kge"] == pytest.approx(240 / 0.49 / 1e3)
+    assert memories.describe(small)["kge"] == pytest.approx(240 / 0.49 / 1e3)
     assert memories.area_mm2(1.0, 510.0) == pytest.approx(1e-3)
 
 
@@ -263,7 +263,7 @@ def test_missing_yosys_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_is_no_liberty_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "bad.lib").write_text(text)
     with pytest.raises(UserError, match="liberty"):
-        liberty.pruned(tmp_path / "bad.lib")
+        liberty_files.pruned(tmp_path / "bad.lib")
 
 
 @pytest.mark.matrix
