@@ -66,7 +66,7 @@ def test_a_bill_of_materials_with_another_hash_is_named(
     altered = tmp_path / "sbom.json"
     altered.write_text(json.dumps(data))
     monkeypatch.setattr(sbom, "FILE", altered)
-    assert sbom.check() == ["sbom.json is not true to the locks; run: tools/lock"]
+    assert sbom.check() == ["sbom.json does not match the locks; run: tools/lock"]
 
 
 @pytest.mark.parametrize("file", ["sbom.json", "project/dependencies.sha256", *(ROOT / "host/locks").glob("*.txt")])
