@@ -1,4 +1,4 @@
-"""The locks are up to date, an altered package is refused, and a program that is too old is named in one line."""
+"""Supply chain: locks are up to date, altered packages are rejected, and old programs are reported in one line."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_a_bill_of_materials_with_another_hash_is_named(
 
 
 @pytest.mark.parametrize("file", ["sbom.json", "project/dependencies.sha256", *(ROOT / "host/locks").glob("*.txt")])
-def test_no_lock_names_a_host(file: str | Path) -> None:
+def test_locks_contain_no_urls(file: str | Path) -> None:
     assert "://" not in (ROOT / file).read_text()
 
 
