@@ -179,9 +179,9 @@ def _levels(units: Mapping[str, Mapping[str, Any]], rows: int, columns: int, box
     for level, copies in zip(LEVELS, (0, rows, columns), strict=True):
         own = [unit for unit in units.values() if unit["level"] == level.name]
         logic = sum(unit["kge"] for unit in own) + copies * below
-        held = [memory for memory in boxes if memory.level == level.name]
-        bits = sum(memory.bits * memory.count for memory in held) + copies * bits_below
-        memory_um2 = sum(memories.area_um2(memory) for memory in held) + copies * memory_below
+        own_memories = [memory for memory in boxes if memory.level == level.name]
+        bits = sum(memory.bits * memory.count for memory in own_memories) + copies * bits_below
+        memory_um2 = sum(memories.area_um2(memory) for memory in own_memories) + copies * memory_below
         um2 = sum(unit["um2"] or 0.0 for unit in own) + copies * area_below
         levels[level.name] = {
             "of_the_level_below": copies,

@@ -86,26 +86,26 @@ def pruned(path: Path, dropped: re.Pattern[str] = FOR_TIMING) -> str:
         raise UserError(f"{path} is not a liberty file: it has no library group")
     if text.rfind("/*") > text.rfind("*/"):
         raise UserError(f"{path} is truncated or not a liberty file: a comment does not end")
-    kept: list[str] = []
+    parts: list[str] = []
     begin = depth = dropped_from = 0
     for token in _DROPPED.finditer(text):
         if token["group"] or token["open"]:
             depth += 1
             if token["group"] and not dropped_from and _is_dropped(token["name"], token["argument"], dropped):
-                kept.append(text[begin : token.start()])
+                parts.append(text[begin : token.start()])
                 dropped_from = depth
         elif token["close"]:
             if dropped_from == depth:
                 begin, dropped_from = token.end(), 0
             depth -= 1
         elif token["comment"] and not dropped_from:
-            kept.append(text[begin : token.start()])
+            parts.append(text[begin : token.start()])
             begin = token.end()
-    kept.append(text[begin:])
+    parts.append(text[begin:])
     if depth != 0:
         raise UserError(f"{path} is truncated or not a liberty file: its braces do not match")
     # Wire load models are among the dropped groups
-    text = re.sub(r"default_wire_load\w*\s*:[^;]*;", "", "".join(kept))
+    text = re.sub(r"default_wire_load\w*\s*:[^;]*;", "", "".join(parts))
     return re.sub(r"\n\s*\n+", "\n", text)
 
 
