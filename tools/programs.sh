@@ -1,4 +1,4 @@
-# What the checkout needs of the machine; sourced by the scripts of this folder.
+# Required programs and common functions; the scripts of this folder source this file.
 # Sets `root` (the checkout) and defines: die, python_program, java_program, missing_packages, install_locked.
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
@@ -7,14 +7,14 @@ sbt_launcher="$root/.tools/sbt-launch-$sbt_version.jar"
 sbt_launcher_sha256=1750c8fb61c2d2f82da40b2cd9014f4d8a1bd49a361402ea5b1cec061ed66578
 sbt_boot="$root/.cache/sbt-boot-$sbt_version" # sbt itself, as the launcher fetches it
 
-# The oldest versions. Verilator: the oldest that the tests have run with. host/colonnade/design/toolchain.py has its twin.
+# Minimum versions. Verilator: the oldest that the tests ran with; keep host/colonnade/{design/toolchain,device/compiler}.py equal.
 minimum_verilator=5.006
 minimum_gxx=10
 minimum_make=4.0
 minimum_java=17
 minimum_python=3.10
 
-# An unset or unusable HOME must not send caches to the file system's root. Java asks the system, not HOME.
+# Without a usable HOME, caches must not go to the root of the file system. Java ignores HOME.
 java_home_option=()
 if [ -z "${HOME:-}" ] || [ ! -d "$HOME" ]; then
   HOME="$(getent passwd "$(id -u)" 2>/dev/null | cut -d: -f6)"
@@ -31,9 +31,9 @@ die() {
   exit 2
 }
 
-# Java, CMake and make take these characters of a path for separators, quotes or commands.
+# Java, CMake and make interpret these characters in a path as separators, quotes or commands.
 case "$root" in
-  *[:\;\"\'\`\#\$\\\&\|\<\>\(\)\*\?]*) die "the checkout's path $root holds a character that Java or CMake cannot work with; move it" ;;
+  *[:\;\"\'\`\#\$\\\&\|\<\>\(\)\*\?]*) die "the path of the checkout, $root, has a character that Java or CMake does not accept; move the checkout" ;;
 esac
 
 has() { command -v "$1" >/dev/null 2>&1; }
@@ -43,7 +43,7 @@ at_least() { [ "$(printf '%s\n%s\n' "$2" "$1" | sort -V | head -n 1)" = "$2" ]; 
 
 python_is_new_enough() { at_least "$(python_version "$1")" "$minimum_python"; }
 
-# The interpreter for .venv: the first of these that is Python 3.10 or newer.
+# The interpreter for .venv: the first candidate that is Python 3.10 or newer.
 python_program() {
   local candidate
   for candidate in "${PYTHON:-python3}" python3 python3.13 python3.12 python3.11 python3.10 /usr/bin/python3; do
@@ -54,7 +54,7 @@ python_program() {
   done
 }
 
-# Python can make environments and compile extensions against its own headers.
+# Whether Python can create environments and has its headers for compiling extensions.
 python_is_complete() {
   "$1" -c '
 import ensurepip, os, sys, sysconfig, venv
@@ -73,14 +73,14 @@ java_is_new_enough() {
   [ -n "$version" ] && at_least "$version" "$minimum_java"
 }
 
-# Versions as the programs say them; empty where they say none.
+# Versions as the programs report them; empty if they report none.
 verilator_version() { verilator --version 2>/dev/null | sed -nE 's/^Verilator ([0-9.]+).*/\1/p' | head -n 1; }
 gxx_version() { g++ -dumpfullversion -dumpversion 2>/dev/null | head -n 1; }
 make_version() { make --version 2>/dev/null | sed -nE 's/^GNU Make ([0-9.]+).*/\1/p' | head -n 1; }
 java_version() { "$1" -version 2>&1 | sed -nE 's/.*version "([0-9]+).*/\1/p' | head -n 1; }
 python_version() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || echo 0; }
 
-# A line for each program that is there but too old, with what to do.
+# Prints a line with advice for each installed program that is too old.
 too_old() {
   local found java
   found="$(verilator_version)"
@@ -102,7 +102,7 @@ too_old() {
 
 sha256_matches() { [ -f "$1" ] && [ "$(sha256sum "$1" | cut -d' ' -f1)" = "$2" ]; }
 
-# The Debian packages whose programs are missing, one line, space separated.
+# Prints the Debian packages of missing programs on one line, separated by spaces.
 missing_packages() {
   local missing=() python
   java_is_new_enough || missing+=(openjdk-17-jdk-headless)
@@ -110,14 +110,14 @@ missing_packages() {
   has g++ || missing+=(g++)
   has make || missing+=(make)
   has z3 || missing+=(z3)
-  # Maven only fetches the sbt launcher: not needed where that is there already, or another sbt is asked for.
+  # Maven only downloads the sbt launcher, so it is not needed if the launcher exists or COLONNADE_SBT is set.
   [ -n "${COLONNADE_SBT:-}" ] || has mvn || sha256_matches "$sbt_launcher" "$sbt_launcher_sha256" || missing+=(maven)
   python="$(python_program)"
   if [ -z "$python" ] || ! python_is_complete "$python"; then missing+=(python3 python3-venv python3-dev); fi
   echo "${missing[*]}"
 }
 
-# Installs a lock of host/locks into an environment; pip refuses every file whose hash the lock does not name.
+# Installs a lock of host/locks into an environment. pip rejects files whose hash is not in the lock.
 # Usage: install_locked ENVIRONMENT LOCK [OPTION OF PIP]…
 install_locked() {
   local environment="$1" lock="$2" log="$root/.cache/pip-$2.log" different
@@ -125,9 +125,9 @@ install_locked() {
   mkdir -p "$root/.cache"
   PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 "$environment/bin/python" -m pip install --no-deps --require-hashes "$@" \
     -r "$root/host/locks/$lock.txt" >"$log" 2>&1 </dev/null && return
-  # pip names the package in the line below its warning, then the hash that it got.
+  # pip prints the package in the line after its warning.
   different="$(awk '/DO NOT MATCH THE HASHES/ { getline; sub(/^ */, ""); sub(/ from .*/, ""); print; exit }' "$log")"
-  [ -z "$different" ] || die "$different is not the file that host/locks/$lock.txt holds by its SHA-256; nothing was installed of it: see $log"
+  [ -z "$different" ] || die "the SHA-256 of $different is not in host/locks/$lock.txt; it was not installed: see $log"
   tail -n 20 "$log" >&2
   die "installing the packages of host/locks/$lock.txt failed: see $log"
 }

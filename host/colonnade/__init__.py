@@ -1,4 +1,4 @@
-"""Host of the Colonnade ray-tracing accelerator: packs scenes, runs the hardware, judges the picture."""
+"""Host software of the Colonnade ray-tracing accelerator: packs scenes, runs the hardware, compares pictures."""
 
 from colonnade.common.errors import UserError
 

@@ -1,5 +1,5 @@
-"""A manifest in memory: the contract's layouts and registers for a small configuration, without the generator; and the
-report of a frame."""
+"""Common fixtures: a manifest of a small configuration that does not need the generator, and the report of an RTL
+frame."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def manifest_data(
     max_width: int = 1920,
     max_height: int = 1080,
 ) -> dict[str, Any]:
-    """The JSON object of a manifest; the numbers follow docs/numbers.md."""
+    """The JSON object of a manifest, with numbers by docs/numbers.md."""
     address = (depth - 1).bit_length()
     coordinate = max(max_width, max_height).bit_length()
     numbers = {
@@ -101,7 +101,7 @@ def _layouts(vertex: int, box: int, arity: int, per_record: int, address: int) -
 
 
 def _placed(fields: FieldList) -> list[dict[str, Any]]:
-    """Offsets in the generator's manner: the first field is the most significant."""
+    """Fields with offsets, as the generator assigns them: the first field is the most significant."""
     placed, offset = [], 0
     for name, width, signed in reversed(fields):
         placed.append({"name": name, "offset": offset, "width": width, "signed": signed, "fraction": 0})
@@ -150,13 +150,13 @@ _SCENE = ("recordCount", "triangleBase", "triangleRecords", "attributeBase")
 
 @pytest.fixture(autouse=True)
 def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No lines of progress between the lines that a test looks at, however slow the machine is."""
+    """Disable progress lines, which a slow machine would print between the expected lines."""
     monkeypatch.setenv("COLONNADE_PROGRESS", "off")
 
 
 @pytest.fixture(scope="session")
 def make_manifest() -> MakeManifest:
-    """Builds a manifest; keywords as of `manifest_data`."""
+    """A function that makes a manifest; keywords as in `manifest_data`."""
     return lambda **changes: Manifest.from_dict(manifest_data(**changes))
 
 
@@ -178,7 +178,7 @@ SMALL_ARRAY = {
     "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1},
 }
 
-#: Of a frame of 100 cycles on `SMALL_ARRAY`: 600 unit cycles, 2,400 context cycles, 600 bank cycles, 300 stream cycles.
+#: Counters of a frame of 100 cycles on `SMALL_ARRAY`: 600 unit, 2,400 context, 600 bank and 300 stream cycles.
 COUNTERS = {
     "raysPrimary": 150,
     "raysInBox": 50,
@@ -203,7 +203,7 @@ COUNTERS = {
 
 
 def frame_report(in_box: float) -> dict[str, Any]:
-    """Of a frame of the RTL at so many in-box rays per cycle."""
+    """The report of an RTL frame with a given number of in-box rays per cycle."""
     return {
         "config": SMALL_ARRAY,
         "config_hash": "c0",
@@ -221,13 +221,13 @@ def frame_report(in_box: float) -> dict[str, Any]:
 
 @pytest.fixture(scope="session")
 def rtl_report() -> Callable[[float], dict[str, Any]]:
-    """Makes the report of a frame from its in-box rays per cycle."""
+    """The function `frame_report`."""
     return frame_report
 
 
 @pytest.fixture(scope="session")
-def innocent_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The files of `hostile.world`, made once."""
+def valid_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files of `hostile.world`, created once."""
     import hostile
 
     folder = tmp_path_factory.mktemp("innocent")
@@ -236,6 +236,6 @@ def innocent_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def folder(innocent_files: Path, tmp_path: Path) -> Path:
-    """A copy of them for one test."""
-    return Path(shutil.copytree(innocent_files, tmp_path / "work"))
+def folder(valid_files: Path, tmp_path: Path) -> Path:
+    """A copy of the valid files for one test."""
+    return Path(shutil.copytree(valid_files, tmp_path / "work"))

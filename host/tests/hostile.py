@@ -1,4 +1,4 @@
-"""Hostile command lines as data: what is typed, which files are there, and what the one line says."""
+"""Test cases of hostile command lines: arguments, files and the expected error line."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from PIL import Image
 from colonnade.cli.main import cli
 from colonnade.design import toolchain
 
-#: Seconds after which a command line counts as hung.
-PATIENCE = 20
+#: Seconds after which a command counts as hung.
+MAX_SECONDS = 20
 
-#: Makes a file of a case: its bytes, its text, or what makes it.
+#: Content of a file: bytes, text, or a function that creates the file.
 Content = bytes | str | Callable[[Path], None]
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 SCENE = '[mesh]\nname = "cube"\n'
-#: Renders a scene, or packs it, without hardware.
+#: Command lines for `s.toml`, without a simulator.
 RENDER = "render s.toml --config tiny --backend model --size 8x8"
 COMPARE = "compare x.png a.png --no-dists"
 HITS = "compare x.npz h.npz"
@@ -46,10 +46,10 @@ class Case:
     """One hostile command line.
 
     Attributes:
-        arguments: As typed after ``colonnade``.
-        says: A part of the one line on standard error.
-        files: Files beside those of `world`, by path.
-        environment: Variables.
+        arguments: Arguments of ``colonnade``.
+        says: Expected part of the error line.
+        files: Additional files to those of `world`, by path.
+        environment: Environment variables.
         status: Exit status.
     """
 
@@ -65,7 +65,7 @@ def parametrised(cases: Mapping[str, Case]) -> pytest.MarkDecorator:
 
 
 def world(folder: Path) -> None:
-    """The innocent files that hostile command lines may name; made in ``folder``."""
+    """Create the valid files that the cases use, in ``folder``."""
     (folder / "s.toml").write_text(SCENE)
     (folder / "tri.obj").write_text(TRIANGLE)
     for name, level in (("a.png", 30), ("b.png", 200)):
@@ -85,19 +85,19 @@ def world(folder: Path) -> None:
 
 
 def meta(**changes: Any) -> dict[str, Any]:
-    """A room's ``meta.json``."""
+    """The content of a room's ``meta.json``."""
     pose = [[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 1.5], [0.0, 0.0, -1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
     return {"fx": 60.0, "fy": 60.0, "cx": 32.0, "cy": 24.0, "cam_to_world": pose} | changes
 
 
 def run(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Run a case in ``folder``, hold it against what every refusal must do, and return its line."""
+    """Run a case in ``folder``, check the common properties of errors, and return the error line."""
     for name, content in case.files.items():
         make(folder / name, content)
     for variable, value in case.environment.items():
         monkeypatch.setenv(variable, value)
     before = snapshot(folder)
-    with inside(folder), no_longer_than(PATIENCE):
+    with inside(folder), no_longer_than(MAX_SECONDS):
         result = CliRunner().invoke(cli, shlex.split(case.arguments))
     line = refused(result, case)
     assert snapshot(folder) == before, "files were made, changed or removed"
@@ -145,7 +145,7 @@ def read_only(path: Path) -> None:
 
 
 def scene(text: str) -> dict[str, Content]:
-    """A scene of the cube with more in it, as x.toml."""
+    """A scene file x.toml of the cube with additional lines."""
     return {"x.toml": SCENE + text}
 
 
@@ -156,7 +156,7 @@ def picture(name: str, kind: str, **options: Any) -> dict[str, Content]:
 
 
 def altered_image(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
-    """A scene image with a changed header and a right checksum, from p/scene.image beside it."""
+    """A scene image with a changed header and a correct checksum, made from p/scene.image."""
 
     def write(path: Path) -> None:
         data = (path.parent / "p" / "scene.image").read_bytes()
@@ -171,7 +171,7 @@ def altered_image(change: Callable[[dict[str, Any]], object]) -> Callable[[Path]
 
 
 def snapshot(folder: Path) -> dict[str, Any]:
-    """Everything in a folder: kind and mode, content or target."""
+    """Kind, mode, and content or link target of each file in a folder."""
     found: dict[str, Any] = {}
     for path in sorted(folder.rglob("*")):
         status = path.lstat()
@@ -195,7 +195,7 @@ def inside(folder: Path) -> Iterator[None]:
 
 
 class HungError(BaseException):
-    """Not caught by what catches exceptions."""
+    """Raised on a timeout; handlers of `Exception` do not catch it."""
 
 
 @contextmanager

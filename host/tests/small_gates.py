@@ -1,17 +1,17 @@
-"""A library of a few cells and netlists of it, for the tests of power and replay."""
+"""A small cell library and its netlists, for the tests of power and replay."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from colonnade.ppa.library import liberty
+from colonnade.ppa.library import liberty, liberty_files
 from colonnade.ppa.library.cells import Library
 from colonnade.ppa.netlist.hierarchy import Hierarchy
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.power.recording import Port, Recording
 
-#: Energies at 2 V: 3 fJ for an output's change (4 and 2, at the supply alone), 1 fJ for a clock pin's; leakage 5 pW.
+#: At 2 V: 3 fJ per output transition (rise 4, fall 2, supply rail only), 1 fJ per clock transition, 5 pW of leakage.
 LIBERTY = """library (small) {
   time_unit : "1ps"; voltage_unit : "1V"; nom_voltage : 2; leakage_power_unit : "1pW"; capacitive_load_unit (1, ff);
   cell (INV) { area : 1; leakage_power () { value : 4; when : "A"; } leakage_power () { value : 6; when : "!A"; }
@@ -40,14 +40,14 @@ LIBERTY = """library (small) {
 
 
 def small_library(tmp_path: Path) -> Library:
-    """The cells of `LIBERTY`, which is ``small.lib`` in the folder `tmp_path`."""
+    """The cells of `LIBERTY`, written to ``small.lib`` in `tmp_path`."""
     (tmp_path / "small.lib").write_text(LIBERTY)
-    (tmp_path / "pruned.lib").write_text(liberty.pruned(tmp_path / "small.lib"))
+    (tmp_path / "pruned.lib").write_text(liberty_files.pruned(tmp_path / "small.lib"))
     return liberty.load([tmp_path / "pruned.lib"])
 
 
 def small_hierarchy(tmp_path: Path) -> Hierarchy:
-    """With a memory of four words of two bits."""
+    """A hierarchy with a memory of four words of two bits."""
     folder = tmp_path / "design"
     folder.mkdir()
     (folder / "table.sv").write_text("module table(\n  input clock\n);\n  table_ext table_ext (\nendmodule\n")
@@ -56,7 +56,7 @@ def small_hierarchy(tmp_path: Path) -> Hierarchy:
 
 
 def cell(kind: str, **pins: int | str) -> dict[str, Any]:
-    """A cell in Yosys's JSON; a pin has a net's number or a constant."""
+    """A cell in Yosys's JSON; the value of a pin is a net number or a constant."""
     return {"type": kind, "connections": {pin: [net] for pin, net in pins.items()}}
 
 
@@ -73,7 +73,7 @@ def top(cells: dict[str, Any], inputs: dict[str, list[int]], outputs: dict[str, 
 
 
 def recording(netlist: Netlist, cycles: list[tuple[int, int]]) -> Recording:
-    """Joined inputs and outputs of each cycle, at the ports of a netlist."""
+    """A recording at the ports of a netlist, from the concatenated inputs and outputs of each cycle."""
 
     def joined(ports: dict[str, Any]) -> tuple[Port, ...]:
         return tuple(Port(name, len(bits)) for name, bits in ports.items() if name != "clock")

@@ -1,4 +1,4 @@
-"""Makes the locks, or checks them offline: ``python tools/supply_chain check`` or ``… UV [--upgrade]``."""
+"""Regenerates the locks, or checks them offline: ``python tools/supply_chain check`` or ``… UV [--upgrade]``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sbom
 
 
 def main(arguments: list[str]) -> int:
-    """Run one of the two; the exit status is 1 where a check fails."""
+    """Run the command; returns the exit status, 1 if a check fails."""
     if arguments == ["check"]:
         faults = [*python_locks.check(), *sbom.check()]
         for fault in faults:

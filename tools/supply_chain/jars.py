@@ -1,4 +1,4 @@
-"""Makes project/dependencies.sha256: the SHA-256 of every artifact that sbt resolves, and of sbt's own."""
+"""Generates project/dependencies.sha256: the SHA-256 of all artifacts that sbt resolves, and of sbt itself."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 HASHES = ROOT / "project" / "dependencies.sha256"
 
-# Together they resolve all there is: both class paths, the compiler and its bridge, the plugins, and scalafmt.
+# Together these commands resolve all artifacts: both class paths, compiler and bridge, plugins, and scalafmt.
 _COMMANDS = ["update", "compilers", "scalafmtSbtCheck"]
 
 
@@ -30,7 +30,7 @@ class Artifact:
 
     @property
     def line(self) -> str:
-        """The artifact as the committed file names it."""
+        """The artifact's line in the committed file."""
         return f"{self.sha256}  {self.organization}:{self.name}:{self.version}:{self.file}"
 
 
@@ -40,13 +40,13 @@ def read(text: str) -> list[Artifact]:
     for line in text.splitlines():
         found = re.fullmatch(r"([0-9a-f]{64})  ([^:]+):([^:]+):([^:]+):([^:]+)", line)
         if found is None:
-            raise ValueError(f"{HASHES.name} has a line of another form: {line!r}")
+            raise ValueError(f"{HASHES.name} has a malformed line: {line!r}")
         artifacts.add(Artifact(found[2], found[3], found[4], found[5], found[1]))
     return sorted(artifacts)
 
 
 def write() -> None:
-    """Resolve everything with sbt and write the committed file again."""
+    """Resolve all artifacts with sbt and write the committed file."""
     with tempfile.TemporaryDirectory() as folder:
         notes = Path(folder) / "resolved"
         environment = {**os.environ, "COLONNADE_LOCK": str(notes)}
@@ -60,7 +60,7 @@ def write() -> None:
 
 
 def _sbt_itself(known: set[str]) -> list[Artifact]:
-    """The artifacts of sbt, which the launcher copied out of Coursier's cache; the cache tells where they belong."""
+    """The artifacts of sbt itself, with their coordinates from Coursier's cache."""
     boots = list((ROOT / ".cache").glob("sbt-boot-*/scala-*"))
     if len(boots) != 1:
         sys.exit(f"colonnade: error: {len(boots)} versions of sbt in .cache; remove .cache/sbt-boot-* and try again")
@@ -71,7 +71,7 @@ def _sbt_itself(known: set[str]) -> list[Artifact]:
             continue
         known.add(sha256)
         cached = next((path for path in coursier_cache().rglob(jar.name) if _sha256_of(path) == sha256), None)
-        if cached is None:  # the compiler's, which lose their version, come after their equals
+        if cached is None:  # artifacts of the compiler, which lack a version, are known by now
             sys.exit(f"colonnade: error: {jar} is not in Coursier's cache; remove .cache/sbt-boot-* and try again")
         *organization, name, version, file = _inside_repository(cached).parts
         artifacts.append(Artifact(".".join(organization), name, version, file, sha256))
@@ -83,13 +83,13 @@ def _sha256_of(path: Path) -> str:
 
 
 def _inside_repository(cached: Path) -> Path:
-    """``org/…/file.jar`` of a path in the cache, which begins with the protocol, the host and the repository."""
+    """The path ``org/…/file.jar`` of a cached file, without the protocol, the host and the repository."""
     parts = cached.relative_to(coursier_cache()).parts
     return Path(*parts[3:])
 
 
 def coursier_cache() -> Path:
-    """Where Coursier keeps what it downloaded."""
+    """The folder of Coursier's download cache."""
     named = os.environ.get("COURSIER_CACHE")
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser() / ".cache")
     return Path(named) if named else base / "coursier" / "v1"

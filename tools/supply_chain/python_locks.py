@@ -1,6 +1,6 @@
-"""Makes the files of host/locks from host/pyproject.toml, and checks offline that they are up to date.
+"""Generates host/locks from host/pyproject.toml, and checks offline that the locks are up to date.
 
-A lock names every package that pip may install, with its version for each Python and the SHA-256 of its files.
+A lock lists all packages that pip may install, with their version for each Python and the SHA-256 of their files.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ class Lock:
 
     @property
     def path(self) -> Path:
-        """Where the lock is kept."""
+        """The file of the lock."""
         return LOCKS / f"{self.name}.txt"
 
     @property
     def digest(self) -> str:
-        """Identifies the tables of pyproject.toml that the lock was made from."""
+        """The digest of the tables of pyproject.toml that determine the lock."""
         text = json.dumps([self.requires_python, sorted(self.requirements)])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 def project_tables() -> dict[str, Any]:
-    """What host/pyproject.toml says."""
+    """The content of host/pyproject.toml."""
     return tomllib.loads(PROJECT.read_text(encoding="utf-8"))
 
 
 def wanted_locks() -> list[Lock]:
-    """The locks that pyproject.toml asks for: build requirements, .venv, and each further extra and group."""
+    """The locks of pyproject.toml: build requirements, .venv, and each further extra and group."""
     data = project_tables()
     project = data["project"]
     extras: dict[str, list[str]] = dict(project.get("optional-dependencies", {}))
@@ -66,7 +66,7 @@ def wanted_locks() -> list[Lock]:
 
 
 def write(uv: str, upgrade: bool) -> None:
-    """Make every lock again with ``uv``; versions stay as they are unless ``upgrade`` or pyproject.toml asks."""
+    """Regenerate all locks with ``uv``. Versions change only with ``upgrade`` or by pyproject.toml."""
     LOCKS.mkdir(exist_ok=True)
     locks = wanted_locks()
     for lock in locks:
@@ -80,16 +80,17 @@ def _compile(uv: str, lock: Lock, upgrade: bool) -> None:
     command = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", oldest, "--generate-hashes"]
     command += ["--no-python-downloads", "--no-header", "--no-annotate", "--no-emit-index-url"]
     with tempfile.TemporaryDirectory() as folder:
-        wishes, result = Path(folder) / "requirements.in", Path(folder) / "lock.txt"
-        wishes.write_text("\n".join(lock.requirements) + "\n", encoding="utf-8")
+        requirements, result = Path(folder) / "requirements.in", Path(folder) / "lock.txt"
+        requirements.write_text("\n".join(lock.requirements) + "\n", encoding="utf-8")
         if lock.path.is_file() and not upgrade:
             result.write_text(lock.path.read_text(encoding="utf-8"), encoding="utf-8")
-        # What lives in the same .venv has the same versions.
+        # Locks of the same .venv share their versions.
         for earlier in ("build", "host"):
             if earlier == lock.name:
                 break
             command += ["--constraints", str(LOCKS / f"{earlier}.txt")]
-        done = subprocess.run([*command, "--output-file", str(result), str(wishes)], cwd=ROOT / "host", check=False)
+        command += ["--output-file", str(result), str(requirements)]
+        done = subprocess.run(command, cwd=ROOT / "host", check=False)
         if done.returncode != 0:
             sys.exit(2)
         text = result.read_text(encoding="utf-8")
@@ -98,11 +99,11 @@ def _compile(uv: str, lock: Lock, upgrade: bool) -> None:
 
 
 def check() -> list[str]:
-    """What is wrong with the locks, one line each; needs no network."""
+    """The errors of the locks, one line each; needs no network."""
     locks = wanted_locks()
     faults = [fault for lock in locks for fault in _faults(lock)]
     for stale in sorted(set(LOCKS.glob("*.txt")) - {lock.path for lock in locks}):
-        faults.append(f"host/locks/{stale.name} belongs to no table of host/pyproject.toml; {REMADE_BY}")
+        faults.append(f"host/locks/{stale.name} has no table in host/pyproject.toml; {REMADE_BY}")
     return faults
 
 
@@ -115,13 +116,13 @@ def _faults(lock: Lock) -> list[str]:
         return [f"{name} is older than the dependencies in host/pyproject.toml; {REMADE_BY}"]
     faults = [f"{name}: {pin.name} {pin.version} has no hash; {REMADE_BY}" for pin in read(text) if not pin.hashes]
     if "://" in text:
-        faults.append(f"{name} names a host; {REMADE_BY}")
+        faults.append(f"{name} contains a URL; {REMADE_BY}")
     return faults
 
 
 @dataclass(frozen=True)
 class Pin:
-    """One package of a lock: its version where ``marker`` holds, and the SHA-256 of the files that pip accepts."""
+    """A package of a lock: its version if ``marker`` is true, and the SHA-256 of the files that pip accepts."""
 
     name: str
     version: str
@@ -130,7 +131,7 @@ class Pin:
 
 
 def read(text: str) -> list[Pin]:
-    """The packages of a lock's text."""
+    """Parse the packages of a lock."""
     pins = []
     for entry in re.sub(r"\\\n", " ", text).splitlines():
         found = re.match(r"([A-Za-z0-9._-]+)==([^ ;]+)(?: ; (.*?))?(?=\s+--hash|\s*$)", entry)

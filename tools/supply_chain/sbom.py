@@ -1,7 +1,7 @@
-"""Writes sbom.json (CycloneDX 1.6) from the locks, and checks offline that it is true to them.
+"""Generates sbom.json (CycloneDX 1.6) from the locks, and checks offline that it matches them.
 
-Versions and hashes come from the locks alone. Licences are what the packages' own metadata say, where a package was at
-hand when the file was written; the check passes over them.
+Versions and hashes come only from the locks. Licences come from the metadata of packages that are installed when the
+file is written; the check ignores them.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ FILE = ROOT / "sbom.json"
 
 Component = dict[str, Any]
 
-# Which minimum of tools/programs.sh a Debian package stands for.
+# The name of a Debian package's minimum version in tools/programs.sh, if it differs from the package.
 _MINIMUM_OF = {"g++": "gxx", "python3": "python", "openjdk-17-jdk-headless": "java"}
 
 
 def write() -> None:
-    """Write sbom.json with licences: of this environment and of Coursier's cache, else those it had before."""
+    """Write sbom.json. Licences come from this environment and Coursier's cache, else from the previous file."""
     before = {part["bom-ref"]: part.get("licenses") for part in _read().get("components", [])}
     components = _components()
     for component in components:
@@ -39,14 +39,14 @@ def write() -> None:
 
 
 def check() -> list[str]:
-    """What is wrong with sbom.json, one line each."""
+    """The errors of sbom.json, one line each."""
     if not FILE.is_file():
         return ["sbom.json is missing; run: tools/lock"]
-    there = _read()
-    for component in there.get("components", []):
+    existing = _read()
+    for component in existing.get("components", []):
         component.pop("licenses", None)
-    if there != _document(_components()):
-        return ["sbom.json is not true to the locks; run: tools/lock"]
+    if existing != _document(_components()):
+        return ["sbom.json does not match the locks; run: tools/lock"]
     return []
 
 
@@ -114,9 +114,9 @@ def _component(purl: str, name: str, version: str | None, hashes: list[str], **p
         component["version"] = version
     if hashes:
         component["hashes"] = [{"alg": "SHA-256", "content": content} for content in hashes]
-    said = {key: value for key, value in properties.items() if value}
-    if said:
-        component["properties"] = [{"name": f"colonnade:{key}", "value": value} for key, value in said.items()]
+    given = {key: value for key, value in properties.items() if value}
+    if given:
+        component["properties"] = [{"name": f"colonnade:{key}", "value": value} for key, value in given.items()]
     return component
 
 
@@ -124,35 +124,35 @@ def _licences(component: Component) -> list[Component]:
     if component["purl"].startswith("pkg:pypi/"):
         return _python_licences(component["name"], component["version"])
     if component["purl"].startswith("pkg:maven/"):
-        place = Path(*component["group"].split("."), component["name"], component["version"])
-        return [{"license": {"name": name}} for name in _pom_licences(place)]
+        folder = Path(*component["group"].split("."), component["name"], component["version"])
+        return [{"license": {"name": name}} for name in _pom_licences(folder)]
     return []
 
 
 def _python_licences(name: str, version: str) -> list[Component]:
     try:
-        said = metadata(name)
+        package = metadata(name)
     except PackageNotFoundError:
         return []
-    if said["Version"] != version:
+    if package["Version"] != version:
         return []
-    if said["License-Expression"]:
-        return [{"expression": said["License-Expression"]}]
-    classifiers = [line for line in said.get_all("Classifier") or [] if line.startswith("License :: ")]
+    if package["License-Expression"]:
+        return [{"expression": package["License-Expression"]}]
+    classifiers = [line for line in package.get_all("Classifier") or [] if line.startswith("License :: ")]
     names = [line.rsplit(" :: ", 1)[-1] for line in classifiers]
-    text = said["License"] or ""
+    text = package["License"] or ""
     if not names and text and "\n" not in text:
         names = [text]
     return [{"license": {"name": name}} for name in names]
 
 
-def _pom_licences(place: Path, depth: int = 0) -> list[str]:
-    """The names of the licences in a module's POM, or in its parent's; ``place`` is org/…/name/version."""
-    pom = next(iter(jars.coursier_cache().glob(f"*/*/*/{place}/*.pom")), None)
+def _pom_licences(folder: Path, depth: int = 0) -> list[str]:
+    """The names of the licences in a module's POM or its parent's; ``folder`` is org/…/name/version."""
+    pom = next(iter(jars.coursier_cache().glob(f"*/*/*/{folder}/*.pom")), None)
     if pom is None or depth > 5:
         return []
     tree = ElementTree.parse(pom).getroot()
-    for element in tree.iter():  # without its name space
+    for element in tree.iter():  # strip the namespace
         element.tag = element.tag.rsplit("}", 1)[-1]
     names = [" ".join((found.text or "").split()) for found in tree.findall("./licenses/license/name")]
     parent = tree.find("./parent")

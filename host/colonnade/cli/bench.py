@@ -54,12 +54,12 @@ def bench(
     from colonnade.design.generator import manifest_for
     from colonnade.evaluation import bench as benchmark
 
-    shown = progress.for_terminal()
+    terminal = progress.for_terminal()
     names = meshes or benchmark.MESHES
 
     def measured(mirror: bool) -> dict[str, Any]:
         table = _table()
-        report = benchmark.bench(config, overrides, names, conditions, shown, partial(_show, table), mirror)
+        report = benchmark.bench(config, overrides, names, conditions, terminal, partial(_show, table), mirror)
         in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
         means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])
         table.print("geometric mean", None, None, *means, None, None, None, "")
@@ -75,7 +75,7 @@ def bench(
 
         plot_stages(report, plot)
     report["mirror"] = None
-    if mirror and int(manifest_for(config, overrides, shown).manifest.config["frame"]["maxBounces"]) > 0:
+    if mirror and int(manifest_for(config, overrides, terminal).manifest.config["frame"]["maxBounces"]) > 0:
         echo("\nAs mirrors, with one reflection:")
         report["mirror"] = measured(mirror=True)
     finish(report, json_file)

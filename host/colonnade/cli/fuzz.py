@@ -66,13 +66,13 @@ def fuzz(
         if kind not in KINDS:
             raise UserError(f"unknown kind of corruption {kind!r}: choose from {', '.join(KINDS)}")
     require_outputs(json_file)
-    shown = progress.for_terminal()
+    terminal = progress.for_terminal()
 
     def show(failed: Disagreement) -> None:
-        with shown.paused():
+        with terminal.paused():
             click.echo(f"seed {failed.seed}, {failed.kind}, {failed.change}: {'; '.join(failed.differences)}")
 
-    report = campaign.fuzz(design_for(config, overrides, shown), frames, seed, kinds, shown, show)
+    report = campaign.fuzz(design_for(config, overrides, terminal), frames, seed, kinds, terminal, show)
     table = Table(
         (Column("kind", 10, is_text=True), *(Column(outcome, 8, ",") for outcome in campaign.OUTCOMES)), click.echo
     )

@@ -44,12 +44,12 @@ def generate(
         if json_file is not None and design_folder.holds(output, json_file):
             raise UserError(f"{json_file} is in the folder that --output replaces: choose another path for --json")
 
-    shown = progress.for_terminal()
+    terminal = progress.for_terminal()
     if print_manifest or output is None:
-        design = generator.manifest_for(config, overrides, shown)
+        design = generator.manifest_for(config, overrides, terminal)
         echo((design.dir / "manifest.json").read_text().rstrip("\n"))
     else:
-        design = generator.generate(config, overrides, output, manifest_only, black_box_memories, shown)
+        design = generator.generate(config, overrides, output, manifest_only, black_box_memories, terminal)
     files = design_folder.listed(design.dir)
     manifest = json.loads((design.dir / "manifest.json").read_text())
     if output is not None:

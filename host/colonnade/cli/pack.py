@@ -51,15 +51,15 @@ def pack(
     check_image_file(file)
     require_outputs(json_file, folders=[file.parent])
     declare_output(file)
-    shown = progress.for_terminal()
+    terminal = progress.for_terminal()
     described = load_scene(scene)
     if mesh is not None:
         described = described.with_mesh(mesh)
     if background is not None:
         described = described.with_environment(background)
-    manifest = manifest_for(config, overrides, shown).manifest
+    manifest = manifest_for(config, overrides, terminal).manifest
     folder = described.background.room
-    with shown.step("packing"):
+    with terminal.step("packing"):
         environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
         image = pack_scene(described, manifest, environment)
     image.save(output)

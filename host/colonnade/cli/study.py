@@ -39,9 +39,9 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
     if frames:
         from colonnade.evaluation.studies import ar_losses
 
-        shown = progress.for_terminal()
-        with shown.step("measuring frames"):
-            by_frame = ar_losses.study_frames(rooms, not no_dists, shown, output)
+        terminal = progress.for_terminal()
+        with terminal.step("measuring frames"):
+            by_frame = ar_losses.study_frames(rooms, not no_dists, terminal, output)
         echo(ar_losses.table(by_frame))
         report = {
             frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}

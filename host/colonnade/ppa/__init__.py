@@ -1,1 +1,1 @@
-"""Power, performance and area of a configuration, with open tools."""
+"""Power, performance (timing) and area of a configuration, estimated with open tools."""

@@ -1,4 +1,4 @@
-"""A configuration's area and timing: units one by one, then render unit, column and array by multiplication."""
+"""Area, timing and power of a configuration: each unit is synthesised, and larger levels are sums over units."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from colonnade.ppa.power.report import Operation, measure_power
 from colonnade.ppa.timing import opensta
 from colonnade.ppa.timing.static import Analysis, Timing, TimingPath, gates_by_name
 
-#: Called with the level, the name and the report of each unit as soon as it is known.
+#: Called after each unit with its level, name and report.
 Finished = Callable[[str, str, Mapping[str, Any]], None]
 
 
@@ -30,25 +30,25 @@ def measure(
     progress: Progress = QUIET,
     finished: Finished = lambda level, name, unit: None,
 ) -> dict[str, Any]:
-    """Synthesise every unit of a configuration and add them up.
+    """Synthesise each unit of a configuration and sum up.
 
     Args:
-        config: name of the configuration, see `colonnade.design.config_name`.
-        overrides: ``key.path=value`` changes.
-        liberties: files or folders; Yosys's own gates without any.
-        delay: target for abc in ns.
-        operation: clock and frame for power, which takes liberties; no power without.
-        progress: shows the steps.
-        finished: see `Finished`.
+        config: Configuration, see `colonnade.design.config_name`.
+        overrides: Changes to the configuration, ``key.path=value``.
+        liberties: Liberty files or folders; empty: Yosys's generic gates.
+        delay: Target delay of abc, ns.
+        operation: Clock and frame for power, which needs liberties; None: no power.
+        progress: Shows the steps.
+        finished: See `Finished`.
 
     Returns:
-        The report as ``--json`` writes it.
+        The report that ``--json`` writes.
     """
     require_yosys()
-    into = technology(tuple(liberties), delay)
+    tech = technology(tuple(liberties), delay)
     design = black_boxed_design_for(config, overrides, progress)
     hierarchy = Hierarchy(design.dir)
-    if into.library and operation:
+    if tech.library and operation:
         require_recordable(operation.stimulus, design.manifest)
     netlists: dict[str, Any] = {}
     units: dict[str, dict[str, Any]] = {}
@@ -57,14 +57,14 @@ def measure(
             name = level.rest if module == level.top else module
             with progress.step(f"synthesising {name}"):
                 for each in (*hierarchy.parts(module), module):
-                    netlists[each] = synthesise(hierarchy, each, into, progress)
-                units[name] = _unit(level, module, netlists, hierarchy.parts(module), into)
+                    netlists[each] = synthesise(hierarchy, each, tech, progress)
+                units[name] = _unit(level, module, netlists, hierarchy.parts(module), tech)
             finished(level.name, name, units[name])
-    with progress.step("timing a render unit as a whole"):
-        whole = _timing(Netlist(netlists, "RenderUnit", into.library), into) if into.library else None
+    with progress.step("timing the whole render unit"):
+        whole = _timing(Netlist(netlists, "RenderUnit", tech.library), tech) if tech.library else None
     power = None
-    if into.library and operation:
-        power = measure_power(design, config, overrides, hierarchy, netlists, into, operation, progress)
+    if tech.library and operation:
+        power = measure_power(design, config, overrides, hierarchy, netlists, tech, operation, progress)
         for name, of_unit in power.pop("units").items():
             units[name] |= of_unit
     array = design.manifest.config["array"]
@@ -80,15 +80,15 @@ def measure(
     return {
         "config": design.manifest.config,
         "config_hash": design.manifest.config_hash,
-        "technology": _described(into),
+        "technology": _describe(tech),
         "units": units,
-        "memories": {memory.name: memories.described(memory) for memory in boxes},
+        "memories": {memory.name: memories.describe(memory) for memory in boxes},
         "flop_tables": [{**asdict(table), "bits": table.bits} for table in hierarchy.tables()],
         "levels": levels,
         "render_unit_kge": levels["render_unit"]["kge"],
         "slowest_path": slowest,
         "render_unit_paths": whole,
-        "opensta": _second_opinion(units),
+        "opensta": _opensta_comparison(units),
         "chip": {
             "mm2": memories.CHIP_MM2,
             "units": memories.CHIP_UNITS,
@@ -102,22 +102,22 @@ def measure(
 
 
 def _unit(
-    level: Level, module: str, netlists: Mapping[str, Any], parts: Mapping[str, int], into: Technology
+    level: Level, module: str, netlists: Mapping[str, Any], parts: Mapping[str, int], tech: Technology
 ) -> dict[str, Any]:
-    own = count_gates(netlists[module], into)
-    of_parts = {part: count_gates(netlists[part], into) for part in parts}
+    own = count_gates(netlists[module], tech)
+    of_parts = {part: count_gates(netlists[part], tech) for part in parts}
     counts = [(own, 1), *((of_parts[part], number) for part, number in parts.items())]
     registers = sum(gates.registers * number for gates, number in counts)
     combinational = sum(gates.combinational * number for gates, number in counts)
-    area = into.gate_area
+    area = tech.gate_area
     paths = None
-    if into.library:
+    if tech.library:
         joined = {name: netlists[name] for name in (module, *parts)}
-        netlist = Netlist(joined, module, into.library)
-        paths = _timing(netlist, into)
+        netlist = Netlist(joined, module, tech.library)
+        paths = _timing(netlist, tech)
         if paths["register_to_register"] and opensta.is_available():
-            edges = Analysis.edges(into.library)
-            paths["register_to_register"]["opensta_ns"] = opensta.register_to_register(netlist, into.library, *edges)
+            edges = Analysis.edges(tech.library)
+            paths["register_to_register"]["opensta_ns"] = opensta.register_to_register(netlist, tech.library, *edges)
     return {
         "level": level.name,
         "module": module,
@@ -139,13 +139,13 @@ def _unit(
     }
 
 
-def _timing(netlist: Netlist, into: Technology) -> dict[str, Any]:
-    assert into.library is not None
-    return _paths(Analysis(netlist, into.library).timing(), into)
+def _timing(netlist: Netlist, tech: Technology) -> dict[str, Any]:
+    assert tech.library is not None
+    return _paths(Analysis(netlist, tech.library).timing(), tech)
 
 
-def _paths(timing: Timing, into: Technology) -> dict[str, Any]:
-    fo4 = into.library.fo4 if into.library else 1.0
+def _paths(timing: Timing, tech: Technology) -> dict[str, Any]:
+    fo4 = tech.library.fo4 if tech.library else 1.0
 
     def path(found: TimingPath | None) -> dict[str, Any] | None:
         if found is None:
@@ -161,8 +161,8 @@ def _paths(timing: Timing, into: Technology) -> dict[str, Any]:
     }
 
 
-def _second_opinion(units: Mapping[str, Mapping[str, Any]]) -> dict[str, Any] | None:
-    """How far OpenSTA's slowest paths are from ours, where it is there."""
+def _opensta_comparison(units: Mapping[str, Mapping[str, Any]]) -> dict[str, Any] | None:
+    """Deviation of our slowest paths from OpenSTA's; None without OpenSTA."""
     found = [unit["paths"]["register_to_register"] for unit in units.values() if _is_timed(unit)]
     shares = [path["ns"] / path["opensta_ns"] - 1 for path in found if path.get("opensta_ns")]
     return {"units": len(shares), "least": min(shares), "most": max(shares)} if shares else None
@@ -173,15 +173,15 @@ def _is_timed(unit: Mapping[str, Any]) -> bool:
 
 
 def _levels(units: Mapping[str, Mapping[str, Any]], rows: int, columns: int, boxes: Sequence[Memory]) -> dict[str, Any]:
-    """Gates and memory bits of one render unit, one column, the array; each holds those below it."""
+    """Gates and memory bits of a render unit, a column and the array; each includes the level below."""
     levels: dict[str, Any] = {}
     below, bits_below, area_below, memory_below = 0.0, 0, 0.0, 0.0
     for level, copies in zip(LEVELS, (0, rows, columns), strict=True):
         own = [unit for unit in units.values() if unit["level"] == level.name]
         logic = sum(unit["kge"] for unit in own) + copies * below
-        held = [memory for memory in boxes if memory.level == level.name]
-        bits = sum(memory.bits * memory.count for memory in held) + copies * bits_below
-        memory_um2 = sum(memories.area_um2(memory) for memory in held) + copies * memory_below
+        own_memories = [memory for memory in boxes if memory.level == level.name]
+        bits = sum(memory.bits * memory.count for memory in own_memories) + copies * bits_below
+        memory_um2 = sum(memories.area_um2(memory) for memory in own_memories) + copies * memory_below
         um2 = sum(unit["um2"] or 0.0 for unit in own) + copies * area_below
         levels[level.name] = {
             "of_the_level_below": copies,
@@ -197,18 +197,18 @@ def _levels(units: Mapping[str, Mapping[str, Any]], rows: int, columns: int, box
     return levels
 
 
-def _described(into: Technology) -> dict[str, Any]:
-    """How the figures were obtained."""
-    library = into.library
+def _describe(tech: Technology) -> dict[str, Any]:
+    """The technology in a report."""
+    library = tech.library
     if library is None:
-        return {"liberty": None, "gates": "transistors of static CMOS by Yosys's table ÷ 4; no delays, no µm²"}
+        return {"liberty": None, "gates": "static-CMOS transistors by Yosys's table ÷ 4; no delays, no µm²"}
     nand, inverter = library.nand2, library.inverter
     return {
         "liberty": [file.name.rsplit("-", 1)[0] for file in library.files],
-        "gates": f"cell area ÷ {nand.area:g} µm² of {nand.name}, the smallest NAND of two inputs",
+        "gates": f"cell area ÷ {nand.area:g} µm² of {nand.name}, the smallest two-input NAND",
         "um2_per_gate": nand.area,
         "fo4_ns": library.fo4,
-        "fo4": f"from the tables of {inverter.name}, which drives four of its like in a chain of such",
-        "delay_target_ns": into.delay,
-        "timing": "our own analysis by the liberty's tables, no wires, ideal clock; clock to set-up",
+        "fo4": f"{inverter.name} driving four copies of itself, by the liberty's tables",
+        "delay_target_ns": tech.delay,
+        "timing": "built-in analysis by the liberty's tables, from clock to set-up; no wires, ideal clock",
     }

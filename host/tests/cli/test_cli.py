@@ -1,4 +1,4 @@
-"""The command line: its help, its files, and one clear line for each way to get the input wrong."""
+"""The command line: help, output files, and one clear line for each wrong input."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def run(*arguments: object) -> Result:
 
 
 def refused(result: Result) -> str:
-    """The one line of a refusal; fails when the command did anything else."""
+    """The error line of a command; fails if the command did not report exactly one error."""
     assert result.exit_code == 2, f"exit {result.exit_code}: {result.output} {result.exception!r}"
     lines = result.stderr.splitlines()
     assert len(lines) == 1, result.stderr

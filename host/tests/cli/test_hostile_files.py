@@ -1,4 +1,4 @@
-"""Pictures, hits, rooms, scene images and liberties that no reader may choke on."""
+"""Hostile pictures, hits, rooms, scene images and liberty files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CASES: dict[str, Case] = {}
 
 
 def png(width: int, height: int) -> bytes:
-    """A PNG of few bytes that claims any size."""
+    """A small PNG file that claims any size."""
 
     def chunk(name: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
@@ -85,7 +85,7 @@ def broken_zlib() -> bytes:
 
 
 def encrypted() -> bytes:
-    """The flag of an encrypted member, in both of its places."""
+    """An archive whose member has the encryption flag in both headers."""
     data = bytearray(npz(triangle=np.zeros((8, 8), np.int64), t=np.ones((8, 8))))
     for mark, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
         at = data.find(mark)
@@ -96,7 +96,7 @@ def encrypted() -> bytes:
 
 
 def bomb() -> bytes:
-    """Members that say they unpack to 4 GB."""
+    """An archive whose members claim 4 GB unpacked."""
     data = bytearray(npz(triangle=np.zeros((8, 8), np.int64), t=np.ones((8, 8))))
     at = data.find(b"PK\x01\x02")
     while at >= 0:
@@ -249,7 +249,7 @@ def test_file_is_refused(case: Case, folder: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_no_program_runs_for_a_picture(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An EPS file made Pillow run ``gs`` from PATH."""
+    """Regression: an EPS file made Pillow run ``gs`` from PATH."""
     gs = folder / "bin" / "gs"
     gs.parent.mkdir()
     gs.write_text("#!/bin/sh\ntouch ran\n")

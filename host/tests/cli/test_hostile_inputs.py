@@ -1,4 +1,4 @@
-"""Inputs that are no files, and scenes, configurations and options that no reader may choke on."""
+"""Hostile scenes, configurations and options, and inputs that are not regular files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def unix_socket(path: Path) -> None:
         socket.socket(socket.AF_UNIX).bind(path.name)
 
 
-#: Kinds of things that are no regular files, and what they are called.
+#: Files that are not regular, with their description in errors.
 KINDS: Mapping[str, tuple[str, dict[str, Content]]] = {
     "fifo": ("a pipe", {"X": fifo}),
     "socket": ("a socket", {"X": unix_socket}),
@@ -34,7 +34,7 @@ KINDS: Mapping[str, tuple[str, dict[str, Content]]] = {
     "dangling": ("", {"X": link_to("nowhere")}),
     "circle": ("Too many levels", {"X": link_to("X")}),
 }
-#: Where an input may stand: its command line, with X.
+#: Command lines with an input X, for each kind of input.
 INPUTS = {
     "scene": ("render x.toml --config tiny", "x.toml"),
     "packed-scene": ("pack x.toml --config tiny --output q", "x.toml"),
@@ -56,7 +56,7 @@ for place, (arguments, file) in INPUTS.items():
 
 
 def replaced(name: str, kind: str) -> Callable[[Path], None]:
-    """A file of the room gives way to something else."""
+    """Replaces a file of the room."""
 
     def write(path: Path) -> None:
         path.unlink()

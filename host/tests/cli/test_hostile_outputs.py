@@ -1,4 +1,4 @@
-"""Outputs that must not be written: devices, pipes, links, read-only files, inputs, other outputs, foreign folders."""
+"""Rejected outputs: devices, pipes, links, read-only files, inputs, other outputs, foreign folders."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from colonnade.design.generator import manifest_for
 GENERATE = "generate --config tiny --manifest-only"
 LONG = "n" * 300
 
-#: What may stand where an output goes: how it is made, and what it is called.
-IN_THE_WAY = {
+#: Existing files at an output's path: how to create them, and their description in errors.
+EXISTING = {
     "fifo": (fifo, "a pipe"),
     "folder": (lambda path: path.mkdir(), "a folder"),
     "link-to-file": (link_to("a.png"), "a symbolic link"),
@@ -48,7 +48,7 @@ OUTPUTS = {
 CASES = {
     f"{option}-{kind}": Case(arguments, says, {"out": content})
     for option, arguments in OUTPUTS.items()
-    for kind, (content, says) in IN_THE_WAY.items()
+    for kind, (content, says) in EXISTING.items()
 }
 CASES |= {
     f"{option}-device": Case(arguments.replace(" out", " /dev/null"), "a device")
@@ -204,7 +204,7 @@ def test_generate_fills_an_empty_folder_but_not_the_working_directory(tmp_path: 
 
 
 def test_python_and_scala_know_each_others_folders(tmp_path: Path) -> None:
-    """`GenerateSpec` has the same two files and the same list."""
+    """`GenerateSpec` checks the same two files and the same list."""
     (tmp_path / "sub").mkdir()
     (tmp_path / "a").write_text("a\n")
     (tmp_path / "sub" / "b").write_text("b\n")
@@ -223,7 +223,7 @@ def test_python_and_scala_know_each_others_folders(tmp_path: Path) -> None:
     check_replaceable(copy)
 
 
-def test_an_output_keeps_the_permissions_of_the_file_it_replaces(folder: Path, innocent_files: Path) -> None:
+def test_an_output_keeps_the_permissions_of_the_file_it_replaces(folder: Path, valid_files: Path) -> None:
     report = folder / "r.json"
     report.write_text("{}")
     report.chmod(0o600)
@@ -231,4 +231,4 @@ def test_an_output_keeps_the_permissions_of_the_file_it_replaces(folder: Path, i
         assert CliRunner().invoke(cli, ["compare", "a.png", "b.png", "--no-dists", "--json", "r.json"]).exit_code == 0
     assert report.stat().st_mode & 0o777 == 0o600
     assert json.loads(report.read_text())["identical"] is False
-    assert {path.name for path in folder.iterdir()} - {path.name for path in innocent_files.iterdir()} == {"r.json"}
+    assert {path.name for path in folder.iterdir()} - {path.name for path in valid_files.iterdir()} == {"r.json"}

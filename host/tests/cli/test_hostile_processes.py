@@ -1,4 +1,4 @@
-"""What needs a process of its own: full disks, folders without access, closed outputs, and the last net."""
+"""Errors that need a separate process: full disks, missing permissions, closed outputs, unexpected exceptions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def colonnade(
 
 @contextlib.contextmanager
 def tiny_disk(place: Path) -> Iterator[Path]:
-    """A file system of 8 KiB; skips where it cannot be mounted."""
+    """A file system of 8 KiB; skips the test if it cannot be mounted."""
     place.mkdir()
     mounted = subprocess.run(
         ["mount", "-t", "tmpfs", "-o", "size=8k", "tmpfs", place], capture_output=True, check=False
@@ -75,7 +75,7 @@ def test_full_disk_is_one_line_and_leaves_nothing(folder: Path, arguments: str) 
 def test_disk_that_fills_while_writing_keeps_what_was_there(
     folder: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The same without root: the stream fails after some bytes."""
+    """The same without root: writing fails after some bytes."""
     whole = os.fdopen
 
     def full(handle: int, mode: str) -> Any:
@@ -139,14 +139,14 @@ def test_no_permission_is_one_line(folder: Path, arguments: str) -> None:
     hostile.one_error_line(done.stderr, "")
 
 
-def test_output_that_nobody_takes_is_one_line(folder: Path) -> None:
+def test_output_to_a_closed_pipe_is_one_line(folder: Path) -> None:
     with Path("/dev/full").open("w") as full:
         done = colonnade(folder, "inspect p", stdout=full)
     assert done.returncode == 2
     hostile.one_error_line(done.stderr, "No space left")
 
 
-def test_bytes_that_are_no_text_in_an_argument(folder: Path) -> None:
+def test_arguments_may_be_invalid_utf_8(folder: Path) -> None:
     command = [sys.executable.encode(), b"-m", b"colonnade", b"render", b"\xff\x1b[31m.toml", b"--config", b"tiny"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=SECONDS, check=False)
     assert done.returncode == 2
@@ -163,7 +163,7 @@ ESCAPED = {
 
 
 @pytest.mark.parametrize(("error", "status", "says"), ESCAPED.values(), ids=list(ESCAPED))
-def test_what_no_command_foresaw_is_one_line(
+def test_an_unexpected_exception_is_one_line(
     folder: Path, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int, says: str
 ) -> None:
     def broken(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Entries and measurements of the cache: what is damaged is made again, once, with one line."""
+"""Cache entries and measurements: damaged ones are rebuilt once, with one line."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ Damage = Callable[[Path], object]
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
-    """Where entries were made; nothing is known to be intact at first."""
+    """Folders of built entries; starts without verified entries."""
     monkeypatch.setattr(cache, "_verified", {})
     return []
 
 
 def get(folder: Path, made: list[Path]) -> Path:
-    """The entry, as a new process would ask for it."""
+    """The entry, as in a new process."""
     cache._verified.clear()
 
     def make(place: Path) -> None:
@@ -96,13 +96,13 @@ def test_makes_a_damaged_entry_again(
     assert capsys.readouterr().err == "colonnade: the cached simulator was damaged and is built again\n"
 
 
-def test_takes_no_entry_of_another_key(tmp_path: Path, made: list[Path]) -> None:
+def test_an_entry_of_another_key_is_not_used(tmp_path: Path, made: list[Path]) -> None:
     get(tmp_path / "k0", made).rename(tmp_path / "k1")
     get(tmp_path / "k1", made)
     assert len(made) == 2
 
 
-def test_keeps_nothing_of_a_making_that_failed(tmp_path: Path, made: list[Path]) -> None:
+def test_a_failed_build_leaves_nothing(tmp_path: Path, made: list[Path]) -> None:
     def fail(place: Path) -> None:
         (place / "half").write_text("")
         raise RuntimeError("no")
@@ -112,7 +112,7 @@ def test_keeps_nothing_of_a_making_that_failed(tmp_path: Path, made: list[Path])
     assert names(tmp_path) == {"k0.lock"}
 
 
-def test_names_a_full_and_an_unwritable_cache(tmp_path: Path, made: list[Path]) -> None:
+def test_a_full_or_unwritable_cache_is_reported(tmp_path: Path, made: list[Path]) -> None:
     def fill(place: Path) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -125,9 +125,7 @@ def test_names_a_full_and_an_unwritable_cache(tmp_path: Path, made: list[Path]) 
         get(tmp_path / "file" / "deep" / "deeper" / "k0", made)
 
 
-def test_says_that_work_failed_for_want_of_space(
-    tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lack_of_space_is_reported(tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(place: Path) -> None:
         raise errors.pop()
 
@@ -139,7 +137,7 @@ def test_says_that_work_failed_for_want_of_space(
     assert names(tmp_path) == {"k0.lock"}
 
 
-def test_threads_share_what_one_of_them_makes(tmp_path: Path, made: list[Path]) -> None:
+def test_threads_share_one_build(tmp_path: Path, made: list[Path]) -> None:
     def make(place: Path) -> None:
         made.append(place)
         time.sleep(0.05)
@@ -192,7 +190,7 @@ def edited(change: Callable[[dict[str, object]], object]) -> Damage:
     ],
     ids=["truncated", "other cycles", "other registers", "no checksum", "plain", "nested", "a folder"],
 )
-def test_believes_no_altered_measurement(damage: Damage, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_altered_measurement_is_not_used(damage: Damage, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "k.json"
     cache.store(file, KEY, CONTENT)
     damage(file)
@@ -200,12 +198,12 @@ def test_believes_no_altered_measurement(damage: Damage, tmp_path: Path, capsys:
     assert capsys.readouterr().err == "colonnade: the cached measurement k.json was damaged and is made again\n"
 
 
-def test_believes_no_measurement_of_another_key(tmp_path: Path) -> None:
+def test_a_measurement_of_another_key_is_not_used(tmp_path: Path) -> None:
     cache.store(tmp_path / "k.json", KEY, CONTENT)
     assert cache.stored(tmp_path / "k.json", {**KEY, "design": "d1"}) is None
 
 
-def test_loses_a_measurement_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_measurement_that_cannot_be_stored_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("")
     cache.store(tmp_path / "file" / "k.json", KEY, CONTENT)
     assert capsys.readouterr().err.count("\n") == 1

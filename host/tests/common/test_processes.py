@@ -1,4 +1,4 @@
-"""Signals end a command line with everything it started, also when they go to its process alone."""
+"""Signals end a command and all processes that it started, also if only its own process gets the signal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pytest
 from colonnade.common import processes
 from colonnade.common.parallel import in_order
 
-#: Like a sweep: two threads, each with a temporary folder and a program that stands for the simulator, and its child.
+#: Imitates a sweep: two threads, each with a temporary folder and a stand-in for the simulator with a child process.
 SWEEP = """
 import sys, time
 from pathlib import Path
@@ -43,7 +43,7 @@ processes.guarded(main)
 
 
 def children(pid: int) -> list[int]:
-    """All processes below one, by /proc."""
+    """All descendants of a process, from /proc."""
     found = []
     for task in Path(f"/proc/{pid}/task").glob("*/children"):
         for child in map(int, task.read_text().split()):
@@ -89,7 +89,7 @@ def test_a_signal_to_the_parent_ends_everything(
     at = time.monotonic()
     process.send_signal(number)
     _, said = process.communicate(timeout=10)
-    # 1.3 seconds at most; more where the machine does something else beside
+    # It takes at most 1.3 seconds on an idle machine
     assert time.monotonic() - at < 4.0
     assert process.returncode == 128 + number
     assert said == f"colonnade: error: {'interrupted' if number == signal.SIGINT else 'terminated'}\n"
@@ -142,7 +142,7 @@ def test_an_ended_group_starts_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_error_in_one_piece_of_work_ends_the_others() -> None:
+def test_an_error_in_one_task_ends_the_others() -> None:
     def work(seconds: int) -> None:
         if seconds == 0:
             time.sleep(0.2)

@@ -1,4 +1,4 @@
-"""Progress outside a terminal: lines for long work, none for quick one, on standard error alone."""
+"""Progress outside a terminal: lines for long steps on standard error, none for short steps."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("COLONNADE_PROGRESS", raising=False)
 
 
-def test_a_long_step_says_its_share_and_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_long_step_shows_its_share_and_seconds(capsys: pytest.CaptureFixture[str]) -> None:
     with LineProgress(0.2).step("rendering in the simulator") as report:
         report(0.372)
         time.sleep(0.9)
     out, err = capsys.readouterr()
     assert out == ""
-    # After 0.2 and 0.6 seconds: the time to the next doubles
+    # Lines after 0.2 and 0.6 seconds: the interval doubles
     assert re.fullmatch(r"colonnade: rendering in the simulator: 37 %, 0 s\n(.*: 37 %, 1 s\n)", err)
 
 
-def test_a_step_without_a_share_says_its_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_step_without_a_share_shows_its_seconds(capsys: pytest.CaptureFixture[str]) -> None:
     with LineProgress(0.1).of("bunny").step("building the simulator"):
         time.sleep(0.2)
     assert capsys.readouterr().err == "colonnade: bunny: building the simulator: 0 s\n"
@@ -67,7 +67,7 @@ def test_can_be_silenced(monkeypatch: pytest.MonkeyPatch) -> None:
         for_terminal()
 
 
-def test_nothing_is_said_while_paused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_is_shown_while_paused(capsys: pytest.CaptureFixture[str]) -> None:
     lines = LineProgress(0.1)
     with lines.step("work"):
         with lines.paused():

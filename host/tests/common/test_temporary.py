@@ -1,4 +1,4 @@
-"""Temporary folders: gone after use, and those of killed processes with the next use."""
+"""Temporary folders are removed after use; the next use removes those of killed processes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_is_gone_after_use(tmp_path: Path) -> None:
     assert names(tmp_path) == set()
 
 
-def test_may_be_renamed_away_over_what_is_there(tmp_path: Path) -> None:
+def test_a_folder_may_be_renamed_over_an_existing_one(tmp_path: Path) -> None:
     target = tmp_path / "out"
     target.mkdir()
     (target / "old").write_text("")
@@ -51,7 +51,7 @@ def test_may_be_renamed_away_over_what_is_there(tmp_path: Path) -> None:
     assert names(target) == {"new"}
 
 
-def test_what_is_there_stays_if_it_cannot_be_replaced(tmp_path: Path) -> None:
+def test_an_existing_folder_stays_if_it_cannot_be_replaced(tmp_path: Path) -> None:
     target = tmp_path / "out"
     target.mkdir()
     (target / "old").write_text("")
@@ -78,7 +78,7 @@ def test_a_killed_process_leaves_nothing_for_long(number: int, tmp_path: Path) -
     assert names(tmp_path) == set()
 
 
-def test_removes_nothing_of_others(tmp_path: Path) -> None:
+def test_folders_of_running_processes_stay(tmp_path: Path) -> None:
     outside = tmp_path / "outside"
     for folder in (outside, tmp_path / ".entry.more", tmp_path / ".entry.none", tmp_path / ".entry.linked"):
         (folder / "content").mkdir(parents=True)
@@ -97,7 +97,7 @@ def test_removes_nothing_of_others(tmp_path: Path) -> None:
     assert names(tmp_path) == before - {".entry.more"}
 
 
-def test_follows_no_link_inside_what_it_removes(tmp_path: Path) -> None:
+def test_links_inside_a_removed_folder_are_not_followed(tmp_path: Path) -> None:
     (tmp_path / "outside").mkdir()
     (tmp_path / "outside" / "precious").write_text("")
     folder = tmp_path / ".entry.x"
@@ -119,7 +119,7 @@ def test_leaves_another_users_folder(tmp_path: Path) -> None:
     assert names(tmp_path) == {".entry.x"}
 
 
-def test_names_a_place_that_is_full_or_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_or_missing_folder_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(temporary.tempfile, "gettempdir", lambda: str(tmp_path / "none"))
     with pytest.raises(UserError, match="TMPDIR"), temporary_folder():
         pass

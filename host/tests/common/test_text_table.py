@@ -1,4 +1,4 @@
-"""Tables line up, in order, whatever runs at the same time."""
+"""Text tables are aligned, and parallel results come in order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from colonnade.common.parallel import in_order
 from colonnade.common.text_table import Column, Table
 
 
-def test_columns_line_up_below_their_titles_and_groups() -> None:
+def test_columns_are_aligned_with_titles_and_groups() -> None:
     lines: list[str] = []
     table = Table(
         (
@@ -47,13 +47,13 @@ def test_results_come_in_order() -> None:
     assert list(in_order(work, [], 2)) == []
 
 
-def test_the_longest_work_begins_first() -> None:
+def test_the_longest_task_starts_first() -> None:
     begun: list[int] = []
     assert list(in_order(lambda item: begun.append(item) or item, [1, 7, 3, 7, 5], 1, length=float)) == [1, 7, 3, 7, 5]
     assert begun == [7, 7, 5, 3, 1]
 
 
-def test_nothing_new_is_begun_after_a_failure() -> None:
+def test_no_task_starts_after_a_failure() -> None:
     begun: list[int] = []
 
     def work(item: int) -> None:

@@ -1,4 +1,4 @@
-"""Finding, running and caching the generator; a small script stands for sbt and Java where only the plumbing counts."""
+"""Finding, running and caching the generator; a script replaces sbt and Java except where their result counts."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def script(path: Path, text: str) -> None:
 
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A checkout whose sbt and Java only log that they ran; Java writes the manifest above."""
+    """A checkout whose sbt and Java only log their runs; Java writes `MANIFEST`."""
     root = tmp_path / "checkout"
     (root / "src" / "main").mkdir(parents=True)
     (root / "configs").mkdir()
@@ -128,13 +128,13 @@ DAMAGES: dict[str, tuple[str, Callable[[Path], object]]] = {
 
 
 @pytest.mark.parametrize(("what", "damage"), DAMAGES.values(), ids=DAMAGES.keys())
-def test_a_damaged_cache_is_made_again_with_one_line(
+def test_a_damaged_cache_is_rebuilt_with_one_line(
     what: str, damage: Callable[[Path], object], checkout: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     first = generator.design_for("tiny")
     manifest, digest = first.manifest, first.digest()
     damage(entry_of(first))
-    # The classes are asked for when something is generated
+    # The classes are checked when a design is generated
     wanted = ["array.rows=2"] if what == "generator" else []
     for _ in range(2):
         cache._verified.clear()
@@ -157,7 +157,7 @@ def test_an_interrupted_generator_leaves_nothing(checkout: Path, monkeypatch: py
     assert {path.name for path in state.iterdir() if path.suffix != ".lock"} <= before
 
 
-def test_the_digest_of_a_kept_design_is_that_of_a_copy(checkout: Path, tmp_path: Path) -> None:
+def test_a_cached_design_has_the_digest_of_its_copy(checkout: Path, tmp_path: Path) -> None:
     design = generator.design_for("tiny")
     assert cache.digests(entry_of(design)) is not None
     copy = generator.generate("tiny", [], tmp_path / "copy")
@@ -187,7 +187,7 @@ def test_compile_error_is_one_line_and_names_the_log(checkout: Path) -> None:
         generator.manifest_for("tiny")
 
 
-def test_refusal_of_the_generator_is_passed_on(checkout: Path) -> None:
+def test_an_error_of_the_generator_is_passed_on(checkout: Path) -> None:
     script(
         checkout / "jdk" / "bin" / "java",
         'if [ "$1" = -version ]; then echo \'java version "21"\' >&2; exit; fi\n'
@@ -245,7 +245,7 @@ def test_malformed_override_is_refused(checkout: Path) -> None:
         find_configuration("tiny", ["array.rows"], checkout)
 
 
-def test_checkout_is_found_or_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_checkout_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLONNADE_HOME", str(tmp_path))
     with pytest.raises(UserError, match="not a checkout"):
         toolchain.project_root()

@@ -1,4 +1,4 @@
-"""The emitted Verilog is clean under Verilator's strictest lint, but for the reasoned waivers of tools/lint.vlt."""
+"""The generated Verilog is clean under Verilator's strictest lint, with the waivers of tools/lint.vlt."""
 
 from __future__ import annotations
 

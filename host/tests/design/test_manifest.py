@@ -1,4 +1,4 @@
-"""Record layouts and registers: what is packed is what is read."""
+"""Record layouts and registers: packing and unpacking are inverse."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from colonnade.design.manifest import Field, Manifest, RecordLayout, Register, v
 
 @st.composite
 def layouts(draw: st.DrawFn) -> RecordLayout:
-    """A record of fields with gaps, in any order."""
+    """A random record layout with gaps, fields in any order."""
     fields, offset = {}, draw(st.integers(0, 40))
     for i in range(draw(st.integers(1, 12))):
         width = draw(st.integers(1, 62))
@@ -65,7 +65,7 @@ def test_a_manifest_is_read_from_its_file(tmp_path: Path, manifest: Manifest, ma
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"version": 1}', '{"version": 99}'])
-def test_what_is_no_manifest_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+def test_an_invalid_manifest_is_one_line(tmp_path: Path, text: str) -> None:
     file = tmp_path / "manifest.json"
     file.write_text(text)
     with pytest.raises(UserError, match="generate"):

@@ -1,4 +1,4 @@
-"""The compiler and Verilator: flags of the user's that must not matter, wrong compilers, old versions."""
+"""The compiler and Verilator: ignored flags of the user, miscompilation, old versions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is 
 
 
 def program(folder: Path, name: str, text: str) -> Path:
-    """A shell script on its own."""
+    """An executable shell script."""
     path = folder / name
     path.write_text(f"#!/bin/sh\n{text}\n")
     path.chmod(0o755)
@@ -38,7 +38,7 @@ def test_the_compiler_is_right_with_the_flags_of_simulators(level: str) -> None:
 
 @needs_compiler
 def test_a_compiler_with_the_bug_is_refused() -> None:
-    """g++ 12.2 without the flag that switches the bug off."""
+    """g++ 12.2 without the flag that avoids the bug."""
     compiler, version = require_compiler("a test")
     if re.search(r" 12\.2\.\d+$", version) is None:
         pytest.skip(f"only g++ 12.2 is known to have the bug: {version}")
@@ -59,7 +59,7 @@ def test_a_compiler_that_fails_is_refused_with_its_first_line(tmp_path: Path) ->
         require_right_compiler(fails, ())
 
 
-def test_flags_of_the_environment_do_not_reach_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_compiler_ignores_flags_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     names = (
         "CFLAGS CXXFLAGS CPPFLAGS LDFLAGS MAKEFLAGS MFLAGS GNUMAKEFLAGS OPT OPT_FAST CXX CPATH OBJCACHE USER_CPPFLAGS"
     )
@@ -78,7 +78,7 @@ def test_an_old_verilator_is_refused(version: str, tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.parametrize("version", ["Verilator 5.006 2023-01-22 rev (Debian 5.006-3)", "Verilator 5.048 2026-04-26"])
-def test_a_newer_verilator_is_taken(version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_newer_verilator_is_accepted(version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program(tmp_path, "verilator", f"echo '{version}'")
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
     assert require_verilator("rendering") == (tmp_path / "verilator", version)

@@ -1,4 +1,4 @@
-"""The model's geometry against exact integers: no ray slips through an edge, no box hides what a ray can meet."""
+"""The model's geometry against exact integers: watertight edges and conservative boxes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def loaded_model(mesh: str, precision: str, *overrides: str) -> tuple[Any, Any, 
 
 
 def grid_vertices(image: Any, manifest: Manifest) -> Integers:
-    """Corners of all packed triangles, int64 [n, 3, 3], as the hardware rounds them to the grid."""
+    """Corners of all packed triangles on the hardware's grid, int64 [n, 3, 3]."""
     header, per_record = image.header, manifest.config["geometry"]["trianglesPerRecord"]
     fields = manifest.layouts["triangles"].unpack(image.records[header.triangle_base : header.attribute_base])
 
@@ -44,7 +44,7 @@ def grid_vertices(image: Any, manifest: Manifest) -> Integers:
 
 
 def inner_points(corners: Integers, count: int, random: np.random.Generator) -> Integers:
-    """Grid points a little inside a closed mesh, below random triangles, int64 [count, 3]."""
+    """Grid points slightly inside a closed mesh, below random triangles, int64 [count, 3]."""
     triangles = corners[random.integers(len(corners), size=count)].astype(np.float64)
     outward = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -54,7 +54,7 @@ def inner_points(corners: Integers, count: int, random: np.random.Generator) -> 
 
 
 def points_on_edges(corners: Integers, count: int, random: np.random.Generator) -> Integers:
-    """Vertices, and points exactly on edges where the edge has grid points at quarters, int64 [count, 3]."""
+    """Vertices, and grid points exactly at quarters of edges, int64 [count, 3]."""
     triangles = corners[random.integers(len(corners), size=count)]
     quarters = (triangles[:, 1] - triangles[:, 0]) * random.integers(0, 5, size=(count, 1))
     return triangles[:, 0] + np.where((quarters % 4 == 0).all(axis=1, keepdims=True), quarters // 4, 0)
@@ -63,7 +63,7 @@ def points_on_edges(corners: Integers, count: int, random: np.random.Generator) 
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("mesh", ("sphere:4", "torus"))
 def test_no_ray_from_inside_slips_through_an_edge_or_a_vertex(mesh: str, precision: str) -> None:
-    """100,000 rays in all, from inside a closed mesh, aimed exactly at its vertices and edges."""
+    """In total 100,000 rays from inside closed meshes, aimed exactly at vertices and edges."""
     model, image, manifest = loaded_model(mesh, precision)
     random = np.random.default_rng(len(mesh))
     corners = grid_vertices(image, manifest)
@@ -73,10 +73,10 @@ def test_no_ray_from_inside_slips_through_an_edge_or_a_vertex(mesh: str, precisi
 
 
 def wrongly_culled(count: int, precision: str, seed: int) -> tuple[int, int]:
-    """Random rays against random boxes (flat ones, axis-parallel rays and origins on slabs among them).
+    """Random rays against random boxes, including flat boxes, axis-parallel rays and origins on slabs.
 
     Returns:
-        Boxes that a set-up ray meets in exact integers but the box test culls, and all that it meets.
+        Number of boxes that rays hit in exact arithmetic but the box test culls, and number of all boxes hit.
     """
     model, _, manifest = loaded_model("cube", precision)
     numbers = manifest.numbers
@@ -91,7 +91,7 @@ def wrongly_culled(count: int, precision: str, seed: int) -> tuple[int, int]:
     while (too_wide := (-(-extent >> exponents) > (1 << box_bits) - 1)).any():
         exponents += too_wide
     high = -(-extent >> exponents)
-    # Rays aimed at points in or near their box, from near and far; some parallel to an axis, some starting on a plane
+    # Rays aim at points in or near their box from various distances; some are parallel to an axis or start on a plane
     target = (
         low
         + random.integers(-1, 2, size=(count, 3)) * (extent // 8)
@@ -113,14 +113,14 @@ def wrongly_culled(count: int, precision: str, seed: int) -> tuple[int, int]:
 
 
 def meets(result: dict[str, Any], i: int, planes: tuple[Integers, Integers], numbers: dict[str, int]) -> bool:
-    """Whether the set-up ray O + t·S, t ≥ 0, meets the box in exact arithmetic (rationals as integer pairs)."""
+    """Whether the prepared ray O + t·S, t ≥ 0, hits the box in exact arithmetic (rationals as integer pairs)."""
     axis, *negative = (int(v) for v in result["heading"][i])
     order = [(axis + 1) % 3, (axis + 2) % 3, axis]
     fraction, one = numbers["gridFraction"], 1 << numbers["shearFraction"]
     slopes = [int(result["shear"][i][0]), int(result["shear"][i][1]), -one if negative[2] else one]
     first, last = (0, 1), None
     for a in range(3):
-        # In steps of the grid, or of a unit where that is finer
+        # In grid steps, or in units if they are finer
         scale, origin = 1 << max(0, fraction), int(result["origin"][i][a]) << max(0, -fraction)
         low, high = int(planes[0][i][order[a]]) * scale - origin, int(planes[1][i][order[a]]) * scale - origin
         slope = slopes[a]
@@ -138,14 +138,14 @@ def meets(result: dict[str, Any], i: int, planes: tuple[Integers, Integers], num
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_no_box_that_a_ray_meets_is_culled(precision: str) -> None:
+def test_no_box_that_a_ray_hits_is_culled(precision: str) -> None:
     culled, met = wrongly_culled(20_000, precision, seed=1)
     assert culled == 0
     assert met > 2_000
 
 
 @pytest.mark.matrix
-def test_a_million_boxes_and_none_culled_wrongly() -> None:
+def test_no_box_of_a_million_is_wrongly_culled() -> None:
     culled, met = wrongly_culled(1_000_000, "32b32s64d", seed=2)
     assert culled == 0
     assert met > 100_000

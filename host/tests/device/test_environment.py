@@ -1,4 +1,4 @@
-"""Frames in a room: the emitted Verilog against the model, bit for bit, and where the room is rendered."""
+"""Frames in a room: the RTL against the model, bit for bit, and the shadow window."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
 @NEEDS_SIMULATOR
 @pytest.mark.parametrize("kind", ["diffuse", "mirror", "glass"])
 def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
-    """All of the room, and only where the object takes its light; both lights, one, and no bounce; a stalled sink."""
+    """The relit room and the shadow window; two lights, one light, no bounces; a stalled sink."""
     design = design_for("small", ())
     held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
     mesh = load_mesh("teapot:4")
@@ -48,7 +48,7 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
     registers: list[dict[str, int]] = [
         frame_registers(view, image.header, design.manifest, 80, 60, held, relit) for view, relit in views
     ]
-    # Far off the surface it shows on which side of it a ray starts
+    # A large offset shows on which side of the surface a ray starts
     registers.append(registers[1] | {"shading.offset": 64 * registers[1]["shading.offset"]})
     simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
     for frame, settings in zip(simulated.frames, registers, strict=True):
@@ -65,7 +65,7 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
 
 
 @pytest.mark.parametrize("light", [TABLE.light, Light((1.2, 2.0, 2.0)), Light((0.1, 0.9, 2.4))])
-def test_the_object_takes_light_within_the_window_only(light: Light) -> None:
+def test_shadows_lie_within_the_shadow_window(light: Light) -> None:
     manifest = manifest_for("small").manifest
     held = EncodedEnvironment.load(ROOMS / "living", manifest)
     image = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest)

@@ -1,4 +1,4 @@
-"""A room in the model: the frame is the reference's, but for what clustering and rebuild lose."""
+"""Frames in a room: the model is close to the reference, within the loss of encoding and reconstruction."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def test_a_frame_in_a_room_is_near_the_reference(scene: Path) -> None:
     model = render(RenderRequest(scene, "small", (), "model", (320, 240), relit=True))
     reference = render(RenderRequest(scene, "small", (), "reference", (320, 240)))
     np.testing.assert_array_equal(model.object_mask, reference.object_mask)
-    # Clustering alone costs the living room's picture to 30 dB
+    # Encoding alone limits the picture of the living room to 30 dB
     assert psnr(encode_srgb(reference.image), encode_srgb(model.image)) > 24
     assert model.report.bytes is not None
     assert model.report.bytes["albedo"] == model.report.bytes["normals"] == 16384
 
 
-def test_the_photo_is_kept_but_for_object_and_shadow(scene: Path) -> None:
+def test_the_photo_changes_only_at_object_and_shadow(scene: Path) -> None:
     photo = load_environment(ROOMS / "living").photo
     assert photo is not None
     result = render(RenderRequest(scene, "small", (), "model", (640, 480)))
@@ -64,6 +64,6 @@ def test_the_photo_is_kept_but_for_object_and_shadow(scene: Path) -> None:
     assert (after[shadow] <= before[shadow] + 1e-9).all(), "an object only takes light"
 
 
-def test_hardware_without_a_memory_for_rooms_refuses_one(scene: Path) -> None:
+def test_a_design_without_attribute_memory_rejects_rooms(scene: Path) -> None:
     with pytest.raises(UserError, match="set physicalAttributeMemory, as in the preset small"):
         render(RenderRequest(scene, "tiny", (), "model", None))

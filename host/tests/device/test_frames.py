@@ -1,4 +1,4 @@
-"""Whole frames: the emitted Verilog under Verilator against the model, bit for bit."""
+"""Whole frames: the RTL under Verilator against the model, bit for bit."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def assert_equal(rtl: Frame, model: Frame) -> None:
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
 def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str, ...], str, Stalls]) -> None:
-    """Three frames in a row, the scene loaded once: smooth, flat from another side, and from inside the object."""
+    """Three frames of a scene that is loaded once: smooth, flat from another side, and from inside the object."""
     _, config, overrides, mesh, stalls = case
     design = design_for(config, overrides)
     image = pack(load_mesh(mesh), design.manifest)
@@ -69,8 +69,8 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
 
 
 @pytest.mark.parametrize("mesh", ["teapot:4", "torus"])
-def test_records_loaded_past_the_port_are_those_that_the_port_loads(mesh: str) -> None:
-    """In every counter, cycles among them: what runs freely in the hardware stands as after the load."""
+def test_direct_loads_equal_loads_through_the_port(mesh: str) -> None:
+    """All counters, including cycles: free-running counters of the hardware have the same state after both loads."""
     design = design_for("tiny")
     image = pack(load_mesh(mesh), design.manifest)
     registers = frame_registers(replace(TEAPOT, mesh=MeshSource(name=mesh)), image.header, design.manifest, 24, 17)
@@ -83,7 +83,7 @@ def test_records_loaded_past_the_port_are_those_that_the_port_loads(mesh: str) -
         assert past.counters == through.counters
 
 
-#: Name, configuration, what the surface is made of, lights.
+#: Name, configuration, material, lights.
 SHINY = [
     ("mirror", "small", Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), (Light(),)),
     ("glass", "small", Material(kind="glass", albedo=(0.9, 1.0, 0.95), ior=1.45), (Light(),)),
@@ -93,7 +93,7 @@ SHINY = [
 
 
 @pytest.mark.parametrize("case", SHINY, ids=lambda case: case[0])
-def test_mirrors_glass_and_lights_are_the_models(case: tuple[str, str, Material, tuple[Light, ...]]) -> None:
+def test_mirrors_glass_and_lights_equal_the_model(case: tuple[str, str, Material, tuple[Light, ...]]) -> None:
     _, config, material, lights = case
     design = design_for(config, ())
     mesh = load_mesh("teapot:4")
@@ -113,7 +113,7 @@ def test_mirrors_glass_and_lights_are_the_models(case: tuple[str, str, Material,
 
 @pytest.fixture(scope="module")
 def holdable() -> GeneratedDesign:
-    """Three units share two banks that can be held."""
+    """Three units with two banks that can be stalled."""
     return design_for("tiny", ("array.rows=3", "columnBvhMemory.holdable=true"))
 
 
@@ -127,8 +127,8 @@ def holdable() -> GeneratedDesign:
     ],
     ids=str,
 )
-def test_random_memory_latency_changes_nothing_but_time(holdable: GeneratedDesign, stalls: Stalls) -> None:
-    """Banks that wait when they like, beside a sink that does: the frames are the model's, and take longer."""
+def test_random_memory_latency_changes_only_time(holdable: GeneratedDesign, stalls: Stalls) -> None:
+    """With random stalls of banks and sink, frames equal the model's and take longer."""
     image = pack(load_mesh("teapot:3"), holdable.manifest)
     flat = replace(TEAPOT, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True))
     registers: list[Mapping[str, int]] = [
@@ -143,7 +143,7 @@ def test_random_memory_latency_changes_nothing_but_time(holdable: GeneratedDesig
 
 @pytest.mark.parametrize("stalls", [Stalls(), Stalls(percent=40, memory_percent=60, seed=2)], ids=str)
 def test_counters_account_for_every_cycle_and_record(holdable: GeneratedDesign, stalls: Stalls) -> None:
-    """Contexts are in one place at a time, units are busy no longer than a frame, and records are taken for a cause."""
+    """Each context is in one state, units are busy at most all cycles, and each record taken has a reason."""
     image = pack(load_mesh("teapot:3"), holdable.manifest)
     settings = frame_registers(TEAPOT, image.header, holdable.manifest, 40, 30)
     frame = render_rtl(holdable, image, [settings], stalls).frames[0]
@@ -155,8 +155,8 @@ def test_counters_account_for_every_cycle_and_record(holdable: GeneratedDesign, 
     assert triangle_records <= counters["triangleTests"] <= 2 * triangle_records
 
 
-def test_memory_that_cannot_be_held_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Refused before anything is built."""
+def test_stalls_of_a_memory_without_stall_input_are_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rejected before the build."""
     monkeypatch.setattr(
         "colonnade.device.verilator.build_simulator", lambda *_, **__: pytest.fail("a simulator is built")
     )
@@ -173,7 +173,7 @@ def test_stalls_that_never_end_are_refused(stalls: dict[str, int]) -> None:
 
 
 def test_single_rays_through_the_hardware_slip_through_no_edge() -> None:
-    """Frames of one pixel whose ray goes from inside a closed mesh exactly to a vertex."""
+    """Frames of one pixel with a ray from inside a closed mesh exactly to a vertex."""
     design = design_for("tiny")
     numbers = design.manifest.numbers
     image = pack(load_mesh("sphere:2"), design.manifest)
@@ -197,7 +197,7 @@ def test_single_rays_through_the_hardware_slip_through_no_edge() -> None:
 
 
 def test_a_distant_camera_sees_the_object() -> None:
-    """A ray's limit is not used up by the way to the object."""
+    """The range of t suffices for a distant object."""
     manifest = manifest_for("tiny").manifest
     image = pack(load_mesh("sphere:3"), manifest)
     for distance in (5.0, 60.0):
@@ -210,7 +210,7 @@ def test_a_distant_camera_sees_the_object() -> None:
 
 
 def nodes_of(manifest: Manifest, pointers: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
-    """Nodes whose boxes are the cube: of each, its firstChild and how many children of kind node it has."""
+    """Nodes with the cube as box, from their firstChild and their number of child nodes."""
     layout = manifest.layouts["node"]
     fields = {name: np.zeros(len(pointers), dtype=np.int64) for name in layout.fields}
     fields["firstChild"][:] = [first for first, _ in pointers]
@@ -232,8 +232,8 @@ def nodes_of(manifest: Manifest, pointers: Sequence[tuple[int, int]]) -> npt.NDA
     ],
     ids=["a root that is its own child", "cycles below the root", "children shared by all nodes"],
 )
-def test_a_walk_without_an_end_is_an_error(pointers: list[tuple[int, int]], errors: list[str]) -> None:
-    """A cycle ends at the first node that is not below its parent. Shared children make no cycle, but many ways."""
+def test_an_endless_traversal_is_an_error(pointers: list[tuple[int, int]], errors: list[str]) -> None:
+    """A node at or before its parent is an error, which ends cycles. Shared children make many paths and no cycle."""
     design = design_for("tiny")
     image = pack(load_mesh("cube"), design.manifest)
     registers = frame_registers(replace(TEAPOT, mesh=MeshSource(name="cube")), image.header, design.manifest, 16, 16)

@@ -1,4 +1,4 @@
-"""The cache of simulators: what its keys hold, and that no wrong simulator stays in it."""
+"""The cache of simulators: its keys, and the removal of wrong simulators."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from colonnade.device.simulator_build import PROGRAM, Tools, build_simulator
 
 @dataclass
 class Notes(Progress):
-    """Collects what is said."""
+    """Collects notes."""
 
     said: list[str] = field(default_factory=list)
 
@@ -35,7 +35,7 @@ class Notes(Progress):
 
 @dataclass
 class Builder:
-    """Stands for Verilator: writes a program that says how often one was built."""
+    """Replaces Verilator: writes a program that prints the number of builds."""
 
     tools: Tools
     builds: int = 0
@@ -51,7 +51,7 @@ class Builder:
 
 @dataclass(frozen=True)
 class Design:
-    """Stands for generated Verilog."""
+    """Replaces generated Verilog."""
 
     text: str = "module Colonnade;"
 
@@ -70,7 +70,7 @@ def builder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Builder:
 
 
 def forget() -> None:
-    """As a new process: nothing is known to be intact."""
+    """Forget verified entries, as a new process does."""
     cache._verified.clear()
 
 
@@ -91,7 +91,7 @@ def test_design_and_versions_are_in_the_key(builder: Builder) -> None:
 
 
 @pytest.mark.parametrize("poison", ["other", "cut", "gone", "unsealed"])
-def test_a_poisoned_simulator_does_not_survive(builder: Builder, poison: str) -> None:
+def test_a_wrong_simulator_is_removed_from_the_cache(builder: Builder, poison: str) -> None:
     program = build_simulator(Design())  # type: ignore[arg-type]
     match poison:
         case "other":
@@ -121,7 +121,7 @@ def test_a_failed_build_leaves_nothing_but_its_log(builder: Builder, tmp_path: P
 
 
 @pytest.mark.parametrize("name", ["a b", "it's", "x;y", "a`b`", "c#d", "e:f", 'g"h', "i\\j", "k$l"])
-def test_a_place_that_make_cannot_work_in_is_refused(
+def test_a_path_that_make_does_not_accept_is_rejected(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / name

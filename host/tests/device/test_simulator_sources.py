@@ -1,4 +1,4 @@
-"""The coupling of a simulator's models: Verilog as firtool writes it, taken apart."""
+"""The coupling of a simulator's models: parsing and rewriting of firtool's Verilog."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_an_unknown_port_is_an_error() -> None:
         module_ports("module RenderUnit(\n  inout x\n);\n", "RenderUnit")
 
 
-def test_registers_take_both_edges_of_any_clock() -> None:
+def test_registers_use_both_edges_of_any_clock() -> None:
     text = both_edges("  always @(posedge clock) begin\n  end // always @(posedge)\n  always @(posedge RW0_clk)\n")
     assert text == "  always @(edge clock) begin\n  end // always @(posedge)\n  always @(edge RW0_clk)\n"
 
@@ -99,7 +99,7 @@ def test_the_units_model_registers_all_but_the_direct_inputs() -> None:
     assert "    .io_requests_ready(io_requests_ready)" in text
 
 
-def test_variables_stand_for_the_ports_of_instances_that_are_taken_out() -> None:
+def test_variables_replace_the_ports_of_removed_instances() -> None:
     opened = open_module(COLUMN, "Column", "RenderUnit", module_ports(UNIT, "RenderUnit"))
     assert opened.count == 2
     assert "RenderUnit RenderUnit" not in opened.verilog
@@ -123,7 +123,7 @@ def test_the_harness_gets_every_connected_port() -> None:
     assert "io_unused" not in header
 
 
-def test_each_model_gets_the_modules_it_holds(tmp_path: Path) -> None:
+def test_each_model_gets_its_modules(tmp_path: Path) -> None:
     top = "  Column columns_0 (\n    .clock (clock)\n  );\n"
     files = {
         "RenderUnit": UNIT,

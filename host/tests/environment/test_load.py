@@ -1,4 +1,4 @@
-"""Rooms: both that come along are read as they are; what a camera may deliver is mended, or refused in one line."""
+"""Loading rooms: the project's rooms are read exactly; flaws of captured rooms are repaired or rejected in one line."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def camera_directions() -> NDArray[np.float64]:
 
 
 def corner() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Depth and view-space normals of a floor 1.2 m below a level camera and a wall 3 m before it."""
+    """Depth and view-space normals of a floor 1.2 m below a level camera and a wall 3 m in front of it."""
     y = camera_directions()[..., 1]
     floor = y > 1.2 / 3
     depth = np.where(floor, 1.2 / np.where(floor, y, 1), 3.0)
@@ -43,7 +43,7 @@ def coded(normals: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 @pytest.fixture
 def environment(tmp_path: Path) -> Path:
-    """A folder with a small room: the corner in plain grey, and no photo."""
+    """The folder of a small room: the corner in grey, without a photo."""
     folder = tmp_path / "corner"
     folder.mkdir()
     depth, normals = corner()
@@ -63,11 +63,11 @@ def change_meta(environment: Path, **values: object) -> None:
 
 
 @pytest.mark.parametrize(("name", "ceiling"), [("living", 2.7), ("office", 2.6)])
-def test_the_rooms_that_come_along(name: str, ceiling: float) -> None:
+def test_the_rooms_of_the_project(name: str, ceiling: float) -> None:
     environment = load_environment(ROOMS / name)
     assert (environment.width, environment.height, environment.has_depth, environment.notes) == (640, 480, True, ())
     assert environment.photo is not None and environment.photo.shape == (480, 640, 3)
-    # The pose, the depth and the sign of each axis: right is right, floor and ceiling lie level in the world
+    # Pose, depth and the sign of each axis: floor and ceiling are level in the world
     assert np.linalg.det(environment.camera_to_world[:, :3]) > 0.999
     assert environment.camera_to_world[0, 0] > 0.98
     world = environment.points() @ environment.camera_to_world[:, :3].T + environment.camera_to_world[:, 3]
@@ -138,7 +138,7 @@ def test_holes_take_their_neighbours_depth(environment: Path) -> None:
     assert np.allclose(loaded.depth, corner()[0])
 
 
-def test_a_few_bad_normals_are_mended(environment: Path) -> None:
+def test_a_few_bad_normals_are_repaired(environment: Path) -> None:
     _, normals = corner()
     normals[3, 4:9] = 0
     normals[20] *= 1.05
@@ -201,15 +201,15 @@ TILTED = np.array([[-1, 0, 0, 0], [0, 2, 0, 1], [0, 0, -1, 0]])
         (np.zeros((48, 64), np.uint16), "3,072 of 3,072 pixels have no depth"),
     ],
 )
-def test_depth_pictures_that_say_nothing(environment: Path, picture: NDArray[np.generic], message: str) -> None:
+def test_uniform_depth_pictures_are_rejected(environment: Path, picture: NDArray[np.generic], message: str) -> None:
     (environment / "depth.npy").unlink()
     Image.fromarray(picture).save(environment / "depth.png")
     with pytest.raises(UserError, match=message):
         load_environment(environment)
 
 
-def test_real_numbers_are_no_samples(environment: Path) -> None:
-    """A picture of floats, which says nothing of what white is."""
+def test_float_pictures_are_rejected(environment: Path) -> None:
+    """A float picture does not define white."""
     Image.fromarray(np.full((48, 64), 0.4, np.float32)).save(environment / "albedo.png", format="TIFF")
     with pytest.raises(UserError, match=r"albedo\.png is not a readable picture: give a PNG"):
         load_environment(environment)
@@ -248,7 +248,7 @@ def test_refusals(environment: Path, damage: Callable[[Path], None], message: st
         load_environment(environment)
 
 
-def test_a_colour_picture_is_no_depth(environment: Path) -> None:
+def test_a_colour_picture_is_not_depth(environment: Path) -> None:
     (environment / "depth.npy").unlink()
     Image.fromarray(np.random.default_rng(1).integers(0, 255, (48, 64, 3), dtype=np.uint8)).save(
         environment / "depth.png"
@@ -257,7 +257,7 @@ def test_a_colour_picture_is_no_depth(environment: Path) -> None:
         load_environment(environment)
 
 
-def test_inspect_shows_what_clustering_costs(environment: Path, tmp_path: Path) -> None:
+def test_inspect_shows_the_loss_of_encoding(environment: Path, tmp_path: Path) -> None:
     output, report = tmp_path / "maps", tmp_path / "report.json"
     arguments = [
         "inspect",

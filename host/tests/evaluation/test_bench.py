@@ -1,4 +1,4 @@
-"""What `colonnade bench` makes of the reports of its frames."""
+"""The benchmark's figures from the reports of its frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from colonnade.report.stages import plot_stages
 MakeReport = Callable[[float], dict[str, Any]]
 
 
-def test_utilisation_is_a_share_of_all_of_a_kind(rtl_report: MakeReport) -> None:
+def test_utilisation_is_averaged_over_instances(rtl_report: MakeReport) -> None:
     figures = throughput.figures(rtl_report(0.5))
     assert figures["utilisation"] == pytest.approx(
         {
@@ -53,19 +53,19 @@ def test_records_are_own_reads_and_snoop_hits(rtl_report: MakeReport) -> None:
     )
 
 
-def test_bounds_let_the_busiest_be_busy_all_the_time(rtl_report: MakeReport) -> None:
+def test_bounds_assume_full_utilisation_of_the_busiest(rtl_report: MakeReport) -> None:
     assert throughput.figures(rtl_report(0.5))["bounds"] == pytest.approx(
         {"perfect_memory": 0.625, "perfect_units": 1.0}
     )
 
 
-def test_limits_are_of_each_alone(rtl_report: MakeReport) -> None:
+def test_limits_assume_full_utilisation_of_each(rtl_report: MakeReport) -> None:
     limits = throughput.figures(rtl_report(0.5))["limits"]
     assert limits["shader"] == pytest.approx(50.0)
     assert min(limits.values()) == limits["box unit"] == pytest.approx(0.625)
 
 
-def test_a_frame_without_rays_to_the_object_has_no_bounds_of_units(rtl_report: MakeReport) -> None:
+def test_a_frame_without_in_box_rays_has_no_unit_bounds(rtl_report: MakeReport) -> None:
     empty = rtl_report(0.0) | {
         "counters": dict.fromkeys(rtl_report(0.0)["counters"], 0) | {"raysPrimary": 300, "idleContexts": 2400}
     }
@@ -83,7 +83,7 @@ def test_geometric_mean() -> None:
 
 @pytest.fixture
 def whole(monkeypatch: pytest.MonkeyPatch, rtl_report: MakeReport) -> dict[str, Any]:
-    """A report over two meshes, named one of them twice."""
+    """A report over two meshes, one of them given twice."""
     in_box = {"cube": 1.0, "torus": 4.0}
 
     def measure(runs: Sequence[Run], *_: object) -> Iterator[dict[str, Any]]:

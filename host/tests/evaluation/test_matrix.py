@@ -1,4 +1,4 @@
-"""The full matrix (`make verify`): one picture, whatever the shape of the array, and hardware equal to its model."""
+"""The full matrix (`make verify`): the array shape does not change a picture, and the RTL equals its model."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.matrix
 SIZE = (96, 72)
 MESHES = ("teapot:3", "torus", "cube", "sphere:3")
 
-#: Overrides that may change the speed of a frame, never a bit of it.
+#: Overrides that may change the cycles of a frame but not its content.
 SHAPES = {
     "1 unit, 1 context": ("array.rows=1", "array.columns=1", "array.contexts=1"),
     "1 row, 3 columns": ("array.rows=1", "array.columns=3"),
@@ -42,7 +42,7 @@ SHAPES = {
     "no tree": ("geometry.bvh=false",),
 }
 
-#: Overrides that change the picture; hardware and model must still agree on every bit.
+#: Overrides that change the picture; RTL and model must still be equal.
 PRECISIONS = ("16b16s16d", "16b32s64d", "24b24s32d", "32b16s16d", "64b64s64d", "17b19s23d")
 
 
@@ -67,7 +67,7 @@ def test_every_shape_renders_the_same_frame(shape: str, mesh: str) -> None:
 @pytest.mark.parametrize("snooping", ("false", "true"))
 @pytest.mark.parametrize("contexts", (1, 4, 8, 12))
 def test_random_memory_latency_changes_no_frame(contexts: int, snooping: str, banks: int) -> None:
-    """Five seeds of banks and a sink that wait at random, on every kind of column memory controller."""
+    """Five seeds of random stalls of banks and sink, on all kinds of column memory controllers."""
     memory = (f"columnBvhMemory.{field}" for field in (f"snooping={snooping}", f"banks={banks}", "holdable=true"))
     design = design_for("tiny", ("array.rows=3", f"array.contexts={contexts}", *memory))
     image = pack(load_mesh("torus"), design.manifest)
@@ -99,7 +99,7 @@ def test_edge_array_equals_its_model(mesh: str) -> None:
 
 @pytest.mark.parametrize("mesh", BENCHMARK)
 def test_no_ray_visits_as_many_nodes_as_the_watchdog_allows(mesh: str) -> None:
-    """The model sets the error bit when a ray visits more nodes than the register says."""
+    """The model sets the error bit when a ray visits more nodes than the register allows."""
     manifest = manifest_for("edge").manifest
     scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh(mesh)
     image = pack(load_mesh(mesh), manifest)

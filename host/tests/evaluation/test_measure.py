@@ -1,4 +1,4 @@
-"""Frames that are measured: in order, and none twice where that is wanted."""
+"""Measurements: results in order, and cached results only with `reuse`."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ RUNS = [Run("tiny", (), "cube"), Run("tiny", (), "tetrahedron")]
 
 @pytest.fixture
 def conditions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Conditions:
-    """Small frames, two at a time, kept in a folder of this test."""
+    """Small frames, two in parallel, with a cache of their own."""
     monkeypatch.setattr(measuring, "cache_directory", lambda _: tmp_path)
     return Conditions(project_root() / "scenes" / "object.toml", (16, 12), jobs=2)
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
-def test_a_kept_run_is_taken_only_where_that_is_wanted(
+def test_a_cached_run_is_used_only_with_reuse(
     conditions: Conditions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = list(measure(RUNS, conditions))
@@ -58,7 +58,7 @@ def a_report(cycles: int) -> dict[str, Any]:
 
 @pytest.fixture
 def rendered(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Counts the frames that are rendered; none goes through a simulator."""
+    """Cycles of the rendered frames, without a simulator."""
     frames: list[int] = []
 
     def render(*_: object, **__: object) -> Simulated:
@@ -93,7 +93,7 @@ def other_registers(file: Path) -> dict[str, Any]:
     ],
     ids=["truncated", "cycles", "registers", "design", "plain"],
 )
-def test_an_altered_measurement_is_made_again(
+def test_an_altered_measurement_is_repeated(
     damage: Callable[[Path], object],
     conditions: Conditions,
     rendered: list[int],

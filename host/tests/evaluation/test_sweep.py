@@ -1,4 +1,4 @@
-"""What `colonnade sweep` measures, and in which order it says so."""
+"""The points of a sweep, their figures and their order."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def manifest_of(_: str, overrides: Sequence[str], *__: object) -> SimpleNamespac
 
 @pytest.fixture
 def runs(monkeypatch: pytest.MonkeyPatch, rtl_report: Callable[[float], dict[str, Any]]) -> list[Run]:
-    """The runs that were made; each reports as many in-box rays per cycle as the design has rows."""
+    """All runs; the in-box rays per cycle of each equal the rows of its design."""
     made: list[Run] = []
 
     def measure(runs: Sequence[Run], *_: object) -> Iterator[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Meshes: clean whatever the source, and bad ones refused with one line."""
+"""Loading meshes: cleaned geometry, and one line for bad files."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from colonnade.mesh.topology import subdivide
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
-def test_vertices_merge_by_position_and_bad_faces_go() -> None:
+def test_vertices_merge_by_position_and_bad_faces_are_removed() -> None:
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [2, 0, 0], [9, 9, 9], [-0.0, 0, 0]])
     faces = np.array([[0, 1, 4], [0, 1, 2], [3, 0, 1], [2, 3, 0], [2, 1, 6]], dtype=np.int32)
     mesh = clean_mesh(vertices, faces, "test")
-    # Without area, kept, twice, two vertices in one place, the other side of the second.
+    # No area, valid, duplicate, two coincident vertices, the back of the second face.
     assert mesh.source_faces.tolist() == [1]
     assert mesh.source_count == 5
     assert len(mesh.vertices) == 3
 
 
 def test_normals_are_weighted_by_angle() -> None:
-    """A cube's corner normals are its diagonals however its faces are cut."""
+    """A cube's corner normals are its diagonals for any triangulation of its faces."""
     mesh = load_mesh("cube")
     np.testing.assert_allclose(mesh.vertex_normals, mesh.vertices / np.sqrt(3), atol=1e-12)
 
@@ -93,7 +93,7 @@ def test_bad_files_are_refused_in_one_line(tmp_path: Path, file: str, content: b
     assert "\n" not in str(caught.value) and file in str(caught.value)
 
 
-def test_what_does_not_exist_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_mesh_is_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("COLONNADE_MESHES", raising=False)
     for name, message in (
         (str(tmp_path / "no.obj"), "does not exist"),

@@ -1,4 +1,4 @@
-"""Materials of mesh files: what is a mirror, what is glass, and which face has which."""
+"""Materials of mesh files: mirror and glass by file format, and the material of each face."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, from_mtl
 
 
-def test_gltf_says_what_a_surface_is() -> None:
+def test_gltf_materials() -> None:
     surface = {"baseColorFactor": [0.5, 0.25, 0.125, 1.0], "metallicFactor": 0.2}
     assert from_gltf({"pbrMetallicRoughness": surface}) == MeshMaterial("diffuse", (0.5, 0.25, 0.125))
     assert from_gltf({"pbrMetallicRoughness": surface | {"metallicFactor": 0.5}}).kind == "mirror"
-    assert from_gltf({"pbrMetallicRoughness": {}}).kind == "mirror"  # metallic unless it says otherwise
+    assert from_gltf({"pbrMetallicRoughness": {}}).kind == "mirror"  # glTF is metallic by default
     assert from_gltf({}).kind == "diffuse"
     textured = surface | {"metallicFactor": 1.0, "metallicRoughnessTexture": {"index": 0}}
     assert from_gltf({"pbrMetallicRoughness": textured}).kind == "diffuse"
@@ -28,7 +28,7 @@ def test_gltf_says_what_a_surface_is() -> None:
     )
 
 
-def test_mtl_says_what_a_surface_is() -> None:
+def test_mtl_materials() -> None:
     assert from_mtl({"kd": [0.1, 0.2, 0.3], "illum": ["2"]}) == MeshMaterial("diffuse", (0.1, 0.2, 0.3))
     assert from_mtl({"kd": [0.1, 0.2, 0.3], "pm": ["1.0"]}).kind == "mirror"
     assert from_mtl({"illum": ["3"]}) == MeshMaterial("mirror", PLAIN.albedo)
@@ -58,14 +58,14 @@ def test_an_obj_file_keeps_its_materials_apart(tmp_path: Path) -> None:
     faces = "usemtl red\nf 1 2 3\nf 1 1 2\nusemtl clear\nf 1 2 4\nf 2 3 4\n"
     (tmp_path / "m.obj").write_text(vertices + faces)
     mesh = load_mesh(tmp_path / "m.obj")
-    # The face without area is gone, and with it its material's place in the row.
+    # The face without area is removed, and with it its material.
     kinds = [mesh.materials[index] for index in mesh.face_materials]
     assert sorted(kinds, key=str) == sorted(
         [MeshMaterial("diffuse", (1.0, 0.0, 0.0))] + 2 * [MeshMaterial("glass", (0.0, 1.0, 1.0), 1.4)], key=str
     )
 
 
-def test_files_without_materials_are_plain(tmp_path: Path) -> None:
+def test_files_without_materials_have_the_default(tmp_path: Path) -> None:
     trimesh.creation.box().export(tmp_path / "b.stl")
     for mesh in (load_mesh(tmp_path / "b.stl"), load_mesh("cube")):
         assert mesh.materials == (PLAIN,) and not mesh.face_materials.any()

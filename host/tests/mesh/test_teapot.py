@@ -1,4 +1,4 @@
-"""Newell's teapot: as many triangles as it must have, closed up along its patches, normals outward."""
+"""Newell's teapot: number of triangles, watertight patches, outward normals."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ def test_the_default_is_the_benchmarks() -> None:
 
 
 def test_patches_meet_bit_for_bit() -> None:
-    """Edges with one face are only those where a part ends: lid, rim, and the ends of handle and spout."""
+    """Only the ends of parts have edges with one face: lid, rim, and the ends of handle and spout."""
     mesh = load_mesh("teapot")
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, count = np.unique(edges, axis=0, return_counts=True)
     assert count.max() == 2
-    # Circles of 40 edges: the rim's inner edge and the lid's. Loops of 20: two ends of the handle, two of the spout.
+    # Circles of 40 edges at rim and lid, loops of 20 edges at both ends of handle and spout.
     assert (count == 1).sum() == 2 * 40 + 4 * 20
 
 
 def test_its_normals_point_outward() -> None:
-    """Tested where it is plain: on the body, away from handle and spout."""
+    """Tested on the body, where the outward direction is obvious."""
     mesh = load_mesh("teapot")
     radius = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 2])
     body = (np.abs(radius - 2.0) < 0.05) & (np.abs(mesh.vertices[:, 2]) > 1.0)

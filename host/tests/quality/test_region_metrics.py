@@ -1,4 +1,4 @@
-"""Figures of parts of a picture: an error counts only where it is."""
+"""Metrics of regions: an error counts only in its region."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_the_shadow_is_background_that_is_darker(picture: np.ndarray) -> None:
     np.testing.assert_array_equal(np.argwhere(parts["shadow"]), [[1, 1], [1, 2], [1, 3]])
 
 
-def test_dists_sees_the_region_and_a_margin_alone(picture: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dists_uses_only_the_region_and_a_margin(picture: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[tuple[np.ndarray, np.ndarray]] = []
 
     def keep(reference: np.ndarray, test: np.ndarray) -> float:

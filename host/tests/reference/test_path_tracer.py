@@ -1,4 +1,4 @@
-"""Mirrors, glass, lights and rooms in the reference against what can be worked out by hand."""
+"""Mirrors, glass, lights and rooms in the reference, against hand calculations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LIGHT = PlacedLight(np.array([0.3, -0.4, 0.5]), np.array([0.6, 0.5, 0.4]))
 
 
 def wall(depth: float = 4.0) -> Environment:
-    """A wall across the view, each pixel in a colour of its own; view space is the world."""
+    """A wall across the view with a different colour per pixel; view space is world space."""
     width, height = SIZE
     y, x = np.mgrid[:height, :width]
     albedo = np.stack([x / width, y / height, 0.5 + 0 * x], axis=2)
@@ -33,7 +33,7 @@ def wall(depth: float = 4.0) -> Environment:
 
 
 def placed(environment: Environment | None, material: MeshMaterial, **changes: object) -> View:
-    """The room's camera; mesh space is view space, so y is down."""
+    """A view by the room's camera; mesh space is view space, so y points down."""
     width, height = SIZE
     view = View(
         width=width,
@@ -55,7 +55,7 @@ def placed(environment: Environment | None, material: MeshMaterial, **changes: o
 
 
 def quads(*corners: list[list[float]], materials: tuple[MeshMaterial, ...] = (MeshMaterial(),)) -> Mesh:
-    """Quads of four corners each; the first has the first material, and so on."""
+    """Quads with four corners each; the first one has the first material, and so on."""
     vertices = np.array(corners).reshape(-1, 3)
     faces = np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + 4 * k for k in range(len(corners))])
     index = np.minimum(np.repeat(np.arange(len(corners)), 2), len(materials) - 1).astype(np.uint8)
@@ -63,12 +63,12 @@ def quads(*corners: list[list[float]], materials: tuple[MeshMaterial, ...] = (Me
 
 
 def upright(x: float, y: float, z: float, half: float) -> list[list[float]]:
-    """A square across the view that faces the camera."""
+    """Corners of a square that faces the camera."""
     return [[x - half, y - half, z], [x - half, y + half, z], [x + half, y + half, z], [x + half, y - half, z]]
 
 
 def lying(y: float, half: float, near: float, far: float) -> list[list[float]]:
-    """A rectangle below the camera that faces up (towards −y)."""
+    """Corners of a rectangle below the camera that faces up (−y)."""
     return [[-half, y, near], [half, y, near], [half, y, far], [-half, y, far]]
 
 
@@ -88,7 +88,7 @@ def test_a_room_alone_is_its_maps_in_the_light() -> None:
     assert (frame.shadow_ratio == 1).all() and not frame.outside.any() and not frame.object_mask.any()
 
 
-def test_falloff_is_one_at_its_reach_and_four_at_most() -> None:
+def test_falloff_is_one_at_the_reference_distance_and_at_most_four() -> None:
     environment = wall()
     for reach, expected in ((3.5, 1.0), (7.0, 4.0), (1.75, 0.25), (70.0, 4.0)):
         light = PlacedLight(np.array([0.0, 0.0, 0.5]), LIGHT.colour, reach)
@@ -109,10 +109,10 @@ def test_lights_add_up() -> None:
 
 
 @pytest.mark.parametrize(("kinds", "share"), [(("diffuse",), 0.0), (("glass",), 0.4), (("glass", "mirror"), 0.0)])
-def test_a_shadow_falls_on_the_room_by_the_darkest_material_between(kinds: tuple[str, ...], share: float) -> None:
+def test_the_most_opaque_occluder_determines_the_shadow(kinds: tuple[str, ...], share: float) -> None:
     environment, material = wall(), MeshMaterial()
     materials = tuple(MeshMaterial(kind) for kind in kinds)
-    # Squares between light and wall, out of the camera's sight of pixel (24, 16).
+    # Squares between light and wall that do not occlude pixel (24, 16).
     mesh = quads(*(upright(0.21, -0.28, 1.5 + k / 10, 0.1) for k in range(len(kinds))), materials=materials)
     view = placed(environment, material, materials=materials, shadow_transmittance=0.4)
     frame = rendered(mesh, view, environment)
@@ -131,7 +131,7 @@ def test_a_mirror_on_the_floor_shows_the_wall_upside_down() -> None:
     environment = wall()
     mesh, view = quads(lying(0.5, 9.0, 1.0, 3.9)), placed(environment, MeshMaterial("mirror", (0.5, 1.0, 1.0)))
     frame, alone = rendered(mesh, view, environment), rendered(FAR_AWAY, view, environment)
-    # The ray of row y meets the floor at z = 0.5 / slope and the wall as far above it as it would be below.
+    # The ray of row y hits the floor at z = 0.5 / slope; the reflection hits the wall at the mirrored height.
     slope = (np.arange(SIZE[1]) + 0.5 - 16) / 40
     for row in np.flatnonzero(frame.object_mask[:, 24]):
         height = 0.5 - slope[row] * (4.0 - 0.5 / slope[row])
@@ -143,7 +143,7 @@ def test_a_mirror_on_the_floor_shows_the_wall_upside_down() -> None:
     assert frame.rays["reflection"] == frame.object_mask.sum() and frame.rays["refraction"] == 0
 
 
-def test_a_mirror_that_looks_out_of_the_view_is_marked() -> None:
+def test_reflections_that_leave_the_view_are_marked() -> None:
     environment = wall()
     frame = rendered(
         quads(upright(0.0, 0.0, 2.0, 0.3)), placed(environment, MeshMaterial("mirror", (1.0,) * 3)), environment
@@ -152,7 +152,7 @@ def test_a_mirror_that_looks_out_of_the_view_is_marked() -> None:
     np.testing.assert_allclose(frame.image[frame.object_mask], [[0.3, 0.2, 0.1]] * int(frame.object_mask.sum()))
 
 
-def test_bounding_planes_stand_in_where_the_maps_end() -> None:
+def test_the_bounding_surface_replaces_missing_maps() -> None:
     class Behind:
         def intersect(self, origins: np.ndarray, directions: np.ndarray) -> BackdropPoints:
             normals = np.broadcast_to([0.0, 0.0, 1.0], origins.shape)
@@ -168,8 +168,8 @@ def test_bounding_planes_stand_in_where_the_maps_end() -> None:
     np.testing.assert_allclose(frame.image[16, 24], [0.02, 0.14, 0.04])
 
 
-def test_glass_gives_and_takes_no_light() -> None:
-    """Under one colour all around, Schlick's part and what goes on add up to the tint of each entry."""
+def test_glass_conserves_energy() -> None:
+    """With a uniform background, reflection and refraction add up to the tint of each entry."""
     mesh, view = load_mesh("sphere:4"), placed(None, MeshMaterial("glass", (0.9, 0.8, 1.0)), bounces=6)
     mesh = replace(mesh, vertices=mesh.vertices * 0.5 + (0, 0, 3.0))
     frame = rendered(mesh, replace(view, flat=False))
@@ -179,7 +179,7 @@ def test_glass_gives_and_takes_no_light() -> None:
     assert frame.rays["refraction"] > frame.object_mask.sum()
 
 
-def test_glass_as_thin_as_air_is_not_there() -> None:
+def test_glass_with_index_one_is_invisible() -> None:
     environment = wall()
     view = placed(environment, MeshMaterial("glass", (1.0,) * 3, 1.0), shadows=False)
     frame, alone = (
@@ -191,7 +191,7 @@ def test_glass_as_thin_as_air_is_not_there() -> None:
 
 
 def test_bounces_end_at_the_background() -> None:
-    """Two parallel mirrors: as many reflections as are allowed, then the object is not there."""
+    """Two parallel mirrors: after the maximum number of reflections the object is ignored."""
     floor, ceiling = lying(0.5, 9.0, 0.5, 39.0), lying(-0.5, 9.0, 0.5, 39.0)
     for bounces in (0, 1, 3):
         view = placed(None, MeshMaterial("mirror", (0.5,) * 3), bounces=bounces)
@@ -201,7 +201,7 @@ def test_bounces_end_at_the_background() -> None:
         assert frame.rays["reflection"] <= bounces * frame.object_mask.sum()
 
 
-def test_the_camera_of_a_room_may_be_drawn_at_another_size() -> None:
+def test_a_room_may_be_rendered_at_another_size() -> None:
     made = attic(64, 48)
     backdrop = full_backdrop(made.environment)
     u, v = (np.mgrid[:48, :64][::-1] + 0.5).reshape(2, -1)
@@ -210,7 +210,7 @@ def test_the_camera_of_a_room_may_be_drawn_at_another_size() -> None:
     np.testing.assert_allclose(seen.albedo.reshape(48, 64, 3), made.environment.albedo)
 
 
-def test_the_depth_mesh_is_met_where_the_camera_sees_it_and_not_between_things() -> None:
+def test_the_depth_mesh_has_no_faces_across_discontinuities() -> None:
     environment = wall()
     depth = environment.depth.copy()
     depth[8:24, 10:30] = 2.0
@@ -220,11 +220,11 @@ def test_the_depth_mesh_is_met_where_the_camera_sees_it_and_not_between_things()
     whole = DepthMesh(stepped, split=False).intersect(np.zeros_like(inner), inner)
     assert not whole.outside.any() and not met.outside.all()
     np.testing.assert_allclose(met.position[~met.outside, 2], depth[1:-1, 1:-1].ravel()[~met.outside], rtol=1e-5)
-    # A ray between plate and wall, from the side: it passes through where a sheet would join them.
+    # A ray from the side passes between plate and wall, where triangles across the discontinuity would be.
     side, across = np.array([[-1.5, 0.0, 3.0]]), np.array([[1.0, 0.0, 0.02]])
     assert DepthMesh(stepped).intersect(side, across).outside.all()
     assert np.abs(DepthMesh(stepped, split=False).intersect(side, across).position[0, 2] - 3.0) < 0.1
-    # The plate from behind is nothing that the map knows.
+    # No map covers the back of the plate.
     assert DepthMesh(stepped).intersect(np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 0.0, -1.0]])).outside.all()
 
 

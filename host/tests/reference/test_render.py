@@ -1,4 +1,4 @@
-"""The reference renderer against what can be worked out by hand."""
+"""The reference renderer against hand calculations."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GREY = np.array([0.5, 0.5, 0.5])
 
 
 def looking_down(width: int = 24, height: int = 16, distance: float = 4.0) -> View:
-    """A camera on the z axis that looks at the origin, 2 by 2 mesh units wide there, its light beside it."""
+    """A camera on the z axis that sees 2 by 2 mesh units around the origin, with a light beside it."""
     step_x = np.array([2.0 / width / distance, 0.0, 0.0])
     step_y = np.array([0.0, -2.0 / height / distance, 0.0])
     centre = np.array([0.0, 0.0, -1.0])
@@ -39,7 +39,7 @@ def looking_down(width: int = 24, height: int = 16, distance: float = 4.0) -> Vi
 
 
 def square(z: float, edge: float, turned: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and faces of a square that faces +z, or -z when turned."""
+    """Vertices and faces of a square that faces +z, or -z if turned."""
     half = edge / 2
     corners = np.array([[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]])
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
@@ -54,7 +54,7 @@ def mesh_of(*parts: tuple[np.ndarray, np.ndarray]) -> Mesh:
 
 
 def slabs(view: View, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Where the rays of all pixels enter a box, float64 [height, width]; not a number where they miss."""
+    """Entry t of the rays of all pixels into a box, NaN for a miss, float64 [height, width]."""
     directions = primary_directions(view, slice(0, view.height))
     with np.errstate(divide="ignore"):
         planes = np.stack([(plane - view.origin) / directions for plane in (low, high)])
@@ -63,7 +63,7 @@ def slabs(view: View, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("position", [(3.0, 2.0, 4.0), (0.3, -5.0, 0.2), (200.0, 150.0, 300.0)])
-def test_a_cube_is_met_where_its_slabs_say(position: tuple[float, float, float]) -> None:
+def test_a_cube_is_hit_at_its_slabs(position: tuple[float, float, float]) -> None:
     mesh = load_mesh("cube")
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     origin, centre = np.array(position) + (low + high) / 2, (low + high) / 2
@@ -84,7 +84,7 @@ def test_a_cube_is_met_where_its_slabs_say(position: tuple[float, float, float])
     assert frame.rays["in_box"] >= np.count_nonzero(frame.object_mask)
 
 
-def test_a_lit_square_has_lamberts_colour() -> None:
+def test_a_lit_square_follows_lamberts_law() -> None:
     view = looking_down()
     frame = render_reference(mesh_of(square(0.0, 1.0)), view)
     assert set(np.unique(frame.hit_triangles)) == {-1, 0, 1}

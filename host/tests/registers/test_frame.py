@@ -1,4 +1,4 @@
-"""Placement: registers that fit, rays that are the float ones, and a rectangle that no ray of the object escapes."""
+"""Frame registers: values that fit, rays of the float camera, and a rectangle that contains the whole object."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def vector(registers: dict[str, int], name: str) -> np.ndarray[Any, Any]:
 
 
 def ray(registers: dict[str, int], x: float, y: float) -> np.ndarray[Any, Any]:
-    """The direction by the formula of docs/numbers.md."""
+    """The direction of a pixel's ray by the formula of docs/numbers.md."""
     first = vector(registers, "camera.direction") * 2.0 ** registers["camera.stepShift"]
     return first + x * vector(registers, "camera.stepX") + y * vector(registers, "camera.stepY")
 
@@ -87,7 +87,7 @@ def test_pixel_0_0_is_at_the_top_left(manifest: Manifest, image: SceneImage) -> 
 
 
 @pytest.mark.parametrize(("width", "height"), [(640, 480), (480, 480), (200, 600)])
-def test_a_framed_object_is_in_the_middle_and_as_high_as_asked(width: int, height: int) -> None:
+def test_a_framed_object_is_centred_with_the_requested_height(width: int, height: int) -> None:
     view = make_view(SCENE, TEAPOT.extent, width, height)
     basis = np.stack([view.step_x, view.step_y, view.direction], axis=1)
     x, y, depth = np.linalg.solve(basis, (TEAPOT.vertices - view.origin).T)
@@ -120,7 +120,7 @@ def test_no_vertex_is_seen_outside_rectangle_and_outline(
     fov: float,
     mac: int,
 ) -> None:
-    """From anywhere, within the object too: each vertex that projects into the frame does so into the rectangle."""
+    """For any camera, also inside the object: each vertex in the frame projects into the rectangle."""
     manifest = make_manifest(mac=mac)
     header = pack(TEAPOT, manifest).header
     if np.linalg.norm(np.subtract(position, target)) < 1e-3:
@@ -178,7 +178,7 @@ def test_a_camera_out_of_reach_is_refused(manifest: Manifest, image: SceneImage)
         frame_registers(far, image.header, manifest, 64, 48)
 
 
-def test_frames_that_cannot_be_are_refused(manifest: Manifest, image: SceneImage) -> None:
+def test_impossible_frame_sizes_are_rejected(manifest: Manifest, image: SceneImage) -> None:
     for size, message in (((0, 4), "no pixels"), ((4, -1), "no pixels"), ((1921, 4), "maxWidth"), ((4, 1081), "maxH")):
         with pytest.raises(UserError, match=message):
             frame_registers(SCENE, image.header, manifest, *size)
@@ -192,7 +192,7 @@ def test_looking_straight_down_works(manifest: Manifest, image: SceneImage) -> N
 
 
 def test_the_watchdog_outlasts_every_legal_frame_and_ends_in_minutes(make_manifest: MakeManifest) -> None:
-    """Every context may visit `TREE_VISITS` nodes for each of its rays; `small` simulates 60,000 cycles a second."""
+    """Each ray may visit `TREE_VISITS` nodes; `small` simulates 60,000 cycles per second."""
     manifest, mesh = make_manifest(), load_mesh("teapot")
     header = pack(mesh, manifest).header
     scene = Scene(MeshSource(name="teapot"))

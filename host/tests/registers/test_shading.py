@@ -1,4 +1,4 @@
-"""Lights, materials and paths in registers: what the scene says, and what the hardware has no room for."""
+"""Lights, materials and paths in registers: the values of a scene, and errors beyond the hardware's limits."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_every_writable_register_has_a_value_that_fits(make_manifest: Callable[.
         manifest.registers[name].encode(value)
 
 
-def test_glass_bends_by_its_index_and_back(make_manifest: Callable[..., Manifest]) -> None:
+def test_glass_has_inverse_indices_at_front_and_back(make_manifest: Callable[..., Manifest]) -> None:
     values = registers(make_manifest(), material=Material(kind="glass", ior=1.6))
     assert values["materials[0].kind"] == 2
     assert values["materials[0].etaFront"] == round(8192 / 1.6)
@@ -42,7 +42,7 @@ def test_glass_bends_by_its_index_and_back(make_manifest: Callable[..., Manifest
     assert values["materials[0].reflectance"] == round(4096 * (0.6 / 2.6) ** 2)
 
 
-def test_reach_is_a_squared_distance_in_grid_steps(make_manifest: Callable[..., Manifest]) -> None:
+def test_the_reference_distance_is_squared_in_grid_steps(make_manifest: Callable[..., Manifest]) -> None:
     manifest = make_manifest()
     mesh = load_mesh("cube")
     header = pack(mesh, manifest).header
@@ -90,7 +90,7 @@ def test_too_many_materials_are_refused(make_manifest: Callable[..., Manifest]) 
         registers_of(view, header, manifest)
 
 
-def test_only_glass_is_clear(make_manifest: Callable[..., Manifest]) -> None:
+def test_only_glass_is_transmissive(make_manifest: Callable[..., Manifest]) -> None:
     manifest = make_manifest()
     mesh = load_mesh("cube")
     layout = manifest.layouts["triangles"]

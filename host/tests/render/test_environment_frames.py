@@ -1,4 +1,4 @@
-"""A scene file with a room, from its folder to the reference's frame."""
+"""A scene in a room, from the room's folder to the reference's frame."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def scene(tmp_path: Path) -> Path:
     return tmp_path / "scene.toml"
 
 
-def test_the_attic_is_read_as_it_was_made(scene: Path) -> None:
+def test_the_attic_round_trips_through_its_folder(scene: Path) -> None:
     made, environment = attic(64, 48).environment, load_environment(scene.parent / "rooms" / "attic")
     np.testing.assert_allclose(environment.depth, made.depth, atol=2e-4)
     np.testing.assert_allclose(environment.camera_to_world, made.camera_to_world, atol=1e-12)
@@ -62,7 +62,7 @@ def test_the_reference_shows_object_and_room(scene: Path, make_manifest: Callabl
     assert 0.02 < bright.mean() < 0.9
 
 
-def test_what_is_wrong_with_a_room_is_one_line(scene: Path, make_manifest: Callable[..., Manifest]) -> None:
+def test_a_wrong_room_is_one_line(scene: Path, make_manifest: Callable[..., Manifest]) -> None:
     with pytest.raises(UserError, match="64x64 pixels does not have the proportions of room attic, 64x48"):
         list(reference_frames([load_scene(scene)], make_manifest(), (64, 64), QUIET))
     (scene.parent / "rooms" / "attic" / "normal.png").unlink()

@@ -1,4 +1,4 @@
-"""Frames of a motion: each is the single frame of its place, whatever the backend; files hold them all."""
+"""Frames of a motion: each equals the single frame of its pose on all backends; their output files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from colonnade.scene.parser import load_scene
 from colonnade.scene.view import make_view
 
 SIZE = (32, 24)
-#: Hardware with a memory for maps of this size.
+#: An attribute memory for maps of this size.
 MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
 ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
 
@@ -75,7 +75,7 @@ def in_environment(file: Path, backend: str, frames: int) -> list[RenderResult]:
 
 
 @pytest.mark.parametrize("backend", ["model", "reference"])
-def test_each_frame_is_the_single_frame_of_its_place(folder: Path, backend: str) -> None:
+def test_each_frame_equals_the_single_frame_of_its_pose(folder: Path, backend: str) -> None:
     motion = "[motion]\nturn = 60.0\nstand_at = [60, 45.5]\nlight = [-1.0, 2.0, 0.6]\n"
     frames = in_environment(scene_file(folder, standing(), motion), backend, 3)
     assert [frame.report.share for frame in frames] == [0.0, 0.5, 1.0]
@@ -112,7 +112,7 @@ def test_frames_are_evenly_spaced(frames: int, turn: float) -> None:
     assert len(shares) == frames and shares[0] == 0.0
     np.testing.assert_allclose(np.diff(shares), shares[1] if frames > 1 else 0.0, atol=1e-12)
     if frames > 1:
-        # What repeats leaves its end out: it is the beginning.
+        # A periodic motion omits its end, which equals its start.
         assert shares[-1] == (1.0 if turn == 90.0 else (frames - 1) / frames)
 
 
@@ -133,7 +133,7 @@ def test_a_turned_object_keeps_its_middle_and_its_vertical(
 
 
 def test_camera_and_lights_stay_where_they_are(folder: Path) -> None:
-    """A framed camera and a light beside the object do not follow it."""
+    """A framing camera and a light near the object do not follow its motion."""
     motion = "[motion]\ntranslate = [3.0, 0.0, 1.0]\nturn = 45.0\n"
     scene, mesh = load_scene(scene_file(folder, 'mesh.name = "teapot:2"\n', motion)), load_mesh("teapot:2")
     start, end = (make_view(scene.at(share), mesh.extent, *SIZE) for share in (0.0, 1.0))
@@ -156,7 +156,7 @@ def test_camera_and_lights_stay_where_they_are(folder: Path) -> None:
         (standing(), "[motion]\ntranslate = [1, 2, 3]\n", "give motion.stand_at"),
     ],
 )
-def test_what_cannot_move_so_is_one_line(folder: Path, text: str, motion: str, message: str) -> None:
+def test_an_invalid_motion_is_one_line(folder: Path, text: str, motion: str, message: str) -> None:
     file = scene_file(folder, text, motion)
     environment = load_environment(folder / "rooms" / "attic") if "background.room" in text else None
     with pytest.raises(UserError, match=message):

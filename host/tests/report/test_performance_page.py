@@ -1,4 +1,4 @@
-"""The performance page shows what its data say."""
+"""The tables of the performance page follow from its data."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from colonnade.report import performance_page
 DOCS = toolchain.project_root() / "docs"
 
 
-def test_page_is_what_its_data_say() -> None:
+def test_the_page_matches_its_data() -> None:
     text = (DOCS / "performance.md").read_text()
     assert performance_page.page(text, DOCS) == text, "run tools/performance page"
 
 
 @pytest.fixture
 def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
-    """A folder with data of bench, of a sweep of rows, and of an ablation with one of the model's points."""
+    """A folder with data of a benchmark, of a sweep over rows, and of an ablation with one point of the cycle model."""
 
     def point(in_box: float, varied: str | None = None, **values: Any) -> dict[str, Any]:
         whole = design_result({"bunny": rtl_report(in_box), "cube": rtl_report(in_box)})
@@ -60,7 +60,7 @@ def table(docs: Path, name: str) -> str:
 
 
 @pytest.mark.parametrize("name", performance_page.TABLES)
-def test_every_table_is_on_the_page_and_is_even(docs: Path, name: str) -> None:
+def test_every_table_is_on_the_page_and_is_regular(docs: Path, name: str) -> None:
     assert f"<!-- {name} -->" in (DOCS / "performance.md").read_text()
     widths = {line.count("|") for line in table(docs, name).splitlines() if line.startswith("|")}
     assert len(widths) == 1
@@ -81,5 +81,5 @@ def test_ablation_stands_beside_the_model(docs: Path) -> None:
     assert rows.count("| cube |") == 2
 
 
-def test_a_table_without_data_says_how_to_get_it(tmp_path: Path) -> None:
+def test_a_table_without_data_names_the_command(tmp_path: Path) -> None:
     assert "Run `tools/performance scaling`." in table(tmp_path, "scaling")

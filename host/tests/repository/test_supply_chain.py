@@ -1,4 +1,4 @@
-"""The locks are up to date, an altered package is refused, and a program that is too old is named in one line."""
+"""Supply chain: locks are up to date, altered packages are rejected, and old programs are reported in one line."""
 
 from __future__ import annotations
 
@@ -66,11 +66,11 @@ def test_a_bill_of_materials_with_another_hash_is_named(
     altered = tmp_path / "sbom.json"
     altered.write_text(json.dumps(data))
     monkeypatch.setattr(sbom, "FILE", altered)
-    assert sbom.check() == ["sbom.json is not true to the locks; run: tools/lock"]
+    assert sbom.check() == ["sbom.json does not match the locks; run: tools/lock"]
 
 
 @pytest.mark.parametrize("file", ["sbom.json", "project/dependencies.sha256", *(ROOT / "host/locks").glob("*.txt")])
-def test_no_lock_names_a_host(file: str | Path) -> None:
+def test_locks_contain_no_urls(file: str | Path) -> None:
     assert "://" not in (ROOT / file).read_text()
 
 

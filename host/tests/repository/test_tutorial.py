@@ -1,4 +1,4 @@
-"""The tutorial is true: its commands run as they are written, in order."""
+"""The commands of the tutorial run in order, as written."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHELL_BLOCK = re.compile(r"^```sh\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 @pytest.fixture
 def no_outputs() -> Iterator[None]:
-    """The tutorial's folder is not there, before and after."""
+    """Remove the tutorial's output folder before and after."""
     shutil.rmtree(PLACE, ignore_errors=True)
     yield
     shutil.rmtree(PLACE, ignore_errors=True)
@@ -29,12 +29,12 @@ def test_every_command_of_the_tutorial_runs(no_outputs: None, tmp_path: Path) ->
     assert len(blocks) >= 8
     script = tmp_path / "tutorial.sh"
     script.write_text("set -euxo pipefail\n" + "\n".join(blocks), encoding="utf-8")
-    # Nothing of the user's: neither settings nor caches of the home folder
+    # Without settings and caches of the user
     environment = {**os.environ, "HOME": str(tmp_path), "COLONNADE_PROGRESS": "off"}
     done = subprocess.run(["bash", script], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
-    # The model's picture is the hardware's, the float reference's is not; the ray passed all of its states
+    # The picture of the model equals that of the RTL, that of the float reference does not; the ray has all its states
     model, reference = re.findall(r"^differing pixels +(\d+)$", done.stdout, re.MULTILINE)
     assert int(model) == 0 < int(reference)
     states = re.findall(r"^cycle \d+: (\w+)$", done.stdout, re.MULTILINE)

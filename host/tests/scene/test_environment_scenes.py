@@ -1,4 +1,4 @@
-"""Scenes in a room that nobody means: the right picture, or one line that says what to do."""
+"""Unusual scenes in a room: a correct picture, or one line with advice."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
 
 SIZE = (96, 72)
-#: Hardware with a memory for maps of this size.
+#: An attribute memory for maps of this size.
 MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
 ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
 
@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def both(folder: Path, text: str) -> tuple[RenderResult, RenderResult]:
-    """The model's frame, and the reference's."""
+    """The frames of the model and of the reference."""
     (folder / "scene.toml").write_text(text)
     model = render(RenderRequest(folder / "scene.toml", "small", ROOM, "model", SIZE, relit=True))
     return model, render(RenderRequest(folder / "scene.toml", "small", ROOM, "reference", SIZE))
@@ -51,7 +51,7 @@ def both(folder: Path, text: str) -> tuple[RenderResult, RenderResult]:
 def assert_alike(model: RenderResult, reference: RenderResult) -> None:
     np.testing.assert_array_equal(model.object_mask, reference.object_mask)
     assert np.isfinite(reference.image).all()
-    # Clustering costs this small attic to 32 dB, and its clear views through glass to 28
+    # Encoding limits this small attic to 32 dB, and views through glass to 28 dB
     assert psnr(encode_srgb(reference.image), encode_srgb(model.image)) > 25
 
 
@@ -70,8 +70,8 @@ def test_an_object_out_of_view_and_one_around_the_camera(folder: Path, transform
 
 
 @pytest.mark.parametrize("turn", [(-1, 1, -1), (1, -1, -1)])
-def test_a_camera_that_looks_elsewhere_takes_its_room_along(folder: Path, turn: tuple[int, int, int]) -> None:
-    """The maps are the camera's, wherever it looks: behind it, or upside down."""
+def test_the_pose_of_the_camera_does_not_change_its_maps(folder: Path, turn: tuple[int, int, int]) -> None:
+    """The maps are in view space for any pose of the camera, even upside down."""
     shutil.copytree(folder / "attic", folder / "turned", dirs_exist_ok=True)
     meta = json.loads((folder / "attic" / "meta.json").read_text())
     meta["cam_to_world"] = (np.array(meta["cam_to_world"]) @ np.diag([*turn, 1])).tolist()
@@ -110,14 +110,14 @@ def test_a_light_anywhere(folder: Path, place: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize("falloff", [1e-6, 1e6])
-def test_light_that_is_nothing_and_light_that_is_all(folder: Path, falloff: float) -> None:
+def test_no_light_and_saturating_light(folder: Path, falloff: float) -> None:
     lamp = f"light = {{position = [0.6, 2.2, 0.6], falloff = {falloff}, colour = [15, 15, 15]}}\n"
     model, reference = both(folder, STANDING + lamp)
     assert_alike(model, reference)
     assert (np.median(model.image) > 0.9) == (falloff > 1)
 
 
-def test_the_default_place_is_on_what_is_in_front(folder: Path) -> None:
+def test_the_default_placement_is_on_the_visible_surface(folder: Path) -> None:
     model, reference = both(folder, IN_ATTIC + LAMP)
     assert 10 < model.object_mask.sum() < 1000
     assert_alike(model, reference)

@@ -1,4 +1,4 @@
-"""Objects that stand in a room, seen by its camera."""
+"""Objects on surfaces of a room, seen by its camera."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def environment() -> Environment:
     return attic(160, 120).environment
 
 
-def test_an_object_stands_on_what_its_pixel_shows(environment: Environment) -> None:
+def test_an_object_stands_on_the_surface_of_its_pixel(environment: Environment) -> None:
     extent = load_mesh("teapot").extent
     pose = object_pose(STANDING, extent, environment)
     outline = pose.to_world(extent.outline)
@@ -30,7 +30,7 @@ def test_an_object_stands_on_what_its_pixel_shows(environment: Environment) -> N
     assert extent.edge * pose.scale == pytest.approx(0.4)
     foot = pose.to_world(extent.centre)
     seen = (np.array([foot[0], 0.0, foot[2]]) - environment.camera_to_world[:, 3]) @ environment.camera_to_world[:, :3]
-    # The pixel's own depth is taken all over it.
+    # The depth is constant within a pixel.
     np.testing.assert_allclose(seen[0] / seen[2] * environment.fx + environment.cx, 100.0, atol=0.05)
     np.testing.assert_allclose(seen[1] / seen[2] * environment.fy + environment.cy, 110.5, atol=0.05)
 
@@ -54,7 +54,7 @@ def test_the_frame_is_the_rooms_view(environment: Environment) -> None:
         np.testing.assert_allclose(view.origin, view.view_to_mesh[:, 3])
 
 
-def test_lights_and_reach_come_along(environment: Environment) -> None:
+def test_lights_and_falloff_are_transformed(environment: Environment) -> None:
     extent = load_mesh("teapot").extent
     pose = object_pose(STANDING, extent, environment)
     scene = Scene(MeshSource("teapot"), placement=STANDING.placement, light=Light((1.0, 2.0, 0.5), falloff=2.0))
@@ -63,7 +63,7 @@ def test_lights_and_reach_come_along(environment: Environment) -> None:
     assert light.reach is not None and light.reach * pose.scale == pytest.approx(2.0)
 
 
-def test_without_a_word_the_object_stands_in_the_middle(environment: Environment) -> None:
+def test_by_default_the_object_stands_in_the_middle(environment: Environment) -> None:
     extent = load_mesh("cube").extent
     pose = object_pose(Scene(MeshSource("cube")), extent, environment)
     seen = (pose.to_world(extent.centre) - environment.camera_to_world[:, 3]) @ environment.camera_to_world[:, :3]
@@ -72,7 +72,7 @@ def test_without_a_word_the_object_stands_in_the_middle(environment: Environment
     np.testing.assert_allclose(placed.to_world(np.zeros(3)), [0.0, 1.0, 0.0])
 
 
-def test_the_scenes_material_takes_the_place_of_the_meshs() -> None:
+def test_the_scenes_material_replaces_the_meshs() -> None:
     from colonnade.mesh.materials import MeshMaterial
 
     extent, own = load_mesh("cube").extent, (MeshMaterial("mirror", (1.0, 0.5, 0.5)), MeshMaterial())
@@ -83,7 +83,7 @@ def test_the_scenes_material_takes_the_place_of_the_meshs() -> None:
     assert view.materials == (MeshMaterial("glass", (1.0, 0.5, 0.5), 1.3), MeshMaterial("glass", ior=1.3))
 
 
-def test_what_does_not_fit_the_room_is_named(environment: Environment) -> None:
+def test_settings_that_do_not_fit_the_room_are_reported(environment: Environment) -> None:
     extent = load_mesh("cube").extent
     outside = Scene(MeshSource("cube"), placement=Placement((160.0, 5.0)))
     with pytest.raises(UserError, match=r"stand_at is \(160, 5\).*160x120"):

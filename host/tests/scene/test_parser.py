@@ -1,4 +1,4 @@
-"""Scene files: defaults, the scenes that come along, and one line for whatever is wrong."""
+"""Scene files: defaults, the project's scenes, and one line for each error."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_the_benchmarks_scene() -> None:
     assert scene.with_mesh("bunny").mesh_source == "bunny"
 
 
-def test_every_scene_that_comes_along_is_read() -> None:
+def test_every_scene_of_the_project_is_read() -> None:
     files = sorted(SCENES.glob("*.toml"))
     assert {"object.toml", "first-light.toml"} <= {file.name for file in files}
     for file in files:
@@ -115,7 +115,7 @@ def test_a_room_with_several_lights_is_read(tmp_path: Path) -> None:
     assert scene.with_environment(tmp_path).background.room == tmp_path
 
 
-def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
+def test_an_unreadable_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="does not exist"):
         load_scene(tmp_path / "none.toml")
     with pytest.raises(UserError, match="cannot read"):

@@ -1,4 +1,4 @@
-"""The tree: conservative boxes, every triangle once, the same order for every arity, bounds that hold."""
+"""The BVH: conservative boxes, every triangle once, the same order for all arities, and valid bounds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def build(vertices: Integers, faces: Integers, **changes: Any) -> Bvh:
 
 
 def random_triangles(seed: int, count: int, spread: int, bits: int = 16) -> tuple[Integers, Integers]:
-    """Small triangles, in clusters when ``spread`` is small, so that centres coincide."""
+    """Small triangles; with a small ``spread`` they form clusters with coincident centres."""
     generator = np.random.default_rng(seed)
     most = (1 << bits) - 1
     centres = generator.integers(0, most + 1, (max(1, spread), 3))
@@ -31,7 +31,7 @@ def random_triangles(seed: int, count: int, spread: int, bits: int = 16) -> tupl
 
 
 def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, box_bits: int) -> None:
-    """Walks the tree with the boxes of all ancestors at hand."""
+    """Traverse the tree and check each box against those of its ancestors."""
     seen: list[int] = []
     most = (1 << 28, -1)
     tasks = [(0, np.full(3, -1), np.full(3, most[0]), 0, 1)]
@@ -82,7 +82,7 @@ def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, 
     per_record=st.sampled_from([1, 2]),
     box_bits=st.integers(4, 12),
 )
-def test_boxes_hold_their_triangles_and_the_order_is_the_arities(
+def test_boxes_contain_their_triangles_and_the_order_is_that_of_the_arity(
     seed: int, count: int, spread: int, per_record: int, box_bits: int
 ) -> None:
     vertices, faces = random_triangles(seed, count, spread)
@@ -106,7 +106,7 @@ def test_one_triangle_has_a_root_with_one_leaf(arity: int) -> None:
 
 @pytest.mark.parametrize("count", [2, 3, 500, 4000])
 def test_triangles_in_one_place_are_halved(count: int) -> None:
-    """Coinciding centres leave nothing to split by; the tree stays balanced and small."""
+    """Coincident centres cannot be split by position; the tree stays balanced and small."""
     vertices = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0]], dtype=np.int32)
     faces = np.tile(np.array([[0, 1, 2]], dtype=np.int32), (count, 1))
     tree = build(vertices, faces)
@@ -115,7 +115,7 @@ def test_triangles_in_one_place_are_halved(count: int) -> None:
 
 
 def one_sided(count: int = 3000) -> tuple[Integers, Integers]:
-    """Triangles whose sizes and places grow by a constant factor: good splits peel a few off at a time."""
+    """Triangles whose sizes and positions grow geometrically: good splits separate only a few at a time."""
     at = np.unique(np.rint(1.004 ** np.arange(count)).astype(np.int64))
     at = at[at < 60000]
     vertices = np.stack(
@@ -143,7 +143,7 @@ def test_the_order_does_not_depend_on_the_arity_when_balanced() -> None:
         assert trees[0].statistics.height_limit == trees[1].statistics.height_limit
 
 
-def test_a_tree_that_cannot_fit_says_what_it_needs() -> None:
+def test_a_tree_that_does_not_fit_reports_its_needs() -> None:
     vertices, faces = random_triangles(3, 4096, 1000)
     tree = build(vertices, faces, stack_depth=4, arity=2)
     assert tree.statistics.stack_bound == 11  # 2,048 leaves, balanced

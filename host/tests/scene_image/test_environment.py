@@ -1,4 +1,4 @@
-"""A room in the scene image: every memory's words survive the file, fit the hardware, and are in its report."""
+"""Rooms in the scene image: words round-trip through the file, fit the hardware, and appear in the report."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from colonnade.scene_image.inspect import describe, report_lines
 from colonnade.scene_image.packer import memory_use, pack
 
 ROOT = Path(__file__).resolve().parents[3]
-#: How the host keeps words of each width.
+#: Array types of words by width.
 WORDS = ((16, np.uint16), (32, np.uint32), (64, np.uint64))
 
 
@@ -36,7 +36,7 @@ def hardware() -> Manifest:
 
 @pytest.fixture(scope="module")
 def held(hardware: Manifest) -> EncodedEnvironment:
-    """A room whose words are random, every bit of them."""
+    """A room with random words."""
     random, memories = np.random.default_rng(5), dict[str, dict[str, Any]]()
     for name, place in hardware.memories.items():
         part, _, memory = name.partition(".")
@@ -57,7 +57,7 @@ def image(hardware: Manifest, held: EncodedEnvironment) -> SceneImage:
     return with_environment(pack(load_mesh("cube"), hardware), held, hardware)
 
 
-def test_all_memories_survive_the_file(
+def test_all_memories_round_trip_through_the_file(
     tmp_path: Path, hardware: Manifest, held: EncodedEnvironment, image: SceneImage
 ) -> None:
     loaded = SceneImage.load(image.save(tmp_path), hardware)
@@ -90,7 +90,7 @@ def test_a_file_that_lacks_words_or_has_others_is_refused(tmp_path: Path, image:
 
 
 def test_maps_that_do_not_fill_the_memories_are_refused(tmp_path: Path, hardware: Manifest, image: SceneImage) -> None:
-    """Though the checksum is right: the words beyond a memory would be lost, those that lack undefined."""
+    """Rejected despite a correct checksum: extra words would be lost, missing words undefined."""
     environment, first = image.header.room, image.attributes[0]
     assert environment is not None
     place = f"for the memory '{first.memory}'"
@@ -108,13 +108,13 @@ def test_maps_that_do_not_fill_the_memories_are_refused(tmp_path: Path, hardware
         SceneImage.load(file)
 
 
-def test_inspect_tells_of_tiles_beyond_their_heap(tmp_path: Path, image: SceneImage) -> None:
-    """In one line; without any there is none."""
+def test_inspect_reports_tiles_beyond_their_heap(tmp_path: Path, image: SceneImage) -> None:
+    """One line if there are any, else none."""
     legal = tuple(
         replace(section, words=np.zeros_like(section.words)) if "descriptors" in section.memory else section
         for section in image.attributes
     )
-    # Mode 7, four entries, at the last word but 32: one of its 33 words lies beyond. One word before, none does
+    # Mode 7, four entries, 32 words before the end: one of its 33 words lies beyond; one word earlier none does
     sections = []
     for section in legal:
         words = section.words.copy()
@@ -133,7 +133,7 @@ def test_inspect_tells_of_tiles_beyond_their_heap(tmp_path: Path, image: SceneIm
         assert counts == {"albedo": 2 if line else 0, "normals": 0, "planes": 0}
 
 
-def test_words_that_no_memory_holds_are_a_bug(hardware: Manifest, held: EncodedEnvironment) -> None:
+def test_words_without_a_memory_are_a_bug(hardware: Manifest, held: EncodedEnvironment) -> None:
     planes = held.image.planes
     for changed in (
         replace(planes, heap=planes.heap[:-1]),
@@ -155,8 +155,8 @@ def test_the_report_has_the_bytes_of_each_map(hardware: Manifest, image: SceneIm
     assert json.loads(json.dumps(describe(image)))["room"]["name"] == "attic"
 
 
-def test_pack_refuses_a_room_that_the_hardware_has_no_memory_for(tmp_path: Path) -> None:
-    """As `render` does; nothing is written."""
+def test_pack_rejects_a_room_without_attribute_memory(tmp_path: Path) -> None:
+    """As `render` does; no file is written."""
     scene = tmp_path / "scene.toml"
     scene.write_text('[mesh]\nname = "cube"\n')
     environment = ROOT / "scenes" / "rooms" / "attic"

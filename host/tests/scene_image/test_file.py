@@ -1,4 +1,4 @@
-"""Scene images: the same after a trip through a file; damaged or foreign ones refused with the reason."""
+"""Scene images round-trip through a file; damaged or foreign files are rejected with the reason."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def image(manifest: Manifest) -> SceneImage:
 
 
 @pytest.mark.parametrize("bvh", [True, False])
-def test_an_image_survives_its_file(tmp_path: Path, make_manifest: MakeManifest, bvh: bool) -> None:
+def test_an_image_round_trips_through_its_file(tmp_path: Path, make_manifest: MakeManifest, bvh: bool) -> None:
     manifest = make_manifest(bvh=bvh)
     image = pack(load_mesh("torus:9"), manifest)
     file = image.save(tmp_path / "new" / "folder")
@@ -79,7 +79,7 @@ def test_appended_bytes_are_refused(tmp_path: Path, image: SceneImage) -> None:
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(position=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
-def test_no_flipped_bit_goes_unseen(tmp_path: Path, image: SceneImage, position: float, bit: int) -> None:
+def test_every_flipped_bit_is_detected(tmp_path: Path, image: SceneImage, position: float, bit: int) -> None:
     file = image.save(tmp_path)
     data = bytearray(file.read_bytes())
     data[int(position * len(data))] ^= 1 << bit

@@ -1,4 +1,4 @@
-"""Packing: what the records say is the mesh, for every layout; what does not fit is refused."""
+"""Packing: the records represent the mesh in every layout; meshes that do not fit are rejected."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MakeManifest = Callable[..., Manifest]
 
 
 def packed_triangles(image: SceneImage, manifest: Manifest) -> dict[int, list[list[int]]]:
-    """Every triangle's corners by packed id, as the records have them."""
+    """The corners of each triangle in the records, by packed id."""
     header = image.header
     section = image.records[header.triangle_base : header.triangle_base + header.triangle_records]
     fields = manifest.layouts["triangles"].unpack(section)
@@ -50,7 +50,7 @@ def test_quantisation_is_uniform_centred_and_near(seed: int, count: int, bits: i
         mesh = clean_mesh(vertices, np.arange(3 * count, dtype=np.int32).reshape(-1, 3), "random")
         result = quantise(mesh, bits)
     except UserError:
-        return  # so small beside its distance from the origin that nothing is left of it
+        return  # too small for its distance from the origin
     most = (1 << bits) - 1
     assert result.vertices.min() >= 0 and result.vertices.max() <= most
     assert np.ptp(result.vertices, axis=0).max() >= most - 1
@@ -79,7 +79,7 @@ def test_nothing_left_is_refused() -> None:
 def test_records_hold_the_mesh_whatever_the_layout(
     make_manifest: MakeManifest, vertex_bits: int, per_record: int
 ) -> None:
-    """Arity 2, arity 4 and no tree at all number the triangles alike."""
+    """The packed ids are equal for arity 2, arity 4 and no tree."""
     mesh = load_mesh("sphere:3")
     quantised = quantise(mesh, vertex_bits)
     triangles, faces = [], []
@@ -156,7 +156,7 @@ def test_too_many_records_are_refused(make_manifest: MakeManifest) -> None:
 def test_too_deep_a_tree_is_refused(make_manifest: MakeManifest) -> None:
     with pytest.raises(UserError, match=r"teapot needs a stack of \d+ entries.*stackDepth is 8: raise"):
         pack(load_mesh("teapot"), make_manifest(stack_depth=8))
-    # The exhaustive baseline has no stack.
+    # Without a BVH there is no stack.
     assert pack(load_mesh("teapot"), make_manifest(stack_depth=8, bvh=False)).header.tree is None
 
 
@@ -181,7 +181,7 @@ def test_reports(make_manifest: MakeManifest) -> None:
 
 
 def two_sided(mesh: Mesh) -> Mesh:
-    """Every face once more, turned round."""
+    """A mesh with each face twice, once reversed."""
     return clean_mesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[:, ::-1]]), mesh.name)
 
 

@@ -64,11 +64,11 @@ struct Options {
 
 #ifdef MEMORY_BANKS
 /// Stalls each bank independently, in bursts of random length, in `percent` of all cycles.
-class BankHolds {
+class BankStalls {
 public:
-    explicit BankHolds(const Options& options) : random_(options.seed), percent_(options.memoryPercent), burst_(1, options.memoryBurst) {
-        const double held = percent_ / 100.0, length = (1.0 + options.memoryBurst) / 2.0;
-        begins_ = std::bernoulli_distribution(percent_ == 0 ? 0.0 : 1.0 / (1.0 + length * (1.0 - held) / held));
+    explicit BankStalls(const Options& options) : random_(options.seed), percent_(options.memoryPercent), burst_(1, options.memoryBurst) {
+        const double stalled = percent_ / 100.0, length = (1.0 + options.memoryBurst) / 2.0;
+        starts_ = std::bernoulli_distribution(percent_ == 0 ? 0.0 : 1.0 / (1.0 + length * (1.0 - stalled) / stalled));
     }
 
     /// Sets the stall bits of the next cycle.
@@ -77,7 +77,7 @@ public:
         unsigned char bits[sizeof(Port)] = {};
         for (unsigned bank = 0; bank < MEMORY_BANKS; ++bank) {
             unsigned& left = left_[bank];
-            if (left == 0 && begins_(random_)) left = burst_(random_);
+            if (left == 0 && starts_(random_)) left = burst_(random_);
             if (left == 0) continue;
             --left;
             bits[bank / 8] |= static_cast<unsigned char>(1u << (bank % 8));
@@ -89,7 +89,7 @@ private:
     std::mt19937 random_;
     unsigned percent_;
     std::uniform_int_distribution<unsigned> burst_;
-    std::bernoulli_distribution begins_;
+    std::bernoulli_distribution starts_;
     unsigned left_[MEMORY_BANKS] = {};
 };
 #endif
@@ -99,7 +99,7 @@ public:
     explicit Harness(const Options& options)
         : random_(options.seed), stallPercent_(options.stallPercent), checkInterval_(std::max(1u, options.checkInterval))
 #ifdef MEMORY_BANKS
-        , holds_(options)
+        , stalls_(options)
 #endif
     {
 #ifndef MEMORY_BANKS
@@ -183,17 +183,17 @@ public:
         write(startAddress, 1);
         const auto begun = std::chrono::steady_clock::now();
         const std::uint64_t first = cycles_;
-        auto shown = begun;
+        auto lastReport = begun;
         quiet_ = 0;
         mayChangeRegisters_ = false;
         while (!top_.io_done) {
 #ifdef MEMORY_BANKS
-            holds_.next(top_.io_memoryHolds);
+            stalls_.next(top_.io_memoryHolds);
 #endif
             cycle();
             if (watchdog != 0 && quiet_ > watchdog + watchdogMargin) throw std::runtime_error("the watchdog did not abort the frame in time");
-            if ((cycles_ & 0xff) == 0 && std::chrono::steady_clock::now() - shown > std::chrono::milliseconds(250)) {
-                shown = std::chrono::steady_clock::now();
+            if ((cycles_ & 0xff) == 0 && std::chrono::steady_clock::now() - lastReport > std::chrono::milliseconds(250)) {
+                lastReport = std::chrono::steady_clock::now();
                 std::cerr << "progress " << static_cast<double>(received_) / static_cast<double>(pixels_.size()) << std::endl;
             }
         }
@@ -284,7 +284,7 @@ private:
     VerilatedVcdC waveform_;
 #endif
 #ifdef MEMORY_BANKS
-    BankHolds holds_;
+    BankStalls stalls_;
 #endif
     std::uint64_t cycles_ = 0;
     /// Cycles since the last pixel in which the sink was ready.

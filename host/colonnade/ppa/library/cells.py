@@ -1,4 +1,4 @@
-"""Standard cells: area, pins, and delays as tables of slew and load; in µm², pF and ns."""
+"""Standard cells: area (µm²), pins (pF), and delays (ns) as tables over slew and load."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from colonnade.common.errors import UserError
 
 @dataclass(frozen=True)
 class LookupTable:
-    """A value, in ns, over input slew (ns) and output load (pF); a table of one row or column, or a scalar too."""
+    """A table of values over input slew (ns) and output load (pF). Each axis may have a single point."""
 
     slews: tuple[float, ...]
     loads: tuple[float, ...]
     values: tuple[tuple[float, ...], ...]
 
     def at(self, slew: float, load: float) -> float:
-        """Bilinear between the points, and straight on beyond them."""
+        """The value by bilinear interpolation, extrapolated beyond the points."""
         slews, loads, values = self.slews, self.loads, self.values
         if len(slews) == 1:
-            return _along(loads, values[0], load) if len(loads) > 1 else values[0][0]
+            return _interpolate(loads, values[0], load) if len(loads) > 1 else values[0][0]
         row = min(max(bisect_right(slews, slew), 1), len(slews) - 1)
         share = (slew - slews[row - 1]) / (slews[row] - slews[row - 1])
         if len(loads) == 1:
             low, high = values[row - 1][0], values[row][0]
         else:
-            low, high = _along(loads, values[row - 1], load), _along(loads, values[row], load)
+            low, high = _interpolate(loads, values[row - 1], load), _interpolate(loads, values[row], load)
         return low + share * (high - low)
 
 
-def _along(points: tuple[float, ...], values: tuple[float, ...], at: float) -> float:
+def _interpolate(points: tuple[float, ...], values: tuple[float, ...], at: float) -> float:
     index = min(max(bisect_right(points, at), 1), len(points) - 1)
     low = points[index - 1]
     return values[index - 1] + (at - low) / (points[index] - low) * (values[index] - values[index - 1])
@@ -40,12 +40,13 @@ def _along(points: tuple[float, ...], values: tuple[float, ...], at: float) -> f
 
 @dataclass(frozen=True)
 class Arc:
-    """From the pin `related` to the pin that holds it.
+    """A timing arc from the pin `related` to the pin that holds the arc.
 
     Attributes:
+        related: Name of the pin at the start of the arc.
         kind: ``timing_type``: ``combinational``, ``rising_edge``, ``setup_rising``, …
         sense: ``positive_unate``, ``negative_unate`` or ``non_unate``.
-        tables: by name: ``cell_rise``, ``rise_transition``, ``rise_constraint``, and the same of fall.
+        tables: Tables by name: ``cell_rise``, ``rise_transition``, ``rise_constraint``, and the same for falls.
     """
 
     related: str
@@ -66,18 +67,25 @@ class Pin:
 
 
 @dataclass(frozen=True)
-class State:
-    """What a flip-flop holds: the names of it and of its inverse in the outputs' functions; clock; what comes next."""
+class FlipFlop:
+    """The state of a flip-flop.
+
+    Attributes:
+        name: Name of the state in the functions of the outputs.
+        inverse: Name of the inverted state in the functions of the outputs.
+        clock: Clock pin.
+        next_state: Function of the next state.
+    """
 
     name: str
     inverse: str
     clock: str
-    following: str
+    next_state: str
 
 
 @dataclass(frozen=True)
 class ClockGate:
-    """An integrated clock gate: its pins of the clock, of what enables it, and of the gated clock."""
+    """The pins of an integrated clock gate."""
 
     clock: str
     enable: str
@@ -86,17 +94,26 @@ class ClockGate:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell; area in µm²; `state` is of flip-flops alone, `clock_gate` of clock gates, which are registers, too."""
+    """A standard cell.
+
+    Attributes:
+        name: Name.
+        area: Area, µm².
+        is_register: Flip-flop, latch or clock gate.
+        pins: Pins by name.
+        flip_flop: The state of a flip-flop without set and reset.
+        clock_gate: The pins of a clock gate.
+    """
 
     name: str
     area: float
     is_register: bool
     pins: dict[str, Pin]
-    state: State | None = None
+    flip_flop: FlipFlop | None = None
     clock_gate: ClockGate | None = None
 
     def is_gate(self, function: str) -> bool:
-        """It computes `function`, a key of `_SPELLINGS`, and nothing else."""
+        """Whether the cell's only output computes `function`, a key of `_SPELLINGS`."""
         inputs = sorted(pin.name for pin in self.pins.values() if pin.direction == "input")
         outputs = [pin for pin in self.pins.values() if pin.direction == "output"]
         if self.is_register or len(outputs) != 1 or len(inputs) != (1 if function == "inverter" else 2):
@@ -108,46 +125,46 @@ class Cell:
         return text in _SPELLINGS[function] or text[1:-1] in _SPELLINGS[function]
 
 
-#: The ways to write a function of A and B, without blanks.
+#: Spellings of a function of A and B, without spaces.
 _SPELLINGS = {"inverter": ("!A", "A'"), "nand": ("!(A&B)", "(A&B)'", "!A|!B", "!B|!A", "A'|B'", "!(B&A)")}
 
 
 @dataclass(frozen=True)
 class Library:
-    """The cells of all files that were named."""
+    """The cells of all given liberty files."""
 
     files: tuple[Path, ...]
     cells: dict[str, Cell] = field(repr=False)
 
     @property
     def nand2(self) -> Cell:
-        """The smallest NAND of two inputs: the unit of gate equivalents."""
+        """The smallest two-input NAND, which defines one gate equivalent."""
         return min(self._gates("nand"), key=lambda cell: (cell.area, cell.name))
 
     @property
     def inverter(self) -> Cell:
-        """The quickest of the smallest inverters."""
+        """The smallest inverter; among equals the fastest."""
         return min(self._gates("inverter"), key=lambda cell: (cell.area, fan_out_of_four(cell)))
 
     @property
     def has_clock_gates(self) -> bool:
-        """Flip-flops with an enable may share a gated clock instead of a multiplexer each."""
+        """Whether flip-flops with an enable can share a gated clock instead of using multiplexers."""
         return any(cell.clock_gate for cell in self.cells.values())
 
     @property
     def fo4(self) -> float:
-        """The delay of `inverter` that drives four of its like, in ns."""
+        """The fan-out-of-four delay of `inverter`, ns."""
         return fan_out_of_four(self.inverter)
 
     def _gates(self, function: str) -> list[Cell]:
         found = [cell for cell in self.cells.values() if cell.is_gate(function)]
         if not found:
-            raise UserError(f"no {function} among the cells of {', '.join(path.name for path in self.files)}")
+            raise UserError(f"the liberty {', '.join(path.name for path in self.files)} has no {function}")
         return found
 
 
 def fan_out_of_four(inverter: Cell) -> float:
-    """Delay, in ns, of an inverter that drives four of its like in a long chain of such; the mean of both edges."""
+    """Delay of an inverter that drives four copies of itself in a long chain, ns; the mean of both edges."""
     load = 4 * next(pin.capacitance for pin in inverter.pins.values() if pin.direction == "input")
     output = next(pin for pin in inverter.pins.values() if pin.direction == "output")
     tables = output.arcs[0].tables

@@ -1,1 +1,1 @@
-"""Netlists: the modules of a design, their synthesis, and what is added for memories."""
+"""Netlists: the module hierarchy of a design, its synthesis, and the cost of memories."""

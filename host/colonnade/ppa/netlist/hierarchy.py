@@ -1,4 +1,4 @@
-"""Which modules the generator wrote, and which of them are the units that are synthesised on their own."""
+"""The module hierarchy of a generated design, and the units that are synthesised separately."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-#: Units of a level, in the order of the data; what is left of the level's module is a unit too, named last.
+#: Units of each level in the order of the data flow. The remaining logic of the level's module is one more unit.
 RENDER_UNIT = (
     *("RayGenerator", "RaySetup", "BoxUnit", "TraversalStack", "TriangleUnit", "Shader", "BounceUnit"),
     *("ShadowRays", "ColourUnit", "EnvironmentStage", "RtController", "RecordFetch", "HitTable"),
@@ -17,7 +17,7 @@ RENDER_UNIT = (
 COLUMN = ("ColumnBvhController", "ColumnEnvironment", "TileWalker", "BackgroundWalker", "PixelCollector")
 DEVICE = ("FrameController", "RegisterFile", "CounterFile")
 
-#: Modules within a unit that are synthesised on their own and counted in it: what divides and takes roots.
+#: Dividers and square roots: parts of units that are synthesised separately and counted in their unit.
 PARTS = re.compile(r"(Divider|SquareRoot|RootDivider)(_\d+)?")
 
 _INSTANCE = re.compile(r"^  (\w+)\s+(\w+) \(", re.MULTILINE)
@@ -27,13 +27,13 @@ _MODULE = re.compile(r"^module (\w+)", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Level:
-    """Render unit, column or array.
+    """A level of the hierarchy: render unit, column or array.
 
     Attributes:
-        name: of the level in reports.
-        top: its module.
-        units: modules that are synthesised on their own.
-        rest: the name of all else in `top`.
+        name: Name in reports.
+        top: Module of the level.
+        units: Modules that are synthesised separately.
+        rest: Name of the remaining logic of `top`.
     """
 
     name: str
@@ -48,13 +48,13 @@ LEVELS = (
     Level("array", "Colonnade", DEVICE, "rest of Colonnade"),
 )
 
-#: Modules at which the synthesis of another one stops.
-BORDERS = frozenset({*RENDER_UNIT, *COLUMN, *DEVICE, "RenderUnit", "Column"})
+#: Modules that the synthesis of another module treats as black boxes.
+BOUNDARIES = frozenset({*RENDER_UNIT, *COLUMN, *DEVICE, "RenderUnit", "Column"})
 
 
 @dataclass(frozen=True)
 class Storage:
-    """Words of a module: in which unit of which level, how many of the module there, and its shape."""
+    """A memory module: its level and unit, the number of instances in the unit, and depth × width."""
 
     name: str
     level: str
@@ -72,22 +72,22 @@ class Memory(Storage):
 
     @property
     def bits(self) -> int:
-        """Of one of them."""
+        """Bits of one instance."""
         return self.depth * self.width
 
 
 @dataclass(frozen=True)
 class FlopTable(Storage):
-    """A memory with combinational reads: it is synthesised, as flip-flops and multiplexers."""
+    """A memory with combinational reads, which is synthesised as flip-flops and multiplexers."""
 
     @property
     def bits(self) -> int:
-        """Of all of them in the unit."""
+        """Bits of all instances in the unit."""
         return self.count * self.depth * self.width
 
 
 class Hierarchy:
-    """The modules of a generated design, memories left out, and who instantiates whom."""
+    """The modules of a generated design and their instances, without memories."""
 
     def __init__(self, folder: Path) -> None:
         self.files: dict[str, Path] = {}
@@ -112,29 +112,29 @@ class Hierarchy:
         return [unit for unit in level.units if unit in self.files]
 
     def closure(self, top: str) -> tuple[list[str], list[str]]:
-        """Modules to read for `top`: those that belong to it, and those where it ends: other units, parts, memories."""
-        own, ends, waiting = [top], [], [top]
-        while waiting:
-            for module in self._instances[waiting.pop()]:
-                if module in self._shapes or module in own or module in ends:
+        """The modules that belong to `top`, and its black boxes: other units, parts and memories."""
+        own, boxes, pending = [top], [], [top]
+        while pending:
+            for module in self._instances[pending.pop()]:
+                if module in self._shapes or module in own or module in boxes:
                     continue
-                if module in BORDERS or PARTS.fullmatch(module) or self._is_memory(module):
-                    ends.append(module)
+                if module in BOUNDARIES or PARTS.fullmatch(module) or self._is_memory(module):
+                    boxes.append(module)
                 else:
                     own.append(module)
-                    waiting.append(module)
-        return sorted(own), sorted(ends)
+                    pending.append(module)
+        return sorted(own), sorted(boxes)
 
     def header(self, module: str) -> str:
-        """A module with its ports and nothing in it."""
+        """The Verilog of a module with its ports and an empty body."""
         text = self.files[module].read_text()
         match = re.search(rf"^module {module}\(.*?^\);\n", text, re.MULTILINE | re.DOTALL)
         if match is None:
-            raise RuntimeError(f"{self.files[module]}: no head of module {module}")
+            raise RuntimeError(f"{self.files[module]} has no module {module}")
         return f"{match.group()}endmodule\n"
 
     def count(self, module: str, inside: str, stop: Iterable[str] = ()) -> int:
-        """Instances of `module` in one `inside`, at any depth; modules of `stop` are not entered."""
+        """Number of instances of `module` within `inside`, at any depth, but not within modules of `stop`."""
         if inside in stop:
             return 0
         return sum(
@@ -143,18 +143,18 @@ class Hierarchy:
         )
 
     def shape(self, module: str) -> tuple[int, int]:
-        """Depth and width of the memory that `module` holds."""
+        """Depth and width of the memory in `module`."""
         (name,) = set(self._instances[module]) & set(self._shapes)
         return int(self._shapes[name]["depth"]), int(self._shapes[name]["width"])
 
     def parts(self, unit: str) -> dict[str, int]:
-        """The parts of a unit, and how many of each."""
+        """The parts of a unit and their number of instances."""
         known = sorted(module for module in self.files if PARTS.fullmatch(module))
-        counts = {module: self.count(module, unit, BORDERS - {unit}) for module in known}
+        counts = {module: self.count(module, unit, BOUNDARIES - {unit}) for module in known}
         return {module: number for module, number in counts.items() if number}
 
     def memories(self) -> list[Memory]:
-        """The memories of each unit, counted within one of its level."""
+        """The memories of all units, counted per instance of the level."""
         found = []
         for name, level, unit, number in self._inside_units(self._shapes):
             shape = self._shapes[name]
@@ -163,7 +163,7 @@ class Hierarchy:
         return found
 
     def tables(self) -> list[FlopTable]:
-        """The tables of each unit that become flip-flops, counted within one of its level; largest first."""
+        """The flip-flop tables of all units, counted per instance of the level, largest first."""
         found = [
             FlopTable(name, level, unit, number, *self._tables[name])
             for name, level, unit, number in self._inside_units(self._tables)
@@ -171,11 +171,11 @@ class Hierarchy:
         return sorted(found, key=lambda table: (-table.bits, table.name))
 
     def _inside_units(self, modules: Iterable[str]) -> Iterator[tuple[str, str, str, int]]:
-        """Module, level, unit, and how many of the module there are in the unit, where there are any."""
+        """Module, level, unit and number of instances for each unit that contains a module of `modules`."""
         for level in LEVELS:
             for unit in (*self.units(level), level.top):
                 for module in modules:
-                    number = self.count(module, unit, BORDERS - {unit})
+                    number = self.count(module, unit, BOUNDARIES - {unit})
                     if number:
                         yield module, level.name, level.rest if unit == level.top else unit, number
 

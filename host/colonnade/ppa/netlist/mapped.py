@@ -1,4 +1,4 @@
-"""A mapped netlist as Yosys writes it in JSON, flattened for timing, replay and power."""
+"""A mapped netlist from Yosys's JSON, flattened for timing, replay and power."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from colonnade.ppa.library.cells import Cell, Library
 #: A net's number, or a constant.
 Bit = int | bool
 
-#: What the synthesis appends to the name of a register's output to name the register.
+#: Suffix of a register's name, which the synthesis appends to the name of its output.
 REGISTER = "_register"
 
 
 @dataclass(frozen=True)
 class Instance:
-    """A cell and the nets at its pins.
+    """A cell instance and the nets at its pins.
 
     Attributes:
-        cell: its kind.
-        nets: the net of each pin that has one.
-        name: what it was synthesised from, for registers.
-        owner: the module that holds it, below the modules that hold that one: ``RaySetup/Divider``.
-        ties: the constant of each pin that has one.
+        cell: The library cell.
+        nets: Nets by pin.
+        name: Name of the RTL register, for registers.
+        owner: Path of the module that contains it, such as ``RaySetup/Divider``.
+        ties: Constants by pin.
     """
 
     cell: Cell
@@ -36,7 +36,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class Box:
-    """A module that is not here, such as a memory: its kind, its owner, and the bits of its ports."""
+    """A black box such as a memory: its module, the path of the module that contains it, and the bits of its ports."""
 
     kind: str
     owner: str
@@ -74,11 +74,11 @@ class Netlist:
 
     @property
     def size(self) -> int:
-        """Numbers that nets have are below this."""
+        """Upper bound of net numbers."""
         return self._next
 
     def _join(self) -> None:
-        """Make one of the nets that a module connects straight through."""
+        """Merge nets that a module connects directly to each other."""
         root = self._root
         if not self._joined:
             return
@@ -103,7 +103,7 @@ class Netlist:
         return net
 
     def _name_inverted(self) -> None:
-        """What a register drives has its name; where it has none, that of what an inverter behind it drives."""
+        """Name the outputs of registers after the register, or after the output of a following inverter."""
         for instance in self.instances:
             if instance.name:
                 for pin, net in instance.nets.items():
@@ -149,7 +149,7 @@ class Netlist:
                     (self.driven_outside if is_output else self.read_outside).update(touched)
 
     def _inner(self, instance: Any, nets: Mapping[Any, int]) -> dict[Any, int]:
-        """The nets at the ports of a module inside, by its own numbers."""
+        """The nets at the ports of an inner module, by its own net numbers."""
         inner, ports = self._modules[instance["type"]], dict[Any, int]()
         for port, outsides in instance["connections"].items():
             is_output = inner["ports"][port]["direction"] == "output"
@@ -166,7 +166,7 @@ class Netlist:
         return ports
 
     def clock_gates(self) -> Iterator[tuple[int, Bit]]:
-        """Each gated clock, and what enables it."""
+        """Each gated clock and its enable."""
         for instance in self.instances:
             gate = instance.cell.clock_gate
             if gate is not None:
@@ -174,7 +174,7 @@ class Netlist:
                 yield instance.nets[gate.gated], wires[gate.enable]
 
     def drivers(self) -> Iterator[tuple[int, Instance, str]]:
-        """Each net that a cell drives, the cell, and its pin."""
+        """Each driven net with its driving cell and pin."""
         for instance in self.instances:
             for pin, net in instance.nets.items():
                 if instance.cell.pins[pin].direction == "output":

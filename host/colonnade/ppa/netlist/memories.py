@@ -1,4 +1,4 @@
-"""What memories cost: they are never synthesised, but added by an area and an energy per bit."""
+"""Area and energy of memories, which are not synthesised but estimated per bit."""
 
 from __future__ import annotations
 
@@ -11,59 +11,59 @@ from colonnade.ppa.netlist.hierarchy import Memory
 
 @dataclass(frozen=True)
 class Rate:
-    """What a bit of memory takes.
+    """Cost of a memory bit.
 
     Attributes:
-        um2_per_bit: area, periphery included.
-        pj_per_bit: energy of a read, for each bit that is read.
+        um2_per_bit: Area with periphery, µm².
+        pj_per_bit: Read energy per bit read, pJ.
     """
 
     um2_per_bit: float
     pj_per_bit: float
 
 
-#: By CACTI 7, a macro of 1k words of 32 bits.
+#: An SRAM macro of 1k words of 32 bits, by CACTI 7.
 SRAM = {"28 nm": Rate(0.19, 0.05), "45 nm": Rate(0.45, 0.09)}
 
-#: A register file of a dozen words, one port to read and one to write. An assumption, without a data sheet: cells of
-#: eight transistors, and periphery that takes three times their area. Latches and multiplexers of standard cells take
-#: three times as much. The energy is that of a macro.
+#: A register file of a dozen words with a read and a write port. This is an assumption without a data sheet: cells of
+#: eight transistors, with three times their area for periphery, and the energy of a macro. Latches and multiplexers of
+#: standard cells take three times as much area.
 REGISTER_FILE = {"28 nm": Rate(1.0, 0.05), "45 nm": Rate(2.4, 0.09)}
 
-#: A memory of fewer words is a register file.
-LEAST_SRAM_WORDS = 64
+#: A memory with fewer words is a register file.
+MIN_SRAM_WORDS = 64
 
-#: The chip's gate: 5.53 mm² of 80 render units are counted as 141 kGE each.
+#: The paper's chip: 5.53 mm² for 80 render units, which makes 141 kGE each.
 CHIP_MM2, CHIP_UNITS = 5.53, 80
 CHIP_NODE, CHIP_GATE_UM2 = "28 nm", 0.49
 
 
 def chip_unit_kge() -> float:
-    """Gate equivalents, in thousands, that the chip has for a render unit, its memories and the rest included."""
+    """Gate equivalents of the chip per render unit, kGE, including memories and all other logic."""
     return CHIP_MM2 * 1e6 / CHIP_UNITS / CHIP_GATE_UM2 / 1e3
 
 
 def rates(memory: Memory) -> Mapping[str, Rate]:
-    """What a bit of this memory takes, by node."""
-    return SRAM if memory.depth >= LEAST_SRAM_WORDS else REGISTER_FILE
+    """The cost of a bit of this memory, by node."""
+    return SRAM if memory.depth >= MIN_SRAM_WORDS else REGISTER_FILE
 
 
 def area_um2(memory: Memory, node: str = CHIP_NODE) -> float:
-    """The area of all memories of a kind in one instance of their level."""
+    """The area of all instances of a memory within one instance of its level, µm²."""
     return memory.count * memory.bits * rates(memory)[node].um2_per_bit
 
 
 def equivalent_kge(um2: float) -> float:
-    """An area as gates of the chip's node."""
+    """An area in gate equivalents of the chip's node, kGE."""
     return um2 / CHIP_GATE_UM2 / 1e3
 
 
 def area_mm2(kge: float, um2: float) -> float:
-    """Gates at the chip's node and the area of memories, placed without gaps."""
+    """The area of gates at the chip's node and of memories, without gaps, mm²."""
     return (kge * 1e3 * CHIP_GATE_UM2 + um2) / 1e6
 
 
-def described(memory: Memory) -> Mapping[str, Any]:
+def describe(memory: Memory) -> Mapping[str, Any]:
     """A memory in a report."""
     return {
         "level": memory.level,

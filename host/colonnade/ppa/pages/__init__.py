@@ -1,1 +1,1 @@
-"""The report of ``colonnade ppa`` as text, and the tables of docs/ppa.md."""
+"""The text report of ``colonnade ppa``, and the generated tables of docs/ppa.md."""

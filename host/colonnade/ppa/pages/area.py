@@ -1,4 +1,4 @@
-"""The tables in ``docs/ppa.md`` of where the gates are, and of what the array's rays are worth at the chip's area."""
+"""Tables of ``docs/ppa.md``: area by unit, and rays per cycle at the chip's area."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Data = Mapping[str, Any]
 
 
 def gates(reports: Mapping[str, Data]) -> str:
-    """Units of a render unit, the largest first, with their memories, against all the chip has for one."""
+    """Area of a render unit by unit, largest first, with memories, relative to the chip's area per render unit."""
     first = next(iter(reports.values()))
     chip = first["chip"]["kge_per_unit"]
     own = [name for name, unit in first["units"].items() if unit["level"] == "render_unit"]
@@ -29,18 +29,18 @@ def gates(reports: Mapping[str, Data]) -> str:
     logic = [level["logic_kge"] for level in whole]
     row = ["**render unit**", *(f"{kge:.1f}" for kge in logic), f"{whole[0]['memory_kge']:.1f}"]
     rows.append([*row, *(f"{100 * level['kge'] / chip:.0f} %" for level in whole)])
-    titles = ["unit", *(f"kGE, {LIBRARIES[name]}" for name in reports), "memories, kGE at 28 nm"]
-    titles += [f"of {chip:.0f} kGE, {LIBRARIES[name]}" for name in reports]
+    titles = ["unit", *(f"logic kGE, {LIBRARIES[name]}" for name in reports), "memory kGE at 28 nm"]
+    titles += [f"share of {chip:.0f} kGE, {LIBRARIES[name]}" for name in reports]
     return markdown(titles, rows)
 
 
 def _memory(report: Data, unit: str) -> float:
-    """Thousands of gates, as area, of a unit's memories."""
+    """Area of a unit's memories in kGE."""
     return float(sum(memory["kge"] for memory in report["memories"].values() if memory["unit"] == unit))
 
 
 def equal_area(reports: Mapping[str, Data], data: Path) -> str:
-    """Rays per cycle of the array over the chip's, at equal area, by what is counted of the array."""
+    """Rays per cycle of the array relative to the chip at equal area, for several scopes of the array's area."""
     file = data / "bench.json"
     if not file.is_file():
         return ""
@@ -53,14 +53,14 @@ def equal_area(reports: Mapping[str, Data], data: Path) -> str:
         local = array["logic_mm2_28nm"] + units * (
             levels["render_unit"]["mm2_28nm"] - levels["render_unit"]["logic_mm2_28nm"]
         )
-        counted = {
+        scopes = {
             "logic": array["logic_mm2_28nm"],
-            "and the render units' memories": local,
-            "and the columns' memories": array["mm2_28nm"],
+            "logic and memories of render units": local,
+            "logic and all memories": array["mm2_28nm"],
         }
-        for title, mm2 in counted.items():
+        for title, mm2 in scopes.items():
             times = mm2 / chip["mm2"]
             rows.append([LIBRARIES[library], title, f"{mm2:.2f}", f"{times:.2f}", f"{faster / times:.1f}"])
     chip_mm2 = next(iter(reports.values()))["chip"]["mm2"]
-    titles = ["library", "counted", "mm² at 28 nm", f"of the chip's {chip_mm2:g} mm²"]
-    return markdown([*titles, f"what remains of {faster:.1f} times its rays per cycle"], rows)
+    titles = ["library", "scope", "area, mm² at 28 nm", f"relative to the chip's {chip_mm2:g} mm²"]
+    return markdown([*titles, f"rays per cycle at equal area (of {faster:.1f}×)"], rows)

@@ -1,6 +1,6 @@
-"""Writes the tables of ``docs/ppa.md`` from the data that `tools/ppa` measured.
+"""Generates the tables of ``docs/ppa.md`` from the data of `tools/ppa`.
 
-A table stands between ``<!-- NAME -->`` and ``<!-- end -->``; everything else of the page is left alone.
+A table replaces the text between ``<!-- NAME -->`` and ``<!-- end -->``; the rest of the page stays as it is.
 Run as ``python -m colonnade.ppa.pages.page DOCS``.
 """
 
@@ -18,19 +18,19 @@ from colonnade.common.markdown import markdown
 from colonnade.ppa.netlist.hierarchy import LEVELS
 from colonnade.ppa.pages.area import equal_area, gates
 from colonnade.ppa.pages.power import power_table, unit_power_table
-from colonnade.ppa.pages.text import LIBRARIES, MOST_FO4, TITLES, second_opinion
+from colonnade.ppa.pages.text import LIBRARIES, MAX_FO4, TITLES, format_opensta
 from colonnade.ppa.pages.tree import bvh, gain, nodes
 
 Data = Mapping[str, Any]
 
-#: Smaller tables are left out of the page.
-LEAST_BITS = 100
+#: Smallest flip-flop table on the page.
+MIN_BITS = 100
 
 _TABLE = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def page(text: str, data: Path) -> str:
-    """The page with its tables written anew from the folder `data`."""
+    """The page with new tables from the folder `data`."""
 
     def replaced(match: re.Match[str]) -> str:
         kind, _, precision = match[2].partition("_")
@@ -49,7 +49,7 @@ def page(text: str, data: Path) -> str:
 
 
 def units(reports: Mapping[str, Data]) -> str:
-    """kGE of each unit by each library, its share, its slowest path."""
+    """Area, share and slowest path of each unit, by library."""
     first = next(iter(reports.values()))
     timed = [name for name, report in reports.items() if report["technology"]["liberty"]]
     titles = ["unit", *(f"kGE, {LIBRARIES[name]}" for name in reports), "share", "flip-flops"]
@@ -69,7 +69,7 @@ def units(reports: Mapping[str, Data]) -> str:
 
 
 def _parts(unit: Data, same: Sequence[Data], of_timed: Sequence[Data]) -> list[list[str]]:
-    """Rows of what a unit is in part: its dividers and square roots, all of a kind together."""
+    """Rows of a unit's parts: dividers and square roots, summed by module."""
     rows = []
     for part, facts in unit.get("parts", {}).items():
         kge = (_of_part(each, part, "kge", ".1f") for each in same)
@@ -80,13 +80,13 @@ def _parts(unit: Data, same: Sequence[Data], of_timed: Sequence[Data]) -> list[l
 
 
 def _of_part(unit: Data, part: str, key: str, form: str) -> str:
-    """A figure of a part; a dash where this library's report is older than its parts."""
+    """A figure of a part; a dash if the report of this library lacks it."""
     facts = unit.get("parts", {}).get(part)
     return f"{facts[key]:{form}}" if facts else "–"
 
 
 def totals(reports: Mapping[str, Data]) -> str:
-    """Render unit, column and array."""
+    """Area of render unit, column and array."""
     rows = []
     for level in LEVELS:
         for library, report in reports.items():
@@ -97,7 +97,7 @@ def totals(reports: Mapping[str, Data]) -> str:
             rows.append([*row, f"{total['logic_mm2_28nm']:.3f}", f"{total['mm2_28nm']:.3f}"])
     chip = next(iter(reports.values()))["chip"]
     row = [
-        "the chip ÷ 80",
+        "chip ÷ 80",
         "–",
         "–",
         "–",
@@ -106,53 +106,53 @@ def totals(reports: Mapping[str, Data]) -> str:
         "–",
         f"{chip['mm2'] / chip['units']:.3f}",
     ]
-    rows += [row, ["the chip", "–", "–", "–", "–", f"{chip['kge_per_unit'] * 80:,.0f}", "–", f"{chip['mm2']:.2f}"]]
-    titles = ["", "library", "logic, kGE", "logic, mm²", "memory, kbit", "with memory, kGE"]
-    return markdown([*titles, "logic scaled to 28 nm, mm²", "with memory at 28 nm, mm²"], rows)
+    rows += [row, ["chip", "–", "–", "–", "–", f"{chip['kge_per_unit'] * 80:,.0f}", "–", f"{chip['mm2']:.2f}"]]
+    titles = ["level", "library", "logic, kGE", "logic, mm²", "memory, kbit", "logic and memory, kGE"]
+    return markdown([*titles, "logic at 28 nm, mm²", "logic and memory at 28 nm, mm²"], rows)
 
 
 def tables(reports: Mapping[str, Data]) -> str:
-    """The memories of a render unit that are flip-flops."""
+    """The flip-flop tables of a render unit."""
     report = next(iter(reports.values()))
     rows = [
         [f"`{table['name']}`", table["unit"], str(table["count"]), f"{table['bits']:,}"]
         for table in report["flop_tables"]
-        if table["level"] == "render_unit" and table["bits"] >= LEAST_BITS
+        if table["level"] == "render_unit" and table["bits"] >= MIN_BITS
     ]
-    return markdown(["table (depth × width)", "unit", "of them", "bits"], rows)
+    return markdown(["table (depth × width)", "unit", "instances", "bits"], rows)
 
 
 def paths(reports: Mapping[str, Data]) -> str:
-    """The slowest paths, and the units above the limit."""
+    """The slowest paths, and the units above `MAX_FO4`."""
     rows, above = [], []
     for library, report in reports.items():
         if not report["technology"]["liberty"]:
             continue
         slowest, whole = report["slowest_path"], (report["render_unit_paths"] or {}).get("register_to_register")
-        found = [(f"within a unit: {slowest['unit']}", slowest), ("a render unit, across its units", whole)]
+        found = [(f"within one unit: {slowest['unit']}", slowest), ("across units of a render unit", whole)]
         for title, path in found:
             if path:
                 row = [title, LIBRARIES[library], f"{path['ns']:.3f}", f"{path['fo4']:.1f}"]
                 rows.append([*row, f"`{path['from']}`", f"`{path['to']}`", str(path["gates"])])
         for name, unit in report["units"].items():
             path = (unit["paths"] or {}).get("register_to_register")
-            if path and path["fo4"] > MOST_FO4:
+            if path and path["fo4"] > MAX_FO4:
                 above.append(f"{name} ({path['fo4']:.0f} with {LIBRARIES[library]})")
     if not rows:
         return ""
-    opinions = [
-        f"with {LIBRARIES[library]} {second_opinion(report['opensta'])}"
+    comparisons = [
+        f"with {LIBRARIES[library]} {format_opensta(report['opensta'])}"
         for library, report in reports.items()
         if report["opensta"]
     ]
-    verdict = f"Against OpenSTA, {'; '.join(opinions)}. " if opinions else ""
-    verdict += f"Units above {MOST_FO4} FO4: {', '.join(above) or 'none'}."
+    head = f"Compared with OpenSTA: {'; '.join(comparisons)}. " if comparisons else ""
+    head += f"Units above {MAX_FO4} FO4: {', '.join(above) or 'none'}."
     titles = ["slowest path", "library", "ns", "FO4", "from", "to", "gates"]
-    return f"{verdict}\n\n{markdown(titles, rows)}"
+    return f"{head}\n\n{markdown(titles, rows)}"
 
 
 def ecp5(data: Path) -> str:
-    """The FPGA's figures."""
+    """Utilisation of the FPGA."""
     file = data / "ppa-ecp5.json"
     if not file.is_file():
         return ""
@@ -162,18 +162,18 @@ def ecp5(data: Path) -> str:
     ]
     depth = report["config"]["columnBvhMemory"]["depth"]
     clock = "–" if report["fmax_mhz"] is None else f"{report['fmax_mhz']:.1f} MHz"
-    return f"{depth:,} records; fmax {clock}.\n\n{markdown([report['target'], 'used', 'there are'], rows)}"
+    return f"{depth:,} records; fmax {clock}.\n\n{markdown([report['target'], 'used', 'available'], rows)}"
 
 
 def libraries(data: Path) -> str:
-    """What the libraries' gate and FO4 are."""
+    """The libraries: gate equivalent, FO4 and target delay."""
     rows = []
     for library, report in _reports(data, "32b32s64d").items():
         used = report["technology"]
         if used["liberty"]:
             row = [LIBRARIES[library], ", ".join(used["liberty"]), f"{used['um2_per_gate']:g}"]
             rows.append([*row, f"{used['fo4_ns'] * 1e3:.1f}", used["fo4"], f"{used['delay_target_ns']:.3f}"])
-    titles = ["library", "files", "µm² a gate", "FO4, ps", "FO4 is", "abc's target, ns"]
+    titles = ["library", "files", "µm² per GE", "FO4, ps", "definition of FO4", "target delay of abc, ns"]
     return markdown(titles, rows) if rows else ""
 
 
@@ -185,11 +185,11 @@ def _reports(data: Path, precision: str) -> dict[str, Data]:
 def _fo4(path: Data | None) -> str:
     if path is None:
         return "–"
-    return f"**{path['fo4']:.0f}**" if path["fo4"] > MOST_FO4 else f"{path['fo4']:.0f}"
+    return f"**{path['fo4']:.0f}**" if path["fo4"] > MAX_FO4 else f"{path['fo4']:.0f}"
 
 
 def main(docs: Path) -> None:
-    """Rewrite the tables of the page in the folder `docs`."""
+    """Update the tables of ``ppa.md`` in the folder `docs`."""
     file = docs / "ppa.md"
     text = page(file.read_text(), docs / "data")
     with replacing(file) as stream:

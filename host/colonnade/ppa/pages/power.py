@@ -1,4 +1,4 @@
-"""The tables of power in ``docs/ppa.md``."""
+"""Tables of ``docs/ppa.md``: power of a render unit."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from colonnade.ppa.pages.text import LIBRARIES
 
 Data = Mapping[str, Any]
 
-#: The chip: mW of all, in nJ a ray, by the paper.
+#: The paper's chip: power, ray rate and number of render units.
 PAPER_MILLIWATTS, PAPER_RAYS_PER_SECOND, PAPER_UNITS = 69.5, 41.6e6, 80
 
 
 def power_table(reports: Mapping[str, Data]) -> str:
-    """A render unit by each library, with and without glitches, and scaled to the chip's node."""
+    """Power of a render unit by library, with and without glitches, and scaled to the chip's node."""
     rows: list[list[str]] = []
     heads = []
     for library, report in _measured(reports).items():
@@ -32,21 +32,22 @@ def power_table(reports: Mapping[str, Data]) -> str:
         size = "×".join(map(str, scene["size"]))
         heads.append(
             f"{LIBRARIES[library]}: {power['clock_mhz']:g} MHz; {scene['mesh']} at {size}, "
-            f"{window['cycles']:,} cycles with {window['rays']:,} rays, {window['rays_in_box']:,} of them in box, "
-            f"{window['hits']:,} hits; × {power['scale_to_28nm']:.3f} to 28 nm."
+            f"{window['cycles']:,} cycles with {window['rays']:,} rays, {window['rays_in_box']:,} in-box rays, "
+            f"{window['hits']:,} hits; scaling to 28 nm: × {power['scale_to_28nm']:.3f}."
         )
     if not rows:
         return ""
     each = PAPER_MILLIWATTS / PAPER_UNITS
     energy = f"{PAPER_MILLIWATTS * 1e6 / PAPER_RAYS_PER_SECOND:.2f}"
-    rows.append(["the chip ÷ 80, whole", *[""] * 8, f"{each:.2f}", energy])
-    titles = ["library", "", "dynamic, mW", "of it clock pins", "leakage", "memories", "total, mW", "nJ a ray in box"]
-    table = markdown([*titles, "nJ a ray", "at 28 nm, mW", "nJ a ray in box, 28 nm"], rows)
+    rows.append(["chip ÷ 80, total", *[""] * 8, f"{each:.2f}", energy])
+    titles = ["library", "glitches", "dynamic, mW", "clock pins, mW", "leakage, mW", "memories, mW", "total, mW"]
+    titles += ["nJ per in-box ray", "nJ per ray"]
+    table = markdown([*titles, "total at 28 nm, mW", "nJ per in-box ray at 28 nm"], rows)
     return "\n".join(heads) + f"\n\n{table}"
 
 
 def unit_power_table(reports: Mapping[str, Data]) -> str:
-    """mW of each unit of a render unit, with glitches, and its share."""
+    """Power of each unit of a render unit with glitches, and its share."""
     found = _measured(reports)
     if not found:
         return ""
@@ -59,7 +60,7 @@ def unit_power_table(reports: Mapping[str, Data]) -> str:
             row += [f"{unit['power_mw']:.3f}", f"{unit['clock_mw']:.3f}", f"{100 * unit['power_mw'] / total:.0f} %"]
         rows.append(row)
     titles = [
-        f"{title}, {LIBRARIES[library]}" for library in found for title in ("with glitches, mW", "of it clock", "share")
+        f"{title}, {LIBRARIES[library]}" for library in found for title in ("total, mW", "clock pins, mW", "share")
     ]
     return markdown(["unit", *titles], rows)
 

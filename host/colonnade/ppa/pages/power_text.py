@@ -1,4 +1,4 @@
-"""The power of a report as text."""
+"""The power section of the text report."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 from colonnade.ppa.netlist.memories import CHIP_NODE
 from colonnade.ppa.power.report import VOLTAGE_28NM
 
-#: Keys of the two figures, and what they are called.
+#: Titles of the two power figures, by key.
 KINDS = {"zero_delay": "without glitches", "glitch_aware": "with glitches"}
 
 
 def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
-    """Power of a render unit and of its units, energy of a ray, and how they were obtained."""
+    """Power of a render unit and of its units, energy per ray, and the method."""
     power = report["power"]
     window, scene = power["window"], power["scene"]
     yield ""
@@ -21,35 +21,35 @@ def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
     yield (
         f"power of a render unit at {power['clock_mhz']:g} MHz and {power['volts']:g} V: {scene['mesh']}, "
         f"{width}×{height}, {window['cycles']:,} cycles, {window['pixels']:,} pixels, {window['rays']:,} rays, "
-        f"{window['rays_in_box']:,} of them in box, {window['hits']:,} hits"
+        f"{window['rays_in_box']:,} in-box rays, {window['hits']:,} hits"
     )
     for kind, title in KINDS.items():
         figures = power[kind]
         yield (
             f"  {title}: {figures['total_mw']:.3f} mW ({figures['dynamic_mw']:.3f} dynamic, "
-            f"{figures['clock_mw']:.3f} of it clock pins; {figures['leakage_mw']:.4f} leakage; "
-            f"{figures['memory_mw']:.3f} memories), {figures['energy_per_ray_nj']:.3f} nJ a ray in box, "
-            f"{figures['energy_per_any_ray_nj']:.3f} nJ a ray"
+            f"including {figures['clock_mw']:.3f} at clock pins; {figures['leakage_mw']:.4f} leakage; "
+            f"{figures['memory_mw']:.3f} memories), {figures['energy_per_ray_nj']:.3f} nJ per in-box ray, "
+            f"{figures['energy_per_any_ray_nj']:.3f} nJ per ray"
         )
         scaled = figures["at_28nm"]
         yield (
             f"    dynamic × {power['scale_to_28nm']:.3f} (C·V², to {CHIP_NODE} and {VOLTAGE_28NM} V), with memories: "
-            f"{scaled['total_mw']:.3f} mW, {scaled['energy_per_ray_nj']:.3f} nJ a ray in box"
+            f"{scaled['total_mw']:.3f} mW, {scaled['energy_per_ray_nj']:.3f} nJ per in-box ray"
         )
     memories = power["memories_mw"]
     yield (
-        f"  memories, at {power['memory_pj_per_bit']} pJ a bit: {memories['own']:.4f} mW the unit's own, "
-        f"{memories['records']:.4f} its share of the column's records"
+        f"  memories, at {power['memory_pj_per_bit']} pJ per bit: {memories['own']:.4f} mW in the render unit, "
+        f"{memories['records']:.4f} mW for its share of the column memory"
     )
     units = {name: unit for name, unit in report["units"].items() if "power_mw" in unit}
     parts = ", ".join(f"{name} {unit['power_mw']:.3f}" for name, unit in units.items())
-    yield f"  of it, with glitches, mW: {parts}"
+    yield f"  by unit, with glitches, mW: {parts}"
     yield (
-        "  By a replay on the gates, held against the RTL in every cycle; no wires, no clock tree; leakage is the mean "
-        "of a cell's states. The column's and the array's own units are not in it."
+        "  Method: replay on the gate netlist, checked against the RTL in every cycle; no wires, no clock tree; mean "
+        "leakage over the states of a cell. Units of column and array are not included."
     )
     if power["opensta_mw"] is not None:
         gates = power["glitch_aware"]["dynamic_mw"] + power["glitch_aware"]["leakage_mw"]
-        yield f"  OpenSTA, on PATH, with the same activities: {power['opensta_mw']:.3f} mW of gates; ours {gates:.3f}"
+        yield f"  gates by OpenSTA with the same activity: {power['opensta_mw']:.3f} mW; ours: {gates:.3f} mW"
     elif power["opensta_is_there"]:
-        yield "  OpenSTA, on PATH, reads no SAIF: no second opinion on power."
+        yield "  The OpenSTA on PATH cannot read SAIF: power is not cross-checked."

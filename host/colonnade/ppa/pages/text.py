@@ -1,4 +1,4 @@
-"""The report of ``colonnade ppa`` as text."""
+"""The text report of ``colonnade ppa``."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from typing import Any
 
 from colonnade.common.text_table import Column, Table
 from colonnade.ppa.netlist.hierarchy import LEVELS
-from colonnade.ppa.netlist.memories import CHIP_NODE, LEAST_SRAM_WORDS, REGISTER_FILE, SRAM, Rate
+from colonnade.ppa.netlist.memories import CHIP_NODE, MIN_SRAM_WORDS, REGISTER_FILE, SRAM, Rate
 from colonnade.ppa.pages.power_text import power_lines
 
-#: What the hardware's rule allows between two registers.
-MOST_FO4 = 100
+#: Design rule: maximum delay between two registers, FO4.
+MAX_FO4 = 100
 
-#: The files of a precision in the page's data, and what their columns are called.
+#: Column titles of the libraries, by the name in the data files.
 LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
 
 TITLES = {"render_unit": "render unit", "column": "column", "array": "array"}
 
 
 class UnitTable:
-    """A row for each unit as soon as it is synthesised."""
+    """A table with one row per unit, printed as soon as the unit is synthesised."""
 
     def __init__(self, echo: Callable[[str], None]) -> None:
         path = "FO4 of the slowest path"
         self._table = Table(
             (
-                Column("part of", 11, is_text=True),
+                Column("level", 11, is_text=True),
                 Column("unit", 19, is_text=True),
                 Column("kGE", 7, ".2f"),
                 Column("flops", 7, ".2f", group="of which"),
@@ -43,7 +43,7 @@ class UnitTable:
         )
 
     def print(self, level: str, name: str, unit: Mapping[str, Any]) -> None:
-        """The row of one unit."""
+        """Print the row of a unit, and one for each of its parts."""
         paths = unit["paths"] or {}
         fo4 = [(paths.get(kind) or {}).get("fo4") for kind in PATHS]
         self._table.print(
@@ -66,53 +66,54 @@ PATHS = ("register_to_register", "input_to_register", "register_to_output", "inp
 
 
 def summary(report: Mapping[str, Any]) -> Iterator[str]:
-    """Totals, memories, the slowest path, and how the figures were obtained."""
+    """Totals, memories, slowest paths, power, and the method."""
     chip, used = report["chip"], report["technology"]
     yield ""
     for level in LEVELS:
         total = report["levels"][level.name]
         copies = total["of_the_level_below"]
         yield (
-            f"{TITLES[level.name]}{f' ({copies} of the above and its own)' if copies else ''}: "
+            f"{TITLES[level.name]}{f' (its units and {copies} × the level above)' if copies else ''}: "
             f"{total['logic_kge']:,.1f} kGE of logic, {total['memory_bits']:,} bits of memory"
             f"{_um2(total['logic_um2'])}; at {CHIP_NODE} {total['logic_mm2_28nm']:,.3f} mm² of logic, "
-            f"{total['mm2_28nm']:,.3f} with memories"
+            f"{total['mm2_28nm']:,.3f} mm² with memories"
         )
     yield (
-        f"render unit with its memories: {report['render_unit_kge']:,.1f} kGE; the chip's: {chip['kge_per_unit']:.0f} "
-        f"({chip['mm2']} mm² / {chip['units']}, memories and all, at {chip['um2_per_gate']} µm² a gate)"
+        f"render unit with memories: {report['render_unit_kge']:,.1f} kGE; the chip: {chip['kge_per_unit']:.0f} kGE "
+        f"({chip['mm2']} mm² / {chip['units']} with everything, at {chip['um2_per_gate']} µm² per GE)"
     )
     for name, memory in report["memories"].items():
         yield (
             f"memory {name}, in {memory['unit']}: {memory['count']} × {memory['depth']:,} × {memory['width']} bits, "
-            f"{_per_node(memory, 'um2', ',.0f')} µm², {_per_node(memory, 'read_pj', '.1f')} pJ a read"
+            f"{_per_node(memory, 'um2', ',.0f')} µm², {_per_node(memory, 'read_pj', '.1f')} pJ per read"
         )
     tables = [table for table in report["flop_tables"] if table["level"] == "render_unit"]
     largest = (f"{table['name']} in {table['unit']}" for table in tables[:3])
     yield (
-        f"tables of a render unit that are flip-flops, and counted as such: "
-        f"{sum(table['bits'] for table in tables):,} bits; the largest are {', '.join(largest)}"
+        f"flip-flop tables of a render unit: {sum(table['bits'] for table in tables):,} bits; "
+        f"the largest are {', '.join(largest)}"
     )
     slowest, whole = report["slowest_path"], report["render_unit_paths"]
     if slowest["unit"]:
-        yield f"slowest path within a unit: {_path(slowest)}, in {slowest['unit']}"
+        yield f"slowest path within one unit: {_path(slowest)}, in {slowest['unit']}"
     if whole and whole["register_to_register"]:
-        yield f"slowest path of a render unit, across its units: {_path(whole['register_to_register'])}"
+        yield f"slowest path across units of a render unit: {_path(whole['register_to_register'])}"
     if report["opensta"]:
-        yield f"OpenSTA, on PATH, as a second opinion on these paths: {second_opinion(report['opensta'])}"
+        yield f"paths compared with OpenSTA: {format_opensta(report['opensta'])}"
     if report["power"]:
         yield from power_lines(report)
     yield ""
-    yield f"kGE: {used['gates']}. Memories: {_rates()}; in kGE as area of {CHIP_NODE}."
+    yield f"kGE: {used['gates']}. Memories: {_rates()}; their kGE are area at {CHIP_NODE}."
     if used["liberty"]:
         yield f"Library: {', '.join(used['liberty'])}; FO4 is {used['fo4_ns'] * 1e3:.1f} ps: {used['fo4']}."
         yield f"Delays: {used['timing']}; target {used['delay_target_ns']:g} ns."
-    yield f"At {CHIP_NODE}: gates × {chip['um2_per_gate']} µm², no gaps; a scaling by gate count, not a synthesis."
+    yield f"At {CHIP_NODE}: gate count × {chip['um2_per_gate']} µm², without gaps; scaled, not synthesised."
 
 
-def second_opinion(opinion: Mapping[str, Any]) -> str:
-    """How far our paths are from OpenSTA's."""
-    return f"ours are {opinion['least']:+.1%} to {opinion['most']:+.1%} longer than its, over {opinion['units']} units"
+def format_opensta(comparison: Mapping[str, Any]) -> str:
+    """The deviation of our slowest paths from OpenSTA's."""
+    least, most = comparison["least"], comparison["most"]
+    return f"our slowest paths deviate by {least:+.1%} to {most:+.1%} over {comparison['units']} units"
 
 
 def _path(path: Mapping[str, Any]) -> str:
@@ -129,7 +130,7 @@ def _per_node(memory: Mapping[str, Any], key: str, form: str) -> str:
 
 def _rates() -> str:
     def of(rates: Mapping[str, Rate]) -> str:
-        each = (f"{rate.um2_per_bit} µm² and {rate.pj_per_bit} pJ a bit at {node}" for node, rate in rates.items())
+        each = (f"{rate.um2_per_bit} µm² and {rate.pj_per_bit} pJ per bit at {node}" for node, rate in rates.items())
         return "; ".join(each)
 
-    return f"SRAM {of(SRAM)}, or below {LEAST_SRAM_WORDS} words register files {of(REGISTER_FILE)}"
+    return f"SRAM with {of(SRAM)}; below {MIN_SRAM_WORDS} words register files with {of(REGISTER_FILE)}"

@@ -1,4 +1,4 @@
-"""The tables in ``docs/ppa.md`` of what the tree costs and saves."""
+"""Tables of ``docs/ppa.md``: cost and gain of the BVH."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from colonnade.evaluation.bench import geometric_mean
 
 
 def bvh(data: Path) -> str:
-    """What the acceleration structure costs in gates."""
+    """Cost of the BVH in gates."""
     files = data / "ppa-32b32s64d-yosys.json", data / "ppa-no-bvh-yosys.json"
     if not all(file.is_file() for file in files):
         return ""
@@ -23,11 +23,11 @@ def bvh(data: Path) -> str:
         rows.append([f"render unit: {title}", f"{on / scale:,.1f}", f"{off / scale:,.1f}", more])
     on, off = (report["levels"]["array"]["logic_kge"] for report in (tree, none))
     rows.append(["array: logic, kGE", f"{on:,.1f}", f"{off:,.1f}", f"{on / off - 1:+.1%}"])
-    return markdown(["", "with a BVH", "without", "for the BVH"], rows)
+    return markdown(["figure", "with BVH", "without BVH", "overhead"], rows)
 
 
 def nodes(data: Path) -> str:
-    """What the acceleration structure costs in memory."""
+    """Cost of the BVH in memory records."""
     file = data / "ppa-nodes.json"
     if not file.is_file():
         return ""
@@ -41,12 +41,12 @@ def nodes(data: Path) -> str:
             [*row, f"{none['records']:,}", f"{tree['nodes'] / none['records']:+.1%}", f"{overheads[-1] - 1:+.1%}"]
         )
     row = ["geometric mean", *[""] * 6, f"{geometric_mean(overheads) - 1:+.1%}"]
-    titles = ["mesh", "triangles", "nodes", "triangle records", "attribute records", "without a tree, all"]
-    return markdown([*titles, "nodes alone", "overhead"], [*rows, row])
+    titles = ["mesh", "triangles", "nodes", "triangle records", "attribute records", "all records without BVH"]
+    return markdown([*titles, "overhead of the nodes", "total overhead"], [*rows, row])
 
 
 def gain(data: Path) -> str:
-    """What the acceleration structure saves in cycles."""
+    """Gain of the BVH in cycles."""
     file = data / "ppa-gain.json"
     if not file.is_file():
         return ""
@@ -62,10 +62,9 @@ def gain(data: Path) -> str:
         rows.append(row)
     means = (["", "", "", f"**{reduction['geomean_gain']:.1f}**"] for reduction in reductions)
     rows.append(["geometric mean", *(cell for mean in means for cell in mean)])
-    titles = ["triangles", "cycles with a tree", "without", "times fewer"] * len(reductions)
+    titles = ["triangles", "cycles with BVH", "cycles without BVH", "speed-up"] * len(reductions)
     width, height = report["size"]
     array = report["config"]["array"]
-    head = (
-        f"{array['rows']}×{array['columns']} render units, {width}×{height}; the paper: {report['paper_gain']} times."
-    )
-    return f"{head}\n\n{markdown(['mesh, reduced', *titles], rows)}"
+    size = f"{array['rows']}×{array['columns']} render units, {width}×{height}"
+    head = f"{size}; speed-up of the paper: {report['paper_gain']}."
+    return f"{head}\n\n{markdown(['reduced mesh', *titles], rows)}"

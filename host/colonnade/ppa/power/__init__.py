@@ -1,1 +1,1 @@
-"""Power: recorded traffic, its replay on gates, and the energy of each transition."""
+"""Power: port recordings of the RTL, their replay on the gate netlist, and the energy per transition."""

@@ -1,7 +1,7 @@
-"""Power of a netlist from the activity of its nets, by the tables of the library.
+"""Power of a netlist from the activity of its nets and the tables of the library.
 
-Dynamic power is ½CV² of every input pin that changes, with no wires, and the cells' internal energies by the tables,
-clock pins among both; leakage is the mean over a cell's states. What a pin takes counts for the unit that has it.
+Dynamic power is ½CV² of each transition at an input pin, without wires, plus the internal energy of the cell. Both
+include clock pins. Leakage is the mean over a cell's states. The power of a pin belongs to the unit of its cell.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from colonnade.ppa.timing.delays import NetTiming
 
 @dataclass(frozen=True)
 class Power:
-    """Of one unit, in mW.
+    """Power of one unit, mW.
 
     Attributes:
-        clock: of dynamic power, what the clock pins of registers take.
-        dynamic: all dynamic power, that of the clock pins included.
-        leakage: of the cells.
+        clock: Dynamic power of the clock pins of registers.
+        dynamic: All dynamic power, including clock pins.
+        leakage: Leakage power.
     """
 
     clock: float
@@ -38,15 +38,15 @@ def power_of(
     cycles: int,
     megahertz: float,
 ) -> dict[str, Power]:
-    """The power of each owner of instances.
+    """The power of each module that contains instances, by `Instance.owner`.
 
     Args:
-        netlist: the gates.
-        energies: of their cells.
-        timing: slews and loads of the nets.
-        changes: of each net in all cycles.
-        cycles: how many.
-        megahertz: the clock.
+        netlist: The gates.
+        energies: Energies of the cells.
+        timing: Slews and loads of the nets.
+        changes: Transitions of each net over all cycles.
+        cycles: Number of cycles.
+        megahertz: Clock frequency, MHz.
     """
     clock, dynamic, leakage = (
         defaultdict[str, float](float),
@@ -69,20 +69,20 @@ def power_of(
             dynamic[owner] += each * changes[net]
             if name in clocked:
                 clock[owner] += each * changes[net]
-    # pJ a cycle times MHz are µW
+    # pJ per cycle × MHz = µW
     scale = megahertz / cycles / 1e3
     return {owner: Power(clock[owner] * scale, dynamic[owner] * scale, leakage[owner]) for owner in leakage}
 
 
 def _clock_pins(instance: Instance) -> tuple[str, ...]:
-    """Those whose power is the clock's: of a flip-flop one, of a clock gate the clock's way through it."""
-    state, gate = instance.cell.state, instance.cell.clock_gate
+    """The clock pins of a cell: the clock of a flip-flop, or the clock input and output of a clock gate."""
+    state, gate = instance.cell.flip_flop, instance.cell.clock_gate
     return (gate.clock, gate.gated) if gate else (state.clock,) if state else ()
 
 
 def _slew(instance: Instance, timing: NetTiming) -> float:
-    """Of what may change a gate's output: the clock, or the mean of its inputs."""
-    state = instance.cell.state
+    """The slew that drives an output: that of the clock, or the mean over the inputs, ns."""
+    state = instance.cell.flip_flop
     if state is not None:
         return timing.slews[instance.nets[state.clock]]
     slews = [timing.slews[net] for pin, net in instance.nets.items() if instance.cell.pins[pin].direction == "input"]

@@ -1,4 +1,4 @@
-"""A netlist as ``harness/gates.cpp`` reads it: gates as truth tables with delays, registers, memories."""
+"""The netlist file of ``harness/gates.cpp``: gates as truth tables with delays, registers and memories."""
 
 from __future__ import annotations
 
@@ -12,21 +12,25 @@ from colonnade.ppa.netlist.hierarchy import Hierarchy
 from colonnade.ppa.netlist.mapped import Bit, Box, Instance, Netlist
 from colonnade.ppa.power.recording import CLOCK, Port
 
-#: What a register behind a clock gate also looks at: the gate's enable, and itself.
+#: Extra inputs of a register behind a clock gate: the gate's enable, and the register itself.
 _ENABLE, _HELD = "clock_gate_enables", "register_holds"
 
 
 def lines(
     netlist: Netlist, hierarchy: Hierarchy, delays: Sequence[int], inputs: Sequence[Port], outputs: Sequence[Port]
 ) -> Iterator[str]:
-    """The netlist's items.
+    """The lines of the netlist file.
 
     Args:
-        netlist: the gates.
-        hierarchy: knows the memories' shapes.
-        delays: of each net's driver in ps.
-        inputs: those of the netlist but the clock, as they are joined.
-        outputs: those of the netlist, as they are joined.
+        netlist: The gates.
+        hierarchy: The hierarchy of the design, for the shapes of memories.
+        delays: Delay of each net's driver, ps.
+        inputs: The netlist's inputs without the clock, most significant first.
+        outputs: The netlist's outputs, most significant first.
+
+    Raises:
+        UserError: The library has a register that is not a plain flip-flop.
+        RuntimeError: A net has no driver, or a register has another clock.
     """
     require_all_driven(netlist)
     yield f"nets {netlist.size}"
@@ -53,14 +57,14 @@ def lines(
 
 
 def require_all_driven(netlist: Netlist) -> None:
-    """Fail on a net that something reads and nothing drives: the netlist and its parts do not match."""
+    """Raise a `RuntimeError` if a net is read but not driven: then the parts of the netlist do not match."""
     driven = {net for net, _, _ in netlist.drivers()} | netlist.driven_outside | set(netlist.ties)
     read = set(netlist.read_outside)
     for instance in netlist.instances:
         read.update(net for pin, net in instance.nets.items() if instance.cell.pins[pin].direction == "input")
     missing = sorted(netlist.names.get(net, f"net {net}") for net in read - driven)
     if missing:
-        raise RuntimeError(f"{len(missing)} nets of the gates have no driver, {missing[0]} among them")
+        raise RuntimeError(f"{len(missing)} nets of the gate netlist have no driver, such as {missing[0]}")
 
 
 def _register(
@@ -72,18 +76,18 @@ def _register(
     gates: Mapping[int, Bit],
     tables: dict[tuple[str, ...], str],
 ) -> str:
-    """One output of a flip-flop. It begins as if it had taken zero: so does a register of the simulated RTL.
+    """One output of a flip-flop. Its state starts at zero, as in the simulated RTL.
 
-    Behind a clock gate, one of `gates`, it keeps its value where the gate is not enabled.
+    Behind a clock gate, one of `gates`, it keeps its value unless the gate is enabled.
     """
-    cell, state = instance.cell, instance.cell.state
-    if state is None or re.search(rf"\b({state.name}|{state.inverse})\b", state.following):
-        raise UserError(f"{cell.name} of the liberty is no plain flip-flop: power knows no others")
+    cell, state = instance.cell, instance.cell.flip_flop
+    if state is None or re.search(rf"\b({state.name}|{state.inverse})\b", state.next_state):
+        raise UserError(f"{cell.name} of the liberty is not a plain flip-flop, which power estimation needs")
     clock = instance.nets.get(state.clock, -1)
     if clock not in gates:
         _require_clock(instance, state.clock, netlist)
     function = re.sub(rf"\b{state.inverse}\b", f"(!{state.name})", cell.pins[pin].function)
-    following = re.sub(rf"\b{state.name}\b", f"({state.following})", function)
+    following = re.sub(rf"\b{state.name}\b", f"({state.next_state})", function)
     first = _function(instance, following, tables)[0][0]
     if clock in gates:
         enable = gates[clock]
@@ -97,11 +101,11 @@ def _register(
 
 def _require_clock(instance: Instance, pin: str, netlist: Netlist) -> None:
     if [instance.nets.get(pin)] != netlist.inputs[CLOCK]:
-        raise RuntimeError(f"the register {instance.name or instance.cell.name} has another clock than the others")
+        raise RuntimeError(f"the register {instance.name or instance.cell.name} is not driven by the port {CLOCK}")
 
 
 def _function(instance: Instance, function: str, tables: dict[tuple[str, ...], str]) -> tuple[str, str]:
-    """The table of a function over the nets of an instance, and these nets."""
+    """The truth table of a function over the nets of an instance, and these nets."""
     pins = [pin for pin in sorted(set(re.findall(r"[A-Za-z_]\w*", function))) if pin in instance.nets]
     ties = tuple(f"{pin}={value:d}" for pin, value in sorted(instance.ties.items()))
     key = (function, *pins, *ties)
@@ -113,10 +117,10 @@ def _function(instance: Instance, function: str, tables: dict[tuple[str, ...], s
 
 
 def _ports(box: Box) -> Iterator[str]:
-    """The ports of one of firtool's memories."""
+    """The port lines of a firtool memory."""
     kinds = sorted({port.split("_")[0] for port in box.ports})
     if any("mask" in port for port in box.ports) or not all(re.fullmatch(r"(RW|R|W)\d+", kind) for kind in kinds):
-        raise RuntimeError(f"memory {box.kind} has ports that the replay does not know: {', '.join(box.ports)}")
+        raise RuntimeError(f"memory {box.kind} has ports that the replay does not support: {', '.join(box.ports)}")
     for kind in kinds:
         address, enable = (_joined(box.ports[f"{kind}_{role}"]) for role in ("addr", "en"))
         if kind.startswith("RW"):

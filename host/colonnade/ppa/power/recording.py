@@ -1,7 +1,7 @@
-"""The traffic at the ports of one module while the RTL renders a frame: what a replay on gates needs.
+"""Records the ports of one module while the RTL renders a frame, for a replay on the gate netlist.
 
-A recorder is bound to the module in the simulation. It writes inputs and outputs, as they are just before each clock
-edge, from the cycle in which ``io_start`` begins the frame.
+A recorder is bound to the module in the simulation. It writes inputs and outputs just before each clock edge, from the
+cycle in which ``io_start`` starts the frame.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root, require_program
+from colonnade.device.harness_job import parse_output
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import write_job
 from colonnade.mesh.load import load_mesh
@@ -28,17 +29,17 @@ from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
 
-#: Ports that the replay drives by itself, or that a recording begins with.
+#: Ports with a special role in a recording or its replay.
 CLOCK, RESET, START, ROW = "clock", "reset", "io_start", "io_row"
 
-#: Which of a column's units is recorded.
-CHOSEN_ROW = 0
+#: Row of the recorded render unit in its column.
+RECORDED_ROW = 0
 
 _RECORDER = """
 module ColonnadeRecorder(
   input clock, input reset, input start, input [{inputs}:0] inputs, input [{outputs}:0] outputs
 );
-  integer file, limit, unused, left, rested;
+  integer file, limit, unused, left, idle_cycles;
   initial begin
     left = 0;
     file = $fopen("limit", "r");
@@ -47,8 +48,8 @@ module ColonnadeRecorder(
     file = $fopen("recording", "w");
   end
   always @(posedge clock) begin
-    rested <= reset ? 0 : rested + 1;
-    if (start) $fwrite(file, "%0d\\n", rested);
+    idle_cycles <= reset ? 0 : idle_cycles + 1;
+    if (start) $fwrite(file, "%0d\\n", idle_cycles);
     if (start || left != 0) $fwrite(file, "%h %h\\n", inputs, outputs);
     if (start) left <= limit - 1;
     else if (left != 0) left <= left - 1;
@@ -62,7 +63,7 @@ bind {module} ColonnadeRecorder recorder(
 
 @dataclass(frozen=True)
 class Port:
-    """A port of the module."""
+    """A port of the recorded module."""
 
     name: str
     bits: int
@@ -70,21 +71,21 @@ class Port:
 
 @dataclass(frozen=True)
 class Recording:
-    """What was seen at a module's ports, cycle by cycle.
+    """The values at a module's ports in each cycle.
 
     Attributes:
-        inputs: its inputs but the clock, as they are joined: the first is the most significant.
-        outputs: the same of its outputs.
-        cycles: the joined inputs and outputs of each cycle.
-        rested: cycles between reset and the first of these.
-        scene: what was rendered, in a report.
-        counters: of the whole frame.
+        inputs: Inputs without the clock; concatenated with the first as the most significant.
+        outputs: Outputs, concatenated alike.
+        cycles: Concatenated inputs and concatenated outputs of each cycle.
+        idle_cycles: Cycles between reset and the first recorded one.
+        scene: Mesh, triangles and size, for reports.
+        counters: Counters of the whole frame.
     """
 
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     cycles: tuple[tuple[int, int], ...]
-    rested: int
+    idle_cycles: int
     scene: Mapping[str, Any]
     counters: Mapping[str, int]
 
@@ -97,22 +98,22 @@ class Recording:
                 if port.name == name:
                     mask = (1 << port.bits) - 1
                     return [cycle[index] >> shift & mask for cycle in self.cycles]
-        raise RuntimeError(f"the recorded module has no port {name}: the power of a ray cannot be told")
+        raise RuntimeError(f"the recorded module has no port {name}, which the energy per ray needs")
 
     def fires(self, stream: str) -> list[bool]:
-        """Whether the stream `stream` passes something on, in each cycle."""
+        """Whether the stream `stream` transfers data, in each cycle."""
         pairs = zip(self.of(f"{stream}_valid"), self.of(f"{stream}_ready"), strict=True)
         return [bool(valid and ready) for valid, ready in pairs]
 
 
 @dataclass(frozen=True)
 class Stimulus:
-    """Which frame is rendered, and how much of it is recorded.
+    """The power workload: a frame, and how much of it is recorded.
 
     Attributes:
-        mesh: name or file; the rest of the scene is the benchmark's.
-        size: width and height in pixels; of None see `whole_frame`.
-        cycles: at most so many, from the frame's start.
+        mesh: Name or file; the rest of the scene is the benchmark scene.
+        size: Width and height, pixels; None: `whole_frame`.
+        cycles: Maximum number of recorded cycles from the start of the frame.
     """
 
     mesh: str
@@ -121,13 +122,17 @@ class Stimulus:
 
 
 def whole_frame(rows: int) -> tuple[int, int]:
-    """A size at which the part of each of so many units in a column takes some ten thousand cycles."""
+    """A frame size at which each render unit of a column with `rows` units works for about ten thousand cycles."""
     width = 4 * round(6 * rows**0.5)
     return width, width * 3 // 4
 
 
 def require_recordable(stimulus: Stimulus, manifest: Manifest) -> tuple[Mesh, tuple[int, int]]:
-    """The mesh and the size of the frame; refuses before the work starts what could not be rendered."""
+    """The mesh and the size of the frame, checked before the work starts.
+
+    Raises:
+        UserError: A program is missing, or the mesh or the size is wrong.
+    """
     for program, package in (("verilator", "verilator"), ("g++", "g++"), ("make", "make")):
         require_program(program, "power (--no-power leaves it out)", package)
     size = stimulus.size or whole_frame(int(manifest.config["array"]["rows"]))
@@ -150,12 +155,12 @@ def record(
     """Render a frame on one column of a configuration and record one instance of a module.
 
     Args:
-        config: name of the configuration, with `overrides` applied.
-        overrides: ``key.path=value`` changes.
-        module: name of the module.
-        ports: its ports in Yosys's JSON.
-        stimulus: which frame.
-        progress: shows the steps.
+        config: Configuration, before `overrides`.
+        overrides: Changes to the configuration, ``key.path=value``.
+        module: Name of the module.
+        ports: Ports of the module in Yosys's JSON.
+        stimulus: The workload.
+        progress: Shows the steps.
     """
     one_column = (*overrides, "array.columns=1")
     design = design_for(config, one_column, progress)
@@ -181,9 +186,8 @@ def record(
         if done.returncode != 0:
             raise RuntimeError(f"the simulated hardware failed (status {done.returncode}): {done.stderr[-300:]}")
         lines = (folder / "recording").read_text().split("\n")
-    values = (line.split() for line in done.stdout.splitlines() if line.startswith("value "))
-    read = {name: int(value) for _, name, value in values}
-    counters = {name.removeprefix("counters."): value for name, value in read.items() if name.startswith("counters.")}
+    (output,) = parse_output(done.stdout.splitlines())
+    counters = {name.removeprefix("counters."): n for name, n in output.values.items() if name.startswith("counters.")}
     cycles = tuple((int(line.split()[0], 16), int(line.split()[1], 16)) for line in lines[1:] if line)
     facts = {"mesh": stimulus.mesh, "triangles": len(mesh.faces), "size": list(size)}
     return Recording(joined["input"], joined["output"], cycles, int(lines[0]), facts, counters)
@@ -193,14 +197,14 @@ def record(
 def _with_recorder(
     design: GeneratedDesign, module: str, inputs: Sequence[Port], outputs: Sequence[Port]
 ) -> Iterator[GeneratedDesign]:
-    """The design with the recorder beside it, in a temporary folder."""
+    """A temporary folder with the design and the recorder."""
     names = {port.name for port in inputs}
     text = _RECORDER.format(
         module=module,
         clock=CLOCK,
         reset=RESET,
         start=START,
-        chosen=f" && {ROW} == {CHOSEN_ROW}" if ROW in names else "",
+        chosen=f" && {ROW} == {RECORDED_ROW}" if ROW in names else "",
         inputs=sum(port.bits for port in inputs) - 1,
         outputs=sum(port.bits for port in outputs) - 1,
         input_names=", ".join(port.name for port in inputs),
@@ -209,6 +213,6 @@ def _with_recorder(
     with temporary_folder() as folder:
         for file in design.sources:
             (folder / file.name).symlink_to(file.resolve())
-        # Before the design, which binds it: files are read in the order of their names
+        # Verilator reads files in the order of their names, and the bound recorder must come first
         (folder / "ColonnadeRecorder.sv").write_text(re.sub(r"^\n", "", text))
         yield GeneratedDesign(folder, design.manifest)

@@ -1,11 +1,11 @@
-"""Recorded traffic on the gates: a simulation that counts how often every net changes.
+"""Replays recorded port values on the gate netlist and counts the transitions of each net.
 
-Each gate has one delay, from the liberty's tables, so that glitches show; what a net is at the end of a cycle tells
-what changes without them. Flip-flops and memories begin with zero, as they do in the simulation that was recorded.
-Outputs are held against the recorded ones in every cycle; the data of a stream counts where the stream is valid.
+Each gate has one delay from the liberty's tables, so the count includes glitches. The values at the end of each cycle
+give the transitions without glitches. Flip-flops and memories start at zero, as in the recorded simulation. Outputs are
+compared with the recorded ones in every cycle; the data of a stream only where the stream is valid.
 
-The simulator is ``harness/gates.cpp``. Icarus Verilog was tried first: after more than four minutes of processor time,
-and with a gigabyte, it was still elaborating the 150,000 gates of a render unit.
+The simulator is ``harness/gates.cpp``. Icarus Verilog was too slow: it took more than four minutes and a gigabyte to
+elaborate the 150,000 gates of a render unit.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ from colonnade.ppa.power.recording import CLOCK, RESET, START, Port, Recording
 #: Cycles of reset before the recorded ones.
 RESET_CYCLES = 8
 
-#: Of the rest between reset and a frame as many cycles are replayed as leave this remainder, and this once more:
-#: counters that run freely, with a period that divides it, are then where they were.
-REST_PERIOD = 240
+#: The replay has this many idle cycles between reset and frame, plus the recorded idle cycles modulo this number. So
+#: free-running counters whose period divides it have the recorded values.
+IDLE_PERIOD = 240
 
 
-#: Of the compiler.
+#: Options of the compiler.
 OPTIONS = ("-std=c++17", "-O2", *SAFE)
 
 
 @dataclass(frozen=True)
 class Activity:
-    """What the gates did in the cycles that were counted.
+    """Activity of the gate netlist in the counted cycles.
 
     Attributes:
-        cycles: how many.
-        changes: of each net, by its number: all changes, glitches included.
-        settled: those that a gate without delay would have made: cycles at whose end the net is another.
-        high: share of the cycles that end with the net at 1.
-        accesses: reads and writes of each memory, in the order of the netlist's boxes.
+        cycles: Number of cycles.
+        changes: Transitions of each net, including glitches.
+        settled: Transitions of each net without glitches: cycles with a changed final value.
+        high: Share of the cycles that end with the net at 1.
+        accesses: Reads and writes of each memory, in the order of the netlist's boxes.
     """
 
     cycles: int
@@ -65,18 +65,18 @@ def replay(
     begin: int = 0,
     progress: Progress = QUIET,
 ) -> Activity:
-    """Run the recorded cycles and count from the cycle `begin` on.
+    """Replay a recording and count transitions from the cycle `begin` on.
 
     Args:
-        netlist: the gates.
-        hierarchy: knows the memories' shapes.
-        delays: of each net's driver in ps.
-        recording: at the ports of the netlist's top.
-        begin: first cycle to count.
-        progress: shows the steps.
+        netlist: The gates.
+        hierarchy: The hierarchy of the design, for the shapes of memories.
+        delays: Delay of each net's driver, ps.
+        recording: Recording of the ports of the netlist's top.
+        begin: First counted cycle.
+        progress: Shows the steps.
 
     Raises:
-        RuntimeError: the gates' outputs are not the recorded ones, or a net has no driver.
+        RuntimeError: An output differs from the recorded one, or a net has no driver.
     """
     program = build(progress)
     prelude = _prelude(recording)
@@ -98,26 +98,26 @@ def replay(
 
 
 def build(progress: Progress = QUIET) -> Path:
-    """The simulator of gates, compiled once per state of its source, compiler and options."""
+    """The gate simulator, cached by its source, compiler and options."""
     source = Path(__file__).parents[2] / "device" / "harness" / "gates.cpp"
     compiler, version = require_compiler("power")
     parts = (source.read_text(), version, " ".join(OPTIONS))
     digest = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
 
-    def make(place: Path) -> None:
-        with progress.step("building the simulator of gates"):
+    def make(output: Path) -> None:
+        with progress.step("building the gate simulator"):
             require_right_compiler(compiler, OPTIONS[1:])
-            command = [compiler, *OPTIONS, "-o", place / "gates", source]
+            command = [compiler, *OPTIONS, "-o", output / "gates", source]
             done = processes.run(command, env=clean_environment())
         if done.returncode != 0:
-            raise RuntimeError(f"the simulator of gates does not build: {done.stderr[:300]}")
+            raise RuntimeError(f"the gate simulator does not build: {done.stderr[:300]}")
 
     entry = cache_directory(project_root()) / "gates" / digest
-    return cache.entry(entry, make, "simulator of gates", progress) / "gates"
+    return cache.entry(entry, make, "gate simulator", progress) / "gates"
 
 
 def require_same(recording: Recording, found: Sequence[int]) -> None:
-    """Fail unless the gates' outputs are the recorded ones, in every cycle."""
+    """Raise a `RuntimeError` if an output differs from the recorded one in any cycle."""
     valid = {port.name: recording.of(guard) for port in recording.outputs if (guard := _guard(recording, port))}
     for cycle, ((_, outputs), value) in enumerate(zip(recording.cycles, found, strict=True)):
         if outputs == value:
@@ -125,13 +125,14 @@ def require_same(recording: Recording, found: Sequence[int]) -> None:
         shift = sum(port.bits for port in recording.outputs)
         for port in recording.outputs:
             shift -= port.bits
-            want, have = (each >> shift & (1 << port.bits) - 1 for each in (outputs, value))
-            if want != have and (port.name not in valid or valid[port.name][cycle]):
-                raise RuntimeError(f"the gates differ from the RTL in cycle {cycle}: {port.name} is {have}, not {want}")
+            expected, actual = (each >> shift & (1 << port.bits) - 1 for each in (outputs, value))
+            if expected != actual and (port.name not in valid or valid[port.name][cycle]):
+                difference = f"{port.name} is {actual}, not {expected}"
+                raise RuntimeError(f"the gates differ from the RTL in cycle {cycle}: {difference}")
 
 
 def _guard(recording: Recording, port: Port) -> str:
-    """The port that tells whether `port`, data of a stream, is valid; nothing for other ports."""
+    """The valid port of a stream if `port` is data of the stream, else an empty string."""
     guard = f"{port.name.split('_bits_')[0]}_valid"
     return guard if "_bits_" in port.name and any(each.name == guard for each in recording.outputs) else ""
 
@@ -140,7 +141,7 @@ def _activity(counts: Sequence[str], cycles: int, netlist: Netlist) -> Activity:
     words = [line.split() for line in counts]
     accesses = tuple((int(reads), int(writes)) for kind, reads, writes in _of(words, "memory"))
     found = [(int(changes), int(settled), int(high) / cycles) for _, changes, settled, high in _of(words, "net")]
-    # The simulator has no clock: registers take their inputs between two cycles
+    # The simulator has no clock net: registers load between two cycles
     for net in netlist.inputs[CLOCK]:
         found[net] = (2 * cycles, 2 * cycles, 0.5)
     for net, enable in netlist.clock_gates():
@@ -156,15 +157,15 @@ def _of(words: Sequence[list[str]], kind: str) -> Iterator[list[str]]:
 
 
 def _prelude(recording: Recording) -> list[int]:
-    """A reset and some rest, with the registers as they are when the frame begins."""
-    resting = recording.cycles[0][0] & ~_bit(recording.inputs, START)
+    """Inputs of reset and idle cycles before the frame, with the frame registers of the frame."""
+    idle = recording.cycles[0][0] & ~_bit(recording.inputs, START)
     reset = _bit(recording.inputs, RESET)
-    rest = REST_PERIOD + recording.rested % REST_PERIOD
-    return [resting | reset] * RESET_CYCLES + [resting & ~reset] * rest
+    idle_cycles = IDLE_PERIOD + recording.idle_cycles % IDLE_PERIOD
+    return [idle | reset] * RESET_CYCLES + [idle & ~reset] * idle_cycles
 
 
 def _bit(ports: Sequence[Port], name: str) -> int:
-    """The joined inputs in which nothing but the port `name`, of one bit, is set; 0 if there is none."""
+    """Concatenated inputs with only the one-bit port `name` set; 0 if there is no such port."""
     shift = sum(port.bits for port in ports)
     for port in ports:
         shift -= port.bits

@@ -1,4 +1,4 @@
-"""What a render unit takes while it renders a real frame: gates, activity and memories in one report."""
+"""The power report of a render unit that renders a frame: gates, activity and memories."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from colonnade.ppa.timing import opensta
 from colonnade.ppa.timing.delays import net_timing
 from colonnade.ppa.timing.static import Analysis
 
-#: The module that is replayed, and its level.
+#: The replayed module and its level.
 TOP = "RenderUnit"
 LEVEL = LEVELS[0]
 
-#: Voltage of the chip's node.
+#: Supply voltage at the chip's node, V.
 VOLTAGE_28NM = 0.9
 
-#: Ports that tell what a render unit did.
+#: Ports that count positions, pixels, rays and hits.
 _POSITIONS, _PIXELS = "io_positions", "io_pixels"
 _IN_BOX, _SHADOW, _HITS = "io_events_raysInBox", "io_events_raysShadow", "io_events_hits"
 
 
 @dataclass(frozen=True)
 class Operation:
-    """How a render unit is run.
+    """The operating point for power.
 
     Attributes:
-        megahertz: the clock.
-        stimulus: the frame.
+        megahertz: Clock frequency, MHz.
+        stimulus: The workload.
     """
 
     megahertz: float
@@ -54,36 +54,36 @@ def measure_power(
     overrides: Sequence[str],
     hierarchy: Hierarchy,
     netlists: Mapping[str, Any],
-    into: Technology,
+    tech: Technology,
     operation: Operation,
     progress: Progress = QUIET,
 ) -> dict[str, Any]:
-    """The ``power`` of a report, with the power of each unit in ``units``.
+    """The ``power`` section of a report, with the power of each unit in ``units``.
 
     Args:
-        design: the configuration's, with black boxes.
-        config: name of the configuration, with `overrides` applied.
-        overrides: ``key.path=value`` changes.
-        hierarchy: of the design.
-        netlists: every module of a render unit in Yosys's JSON.
-        into: the library.
-        operation: clock and frame.
-        progress: shows the steps.
+        design: The design with black-box memories.
+        config: Configuration, before `overrides`.
+        overrides: Changes to the configuration, ``key.path=value``.
+        hierarchy: The hierarchy of the design.
+        netlists: All modules of a render unit in Yosys's JSON.
+        tech: The technology, with a library.
+        operation: Clock and workload.
+        progress: Shows the steps.
     """
-    assert into.library is not None
+    assert tech.library is not None
     ports = netlists[TOP]["ports"]
     recording, begin = _between_pixels(record(config, overrides, TOP, ports, operation.stimulus, progress))
-    with progress.step("joining the gates of a render unit"):
-        netlist = Netlist(netlists, TOP, into.library)
-        analysis = Analysis(netlist, into.library)
+    with progress.step("reading the gate netlist"):
+        netlist = Netlist(netlists, TOP, tech.library)
+        analysis = Analysis(netlist, tech.library)
         timing = net_timing(analysis, netlist.size)
-        cells = energies.load(into.sources, {instance.cell.name for instance in netlist.instances})
+        cells = energies.load(tech.sources, {instance.cell.name for instance in netlist.instances})
     activity = replay(netlist, hierarchy, timing.delays, recording, begin, progress)
-    with progress.step("adding up the power"):
+    with progress.step("summing up the power"):
         megahertz = operation.megahertz
         of_unit, kinds = _memories(netlist, hierarchy, recording, activity, begin, design, megahertz)
         rays = _rays(recording, begin)
-        scale = node_scale(into.library.nand2.area, cells.voltage)
+        scale = node_scale(tech.library.nand2.area, cells.voltage)
         totals, units = dict[str, dict[str, Any]](), dict[str, dict[str, float]]()
         for name, changes in (("zero_delay", activity.settled), ("glitch_aware", activity.changes)):
             found = by_unit(power_of(netlist, cells, timing, changes, activity.cycles, megahertz))
@@ -96,7 +96,7 @@ def measure_power(
             units = {unit: _of_unit(power, of_unit.get(unit, 0.0)) for unit, power in found.items()}
         second = None
         if opensta.reads_activities():
-            second = opensta.power(netlist, into.sources, activity, analysis.slew, megahertz)
+            second = opensta.power(netlist, tech.sources, activity, analysis.slew, megahertz)
     return {
         "of": LEVEL.name,
         "clock_mhz": megahertz,
@@ -114,24 +114,24 @@ def measure_power(
 
 
 def node_scale(gate_um2: float, volts: float) -> float:
-    """Factor of dynamic energy from a library to the chip's node and 0.9 V: C·V².
+    """The factor that scales dynamic energy (C·V²) of a library to the chip's node and 0.9 V.
 
-    Capacitances go as lengths do, and these as the square root of the area of a gate.
+    Capacitance scales with length, and length with the square root of a gate's area.
     """
     return float((memories.CHIP_GATE_UM2 / gate_um2) ** 0.5 * (VOLTAGE_28NM / volts) ** 2)
 
 
 def _between_pixels(recording: Recording) -> tuple[Recording, int]:
-    """The recording up to the last pixel that leaves, and the cycle in which the first position comes."""
-    enter, leave = recording.fires(_POSITIONS), recording.fires(_PIXELS)
-    if True not in enter or True not in leave:
-        raise UserError("no pixel went through the recorded render unit: give it more --cycles, or a larger --size")
-    last = len(leave) - 1 - leave[::-1].index(True)
-    return replace(recording, cycles=recording.cycles[: last + 1]), enter.index(True)
+    """The recording up to the last output pixel, and the cycle of the first input position."""
+    inputs, outputs = recording.fires(_POSITIONS), recording.fires(_PIXELS)
+    if True not in inputs or True not in outputs:
+        raise UserError("the recorded render unit has no pixel: use more --cycles, or a larger --size")
+    last = len(outputs) - 1 - outputs[::-1].index(True)
+    return replace(recording, cycles=recording.cycles[: last + 1]), inputs.index(True)
 
 
 def _rays(recording: Recording, begin: int) -> dict[str, int]:
-    """Rays of the window: those that enter the object's box, and all: pixels and shadow rays."""
+    """Numbers of pixels, rays (primary and shadow), in-box rays and hits, from the cycle `begin` on."""
     shadow = sum(recording.of(_SHADOW)[begin:])
     return {
         "pixels": sum(recording.fires(_PIXELS)[begin:]),
@@ -150,7 +150,7 @@ def _memories(
     design: GeneratedDesign,
     megahertz: float,
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """mW by unit, and by kind: memories of the render unit, and its share of the column's records."""
+    """Memory power by unit, and by kind: memories of the render unit, and its share of the column memory, mW."""
     each = memories.SRAM[memories.CHIP_NODE].pj_per_bit * megahertz / activity.cycles / 1e3
     by_unit: dict[str, float] = defaultdict(float)
     for box, (reads, writes) in zip(netlist.boxes, activity.accesses, strict=True):
@@ -163,12 +163,12 @@ def _memories(
 
 
 def _unit(owner: str) -> str:
-    """The innermost unit; a unit may hold another."""
+    """The innermost unit of an instance's path."""
     return next((module for module in reversed(owner.split("/")) if module in LEVEL.units), LEVEL.rest)
 
 
 def by_unit(powers: Mapping[str, Power]) -> dict[str, Power]:
-    """The power of each unit from that of each owner of gates: parts belong to their units."""
+    """The power of each unit, summed over the modules within it."""
     found: dict[str, Power] = {}
     for owner, power in powers.items():
         other = found.get(_unit(owner), Power(0.0, 0.0, 0.0))
@@ -197,7 +197,7 @@ def _total(powers: Any, memory: float) -> dict[str, float]:
 def _scaled(
     total: Mapping[str, float], scale: float, rays: Mapping[str, int], cycles: int, megahertz: float
 ) -> dict[str, float | None]:
-    """Dynamic power at the chip's node; leakage is left out, for it does not scale so; memories are of that node."""
+    """Dynamic and memory power at the chip's node, without leakage, which scales differently."""
     dynamic = total["dynamic_mw"] * scale
     both = dynamic + total["memory_mw"]
     facts = {"dynamic_mw": dynamic, "memory_mw": total["memory_mw"], "total_mw": both}
@@ -205,8 +205,8 @@ def _scaled(
 
 
 def _energies(milliwatts: float, rays: Mapping[str, int], cycles: int, megahertz: float) -> dict[str, float | None]:
-    """nJ for each ray that entered the object's box, and for each ray."""
-    # mW times µs are nJ
+    """Energy per in-box ray and per ray, nJ."""
+    # mW × µs = nJ
     nanojoules = milliwatts * cycles / megahertz
     return {
         "energy_per_ray_nj": nanojoules / rays["rays_in_box"] if rays["rays_in_box"] else None,

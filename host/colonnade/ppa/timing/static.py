@@ -1,8 +1,8 @@
-"""Static timing of a mapped netlist: the slowest paths, by the tables of the library.
+"""Static timing analysis of a mapped netlist by the tables of the library.
 
-A path begins at a register's clock, or at an input, and ends at a register's set-up, or at an output. The clock is
-ideal; wires have neither resistance nor capacitance; slews are the worst that arrive at a pin. Black boxes, such as
-memories, are like the outside: what they drive is an input.
+A path starts at a register's clock or at an input, and ends at a register's set-up or at an output. The clock is ideal;
+wires have no resistance and no capacitance; the worst slew at a pin propagates. Ports of black boxes, such as memories,
+count as inputs and outputs of the netlist.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from colonnade.ppa.library.cells import Arc, Cell, Library, Pin
 from colonnade.ppa.netlist.mapped import Instance, Netlist
 
-#: Values of a net: arrival of its rise and its fall in ns (negative: never), and their slews.
+#: Arrival times of a net's rise and fall (ns, negative: never), and their slews (ns).
 Edges = list[float]
 
 _NEVER = -1.0
@@ -25,10 +25,10 @@ class TimingPath:
     """The slowest path of a kind.
 
     Attributes:
-        ns: from clock to set-up, both included; or from an input, or to an output.
-        begin: the net where it begins.
-        end: the register or the output where it ends.
-        cells: the gates on it, in order.
+        ns: Delay with clock-to-output and set-up times, where it starts or ends at a register.
+        begin: The net where it starts.
+        end: The register or the output where it ends.
+        cells: The gates on it, in order.
     """
 
     ns: float
@@ -39,7 +39,7 @@ class TimingPath:
 
 @dataclass(frozen=True)
 class Timing:
-    """The slowest path of each kind; None where there is no such path."""
+    """The slowest path of each kind; None without such a path."""
 
     register_to_register: TimingPath | None
     input_to_register: TimingPath | None
@@ -48,14 +48,14 @@ class Timing:
 
 
 class Analysis:
-    """Propagates arrivals through a netlist.
+    """Propagates arrival times through a netlist.
 
     Attributes:
-        slew: of inputs and of the clock, in ns.
-        output_load: of outputs, in pF.
-        loads: of each net, in pF.
-        order: gates after those that drive them, without registers.
-        registers: all others.
+        slew: Slew of inputs and of the clock, ns.
+        output_load: Load of outputs, pF.
+        loads: Load of each net, pF.
+        order: Combinational cells in topological order.
+        registers: Register cells.
     """
 
     def __init__(self, netlist: Netlist, library: Library) -> None:
@@ -68,7 +68,7 @@ class Analysis:
 
     @staticmethod
     def edges(library: Library) -> tuple[float, float]:
-        """Slew of inputs and of the clock in ns, load of outputs in pF: those of an inverter in a FO4 chain."""
+        """Slew of inputs and clock (ns) and load of outputs (pF): those of an inverter in an FO4 chain."""
         inverter = library.inverter
         load = 4 * next(pin.capacitance for pin in inverter.pins.values() if pin.direction == "input")
         output = next(pin for pin in inverter.pins.values() if pin.direction == "output")
@@ -175,7 +175,7 @@ class Analysis:
         return TimingPath(ns, self._name(net), end, tuple(reversed(cells)))
 
     def _name(self, net: int) -> str:
-        return self._netlist.names.get(net, "a net without a name")
+        return self._netlist.names.get(net, "an unnamed net")
 
     def _register_name(self, register: Instance) -> str:
         gate = register.cell.clock_gate
@@ -187,7 +187,7 @@ class Analysis:
         return register.name or (named[0] if named else self._name(nets[0]) if nets else "a register")
 
     def outputs(self, cell: Cell) -> list[tuple[Pin, list[Arc]]]:
-        """The outputs of a cell with the arcs to them; of a register those from its clock."""
+        """The outputs of a cell and their arcs; for a register only the arcs from its clock."""
         found = self._arcs.get(cell.name)
         if found is None:
             wanted = ("rising_edge", "falling_edge") if cell.is_register else ("combinational",)
@@ -211,7 +211,7 @@ class Analysis:
         return loads
 
     def _sorted(self) -> list[Instance]:
-        """Gates after those that drive them."""
+        """The combinational cells in topological order."""
         gates = [instance for instance in self._netlist.instances if not instance.cell.is_register]
         driver: dict[int, int] = {}
         for index, gate in enumerate(gates):
@@ -231,7 +231,7 @@ class Analysis:
                 if waits[reader] == 0:
                     order.append(reader)
         if len(order) < len(gates):
-            raise RuntimeError(f"{len(gates) - len(order)} gates are in or behind a combinational loop")
+            raise RuntimeError(f"{len(gates) - len(order)} gates lie in or after a combinational loop")
         return [gates[index] for index in order]
 
 
@@ -240,7 +240,7 @@ def _is_read(gate: Instance, pin: str) -> bool:
 
 
 def gates_by_name(cells: Iterable[str]) -> str:
-    """A path's gates, short: how many of each, without the suffixes of the library."""
+    """The number of each gate on a path, by names without the library's prefix or suffix."""
     counts: dict[str, int] = {}
     for cell in cells:
         name = re.sub(r"_ASAP7.*|^sky130_fd_sc_\w+?__", "", cell)

@@ -1,1 +1,1 @@
-"""The environment in floats: what rays meet that miss the object."""
+"""The environment in the float reference: depth mesh, ray march, and decoded maps."""

@@ -1,4 +1,4 @@
-"""Albedo and normals in the physical-attribute memory: exact sizes and bits, and as little loss as was promised."""
+"""Encoded albedo and normals: exact sizes and bits, and the documented loss."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ALBEDO, NORMAL = AlbedoSpace(12), NormalSpace(12)
 
 
 def noise(layout: AttributeLayout, seed: int = 0) -> NDArray[np.float64]:
-    """A map of all kinds of tiles: noise, smooth slopes, edges, plain ones."""
+    """A map with all kinds of tiles: noise, smooth slopes, edges, uniform colour."""
     random = np.random.default_rng(seed)
     v, u = np.mgrid[: layout.height, : layout.width]
     slope = np.stack([u / layout.width, v / layout.height, (u + v) % 37 / 37], axis=-1)
@@ -72,7 +72,7 @@ def test_memories_have_the_layouts_sizes(encoding: str) -> None:
         ({"height": 0}, "height is 0"),
     ],
 )
-def test_layouts_that_cannot_be(settings: dict[str, int | str], message: str) -> None:
+def test_impossible_layouts_are_rejected(settings: dict[str, int | str], message: str) -> None:
     with pytest.raises(UserError, match=message):
         AttributeLayout(**settings)  # type: ignore[arg-type]
 
@@ -98,7 +98,7 @@ def test_vectors_keep_their_meaning() -> None:
 
 
 def slow_entry(content: TwoLevelMap, u: int, v: int, layout: AttributeLayout) -> int:
-    """The palette index of a pixel, from the words as the documentation tells it."""
+    """The palette index of a pixel, decoded from the words by the documentation."""
     descriptor = int(content.descriptors[v // layout.tile_size * layout.tile_columns + u // layout.tile_size])
     number, pointer = descriptor % 8, descriptor // 8 % 8192
     entries = [descriptor >> 16 & 255, descriptor >> 24]
@@ -174,7 +174,7 @@ def test_best_subsets_against_all_pairs() -> None:
     assert (total >= np.array(best) - 1e-4).all()
 
 
-def test_a_budget_is_kept_and_spent_where_it_helps() -> None:
+def test_the_budget_is_met_and_spent_where_it_helps() -> None:
     errors = np.array([[9.0, 1.0, 0.0], [5.0, 4.9, 0.1], [1.0, 1.0, 1.0]])
     sizes = np.array([0, 1, 4])
     assert list(choose_within_budget(errors, sizes, 100)) == [2, 2, 0]

@@ -1,4 +1,4 @@
-"""Planes in the physical-attribute memory: exact bits, right geometry, and a room that is where it was."""
+"""Encoded planes: exact bits, correct geometry, and accurate surfaces of rooms."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LEVEL = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 1.2], [0, 0, -1.0, 0]])
 
 
 def boxes(width: int = 160, height: int = 120, steps: bool = True) -> Environment:
-    """A level camera 1.2 m above the floor of a box, 4 m deep, 3 m wide, 2.4 m high; a slanted board before it."""
+    """A box room, 4 m deep, 3 m wide and 2.4 m high, with a slanted board; a level camera 1.2 m above the floor."""
     camera = EnvironmentCamera(120.0, 120.0, width / 2 + 3, height / 2 - 2, LEVEL)
     rays = camera.directions(width, height)
     normals = np.array([[0.0, 0, -1], [0, -1, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0]])
@@ -83,7 +83,7 @@ def test_flat_walls_are_where_they_were(width: int, height: int, tile: int) -> N
     layout = AttributeLayout(width, height, tile_size=tile)
     content = encode_planes(environment, layout)
     errors = ray_errors(environment, content.depth(layout, PlaneProjection.of(environment, content.depth_unit)))
-    # Cells of two pixels and more meet the walls' corners and the board's edge
+    # Cells of two pixels or more contain corners of the walls and the edge of the board
     assert np.median(errors) < 0.0005
     assert np.mean(errors > 0.01) < 0.06
     w = content.inverse_depth(layout, PlaneProjection.of(environment, content.depth_unit))
@@ -91,7 +91,7 @@ def test_flat_walls_are_where_they_were(width: int, height: int, tile: int) -> N
 
 
 def slow_id(content: PlaneMap, u: int, v: int, layout: AttributeLayout) -> int:
-    """The plane id of a pixel, from the words as the documentation tells it."""
+    """The plane id of a pixel, decoded from the words by the documentation."""
     descriptor = int(content.descriptors[v // layout.tile_size * layout.tile_columns + u // layout.tile_size])
     number, pointer = descriptor % 8, descriptor // 8
     if number == 0:
@@ -108,7 +108,7 @@ def slow_id(content: PlaneMap, u: int, v: int, layout: AttributeLayout) -> int:
 
 
 def bumps(width: int, height: int) -> Environment:
-    """Many small steps and slopes, so that tiles of all kinds occur."""
+    """Many small steps and slopes, which give tiles of all kinds."""
     environment = boxes(width, height)
     v, u = np.mgrid[:height, :width]
     depth = environment.depth * (1 - 0.3 * ((u // 7 + v // 5) % 3 == 0) * (u > width // 2))
@@ -131,7 +131,7 @@ def test_random_access_follows_the_words(plane_bytes: int, cells: int) -> None:
 
 
 def bounding_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Planes, albedos and normals of the bounding planes' used entries."""
+    """Planes, albedos and normals of the used bounding planes."""
     entries = [sum(int(part) << (64 * k) for k, part in enumerate(words)) for words in content.shell if words.any()]
     planes = unpack_planes(np.array([entry & (1 << 64) - 1 for entry in entries], np.uint64))
     albedos = unpack(np.array([entry >> 64 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=False)
@@ -140,7 +140,7 @@ def bounding_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.
     return planes, albedos / 4095, normals / 2047
 
 
-def test_the_bounding_planes_are_the_box_and_a_wall_behind() -> None:
+def test_bounding_planes_are_the_box_and_a_wall_behind() -> None:
     environment = boxes(320, 240)
     layout = AttributeLayout(320, 240)
     content = encode_planes(environment, layout)
@@ -161,11 +161,11 @@ def test_the_bounding_planes_are_the_box_and_a_wall_behind() -> None:
         assert np.abs(normal - np.rint(normal)).max() < 0.01
         assert abs(1 / np.linalg.norm(plane) - distance) < 0.02
         assert np.abs(albedo - colour).max() < 0.02
-    # Behind the camera: w is negative where the projection is
+    # Behind the camera: w of the projection is negative
     assert np.allclose(planes[0], [0, 0, -content.depth_unit / 0.5], atol=1e-4)
 
 
-def test_few_bounding_planes_keeps_the_largest() -> None:
+def test_few_bounding_planes_are_the_largest() -> None:
     environment = boxes(320, 240)
     content = encode_planes(environment, AttributeLayout(320, 240, bounding_planes=3))
     _, _, normals = bounding_fields(content)
@@ -185,7 +185,7 @@ def test_surfaces_of_the_rooms(name: str, mean: float, p95: float) -> None:
     planes, _, normals = bounding_fields(content)
     up = normals @ environment.camera_to_world[1, :3]
     distance = 1 / np.linalg.norm(PlaneProjection.of(environment, content.depth_unit).dual_vectors(planes), axis=1)
-    # The floor is as far below the camera as the pose says
+    # The distance of the floor below the camera follows from the pose
     assert abs(distance[up > 0.99][0] - environment.camera_to_world[1, 3]) < 0.02
     assert len(planes) == 6
 
@@ -194,7 +194,7 @@ def all_words(image: AttributeImage) -> list[bytes]:
     return [memory.tobytes() for part in image.memories().values() for memory in part.values()]
 
 
-def test_a_whole_room_is_the_same_every_time() -> None:
+def test_encoding_is_reproducible() -> None:
     environment = boxes()
     images = [encode_environment(environment, AttributeLayout(160, 120)) for _ in range(2)]
     assert all_words(images[0]) == all_words(images[1])

@@ -1,4 +1,4 @@
-"""Corrupt frames: hardware and model agree on them, and the frame after each is exact; docs/errors.md."""
+"""Corrupt frames: RTL and model agree, and the frame after each is exact (docs/errors.md)."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from colonnade.evaluation.fuzz.simulator import SimulatedFrame
 
 needs_verilator = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 
-#: Configurations whose simulators `test_frames.py` builds; frames of each.
+#: Configurations whose simulators `test_frames.py` builds too, and their number of frames.
 DESIGNS = (("tiny", 160), ("small", 120))
 
 
 @needs_verilator
 @pytest.mark.parametrize(("config", "frames"), DESIGNS)
-def test_corrupt_frames_are_the_models_and_leave_nothing_behind(config: str, frames: int) -> None:
+def test_corrupt_frames_equal_the_models_and_leave_no_state(config: str, frames: int) -> None:
     report = campaign.fuzz(design_for(config, ()), frames, seed=1)
     assert report["disagreements"] == []
     assert report["legal_failures"] == 0
@@ -42,7 +42,7 @@ def test_corrupt_frames_are_the_models_and_leave_nothing_behind(config: str, fra
 
 
 @needs_verilator
-def test_a_model_that_is_wrong_is_found_and_its_frame_can_be_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_model_is_found_and_its_frame_is_reproducible(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = campaign.model_frame
 
     def wrong(model: Any, registers: dict[str, int]) -> Frame:
@@ -58,7 +58,7 @@ def test_a_model_that_is_wrong_is_found_and_its_frame_can_be_repeated(monkeypatc
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_seed_decides_what_is_corrupted(kind: str) -> None:
+def test_a_seed_determines_the_corruption(kind: str) -> None:
     manifest = manifest_for("tiny").manifest
     cases = legal_cases(manifest)
     if not any(KINDS[kind].applies(case) for case in cases):
@@ -72,7 +72,7 @@ def test_a_seed_decides_what_is_corrupted(kind: str) -> None:
     assert len(changes) > 30
 
 
-def test_every_difference_is_named() -> None:
+def test_every_difference_is_described() -> None:
     manifest = manifest_for("tiny").manifest
     case = legal_cases(manifest)[0]
     frame = model_frame(loaded_model(manifest, case.image), case.registers)

@@ -1,4 +1,4 @@
-"""Illegal maps and room registers: hardware and model give the same frames, and the model is defined on any of them."""
+"""Illegal maps and room registers: RTL and model render the same frames, and the model is defined on all inputs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def manifest() -> Manifest:
 
 @NEEDS_SIMULATOR
 def test_hardware_and_model_agree_on_corrupt_maps() -> None:
-    """Pixels, ratios, counters and error bits, and the legal frame after each. By command:
+    """Pixels, ratios, counters and error bits, and the legal frame after each. Long version:
     ``colonnade fuzz --config small --kind maps --frames 700``.
     """
     report = fuzz(design_for("small", ()), FRAMES, seed=1, kinds=("maps",))
@@ -47,7 +47,7 @@ def test_a_seed_always_makes_the_same_corrupt_case(manifest: Manifest) -> None:
 
 
 def test_pointers_beyond_the_heap_set_the_error_and_read_zeros(manifest: Manifest) -> None:
-    """A tile whose mask lies beyond the heap has its first entry, one that lies in it is no error."""
+    """A tile with its mask beyond the heap gets its first entry and an error; a mask inside the heap is no error."""
     case = environment_cases(manifest)[0]
     depth = int(manifest.memories["albedo.heap"]["depth"])
     frames = {}
@@ -56,7 +56,7 @@ def test_pointers_beyond_the_heap_set_the_error_and_read_zeros(manifest: Manifes
         for section in case.image.attributes:
             words = section.words
             if section.memory == "albedo.descriptors":
-                # Mode 1: the pointer's word is the mask
+                # Mode 1: the pointer addresses the mask
                 word = (5 << 24) | (9 << 16) | (pointer << 3) | 1
                 words = np.tile(np.frombuffer(word.to_bytes(4, "little"), dtype=np.uint8), (len(words), 1))
             if section.memory == "albedo.heap":
@@ -69,7 +69,7 @@ def test_pointers_beyond_the_heap_set_the_error_and_read_zeros(manifest: Manifes
 
 
 def test_the_model_of_a_room_is_defined_on_all_words_and_registers(manifest: Manifest) -> None:
-    """Loads beyond a memory are dropped, words that are too short refused; the march ends."""
+    """Loads beyond a memory are ignored, short words are rejected, and the march terminates."""
     assert manifest.attributes is not None
     random = np.random.default_rng(7)
     numbers = dict(manifest.numbers) | dict.fromkeys(("arity", "trianglesPerRecord", "stackDepth", "bvh"), 0)

@@ -1,4 +1,4 @@
-"""What an AR frame loses, part by part, and the bounding planes around a clustered room."""
+"""Loss of AR frames by source, and the bounding planes of an encoded room."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def measured(environment: Environment, image: AttributeImage) -> Losses:
     return losses(mesh, view, environment, image, march, device, with_dists=False)
 
 
-def test_the_bounding_planes_are_all_around_and_faces_inward(environment: Environment, image: AttributeImage) -> None:
+def test_bounding_planes_face_inward_on_all_sides(environment: Environment, image: AttributeImage) -> None:
     bounding = BoundingPlanes(environment, image)
     directions = np.random.default_rng(7).normal(size=(2000, 3))
     origins = np.broadcast_to([0.0, 0.0, 1.0], directions.shape)
     met = bounding.intersect(origins, directions)
     away = np.einsum("ni,ni->n", met.position - origins, directions)
-    # Where no plane of the bounding planes stands, above and beside, a ray may leave for ever.
+    # A ray may leave where there is no bounding plane, above and to the side.
     assert met.outside.mean() < 0.4
     assert (np.einsum("ni,ni->n", met.normals, directions)[~met.outside] < 0).all()
     assert (away[~met.outside] > 0).all()
@@ -58,12 +58,12 @@ def test_the_bounding_planes_are_all_around_and_faces_inward(environment: Enviro
     np.testing.assert_allclose(behind.normals[0], [0, 0, 1], atol=1e-3)
 
 
-def test_planes_stand_where_the_room_is(environment: Environment, image: AttributeImage) -> None:
+def test_planes_match_the_room(environment: Environment, image: AttributeImage) -> None:
     away = np.abs(decoded_depth(environment, image) - environment.depth) / environment.depth
     assert np.median(away) < 0.01 and np.percentile(away, 90) < 0.05
 
 
-def test_each_loss_is_seen_where_it_is(measured: Losses) -> None:
+def test_each_loss_shows_in_its_region(measured: Losses) -> None:
     loss = measured.by_loss
     assert set(loss) == {"clustering", "rebuild", "both", "fixed point", "device"}
     truth = measured.pictures["full"]
@@ -80,15 +80,15 @@ def test_each_loss_is_seen_where_it_is(measured: Losses) -> None:
     assert loss["rebuild"]["shadow"].pixels > 20
 
 
-def test_losses_read_as_a_table(measured: Losses) -> None:
+def test_losses_are_printed_as_a_table(measured: Losses) -> None:
     lines = table({"attic: teapot": measured.by_loss}).splitlines()
     assert len(lines) == 2 + 5 and all(line.count("|") == 6 for line in lines)
 
 
-def test_the_device_shows_the_rebuilt_room_but_for_its_rounding(
+def test_the_device_shows_the_reconstructed_room_within_rounding(
     environment: Environment, image: AttributeImage, measured: Losses
 ) -> None:
-    """The rows `fixed point` and `device`: of the model's frame of the very same scene."""
+    """The rows `fixed point` and `device`, from the model's frame of the same scene."""
     mesh = load_mesh("teapot:4")
     scene = placed_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
     view = make_view(scene, mesh.extent, 160, 120, mesh.materials, environment)

@@ -1,4 +1,4 @@
-"""The page: its text stays, tables say what is missing; where the gates are, and rays at equal area."""
+"""The page of costs: only tables change, missing data is reported; area by unit, and rays per cycle at equal area."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from colonnade.ppa.pages.page import page
 
 
 def report() -> dict[str, Any]:
-    """Two columns of three render units; 4 mm² of logic, 1 of it beside 6 units with 0.5 mm² and memories of 0.1."""
+    """Two columns of three render units: 4 mm² of logic; each unit has 0.5 mm² of logic and 0.1 mm² of memories."""
     return {
         "chip": {"kge_per_unit": 100.0, "mm2": 2.0},
         "units": {
@@ -37,7 +37,7 @@ def report() -> dict[str, Any]:
     }
 
 
-def test_units_are_told_with_their_memories_the_largest_first() -> None:
+def test_units_are_sorted_by_area_with_memories() -> None:
     lines = gates({"yosys": report()}).splitlines()
     assert lines[2:] == [
         "| Small | 10.0 | 25.0 | 35 % |",
@@ -46,7 +46,7 @@ def test_units_are_told_with_their_memories_the_largest_first() -> None:
     ]
 
 
-def test_rays_at_equal_area_are_fewer_by_the_area(tmp_path: Path) -> None:
+def test_rays_at_equal_area_scale_with_the_area(tmp_path: Path) -> None:
     assert equal_area({"yosys": report()}, tmp_path) == ""
     (tmp_path / "bench.json").write_text(json.dumps({"ratio_to_paper": 12.0}))
     rows = [line.split("|")[3:6] for line in equal_area({"yosys": report()}, tmp_path).splitlines()[2:]]
@@ -54,7 +54,7 @@ def test_rays_at_equal_area_are_fewer_by_the_area(tmp_path: Path) -> None:
     assert figures == [pytest.approx(row) for row in ([4.0, 2.0, 6.0], [4.6, 2.3, 5.2], [8.0, 4.0, 3.0])]
 
 
-def test_the_page_keeps_its_text_and_names_what_is_missing(tmp_path: Path) -> None:
+def test_the_page_keeps_its_text_and_reports_missing_data(tmp_path: Path) -> None:
     text = "# Cost\n<!-- units_32b32s64d -->\nold\n<!-- end -->\nprose\n<!-- ecp5 -->\n<!-- end -->\n"
     missing = "Not measured: run `tools/ppa`."
     written = (

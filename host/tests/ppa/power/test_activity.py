@@ -1,4 +1,4 @@
-"""Power: energies of liberties, sums, reports, and second opinions; the frame that is recorded."""
+"""Power: energies of liberty files, sums, reports, OpenSTA, and the checks of the workload."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def library(tmp_path: Path) -> Library:
     return small_library(tmp_path)
 
 
-def test_energies_are_those_at_the_supply(library: Library, tmp_path: Path) -> None:
+def test_energies_are_those_of_the_supply_rail(library: Library, tmp_path: Path) -> None:
     found = energies.load([tmp_path / "small.lib"], ["INV", "DFFN"])
     assert found.voltage == 2
     assert set(found.cells) == {"INV", "DFFN"}
@@ -42,7 +42,7 @@ def test_energies_are_those_at_the_supply(library: Library, tmp_path: Path) -> N
     assert inverter.of_transition("A", 0.0, 0.0) == 0
 
 
-def test_power_is_capacitance_and_tables_times_changes(library: Library, tmp_path: Path) -> None:
+def test_power_is_capacitance_and_tables_times_transitions(library: Library, tmp_path: Path) -> None:
     inner = top({"g": cell("INV", A=4, Y=5)}, {"a": [4]}, {})
     cells = {
         "kept": cell("DFFN", C=2, D=4, Q=5),
@@ -58,7 +58,7 @@ def test_power_is_capacitance_and_tables_times_changes(library: Library, tmp_pat
     register = next(instance for instance in netlist.instances if instance.cell.is_register)
     changes[register.nets["Q"]] = 10
     power = power_of(netlist, found, timing, changes, cycles=10, megahertz=1000)
-    # ½ · 1 fF · 4 V² = 2 fJ a pin's change; a clock pin 2 + 1 fJ twice a cycle; an inverter's input, 2 fJ each cycle
+    # ½ · 1 fF · 4 V² = 2 fJ per transition; a clock pin: 2 + 1 fJ twice per cycle; an inverter's input: 2 fJ per cycle
     assert power[""].clock == pytest.approx(6e-3)
     assert power[""].dynamic == pytest.approx(6e-3 + 2e-3)
     assert power[""].leakage == pytest.approx(5e-9)
@@ -66,7 +66,7 @@ def test_power_is_capacitance_and_tables_times_changes(library: Library, tmp_pat
     assert power["Unit"].leakage == pytest.approx(5e-9)
 
 
-def test_the_clock_pays_for_its_gates(library: Library, tmp_path: Path) -> None:
+def test_clock_gates_count_as_clock_power(library: Library, tmp_path: Path) -> None:
     cells = {"gate": cell("GATE", C=2, E=4, G=5), "kept": cell("DFFN", C=5, D=4, Q=6)}
     netlist = Netlist({"top": top(cells, {"e": [4]}, {"q": [6]})}, "top", library)
     found = energies.load([tmp_path / "small.lib"], ["GATE", "DFFN"])
@@ -76,7 +76,7 @@ def test_the_clock_pays_for_its_gates(library: Library, tmp_path: Path) -> None:
     (clock,) = (bit for bit in netlist.inputs["clock"] if not isinstance(bit, bool))
     changes[clock], changes[gated] = 20, 10
     power = power_of(netlist, found, timing, changes, cycles=10, megahertz=1000)[""]
-    # The gate's clock pin, 2 fJ twice a cycle; the register's, 3 fJ twice in every other
+    # The clock pin of the gate: 2 fJ twice per cycle; of the register: 3 fJ twice in every other cycle
     assert power.clock == power.dynamic == pytest.approx(4e-3 + 3e-3)
 
 
@@ -96,7 +96,7 @@ def test_meshes_are_reduced_to_whole_faces() -> None:
     assert np.abs(vertices).max() <= np.abs(mesh.vertices).max()
 
 
-def test_a_frame_to_record_is_checked_before_the_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_workload_is_checked_before_synthesis(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     manifest = manifest_for("tiny").manifest
     assert require_recordable(Stimulus("cube", None, 10), manifest)[1] == (24, 18)
     with pytest.raises(UserError, match="no mesh"):
@@ -124,9 +124,12 @@ def test_the_page_shows_power_by_library_and_unit() -> None:
     unit = {"power_mw": 1.0, "clock_mw": 0.5}
     report = {"power": power, "units": {"BoxUnit": unit, "Shader": {**unit, "power_mw": 3.0}, "Column": {}}}
     table = power_table({"yosys": {"power": None}, "asap7": report})
-    assert "ASAP7: 200 MHz; teapot at 24×18, 1,000 cycles with 9 rays, 7 of them in box, 3 hits; × 4.790" in table
+    assert (
+        "ASAP7: 200 MHz; teapot at 24×18, 1,000 cycles with 9 rays, 7 in-box rays, 3 hits; scaling to 28 nm: × 4.790"
+        in table
+    )
     assert "| ASAP7, 0.7 V | with glitches | 2.500 |" in table
-    assert "| the chip ÷ 80, whole |" in table
+    assert "| chip ÷ 80, total |" in table
     assert "| Shader | 3.000 | 0.500 | 75 % |" in unit_power_table({"asap7": report})
     assert power_table({"yosys": {"power": None}}) == ""
 
@@ -137,7 +140,7 @@ def test_scaling_is_by_length_and_voltage() -> None:
 
 
 def fake_sta(folder: Path, monkeypatch: pytest.MonkeyPatch, answer: str) -> None:
-    """An OpenSTA that keeps what it is given and answers to power."""
+    """A stand-in for OpenSTA that stores its inputs and reports power."""
     program = folder / "sta"
     program.write_text(
         f'#!/bin/sh\ncp unit.v unit.saif "{folder}"\nif grep -q "info commands" script.tcl; then echo "{answer}"; fi\n'
@@ -173,7 +176,7 @@ def test_a_wrong_size_is_one_line() -> None:
 
 @pytest.mark.matrix
 def test_the_gates_of_tiny_do_what_the_rtl_does(tmp_path: Path) -> None:
-    """A thousand cycles of a real frame on the gates; every output as in the RTL, or it fails."""
+    """A thousand cycles of a frame on the gate netlist; the replay compares all outputs with the RTL."""
     named = os.environ.get("COLONNADE_LIBERTY", "").split()
     if not named:
         pytest.skip("no standard cells: name their liberties in COLONNADE_LIBERTY, blanks between them")

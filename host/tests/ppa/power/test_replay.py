@@ -1,4 +1,4 @@
-"""The simulator of gates: functions, glitches, registers, memories, and that it is held against a recording."""
+"""The gate simulator: functions, glitches, registers, memories, and the comparison with a recording."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ def test_functions_become_truth_tables(function: str, table: str) -> None:
 
 
 @pytest.mark.parametrize("function", ["A &", "(A", "A ? B", "C", "A)"])
-def test_what_is_no_function_is_refused(function: str) -> None:
-    with pytest.raises(UserError, match="not understood"):
+def test_an_invalid_function_is_rejected(function: str) -> None:
+    with pytest.raises(UserError, match="cannot parse"):
         truth_table(function, ["A", "B"])
 
 
-def test_a_glitch_changes_a_net_twice_and_settles_nothing(library: Library, hierarchy: Hierarchy) -> None:
+def test_a_glitch_counts_two_transitions_and_none_settled(library: Library, hierarchy: Hierarchy) -> None:
     cells = {"late": cell("INV", A=4, Y=5), "later": cell("INV", A=5, Y=6), "differ": cell("XOR", A=4, B=6, Y=7)}
     netlist = Netlist({"top": top(cells, {"a": [4]}, {"z": [7]})}, "top", library)
     (z,) = (bit for bit in netlist.outputs["z"] if not isinstance(bit, bool))
@@ -58,17 +58,17 @@ def test_a_glitch_changes_a_net_twice_and_settles_nothing(library: Library, hier
     activity = replay(netlist, hierarchy, delays, seen)
     assert (activity.changes[a], activity.settled[a], activity.high[a]) == (2, 2, 0.25)
     assert (activity.changes[z], activity.settled[z]) == (4, 0)
-    # A pulse shorter than the gate's delay does not leave it
+    # The gate suppresses a pulse that is shorter than its delay
     delays[z] = 41
     assert replay(netlist, hierarchy, delays, seen).changes[z] == 0
-    # Only the cycles from the second on
+    # Counts from the second cycle on
     assert replay(netlist, hierarchy, delays, seen, begin=2).changes[a] == 1
 
 
-def test_registers_begin_with_zero_behind_their_inverter(library: Library, hierarchy: Hierarchy) -> None:
+def test_registers_with_inverters_start_at_zero(library: Library, hierarchy: Hierarchy) -> None:
     cells = {"kept": cell("DFFN", C=2, D=4, Q=5), "right": cell("INV", A=5, Y=6), "ties": cell("NAND", A=6, B="1", Y=7)}
     netlist = Netlist({"top": top(cells, {"a": [4]}, {"q": [6, "1"], "n": [7]})}, "top", library)
-    # q has the input of the cycle before, and a constant bit; n is its inverse
+    # q is the input of the previous cycle and a constant bit; n is its inverse
     seen = recording(netlist, [(a, (0b10 | q) << 1 | 1 - q) for a, q in ((0, 0), (1, 0), (0, 1), (1, 0))])
     activity = replay(netlist, hierarchy, [5] * netlist.size, seen)
     (clock,) = (bit for bit in netlist.inputs["clock"] if not isinstance(bit, bool))
@@ -85,7 +85,7 @@ def test_a_register_behind_a_clock_gate_keeps_its_value(library: Library, hierar
         "right": cell("INV", A=7, Y=8),
     }
     netlist = Netlist({"top": top(cells, {"a": [4], "e": [5]}, {"q": [8]})}, "top", library)
-    # Inputs are reset, a, e; q is the last a that came with e
+    # Inputs are reset, a, e; q is the last a with e set
     steps = [(0b00, 0), (0b11, 0), (0b00, 1), (0b10, 1), (0b01, 1), (0b10, 0)]
     seen = recording(netlist, steps)
     activity = replay(netlist, hierarchy, [5] * netlist.size, seen)
@@ -100,11 +100,11 @@ def test_a_register_behind_a_clock_gate_keeps_its_value(library: Library, hierar
 def test_a_gate_of_another_clock_is_refused(library: Library, hierarchy: Hierarchy) -> None:
     cells = {"gate": cell("GATE", C=4, E=5, G=6), "kept": cell("DFFN", C=6, D=4, Q=7)}
     netlist = Netlist({"top": top(cells, {"a": [4], "e": [5]}, {"q": [7]})}, "top", library)
-    with pytest.raises(RuntimeError, match="another clock"):
+    with pytest.raises(RuntimeError, match="not driven by the port clock"):
         replay(netlist, hierarchy, [5] * netlist.size, recording(netlist, [(0, 0)]))
 
 
-def test_data_counts_where_its_stream_is_valid(library: Library, hierarchy: Hierarchy) -> None:
+def test_stream_data_is_compared_only_where_valid(library: Library, hierarchy: Hierarchy) -> None:
     ports = {"s_valid": [4], "s_bits_x": [5]}
     netlist = Netlist({"top": top({}, {"v": [4], "x": [5]}, ports)}, "top", library)
     # Inputs are reset, v, x; outputs valid, x
@@ -114,7 +114,7 @@ def test_data_counts_where_its_stream_is_valid(library: Library, hierarchy: Hier
         replay(netlist, hierarchy, [1] * netlist.size, replace(invalid, cycles=((0b01, 0b00), (0b11, 0b10))))
 
 
-def test_a_memory_shows_what_was_written_and_counts(library: Library, hierarchy: Hierarchy) -> None:
+def test_a_memory_returns_written_words_and_counts_accesses(library: Library, hierarchy: Hierarchy) -> None:
     bits = {
         "RW0_addr": [4, 5],
         "RW0_en": [6],
@@ -139,5 +139,5 @@ def test_a_memory_shows_what_was_written_and_counts(library: Library, hierarchy:
 
 def test_a_net_without_a_driver_fails(library: Library, hierarchy: Hierarchy) -> None:
     netlist = Netlist({"top": top({"gate": cell("INV", A=8, Y=5)}, {}, {"z": [5]})}, "top", library)
-    with pytest.raises(RuntimeError, match="1 nets of the gates have no driver"):
+    with pytest.raises(RuntimeError, match="1 nets of the gate netlist have no driver"):
         replay(netlist, hierarchy, [1] * netlist.size, recording(netlist, [(0, 0)]))

@@ -1,4 +1,4 @@
-"""Measuring a rebuilt room: the rays, the figures, and the march through the full depth map."""
+"""Accuracy of a reconstructed room: probe rays, figures, and the march through the full depth map."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def made() -> Attic:
     return attic(160, 120)
 
 
-def test_spheres_stand_free_and_in_sight(made: Attic) -> None:
+def test_spheres_are_free_and_visible(made: Attic) -> None:
     environment, tracer = made.environment, RayTracer(made.surface)
     centres = standing_spheres(environment)
     assert len(centres) == 6
@@ -60,7 +60,7 @@ def test_rays_leave_their_sphere(made: Attic) -> None:
     np.testing.assert_allclose(straight.directions[middle], axis, atol=0.02)
 
 
-def test_the_march_meets_what_the_true_room_has_there(made: Attic) -> None:
+def test_the_march_hits_the_true_surface(made: Attic) -> None:
     environment = made.environment
     march = DepthMarch(environment)
     rays = cosine_rays(standing_spheres(environment)[0], 2000, np.random.default_rng(5))
@@ -76,7 +76,7 @@ def test_the_march_meets_what_the_true_room_has_there(made: Attic) -> None:
     assert (away < 0.1).mean() > 0.9
 
 
-def test_the_study_knows_a_good_rebuild_from_a_bad_one(made: Attic) -> None:
+def test_the_study_separates_good_and_bad_marches(made: Attic) -> None:
     environment = made.environment
     march = DepthMarch(environment)
 
@@ -101,7 +101,7 @@ def test_the_study_knows_a_good_rebuild_from_a_bad_one(made: Attic) -> None:
     assert len(table({"good": good, "none": none}).splitlines()) == 4
 
 
-def test_a_march_that_returns_arrays_is_a_rebuild_and_a_geometry(made: Attic) -> None:
+def test_a_function_of_arrays_becomes_a_march_and_a_geometry(made: Attic) -> None:
     environment = made.environment
     march = DepthMarch(environment)
     rays = mirror_rays(standing_spheres(environment)[0])
@@ -115,7 +115,7 @@ def test_a_march_that_returns_arrays_is_a_rebuild_and_a_geometry(made: Attic) ->
     np.testing.assert_array_equal(points.outside, (met.kind != HIT) & (met.kind != HIDDEN))
 
 
-def test_a_start_just_behind_the_surface_is_on_it(made: Attic) -> None:
+def test_an_origin_just_behind_the_surface_is_on_it(made: Attic) -> None:
     environment = made.environment
     row, column = 100, 80
     point = environment.points()[row, column]
