@@ -32,7 +32,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   val distanceDigits:  Int = gridBits.min(mantissaBits)
   val barycentricBits: Int = weightBits.min(colourBits)
 
-  /** Magnitude bits of a vector component in the shader's dot products: 18 suffice for a cosine of [[colourBits]]. */
+  /** Magnitude bits of a vector component in the shader's dot products: 18 suffice for a cosine of `colourBits`. */
   val shadeBits:      Int = macBits.min(colourBits + 6)
   val radicandBits:   Int = precision.sqrt / 2 * 2
   val cosineFraction: Int = mantissaBits.min(colourBits + 4)

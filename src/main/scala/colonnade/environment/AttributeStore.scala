@@ -16,7 +16,7 @@ final class AttributeStoreIO(config: ColonnadeConfig, memory: AttributeMemory) e
   val word = Output(UInt(memory.bits.W))
 }
 
-/** One of the [[AttributeMemories]]. It has a single port, since reads and loads exclude each other. A load beyond its
+/** One of the `AttributeMemories`. It has a single port, since reads and loads exclude each other. A load beyond its
   * depth is ignored.
   */
 final class AttributeStore(config: ColonnadeConfig, memory: AttributeMemory) extends Module {

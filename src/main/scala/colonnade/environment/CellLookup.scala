@@ -13,7 +13,7 @@ final class CellLookupIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   val cells = Flipped(new AttributeChannel(new CellRequest(layout), new CellResponse(layout), tagBits))
 }
 
-/** Looks up the planes of a pixel's tile, or the plane of its cell; see [[PlaneDescriptor]]. A mode beyond 4 counts as 0.
+/** Looks up the planes of a pixel's tile, or the plane of its cell; see `PlaneDescriptor`. A mode beyond 4 counts as 0.
   *
   * A tile has consecutive words: two plane ids per word, then the cells' mask. Latency five cycles and one request a cycle
   * if it needs at most one word. Each further word takes one cycle; the most are three words, for a cell of four planes.

@@ -6,7 +6,7 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.MapDescriptor
 
 /** A map of tiles with two or four palette entries each. A mask selects the entry of each cell; a cell's size depends on
-  * the tile. See [[MapDescriptor]].
+  * the tile. See `MapDescriptor`.
   *
   * Three reads in sequence: descriptor, mask, palette. Latency six cycles, one pixel a cycle. A tile of four entries has a
   * word with two of them, which is read before the mask: its pixels take two cycles and a latency of seven. A word beyond

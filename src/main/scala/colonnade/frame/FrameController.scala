@@ -36,7 +36,7 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   /** Render units get the pixels of this window, too. */
   val window = Input(new EnvironmentWindow(config))
 
-  /** Valid only where ready is set, see [[Dispatcher]]. */
+  /** Valid only where ready is set, see `Dispatcher`. */
   val tiles = Vec(columns, Decoupled(new Tile(config)))
 
   /** Tiles without a pixel for the render units. */

@@ -16,7 +16,7 @@ final class TileSchedulerIO(config: ColonnadeConfig) extends Bundle {
   /** Starts the tiles of a frame; only while idle. */
   val start = Input(Bool())
 
-  /** Valid only where ready is set, see [[Dispatcher]]. */
+  /** Valid only where ready is set, see `Dispatcher`. */
   val tiles = Vec(config.array.columns, Decoupled(new Tile(config)))
 
   /** No tile is left. */

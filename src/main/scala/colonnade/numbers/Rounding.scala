@@ -18,7 +18,7 @@ object Rounding {
 
   def floor(x: UInt, bits: UInt): UInt = x >> bits
 
-  /** Drops `bits` low bits to nearest, ties to even; one bit wider than [[floor]], for the carry. */
+  /** Drops `bits` low bits to nearest, ties to even; one bit wider than `floor`, for the carry. */
   def nearestEven(x: SInt, bits: Int): SInt =
     if (bits <= 0) shiftedLeft(x, -bits)
     else {
@@ -26,7 +26,7 @@ object Rounding {
       floor(wide, bits) +& roundsUp(wide.asUInt, bits).zext
     }
 
-  /** Drops `bits` low bits to nearest, ties to even; one bit wider than [[floor]], for the carry. */
+  /** Drops `bits` low bits to nearest, ties to even; one bit wider than `floor`, for the carry. */
   def nearestEven(x: UInt, bits: Int): UInt =
     if (bits <= 0) shiftedLeft(x, -bits)
     else {
@@ -62,14 +62,14 @@ object Rounding {
   /** The low bits. The caller guarantees that the others are zero. */
   def narrow(x: UInt, width: Int): UInt = if (x.getWidth <= width) x else x(width - 1, 0)
 
-  /** [[floor]] to the fraction bits of a format whose range includes the number's. */
+  /** `floor` to the fraction bits of a format whose range includes the number's. */
   def floor(x: Fixed, to: FixedPointFormat): Fixed = fitted(floor(x.integer, x.format.fraction - to.fraction), x, to)
 
-  /** [[nearestEven]] to the fraction bits of a format whose range includes the number's. */
+  /** `nearestEven` to the fraction bits of a format whose range includes the number's. */
   def nearestEven(x: Fixed, to: FixedPointFormat): Fixed =
     fitted(nearestEven(x.integer, x.format.fraction - to.fraction), x, to)
 
-  /** [[floor]] to the fraction bits of a format, then the nearest value in its range. */
+  /** `floor` to the fraction bits of a format, then the nearest value in its range. */
   def saturate(x: Fixed, to: FixedPointFormat): Fixed =
     Fixed.fromLowBits(to, saturate(floor(x.integer, x.format.fraction - to.fraction), to.lowest, to.highest))
 

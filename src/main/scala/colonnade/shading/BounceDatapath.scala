@@ -8,7 +8,7 @@ import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
 
 /** The bounce unit's datapath: rotating vector registers around one multiplier, one adder, and a unit for roots and
-  * quotients. [[BounceProgram]] controls it; see [[VectorRegister]].
+  * quotients. [[BounceProgram]] controls it; see `VectorRegister`.
   */
 final class BounceDatapath(config: ColonnadeConfig) extends Module {
   import VectorRegister.rotate

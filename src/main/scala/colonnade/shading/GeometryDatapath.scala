@@ -8,7 +8,7 @@ import colonnade.numbers.{Normalise, Rounding}
 import colonnade.ray.PermutedFrame
 
 /** The shader geometry's datapath: rotating vector registers around one multiplier, one adder and one shifter.
-  * [[GeometryProgram]] controls it; see [[VectorRegister]].
+  * [[GeometryProgram]] controls it; see `VectorRegister`.
   */
 final class GeometryDatapath(config: ColonnadeConfig) extends Module {
   import VectorRegister.rotate

@@ -16,7 +16,7 @@ object Occupancy {
   }
 }
 
-/** Collects the events of a render unit from its stages. Stages name their events as [[UnitEvents]] does. */
+/** Collects the events of a render unit from its stages. Stages name their events as `UnitEvents` does. */
 object UnitCounters {
   def apply(
       config:      ColonnadeConfig,
