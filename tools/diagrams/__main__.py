@@ -1,4 +1,4 @@
-"""Draws docs/diagrams: each ``*.toml`` (blocks and arrows), ``*.json`` (WaveDrom) and ``*.dot`` (graph) becomes an SVG.
+"""Draws docs/diagrams: each ``*.toml`` (blocks and arrows) and ``*.json`` (WaveDrom) becomes an SVG of its name.
 
 ``python tools/diagrams`` draws what is out of date; it needs the packages of host/locks/docs.txt. ``… --check`` needs
 nothing but Python: each SVG names the digests of its source with the files of this folder, and of its own contents.
@@ -20,7 +20,7 @@ def main(arguments: list[str]) -> int:
     if arguments not in ([], ["--check"]):
         print("usage: python tools/diagrams [--check]", file=sys.stderr)
         return 2
-    sources = sorted(path for path in FOLDER.iterdir() if path.suffix in (".toml", ".json", ".dot"))
+    sources = sorted(path for path in FOLDER.iterdir() if path.suffix in (".toml", ".json"))
     stale = [source for source in sources if not _is_current(source)]
     orphans = sorted(set(FOLDER.glob("*.svg")) - {_drawing_of(source) for source in sources})
     if arguments:
@@ -39,10 +39,9 @@ def main(arguments: list[str]) -> int:
 def _draw(source: Path) -> None:
     # Imported here, so that the check needs none of the packages
     import blocks
-    import graphs
     import timing
 
-    draw = {".toml": blocks.draw, ".json": timing.draw, ".dot": graphs.draw}[source.suffix]
+    draw = {".toml": blocks.draw, ".json": timing.draw}[source.suffix]
     drawing = draw(source.read_text(encoding="utf-8"))
     _drawing_of(source).write_text(_mark(source, drawing) + drawing, encoding="utf-8")
     print(f"diagrams: drew {_drawing_of(source).relative_to(ROOT)}")
