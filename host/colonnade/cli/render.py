@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     "--waveform",
     type=FILE,
     metavar="FILE",
-    help="Write the signals of the device, its first column and its first render unit, a VCD; for small frames.",
+    help="Write a VCD waveform of the device, its first column and first render unit; for small frames.",
 )
 @json_option
 def render(

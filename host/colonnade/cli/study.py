@@ -22,8 +22,8 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
 
     By default the command traces rays from mirror, matt and glass spheres, and prints the share that finds the correct
     point: with planes of the full maps, and with those of the attribute memory. With --frames it prints the loss from
-    encoding, reconstruction and fixed-point arithmetic as PSNR, FLIP and DISTS of the whole frame, the object and its
-    shadow. Tables are in Markdown.
+    encoding, reconstruction and fixed-point arithmetic. The loss is PSNR, FLIP and DISTS of frame, object and shadow.
+    Tables are in Markdown.
     """
     if output is not None and not frames:
         raise click.UsageError("--output needs --frames", click.get_current_context())

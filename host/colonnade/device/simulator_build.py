@@ -33,7 +33,7 @@ VERILATOR_OPTIONS = (
     "--output-split 20000 --output-split-cfuncs 2000 -Wno-fatal"
 ).split()
 
-#: Of a simulator that writes waveforms: records are wider than Verilator would trace.
+#: Options of a simulator that writes waveforms. Records are wider than the default limit of Verilator.
 WAVEFORM_OPTIONS = ("--trace", "--trace-max-width", "1024", "-CFLAGS", "-DWAVEFORM")
 
 #: Replaces -Os of Verilator's makefile, which is a third slower.
@@ -68,9 +68,9 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, wavefor
     """The simulator of a design, built unless `cache.entry` has it.
 
     Args:
-        design: What is simulated.
+        design: The design to simulate.
         progress: Shows the build.
-        waveform: It can write waveforms; it is then slower.
+        waveform: Build a slower simulator that can write waveforms.
 
     Raises:
         UserError: A program is missing, too old, or compiles wrongly.

@@ -11,10 +11,10 @@ One evaluation of each unit and a few of columns and device simulate a cycle exa
 3. A column's outputs to the device depend combinationally on the device's outputs only through the pixel stream.
 
 In each cycle all models settle first: device, columns, device. Then the clock edge of the device, the columns and the
-units follows. Between the last two, the inputs of a unit that are not direct are copied into registers around the unit
-(`UNIT_MODEL`), so the unit sees them in the same cycle as the column's registers. The harness checks the coupling at
-run time (``Array::check``). All models clock on both edges (`both_edges`): a cycle takes one evaluation of a unit, not
-two.
+units follows. Between the last two, all inputs of a unit except the direct ones are copied into registers around the
+unit (`UNIT_MODEL`). So the unit sees them in the same cycle as the column's registers. The harness checks the coupling
+at run time (``Array::check``). All models clock on both edges (`both_edges`): a cycle takes one evaluation of a unit,
+not two.
 """
 
 from __future__ import annotations

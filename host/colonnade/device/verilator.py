@@ -91,7 +91,7 @@ def render_rtl(
         stalls: Random stalls; None: no stalls.
         progress: Shows the steps.
         through_port: Load records through the load port, one per cycle, and not directly into the memories.
-        waveform: A VCD file for the signals of the device, its first column and that column's first render unit.
+        waveform: VCD file for the signals of the device, its first column and that column's first render unit.
 
     Raises:
         UserError: The stalls include banks, and the design has no input for that.

@@ -165,7 +165,7 @@ def _opensta_comparison(units: Mapping[str, Mapping[str, Any]]) -> dict[str, Any
     """Deviation of our slowest paths from OpenSTA's; None without OpenSTA."""
     found = [unit["paths"]["register_to_register"] for unit in units.values() if _is_timed(unit)]
     shares = [path["ns"] / path["opensta_ns"] - 1 for path in found if path.get("opensta_ns")]
-    return {"units": len(shares), "least": min(shares), "most": max(shares)} if shares else None
+    return {"units": len(shares), "min": min(shares), "max": max(shares)} if shares else None
 
 
 def _is_timed(unit: Mapping[str, Any]) -> bool:

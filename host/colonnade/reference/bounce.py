@@ -33,8 +33,8 @@ def bounce(
 ) -> Bounces:
     """Reflect or refract rays.
 
-    The geometric normal replaces a shading normal that faces away from the ray, or that would scatter the ray to the
-    wrong side of the surface.
+    The geometric normal replaces a shading normal that faces away from the ray. It also replaces one that scatters the
+    ray to the wrong side of the surface.
 
     Args:
         directions: Unit directions, float64 [n, 3].

@@ -101,7 +101,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
 
 
 def _check_waveform(request: RenderRequest, size: tuple[int, int]) -> None:
-    """Refuse a waveform of what has no signals, or of so much that it would fill the disk."""
+    """Raise a `UserError` if the request cannot write a waveform: wrong backend, several frames, or a large frame."""
     if request.backend != "rtl":
         raise UserError(f"the {request.backend} backend has no signals: use --backend rtl for --waveform")
     if request.frames != 1:

@@ -26,7 +26,7 @@ class RenderRequest:
         background: Folder of a room that replaces the scene's background.
         hits: Whether the caller needs hit triangles; the configuration must then have them.
         relit: Whether the scene's lights shade the room even if it has a photo.
-        waveform: A VCD file for the hardware's signals during the frame; of the RTL, one small frame.
+        waveform: VCD file for the signals of one small RTL frame.
     """
 
     scene: Path

@@ -42,7 +42,7 @@ def test_a_compiler_with_the_bug_is_refused() -> None:
     compiler, version = require_compiler("a test")
     if re.search(r" 12\.2\.\d+$", version) is None:
         pytest.skip(f"only g++ 12.2 is known to have the bug: {version}")
-    with pytest.raises(UserError, match=r"miscompiles population counts with -O2: simulated hardware would be wrong"):
+    with pytest.raises(UserError, match=r"miscompiles population counts with -O2: the simulator would be wrong"):
         require_right_compiler(compiler, ("-O2",))
 
 

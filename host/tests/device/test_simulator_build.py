@@ -41,12 +41,14 @@ class Builder:
     builds: int = 0
     fails: bool = False
 
-    def __call__(self, tools: Tools, design: GeneratedDesign, harness: Path, place: Path, log: Path) -> None:
+    def __call__(
+        self, tools: Tools, design: GeneratedDesign, harness: Path, output: Path, log: Path, waveform: bool = False
+    ) -> None:
         self.builds += 1
         if self.fails:
-            (place / "half").write_text("half")
+            (output / "half").write_text("half")
             raise RuntimeError(f"the simulator does not build (status 1): see {log}")
-        (place / PROGRAM).write_text(f"build {self.builds}")
+        (output / PROGRAM).write_text(f"build {self.builds}")
 
 
 @dataclass(frozen=True)

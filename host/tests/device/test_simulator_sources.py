@@ -82,7 +82,7 @@ def test_ports_have_direction_width_and_kind() -> None:
 
 
 def test_an_unknown_port_is_an_error() -> None:
-    with pytest.raises(ValueError, match=r"a port of RenderUnit is not understood: inout x"):
+    with pytest.raises(ValueError, match=r"cannot parse a port of RenderUnit: inout x"):
         module_ports("module RenderUnit(\n  inout x\n);\n", "RenderUnit")
 
 

@@ -128,7 +128,7 @@ def test_a_damaged_gate_simulator_is_rebuilt(
     first.write_text("poison")
     assert [again(), again()] == [first, first]
     assert first.read_text() == "#!/bin/sh\nexit 0\n"
-    assert capsys.readouterr().err == "colonnade: the cached simulator of gates was damaged and is built again\n"
+    assert capsys.readouterr().err == "colonnade: the cached gate simulator was damaged and is built again\n"
     compiler.with_name("g++.version").write_text("g++ 13\n")
     assert again() != first
     lines = compiler.with_name("g++.log").read_text().splitlines()

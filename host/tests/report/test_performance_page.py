@@ -70,14 +70,14 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     rates = table(docs, "rates")
     assert "| bunny | 12 | 100 | 50 | **1.00** | 2.00 | 1.25 | 2.00 | box unit, 80 % |" in rates
     assert "**4.8 times** the chip's 0.208" in rates
-    assert "| rows (render units of a column) | 4 | 2.000 | 2.000 | 0.3333 | 2.00 |" in table(docs, "scaling")
+    assert "| rows (render units per column) | 4 | 2.000 | 2.000 | 0.3333 | 2.00 |" in table(docs, "scaling")
 
 
 def test_ablation_stands_beside_the_model(docs: Path) -> None:
     rows = table(docs, "ablation")
-    assert "| mesh | contexts |  | round-robin, 1 bank | snooping, 1 bank |" in rows
-    assert "| bunny | 4 | RTL | **0.333** | **0.417** |\n|  |  | model, 6/2 lanes | 0.090 | 0.165 |" in rows
-    assert "|  |  | model, 12/4 lanes | – | 0.190 |" in rows
+    assert "| mesh | contexts | source | round-robin, 1 bank | snooping, 1 bank |" in rows
+    assert "| bunny | 4 | RTL | **0.333** | **0.417** |\n|  |  | cycle model, 6/2 lanes | 0.090 | 0.165 |" in rows
+    assert "|  |  | cycle model, 12/4 lanes | – | 0.190 |" in rows
     assert rows.count("| cube |") == 2
 
 

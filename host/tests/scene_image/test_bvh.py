@@ -23,18 +23,18 @@ def build(vertices: Integers, faces: Integers, **changes: Any) -> Bvh:
 def random_triangles(seed: int, count: int, spread: int, bits: int = 16) -> tuple[Integers, Integers]:
     """Small triangles; with a small ``spread`` they form clusters with coincident centres."""
     generator = np.random.default_rng(seed)
-    most = (1 << bits) - 1
-    centres = generator.integers(0, most + 1, (max(1, spread), 3))
+    maximum = (1 << bits) - 1
+    centres = generator.integers(0, maximum + 1, (max(1, spread), 3))
     corners = centres[generator.integers(0, len(centres), count)][:, None] + generator.integers(-40, 41, (count, 3, 3))
-    vertices = np.clip(corners, 0, most).reshape(-1, 3).astype(np.int32)
+    vertices = np.clip(corners, 0, maximum).reshape(-1, 3).astype(np.int32)
     return vertices, np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
 
 
 def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, box_bits: int) -> None:
     """Traverse the tree and check each box against those of its ancestors."""
     seen: list[int] = []
-    most = (1 << 28, -1)
-    tasks = [(0, np.full(3, -1), np.full(3, most[0]), 0, 1)]
+    maximum = (1 << 28, -1)
+    tasks = [(0, np.full(3, -1), np.full(3, maximum[0]), 0, 1)]
     deepest_stack = depth = 0
     while tasks:
         node, low, high, waiting, level = tasks.pop()

@@ -51,9 +51,9 @@ def test_quantisation_is_uniform_centred_and_near(seed: int, count: int, bits: i
         result = quantise(mesh, bits)
     except UserError:
         return  # too small for its distance from the origin
-    most = (1 << bits) - 1
-    assert result.vertices.min() >= 0 and result.vertices.max() <= most
-    assert np.ptp(result.vertices, axis=0).max() >= most - 1
+    maximum = (1 << bits) - 1
+    assert result.vertices.min() >= 0 and result.vertices.max() <= maximum
+    assert np.ptp(result.vertices, axis=0).max() >= maximum - 1
     exact = (mesh.vertices - np.array(result.frame.offset)) * result.frame.scale
     rounding = np.abs(mesh.vertices).max() * result.frame.scale * 1e-15
     assert np.abs(exact - result.vertices).max() <= 0.5 + 1e-3 + rounding

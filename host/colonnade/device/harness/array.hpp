@@ -129,7 +129,7 @@ public:
     }
 
 #ifdef WAVEFORM
-    /// Adds the device, its first column and that column's first unit to a waveform that is not yet open.
+    /// Adds the device, its first column and that column's first unit to a waveform before it is opened.
     void addTo(VerilatedVcdC& waveform) {
         device.trace(&waveform, 99);
         columns_.front()->trace(&waveform, 99);

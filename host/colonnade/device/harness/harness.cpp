@@ -12,7 +12,7 @@
 // Options: --stall PERCENT of cycles in which the pixel sink is not ready; --seed N; for designs with memory stalls:
 // --memory PERCENT of cycles in which each bank is stalled, --burst N, the longest stall in cycles;
 // --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
-// With WAVEFORM defined, --waveform FILE: the signals of the frames as VCD; its time unit is a cycle.
+// With WAVEFORM defined, --waveform FILE writes the signals of the frames as VCD; the time unit is a cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
 #include <algorithm>
 #include <chrono>
@@ -113,7 +113,7 @@ public:
             if (!waveform_.isOpen()) throw std::runtime_error("the waveform cannot be written");
         }
 #else
-        if (!options.waveform.empty()) throw std::runtime_error("this simulator writes no waveforms");
+        if (!options.waveform.empty()) throw std::runtime_error("this simulator was built without waveforms");
 #endif
         top_.reset = 1;
         for (int i = 0; i < 8; ++i) cycle();
@@ -201,7 +201,7 @@ public:
         std::memset(&top_.io_memoryHolds, 0, sizeof top_.io_memoryHolds);
 #endif
         mayChangeRegisters_ = true;
-        // The cycle in which `done` is up belongs to the waveform
+        // The waveform includes the cycle in which `done` is high
         if (traces()) cycle();
         isTraced_ = false;
         const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
@@ -256,7 +256,7 @@ private:
         ++cycles_;
     }
 
-    /// The cycle goes into the waveform.
+    /// Whether the waveform includes this cycle.
     bool traces() const {
 #ifdef WAVEFORM
         return isTraced_ && waveform_.isOpen();

@@ -1,8 +1,8 @@
 """Accuracy of a reconstructed room: rays from mirror, matt and glass spheres against the mesh of the full depth map.
 
-A ray is *known* if it hits the mesh from the front. A known ray is *ok* if its hit in the march lies within
-`NEAR_PIXELS` of the same map position or within `NEAR_METRES` of the same point. It is *missed* if the march has no
-hit. Pictures show the albedo in sRGB over known rays; missed rays are black.
+A ray is *known* if it hits the mesh from the front. A known ray is *ok* if the march hits within `NEAR_PIXELS` of the
+same map position or within `NEAR_METRES` of the same point. It is *missed* if the march has no hit. Pictures show the
+albedo in sRGB over known rays; missed rays are black.
 
 `colonnade study ROOM …` prints the figures of rooms for three marches: float through the planes of the full maps, float
 through the planes of the attribute memory, and the device's march.

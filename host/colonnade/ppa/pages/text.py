@@ -112,8 +112,8 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
 
 def format_opensta(comparison: Mapping[str, Any]) -> str:
     """The deviation of our slowest paths from OpenSTA's."""
-    least, most = comparison["least"], comparison["most"]
-    return f"our slowest paths deviate by {least:+.1%} to {most:+.1%} over {comparison['units']} units"
+    low, high = comparison["min"], comparison["max"]
+    return f"our slowest paths deviate by {low:+.1%} to {high:+.1%} over {comparison['units']} units"
 
 
 def _path(path: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """Background surfaces, in a room's view space: what the reference shades where rays miss the object.
 
-A `Backdrop` combines any `Geometry` (depth mesh or reconstructed room) with any maps (full or decoded), so a study can
+A `Backdrop` combines any `Geometry` (depth mesh or reconstructed room) with any maps (full or decoded). So a study can
 measure the loss of each separately.
 """
 
