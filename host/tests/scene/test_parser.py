@@ -45,7 +45,7 @@ def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
     [
         ("", r"\[mesh\] needs either a name or a path"),
         ("mesh = 3", "mesh must be a table"),
-        ('[mesh]\nname = "a"\npath = "b"', "one of the two"),
+        ('[mesh]\nname = "a"\npath = "b"', "either a name or a path"),
         ("[mesh]\nname = 3", "mesh.name must be text"),
         ('[mesh]\nname = "a"\n[lihgt]', "unknown key lihgt; known here: mesh"),
         ('[mesh]\nname = "a"\n[light]\ncolor = [1, 1, 1]', "unknown key light.color; known here"),
@@ -64,7 +64,7 @@ def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
         ('[mesh]\nname = "a"\n[transform]\nscale = 0', "transform.scale must be a number"),
         ('[mesh]\nname = "a"\n[frame]\nwidth = 0', "frame.width must be a whole number"),
         ('[mesh]\nname = "a"\n[material]\nkind = "wood"', "material.kind must be one of diffuse, mirror, glass"),
-        ('[mesh]\nname = "a"\n[material]\nkind = "mirror"\nior = 1.5', "material.ior belongs to glass"),
+        ('[mesh]\nname = "a"\n[material]\nkind = "mirror"\nior = 1.5', "material.ior is for glass"),
         ('[mesh]\nname = "a"\n[material]\nior = 0.5', "material.ior must be a number from 1 to 4"),
         ('[mesh]\nname = "a"\n[light]\nfalloff = 0', "light.falloff must be a number"),
         ('[mesh]\nname = "a"\n[[light]]\n[[light]]\nshadows = false', "unknown key light.shadows; known here: pos"),
