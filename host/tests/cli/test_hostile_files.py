@@ -220,17 +220,23 @@ CASES |= {
     "liberty-gz-zlib": Case(
         "ppa --liberty x.lib.gz --no-power", "unpacked", {"x.lib.gz": gzip.compress(b"l" * 99)[:12] + b"\xff" * 30}
     ),
-    "liberty-empty": Case(PPA, "no liberty", {"x.lib": ""}),
-    "liberty-noise": Case(PPA, "no liberty", {"x.lib": np.random.default_rng(3).bytes(3000)}),
+    "liberty-empty": Case(PPA, "is not a liberty file", {"x.lib": ""}),
+    "liberty-noise": Case(PPA, "is not a liberty file", {"x.lib": np.random.default_rng(3).bytes(3000)}),
     "liberty-no-cells": Case(PPA, "x", {"x.lib": LIBRARY.format("")}),
     "liberty-open": Case(PPA, "braces", {"x.lib": "library (x) {"}),
     "liberty-comments": Case(PPA, "comment", {"x.lib": "library (x) { " + "/*" * 300_000}),
-    "liberty-area": Case(PPA, "no liberty", {"x.lib": LIBRARY.format("cell (a) { area : big; }")}),
+    "liberty-area": Case(PPA, "is not a usable liberty file", {"x.lib": LIBRARY.format("cell (a) { area : big; }")}),
     "liberty-nan": Case(PPA, "finite", {"x.lib": LIBRARY.format("cell (a) { area : nan; }")}),
-    "liberty-load-unit": Case(PPA, "no liberty", {"x.lib": LIBRARY.format("capacitive_load_unit (one, pf);")}),
-    "liberty-strange-unit": Case(PPA, "no liberty", {"x.lib": LIBRARY.format("capacitive_load_unit (1, kg);")}),
+    "liberty-load-unit": Case(
+        PPA, "is not a usable liberty file", {"x.lib": LIBRARY.format("capacitive_load_unit (one, pf);")}
+    ),
+    "liberty-strange-unit": Case(
+        PPA, "is not a usable liberty file", {"x.lib": LIBRARY.format("capacitive_load_unit (1, kg);")}
+    ),
     "liberty-time-unit": Case(PPA, "time_unit", {"x.lib": LIBRARY.format('time_unit : "1 week";')}),
-    "liberty-nameless-cell": Case(PPA, "no liberty", {"x.lib": LIBRARY.format("cell () { area : 1; }")}),
+    "liberty-nameless-cell": Case(
+        PPA, "is not a usable liberty file", {"x.lib": LIBRARY.format("cell () { area : 1; }")}
+    ),
     "liberty-spaces": Case(
         "ppa --liberty 'a b;c.lib' --no-power", "a_b_c", {"a b;c.lib": LIBRARY.format("cell () { }")}
     ),

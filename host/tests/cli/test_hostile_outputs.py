@@ -62,8 +62,8 @@ CASES |= {
     "full-device": Case(f"{RENDER} --output /dev/full", "a device"),
     "stdout": Case(f"{RENDER} --json /dev/stdout", "/dev/stdout is"),
     "descriptor": Case(f"{RENDER} --json /dev/fd/1", "/dev/fd/1 is"),
-    "no-parent": Case(f"{RENDER} --output none/f.png", "no folder"),
-    "parent-is-a-file": Case(f"{RENDER} --output a.png/f.png", "no folder"),
+    "no-parent": Case(f"{RENDER} --output none/f.png", "is not a folder"),
+    "parent-is-a-file": Case(f"{RENDER} --output a.png/f.png", "is not a folder"),
     "in-proc": Case(f"{RENDER} --output /proc/f.png", "/proc"),
     "long-path": Case(f"{RENDER} --output {'d/' * 3000}f.png", "File name too long"),
     # An input of the same command
@@ -117,10 +117,10 @@ CASES |= {
     ),
     # Folders
     "pack-into-a-file": Case(f"{PACK} --output Makefile", "a file", {"Makefile": "all:\n"}),
-    "pack-over-a-text": Case(f"{PACK} --output notes.txt", "no scene image", {"notes.txt": "irreplaceable"}),
+    "pack-over-a-text": Case(f"{PACK} --output notes.txt", "is not a scene image", {"notes.txt": "irreplaceable"}),
     "pack-into-a-pipe": Case(f"{PACK} --output q", "a pipe", {"q": fifo}),
     "pack-onto-a-link": Case(f"{PACK} --output q", "a symbolic link", {"q/scene.image": link_to("../a.png")}),
-    "pack-over-a-foreign-image": Case(f"{PACK} --output q", "no scene image", {"q/scene.image": "mine"}),
+    "pack-over-a-foreign-image": Case(f"{PACK} --output q", "is not a scene image", {"q/scene.image": "mine"}),
     "pack-long-name": Case(f"{PACK} --output {LONG}", "File name too long"),
     "maps-into-a-file": Case("inspect --background room --no-dists --output a.png", "a file"),
     "study-into-a-file": Case("study room --frames --no-dists --output a.png", "a file"),
@@ -138,7 +138,7 @@ CASES |= {
     "generate-over-a-false-marker": Case(f"{GENERATE} --output d", "cannot be read", {f"d/{MARKER}": "mine\n"}),
     "generate-over-a-binary-marker": Case(f"{GENERATE} --output d", "cannot be read", {f"d/{MARKER}": b"\xff\xfe"}),
     "generate-long-name": Case(f"{GENERATE} --output {LONG}", "File name too long"),
-    "generate-below-a-file": Case(f"{GENERATE} --output a.png/d", "no folder"),
+    "generate-below-a-file": Case(f"{GENERATE} --output a.png/d", "is not a folder"),
     "generate-nothing": Case(f"{GENERATE} --output ''", "working directory"),
     "control-characters": Case(RENDER + " --output x\x1b[31m/f.png", "\\x1b[31m"),
 }

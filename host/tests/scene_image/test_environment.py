@@ -137,7 +137,7 @@ def test_words_without_a_memory_are_a_bug(hardware: Manifest, held: EncodedEnvir
     planes = held.image.planes
     for changed in (
         replace(planes, heap=planes.heap[:-1]),
-        replace(planes, shell=planes.bounding | np.uint64(1 << 40)),
+        replace(planes, bounding=planes.bounding | np.uint64(1 << 40)),
     ):
         wrong = EncodedEnvironment(held.environment, replace(held.image, planes=changed))
         with pytest.raises(ValueError, match="do not fit"):
@@ -150,7 +150,7 @@ def test_the_report_has_the_bytes_of_each_map(hardware: Manifest, image: SceneIm
     assert use["albedo"]["source_bytes"] == 921600 and use["albedo"]["ratio"] == pytest.approx(56.25)
     lines = "\n".join(report_lines(image.header, hardware))
     assert "16,384 bytes of memory, a 56.2x reduction from the map's 921,600" in lines
-    assert "planes.bounding            8 words of 17 bytes, load target 10" in lines
+    assert "  planes.bounding         8 words of 17 bytes, load target 10" in lines
     assert "albedo.palette" in "\n".join(report_lines(image.header))
     assert json.loads(json.dumps(describe(image)))["room"]["name"] == "attic"
 

@@ -132,7 +132,7 @@ def test_random_access_follows_the_words(plane_bytes: int, cells: int) -> None:
 
 def bounding_fields(content: PlaneMap) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Planes, albedos and normals of the used bounding planes."""
-    entries = [sum(int(part) << (64 * k) for k, part in enumerate(words)) for words in content.shell if words.any()]
+    entries = [sum(int(part) << (64 * k) for k, part in enumerate(words)) for words in content.bounding if words.any()]
     planes = unpack_planes(np.array([entry & (1 << 64) - 1 for entry in entries], np.uint64))
     albedos = unpack(np.array([entry >> 64 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=False)
     normals = unpack(np.array([entry >> 100 & (1 << 36) - 1 for entry in entries], np.uint64), 12, signed=True)
