@@ -225,18 +225,16 @@ CASES |= {
     "liberty-no-cells": Case(PPA, "x", {"x.lib": LIBRARY.format("")}),
     "liberty-open": Case(PPA, "braces", {"x.lib": "library (x) {"}),
     "liberty-comments": Case(PPA, "comment", {"x.lib": "library (x) { " + "/*" * 300_000}),
-    "liberty-area": Case(PPA, "is not a usable liberty file", {"x.lib": LIBRARY.format("cell (a) { area : big; }")}),
+    "liberty-area": Case(PPA, "not a usable liberty", {"x.lib": LIBRARY.format("cell (a) { area : big; }")}),
     "liberty-nan": Case(PPA, "finite", {"x.lib": LIBRARY.format("cell (a) { area : nan; }")}),
     "liberty-load-unit": Case(
-        PPA, "is not a usable liberty file", {"x.lib": LIBRARY.format("capacitive_load_unit (one, pf);")}
+        PPA, "not a usable liberty", {"x.lib": LIBRARY.format("capacitive_load_unit (one, pf);")}
     ),
     "liberty-strange-unit": Case(
-        PPA, "is not a usable liberty file", {"x.lib": LIBRARY.format("capacitive_load_unit (1, kg);")}
+        PPA, "not a usable liberty", {"x.lib": LIBRARY.format("capacitive_load_unit (1, kg);")}
     ),
     "liberty-time-unit": Case(PPA, "time_unit", {"x.lib": LIBRARY.format('time_unit : "1 week";')}),
-    "liberty-nameless-cell": Case(
-        PPA, "is not a usable liberty file", {"x.lib": LIBRARY.format("cell () { area : 1; }")}
-    ),
+    "liberty-nameless-cell": Case(PPA, "not a usable liberty", {"x.lib": LIBRARY.format("cell () { area : 1; }")}),
     "liberty-spaces": Case(
         "ppa --liberty 'a b;c.lib' --no-power", "a_b_c", {"a b;c.lib": LIBRARY.format("cell () { }")}
     ),
