@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.atomic_files import replacing, write_json
@@ -36,13 +37,45 @@ NO_TREE = "geometry.bvh=false"
 
 
 def reduced(mesh: Mesh, maximum: int) -> tuple[Array, Array]:
-    """Vertices [n, 3] and faces [m, 3] of a mesh, simplified by quadrics to at most `maximum` faces."""
-    import fast_simplification
+    """Simplify a mesh by vertex clustering (Rossignac and Borrel 1993), on the finest grid.
 
-    points, faces = fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=maximum)
-    if len(faces) > maximum:
+    At most `maximum` faces are left.
+
+    A library's edge collapse (fast-simplification, by quadrics) does not serve: it keeps every component, and the 875
+    components of the dragon leave 5,143 faces.
+
+    Returns:
+        Vertices [n, 3] and faces [m, 3].
+    """
+    least = mesh.vertices.min(axis=0)
+    edge = float((mesh.vertices.max(axis=0) - least).max())
+    finest: tuple[Array, Array] | None = None
+    # The number of faces grows with the grid, if not strictly
+    low, high = 1, 1024
+    while low < high - 1:
+        cells = (low + high) // 2
+        vertices, faces = _clustered(mesh, np.floor((mesh.vertices - least) / edge * cells).astype(np.int64))
+        if 0 < len(faces) <= maximum:
+            low, finest = cells, (vertices, faces)
+        else:
+            low, high = (low, cells) if len(faces) else (cells, high)
+    if finest is None:
         raise RuntimeError(f"{mesh.name} cannot be simplified to {maximum} triangles")
-    return points, faces
+    return finest
+
+
+def _clustered(mesh: Mesh, cells: Array) -> tuple[Array, Array]:
+    """Replace the vertices of each cell by their mean; drop faces without area, and duplicates."""
+    _, index, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    index = index.reshape(-1)
+    sums = np.zeros((len(counts), 3))
+    np.add.at(sums, index, mesh.vertices)
+    faces = index[mesh.faces]
+    corners = np.sort(faces, axis=1)
+    is_flat = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2])
+    _, first = np.unique(corners, axis=0, return_index=True)
+    kept = np.intersect1d(first, np.flatnonzero(~is_flat))
+    return sums / counts[:, None], faces[kept]
 
 
 def tree_gain(config: str, counts: Sequence[int], size: tuple[int, int]) -> dict[str, Any]:
