@@ -1,4 +1,4 @@
-// colonnade._core: the compiled half of the host. Each bind_*.cpp binds one part.
+// colonnade._core: the compiled half of the host. Each bind_*.cpp exports one part.
 #include <nanobind/nanobind.h>
 
 namespace nb = nanobind;

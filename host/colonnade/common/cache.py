@@ -38,7 +38,7 @@ _verified: dict[Path, dict[str, str]] = {}
 
 
 def seal(folder: Path, key: str | None = None) -> None:
-    """Write ``contents.json``, which binds a folder's files to its key; the default key is the folder's name."""
+    """Write ``contents.json``, the digests of a folder's files under its key; the default key is the folder's name."""
     files = {name: [size, digest] for name, (size, digest) in _contents(folder).items()}
     write_json(folder / CONTENTS, {"version": VERSION, "key": key or folder.name, "files": files})
 
