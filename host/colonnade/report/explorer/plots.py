@@ -1,0 +1,85 @@
+"""Writes the charts of a study as SVG and PNG files."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import vl_convert
+
+from colonnade.common.atomic_files import make_folder, replacing
+from colonnade.report.explorer.charts import INK, Spec
+from colonnade.report.explorer.rows import LEVELS
+from colonnade.report.explorer.sections import Chart, bar_charts, scatter_axes, scatter_chart
+from colonnade.report.explorer.study import Study, objectives
+
+#: Width of a plot, CSS pixels, and how many pixels of a PNG each is.
+WIDTH = 760
+SCALE = 2.0
+
+#: Characters of a file name; equal names are numbered.
+MAX_NAME = 100
+
+
+def write_all(study: Study, folder: Path) -> list[Path]:
+    """Write a plot for each pair of objectives and for each library, level and workload; returns the paths."""
+    make_folder(folder)
+    paths = []
+    for name, spec in plots(study):
+        svg = vl_convert.vegalite_to_svg(_static(spec))
+        for suffix, data in ((".svg", svg.encode()), (".png", vl_convert.svg_to_png(svg, scale=SCALE))):
+            paths.append(folder / (name + suffix))
+            with replacing(paths[-1]) as stream:
+                stream.write(data)
+    return paths
+
+
+def plots(study: Study) -> Iterator[tuple[str, Spec]]:
+    """File name and specification of each plot."""
+    count: Counter[str] = Counter()
+    for name, spec in _all(study):
+        file = re.sub(r"[^A-Za-z0-9._-]+", "-", name)[:MAX_NAME]
+        count[file] += 1
+        yield file if count[file] == 1 else f"{file}.{count[file]}", spec
+
+
+def _all(study: Study) -> Iterator[tuple[str, Spec]]:
+    pairs = list(itertools.combinations(objectives(study), 2))
+    first = scatter_axes(study)
+    for x, y in pairs or ([first] if first else []):
+        yield f"pareto--{x['key']}--{y['key']}", scatter_chart(study, x, y)
+    for chart in bar_charts(study).values():
+        yield from _choices(chart)
+
+
+def _choices(chart: Chart) -> Iterator[tuple[str, Spec]]:
+    """The chart with each combination of values that has data, its title naming them."""
+    rows = chart.spec["data"]["values"]
+    for values in itertools.product(*chart.choices.values()):
+        chosen = dict(zip(chart.choices, values, strict=True))
+        if not any(all(row[key] == value for key, value in chosen.items()) for row in rows):
+            continue
+        spec = copy.deepcopy(chart.spec)
+        for parameter in spec.get("params", []):
+            parameter["value"] = chosen[parameter["name"]]
+        spec["title"] = ", ".join([chart.title, *(LEVELS.get(value, value) for value in values)])
+        yield "--".join([chart.name, *values]), spec
+
+
+def _static(spec: Spec) -> Spec:
+    """The specification for a white page of fixed width."""
+    static: Spec = _replaced(spec, INK, "black")
+    return static | {"width": WIDTH, "padding": 10, "config": static["config"] | {"background": "white"}}
+
+
+def _replaced(value: Any, old: str, new: str) -> Any:
+    if isinstance(value, dict):
+        return {key: item if key == "data" else _replaced(item, old, new) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_replaced(item, old, new) for item in value]
+    return new if value == old else value
