@@ -33,6 +33,9 @@ KEPT_STATES = 4
 DESIGN = "design"
 CLASSPATH = "classpath.json"
 
+#: Most of the generator's code runs once. The optimising compiler of Java would take longer than it saves.
+JAVA_OPTIONS = ("-XX:TieredStopAtLevel=1",)
+
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 
@@ -177,7 +180,7 @@ def _run(
 ) -> None:
     """Run the generator; status 2 becomes a UserError with the generator's message."""
     sets = [argument for override in source.overrides for argument in ("--set", override)]
-    command = [str(java), *_java_options(root), "-cp", classpath, "colonnade.Generate"]
+    command = [str(java), *JAVA_OPTIONS, *_java_options(root), "-cp", classpath, "colonnade.Generate"]
     command += ["--config", str(source.path), "--output", str(design), *sets, *options]
     with progress.step("generating the manifest" if "--manifest-only" in options else "generating the hardware"):
         done = processes.run(command, cwd=root)

@@ -1,13 +1,14 @@
 package colonnade
 
 import chisel3._
+import chisel3.experimental.hierarchy.{Definition, Instance}
 import chisel3.util.{Decoupled, Pipe}
 import colonnade.column.Column
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, EnvironmentWindow, FrameController}
-import colonnade.unit.{RenderUnit, RenderUnitIO}
+import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** Ports of [[Colonnade]]. */
 final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
@@ -38,7 +39,7 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   */
 final class Colonnade(
     config:     ColonnadeConfig,
-    renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO } = new RenderUnit(_)
+    renderUnit: ColonnadeConfig => RenderUnitModule = new RenderUnit(_)
 ) extends Module {
   val io = IO(new ColonnadeIO(config))
 
@@ -46,7 +47,8 @@ final class Colonnade(
   private val controller = Module(new FrameController(config))
   private val counters   = Module(new CounterFile(config))
   private val clears     = reset.asBool || controller.io.aborts
-  private val columns    = Seq.fill(config.array.columns)(withReset(clears)(Module(new Column(config, renderUnit))))
+  private val definition = Definition(new Column(config, renderUnit)) // elaborated once, not once per column
+  private val columns    = Seq.fill(config.array.columns)(withReset(clears)(Instance(definition)))
 
   // Loads go to all columns
   private val load = Pipe(io.load.fire, io.load.bits)

@@ -1,6 +1,8 @@
 package colonnade.column
 
 import chisel3._
+import chisel3.experimental.hierarchy.{instantiable, public, Definition, Instance}
+import chisel3.experimental.noPrefix
 import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributePort, ColumnEnvironment}
@@ -14,7 +16,7 @@ import colonnade.frame.{
   Tile,
   TileWalker
 }
-import colonnade.unit.{RenderUnit, RenderUnitIO}
+import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** Ports of [[Column]]. */
 final class ColumnIO(config: ColonnadeConfig) extends Bundle {
@@ -50,15 +52,18 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   *
   * @param renderUnit makes a render unit; specs pass another one with the same ports
   */
+@instantiable
 final class Column(
     config:     ColonnadeConfig,
-    renderUnit: ColonnadeConfig => Module { val io: RenderUnitIO } = new RenderUnit(_)
+    renderUnit: ColonnadeConfig => RenderUnitModule = new RenderUnit(_)
 ) extends Module {
-  val io = IO(new ColumnIO(config))
+  @public val io = IO(new ColumnIO(config))
 
   private val walker     = Module(new TileWalker(config))
   private val background = Module(new BackgroundWalker(config))
-  private val units      = Seq.fill(config.array.rows)(Module(renderUnit(config)).io)
+  // A definition: the unit is elaborated once, not once per row. Without prefix the instances are RenderUnit, RenderUnit_1…
+  private val definition = Definition(renderUnit(config))
+  private val units      = Seq.fill(config.array.rows)(noPrefix(Instance(definition)).io)
   private val controller = Module(new ColumnBvhController(config))
   private val memory     = Module(new ColumnBvhMemory(config))
   private val collector  = Module(new PixelCollector(config, config.array.rows + 1))

@@ -19,9 +19,7 @@ import colonnade.shading.{ColourUnit, LitSurface, Shader, ShadowRays}
   * RtController holds the state of every context and issues it to its next stage. Pixels leave in any order; their order
   * depends on timing, their values do not.
   */
-final class RenderUnit(config: ColonnadeConfig) extends Module {
-  val io = IO(new RenderUnitIO(config))
-
+final class RenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config) {
   private val controller  = Module(new RtController(config)).io
   private val primaryRays = Module(new PrimaryRays(config)).io
   private val raySetup    = Module(new RaySetup(config)).io

@@ -1,6 +1,7 @@
 package colonnade.unit
 
 import chisel3._
+import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.environment.AttributePort
@@ -24,4 +25,10 @@ final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
   /** No pixel is in flight. */
   val isIdle = Output(Bool())
   val events = Output(new UnitEvents(config))
+}
+
+/** A module with the ports of a render unit: [[RenderUnit]], or what specs put in its place. */
+@instantiable
+abstract class RenderUnitModule(config: ColonnadeConfig) extends Module {
+  @public val io: RenderUnitIO = IO(new RenderUnitIO(config))
 }

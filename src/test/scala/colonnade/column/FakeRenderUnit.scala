@@ -4,16 +4,14 @@ import chisel3._
 import chisel3.util.random.LFSR
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Pixel, PixelPosition, RecordFormats}
-import colonnade.unit.RenderUnitIO
+import colonnade.unit.RenderUnitModule
 
 /** Renders a pixel by a chain of records: the position names the first one, each record the next one, with random pauses.
   * With `shading.shadows` it hangs at [[FakeRenderUnit.hangsAt]]; with `shading.flat` it reports an illegal record
   * for each pixel of column 5.
   */
-class FakeRenderUnit(config: ColonnadeConfig) extends Module {
+class FakeRenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config) {
   import FakeRenderUnit._
-
-  val io = IO(new RenderUnitIO(config))
 
   private object State extends ChiselEnum {
     val free, asking, waiting, resting, leaving = Value
