@@ -13,6 +13,7 @@ import click
 from colonnade import __version__
 from colonnade.cli.bench import bench
 from colonnade.cli.compare import compare
+from colonnade.cli.explore import explore
 from colonnade.cli.fuzz import fuzz
 from colonnade.cli.generate import generate
 from colonnade.cli.inspect import inspect
@@ -102,7 +103,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, render, compare, study, verify, fuzz, bench, sweep, ppa):
+for command in (generate, pack, inspect, render, compare, study, verify, fuzz, bench, sweep, explore, ppa):
     cli.add_command(command)
 
 

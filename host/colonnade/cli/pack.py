@@ -41,6 +41,7 @@ def pack(
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
     from colonnade.environment.encoded import EncodedEnvironment
+    from colonnade.mesh.load import load_mesh
     from colonnade.render.frames import pack_scene
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.file import check_image_file, image_file
@@ -61,7 +62,7 @@ def pack(
     folder = described.background.room
     with terminal.step("packing"):
         environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
-        image = pack_scene(described, manifest, environment)
+        image = pack_scene(described, load_mesh(described.mesh_source), manifest, environment)
     image.save(output)
 
     echo(f"packed      {file}")

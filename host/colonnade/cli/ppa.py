@@ -97,7 +97,7 @@ def ppa(
     from colonnade.ppa.power.report import Operation
 
     table = UnitTable(echo)
-    operation = Operation(megahertz, Stimulus(mesh, pixels, cycles)) if power else None
+    operation = Operation(megahertz, Stimulus.of_benchmark(mesh, pixels, cycles)) if power else None
     report: Mapping[str, Any] = measure(
         config, overrides, liberties, delay, operation, progress.for_terminal(), finished=table.print
     )

@@ -94,7 +94,15 @@ def measure(runs: Sequence[Run], conditions: Conditions, progress: Progress = QU
             meshes[name] = load_mesh(scene.with_mesh(name).mesh_source)
 
     def prepare(run: Run) -> _Prepared:
-        return _prepared(run, scene, meshes[run.mesh], conditions, progress.of(run.title))
+        return _prepared(
+            run,
+            run.scene(scene),
+            meshes[run.mesh],
+            conditions.size,
+            reuse=conditions.reuse,
+            is_estimated=conditions.jobs > 1,
+            progress=progress.of(run.title),
+        )
 
     def render(frame: _Prepared) -> dict[str, Any]:
         return frame.cached or _measured(frame, progress.of(frame.run.title))
@@ -128,12 +136,34 @@ class _Prepared:
     seconds: float
 
 
-def _prepared(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progress: Progress) -> _Prepared:
-    scene = run.scene(scene)
+def measure_frame(
+    config: str,
+    overrides: Sequence[str],
+    scene: Scene,
+    mesh: Mesh,
+    size: tuple[int, int],
+    progress: Progress = QUIET,
+) -> dict[str, Any]:
+    """The report of one frame, see `measure`; from the cache if it is there. The scene's own mesh is not read."""
+    run = Run(config, tuple(overrides), mesh.name)
+    frame = _prepared(run, scene, mesh, size, reuse=True, is_estimated=False, progress=progress)
+    return frame.cached or _measured(frame, progress)
+
+
+def _prepared(
+    run: Run,
+    scene: Scene,
+    mesh: Mesh,
+    size: tuple[int, int] | None,
+    *,
+    reuse: bool,
+    is_estimated: bool,
+    progress: Progress,
+) -> _Prepared:
     with _BUILD_LOCK:
         design = design_for(run.config, run.overrides, progress)
     manifest = design.manifest
-    width, height = conditions.size or (scene.frame.width, scene.frame.height)
+    width, height = size or (scene.frame.width, scene.frame.height)
     check_size((width, height), manifest)
     begun = time.perf_counter()
     try:
@@ -146,7 +176,7 @@ def _prepared(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
     key = _key(design, image, registers)
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
     cache_file = cache_directory(project_root()) / "measurements" / f"{name}.json"
-    cached = cache.stored(cache_file, key, progress) if conditions.reuse else None
+    cached = cache.stored(cache_file, key, progress) if reuse else None
     work = 0
     if cached is not None:
         cached |= {
@@ -154,7 +184,7 @@ def _prepared(run: Run, scene: Scene, mesh: Mesh, conditions: Conditions, progre
             "config_hash": manifest.config_hash,
             "mesh": asdict(mesh_report(image.header)),
         }
-    elif conditions.jobs > 1:
+    elif is_estimated:
         small = frame_registers(scene, image.header, manifest, max(1, width // 8), max(1, height // 8))
         counters = model_frame(loaded_model(manifest, image), small).counters
         work = counters["nodeReads"] + counters["triangleTests"]

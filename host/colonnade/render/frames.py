@@ -18,6 +18,7 @@ from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.environment.encoded import EncodedEnvironment
 from colonnade.mesh.load import load_mesh
+from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport, frame_report
@@ -71,7 +72,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     begun = time.perf_counter()
     with progress.step("packing the scene"):
         environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
-        image = pack_scene(scene, manifest, environment)
+        image = pack_scene(scene, load_mesh(scene.mesh_source), manifest, environment)
         shows_environment = request.relit or environment is None or environment.environment.photo is None
         registers = [
             frame_registers(pose, image.header, manifest, width, height, environment, shows_environment)
@@ -154,9 +155,28 @@ def _model_frames(
     yield from map(one, registers)
 
 
-def pack_scene(scene: Scene, manifest: Manifest, environment: EncodedEnvironment | None = None) -> SceneImage:
-    """The scene image of a scene's mesh, with the scene's material and the maps of its room."""
-    mesh = load_mesh(scene.mesh_source)
+def render_model(
+    scene: Scene, mesh: Mesh, manifest: Manifest, size: tuple[int, int], progress: Progress = QUIET
+) -> RenderResult:
+    """Render one frame with the model. The scene's own mesh is not read, and error bits only appear in the report."""
+    folder = scene.background.room
+    with progress.step("packing the scene"):
+        environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
+        image = pack_scene(scene, mesh, manifest, environment)
+        seen = None if environment is None else environment.environment
+        registers = frame_registers(
+            scene, image.header, manifest, *size, environment, seen is None or seen.photo is None
+        )
+    ((frame, _, _),) = _model_frames(manifest, image, [registers], progress)
+    view = make_view(scene, image.header.extent, *size, image.header.materials, seen)
+    result = _result(frame, image, view, manifest, frame_report("model", manifest, image.header, frame))
+    return result if seen is None else replace(result, image=composited(result.image, frame, seen))
+
+
+def pack_scene(
+    scene: Scene, mesh: Mesh, manifest: Manifest, environment: EncodedEnvironment | None = None
+) -> SceneImage:
+    """The scene image of a mesh, with the scene's material and the maps of its room."""
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     if environment is None:
         return image

@@ -12,6 +12,7 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import json
+import os
 import re
 import subprocess
 import sys
@@ -141,6 +142,8 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
             with replacing(copy) as stream:
                 stream.write(text)
         pruned.append(copy)
+    # abc loses the cells of a small file that it reads before a large one
+    pruned.sort(key=lambda copy: (-copy.stat().st_size, copy.name))
     library = liberty.load(pruned)
     digest = " ".join(copy.name for copy in pruned)
     with liberty_syntax.parsing(sources[0]):
@@ -233,7 +236,9 @@ def run_yosys(script: list[str], folder: Path, links: Mapping[str, Path], log: P
     (folder / "script.ys").write_text("\n".join(script) + "\n")
     with log.open("w") as stream:
         command = [sys.executable, "-c", _RUN, "script.ys"]
-        done = processes.run(command, cwd=folder, stdout=stream, stderr=subprocess.STDOUT)
+        # Yosys shares converted libraries below TMPDIR between processes
+        environment = os.environ | {"TMPDIR": str(folder)}
+        done = processes.run(command, cwd=folder, env=environment, stdout=stream, stderr=subprocess.STDOUT)
     if done.returncode != 0:
         errors = [line for line in log.read_text(errors="replace").splitlines() if "ERROR" in line or "error:" in line]
         raise RuntimeError(f"Yosys failed: {(errors or ['no error message'])[0]} (see {log})")

@@ -27,6 +27,7 @@ from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
+from colonnade.scene.view import with_overrides
 from colonnade.scene_image.packer import pack
 
 #: Ports with a special role in a recording or its replay.
@@ -111,14 +112,22 @@ class Stimulus:
     """The power workload: a frame, and how much of it is recorded.
 
     Attributes:
-        mesh: Name or file; the rest of the scene is the benchmark scene.
+        scene: The scene; its mesh is not read.
+        mesh: The mesh.
         size: Width and height, pixels; None: `whole_frame`.
         cycles: Maximum number of recorded cycles from the start of the frame.
     """
 
-    mesh: str
+    scene: Scene
+    mesh: Mesh
     size: tuple[int, int] | None
     cycles: int
+
+    @staticmethod
+    def of_benchmark(mesh: str, size: tuple[int, int] | None, cycles: int) -> Stimulus:
+        """The benchmark scene with a mesh, a name or a file."""
+        scene = load_scene(project_root() / "scenes" / "object.toml").with_mesh(mesh)
+        return Stimulus(scene, load_mesh(scene.mesh_source), size, cycles)
 
 
 def whole_frame(rows: int) -> tuple[int, int]:
@@ -127,21 +136,17 @@ def whole_frame(rows: int) -> tuple[int, int]:
     return width, width * 3 // 4
 
 
-def require_recordable(stimulus: Stimulus, manifest: Manifest) -> tuple[Mesh, tuple[int, int]]:
-    """The mesh and the size of the frame, checked before the work starts.
+def require_recordable(stimulus: Stimulus, manifest: Manifest) -> tuple[int, int]:
+    """The size of the frame, checked before the work starts.
 
     Raises:
-        UserError: A program is missing, or the mesh or the size is wrong.
+        UserError: A program is missing, or the size is wrong.
     """
     for program, package in (("verilator", "verilator"), ("g++", "g++"), ("make", "make")):
         require_program(program, "power (--no-power leaves it out)", package)
     size = stimulus.size or whole_frame(int(manifest.config["array"]["rows"]))
     check_size(size, manifest)
-    return load_mesh(_scene(stimulus).mesh_source), size
-
-
-def _scene(stimulus: Stimulus) -> Scene:
-    return load_scene(project_root() / "scenes" / "object.toml").with_mesh(stimulus.mesh)
+    return size
 
 
 def record(
@@ -164,10 +169,10 @@ def record(
     """
     one_column = (*overrides, "array.columns=1")
     design = design_for(config, one_column, progress)
-    mesh, size = require_recordable(stimulus, design.manifest)
+    size = require_recordable(stimulus, design.manifest)
     with progress.step("packing the scene"):
-        image = pack(mesh, design.manifest)
-        registers = frame_registers(_scene(stimulus), image.header, design.manifest, *size)
+        image = pack(stimulus.mesh, design.manifest, with_overrides(stimulus.mesh.materials, stimulus.scene.material))
+        registers = frame_registers(stimulus.scene, image.header, design.manifest, *size)
     joined = {
         direction: tuple(
             Port(name, len(port["bits"]))
@@ -189,7 +194,7 @@ def record(
     (output,) = parse_output(done.stdout.splitlines())
     counters = {name.removeprefix("counters."): n for name, n in output.values.items() if name.startswith("counters.")}
     cycles = tuple((int(line.split()[0], 16), int(line.split()[1], 16)) for line in lines[1:] if line)
-    facts = {"mesh": stimulus.mesh, "triangles": len(mesh.faces), "size": list(size)}
+    facts = {"mesh": stimulus.mesh.name, "triangles": len(stimulus.mesh.faces), "size": list(size)}
     return Recording(joined["input"], joined["output"], cycles, int(lines[0]), facts, counters)
 
 

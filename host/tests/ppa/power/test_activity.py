@@ -98,14 +98,14 @@ def test_meshes_are_reduced_to_whole_faces() -> None:
 
 def test_the_workload_is_checked_before_synthesis(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     manifest = manifest_for("tiny").manifest
-    assert require_recordable(Stimulus("cube", None, 10), manifest)[1] == (24, 18)
+    assert require_recordable(Stimulus.of_benchmark("cube", None, 10), manifest) == (24, 18)
     with pytest.raises(UserError, match="no mesh"):
-        require_recordable(Stimulus("no-such-mesh", None, 10), manifest)
+        require_recordable(Stimulus.of_benchmark("no-such-mesh", None, 10), manifest)
     with pytest.raises(UserError, match="9999"):
-        require_recordable(Stimulus("cube", (9999, 10), 10), manifest)
+        require_recordable(Stimulus.of_benchmark("cube", (9999, 10), 10), manifest)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(UserError, match="no verilator found, which power"):
-        require_recordable(Stimulus("cube", None, 10), manifest)
+        require_recordable(Stimulus.of_benchmark("cube", None, 10), manifest)
 
 
 def test_the_page_shows_power_by_library_and_unit() -> None:

@@ -1,0 +1,134 @@
+"""Where jobs run: on this machine, or on a Dask cluster. Both return `concurrent.futures` futures."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Protocol
+
+from colonnade.common.errors import UserError
+from colonnade.common.processes import Group
+from colonnade.explore import jobs
+from colonnade.explore.jobs import Content, Job, JobFailed
+
+#: Seconds to wait for the scheduler's answer.
+CONNECT_SECONDS = 10
+
+#: Retries of a job whose worker was lost.
+RETRIES = 2
+
+
+class Runner(Protocol):
+    """Runs jobs."""
+
+    #: Number of jobs that run at a time, for the estimate of the time.
+    parallel: int
+
+    def missing(self, job: Job) -> str | None:
+        """Why no worker can run the job; None if one can."""
+
+    def has_place(self, job: Job, running: Iterable[Job]) -> bool:
+        """Whether to submit the job now."""
+
+    def submit(self, job: Job, inputs: tuple[Content, ...]) -> Future[dict[str, bytes]]:
+        """Start a job. The future has its files, or raises `JobFailed`."""
+
+    def close(self) -> None:
+        """End all jobs."""
+
+
+class LocalRunner:
+    """Runs jobs on this machine, within its memory."""
+
+    def __init__(self, parallel: int) -> None:
+        self.parallel = parallel
+        self._group = Group()
+        self._pool = ThreadPoolExecutor(parallel, thread_name_prefix="job", initializer=self._group.join)
+        self._memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") >> 20
+
+    def missing(self, job: Job) -> str | None:
+        """The program that is not installed here."""
+        for name in job.kind.needs:
+            if name == "yosys" and importlib.util.find_spec("pyosys") is None:
+                return f"{job.kind.name} needs Yosys: run tools/ppa-environment"
+            if name == "verilator" and shutil.which("verilator") is None:
+                return f"{job.kind.name} needs verilator: sudo apt-get install verilator"
+        return None
+
+    def has_place(self, job: Job, running: Iterable[Job]) -> bool:
+        """Place for `parallel` jobs, and for their memory if more than one runs."""
+        others = list(running)
+        memory = sum(other.kind.needs["memory"] for other in others) + job.kind.needs["memory"]
+        return not others or (len(others) < self.parallel and memory <= self._memory)
+
+    def submit(self, job: Job, inputs: tuple[Content, ...]) -> Future[dict[str, bytes]]:
+        """Run the job in a thread that waits for its process."""
+        return self._pool.submit(jobs.run, job, inputs)
+
+    def close(self) -> None:
+        """End all jobs and their programs."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._group.end()
+
+
+class ClusterRunner:
+    """Runs jobs on the workers of a Dask scheduler. A job whose worker is lost moves to another one.
+
+    A worker is a checkout of the same sources. It declares what it has: ``dask worker ADDRESS --resources
+    "memory=16000 java=2 verilator=2 yosys=2"``, memory in MB.
+    """
+
+    def __init__(self, address: str) -> None:
+        from distributed import Client
+
+        try:
+            self._client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise UserError(f"no Dask scheduler at {address}: {error or 'no answer'}") from None
+        self._executors: dict[tuple[tuple[str, int], ...], Any] = {}
+        self.parallel = max(1, sum(worker["nthreads"] for worker in self._workers().values()))
+
+    def _workers(self) -> Mapping[str, Any]:
+        workers: Mapping[str, Any] = self._client.scheduler_info(n_workers=-1)["workers"]
+        return workers
+
+    def missing(self, job: Job) -> str | None:
+        """What no worker declares."""
+        workers = self._workers().values()
+        self.parallel = max(1, sum(worker["nthreads"] for worker in workers))
+        if any(
+            all(worker["resources"].get(name, 0) >= amount for name, amount in job.kind.needs.items())
+            for worker in workers
+        ):
+            return None
+        needs = " ".join(f"{name}={amount}" for name, amount in job.kind.needs.items())
+        return f"no worker offers {needs} for {job.kind.name} jobs: start one with --resources"
+
+    def has_place(self, job: Job, running: Iterable[Job]) -> bool:
+        """Always: the scheduler queues."""
+        return True
+
+    def submit(self, job: Job, inputs: tuple[Content, ...]) -> Future[dict[str, bytes]]:
+        """Queue the job for a worker that has what it needs."""
+        needs = tuple(job.kind.needs.items())
+        if needs not in self._executors:
+            self._executors[needs] = self._client.get_executor(resources=dict(needs), retries=RETRIES, pure=False)
+        future: Future[dict[str, bytes]] = self._executors[needs].submit(_run_remotely, job, job.key, inputs)
+        return future
+
+    def close(self) -> None:
+        """Withdraw all jobs; one that runs ends by itself, and its worker keeps the result."""
+        for executor in self._executors.values():
+            executor.shutdown(wait=False)
+        self._client.close(timeout=1)
+
+
+def _run_remotely(job: Job, key: str, inputs: tuple[Content, ...]) -> dict[str, bytes]:
+    """Run a job on a worker, if its sources give the same key."""
+    if dataclasses.replace(job).key != key:
+        raise JobFailed("the worker has other sources than this checkout: update it")
+    return jobs.run(job, inputs)

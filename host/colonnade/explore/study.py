@@ -1,0 +1,323 @@
+"""The study file: its schema, and the line of every error.
+
+A study names hardware configurations, the frames that they render, and what is measured. All keys and defaults are the
+fields of `Study`; an unknown key is refused.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import sys
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Gt, Interval, MinLen
+from pydantic import ConfigDict, Strict, StrictBool, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from colonnade.common.errors import UserError
+from colonnade.common.input_files import check_values, read_input
+from colonnade.common.limits import MAX_DEPTH
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_STRICT = ConfigDict(extra="forbid")
+
+#: A value of a configuration field: a number, a Boolean, text such as a precision, or a whole section.
+FieldValue = bool | int | float | str | dict[str, Any] | None
+
+#: The way in which the axes combine.
+Combination = Literal["grid", "one-by-one", "list", "search"]
+
+_Count = Annotated[int, Strict(), Ge(1)]
+_Names = tuple[Annotated[str, MinLen(1)], ...]
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Design:
+    """The configuration that every point starts from.
+
+    Attributes:
+        config: Preset, or precision in the paper's notation. A JSON file is relative to the study.
+        set: Changes to it, ``key.path=value``.
+    """
+
+    config: str = "small"
+    set: _Names = ()
+
+
+@dataclass(frozen=True, config=_STRICT)
+class NamedPoint:
+    """A point beside those of the axes.
+
+    Attributes:
+        name: Its name in tables and plots.
+        set: Fields and their values.
+    """
+
+    name: Annotated[str, MinLen(1)]
+    set: Mapping[str, FieldValue] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Workload:
+    """The frames: each scene with each mesh.
+
+    Attributes:
+        scenes: Scene files, relative to the study.
+        meshes: Names or files; empty: the mesh of each scene.
+        size: Width and height, pixels.
+    """
+
+    scenes: Annotated[_Names, MinLen(1)]
+    meshes: _Names = ()
+    size: tuple[_Count, _Count] = (640, 480)
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Quality:
+    """Pictures of the bit-exact model, compared with Embree's and with those of the baseline.
+
+    Attributes:
+        dists: Measure DISTS, whose weights are a download of 64 MB.
+    """
+
+    dists: StrictBool = True
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Cycles:
+    """Frames of the RTL. `meshes` restricts them; empty: all of the workload."""
+
+    meshes: _Names = ()
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Area:
+    """Gates, memories and timing paths, with each library."""
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Power:
+    """Gate-level power of one render unit, with each library.
+
+    Attributes:
+        meshes: Meshes of the workload; empty: all.
+        size: Width and height of the frame, pixels; without it one that the window replays completely.
+        cycles: Cycles to replay on the gates, at most.
+        clock: MHz.
+    """
+
+    meshes: _Names = ()
+    size: tuple[_Count, _Count] | None = None
+    cycles: _Count = 4000
+    clock: Annotated[float, Gt(0)] = 200.0
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Search:
+    """A search for the Pareto front over the axes.
+
+    Attributes:
+        budget: Points to evaluate, at most.
+        objectives: Figures to minimise or maximise, as they are better.
+        constraints: Conditions ``figure >= number`` or ``figure <= number``.
+        sampler: ``nsga2`` or ``tpe`` of Optuna.
+        batch: Points to evaluate before the sampler learns from them: the population of ``nsga2``.
+        seed: Seed of the sampler: the same study gives the same points.
+    """
+
+    budget: _Count
+    objectives: Annotated[_Names, MinLen(2)]
+    constraints: _Names = ()
+    sampler: Literal["nsga2", "tpe"] = "nsga2"
+    batch: _Count = 8
+    seed: Annotated[int, Strict(), Interval(ge=0, le=2**32 - 1)] = 1
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Study:
+    """A study.
+
+    Attributes:
+        title, description: Text for the report.
+        combine: ``grid``: all combinations of the axes; ``one-by-one``: each value of each axis alone, after the
+            unchanged design; ``list``: the named points only; ``search``: points that a search chooses.
+        baseline: Name of the point that the others are compared with.
+        libraries: Names of standard-cell libraries, whose files the command line gives; empty: Yosys's generic gates.
+        objectives: Figures whose Pareto front is reported.
+        quality, cycles, area, power: The measures; one without a table is not taken.
+        design: The configuration that every point starts from.
+        axes: Values of configuration fields.
+        point: Points beside those of the axes.
+        workload: The frames.
+        search: The search, for ``combine = "search"``.
+    """
+
+    title: str
+    workload: Workload
+    description: str = ""
+    combine: Combination = "grid"
+    baseline: str | None = None
+    libraries: _Names = ()
+    objectives: _Names = ()
+    design: Design = field(default_factory=Design)
+    axes: Mapping[str, Annotated[tuple[FieldValue, ...], MinLen(1)]] = field(default_factory=dict)
+    point: tuple[NamedPoint, ...] = ()
+    quality: Quality | None = None
+    cycles: Cycles | None = None
+    area: Area | None = None
+    power: Power | None = None
+    search: Search | None = None
+
+    def __post_init__(self) -> None:
+        problem = self._problem()
+        if problem is not None:
+            raise ValueError(problem)
+
+    def _problem(self) -> str | None:
+        """What contradicts itself; None if nothing does."""
+        if (self.combine == "search") != (self.search is not None):
+            return 'combine: a search needs combine = "search" and a table [search]'
+        if self.combine == "list" and (self.axes or not self.point):
+            return "combine: a list has [[point]] tables and no [axes]"
+        if self.combine != "list" and not self.axes:
+            return 'combine: no [axes]; use combine = "list" for [[point]] tables alone'
+        if not any((self.quality, self.cycles, self.area, self.power)):
+            return "nothing is measured: give [quality], [cycles], [area] or [power]"
+        if self.power is not None and not self.libraries:
+            return 'power: the gates need a library: give libraries = ["NAME"]'
+        for name, part in (("cycles", self.cycles), ("power", self.power)):
+            unknown = [mesh for mesh in (part.meshes if part else ()) if mesh not in self.workload.meshes]
+            if unknown:
+                return f"{name}.meshes: {unknown[0]} is not in workload.meshes"
+        return None
+
+
+_SCHEMA = TypeAdapter(Study)
+
+
+@dataclasses.dataclass(frozen=True)
+class StudyFile:
+    """A study and the file that it came from.
+
+    Attributes:
+        study: The study.
+        path: The file.
+        text: Its content.
+    """
+
+    study: Study
+    path: Path
+    text: str
+
+    def error(self, where: tuple[str, ...], message: str) -> UserError:
+        """An error of a key or value, with its line. `where` is the path of keys, and a value as the last part."""
+        line = line_of(self.text, where)
+        return UserError(f"{self.path}{'' if line is None else f':{line}'}: {message}")
+
+
+def load_study(path: Path) -> StudyFile:
+    """Read a study.
+
+    Raises:
+        UserError: The file is missing, is not TOML, or has an invalid key or value; with its line.
+    """
+    content = read_input(path, "the study", missing=f"study file {path} does not exist")
+    try:
+        text = content.decode("utf-8")
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise UserError(f"study {path} is nested too deeply: {MAX_DEPTH} levels at most") from None
+    except ValueError as error:
+        raise UserError(f"study {path} is not TOML: {error}") from None
+    check_values(data, f"study {path}")
+    try:
+        study = _SCHEMA.validate_python(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = tuple(str(part) for part in first["loc"] if isinstance(part, str) and not part[:1].isupper())
+        message = _message(first["type"], where, first.get("ctx", {}), first["msg"])
+        if first["type"] == "value_error":
+            where = (str(first["ctx"]["error"]).partition(":")[0],)
+        line = line_of(text, where)
+        raise UserError(f"{path}{'' if line is None else f':{line}'}: {message}") from None
+    return StudyFile(study, path, text)
+
+
+def _message(kind: str, where: tuple[str, ...], context: Mapping[str, Any], text: str) -> str:
+    name = ".".join(where)
+    if kind == "unexpected_keyword_argument":
+        return f"unknown key {name}; known here: {', '.join(_keys(where[:-1]))}"
+    if kind == "missing_argument" or kind == "missing":
+        return f"the key {name} is missing"
+    if kind == "value_error":
+        return str(context["error"])
+    return f"{name}: {text[:1].lower()}{text[1:]}"
+
+
+def _keys(table: tuple[str, ...]) -> list[str]:
+    """The known keys of a table."""
+    schema: dict[str, Any] = _SCHEMA.json_schema()
+    node = schema
+    for name in table:
+        node = node["properties"][name]
+        options = [node, *node.get("anyOf", []), node.get("items", {})]
+        reference = next((option["$ref"] for option in options if "$ref" in option), None)
+        if reference is None:
+            return []
+        node = schema["$defs"][reference.rpartition("/")[2]]
+    return list(node.get("properties", {}))
+
+
+def line_of(text: str, where: tuple[str, ...]) -> int | None:
+    """The line of a key, or of a value below it, in a TOML text, from 1; None if it is not found.
+
+    Args:
+        text: The text.
+        where: Tables and key from the outside in; the last part may be a value, or a key within an inline table.
+    """
+    table: tuple[str, ...] = ()
+    best, depth = None, 0
+    for number, line in enumerate(text.splitlines(), 1):
+        stripped = line.strip()
+        if header := re.fullmatch(r"\[\[?([^\]]+)\]\]?\s*(#.*)?", stripped):
+            table = _split(header[1])
+            path = table
+        elif key := re.match(r"([\w.\"'-]+)\s*=", stripped):
+            path = (*table, *_split(key[1])) if where[: len(table)] == table else ()
+            if path and where[: len(path)] != path and (*table, key[1].strip("\"'")) == where[: len(table) + 1]:
+                path = (*table, key[1].strip("\"'"))
+        else:
+            path = ()
+        matched = 0
+        for own, wanted in zip(path, where, strict=False):
+            if own != wanted:
+                break
+            matched += 1
+        if matched == len(path) and matched > depth:
+            best, depth = number, matched
+        if depth and depth == len(where) - 1 and best is not None and number >= best and _holds(line, where[-1]):
+            return number
+    return best
+
+
+def _split(key: str) -> tuple[str, ...]:
+    return tuple(part[0] or part[1] or part[2] for part in re.findall(r"\"([^\"]*)\"|'([^']*)'|([\w-]+)", key))
+
+
+def _holds(line: str, value: str) -> bool:
+    """Whether a line names a value, as text or as a number."""
+    return re.search(rf"(?<![\w.-]){re.escape(value)}(?![\w-])", line) is not None
+
+
+def value_text(value: FieldValue) -> str:
+    """A value as ``--set`` takes it."""
+    return value if isinstance(value, str) else json.dumps(value)

@@ -1,0 +1,143 @@
+"""Pareto front, RenderIndex and the search."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colonnade.common.errors import UserError
+from colonnade.explore.figures import Column, columns, front
+from colonnade.explore.render_index import index_rows, sensitivity
+from colonnade.explore.search import check_search, parse_condition, search_front
+from colonnade.explore.study import FieldValue, StudyFile, load_study
+
+COST = Column("cost", "cost", "", "lower", ".1f", "")
+GAIN = Column("gain", "gain", "", "higher", ".1f", "")
+
+
+def points(values: Sequence[tuple[float | None, float]]) -> list[dict[str, Any]]:
+    return [{"name": str(i), "figures": {"cost": cost, "gain": gain}} for i, (cost, gain) in enumerate(values)]
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=20))
+def test_the_front_is_what_nothing_surpasses(values: list[tuple[float | None, float]]) -> None:
+    names = front(points(values), ["cost", "gain"], [COST, GAIN])
+    assert names
+    for index, (cost, gain) in enumerate(values):
+        assert cost is not None
+        better = [v for v in values if v[0] is not None and v[0] <= cost and v[1] >= gain and v != (cost, gain)]
+        assert (str(index) in names) == (not better)
+
+
+def test_a_point_without_a_figure_is_not_on_the_front() -> None:
+    assert front(points([(None, 9), (1, 1)]), ["cost", "gain"], [COST, GAIN]) == ["1"]
+
+
+def measured(**figures: tuple[float, float, float]) -> list[dict[str, Any]]:
+    keys = ("dists_loss", "mw.a", "array_kge.a")
+    return [{"name": name, "figures": dict(zip(keys, own, strict=True))} for name, own in figures.items()]
+
+
+def test_render_index_of_the_baseline_is_one_and_a_loss_of_zero_does_not_win_by_itself() -> None:
+    found = measured(wide=(0.0, 2.0, 100.0), exact=(0.0, 1.9, 99.0), lean=(0.5, 1.0, 60.0), coarse=(9.0, 0.8, 50.0))
+    rows = {row["name"]: row for row in index_rows(found, "wide", ["a"])}
+    assert rows["wide"]["index"] == 1.0
+    assert rows["lean"]["index"] == pytest.approx(1.5 * 0.5 * 0.6)
+    assert min(rows, key=lambda name: rows[name]["index"]) == "lean"
+    rankings = {each["choice"]: each["ranking"] for each in sensitivity(found, "wide", ["a"])}
+    assert rankings["power × area alone"][0] == "coarse"
+    assert rankings["shares of the ranges (a 0 wins)"][0] in ("wide", "exact", "coarse")
+    assert rankings["1 + loss / 0.1 %"][-1] == "coarse"
+    assert all(sorted(ranking) == sorted(rows) for ranking in rankings.values())
+
+
+def test_render_index_needs_the_baseline_and_leaves_out_points_without_figures() -> None:
+    found = measured(wide=(0.0, 2.0, 100.0), lean=(0.5, 1.0, 60.0))
+    found[1]["figures"]["mw.a"] = None
+    assert [row["name"] for row in index_rows(found, "wide", ["a"])] == ["wide"]
+    assert index_rows(found, "lean", ["a"]) == []
+
+
+SEARCH = """title = "Search"
+combine = "search"
+
+[axes]
+"array.rows" = [1, 2, 3, 4, 5, 6, 7, 8]
+"array.columns" = [1, 2, 3, 4, 5, 6, 7, 8]
+"array.contexts" = [1, 2, 3, 4, 5, 6, 7, 8]
+
+[workload]
+scenes = ["object.toml"]
+
+[search]
+budget = 60
+objectives = ["psnr_min", "rays_per_cycle"]
+constraints = ["psnr_min >= 3"]
+batch = 10
+
+[quality]
+[cycles]
+"""
+
+HAS = {"quality": True, "baseline": False, "cycles": True, "area": False, "power": False}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> StudyFile:
+    (tmp_path / "search.toml").write_text(SEARCH)
+    return load_study(tmp_path / "search.toml")
+
+
+def evaluated(file: StudyFile) -> dict[tuple[FieldValue, ...], Mapping[str, float | None] | None]:
+    """All points of a search over a problem whose front is contexts = 8 with rows + columns constant."""
+    found: dict[tuple[FieldValue, ...], Mapping[str, float | None] | None] = {}
+
+    def evaluate(batch: Sequence[Mapping[str, FieldValue]]) -> list[Mapping[str, float | None] | None]:
+        answers: list[Mapping[str, float | None] | None] = []
+        for values in batch:
+            rows, cols, contexts = (int(str(value)) for value in values.values())
+            figures = {"psnr_min": float(rows + contexts), "rays_per_cycle": float(9 - rows + contexts - abs(cols - 4))}
+            answers.append(None if (rows, cols) == (2, 2) else figures)
+            assert tuple(values.values()) not in found
+            found[tuple(values.values())] = answers[-1]
+        return answers
+
+    counts = list(search_front(file, columns(HAS, []), evaluate))
+    assert counts[-1] == len(found) <= 60
+    return found
+
+
+def test_a_search_is_reproducible_and_beats_chance(file: StudyFile) -> None:
+    found = evaluated(file)
+    assert found == evaluated(file)
+    assert next(iter(found)) == (1, 1, 1)
+    best = [key for key in found if key[1:] == (4, 8)]
+    share = len(best) / len(found)
+    assert share > 4 * 8 / 512, "no better than chance: 1 of 64"
+    assert math.prod((8, 8, 8)) > 8 * len(found)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"psnr_min", "rays', '"psnr_max", "rays', ":14: no figure psnr_max; figures of this study: psnr_min"),
+        ("psnr_min >= 3", "psnr_min > 3", ":15: psnr_min > 3 is not of the form figure >= number"),
+        ("psnr_min >= 3", "cost >= 3", ":15: no figure cost"),
+    ],
+)
+def test_unknown_figures_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    (tmp_path / "s.toml").write_text(SEARCH.replace(old, new))
+    with pytest.raises(UserError) as error:
+        check_search(load_study(tmp_path / "s.toml"), columns(HAS, []))
+    assert message in str(error.value)
+
+
+def test_conditions() -> None:
+    assert parse_condition("nj.asap7 <= 1.5e-1") == ("nj.asap7", "<=", 0.15)
+    assert parse_condition("psnr_min == 3") is None

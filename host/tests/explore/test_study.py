@@ -1,0 +1,124 @@
+"""Study files: defaults, and errors that name the line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.design.toolchain import project_root
+from colonnade.explore.points import grid_size, manifests_of, point_of, points_of
+from colonnade.explore.study import StudyFile, line_of, load_study
+
+STUDY = """title = "Try"
+baseline = "32b32s64d"
+
+[design]
+config = "tiny"
+
+[axes]
+precision = ["16b16s32d", "32b32s64d"]
+"array.contexts" = [
+  4,
+  8,
+]
+
+[workload]
+scenes = ["object.toml"]
+meshes = ["cube"]
+size = [32, 24]
+
+[quality]
+dists = false
+"""
+
+
+def study(folder: Path, text: str) -> StudyFile:
+    (folder / "study.toml").write_text(text)
+    return load_study(folder / "study.toml")
+
+
+def test_the_grid_has_all_combinations_in_order(tmp_path: Path) -> None:
+    file = study(tmp_path, STUDY.replace('baseline = "32b32s64d"\n', ""))
+    names = [point.name for point in points_of(file)]
+    assert names == [f"{p}, contexts={c}" for p in ("16b16s32d", "32b32s64d") for c in (4, 8)]
+    assert grid_size(file) == len(names)
+    assert points_of(file)[1].overrides == ("precision=16b16s32d", "array.contexts=8")
+
+
+def test_one_by_one_varies_each_axis_alone(tmp_path: Path) -> None:
+    file = study(tmp_path, STUDY.replace('baseline = "32b32s64d"', 'combine = "one-by-one"'))
+    assert [point.name for point in points_of(file)] == ["base", "16b16s32d", "32b32s64d", "contexts=4", "contexts=8"]
+
+
+def test_named_points_come_first_and_may_be_the_baseline(tmp_path: Path) -> None:
+    lean = '[[point]]\nname = "lean"\nset = { "geometry.triangleBits" = 24 }\n'
+    file = study(tmp_path, STUDY.replace("32b32s64d", "lean", 1) + lean)
+    assert points_of(file)[0] == point_of(file, {"geometry.triangleBits": 24}, "lean")
+
+
+def refused(folder: Path, text: str) -> str:
+    with pytest.raises(UserError) as error:
+        file = study(folder, text)
+        manifests_of(file, points_of(file))
+    message = str(error.value)
+    assert "\n" not in message
+    return message.removeprefix(f"{folder / 'study.toml'}:")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('title = "Try"', 'titel = "Try"', "1: unknown key titel; known here: title, workload"),
+        ('config = "tiny"', 'konfig = "tiny"', "5: unknown key design.konfig; known here: config, set"),
+        ('config = "tiny"', "config = 3", "5: design.config: "),
+        ('meshes = ["cube"]', "", "2: baseline: there is no point 32b32s64d"),
+        ("[32, 24]", "[32, 0]", "17: workload.size: "),
+        ("[32, 24]", "[32]", "17: workload.size: "),
+        ('scenes = ["object.toml"]', "scenes = []", "15: workload.scenes: "),
+        ("dists = false", "dists = 1", "20: quality.dists: "),
+        ("[quality]\ndists = false", "", "nothing is measured: give [quality], [cycles], [area] or [power]"),
+        ("[quality]", '[power]\nmeshes = ["teapot"]\n[quality]', "power: the gates need a library"),
+        ("[quality]", '[cycles]\nmeshes = ["teapot"]\n[quality]', "19: cycles.meshes: teapot is not in"),
+        ('"Try"\n', '"Try"\ncombine = "list"\n', "2: combine: a list has [[point]] tables and no [axes]"),
+        ('"Try"\n', '"Try"\ncombine = "search"\n', '2: combine: a search needs combine = "search" and a table'),
+        ('"Try"\n', '"Try"\ncombine = "all"\n', "2: combine: "),
+        ("  8,", "  4,", "two points are named 16b16s32d, contexts=4"),
+        ("  8,", "  17,", "11: 16b16s32d, contexts=17: "),
+        ('"32b32s64d"]', '"32b32s65d"]', "8: "),
+        ('"array.contexts"', '"array.kontexts"', "9: 16b16s32d, kontexts=4: "),
+        ('config = "tiny"', 'config = "huge"', "no configuration huge"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str) -> None:
+    text = STUDY.replace(old, new)
+    if "baseline" not in message and "32b32s65d" not in new:
+        text = text.replace('baseline = "32b32s64d"', "#")
+    assert text != STUDY
+    found = refused(tmp_path, text)
+    assert found.startswith(message) or message in found
+
+
+def test_no_toml_and_no_file_are_one_line(tmp_path: Path) -> None:
+    assert "is not TOML" in refused(tmp_path, "title = ")
+    with pytest.raises(UserError, match="does not exist"):
+        load_study(tmp_path / "none.toml")
+
+
+def test_lines_of_values_and_quoted_keys() -> None:
+    assert line_of(STUDY, ("axes", "array.contexts")) == 9
+    assert line_of(STUDY, ("axes", "array.contexts", "8")) == 11
+    assert line_of(STUDY, ("axes", "precision", "32b32s64d")) == 8
+    assert line_of(STUDY, ("workload", "meshes", "cube")) == 16
+    assert line_of(STUDY, ("quality", "none")) == 19
+    assert line_of(STUDY, ("power",)) is None
+
+
+@pytest.mark.parametrize(
+    "path", sorted((project_root() / "scenes" / "studies").glob("*.toml")), ids=lambda path: path.stem
+)
+def test_the_studies_of_the_repository_are_legal(path: Path) -> None:
+    file = load_study(path)
+    points = points_of(file)
+    assert len(manifests_of(file, points[:2])) == len(points[:2])
