@@ -112,6 +112,7 @@ def _origin(file: StudyFile, point: Point, problem: str) -> tuple[str, ...]:
     """Where a configuration's problem comes from: the field that the message names, else the varied one."""
     for key in sorted(point.values, key=lambda key: key not in problem and key.rpartition(".")[2] not in problem):
         if key in file.study.axes:
-            return "axes", key, value_text(point.values[key])
+            value = () if "unknown key" in problem else (value_text(point.values[key]),)
+            return "axes", key, *value
         return "point", "set", key
     return ("design",)

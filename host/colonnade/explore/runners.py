@@ -16,7 +16,7 @@ from colonnade.explore import jobs
 from colonnade.explore.jobs import Content, Job, JobFailed
 
 #: Seconds to wait for the scheduler's answer.
-CONNECT_SECONDS = 10
+CONNECT_SECONDS = 5
 
 #: Retries of a job whose worker was lost.
 RETRIES = 2

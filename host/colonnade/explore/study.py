@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Gt, Interval, MinLen
 from pydantic import ConfigDict, Strict, StrictBool, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
+from pydantic_core import ErrorDetails
 
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import check_values, read_input
@@ -242,24 +243,27 @@ def load_study(path: Path) -> StudyFile:
     try:
         study = _SCHEMA.validate_python(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
+        # An unknown key explains a missing one
+        found = error.errors(include_url=False)
+        first = next((each for each in found if each["type"] == "unexpected_keyword_argument"), found[0])
         where = tuple(str(part) for part in first["loc"] if isinstance(part, str) and not part[:1].isupper())
-        message = _message(first["type"], where, first.get("ctx", {}), first["msg"])
+        message = _message(first, where)
         if first["type"] == "value_error":
-            where = (str(first["ctx"]["error"]).partition(":")[0],)
+            where = tuple(message.partition(":")[0].split("."))
         line = line_of(text, where)
         raise UserError(f"{path}{'' if line is None else f':{line}'}: {message}") from None
     return StudyFile(study, path, text)
 
 
-def _message(kind: str, where: tuple[str, ...], context: Mapping[str, Any], text: str) -> str:
-    name = ".".join(where)
-    if kind == "unexpected_keyword_argument":
+def _message(error: ErrorDetails, where: tuple[str, ...]) -> str:
+    name, text = ".".join(where), error["msg"]
+    if error["type"] == "unexpected_keyword_argument":
         return f"unknown key {name}; known here: {', '.join(_keys(where[:-1]))}"
-    if kind == "missing_argument" or kind == "missing":
-        return f"the key {name} is missing"
-    if kind == "value_error":
-        return str(context["error"])
+    if error["type"] == "value_error":
+        return str(error["ctx"]["error"])
+    if error["type"] in ("missing_argument", "missing"):
+        is_key = isinstance(error["loc"][-1], str)
+        return f"the key {name} is missing" if is_key else f"{name}: too few values"
     return f"{name}: {text[:1].lower()}{text[1:]}"
 
 

@@ -80,6 +80,7 @@ budget = 60
 objectives = ["psnr_min", "rays_per_cycle"]
 constraints = ["psnr_min >= 3"]
 batch = 10
+seed = 2
 
 [quality]
 [cycles]

@@ -1,0 +1,231 @@
+"""Whole studies: on this machine, killed and continued, and on a Dask cluster that loses a worker."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import hostile
+import pytest
+from click.testing import CliRunner
+
+from colonnade.cli.main import cli
+from colonnade.explore.explore import Exploration
+from colonnade.explore.jobs import entry_of
+from colonnade.explore.study import load_study
+
+STUDY = """title = "Try <b>"
+baseline = "32b32s64d"
+objectives = ["psnr_min", "psnr_baseline_min"]
+
+[design]
+config = "tiny"
+
+[axes]
+precision = ["16b16s32d", "32b32s64d"]
+
+[workload]
+scenes = ["scene.toml"]
+meshes = ["cube"]
+size = [32, 24]
+
+[quality]
+dists = false
+"""
+
+SCENE = """[mesh]
+name = "cube"
+[camera]
+direction = [{}, 0.4, 1.0]
+"""
+
+SECONDS = 120
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Iterator[Path]:
+    """A study of a scene that no other test renders, so that no result is cached before or after."""
+    (tmp_path / "scene.toml").write_text(SCENE.format(random.random()))
+    (tmp_path / "study.toml").write_text(STUDY)
+    exploration = Exploration(load_study(tmp_path / "study.toml"), {})
+    yield tmp_path / "study.toml"
+    forget(exploration)
+
+
+def forget(exploration: Exploration) -> None:
+    for point in exploration.points:
+        for job in point.all():
+            shutil.rmtree(entry_of(job), ignore_errors=True)
+
+
+def command(study: Path, *more: str) -> list[str]:
+    return [sys.executable, "-m", "colonnade", "explore", str(study), "--output", str(study.parent / "out"), *more]
+
+
+def explored(study: Path, *more: str) -> tuple[dict[str, Any], str]:
+    done = subprocess.run(command(study, *more), capture_output=True, text=True, timeout=SECONDS, check=False)
+    assert done.returncode == 0, done.stderr
+    content: dict[str, Any] = json.loads((study.parent / "out" / "study.json").read_text())
+    return content, done.stdout
+
+
+def figures(content: dict[str, Any]) -> dict[str, Any]:
+    return {point["name"]: (point["figures"], point["workloads"]) for point in content["points"]}
+
+
+def test_a_study_killed_in_the_middle_continues_and_gives_the_same_numbers(study: Path) -> None:
+    running = subprocess.Popen(command(study, "--jobs", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + SECONDS
+    while not (study.parent / "out" / "study.json").exists():
+        assert running.poll() is None and time.monotonic() < deadline
+        time.sleep(0.02)
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    partial = json.loads((study.parent / "out" / "study.json").read_text())
+    assert partial["jobs"]["run"] < 7
+
+    continued, printed = explored(study)
+    assert continued["jobs"]["cached"] >= 1
+    assert continued["jobs"]["run"] + continued["jobs"]["cached"] == 7
+    assert continued["jobs"]["failed"] == 0
+    assert "report.html" in printed
+    out = study.parent / "out"
+    assert len(list((out / "pictures").iterdir())) == 3
+    assert (out / "report.html").stat().st_size > 100_000
+    assert "16b16s32d" in (out / "points.csv").read_text()
+
+    forget(Exploration(load_study(study), {}))
+    fresh, _ = explored(study)
+    assert fresh["jobs"]["cached"] == 0
+    assert figures(fresh) == figures(continued)
+
+
+def test_a_study_is_extended(study: Path) -> None:
+    explored(study)
+    study.write_text(study.read_text().replace('["16b16s32d", ', '["16b16s32d", "24b24s32d", '))
+    extended, _ = explored(study)
+    assert [point["name"] for point in extended["points"]] == ["16b16s32d", "24b24s32d", "32b32s64d"]
+    assert extended["jobs"]["cached"] == 7
+    assert extended["jobs"]["run"] == 3
+    assert extended["points"][2]["figures"]["psnr_baseline_min"] == 100.0
+
+
+@contextlib.contextmanager
+def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A scheduler and two workers of one thread each, as the documentation starts them."""
+    dask = Path(sys.executable).parent / "dask"
+    file = folder / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+    local = ["--host", "127.0.0.1"]
+    scheduler = subprocess.Popen(
+        [dask, "scheduler", *local, "--port", "0", "--no-dashboard", "--scheduler-file", file], **quiet
+    )
+    workers: list[subprocess.Popen[bytes]] = []
+    try:
+        deadline = time.monotonic() + SECONDS
+        while not file.exists():
+            assert scheduler.poll() is None and time.monotonic() < deadline
+            time.sleep(0.1)
+        resources = ["--nthreads", "1", "--no-dashboard", "--resources", "memory=4000 java=1"]
+        for _ in range(2):
+            place = ["--scheduler-file", file, "--local-directory", folder]
+            workers.append(subprocess.Popen([dask, "worker", *local, *place, *resources], **quiet))
+        yield json.loads(file.read_text())["address"], workers
+    finally:
+        for process in (*workers, scheduler):
+            process.terminate()
+        for process in (*workers, scheduler):
+            process.wait(SECONDS)
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(study: Path) -> None:
+    here, _ = explored(study)
+    forget(Exploration(load_study(study), {}))
+    shutil.rmtree(study.parent / "out")
+    with cluster(study.parent) as (address, workers):
+        running = subprocess.Popen(
+            command(study, "--scheduler", address), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        deadline = time.monotonic() + SECONDS
+        while not (study.parent / "out" / "study.json").exists():
+            assert running.poll() is None and time.monotonic() < deadline
+            time.sleep(0.02)
+        kill_with_children(workers[0].pid)
+        _, errors = running.communicate(timeout=SECONDS)
+        assert running.returncode == 0, errors
+    there = json.loads((study.parent / "out" / "study.json").read_text())
+    assert there["jobs"]["failed"] == 0
+    assert there["jobs"]["cached"] == 0
+    assert figures(there) == figures(here)
+
+
+def kill_with_children(number: int) -> None:
+    """SIGKILL for a worker's nanny and the worker, so that nothing restarts."""
+    children = Path(f"/proc/{number}/task/{number}/children").read_text().split()
+    for process in (number, *map(int, children)):
+        os.kill(process, signal.SIGKILL)
+
+
+def test_a_scheduler_that_is_not_there_is_one_line(study: Path) -> None:
+    result = CliRunner().invoke(
+        cli, ["explore", str(study), "--output", str(study.parent / "out"), "--scheduler", "tcp://127.0.0.1:9"]
+    )
+    assert result.exit_code == 2
+    hostile.one_error_line(result.stderr, "no Dask scheduler at tcp://127.0.0.1:9")
+    assert not (study.parent / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda out: out.write_text("x"), "is a file"),
+        (lambda out: (out.mkdir(), (out / "thesis.txt").write_text("x")), "holds other files"),
+        (lambda out: (out.mkdir(), (out / "study.json").write_text("{}")), "holds other files"),
+    ],
+)
+def test_other_peoples_folders_are_refused(study: Path, make: Any, message: str) -> None:
+    out = study.parent / "out"
+    make(out)
+    before = hostile.snapshot(study.parent)
+    result = CliRunner().invoke(cli, ["explore", str(study), "--output", str(out)])
+    assert result.exit_code == 2
+    hostile.one_error_line(result.stderr, message)
+    assert hostile.snapshot(study.parent) == before
+
+
+def test_check_lists_the_points_and_writes_nothing(study: Path) -> None:
+    result = CliRunner().invoke(cli, ["explore", str(study), "--output", str(study.parent / "out"), "--check"])
+    assert result.output.splitlines() == ["16b16s32d", "32b32s64d", "2 points, 7 jobs"]
+    assert not (study.parent / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('["cube"]', '["kube"]', ":13: "),
+        ("scene.toml", "none.toml", ":12: "),
+        ("[quality]", "[area]\n[quality]", None),
+        ('"Try <b>"\n', '"Try"\nlibraries = ["asap7"]\n', ":2: the library asap7 has no files: --library asap7=FILE"),
+    ],
+)
+def test_what_is_missing_is_refused_before_the_first_job(
+    study: Path, old: str, new: str, message: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study.write_text(study.read_text().replace(old, new))
+    if message is None:
+        monkeypatch.setitem(sys.modules, "pyosys", None)
+        message = "area needs Yosys: run tools/ppa-environment"
+    result = CliRunner().invoke(cli, ["explore", str(study), "--output", str(study.parent / "out")])
+    assert result.exit_code == 2
+    hostile.one_error_line(result.stderr, message)
+    assert not (study.parent / "out").exists()
