@@ -42,7 +42,7 @@ def scatter(rows: Sequence[Row], x: Column, y: Column, fields: int, *, has_front
         .transform_calculate(x="datum.numbers[x]", y="datum.numbers[y]", xText="datum.texts[x]", yText="datum.texts[y]")
         .transform_filter("isValid(datum.x) && isValid(datum.y)")
     )
-    scale = alt.Scale(zero=False, nice=True, padding=14)
+    scale = alt.Scale(zero=False, nice=False, padding=18)
     horizontal = alt.X("x:Q", title=axis_title_of(x), scale=scale)
     vertical = alt.Y("y:Q", title=axis_title_of(y), scale=scale)
     kinds = [ON_FRONT, OFF_FRONT] if has_front else [OFF_FRONT]
