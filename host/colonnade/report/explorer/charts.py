@@ -37,12 +37,12 @@ _FONT = "system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', Arial, sans-se
 def scatter(rows: Sequence[Row], x: Column, y: Column, fields: int, *, has_front: bool) -> Spec:
     """Two figures of all points; parameters ``x``, ``y`` (keys of columns) and ``selected`` (a name)."""
     base = (
-        alt.Chart(_data(rows), height=440)
+        alt.Chart(_data(rows), height=540)
         .add_params(_param("x", x["key"]), _param("y", y["key"]), _param("selected", ""))
         .transform_calculate(x="datum.numbers[x]", y="datum.numbers[y]", xText="datum.texts[x]", yText="datum.texts[y]")
         .transform_filter("isValid(datum.x) && isValid(datum.y)")
     )
-    scale = alt.Scale(zero=False, nice=True, padding=14)
+    scale = alt.Scale(zero=False, nice=False, padding=18)
     horizontal = alt.X("x:Q", title=axis_title_of(x), scale=scale)
     vertical = alt.Y("y:Q", title=axis_title_of(y), scale=scale)
     kinds = [ON_FRONT, OFF_FRONT] if has_front else [OFF_FRONT]
@@ -112,14 +112,15 @@ def units(rows: Sequence[Row], library: str, level: str, title: str, unit: str) 
         title: What is drawn.
         unit: Its unit.
     """
+    names = _points(rows)
     chart = (
-        alt.Chart(_data(rows), height={"step": _STEP})
+        alt.Chart(_data(rows), height=_STEP * len(names))
         .add_params(_param("library", library), _param("level", level))
         .transform_filter("datum.library === library && datum.level === level")
         .mark_bar()
         .encode(
             x=alt.X("value:Q", title=f"{title}, {unit}"),
-            y=alt.Y("point:N", sort=None, title=None),
+            y=alt.Y("point:N", title=None, scale=alt.Scale(domain=names)),
             order=alt.Order("order:Q"),
             color=alt.Color(
                 "unit:N",
@@ -143,14 +144,15 @@ def stalls(rows: Sequence[Row], workload: str) -> Spec:
     stages = [stage for stage in stages if any(row["stage"] == stage for row in rows)]
     spare = iter(_cycle(UNIT_COLOURS, len(stages)))
     ranked = [row | {"order": stages.index(row["stage"])} for row in rows]
+    names = _points(rows)
     chart = (
-        alt.Chart(_data(ranked), height={"step": _STEP})
+        alt.Chart(_data(ranked), height=_STEP * len(names))
         .add_params(_param("workload", workload))
         .transform_filter("datum.workload === workload")
         .mark_bar()
         .encode(
             x=alt.X("share:Q", title="context cycles", axis=alt.Axis(format=".0%"), scale=alt.Scale(domainMax=1)),
-            y=alt.Y("point:N", sort=None, title=None),
+            y=alt.Y("point:N", title=None, scale=alt.Scale(domain=names)),
             order=alt.Order("order:Q"),
             color=alt.Color(
                 "stage:N",
@@ -169,13 +171,14 @@ def stalls(rows: Sequence[Row], workload: str) -> Spec:
 
 def utilisation(rows: Sequence[Row], workload: str) -> Spec:
     """Utilisation of units and ports as a grid, the bottleneck in bold; parameter ``workload``."""
+    names = _points(rows)
     base = (
-        alt.Chart(_data(rows), height={"step": _STEP})
+        alt.Chart(_data(rows), height=_STEP * len(names))
         .add_params(_param("workload", workload))
         .transform_filter("datum.workload === workload")
         .encode(
             x=alt.X("unit:N", sort=None, title=None, axis=alt.Axis(labelAngle=0, orient="top", domain=False)),
-            y=alt.Y("point:N", sort=None, title=None, axis=alt.Axis(domain=False)),
+            y=alt.Y("point:N", title=None, axis=alt.Axis(domain=False), scale=alt.Scale(domain=names)),
         )
     )
     cells = base.mark_rect(stroke="white").encode(
@@ -184,7 +187,7 @@ def utilisation(rows: Sequence[Row], workload: str) -> Spec:
     )
     texts = base.mark_text(fontSize=11).encode(
         text=alt.Text("share:Q", format=".0%"),
-        color=alt.when("datum.share > 0.6").then(alt.value("white")).otherwise(alt.value("black")),
+        color=alt.when("datum.share > 0.85").then(alt.value("white")).otherwise(alt.value("black")),
     )
     bold = base.transform_filter("datum.binds").mark_text(fontSize=11, fontWeight="bold")
     return _spec(
@@ -196,6 +199,11 @@ def utilisation(rows: Sequence[Row], workload: str) -> Spec:
 
 def _data(rows: Sequence[Row]) -> alt.InlineData:
     return alt.InlineData(values=list(rows), name="rows")
+
+
+def _points(rows: Sequence[Row]) -> list[str]:
+    """The points of all rows in their order, so that each keeps its place whatever is selected."""
+    return list(dict.fromkeys(row["point"] for row in rows))
 
 
 def _param(name: str, value: str) -> alt.Parameter:
@@ -215,6 +223,7 @@ def _spec(chart: Any) -> Spec:
         background="transparent",
         font=_FONT,
         axis={**text, "gridColor": INK, "gridOpacity": 0.13, "domainColor": INK, "tickColor": INK, "labelLimit": 260},
+        axisQuantitative={"tickCount": 9, "labelFlush": False},
         legend={**text, "labelLimit": 260},
         view={"stroke": None},
     )

@@ -27,6 +27,16 @@ function setOptions(select, pairs, wanted) {
   if (kept !== undefined && kept !== null) select.value = kept;
 }
 
+// A printed page shows all tables and how the figures were made.
+let closed = [];
+window.addEventListener("beforeprint", () => {
+  closed = Array.from(document.querySelectorAll("details:is(.numbers, .provenance):not([open])"));
+  for (const details of closed) details.open = true;
+});
+window.addEventListener("afterprint", () => {
+  for (const details of closed) details.open = false;
+});
+
 const selectionListeners = [];
 let selectedPoint = null;
 

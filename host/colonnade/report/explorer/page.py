@@ -187,7 +187,7 @@ def _point_data(point: Point, study: Study, encoded: Mapping[str, pictures.Encod
             ("preset or file", point["config"]),
             ("overrides", " ".join(point["overrides"]) or "none"),
             *((axis, text_of(value)) for axis, value in point["values"].items()),
-            ("hash", point["config_hash"] or "none"),
+            ("hash", (point["config_hash"] or "none")[:16]),
         ],
         "figures": figures,
         "failures": [f"{failure['measure']}: {failure['reason']}" for failure in point["failures"]],

@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,11 @@ from numpy.typing import NDArray
 
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import read_picture
+from colonnade.common.parallel import in_order, processors
 from colonnade.report.explorer.study import Study
+
+#: 8-bit sRGB, [height, width, 3].
+Pixels = NDArray[np.uint8]
 
 #: Bytes of all pictures; base64 makes 24 MB of them.
 MAX_BYTES = 18_000_000
@@ -31,9 +35,8 @@ QUALITY = 90
 
 @dataclass(frozen=True)
 class Encoded:
-    """An encoded picture. ``kind`` is its media type."""
+    """A picture as WebP."""
 
-    kind: str
     data: bytes
     width: int
     height: int
@@ -46,7 +49,7 @@ class Encoded:
 
     def as_json(self) -> dict[str, Any]:
         """The picture for the page's script, with its data URI."""
-        uri = f"data:{self.kind};base64,{base64.b64encode(self.data).decode()}"
+        uri = f"data:image/webp;base64,{base64.b64encode(self.data).decode()}"
         return {"uri": uri, "width": self.width, "height": self.height, "lossy": self.is_lossy}
 
 
@@ -71,45 +74,49 @@ def load(study: Study, folder: Path, max_bytes: int = MAX_BYTES) -> dict[str, En
     Raises:
         UserError: A picture is missing, unreadable, or outside of `folder`.
     """
-    by_workload = {
-        workload: {path: _lossless(_read(folder, path)) for path in paths}
-        for workload, paths in paths_of(study).items()
-    }
+    by_workload = {workload: _encode(folder, paths, _lossless) for workload, paths in paths_of(study).items()}
     total = sum(map(_size, by_workload.values()))
     for workload in sorted(by_workload, key=lambda name: -_size(by_workload[name])):
         if total <= max_bytes:
             break
         total -= _size(by_workload[workload])
-        by_workload[workload] = {path: _lossy(_read(folder, path)) for path in by_workload[workload]}
+        by_workload[workload] = _encode(folder, list(by_workload[workload]), _lossy)
         total += _size(by_workload[workload])
     return {path: picture for pictures in by_workload.values() for path, picture in pictures.items()}
 
 
 def _size(pictures: Mapping[str, Encoded]) -> int:
-    return sum(len(picture.data) for picture in pictures.values())
+    """Bytes of the different pictures."""
+    return sum({picture.key: len(picture.data) for picture in pictures.values()}.values())
 
 
-def _read(folder: Path, path: str) -> NDArray[np.uint8]:
+def _encode(folder: Path, paths: Sequence[str], encode: Callable[[Pixels], Encoded]) -> dict[str, Encoded]:
+    """The encoded pictures by their path. Designs often differ in speed only, so equal pictures are encoded once."""
+    pixels = {path: _read(folder, path) for path in paths}
+    digests = {path: (each.shape, hashlib.sha256(each.tobytes()).digest()) for path, each in pixels.items()}
+    different = {digest: pixels[path] for path, digest in digests.items()}
+    encoded = dict(zip(different, in_order(encode, list(different.values()), processors()), strict=True))
+    return {path: encoded[digest] for path, digest in digests.items()}
+
+
+def _read(folder: Path, path: str) -> Pixels:
     if not (folder / path).resolve().is_relative_to(folder.resolve()):
         raise UserError(f"the study names the picture {path}, which is outside of {folder}")
     return read_picture(folder / path)
 
 
-def _lossless(pixels: NDArray[np.uint8]) -> Encoded:
-    """The smaller of lossless WebP and PNG."""
-    webp = _encoded(pixels, "WEBP", lossless=True, quality=60, method=4, exact=True)
-    png = _encoded(pixels, "PNG", optimize=True)
-    return webp if len(webp.data) < len(png.data) else png
+def _lossless(pixels: Pixels) -> Encoded:
+    return _encoded(pixels, is_lossy=False, lossless=True, quality=60, method=4)
 
 
-def _lossy(pixels: NDArray[np.uint8]) -> Encoded:
-    return _encoded(pixels, "WEBP", is_lossy=True, quality=QUALITY, method=4)
+def _lossy(pixels: Pixels) -> Encoded:
+    return _encoded(pixels, is_lossy=True, quality=QUALITY, method=4)
 
 
-def _encoded(pixels: NDArray[np.uint8], form: str, *, is_lossy: bool = False, **options: Any) -> Encoded:
+def _encoded(pixels: Pixels, *, is_lossy: bool, **options: Any) -> Encoded:
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, format=form, **options)
+    Image.fromarray(pixels).save(stream, format="WEBP", **options)
     height, width = pixels.shape[:2]
-    return Encoded(f"image/{form.lower()}", stream.getvalue(), width, height, is_lossy)
+    return Encoded(stream.getvalue(), width, height, is_lossy)
