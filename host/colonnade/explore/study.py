@@ -291,24 +291,15 @@ def line_of(text: str, where: tuple[str, ...]) -> int | None:
     table: tuple[str, ...] = ()
     best, depth = None, 0
     for number, line in enumerate(text.splitlines(), 1):
-        stripped = line.strip()
-        if header := re.fullmatch(r"\[\[?([^\]]+)\]\]?\s*(#.*)?", stripped):
-            table = _split(header[1])
-            path = table
-        elif key := re.match(r"([\w.\"'-]+)\s*=", stripped):
-            path = (*table, *_split(key[1])) if where[: len(table)] == table else ()
-            if path and where[: len(path)] != path and (*table, key[1].strip("\"'")) == where[: len(table) + 1]:
-                path = (*table, key[1].strip("\"'"))
-        else:
-            path = ()
-        matched = 0
-        for own, wanted in zip(path, where, strict=False):
-            if own != wanted:
-                break
-            matched += 1
-        if matched == len(path) and matched > depth:
-            best, depth = number, matched
-        if depth and depth == len(where) - 1 and best is not None and number >= best and _holds(line, where[-1]):
+        path: tuple[str, ...] = ()
+        if header := re.fullmatch(r"\s*\[\[?([^\]]+)\]\]?\s*(#.*)?", line):
+            path = table = _split(header[1])
+        elif key := re.match(r"\s*([\w.\"'-]+)\s*=", line):
+            path = (*table, *_split(key[1]))
+        if depth < len(path) and path == where[: len(path)]:
+            best, depth = number, len(path)
+        # The value, or the key of an inline table, is on this line or below it
+        if best is not None and depth == len(where) - 1 and _holds(line, where[-1]):
             return number
     return best
 
