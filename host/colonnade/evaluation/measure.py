@@ -143,10 +143,12 @@ def measure_frame(
     mesh: Mesh,
     size: tuple[int, int],
     progress: Progress = QUIET,
+    *,
+    reuse: bool = True,
 ) -> dict[str, Any]:
-    """The report of one frame, see `measure`; from the cache if it is there. The scene's own mesh is not read."""
+    """The report of one frame, see `measure`. The scene's own mesh is not read."""
     run = Run(config, tuple(overrides), mesh.name)
-    frame = _prepared(run, scene, mesh, size, reuse=True, is_estimated=False, progress=progress)
+    frame = _prepared(run, scene, mesh, size, reuse=reuse, is_estimated=False, progress=progress)
     return frame.cached or _measured(frame, progress)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from colonnade.design import toolchain
-from colonnade.evaluation.bench import design_result
+from colonnade.evaluation.bench import design_result, mesh_result
 from colonnade.report import performance_page
 
 DOCS = toolchain.project_root() / "docs"
@@ -25,7 +25,9 @@ def test_the_page_matches_its_data() -> None:
 @pytest.fixture
 def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
     """A folder with data of a benchmark, of a study of rows, and of an ablation with one point of the cycle model."""
-    benchmark = design_result({"bunny": rtl_report(1.0), "cube": rtl_report(1.0)})
+    report = rtl_report(1.0)
+    meshes = {name: mesh_result(report) for name in ("bunny", "cube")}
+    benchmark = design_result(report["config"], "c0", (15, 10), meshes)
 
     def point(in_box: float, **values: Any) -> dict[str, Any]:
         array = benchmark["config"]["array"] | ({"rows": values["array.rows"]} if "array.rows" in values else {})
