@@ -238,7 +238,7 @@ def _point(position: int, precision: str) -> dict[str, Any]:
         }
     return {
         "name": precision,
-        "values": {"precision": precision, "geometry.triangleBits": 24 if mac < 32 else None},
+        "values": {"precision": precision, "geometry.triangleBits": mac if mac < 32 else None},
         "config": "edge",
         "overrides": [f"precision={precision}"],
         "config_hash": f"{position:064x}",

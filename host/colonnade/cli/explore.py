@@ -50,6 +50,7 @@ def explore(
     from colonnade.common.parallel import processors
     from colonnade.explore.explore import Exploration, report_of
     from colonnade.explore.explore import explore as run_study
+    from colonnade.explore.points import grid_size
     from colonnade.explore.results import check_output
     from colonnade.explore.study import load_study
 
@@ -65,6 +66,8 @@ def explore(
         for point in exploration.points:
             echo(point.point.name)
         echo(f"{len(exploration.points)} points, {number} jobs")
+        if file.study.search is not None:
+            echo(f"search: up to {file.study.search.budget} of {grid_size(file):,} points")
         return
     command = shlex.join(["colonnade", *sys.argv[1:]])
     report = run_study(file, named, output, command, jobs or processors(), scheduler, terminal)

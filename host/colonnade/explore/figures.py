@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
@@ -62,15 +63,27 @@ POWER = (
     Column("nj", "energy", "nJ/ray", "lower", ".3f", "energy of a render unit per in-box ray, mean over the meshes"),
     Column("nj_28nm", "energy at 28 nm", "nJ/ray", "lower", ".3f", "dynamic energy per in-box ray, scaled to 28 nm"),
 )
-COMBINED = (
+PER_RATE = (
     Column(
-        "energy_area",
-        "energy × area",
-        "nJ·kGE/ray",
+        "area_per_rate",
+        "area ÷ rate",
+        "kGE·cycle/ray",
         "lower",
         ",.0f",
-        "energy per in-box ray times the area of a render unit and its share of the array",
+        "area of the array divided by its in-box rays per cycle",
     ),
+)
+ENERGY_AREA = (
+    Column(
+        "energy_area",
+        "energy × area ÷ rate",
+        "nJ·kGE·cycle/ray²",
+        "lower",
+        ",.0f",
+        "energy per in-box ray × area of the array ÷ in-box rays per cycle",
+    ),
+)
+RENDER_INDEX = (
     Column("render_index", "RenderIndex", "", "lower", ".3f", "Norm(DISTS loss) × Norm(power) × Norm(area)"),
 )
 
@@ -88,8 +101,9 @@ def columns(has: Mapping[str, bool], libraries: Sequence[str]) -> list[Column]:
     for library in libraries:
         of_library = list(AREA) if has["area"] else []
         of_library += POWER if has["power"] else ()
-        of_library += COMBINED[:1] if has["area"] and has["power"] else ()
-        of_library += COMBINED[1:] if all(has[name] for name in ("quality", "baseline", "area", "power")) else ()
+        of_library += PER_RATE if has["area"] and has["cycles"] else ()
+        of_library += ENERGY_AREA if has["area"] and has["cycles"] and has["power"] else ()
+        of_library += RENDER_INDEX if all(has[name] for name in ("quality", "baseline", "area", "power")) else ()
         title = f", {library}" if len(libraries) > 1 or library != "yosys" else ""
         found += [
             Column(f"{c.key}.{library}", f"{c.label}{title}", c.unit, c.better, c.format, f"{c.what}; {library}")
@@ -145,7 +159,6 @@ def point_figures(point: Mapping[str, Any], has: Mapping[str, bool], libraries: 
         libraries: Names of the libraries.
     """
     frames = list(point["workloads"].values())
-    units = point["config_values"]["array"]["rows"] * point["config_values"]["array"]["columns"]
     found: dict[str, Any] = {}
     if has["quality"]:
         found["psnr_min"] = _of(min, (frame["psnr"] for frame in frames))
@@ -170,9 +183,12 @@ def point_figures(point: Mapping[str, Any], has: Mapping[str, bool], libraries: 
             runs = list(point["power"].get(library, {}).values())
             for key, source in (("mw", "mw"), ("nj", "nj_per_ray"), ("nj_28nm", "nj_per_ray_28nm")):
                 found[f"{key}.{library}"] = _of(_mean, (run and run[source] for run in runs))
-        if has["area"] and has["power"]:
-            energy, kge = found[f"nj.{library}"], found[f"array_kge.{library}"]
-            found[f"energy_area.{library}"] = None if energy is None or kge is None else energy * kge / units
+        if has["area"] and has["cycles"]:
+            pair = (found[f"array_kge.{library}"], found["rays_per_cycle"])
+            found[f"area_per_rate.{library}"] = _of(lambda values: values[0] / values[1], pair)
+        if has["area"] and has["cycles"] and has["power"]:
+            pair = (found[f"area_per_rate.{library}"], found[f"nj.{library}"])
+            found[f"energy_area.{library}"] = _of(math.prod, pair)
     return found
 
 

@@ -120,6 +120,29 @@ def test_a_study_is_extended(study: Path) -> None:
     assert extended["points"][2]["figures"]["psnr_baseline_min"] == 100.0
 
 
+def test_an_interrupt_ends_all_jobs_within_two_seconds(study: Path) -> None:
+    running = subprocess.Popen(command(study), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + SECONDS
+    while not (jobs := descendants(running.pid)):
+        assert running.poll() is None and time.monotonic() < deadline
+        time.sleep(0.02)
+    begun = time.monotonic()
+    running.send_signal(signal.SIGINT)
+    _, errors = running.communicate(timeout=SECONDS)
+    assert time.monotonic() - begun < 2
+    assert running.returncode == 130
+    assert errors.splitlines()[-1] == "colonnade: error: interrupted"
+    assert not any(Path(f"/proc/{job}/cmdline").exists() for job in jobs)
+
+
+def descendants(number: int) -> list[int]:
+    """The processes of jobs below a process."""
+    found = []
+    for threads in Path(f"/proc/{number}/task").iterdir():
+        found += [int(child) for child in (threads / "children").read_text().split()]
+    return [child for child in found if b"explore.worker" in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
 @contextlib.contextmanager
 def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """A scheduler and two workers of one thread each, as the documentation starts them."""

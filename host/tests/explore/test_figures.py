@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
-from colonnade.explore.figures import Column, columns, front
+from colonnade.explore.figures import Column, columns, front, point_figures
 from colonnade.explore.render_index import index_rows, sensitivity
 from colonnade.explore.search import check_search, parse_condition, search_front
 from colonnade.explore.study import FieldValue, StudyFile, load_study
@@ -62,6 +62,28 @@ def test_render_index_needs_the_baseline_and_leaves_out_points_without_figures()
     found[1]["figures"]["mw.a"] = None
     assert [row["name"] for row in index_rows(found, "wide", ["a"])] == ["wide"]
     assert index_rows(found, "lean", ["a"]) == []
+
+
+def test_figures_of_a_point_are_missing_only_where_a_measurement_is() -> None:
+    has = dict.fromkeys(("quality", "baseline", "cycles", "area", "power"), True)
+    frame = {"psnr": 50.0, "dists": 0.01, "flip": 0.02, "dists_baseline": 0.004, "psnr_baseline": 60.0}
+    frame |= {"rays_per_cycle_in_box": 2.0, "is_timed": True}
+    other = frame | {"psnr": 40.0, "dists_baseline": 0.006, "rays_per_cycle_in_box": 8.0}
+    unit = {"render_unit_kge": 300.0, "array_kge": 24000.0, "mm2_28nm": 11.8, "slowest_path_fo4": 60.0}
+    runs = {name: {"mw": mw, "nj_per_ray": mw / 4, "nj_per_ray_28nm": mw} for name, mw in (("a", 4.0), ("b", 8.0))}
+    point = {"workloads": {"a": frame, "b": other}, "area": {"lib": unit}, "power": {"lib": runs}}
+    found = point_figures(point, has, ["lib"])
+    assert (found["psnr_min"], found["psnr_mean"]) == (40.0, 45.0)
+    assert (found["dists_loss"], found["dists_loss_max"]) == (pytest.approx(0.5), pytest.approx(0.6))
+    assert found["rays_per_cycle"] == pytest.approx(4.0)
+    assert (found["mw.lib"], found["nj.lib"], found["nj_28nm.lib"]) == (6.0, 1.5, 6.0)
+    assert found["area_per_rate.lib"] == pytest.approx(6000.0)
+    assert found["energy_area.lib"] == pytest.approx(9000.0)
+    assert {column.key for column in columns(has, ["lib"])} == {*found, "render_index.lib"}
+    point["power"]["lib"]["b"] = None
+    found = point_figures(point, has, ["lib"])
+    assert found["nj.lib"] is found["energy_area.lib"] is None
+    assert found["area_per_rate.lib"] is not None
 
 
 SEARCH = """title = "Search"

@@ -42,9 +42,9 @@ def scatter(rows: Sequence[Row], x: Column, y: Column, fields: int, *, has_front
         .transform_calculate(x="datum.numbers[x]", y="datum.numbers[y]", xText="datum.texts[x]", yText="datum.texts[y]")
         .transform_filter("isValid(datum.x) && isValid(datum.y)")
     )
-    scale = alt.Scale(zero=False, nice=False, padding=18)
-    horizontal = alt.X("x:Q", title=axis_title_of(x), scale=scale)
-    vertical = alt.Y("y:Q", title=axis_title_of(y), scale=scale)
+    # The padding leaves space for the labels above the points.
+    horizontal = alt.X("x:Q", title=axis_title_of(x), scale=alt.Scale(zero=False, nice=False, padding=42))
+    vertical = alt.Y("y:Q", title=axis_title_of(y), scale=alt.Scale(zero=False, nice=False, padding=26))
     kinds = [ON_FRONT, OFF_FRONT] if has_front else [OFF_FRONT]
     legend = alt.Legend(title=None, orient="top", symbolSize=110) if has_front else None
     colour = alt.Scale(domain=kinds, range=[COLOURS[5], COLOURS[0]][-len(kinds) :])

@@ -96,12 +96,12 @@ def measured_columns(study: Study) -> list[Column]:
 
 
 def scatter_columns(study: Study) -> list[Column]:
-    """What the axes of a scatter plot may be: measured columns, then varied fields that are numbers."""
-    keys = {column["key"] for column in study["columns"]}
+    """What the axes of a scatter plot may be: measured columns, then varied fields with several numbers."""
+    points, keys = study["points"], {column["key"] for column in study["columns"]}
     fields = [
         {"key": field, "label": field, "unit": "", "better": None, "format": "", "what": "a varied field"}
         for field in study["axes"]
-        if any(is_number(point["values"].get(field)) for point in study["points"]) and field not in keys
+        if field not in keys and len(set(filter(is_number, (point["values"].get(field) for point in points)))) > 1
     ]
     return [*measured_columns(study), *fields]
 
