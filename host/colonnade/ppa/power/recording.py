@@ -1,7 +1,8 @@
 """Records the ports of one module while the RTL renders a frame, for a replay on the gate netlist.
 
 A recorder is bound to the module in the simulation. It writes inputs and outputs just before each clock edge, from the
-cycle in which ``io_start`` starts the frame.
+cycle in which ``io_start`` starts the frame. Of several instances, the one that finds no recording yet makes it: the
+simulator evaluates them in the order of their rows.
 """
 
 from __future__ import annotations
@@ -31,33 +32,38 @@ from colonnade.scene.view import with_overrides
 from colonnade.scene_image.packer import pack
 
 #: Ports with a special role in a recording or its replay.
-CLOCK, RESET, START, ROW = "clock", "reset", "io_start", "io_row"
-
-#: Row of the recorded render unit in its column.
-RECORDED_ROW = 0
+CLOCK, RESET, START = "clock", "reset", "io_start"
 
 _RECORDER = """
 module ColonnadeRecorder(
   input clock, input reset, input start, input [{inputs}:0] inputs, input [{outputs}:0] outputs
 );
-  integer file, limit, unused, left, idle_cycles;
+  integer file, limit, unused, other, left, idle_cycles;
   initial begin
     left = 0;
     file = $fopen("limit", "r");
     unused = $fscanf(file, "%d", limit);
     $fclose(file);
-    file = $fopen("recording", "w");
+    file = 0;
   end
   always @(posedge clock) begin
     idle_cycles <= reset ? 0 : idle_cycles + 1;
-    if (start) $fwrite(file, "%0d\\n", idle_cycles);
-    if (start || left != 0) $fwrite(file, "%h %h\\n", inputs, outputs);
-    if (start) left <= limit - 1;
-    else if (left != 0) left <= left - 1;
+    if (start && file == 0) begin
+      other = $fopen("recording", "r");
+      if (other == 0) begin
+        file = $fopen("recording", "w");
+        $fwrite(file, "%0d\\n", idle_cycles);
+        $fwrite(file, "%h %h\\n", inputs, outputs);
+        left <= limit - 1;
+      end else $fclose(other);
+    end else if (left != 0) begin
+      $fwrite(file, "%h %h\\n", inputs, outputs);
+      left <= left - 1;
+    end
   end
 endmodule
 bind {module} ColonnadeRecorder recorder(
-  .clock({clock}), .reset({reset}), .start({start}{chosen}), .inputs({{{input_names}}}), .outputs({{{output_names}}})
+  .clock({clock}), .reset({reset}), .start({start}), .inputs({{{input_names}}}), .outputs({{{output_names}}})
 );
 """
 
@@ -203,13 +209,11 @@ def _with_recorder(
     design: GeneratedDesign, module: str, inputs: Sequence[Port], outputs: Sequence[Port]
 ) -> Iterator[GeneratedDesign]:
     """A temporary folder with the design and the recorder."""
-    names = {port.name for port in inputs}
     text = _RECORDER.format(
         module=module,
         clock=CLOCK,
         reset=RESET,
         start=START,
-        chosen=f" && {ROW} == {RECORDED_ROW}" if ROW in names else "",
         inputs=sum(port.bits for port in inputs) - 1,
         outputs=sum(port.bits for port in outputs) - 1,
         input_names=", ".join(port.name for port in inputs),
