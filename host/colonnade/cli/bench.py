@@ -15,19 +15,30 @@ from colonnade.cli.options import (
     echo,
     finish,
     json_option,
-    measurement_options,
     require_outputs,
+    size_option,
 )
 
 if TYPE_CHECKING:
     from colonnade.common.text_table import Table
-    from colonnade.evaluation.measure import Conditions
 
 
 @click.command(short_help="Measure rays per cycle of the benchmark meshes.")
 @configuration_options
 @click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Render only this mesh. Repeatable.")
-@measurement_options
+@size_option("Frame size in pixels.  [default: that of the benchmark scene]")
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Frames to render in parallel, one processor each.  [default: number of processors]",
+)
+@click.option(
+    "--reuse/--fresh",
+    default=False,
+    show_default=True,
+    help="Reuse cached results of earlier runs, also those of explore.",
+)
 @click.option("--mirror/--no-mirror", default=True, show_default=True, help="Also render the meshes as mirrors.")
 @click.option("--plot", type=FILE, metavar="FILE", help="Plot the utilisation of each stage as PNG.")
 @json_option
@@ -35,7 +46,9 @@ def bench(
     config: str,
     overrides: tuple[str, ...],
     meshes: tuple[str, ...],
-    conditions: Conditions,
+    size: str | None,
+    jobs: int | None,
+    reuse: bool,
     mirror: bool,
     plot: Path | None,
     json_file: Path | None,
@@ -48,24 +61,39 @@ def bench(
     a perfect memory the busiest unit is the limit, with perfect units the busiest port. Meshes that are not built in
     come from the folders in COLONNADE_MESHES.
     """
+    from colonnade.common.frame_size import parse_size
+
+    pixels = parse_size(size) if size is not None else None
     require_outputs(plot, json_file)
 
     from colonnade.common import progress
+    from colonnade.common.parallel import processors
     from colonnade.design.generator import manifest_for
-    from colonnade.evaluation import bench as benchmark
+    from colonnade.evaluation.bench import MESHES, PAPER_RAYS_PER_CYCLE
+    from colonnade.explore.bench import bench as run_benchmark
 
     terminal = progress.for_terminal()
-    names = meshes or benchmark.MESHES
+    names = meshes or MESHES
 
     def measured(mirror: bool) -> dict[str, Any]:
         table = _table()
-        report = benchmark.bench(config, overrides, names, conditions, terminal, partial(_show, table), mirror)
+        report = run_benchmark(
+            config,
+            overrides,
+            names,
+            pixels,
+            jobs or processors(),
+            terminal,
+            partial(_show, table),
+            reuse=reuse,
+            mirror=mirror,
+        )
         in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
         means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])
         table.print("geometric mean", None, None, *means, None, None, None, "")
         echo(
             f"{in_box:.3f} in-box rays per cycle: "
-            f"{report['ratio_to_paper']:.1f} times the paper's {benchmark.PAPER_RAYS_PER_CYCLE}"
+            f"{report['ratio_to_paper']:.1f} times the paper's {PAPER_RAYS_PER_CYCLE}"
         )
         return report
 

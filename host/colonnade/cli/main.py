@@ -21,7 +21,6 @@ from colonnade.cli.pack import pack
 from colonnade.cli.ppa import ppa
 from colonnade.cli.render import render
 from colonnade.cli.study import study
-from colonnade.cli.sweep import sweep
 from colonnade.cli.verify import verify
 from colonnade.common import ledger
 from colonnade.common.errors import UserError, reason_of
@@ -33,6 +32,8 @@ WRONG_INPUT = 2
 BUG = 1
 #: The environment variable that, set to anything but 0, prints the traceback of an unexpected error.
 DEBUG = "COLONNADE_DEBUG"
+#: Former commands, and what replaces them.
+REPLACED = {"sweep": "colonnade explore STUDY.toml"}
 
 
 class OneLineErrors(click.Group):
@@ -57,6 +58,14 @@ class OneLineErrors(click.Group):
         except Exception as error:
             _fail(*_unexpected(error))
         sys.exit(status if isinstance(status, int) else 0)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command; a former one is an error that names what replaces it."""
+        if args[0] in REPLACED:
+            ctx.fail(f"there is no {args[0]} any more: use {REPLACED[args[0]]}")
+        return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The commands in the order in which a user needs them, not alphabetically."""
@@ -103,7 +112,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, render, compare, study, verify, fuzz, bench, sweep, explore, ppa):
+for command in (generate, pack, inspect, render, compare, study, verify, fuzz, bench, explore, ppa):
     cli.add_command(command)
 
 

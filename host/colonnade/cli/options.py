@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,10 +10,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from colonnade.common.terminal_text import plain
-
-if TYPE_CHECKING:
-    from colonnade.evaluation.measure import Conditions
-
 
 if TYPE_CHECKING:
     _NumberType = click.ParamType[float]
@@ -60,38 +55,6 @@ def configuration_options(command: Command) -> Command:
         metavar="CONFIG",
         help="Hardware configuration: a preset (tiny, small, edge), a JSON file, or a precision such as 32b32s64d.",
     )(command)
-
-
-def measurement_options(command: Command) -> Callable[..., Any]:
-    """Add ``--size``, ``--jobs`` and ``--reuse``. The command receives them as `conditions` on the benchmark scene."""
-
-    @functools.wraps(command)
-    def with_conditions(*, size: str | None, jobs: int | None, reuse: bool, **others: Any) -> Any:
-        return command(conditions=_conditions(size, jobs, reuse), **others)
-
-    wrapped = click.option(
-        "--reuse/--fresh",
-        default=False,
-        show_default=True,
-        help="Reuse cached counters of an earlier run with the same hardware and scene image.",
-    )(with_conditions)
-    wrapped = click.option(
-        "--jobs",
-        type=click.IntRange(min=1),
-        metavar="N",
-        help="Frames to render in parallel, one processor each.  [default: number of processors]",
-    )(wrapped)
-    return size_option("Frame size in pixels.  [default: that of the benchmark scene]")(wrapped)
-
-
-def _conditions(size: str | None, jobs: int | None, reuse: bool) -> Conditions:
-    from colonnade.common.frame_size import parse_size
-    from colonnade.common.parallel import processors
-    from colonnade.design.toolchain import project_root
-    from colonnade.evaluation.measure import Conditions
-
-    pixels = parse_size(size) if size is not None else None
-    return Conditions(project_root() / "scenes" / "object.toml", pixels, jobs or processors(), reuse)
 
 
 def size_option(text: str) -> Callable[[Command], Command]:

@@ -14,7 +14,7 @@ MAX_PIXELS = 2 * 4096 * 4096
 MAX_FRAMES = 10_000
 #: Pixels of a frame that is recorded as a waveform; each takes on the order of 100 kB.
 MAX_WAVEFORM_PIXELS = 4096
-#: Designs of one sweep.
+#: Points of a study's grid.
 MAX_DESIGNS = 1_000
 
 #: Bytes of a scene, a configuration or a room's ``meta.json``.

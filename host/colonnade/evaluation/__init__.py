@@ -1,1 +1,1 @@
-"""Benchmarks, sweeps, verification and fuzzing of designs."""
+"""Benchmarks, verification and fuzzing of designs."""

@@ -5,10 +5,12 @@ A result is a folder of files, of which ``result.json`` holds the figures. The c
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import json
 import pickle
+import shutil
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -39,7 +41,7 @@ class Kind:
         packages: The host's packages whose sources determine the result.
         needs: Resources of a worker: programs by their names, and ``memory`` in MB.
         uses_generator: The hardware's sources determine the result.
-        uses_model: The sources of the model do.
+        uses_model: The compiled sources do: those of the tree builder and of the model.
     """
 
     name: str
@@ -58,7 +60,13 @@ KINDS = {
         Kind("reference", (*_SCENE, "reference"), {"memory": 1000}),
         Kind("picture", (*_SCENE, "device", "render"), {"memory": 1000, "java": 1}, uses_model=True),
         Kind("comparison", ("quality",), {"memory": 1000}),
-        Kind("cycles", (*_SCENE, "device"), {"memory": 7000, "java": 1, "verilator": 1}, uses_generator=True),
+        Kind(
+            "cycles",
+            (*_SCENE, "device", "render", "evaluation"),
+            {"memory": 7000, "java": 1, "verilator": 1},
+            uses_generator=True,
+            uses_model=True,
+        ),
         Kind("area", ("ppa",), {"memory": 7000, "java": 1, "yosys": 1}, uses_generator=True),
         Kind(
             "power",
@@ -140,6 +148,12 @@ def cached(job: Job) -> Path | None:
     """The intact result of a job; None if there is none."""
     folder = entry_of(job)
     return folder if (folder / cache.CONTENTS).is_file() and cache.is_intact(folder) else None
+
+
+def forget(job: Job) -> None:
+    """Drop the result of a job, so that it is made anew."""
+    with contextlib.suppress(FileNotFoundError):
+        shutil.rmtree(entry_of(job))
 
 
 def figures_of(folder: Path) -> dict[str, Any]:

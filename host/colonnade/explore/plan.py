@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-from pydantic import TypeAdapter
 
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
@@ -18,6 +15,7 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 from colonnade.explore import figures
+from colonnade.explore.frames import Frame, cycles_job, frame_of
 from colonnade.explore.jobs import KINDS, Job, JobFailed, figures_of
 from colonnade.explore.points import Point, config_of
 from colonnade.explore.schedule import Outcome
@@ -25,7 +23,6 @@ from colonnade.explore.study import StudyFile
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.ppa.library.liberty_files import find_liberties
-from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
 
 #: The library of Yosys's generic gates.
@@ -33,27 +30,6 @@ GENERIC = "yosys"
 
 #: Sections of a configuration that do not change a picture.
 _ARRAY_SECTIONS = ("array", "units", "columnBvhMemory")
-
-_SCENE = TypeAdapter(Scene)
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A frame of the workload.
-
-    Attributes:
-        name: Its name in tables: that of the mesh, or of the scene, or of both where both vary.
-        scene: The scene with the mesh's name.
-        mesh: The mesh.
-        source: The mesh as the study names it; None: the scene's.
-        identity: What determines the frame but the configuration.
-    """
-
-    name: str
-    scene: Scene
-    mesh: Mesh
-    source: str | None
-    identity: Mapping[str, Any]
 
 
 class Plan:
@@ -145,12 +121,8 @@ class Plan:
         identity = {"config": manifest.config}
         if study.cycles is not None:
             for frame in self._frames_of(study.cycles.meshes):
-                found.cycles[frame.name] = _job(
-                    "cycles",
-                    f"cycles of {point.name}, {frame.name}",
-                    identity | {"frame": frame.identity, "size": study.workload.size},
-                    design | {"scene": frame.scene, "mesh": frame.mesh, "size": study.workload.size},
-                )
+                title = f"cycles of {point.name}, {frame.name}"
+                found.cycles[frame.name] = cycles_job(title, design, manifest, frame, study.workload.size)
         for library in self.libraries:
             of_library = identity | {"library": self._digests.get(library, {})}
             arguments = design | {"library": self._contents.get(library, {})}
@@ -281,25 +253,8 @@ def _frames(file: StudyFile) -> list[Frame]:
             stem = Path(name).stem
             title = f"{stem}, {source}" if both else stem if source is None else source
             mesh = replace(meshes[key], name=source or meshes[key].name)
-            found.append(Frame(title, own, mesh, source, _frame_identity(own, mesh)))
+            found.append(frame_of(title, own, mesh, source))
     return found
-
-
-def _frame_identity(scene: Scene, mesh: Mesh) -> dict[str, Any]:
-    """What determines a frame: the content of mesh and room, and the scene without its paths."""
-    plain = _SCENE.dump_python(scene, mode="json", exclude={"mesh": True, "background": {"room": True}})
-    digest = hashlib.sha256()
-    for array in (mesh.vertices, mesh.faces, mesh.vertex_normals, mesh.face_materials, mesh.source_faces):
-        digest.update(f"{array.shape} {array.dtype}\n".encode() + array.tobytes())
-    digest.update(repr((mesh.materials, mesh.source_count)).encode())
-    room = None
-    if scene.background.room is not None:
-        room = {
-            path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-            for path in sorted(scene.background.room.iterdir())
-            if path.is_file()
-        }
-    return {"scene": json.loads(json.dumps(plain)), "mesh": digest.hexdigest(), "room": room}
 
 
 def _library(file: StudyFile, name: str, given: Mapping[str, Sequence[str]]) -> dict[str, bytes]:

@@ -104,6 +104,7 @@ class Results:
                     "mesh": frame.mesh.name,
                     "scene": Path(frame_scene).name,
                     "triangles": len(frame.mesh.faces),
+                    "size": list(study.workload.size),
                 }
                 for frame, frame_scene in zip(plan.frames, self._scenes(), strict=True)
             ],

@@ -44,11 +44,12 @@ class Tally:
 class Schedule:
     """The outcomes of all jobs so far. A search adds jobs in batches."""
 
-    def __init__(self, runner: Runner, progress: Progress = QUIET) -> None:
+    def __init__(self, runner: Runner, progress: Progress = QUIET, title: str = "exploring") -> None:
         self.outcomes: dict[str, Outcome] = {}
         self.tally = Tally()
         self._runner = runner
         self._progress = progress
+        self._title = title
         self._interval = FIRST_LINE
         self._due = time.monotonic() + FIRST_LINE
         self._waits: set[str] = set()
@@ -61,23 +62,27 @@ class Schedule:
 
         def end(job: Job, outcome: Outcome) -> None:
             self.outcomes[job.key] = outcome
-            if isinstance(outcome, JobFailed):
-                self.tally.failed += 1
-                self._progress.note(f"{job.title} failed: {outcome}")
+            self.tally.failed += isinstance(outcome, JobFailed)
             finished(job, outcome)
+            if isinstance(outcome, JobFailed):
+                self._progress.note(f"{job.title} failed: {outcome}")
 
-        with self._progress.step("exploring") as report:
-            while left or running:
-                self._start(left, running, end)
-                report(1 - (len(left) + len(running)) / total if total else 1.0)
-                if not running:
-                    continue
-                done, _ = wait(running, timeout=FIRST_LINE, return_when=FIRST_COMPLETED)
-                for future in done:
-                    job, begun, shown = running.pop(future)
+        with self._progress.step(self._title) as report:
+            try:
+                while left or running:
+                    self._start(left, running, end)
+                    report(1 - (len(left) + len(running)) / total if total else 1.0)
+                    if not running:
+                        continue
+                    done, _ = wait(running, timeout=FIRST_LINE, return_when=FIRST_COMPLETED)
+                    for future in done:
+                        job, begun, shown = running.pop(future)
+                        shown.close()
+                        end(job, self._outcome(job, future, time.monotonic() - begun))
+                    self._say(left, [job for job, _, _ in running.values()])
+            finally:
+                for _, _, shown in running.values():
                     shown.close()
-                    end(job, self._outcome(job, future, time.monotonic() - begun))
-                self._say(left, [job for job, _, _ in running.values()])
 
     def _start(
         self,
@@ -127,7 +132,7 @@ class Schedule:
 
     def _say(self, left: dict[str, Job], running: list[Job]) -> None:
         now = time.monotonic()
-        if now < self._due or not running:
+        if now < self._due or not running or self._progress is QUIET:
             return
         self._interval = min(2 * self._interval, MAX_INTERVAL)
         self._due = now + self._interval

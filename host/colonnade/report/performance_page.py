@@ -16,7 +16,7 @@ from typing import Any
 from colonnade.common.atomic_files import replacing
 from colonnade.common.markdown import markdown
 from colonnade.evaluation.bench import PAPER_RAYS_PER_CYCLE, geometric_mean
-from colonnade.report.sweep import LABELS
+from colonnade.report.fields import LABELS, base_of, rate_of, varied_points
 
 Data = Mapping[str, Any]
 
@@ -139,45 +139,46 @@ def speed(bench: Data, _: Path) -> str:
     return markdown(titles, rows)
 
 
-def scaling(sweep: Data, _: Path) -> str:
-    """Rays per cycle of the sweep, as picture and as table."""
-    base = sweep["base"]
-    titles = ["field", "value", *(f"{name}: in-box rays per cycle" for name in base["meshes"])]
+def scaling(study: Data, _: Path) -> str:
+    """Rays per cycle of the study of each field, as picture and as table."""
+    base = base_of(study)
+    titles = ["field", "value", *(f"{name}: in-box rays per cycle" for name in base["workloads"])]
     titles += ["per render unit", "relative to base"]
 
     def row(name: str, value: str, point: Data) -> tuple[str, ...]:
-        meshes = (f"{mesh['rays_per_cycle_in_box']:.3f}" for mesh in point["meshes"].values())
-        return name, value, *meshes, f"{point['in_box_per_unit']:.4f}", f"{point['ratio_to_base']:.2f}"
+        rates = (f"{rate_of(point, workload):.3f}" for workload in point["workloads"])
+        array, mean = point["config_values"]["array"], point["figures"]["rays_per_cycle"]
+        per_unit, relative = mean / (array["rows"] * array["columns"]), mean / base["figures"]["rays_per_cycle"]
+        return name, value, *rates, f"{per_unit:.4f}", f"{relative:.2f}"
 
     rows = [row("base", "", base)]
-    for point in sweep["points"]:
-        key = point["varied"]
-        rows.append(row(LABELS.get(key, key), str(point["values"][key]), point))
+    for point in varied_points(study):
+        ((key, value),) = point["values"].items()
+        rows.append(row(LABELS.get(key, key), str(value), point))
     picture = "![In-box rays per cycle over each field](pictures/scaling.png)"
     return f"{picture}\n\n{markdown(titles, rows)}"
 
 
-def ablation(sweep: Data, docs: Path) -> str:
+def ablation(study: Data, docs: Path) -> str:
     """In-box rays per cycle and column, of the RTL and of the cycle model, by mesh and number of contexts."""
     keys = ("array.contexts", "columnBvhMemory.snooping", "columnBvhMemory.banks")
-    points = {tuple(point["values"][key] for key in keys): point for point in sweep["points"]}
+    points = {tuple(point["values"][key] for key in keys): point for point in varied_points(study)}
     modelled = json.loads((docs / "data" / "cycle-model.json").read_text())
     model = {
         (p["mesh"], p["lanes"], p["contexts"], p["snooping"], p["banks"]): p["in_box"] / modelled["columns"]
         for p in modelled["points"]
     }
-    columns = sweep["base"]["config"]["array"]["columns"]
+    base = base_of(study)
+    columns = base["config_values"]["array"]["columns"]
     variants = list(dict.fromkeys((snooping, banks) for _, snooping, banks in points))
     names = [
         f"{'snooping' if snooping else 'round-robin'}, {banks} bank{'s' * (banks > 1)}" for snooping, banks in variants
     ]
     rows = []
-    for mesh in sweep["base"]["meshes"]:
+    for mesh in base["workloads"]:
         for contexts in dict.fromkeys(contexts for contexts, _, _ in points):
             keys_of_row = [(contexts, *variant) for variant in variants]
-            measured = (
-                f"**{points[key]['meshes'][mesh]['rays_per_cycle_in_box'] / columns:.3f}**" for key in keys_of_row
-            )
+            measured = (f"**{rate_of(points[key], mesh) / columns:.3f}**" for key in keys_of_row)
             rows.append((mesh, str(contexts), "RTL", *measured))
             for lanes in ("6/2", "12/4"):
                 figures = [model.get((mesh, lanes, *key)) for key in keys_of_row]

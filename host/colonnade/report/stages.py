@@ -29,7 +29,7 @@ MAX_NAME = 13
 
 
 def plot_stages(report: Mapping[str, Any], path: Path) -> None:
-    """Plot a report of `colonnade.evaluation.bench.bench` as PNG."""
+    """Plot a report of `colonnade.explore.bench.bench` as PNG."""
     assert set(STAGES) == {*CONTEXT_CYCLES, COMPLETION}
     width = max(7.0, 3.3 + 0.86 * len(report["meshes"]))
     with figure(path, width, 6.4, 2, 1, sharex=True, gridspec_kw={"height_ratios": [1.25, 1.0]}) as axes:

@@ -18,7 +18,7 @@ from colonnade.common.frame_size import parse_size
 from colonnade.design import toolchain
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-COMMANDS = ("generate", "pack", "inspect", "render", "compare", "study", "verify", "bench", "sweep", "ppa")
+COMMANDS = ("generate", "pack", "inspect", "render", "compare", "study", "verify", "bench", "explore", "ppa")
 
 
 def run(*arguments: object) -> Result:
@@ -72,6 +72,7 @@ def test_module_and_script_are_the_same_command() -> None:
     ("arguments", "message"),
     [
         (("rendre",), "No such command"),
+        (("sweep", "--vary", "array.rows=1,2"), "use colonnade explore"),
         (("render",), "Missing argument"),
         (("render", "s.toml", "--colour", "red"), "No such option"),
         (("render", "s.toml", "--backend", "gpu"), "gpu"),

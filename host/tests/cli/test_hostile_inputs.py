@@ -16,7 +16,14 @@ from colonnade.cli.main import cli
 X = "render x.toml --config tiny --backend model --size 8x8"
 NINES = "9" * 400
 DEEP = 20_000
-TWENTY = ",".join(map(str, range(20)))
+TWENTY = list(range(20))
+STUDY = "explore x.toml --output o"
+
+
+def study(axes: str) -> dict[str, Content]:
+    """A study file x.toml with these axes."""
+    text = 'title = "x"\n[design]\nconfig = "tiny"\n[workload]\nscenes = ["s.toml"]\nsize = [8, 8]\n[cycles]\n[axes]\n'
+    return {"x.toml": text + axes}
 
 
 def unix_socket(path: Path) -> None:
@@ -45,6 +52,7 @@ INPUTS = {
     "hits-option": ("compare a.png b.png --no-dists --hits-a h.npz --hits-b x.npz", "x.npz"),
     "image": ("inspect x.image", "x.image"),
     "liberty": (PPA, "x.lib"),
+    "study": (STUDY, "x.toml"),
 }
 CASES: dict[str, Case] = {}
 for place, (arguments, file) in INPUTS.items():
@@ -146,7 +154,15 @@ CASES |= {
         "generate --config small --set physicalAttributeMemory.shellPlanes=4 --print", "it is boundingPlanes now"
     ),
     "set-nothing": Case("generate --config tiny --set =1 --print", "key.path=value"),
-    "many-variations": Case("sweep " + " ".join(f"--vary a{key}={TWENTY}" for key in range(5)), "combinations"),
+    # Studies
+    "study-of-many-points": Case(
+        STUDY, "more than 1,000 points", study("".join(f"a{k} = {TWENTY}\n" for k in range(5)))
+    ),
+    "study-of-nothing": Case(STUDY, "title", {"x.toml": ""}),
+    "study-deep": Case(STUDY, "nested too deeply", study(f"a = {'[' * DEEP}{']' * DEEP}\n")),
+    "study-digits": Case(STUDY, "digits", study(f"a = [{NINES}]\n")),
+    "study-with-escapes": Case(STUDY, "x1b[2J", study('"\\u001b[2J" = 1\n')),
+    "study-of-5-MB": Case(STUDY, "too large", study(f"# {'n' * 5_000_000}\n")),
     # Numbers of options
     "frames": Case(f"{RENDER} --frames 1000000000 --output f.png", "1<=x<=10000"),
     "no-frames": Case(f"{RENDER} --frames 0 --output f.png", "1<=x<=10000"),

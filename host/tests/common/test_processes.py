@@ -16,8 +16,8 @@ import pytest
 from colonnade.common import processes
 from colonnade.common.parallel import in_order
 
-#: Imitates a sweep: two threads, each with a temporary folder and a stand-in for the simulator with a child process.
-SWEEP = """
+#: Imitates a study: two threads, each with a temporary folder and a stand-in for the simulator with a child process.
+STUDY = """
 import sys, time
 from pathlib import Path
 from colonnade.common import processes
@@ -78,7 +78,7 @@ def begun() -> Iterator[list[subprocess.Popen[str]]]:
 def test_a_signal_to_the_parent_ends_everything(
     kind: str, programs: int, number: signal.Signals, tmp_path: Path, begun: list[subprocess.Popen[str]]
 ) -> None:
-    command = [sys.executable, "-c", SWEEP, str(tmp_path), kind]
+    command = [sys.executable, "-c", STUDY, str(tmp_path), kind]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     begun.append(process)
     wait_for(lambda: len(children(process.pid)) == programs)

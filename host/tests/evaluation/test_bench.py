@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from colonnade.evaluation import bench, throughput
-from colonnade.evaluation.measure import Conditions, Run
 from colonnade.report.stages import plot_stages
 
 MakeReport = Callable[[float], dict[str, Any]]
@@ -82,19 +81,11 @@ def test_geometric_mean() -> None:
 
 
 @pytest.fixture
-def whole(monkeypatch: pytest.MonkeyPatch, rtl_report: MakeReport) -> dict[str, Any]:
-    """A report over two meshes, one of them given twice."""
-    in_box = {"cube": 1.0, "torus": 4.0}
-
-    def measure(runs: Sequence[Run], *_: object) -> Iterator[dict[str, Any]]:
-        return iter([rtl_report(in_box[run.mesh]) for run in runs])
-
-    monkeypatch.setattr(bench, "measure", measure)
-    seen: list[str] = []
-    conditions = Conditions(Path("s.toml"))
-    result = bench.bench("tiny", (), ("cube", "torus", "cube"), conditions, finished=lambda name, _: seen.append(name))
-    assert seen == ["cube", "torus"]
-    return result
+def whole(rtl_report: MakeReport) -> dict[str, Any]:
+    """A report over two meshes."""
+    rates = {"cube": 1.0, "torus": 4.0}
+    meshes = {name: bench.mesh_result(rtl_report(rate)) for name, rate in rates.items()}
+    return bench.design_result(rtl_report(1.0)["config"], "c0", (15, 10), meshes)
 
 
 def test_report_of_all_meshes(whole: dict[str, Any]) -> None:

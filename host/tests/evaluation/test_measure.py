@@ -1,11 +1,10 @@
-"""Measurements: results in order, and cached results only with `reuse`."""
+"""The measurement of a frame: cached by the content of Verilog, scene image and registers."""
 
 from __future__ import annotations
 
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,39 +16,40 @@ from colonnade.design.generator import manifest_for
 from colonnade.design.toolchain import project_root
 from colonnade.device.verilator import Simulated
 from colonnade.evaluation import measure as measuring
-from colonnade.evaluation.measure import Conditions, Run, measure
+from colonnade.evaluation.measure import measure_frame
+from colonnade.mesh.load import load_mesh
+from colonnade.scene.parser import load_scene
 
-RUNS = [Run("tiny", (), "cube"), Run("tiny", (), "tetrahedron")]
+
+def measured(name: str, *overrides: str, size: tuple[int, int] = (16, 12), reuse: bool = True) -> dict[str, Any]:
+    """The report of a small frame."""
+    scene = load_scene(project_root() / "scenes" / "object.toml")
+    return measure_frame("tiny", overrides, scene, load_mesh(name), size, reuse=reuse)
 
 
-@pytest.fixture
-def conditions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Conditions:
-    """Small frames, two in parallel, with a cache of their own."""
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of a cache of its own."""
     monkeypatch.setattr(measuring, "cache_directory", lambda _: tmp_path)
-    return Conditions(project_root() / "scenes" / "object.toml", (16, 12), jobs=2)
+    return tmp_path / "measurements"
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
-def test_a_cached_run_is_used_only_with_reuse(
-    conditions: Conditions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    first = list(measure(RUNS, conditions))
-    assert [report["mesh"]["name"] for report in first] == ["cube", "tetrahedron"]
-    assert all(report["counters"]["cycles"] == report["cycles"] > 0 for report in first)
-    assert len(list((tmp_path / "measurements").iterdir())) == 2
+def test_cached_counters_are_used_unless_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = measured("cube")
+    assert first["mesh"]["name"] == "cube"
+    assert first["counters"]["cycles"] == first["cycles"] > 0
+    assert len(list(folder.iterdir())) == 1
 
     rendered: list[int] = []
     render = measuring.render_rtl
     monkeypatch.setattr(measuring, "render_rtl", lambda *a, **k: (rendered.append(1), render(*a, **k))[1])
-    reusing = replace(conditions, reuse=True)
-    assert list(measure(RUNS, reusing)) == first
+    assert measured("cube") == first
     assert rendered == []
-    other_size = list(measure(RUNS[:1], replace(reusing, size=(8, 8))))
-    assert other_size[0]["size"] == [8, 8]
+    assert measured("cube", size=(8, 8))["size"] == [8, 8]
     assert len(rendered) == 1
-    again = list(measure(RUNS, conditions))
-    assert [report["counters"] for report in again] == [report["counters"] for report in first]
-    assert len(rendered) == 3
+    assert measured("cube", reuse=False)["counters"] == first["counters"]
+    assert len(rendered) == 2
 
 
 def a_report(cycles: int) -> dict[str, Any]:
@@ -94,29 +94,17 @@ def other_registers(file: Path) -> dict[str, Any]:
     ids=["truncated", "cycles", "registers", "design", "plain"],
 )
 def test_an_altered_measurement_is_repeated(
-    damage: Callable[[Path], object],
-    conditions: Conditions,
-    rendered: list[int],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    damage: Callable[[Path], object], folder: Path, rendered: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    reusing = replace(conditions, reuse=True)
-    assert [report["cycles"] for report in measure(RUNS[:1], reusing)] == [1234]
-    (kept,) = (tmp_path / "measurements").iterdir()
+    assert measured("cube")["cycles"] == 1234
+    (kept,) = folder.iterdir()
     damage(kept)
     for _ in range(2):
-        (again,) = measure(RUNS[:1], reusing)
-        assert again["cycles"] == 1234
+        assert measured("cube")["cycles"] == 1234
     assert len(rendered) == 2
     assert capsys.readouterr().err == (f"colonnade: the cached measurement {kept.name} was damaged and is made again\n")
 
 
-def test_a_missing_mesh_is_named_before_any_frame(conditions: Conditions, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measuring, "design_for", lambda *_: pytest.fail("a design is generated"))
-    with pytest.raises(UserError, match="no-such-mesh"):
-        measure([*RUNS, Run("tiny", (), "no-such-mesh")], conditions)
-
-
-def test_a_mesh_that_does_not_fit_names_the_point(conditions: Conditions) -> None:
-    with pytest.raises(UserError, match=r"columnBvhMemory\.depth=64: .*columnBvhMemory\.depth"):
-        list(measure([Run("tiny", ("columnBvhMemory.depth=64",), "sphere:4")], conditions))
+def test_a_mesh_that_does_not_fit_is_named() -> None:
+    with pytest.raises(UserError, match=r"sphere:4 .*columnBvhMemory\.depth"):
+        measured("sphere:4", "columnBvhMemory.depth=64")

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from colonnade.design import toolchain
-from colonnade.evaluation.bench import design_result
+from colonnade.evaluation.bench import design_result, mesh_result
 from colonnade.report import performance_page
 
 DOCS = toolchain.project_root() / "docs"
@@ -24,22 +24,31 @@ def test_the_page_matches_its_data() -> None:
 
 @pytest.fixture
 def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
-    """A folder with data of a benchmark, of a sweep over rows, and of an ablation with one point of the cycle model."""
+    """A folder with data of a benchmark, of a study of rows, and of an ablation with one point of the cycle model."""
+    report = rtl_report(1.0)
+    meshes = {name: mesh_result(report) for name in ("bunny", "cube")}
+    benchmark = design_result(report["config"], "c0", (15, 10), meshes)
 
-    def point(in_box: float, varied: str | None = None, **values: Any) -> dict[str, Any]:
-        whole = design_result({"bunny": rtl_report(in_box), "cube": rtl_report(in_box)})
-        return whole | {"values": values, "varied": varied, "in_box_per_unit": in_box / 6, "ratio_to_base": in_box}
+    def point(in_box: float, **values: Any) -> dict[str, Any]:
+        array = benchmark["config"]["array"] | ({"rows": values["array.rows"]} if "array.rows" in values else {})
+        return {
+            "values": values,
+            "config_values": {"array": array},
+            "workloads": {name: {"rays_per_cycle_in_box": in_box} for name in ("bunny", "cube")},
+            "figures": {"rays_per_cycle": in_box},
+        }
 
-    base = point(1.0)
     kinds = [(contexts, snooping) for contexts in (1, 4) for snooping in (False, True)]
     keys = ("array.contexts", "columnBvhMemory.snooping", "columnBvhMemory.banks")
     rates = dict(zip(kinds, (0.5, 0.75, 1.0, 1.25), strict=True))
     data = {
-        "bench": base | {"mirror": base},
-        "scaling": {"base": base, "points": [point(2.0, "array.rows", **{"array.rows": 4})]},
+        "bench": benchmark | {"mirror": benchmark},
+        "scaling": {"points": [point(1.0), point(2.0, **{"array.rows": 4})]},
         "ablation": {
-            "base": base,
-            "points": [point(rates[kind], **dict(zip(keys, (*kind, 1), strict=True))) for kind in kinds],
+            "points": [
+                point(1.0),
+                *(point(rates[kind], **dict(zip(keys, (*kind, 1), strict=True))) for kind in kinds),
+            ],
         },
     }
     (tmp_path / "data").mkdir()
@@ -70,7 +79,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     rates = table(docs, "rates")
     assert "| bunny | 12 | 100 | 50 | **1.00** | 2.00 | 1.25 | 2.00 | box unit, 80 % |" in rates
     assert "**4.8 times** the chip's 0.208" in rates
-    assert "| rows (render units per column) | 4 | 2.000 | 2.000 | 0.3333 | 2.00 |" in table(docs, "scaling")
+    assert "| rows (render units per column) | 4 | 2.000 | 2.000 | 0.1667 | 2.00 |" in table(docs, "scaling")
 
 
 def test_ablation_stands_beside_the_model(docs: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from small_gates import cell, small_library, top
@@ -13,7 +12,6 @@ from small_gates import cell, small_library, top
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
-from colonnade.mesh.load import load_mesh
 from colonnade.ppa.library import energies
 from colonnade.ppa.library.cells import Library
 from colonnade.ppa.netlist.mapped import Netlist
@@ -22,7 +20,6 @@ from colonnade.ppa.power.activity import Power, power_of
 from colonnade.ppa.power.recording import Stimulus, require_recordable
 from colonnade.ppa.power.replay import Activity
 from colonnade.ppa.power.report import by_unit, node_scale
-from colonnade.ppa.studies.tree_cycles import reduced
 from colonnade.ppa.timing import opensta
 from colonnade.ppa.timing.delays import NetTiming
 
@@ -85,15 +82,6 @@ def test_power_belongs_to_the_innermost_unit() -> None:
     owners = ("", "Queue", "Shader", "Shader/CosineUnit", "Shader/BounceUnit", "Shader/BounceUnit/Divider")
     found = by_unit(dict.fromkeys(owners, flat))
     assert {unit: power.clock for unit, power in found.items()} == {"contexts": 2, "Shader": 2, "BounceUnit": 2}
-
-
-def test_meshes_are_reduced_to_whole_faces() -> None:
-    mesh = load_mesh("sphere:2000")
-    vertices, faces = reduced(mesh, 200)
-    assert 50 < len(faces) <= 200
-    assert faces.max() < len(vertices)
-    assert all(len(set(face)) == 3 for face in faces.tolist())
-    assert np.abs(vertices).max() <= np.abs(mesh.vertices).max()
 
 
 def test_the_workload_is_checked_before_synthesis(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

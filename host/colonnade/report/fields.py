@@ -1,9 +1,13 @@
-"""Plot of a sweep: rays per cycle over the varied fields."""
+"""Plot of a study of rays per cycle over its varied fields.
+
+Run as ``python -m colonnade.report.fields STUDY.json PICTURE.png``.
+"""
 
 from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,14 +29,42 @@ LABELS = {
 
 MARKERS = "osD^vP*X"
 
+#: The content of ``study.json``, and one of its points.
+Study = Mapping[str, Any]
+Point = Mapping[str, Any]
 
-def plot_sweep(report: Mapping[str, Any], path: Path) -> None:
-    """Plot a report of `colonnade.evaluation.sweep.sweep` as PNG.
 
-    One by one: a panel per field, a line per mesh. Cross product: a panel per mesh with the first field on the x axis,
-    and a line per combination of the other fields.
+def base_of(study: Study) -> Point:
+    """The point without a changed field.
+
+    Raises:
+        StopIteration: The study has none.
     """
-    panels = _panels_one_by_one(report) if report["one_by_one"] else _panels_of_meshes(report)
+    return next(point for point in study["points"] if not point["values"])
+
+
+def varied_points(study: Study) -> list[Point]:
+    """All points but the base."""
+    return [point for point in study["points"] if point["values"]]
+
+
+def rate_of(point: Point, workload: str) -> float:
+    """In-box rays per cycle of a frame."""
+    return float(point["workloads"][workload]["rays_per_cycle_in_box"])
+
+
+def plot_fields(study: Study, path: Path) -> None:
+    """Plot the in-box rays per cycle of a study with a base as PNG.
+
+    Fields varied one by one: a panel per field, a line per workload. A grid: a panel per workload with the first field
+    on the x axis, and a line per combination of the other fields.
+
+    Args:
+        study: The content of ``study.json``.
+        path: Output file.
+    """
+    one_by_one = all(len(point["values"]) == 1 for point in varied_points(study))
+    panels = _panels_one_by_one(study) if one_by_one else _panels_of_workloads(study)
     has_free_cell = len(panels) > PANELS and len(panels) % PANELS != 0
     columns = min(PANELS, len(panels))
     rows = math.ceil(len(panels) / columns)
@@ -46,9 +78,9 @@ def plot_sweep(report: Mapping[str, Any], path: Path) -> None:
         for axis in cells[len(panels) :]:
             axis.set_axis_off()
         handles, labels = cells[0].get_legend_handles_labels()
-        width, height = report["base"]["size"]
-        dotted = " (dotted)" if report["one_by_one"] else ""
-        title = f"base{dotted}: {array_name(report['base']['config'])}; {width}×{height}"
+        width, height = study["workloads"][0]["size"]
+        dotted = " (dotted)" if one_by_one else ""
+        title = f"base{dotted}: {array_name(base_of(study)['config_values'])}; {width}×{height}"
         if has_free_cell:
             cells[-1].legend(
                 handles, labels, loc="upper left", title=title.replace(": ", ":\n"), alignment="left", fontsize=9
@@ -84,32 +116,37 @@ class _Panel:
         axis.set_title(self.title)
 
 
-def _panels_one_by_one(report: Mapping[str, Any]) -> list[_Panel]:
-    base = report["base"]
+def _panels_one_by_one(study: Study) -> list[_Panel]:
+    base = base_of(study)
     panels = []
-    for key in report["vary"]:
-        points = [base, *(point for point in report["points"] if point["varied"] == key)]
-        by_value = {_text(point["values"][key]): point for point in points}
-        ordered = sorted(by_value.values(), key=lambda point: _order(point["values"][key]))
-        lines = {
-            mesh: [(point["values"][key], point["meshes"][mesh]["rays_per_cycle_in_box"]) for point in ordered]
-            for mesh in base["meshes"]
-        }
-        label = LABELS.get(key, key)
-        panels.append(_Panel(key.rpartition(".")[2], label, lines, base["values"][key]))
+    for key in study["axes"]:
+        own = _value_of(base["config_values"], key)
+        points = [(own, base)] + [(p["values"][key], p) for p in varied_points(study) if key in p["values"]]
+        by_value = {_text(value): (value, point) for value, point in points}
+        ordered = sorted(by_value.values(), key=lambda each: _order(each[0]))
+        lines = {name: [(value, rate_of(point, name)) for value, point in ordered] for name in base["workloads"]}
+        panels.append(_Panel(key.rpartition(".")[2], LABELS.get(key, key), lines, own))
     return panels
 
 
-def _panels_of_meshes(report: Mapping[str, Any]) -> list[_Panel]:
-    first, *others = report["vary"]
+def _panels_of_workloads(study: Study) -> list[_Panel]:
+    first, *others = study["axes"]
     panels = []
-    for mesh in report["base"]["meshes"]:
+    for workload in base_of(study)["workloads"]:
         lines: dict[str, list[tuple[Any, float]]] = {}
-        for point in report["points"]:
-            name = ", ".join(_phrase(key, point["values"][key]) for key in others) or mesh
-            lines.setdefault(name, []).append((point["values"][first], point["meshes"][mesh]["rays_per_cycle_in_box"]))
-        panels.append(_Panel(mesh, LABELS.get(first, first), lines, None))
+        for point in varied_points(study):
+            name = ", ".join(_phrase(key, point["values"][key]) for key in others) or workload
+            lines.setdefault(name, []).append((point["values"][first], rate_of(point, workload)))
+        panels.append(_Panel(workload, LABELS.get(first, first), lines, None))
     return panels
+
+
+def _value_of(config: Mapping[str, Any], key: str) -> Any:
+    """The value of a configuration field ``key.path``."""
+    value: Any = config
+    for part in key.split("."):
+        value = value[part]
+    return value
 
 
 def _phrase(key: str, value: Any) -> str:
@@ -127,3 +164,7 @@ def _text(value: Any) -> str:
 def _order(value: Any) -> tuple[int, Any]:
     """Sort key: numbers by size, then all other values by their text."""
     return (0, value) if isinstance(value, int | float) else (1, _text(value))
+
+
+if __name__ == "__main__":
+    plot_fields(json.loads(Path(sys.argv[1]).read_text()), Path(sys.argv[2]))

@@ -2,7 +2,7 @@
 
 Without a BVH each ray tests every triangle, and full meshes would take days. So meshes are simplified by quadrics.
 
-``python -m colonnade.ppa.studies.tree_cycles CONFIG SIZE COUNT,COUNT,… FILE`` writes the figures.
+``python -m colonnade.explore.tree_cycles CONFIG SIZE COUNT,COUNT,… FILE`` writes the figures.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from colonnade.common.parallel import processors
 from colonnade.common.progress import for_terminal
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.evaluation.bench import MESHES, geometric_mean
-from colonnade.evaluation.measure import Conditions, Run, measure
+from colonnade.explore.frames import cycles_job, design_of, frame_of, run_in_order
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
+from colonnade.scene.parser import load_scene
 
 Array = npt.NDArray[Any]
 
@@ -85,19 +86,28 @@ def tree_gain(config: str, counts: Sequence[int], size: tuple[int, int]) -> dict
     progress = for_terminal()
     with progress.step("simplifying the meshes"):
         files = {(maximum, name): _written(load_mesh(name), maximum, folder) for maximum in counts for name in REDUCED}
-    conditions = Conditions(project_root() / "scenes" / "object.toml", size, processors(), reuse=True)
-    runs = [Run(config, overrides, str(file)) for overrides in ((), (NO_TREE,)) for file in files.values()]
-    reports = list(measure(runs, conditions, progress))
+    scene = load_scene(project_root() / "scenes" / "object.toml")
+    frames = [
+        frame_of(file.stem, scene.with_mesh(str(file)), load_mesh(str(file)), str(file)) for file in files.values()
+    ]
+    jobs = []
+    # Those without a BVH take longer, and come first
+    for overrides in ((NO_TREE,), ()):
+        design, manifest = design_of(config, overrides, progress)
+        for frame in frames:
+            title = " ".join(("cycles of", frame.name, *overrides))
+            jobs.append(cycles_job(title, design, manifest, frame, size))
+    results = run_in_order(jobs, processors(), progress)
     reductions: dict[str, dict[str, Any]] = {str(maximum): {} for maximum in counts}
-    for (maximum, name), tree, none in zip(files, reports, reports[len(files) :], strict=False):
+    for (maximum, name), none, tree in zip(files, results, results[len(files) :], strict=False):
         reductions[str(maximum)][name] = {
-            "triangles": tree["mesh"]["triangles"],
+            "triangles": tree["triangles"],
             "rays_in_box": tree["rays"]["in_box"],
             "cycles": {"tree": tree["cycles"], "none": none["cycles"]},
             "gain": none["cycles"] / tree["cycles"],
         }
     return {
-        "config": reports[0]["config"],
+        "config": manifest.config,
         "size": list(size),
         "reductions": {
             maximum: {"meshes": meshes, "geomean_gain": geometric_mean(mesh["gain"] for mesh in meshes.values())}
