@@ -63,16 +63,17 @@ KINDS = {
         Kind(
             "cycles",
             (*_SCENE, "device", "render", "evaluation"),
-            {"memory": 7000, "java": 1, "verilator": 1},
+            {"memory": 3000, "java": 1, "verilator": 1},
             uses_generator=True,
             uses_model=True,
         ),
-        Kind("area", ("ppa",), {"memory": 7000, "java": 1, "yosys": 1}, uses_generator=True),
+        Kind("area", ("ppa",), {"memory": 2000, "java": 1, "yosys": 1}, uses_generator=True),
         Kind(
             "power",
             (*_SCENE, "device", "ppa"),
-            {"memory": 7000, "java": 1, "yosys": 1, "verilator": 1},
+            {"memory": 3000, "java": 1, "yosys": 1, "verilator": 1},
             uses_generator=True,
+            uses_model=True,
         ),
     )
 }
