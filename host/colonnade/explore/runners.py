@@ -28,6 +28,9 @@ class Runner(Protocol):
     #: Number of jobs that run at a time, for the estimate of the time.
     parallel: int
 
+    #: State of a job between submission and result, for progress.
+    state: str
+
     def missing(self, job: Job) -> str | None:
         """Why no worker can run the job; None if one can."""
 
@@ -43,6 +46,8 @@ class Runner(Protocol):
 
 class LocalRunner:
     """Runs jobs on this machine, within its memory."""
+
+    state = "running"
 
     def __init__(self, parallel: int) -> None:
         self.parallel = parallel
@@ -81,6 +86,8 @@ class ClusterRunner:
     A worker is a checkout of the same sources. It declares what it has: ``dask worker ADDRESS --resources
     "memory=16000 java=2 verilator=2 yosys=2"``, memory in MB.
     """
+
+    state = "submitted"
 
     def __init__(self, address: str) -> None:
         from distributed import Client

@@ -70,9 +70,12 @@ class Schedule:
         with self._progress.step(self._title) as report:
             try:
                 while left or running:
+                    before = len(left)
                     self._start(left, running, end)
                     report(1 - (len(left) + len(running)) / total if total else 1.0)
                     if not running:
+                        if len(left) == before:
+                            raise RuntimeError(f"{next(iter(left.values())).title} waits for a job that is not there")
                         continue
                     done, _ = wait(running, timeout=FIRST_LINE, return_when=FIRST_COMPLETED)
                     for future in done:
@@ -141,7 +144,7 @@ class Schedule:
         done = self.tally.run + self.tally.cached
         failed = f", {self.tally.failed} failed" if self.tally.failed else ""
         self._progress.note(
-            f"{done} jobs done ({self.tally.cached} from the cache{failed}), {len(running)} running, {len(left)} left, "
+            f"{done} jobs done ({self.tally.cached} from the cache{failed}), {len(running)} {self._runner.state}, {len(left)} left, "
             f"{_duration(ahead / self._runner.parallel)}"
         )
 

@@ -22,6 +22,7 @@ class FakeRunner:
     """Answers at once with the identity of the job, and fails those that say so."""
 
     parallel = 2
+    state = "running"
 
     def __init__(self) -> None:
         self.ran: list[str] = []
@@ -111,6 +112,11 @@ def test_a_failure_does_not_lose_the_others(runner: FakeRunner, capsys: pytest.C
     retried = Schedule(runner)
     retried.run([bad])
     assert retried.tally.failed == 1, "failures are not cached"
+
+
+def test_a_job_without_its_input_is_an_error_and_no_hang(runner: FakeRunner) -> None:
+    with pytest.raises(RuntimeError, match="comparison 1 waits for a job that is not there"):
+        Schedule(runner).run([job("picture", 2), job("comparison", 1, inputs=(job("picture", 1),))])
 
 
 def test_the_key_is_made_of_everything_that_matters() -> None:
