@@ -143,10 +143,9 @@ class Schedule:
         ahead += sum(self.tally.expected(job.kind.name) / 2 for job in running)
         done = self.tally.run + self.tally.cached
         failed = f", {self.tally.failed} failed" if self.tally.failed else ""
-        self._progress.note(
-            f"{done} jobs done ({self.tally.cached} from the cache{failed}), {len(running)} {self._runner.state}, {len(left)} left, "
-            f"{_duration(ahead / self._runner.parallel)}"
-        )
+        state = f"{len(running)} {self._runner.state}, {len(left)} left"
+        time_left = _duration(ahead / self._runner.parallel)
+        self._progress.note(f"{done} jobs done ({self.tally.cached} from the cache{failed}), {state}, {time_left}")
 
 
 def _duration(seconds: float) -> str:
