@@ -84,7 +84,7 @@ ENERGY_AREA = (
     ),
 )
 RENDER_INDEX = (
-    Column("render_index", "RenderIndex", "", "lower", ".3f", "Norm(DISTS loss) × Norm(power) × Norm(area)"),
+    Column("render_index", "RenderIndex", "", "lower", ".3f", "Norm(DISTS loss) × Norm(energy per ray) × Norm(area)"),
 )
 
 

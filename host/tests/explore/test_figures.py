@@ -40,8 +40,11 @@ def test_a_point_without_a_figure_is_not_on_the_front() -> None:
 
 
 def measured(**figures: tuple[float, float, float]) -> list[dict[str, Any]]:
-    keys = ("dists_loss", "mw.a", "array_kge.a")
-    return [{"name": name, "figures": dict(zip(keys, own, strict=True))} for name, own in figures.items()]
+    """Points with a loss, an energy and an area; the power of a point is 1 mW."""
+    keys = ("dists_loss", "nj.a", "array_kge.a")
+    return [
+        {"name": name, "figures": dict(zip(keys, own, strict=True)) | {"mw.a": 1.0}} for name, own in figures.items()
+    ]
 
 
 def test_render_index_of_the_baseline_is_one_and_a_loss_of_zero_does_not_win_by_itself() -> None:
@@ -51,15 +54,16 @@ def test_render_index_of_the_baseline_is_one_and_a_loss_of_zero_does_not_win_by_
     assert rows["lean"]["index"] == pytest.approx(1.5 * 0.5 * 0.6)
     assert min(rows, key=lambda name: rows[name]["index"]) == "lean"
     rankings = {each["choice"]: each["ranking"] for each in sensitivity(found, "wide", ["a"])}
-    assert rankings["power × area alone"][0] == "coarse"
+    assert rankings["energy × area alone"][0] == "coarse"
     assert rankings["shares of the ranges (a 0 wins)"][0] in ("wide", "exact", "coarse")
     assert rankings["1 + loss / 0.1 %"][-1] == "coarse"
+    assert rankings["power in place of energy"][0] == "lean"
     assert all(sorted(ranking) == sorted(rows) for ranking in rankings.values())
 
 
 def test_render_index_needs_the_baseline_and_leaves_out_points_without_figures() -> None:
     found = measured(wide=(0.0, 2.0, 100.0), lean=(0.5, 1.0, 60.0))
-    found[1]["figures"]["mw.a"] = None
+    found[1]["figures"]["nj.a"] = None
     assert [row["name"] for row in index_rows(found, "wide", ["a"])] == ["wide"]
     assert index_rows(found, "lean", ["a"]) == []
 
