@@ -15,8 +15,8 @@ from typing import Any
 #: The DISTS loss that doubles the index, %.
 SCALE = 1.0
 
-#: Other scales, %, for the dependence of the ranking on this choice.
-SCALES = (0.1, 0.3, 1.0, 3.0, 10.0)
+#: Scales, %, for the dependence of the ranking on this choice; the definition is the first.
+SCALES = (SCALE, 0.1, 0.3, 3.0, 10.0)
 
 #: What is added to all three shares of the ranges by the norm over ranges.
 OFFSET = 0.1
