@@ -95,7 +95,7 @@ def savings(study: Data) -> str:
             own = points[name]["figures"]
             losses = [100 * frame["dists_baseline"] for frame in points[name]["workloads"].values()]
             saved = [1 - own[f"{key}.{library}"] / base[f"{key}.{library}"] for key in ("nj", "mw", "array_kge")]
-            loss = f"{min(losses):.2f} to {max(losses):.2f} %"
+            loss = f"{min(losses):.4f} to {max(losses):.4f} %"
             rows.append([LIBRARIES.get(library, library), name, *(f"{100 * share:.1f} %" for share in saved), loss])
     return markdown(["", "design", "energy per ray saved", "power saved", "area saved", "DISTS loss of a frame"], rows)
 

@@ -1,9 +1,9 @@
 """The paper's RenderIndex: Norm(DISTS loss) × Norm(power) × Norm(area), the lower the better.
 
-The paper leaves Norm open. Here power and area are ratios to the baseline's. Power is that at equal rates of rays, which
-is energy per ray: otherwise a design wins that is slow. The loss is the mean DISTS distance from the baseline's frames;
-its norm is ``1 + loss / SCALE``. So a loss of 0 is worth 1, not 0, and cannot win by itself: a loss of `SCALE` has to be
-paid for by half of the power or half of the area.
+The paper leaves Norm open. Here power and area are ratios to the baseline's. Power is that at equal rates of rays,
+which is energy per ray: otherwise a slow design wins. The loss is the mean DISTS distance from the baseline's frames;
+its norm is ``1 + loss / SCALE``. So a loss of 0 is worth 1, not 0, and cannot win by itself: a loss of `SCALE` has to
+be paid for by half of the power or half of the area.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ Terms = tuple[float, float, float, float]
 
 DEFINITION = (
     f"RenderIndex = (1 + DISTS loss / {SCALE:g} %) × energy per ray / the baseline's × area / the baseline's; lower is "
-    "better. The DISTS loss is the mean DISTS distance from the baseline's frames. Energy per ray is power at equal rates."
+    "better. The DISTS loss is the mean DISTS distance from the baseline's frames. Energy per ray is power at equal "
+    "rates of rays."
 )
 
 
