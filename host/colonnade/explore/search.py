@@ -48,7 +48,8 @@ Evaluate = Callable[[Sequence[Mapping[str, FieldValue]]], Sequence[Mapping[str, 
 def search_front(file: StudyFile, columns: Sequence[Column], evaluate: Evaluate) -> Iterator[int]:
     """Evaluate points chosen by a sampler, in batches; yields the number of points evaluated so far.
 
-    The first batch begins with the first value of every axis. A point that the sampler repeats is not counted again.
+    The first batch begins with the first value of every axis, then the points of ``search.start``.
+    A point that the sampler repeats is not counted again.
     The search ends with its budget, or when the sampler finds nothing new.
     """
     import optuna
@@ -58,7 +59,8 @@ def search_front(file: StudyFile, columns: Sequence[Column], evaluate: Evaluate)
     assert search is not None
     signs = {column.key: -1.0 if column.better == "higher" else 1.0 for column in columns}
     study = optuna.create_study(directions=["minimize"] * len(search.objectives), sampler=_sampler(search))
-    study.enqueue_trial({key: 0 for key in file.study.axes})
+    for start in ({}, *search.start):
+        study.enqueue_trial({key: axis.index(start.get(key, axis[0])) for key, axis in file.study.axes.items()})
     known: dict[tuple[str, ...], Mapping[str, float | None] | None] = {}
     idle = 0
     while len(known) < search.budget and idle < _IDLE_BATCHES:

@@ -133,6 +133,8 @@ class Search:
         sampler: ``nsga2`` or ``tpe`` of Optuna.
         batch: Points to evaluate before the sampler learns from them: the population of ``nsga2``.
         seed: Seed of the sampler: the same study gives the same points.
+        start: Values of axes that the search begins with, after the first value of every axis. An axis that one of them
+            leaves out has its first value.
     """
 
     budget: _Count
@@ -141,6 +143,7 @@ class Search:
     sampler: Literal["nsga2", "tpe"] = "nsga2"
     batch: _Count = 8
     seed: Annotated[int, Strict(), Interval(ge=0, le=2**32 - 1)] = 1
+    start: tuple[dict[str, FieldValue], ...] = ()
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -193,6 +196,10 @@ class Study:
             return 'combine: no [axes]; use combine = "list" for [[point]] tables alone'
         if not any((self.quality, self.cycles, self.area, self.power)):
             return "nothing is measured: give [quality], [cycles], [area] or [power]"
+        for values in self.search.start if self.search else ():
+            for key, value in values.items():
+                if value not in self.axes.get(key, ()):
+                    return f"search.start: {key} = {value_text(value)} is not a value of the axes"
         if self.power is not None and not self.libraries:
             return 'power: the gates need a library: give libraries = ["NAME"]'
         for name, part in (("cycles", self.cycles), ("power", self.power)):

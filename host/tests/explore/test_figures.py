@@ -150,6 +150,19 @@ def test_a_search_is_reproducible_and_beats_chance(file: StudyFile) -> None:
     assert math.prod((8, 8, 8)) > 8 * len(found)
 
 
+def test_a_search_begins_with_the_points_of_start(tmp_path: Path) -> None:
+    start = 'start = [{ "array.rows" = 3 }, { "array.columns" = 5, "array.contexts" = 8 }]'
+    (tmp_path / "start.toml").write_text(SEARCH.replace("seed = 2", f"seed = 2\n{start}"))
+    assert list(evaluated(load_study(tmp_path / "start.toml")))[:3] == [(1, 1, 1), (3, 1, 1), (1, 5, 8)]
+
+
+@pytest.mark.parametrize("start", ['{ "array.rows" = 9 }', '{ "array.lanes" = 1 }'])
+def test_a_start_outside_the_axes_is_refused(tmp_path: Path, start: str) -> None:
+    (tmp_path / "start.toml").write_text(SEARCH.replace("seed = 2", f"start = [{start}]"))
+    with pytest.raises(UserError, match=r":17: search.start: array\.(rows = 9|lanes = 1) is not a value of the axes"):
+        load_study(tmp_path / "start.toml")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
