@@ -39,7 +39,7 @@ WAVEFORM_OPTIONS = ("--trace", "--trace-max-width", "1024", "-CFLAGS", "-DWAVEFO
 #: Replaces -Os of Verilator's makefile, which is a third slower; -O2 is 2 % slower.
 OPTIMISATION = ("-O3",)
 
-_HARNESS = ("harness.cpp", "array.hpp")
+_HARNESS = ("harness.cpp", "array.hpp", "dram.hpp")
 
 #: Paths that make and the shell take as one word.
 _PLAIN_PATH = re.compile(r"[\w/.+@%,-]+", re.ASCII)
@@ -141,6 +141,10 @@ def _ports_header(manifest: Manifest, sources: Sequence[Path]) -> str:
     if match := re.search(r"io_pixels_0_bits_ratio_r_(\w+)", top):
         port = f"top_.io_pixels_##column##_bits_ratio_##channel##_{match.group(1)}"
         header += f"#define RATIO(column, channel) {port}\n"
+    if cache := manifest.config["columnBvhMemory"]["cache"]:
+        line = manifest.memories["columnBvh"]["line"]
+        header += f"#define DRAM_BUS_BYTES {cache['busBytes']}\n#define DRAM_LINE_RECORDS {line['records']}\n"
+        header += f"#define DRAM_LINE_PITCH {line['pitch']}\n"
     if manifest.config["columnBvhMemory"].get("holdable", False):
         header += f"#define MEMORY_BANKS {columns * int(manifest.config['columnBvhMemory']['banks'])}\n"
     return header

@@ -191,10 +191,15 @@ def coupling(opened: Opened, inner: str) -> str:
     return "\n".join([*lines, "    };", "}"]) + "\n"
 
 
-def record_banks(verilog: str) -> str:
-    """C++ macro ``RECORD_BANKS(DO)``, which expands ``DO(memory)`` for each bank of a column's memory, in order."""
-    banks = [f"DO({COLUMN}__DOT__memory__DOT__{bank}__DOT__Memory)" for bank in _RECORDS.findall(verilog)]
-    return f"constexpr unsigned banksOfColumn = {len(banks)};\n#define RECORD_BANKS(DO) {' '.join(banks)}\n"
+def record_banks(verilog: str | None) -> str:
+    """C++ macro ``RECORD_BANKS(DO)``, which expands ``DO(memory)`` for each bank of a column's memory, in order.
+
+    Args:
+        verilog: The module ColumnBvhMemory; None: the columns have caches.
+    """
+    found = [] if verilog is None else _RECORDS.findall(verilog)
+    banks = [f"DO({COLUMN}__DOT__memory__DOT__{bank}__DOT__Memory)" for bank in found]
+    return f"constexpr unsigned banksOfColumn = {len(banks) or 1};\n#define RECORD_BANKS(DO) {' '.join(banks)}\n"
 
 
 def write_sources(sources: Iterable[Path], folder: Path) -> dict[str, list[Path]]:
@@ -207,7 +212,7 @@ def write_sources(sources: Iterable[Path], folder: Path) -> dict[str, list[Path]
     ports = {module: module_ports(verilog[module], module) for module in (UNIT, COLUMN)}
     column = open_module(verilog[COLUMN], COLUMN, UNIT, ports[UNIT])
     device = open_module(verilog[DEVICE], DEVICE, COLUMN, ports[COLUMN])
-    header = "#pragma once\n" + record_banks(verilog["ColumnBvhMemory"])
+    header = "#pragma once\n" + record_banks(verilog.get("ColumnBvhMemory"))
     (folder / "coupling.hpp").write_text(header + coupling(column, UNIT) + coupling(device, COLUMN))
     for module in verilog:
         if module.startswith("records_"):

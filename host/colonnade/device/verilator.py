@@ -39,6 +39,9 @@ class Stalls:
         memory_percent: Percentage of cycles in which each bank is stalled, 0 to 99; needs `is_holdable`.
         memory_burst: Longest stall of a bank, cycles; lengths are uniform from 1.
         check_interval: Cycles between checks of the coupling of the simulator's models.
+        dram_latency: Cycles from a read to its first data, for designs with a cache.
+        dram_random: Percentage of cycles in which DRAM accepts or delivers nothing; reads then overtake each other.
+        dram_errors: Beats of 1024 that DRAM answers with an error in the first frame.
     """
 
     percent: int = 0
@@ -46,6 +49,9 @@ class Stalls:
     memory_percent: int = 0
     memory_burst: int = 32
     check_interval: int = 64
+    dram_latency: int = 100
+    dram_random: int = 0
+    dram_errors: int = 0
 
     def __post_init__(self) -> None:
         bursts = self.memory_burst >= 1 and self.check_interval >= 1
@@ -55,9 +61,13 @@ class Stalls:
     @property
     def options(self) -> list[str]:
         """Command-line options of the harness."""
+        dram = [
+            *("--dram", str(self.dram_latency), "--dram-random", str(self.dram_random)),
+            *("--dram-errors", str(self.dram_errors)),
+        ]
         memory = ["--memory", str(self.memory_percent), "--burst", str(self.memory_burst)]
         sink = ["--stall", str(self.percent), "--seed", str(self.seed), "--check", str(self.check_interval)]
-        return [*sink, *(memory if self.memory_percent else [])]
+        return [*sink, *dram, *(memory if self.memory_percent else [])]
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,8 @@ def frame_registers(
     registers = registers_of(view, header, manifest)
     if environment is not None:
         registers |= environment_registers(view, environment, header, manifest, relit)
+    if manifest.config["columnBvhMemory"]["cache"]:
+        registers["dram.page"] = 0
     return registers | {"frame.watchdogCycles": watchdog_cycles(registers, header, manifest)}
 
 

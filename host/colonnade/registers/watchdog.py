@@ -24,6 +24,9 @@ TRIANGLE_CYCLES = 24
 #: A design without a tree visits all records.
 TREE_VISITS = 128
 
+#: A read from DRAM, behind those of all other render units.
+DRAM_CYCLES = 2000
+
 #: A step of the march through an environment, without the lookups of the other units; steps in a tile, cells included.
 MARCH_CYCLES = 24
 TILE_STEPS = 17
@@ -40,7 +43,8 @@ def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest:
     nodes, leaves = header.triangle_base, header.triangle_records
     if geometry["bvh"]:
         nodes, leaves = min(nodes, TREE_VISITS), min(leaves, TREE_VISITS)
-    fetch = rows + int(manifest.config["columnBvhMemory"]["readLatency"]) + NODE_CYCLES
+    memory = manifest.config["columnBvhMemory"]
+    fetch = rows + (DRAM_CYCLES if memory["cache"] else int(memory["readLatency"])) + NODE_CYCLES
     walk = nodes * fetch + leaves * (fetch + TRIANGLE_CYCLES * int(geometry["trianglesPerRecord"]))
     lights = registers["shading.lights"] if registers["shading.shadows"] else 0
     is_shiny = any(value != 0 for name, value in registers.items() if name.endswith(".kind"))

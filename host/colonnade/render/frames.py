@@ -189,6 +189,7 @@ def require_no_errors(frame: Frame) -> None:
     """Raise a `UserError` with advice for a frame that has an error bit."""
     advice = {
         "stackOverflow": "the traversal stack overflowed: raise columnBvhMemory.stackDepth",
+        "memory": "a read from DRAM failed: check the scene's address and the memory",
         "illegalRecord": "a record was illegal, or a pointer left its section: pack the scene again",
         "watchdog": "the watchdog aborted the frame: the scene image may be corrupt, pack the scene again",
     }

@@ -11,6 +11,7 @@
 //
 // Options: --stall PERCENT of cycles in which the pixel sink is not ready; --seed N; for designs with memory stalls:
 // --memory PERCENT of cycles in which each bank is stalled, --burst N, the longest stall in cycles;
+// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-random PERCENT, --dram-errors N (dram.hpp);
 // --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
 // With WAVEFORM defined, --waveform FILE writes the signals of the frames as VCD; the time unit is a cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
@@ -32,6 +33,13 @@
 // EACH_COLUMN(DO): DO(column) for each column. If the design has them: HIT_DISTANCE(column) of the hit,
 // RATIO(column, channel), the shadow ratio, and MEMORY_BANKS, the number of banks of all columns.
 #include "ports.hpp"
+#ifdef DRAM_BUS_BYTES
+#include "dram.hpp"
+#else
+struct DramOptions {
+    unsigned latency = 100, randomPercent = 0, errorsPer1024 = 0, seed = 1;
+};
+#endif
 
 namespace {
 
@@ -60,6 +68,7 @@ constexpr std::uint64_t freePeriods = 840;
 struct Options {
     unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32, checkInterval = 64;
     std::string waveform;
+    DramOptions dram;
 };
 
 #ifdef MEMORY_BANKS
@@ -101,6 +110,9 @@ public:
 #ifdef MEMORY_BANKS
         , stalls_(options)
 #endif
+#ifdef DRAM_BUS_BYTES
+        , dram_(top_, options.dram)
+#endif
     {
 #ifndef MEMORY_BANKS
         if (options.memoryPercent != 0) throw std::runtime_error("this design cannot stall its memory");
@@ -135,6 +147,12 @@ public:
         std::vector<char> word(bytes);
         std::uint64_t address = 0;
         for (; stream.read(word.data(), static_cast<std::streamsize>(bytes)); ++address) {
+#ifdef DRAM_BUS_BYTES
+            if (target == 0) {
+                dram_.store(address, word.data(), bytes);
+                continue;
+            }
+#endif
             if (target == 0 && !throughPort) {
                 array_.store(address, word.data(), bytes);
                 continue;
@@ -200,6 +218,9 @@ public:
 #ifdef MEMORY_BANKS
         std::memset(&top_.io_memoryHolds, 0, sizeof top_.io_memoryHolds);
 #endif
+#ifdef DRAM_BUS_BYTES
+        dram_.mend();
+#endif
         mayChangeRegisters_ = true;
         // The waveform includes the cycle in which `done` is high
         if (traces()) cycle();
@@ -216,7 +237,13 @@ private:
 #define OFFER(column) top_.io_pixels_##column##_ready = takes;
         EACH_COLUMN(OFFER)
 #undef OFFER
+#ifdef DRAM_BUS_BYTES
+        dram_.offer();
+#endif
         array_.settle();
+#ifdef DRAM_BUS_BYTES
+        dram_.take();
+#endif
         quiet_ += takes;
 #define TAKE(column)                                                                                                                      \
     if (takes && top_.io_pixels_##column##_valid) {                                                                                       \
@@ -286,6 +313,9 @@ private:
 #ifdef MEMORY_BANKS
     BankStalls stalls_;
 #endif
+#ifdef DRAM_BUS_BYTES
+    Dram<VColonnade> dram_;
+#endif
     std::uint64_t cycles_ = 0;
     /// Cycles since the last pixel in which the sink was ready.
     std::uint64_t quiet_ = 0;
@@ -322,7 +352,8 @@ int main(int argc, char** argv) try {
     std::string job;
     Options options;
     const std::pair<const char*, unsigned*> named[] = {
-        {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}, {"--check", &options.checkInterval}};
+        {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}, {"--check", &options.checkInterval},
+        {"--dram", &options.dram.latency}, {"--dram-random", &options.dram.randomPercent}, {"--dram-errors", &options.dram.errorsPer1024}};
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });
@@ -331,6 +362,7 @@ int main(int argc, char** argv) try {
         else if (++i < argc) *option->second = static_cast<unsigned>(std::stoul(argv[i]));
         else throw std::runtime_error(argument + " needs a number");
     }
+    options.dram.seed = options.seed;
     run(job, options);
     return 0;
 } catch (const std::exception& problem) {

@@ -8,6 +8,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, EnvironmentWindow, FrameController}
+import colonnade.memory.{AxiReadPort, SceneMemory}
 import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** Ports of [[Colonnade]]. */
@@ -24,6 +25,9 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   val memoryHolds =
     if (config.columnBvhMemory.holdable) Some(Input(UInt((config.array.columns * config.columnBvhMemory.banks).W)))
     else None
+
+  /** With a cache: reads of the scene in DRAM. */
+  val memory = config.columnBvhMemory.cache.map(_ => new AxiReadPort(config))
 
   /** The frame is complete; cleared by the next start. */
   val done = Output(Bool())
@@ -63,6 +67,23 @@ final class Colonnade(
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
   }
 
+  // The scene in DRAM. Caches are forgotten on request, and after a failed read
+  private val sceneMemory = config.columnBvhMemory.cache.map(_ => Module(new SceneMemory(config)).io)
+  for (memory <- sceneMemory) {
+    val invalidate = registers.io.invalidate.get || (controller.io.frameStart && counters.io.isMemoryError.get)
+    memory.page := registers.io.frame.dram.get.page
+    io.memory.get :<>= memory.axi
+    memory.invalidate := invalidate
+    for ((column, requests) <- columns.zip(memory.requests)) {
+      requests :<>= column.io.lineRequests.get
+      column.io.lines.get      := memory.lines
+      column.io.invalidate.get := invalidate
+    }
+    counters.io.dramReads.get   := memory.events.dramReads
+    counters.io.memoryError.get := memory.events.error
+  }
+  controller.io.memoryIsIdle := sceneMemory.fold(true.B)(_.isIdle)
+
   // Frame: tiles to the columns, pixels from them
   registers.io.register <> io.register
   controller.io.start  := registers.io.start
@@ -88,10 +109,11 @@ final class Colonnade(
   counters.io.isCounting := controller.io.isRunning
 
   private val device = registers.io.device
-  device.status               := controller.io.status
-  device.counters             := counters.io.counters
-  device.errors.stackOverflow := counters.io.stackOverflow
-  device.errors.illegalRecord := counters.io.illegalRecord
-  device.errors.watchdog      := controller.io.watchdogError
-  io.done                     := device.status.done
+  device.status                                                                   := controller.io.status
+  device.counters                                                                 := counters.io.counters
+  device.errors.stackOverflow                                                     := counters.io.stackOverflow
+  device.errors.illegalRecord                                                     := counters.io.illegalRecord
+  device.errors.watchdog                                                          := controller.io.watchdogError
+  for (error <- device.errors.memory; isError <- counters.io.isMemoryError) error := isError
+  io.done                                                                         := device.status.done
 }

@@ -40,7 +40,38 @@ object ArbitraryConfig {
     recordBuffers <- Gen.chooseNum(1, 8)
     readLatency   <- Gen.chooseNum(1, 16)
     holdable      <- flag
-  } yield ColumnBvhMemoryConfig(depth, banks, stackDepth, snooping, recordBuffers, readLatency, holdable)
+    cache         <- Gen.option(sceneCache(banks))
+  } yield
+    if (cache.isEmpty)
+      ColumnBvhMemoryConfig(depth, banks, stackDepth, snooping, recordBuffers, readLatency, holdable, None)
+    else ColumnBvhMemoryConfig(
+      depth.max(SceneCacheConfig.leastDepth),
+      banks,
+      stackDepth,
+      true,
+      recordBuffers,
+      1,
+      false,
+      cache
+    )
+
+  private def sceneCache(banks: Int) = for {
+    sets         <- Gen.oneOf(1, 2, 16)
+    ways         <- Gen.oneOf(1, 2, 4, 8)
+    misses       <- Gen.chooseNum(1, 4)
+    sharedSets   <- Gen.oneOf(1, 4, 32)
+    sharedWays   <- Gen.oneOf(1, 2, 8)
+    sharedMisses <- Gen.chooseNum(1, 16)
+    busBytes     <- Gen.oneOf(4, 8, 16, 32, 64, 128)
+  } yield SceneCacheConfig(
+    sets * ways * banks,
+    ways,
+    misses * banks,
+    sharedSets * sharedWays * banks,
+    sharedWays,
+    sharedMisses * banks,
+    busBytes
+  )
 
   /** Maps with a legal size: at least their fixed parts, at most the reach of pointers. */
   private val physicalAttributeMemory = for {

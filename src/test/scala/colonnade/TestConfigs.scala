@@ -18,7 +18,8 @@ object TestConfigs {
       snooping = true,
       recordBuffers = 2,
       readLatency = 1,
-      holdable = false
+      holdable = false,
+      cache = None
     ),
     physicalAttributeMemory = None,
     FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, lights = 2, maxBounces = 3, hits = true)
@@ -57,6 +58,33 @@ object TestConfigs {
     Seq(environment, large, odd)
       .flatMap(size => MapEncoding.all.map(encoding => withEnvironment(size.copy(encoding = encoding))))
   }
+
+  /** A cache of a few lines in front of a scene of `depth` records. */
+  def withCache(
+      rows:    Int = 1,
+      columns: Int = 1,
+      banks:   Int = 2,
+      sets:    Int = 2,
+      ways:    Int = 2,
+      misses:  Int = 2,
+      depth:   Int = 256,
+      bus:     Int = 32
+  ): ColonnadeConfig = tiny.copy(
+    array = tiny.array.copy(rows = rows, columns = columns),
+    columnBvhMemory = tiny.columnBvhMemory.copy(
+      depth = depth,
+      banks = banks,
+      cache = Some(SceneCacheConfig(
+        lines = sets * ways * banks,
+        ways = ways,
+        misses = misses * banks,
+        sharedLines = 2 * sets * ways * banks,
+        sharedWays = ways,
+        sharedMisses = 2 * misses * banks,
+        busBytes = bus
+      ))
+    )
+  )
 
   def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig =
     tiny.copy(precision = PrecisionConfig(mac, sqrt, div))

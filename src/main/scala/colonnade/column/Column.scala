@@ -16,10 +16,12 @@ import colonnade.frame.{
   Tile,
   TileWalker
 }
+import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
 import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** Ports of [[Column]]. */
 final class ColumnIO(config: ColonnadeConfig) extends Bundle {
+  private val banks = config.columnBvhMemory.banks
 
   /** Constant while a frame runs. */
   val registers = Input(new FrameRegisters(config))
@@ -32,7 +34,14 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
 
   /** See [[ColumnBvhMemoryIO]]. */
   val holds = if (config.columnBvhMemory.holdable) Some(Input(UInt(config.columnBvhMemory.banks.W))) else None
-  val tiles = Flipped(Decoupled(new Tile(config)))
+
+  /** With a cache, by bank: lines that are awaited, and lines that come. */
+  val lineRequests = config.columnBvhMemory.cache.map(_ => Vec(banks, Decoupled(UInt(Lines.lineBits(config).W))))
+  val lines        = config.columnBvhMemory.cache.map(_ => Input(Vec(banks, new LineBroadcast(config))))
+
+  /** With a cache: it forgets its lines; only while idle. */
+  val invalidate = config.columnBvhMemory.cache.map(_ => Input(Bool()))
+  val tiles      = Flipped(Decoupled(new Tile(config)))
 
   /** Tiles without a pixel whose primary ray may hit the object. */
   val backgroundTiles = Flipped(Decoupled(new Tile(config)))
@@ -65,7 +74,6 @@ final class Column(
   private val definition = Definition(renderUnit(config))
   private val units      = Seq.fill(config.array.rows)(noPrefix(Instance(definition)).io)
   private val controller = Module(new ColumnBvhController(config))
-  private val memory     = Module(new ColumnBvhMemory(config))
   private val collector  = Module(new PixelCollector(config, config.array.rows + 1))
 
   // Walk tiles: pixel positions for the units
@@ -82,10 +90,26 @@ final class Column(
 
   // Records: units send requests and receive all broadcasts
   controller.io.requests.zip(units).foreach { case (requests, unit) => requests <> unit.requests }
-  memory.io.banks <> controller.io.memory
   units.foreach(_.broadcasts := controller.io.broadcasts)
-  memory.io.load := io.load
-  memory.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
+
+  // The whole scene, or a cache of it
+  private val cachesAreIdle = config.columnBvhMemory.cache match {
+    case None =>
+      val memory = Module(new ColumnBvhMemory(config))
+      memory.io.banks <> controller.io.memory
+      memory.io.load := io.load
+      memory.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
+      true.B
+    case Some(_) =>
+      val caches = Seq.fill(config.columnBvhMemory.banks)(Module(new ColumnCache(config)).io)
+      for ((cache, bank) <- caches.zipWithIndex) {
+        cache.port <> controller.io.memory(bank)
+        io.lineRequests.get(bank) :<>= cache.request
+        cache.lines      := io.lines.get(bank)
+        cache.invalidate := io.invalidate.get
+      }
+      caches.map(_.isIdle).reduce(_ && _)
+  }
 
   // Environment: units read the column's own maps, or those that all columns share
   private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(config)).io)
@@ -115,7 +139,7 @@ final class Column(
   inFlight := inFlight + enters - retired
 
   io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === retired.asUInt
-  io.progress.isIdle    := RegNext(units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle, true.B)
+  io.progress.isIdle    := RegNext(units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle && cachesAreIdle, true.B)
   io.events             := RegNext(EventSums.ofColumn(
     config,
     enters,

@@ -5,6 +5,7 @@ import chisel3.util.{Decoupled, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordRequest}
 import colonnade.frame.ColumnBvhEvents
+import colonnade.memory.{BankPort, Banks}
 
 /** Ports of [[ColumnBvhController]]. */
 final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {
@@ -44,10 +45,12 @@ final class ColumnBvhController(config: ColonnadeConfig) extends Module {
   }
   for ((reader, bank) <- readers.zipWithIndex) {
     io.memory(bank) <> reader.io.memory
+    reader.io.bank      := bank.U
     io.broadcasts(bank) := reader.io.broadcast
   }
 
   io.events.recordReads   := readers.map(_.io.events.recordReads).reduce(_ +& _)
   io.events.bankConflicts := readers.map(_.io.events.bankConflicts).reduce(_ +& _)
-  io.isIdle               := readers.map(_.io.isIdle).reduce(_ && _)
+  io.events.cacheMisses.foreach(_ := readers.flatMap(_.io.events.cacheMisses).reduce(_ +& _))
+  io.isIdle := readers.map(_.io.isIdle).reduce(_ && _)
 }

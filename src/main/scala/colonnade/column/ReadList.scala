@@ -4,6 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordRequest
+import colonnade.memory.Banks
 
 /** A read in flight. */
 final class Read(config: ColonnadeConfig) extends Bundle {
@@ -17,20 +18,16 @@ final class ReadListIO(config: ColonnadeConfig) extends Bundle {
   val oldest = Decoupled(new Read(config))
 
   /** All reads in flight, the oldest first. */
-  val reads = Output(Vec(ReadList.depth(config), Valid(new Read(config))))
+  val reads = Output(Vec(Banks.readsInFlight(config), Valid(new Read(config))))
 }
 
-object ReadList {
-  def depth(config: ColonnadeConfig): Int = config.columnBvhMemory.readLatency + 1
-}
-
-/** The reads in flight of a bank, in order: as many as a memory of `readLatency` holds at full throughput. This is a shift
+/** The reads in flight of a bank, in order: as many as a bank has in flight at full throughput. This is a shift
   * register, because there are few, and model checkers are slow on memories.
   */
 final class ReadList(config: ColonnadeConfig) extends Module {
   val io = IO(new ReadListIO(config))
 
-  private val depth = ReadList.depth(config)
+  private val depth = Banks.readsInFlight(config)
   private val reads = Reg(Vec(depth, new Read(config)))
   private val count = RegInit(0.U(log2Ceil(depth + 1).W))
   private val left  = count - io.oldest.fire

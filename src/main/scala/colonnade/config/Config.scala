@@ -78,6 +78,7 @@ final case class UnitsConfig(boxLanes: Int, triangleLanes: Int) {
   * @param recordBuffers record buffers of a render unit
   * @param readLatency   cycles from an accepted read to its record
   * @param holdable      an input per bank that stalls it, so that verification can vary the latency at run time
+  * @param cache         the memory is a cache of records in DRAM; none: a scratchpad that holds the whole scene
   */
 final case class ColumnBvhMemoryConfig(
     depth:         Int,
@@ -86,13 +87,15 @@ final case class ColumnBvhMemoryConfig(
     snooping:      Boolean,
     recordBuffers: Int,
     readLatency:   Int,
-    holdable:      Boolean
+    holdable:      Boolean,
+    cache:         Option[SceneCacheConfig]
 ) {
   Require.within("columnBvhMemory.depth", depth, 16, 1 << 22)
   Require.oneOf("columnBvhMemory.banks", banks, Seq(1, 2, 4))
   Require.within("columnBvhMemory.stackDepth", stackDepth, 4, 256)
   Require.within("columnBvhMemory.recordBuffers", recordBuffers, 1, 8)
   Require.within("columnBvhMemory.readLatency", readLatency, 1, 16)
+  cache.foreach(_.check(this))
 }
 
 /** Limits of a frame.

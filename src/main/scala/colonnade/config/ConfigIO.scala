@@ -56,7 +56,8 @@ object ConfigIO {
       "snooping",
       "recordBuffers",
       "readLatency",
-      "holdable"
+      "holdable",
+      "cache"
     )
     val frame = root.section("frame", "maxWidth", "maxHeight", "tileSize", "materials", "lights", "maxBounces", "hits")
 
@@ -83,7 +84,10 @@ object ConfigIO {
         snooping = memory.boolean("snooping"),
         recordBuffers = memory.int("recordBuffers"),
         readLatency = memory.int("readLatency"),
-        holdable = memory.boolean("holdable")
+        holdable = memory.boolean("holdable"),
+        cache = memory
+          .optionalSection("cache", "lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes")
+          .map(sceneCache)
       ),
       physicalAttributeMemory = root
         .optionalSection(
@@ -138,7 +142,8 @@ object ConfigIO {
         "snooping"      -> columnBvhMemory.snooping,
         "recordBuffers" -> columnBvhMemory.recordBuffers,
         "readLatency"   -> columnBvhMemory.readLatency,
-        "holdable"      -> columnBvhMemory.holdable
+        "holdable"      -> columnBvhMemory.holdable,
+        "cache"         -> columnBvhMemory.cache.fold[ujson.Value](ujson.Null)(written)
       ),
       "physicalAttributeMemory" -> config.physicalAttributeMemory.fold[ujson.Value](ujson.Null)(written),
       "frame"                   -> ujson.Obj(
@@ -177,6 +182,26 @@ object ConfigIO {
     "planeBytes"     -> memory.planeBytes,
     "boundingPlanes" -> memory.boundingPlanes,
     "shared"         -> memory.shared
+  )
+
+  private def sceneCache(cache: ConfigReader) = SceneCacheConfig(
+    lines = cache.int("lines"),
+    ways = cache.int("ways"),
+    misses = cache.int("misses"),
+    sharedLines = cache.int("sharedLines"),
+    sharedWays = cache.int("sharedWays"),
+    sharedMisses = cache.int("sharedMisses"),
+    busBytes = cache.int("busBytes")
+  )
+
+  private def written(cache: SceneCacheConfig) = ujson.Obj(
+    "lines"        -> cache.lines,
+    "ways"         -> cache.ways,
+    "misses"       -> cache.misses,
+    "sharedLines"  -> cache.sharedLines,
+    "sharedWays"   -> cache.sharedWays,
+    "sharedMisses" -> cache.sharedMisses,
+    "busBytes"     -> cache.busBytes
   )
 
   private def precision(root: ConfigReader): PrecisionConfig = root.value("precision") match {

@@ -3,6 +3,9 @@ package colonnade.config
 /** Checks of configuration values; a failure names the field, the value and the rule. */
 private[config] object Require {
 
+  def apply(field: String, holds: Boolean, rule: String): Unit =
+    if (!holds) throw new ConfigError(s"$field $rule")
+
   def within(field: String, value: Int, low: Int, high: Int): Unit =
     if (value < low || value > high) throw new ConfigError(s"$field is $value; it must be from $low to $high")
 

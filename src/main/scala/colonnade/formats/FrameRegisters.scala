@@ -1,7 +1,8 @@
 package colonnade.formats
 
 import chisel3._
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import chisel3.util.log2Ceil
+import colonnade.config.{ColonnadeConfig, NumberFormats, SceneCacheConfig}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
 import scala.collection.immutable.SeqMap
@@ -98,6 +99,30 @@ final class SceneMap(countBits: Int) extends Bundle {
   val attributeBase   = UInt(countBits.W)
 }
 
+/** Where the records lie in DRAM. */
+final class SceneInDram extends Bundle {
+
+  /** The page of 4 KB in which the first line of four records begins; docs/scene-cache.md. */
+  val page = UInt(SceneInDram.pageBits.W)
+}
+
+/** The layout of records in DRAM: lines of four, at a pitch of a power of two, so that no line crosses a page of 4 KB. */
+object SceneLines {
+  val records: Int = SceneCacheConfig.lineRecords
+
+  /** Bytes of a line. */
+  def bytes(config: ColonnadeConfig): Int = records * new RecordFormats(config).recordBits / 8
+
+  /** Distance of consecutive lines in bytes. */
+  def pitch(config: ColonnadeConfig): Int = 1 << log2Ceil(bytes(config))
+}
+
+object SceneInDram {
+  val addressBits: Int = 40
+  val pageLog:     Int = 12
+  val pageBits:    Int = addressBits - pageLog
+}
+
 /** The registers that the host writes before a frame. Constant while a frame runs.
   *
   * A record, not a bundle, because `environment` exists only with a physical-attribute memory.
@@ -115,6 +140,7 @@ final class FrameRegisters(config: ColonnadeConfig) extends Record {
   val bounds      = new Bounds(numbers)
   val scene       = new SceneMap(RecordFormats.idBits(config))
   val environment = config.physicalAttributeMemory.map(_ => new EnvironmentView(numbers))
+  val dram        = config.columnBvhMemory.cache.map(_ => new SceneInDram)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
     Seq(
@@ -127,7 +153,7 @@ final class FrameRegisters(config: ColonnadeConfig) extends Record {
       "materials"  -> materials,
       "bounds"     -> bounds,
       "scene"      -> scene
-    ) ++ environment.map("environment" -> _): _*
+    ) ++ environment.map("environment" -> _) ++ dram.map("dram" -> _): _*
   )
 }
 
@@ -160,16 +186,20 @@ final class Status extends Bundle {
 }
 
 /** Sticky until the next start. */
-final class Errors extends Bundle {
+final class Errors(config: ColonnadeConfig) extends Bundle {
   val stackOverflow = Bool()
   val illegalRecord = Bool()
   val watchdog      = Bool()
+
+  /** A read from DRAM failed; its records counted as 0. */
+  val memory = config.columnBvhMemory.cache.map(_ => Bool())
 }
 
 /** Event counters of the last frame, summed over the array unless a field says otherwise. */
 final class Counters(config: ColonnadeConfig) extends Bundle {
   private def counter            = UInt(Counters.bits.W)
   private def environmentCounter = config.physicalAttributeMemory.map(_ => counter)
+  private def cacheCounter       = config.columnBvhMemory.cache.map(_ => counter)
 
   /** Cycles from the start to the last pixel. */
   val cycles      = counter
@@ -196,6 +226,10 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
   /** Records that a context got from the read of another context. */
   val snoopHits     = counter
   val bankConflicts = counter
+
+  /** Reads that a column's cache answers later, and lines that are read from DRAM. */
+  val cacheMisses = cacheCounter
+  val dramReads   = cacheCounter
 
   /** Cycles in which the bottleneck stage of a unit is busy, summed over units. */
   val busyRaySetup     = counter
@@ -234,17 +268,20 @@ object Counters {
 /** The registers that the host reads. */
 final class DeviceStatus(config: ColonnadeConfig) extends Bundle {
   val status   = new Status
-  val errors   = new Errors
+  val errors   = new Errors(config)
   val counters = new Counters(config)
 }
 
-final class Control extends Bundle {
+final class Control(config: ColonnadeConfig) extends Bundle {
 
   /** A write of 1 starts a frame. */
   val start = Bool()
+
+  /** A write of 1 makes the caches forget the scene. */
+  val invalidate = config.columnBvhMemory.cache.map(_ => Bool())
 }
 
 /** The registers that the host pulses. */
-final class HostCommands extends Bundle {
-  val control = new Control
+final class HostCommands(config: ColonnadeConfig) extends Bundle {
+  val control = new Control(config)
 }

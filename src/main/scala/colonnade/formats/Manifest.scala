@@ -36,6 +36,13 @@ object Manifest {
         "banks" -> config.columnBvhMemory.banks
       )
     )
+    if (config.columnBvhMemory.cache.nonEmpty)
+      memories("columnBvh")("line") =
+        ujson.Obj(
+          "records" -> SceneLines.records,
+          "bytes"   -> SceneLines.bytes(config),
+          "pitch"   -> SceneLines.pitch(config)
+        )
     for (memory <- AttributeMemories(config))
       memories(memory.name) = ujson.Obj("depth" -> memory.depth, "bits" -> memory.bits, "target" -> memory.target)
     val maps   = config.physicalAttributeMemory.map(_ => attributes(config))

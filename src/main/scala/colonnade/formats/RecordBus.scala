@@ -16,4 +16,7 @@ final class RecordBroadcast(config: ColonnadeConfig) extends Bundle {
 
   /** The row that requested it. */
   val row = UInt(log2Ceil(config.array.rows.max(2)).W)
+
+  /** With a cache: this is no record. The cache awaits it, and another broadcast will bring it. */
+  val isLater = if (config.columnBvhMemory.cache.nonEmpty) Some(Bool()) else None
 }

@@ -24,6 +24,9 @@ final class RegisterFileIO(config: ColonnadeConfig) extends Bundle {
 
   /** A pulse: a frame starts. */
   val start = Output(Bool())
+
+  /** A pulse: caches forget the scene. */
+  val invalidate = if (config.columnBvhMemory.cache.nonEmpty) Some(Output(Bool())) else None
 }
 
 /** The registers of the host, at the addresses of [[RegisterMap]]. Settings above their limit are clamped for the device.
@@ -49,8 +52,10 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   scene.triangleBase  := least(legal("scene.triangleBase"), attributeBase)
 
   // Control: a pulse in the cycle of the write.
-  private val start = registers.filter(_.access == Access.WriteOnly).head
-  io.start := writes && io.register.address === start.address.U && io.register.writeData(0)
+  private def pulse(name: String): Bool =
+    writes && io.register.address === registers.find(_.name == name).get.address.U && io.register.writeData(0)
+  io.start := pulse("control.start")
+  io.invalidate.foreach(_ := pulse("control.invalidate"))
 
   // Reads of settings and status.
   private val status   = Layout.of(io.device).map(field => field.name -> field).toMap

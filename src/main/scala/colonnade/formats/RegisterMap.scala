@@ -37,7 +37,7 @@ object RegisterMap {
 
   def apply(config: ColonnadeConfig): Seq[Register] = {
     val numbers = Seq(
-      (new HostCommands, Access.WriteOnly),
+      (new HostCommands(config), Access.WriteOnly),
       (new DeviceStatus(config), Access.ReadOnly),
       (new FrameRegisters(config), Access.ReadWrite)
     ).flatMap { case (bundle, access) => Layout.of(bundle).map(_ -> access) }

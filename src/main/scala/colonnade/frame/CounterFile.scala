@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.ShiftRegister
+import chisel3.util.{log2Ceil, ShiftRegister}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Counters
 
@@ -10,6 +10,10 @@ final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
 
   /** By column, delayed by one cycle. */
   val events = Input(Vec(config.array.columns, new EventSums(config, 1)))
+
+  /** With a cache: lines that are read from DRAM, and whether a read failed. */
+  val dramReads   = config.columnBvhMemory.cache.map(_ => Input(UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)))
+  val memoryError = config.columnBvhMemory.cache.map(_ => Input(Bool()))
 
   /** A frame starts. */
   val clear = Input(Bool())
@@ -22,6 +26,7 @@ final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
   /** Sticky until cleared. */
   val stackOverflow = Output(Bool())
   val illegalRecord = Output(Bool())
+  val isMemoryError = config.columnBvhMemory.cache.map(_ => Output(Bool()))
 }
 
 /** The counters and sticky errors of the array, over the cycles of `isCounting`.
@@ -60,6 +65,16 @@ final class CounterFile(config: ColonnadeConfig) extends Module {
       overflow := overflow || events.stackOverflow
       illegal  := illegal || events.illegalRecord
     }
+  }
+
+  // Reads from DRAM come from no column. An error counts until the device is idle
+  for (reads <- io.dramReads; counter <- counters.dramReads) {
+    when(io.clear) { counter := 0.U }.elsewhen(countsEvents) { counter := counter + reads }
+  }
+  for (error <- io.memoryError; output <- io.isMemoryError) {
+    val failed = RegInit(false.B)
+    failed := !io.clear && (failed || error)
+    output := failed
   }
 
   io.counters      := counters

@@ -11,6 +11,9 @@ final class ColumnBvhEvents(config: ColonnadeConfig) extends Bundle {
 
   /** Requests that wait because the bank reads for another row. */
   val bankConflicts = UInt(log2Ceil(config.array.rows + 1).W)
+
+  /** Reads that a cache answers later. */
+  val cacheMisses = config.columnBvhMemory.cache.map(_ => UInt(log2Ceil(config.columnBvhMemory.banks + 1).W))
 }
 
 /** Events of some columns in one cycle, summed over their units and controllers; names as in `Counters`. */
@@ -37,6 +40,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val recordReads      = sum(columns * config.columnBvhMemory.banks)
   val snoopHits        = perContext
   val bankConflicts    = perUnit
+  val cacheMisses      = config.columnBvhMemory.cache.map(_ => sum(columns * config.columnBvhMemory.banks))
   val busyRaySetup     = perUnit
   val busyBoxUnit      = perUnit
   val busyTriangleUnit = sum(units * config.units.triangleLanes)
@@ -80,9 +84,10 @@ object EventSums {
       environment: Option[AttributeEvents]
   ): EventSums = {
     val sums = joined(new EventSums(config, 1), units.map(_.elements.toMap))
-    sums.raysPrimary                                                                  := raysPrimary
-    sums.recordReads                                                                  := controller.recordReads
-    sums.bankConflicts                                                                := controller.bankConflicts
+    sums.raysPrimary   := raysPrimary
+    sums.recordReads   := controller.recordReads
+    sums.bankConflicts := controller.bankConflicts
+    sums.cacheMisses.zip(controller.cacheMisses).foreach { case (sum, misses) => sum := misses }
     for (events <- environment; (name, event) <- events.elements) sums.elements(name) := event
     sums
   }

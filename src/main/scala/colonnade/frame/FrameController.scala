@@ -44,6 +44,9 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   val progress        = Input(Vec(columns, new ColumnProgress))
   val traffic         = Input(new PixelTraffic)
 
+  /** No read of the scene is in flight outside the columns. */
+  val memoryIsIdle = Input(Bool())
+
   /** A frame starts: resets the state of the previous one. */
   val frameStart = Output(Bool())
 
@@ -82,7 +85,7 @@ final class FrameController(config: ColonnadeConfig) extends Module {
   private val watchdog = Module(new Watchdog(io.frame.watchdogCycles.getWidth))
 
   private val isFinished = schedulers.map(_.io.isIdle).reduce(_ && _) && io.progress.map(_.isDrained).reduce(_ && _)
-  private val isAtRest   = settling === 0.U && io.progress.map(_.isIdle).reduce(_ && _)
+  private val isAtRest   = settling === 0.U && io.progress.map(_.isIdle).reduce(_ && _) && io.memoryIsIdle
 
   switch(state) {
     is(State.waiting) {

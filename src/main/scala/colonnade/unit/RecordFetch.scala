@@ -1,9 +1,19 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Mux1H, MuxLookup, OHToUInt, PopCount, PriorityEncoder, PriorityEncoderOH, RegEnable}
+import chisel3.util.{
+  log2Ceil,
+  Mux1H,
+  MuxLookup,
+  OHToUInt,
+  PopCount,
+  PriorityEncoder,
+  PriorityEncoderOH,
+  RegEnable,
+  Valid
+}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordFormats
+import colonnade.formats.{RecordBroadcast, RecordFormats}
 
 /** Fetches records for contexts: a small file of fill buffers with miss handling and snooping.
   *
@@ -11,6 +21,10 @@ import colonnade.formats.RecordFormats
   * takes a matching record, from a broadcast or from a buffer, whichever row requested it. A buffer also captures any
   * broadcast that a context waits for, and keeps its record until another read needs the buffer. Without snooping, a
   * context takes only the response to its own read.
+  *
+  * With a cache, a read may be answered "later". The contexts that wait for this record then sleep, and their buffer is
+  * free again. The record's broadcast wakes them. If no buffer is available for it, they ask once more, and this time
+  * keep their buffer until the record comes, so that every context gets its record in the end.
   *
   * Arbitration is pipelined. The winner (`grantNext`) is chosen one cycle early and addresses the tables of the context;
   * `response` follows with the record. A unit therefore says one cycle ahead that it accepts a record (`readyNext`).
@@ -23,6 +37,7 @@ import colonnade.formats.RecordFormats
 final class RecordFetch(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
   private val snooping = config.columnBvhMemory.snooping.B
+  private val hasCache = config.columnBvhMemory.cache.nonEmpty
 
   val io = IO(new RecordFetchIO(config))
 
@@ -33,6 +48,9 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val state   = RegInit(BufferState.empty)
     val address = Reg(UInt(RecordFormats.addressBits(config).W))
     val record  = Reg(new RecordFormats(config).record)
+
+    /** Stays reserved when the record comes later. */
+    val isKept = if (hasCache) Some(Reg(Bool())) else None
   }
   private final class ContextFetch {
     val isPending = RegInit(false.B)
@@ -46,7 +64,18 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val kind     = Reg(RecordKind())
     val address  = Reg(UInt(RecordFormats.idBits(config).W))
     val buffer   = Reg(UInt(log2Ceil(config.columnBvhMemory.recordBuffers.max(2)).W))
+
+    /** The record comes later, without a request. */
+    val sleeps = if (hasCache) Some(RegInit(false.B)) else None
+
+    /** The context has missed the broadcast it slept for. */
+    val insists = if (hasCache) Some(Reg(Bool())) else None
   }
+
+  /** A broadcast that is a record. */
+  private def isRecord(broadcast: Valid[RecordBroadcast]): Bool =
+    broadcast.valid && !broadcast.bits.isLater.getOrElse(false.B)
+
   private val buffers = Seq.fill(config.columnBvhMemory.recordBuffers)(new RecordBuffer)
   private val fetches = Seq.fill(contexts)(new ContextFetch)
 
@@ -90,8 +119,8 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
         )
         val isMissing  = waits.zip(bufferHits).map { case (waits, hits) => waits && !hits.reduce(_ || _) }
         val isSnooped  = snooping && !isReserved.reduce(_ || _) && isMissing.reduce(_ || _)
-        val allocOH    = PriorityEncoderOH(available).map(_ && isSnooped && broadcast.valid)
-        val reservedOH = PriorityEncoderOH(isReserved).map(_ && broadcast.valid)
+        val allocOH    = PriorityEncoderOH(available).map(_ && isSnooped && isRecord(broadcast))
+        val reservedOH = PriorityEncoderOH(isReserved).map(_ && isRecord(broadcast))
         val fillOH     = allocOH.zip(reservedOH).map { case (allocated, reserved) => allocated || reserved }
         (available.zip(allocOH).map { case (free, allocated) => free && !allocated }, fills :+ fillOH)
     }
@@ -134,7 +163,7 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     )
   )
   private val missOH = PriorityEncoderOH(fetches.zip(isBufferedOrPending).map { case (fetch, isExpected) =>
-    fetch.isPending && !isExpected
+    fetch.isPending && !isExpected && !fetch.sleeps.getOrElse(false.B)
   })
   private val hasMiss = missOH.reduce(_ || _)
   private val address = Mux1H(missOH, fetches.map(_.address))
@@ -149,12 +178,35 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
       when(isAllocated) {
         buffer.state   := BufferState.reserved
         buffer.address := address
+        buffer.isKept.foreach(_ := Mux1H(missOH, fetches.flatMap(_.insists)))
       }
     }
     fetches.zip(missOH).foreach { case (fetch, isMiss) =>
       when(isMiss) {
         fetch.isIssued := true.B
         fetch.buffer   := PriorityEncoder(allocOH)
+      }
+    }
+  }
+
+  // A record that comes later frees its buffer, and its contexts sleep until it comes
+  for (broadcast <- io.broadcasts; isLater <- broadcast.bits.isLater) {
+    val keeps = buffers.map(buffer =>
+      buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address && buffer.isKept.get
+    )
+    when(broadcast.valid && isLater) {
+      buffers.zip(keeps).foreach { case (buffer, isKept) =>
+        when(buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address && !isKept) {
+          buffer.state := BufferState.empty
+        }
+      }
+    }
+    for ((fetch, fills) <- fetches.zip(contextFills)) {
+      val matches = broadcast.valid && fetch.isPending && fetch.address === broadcast.bits.address
+      when(matches && isLater && !keeps.reduce(_ || _)) { fetch.sleeps.foreach(_ := true.B) }
+      when(matches && !isLater && !fills.reduce(_ || _)) {
+        fetch.sleeps.foreach(_ := false.B)
+        fetch.insists.foreach(_ := true.B)
       }
     }
   }
@@ -208,8 +260,10 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
       fetch.isPending := isLegal
       fetch.isIllegal := !isLegal
       fetch.isIssued  := false.B
-      fetch.kind      := port.bits.kind
-      fetch.address   := port.bits.address
+      fetch.sleeps.foreach(_ := false.B)
+      fetch.insists.foreach(_ := false.B)
+      fetch.kind    := port.bits.kind
+      fetch.address := port.bits.address
     }
   }
   when(io.start) { buffers.foreach(_.state := BufferState.empty) }

@@ -3,6 +3,7 @@ package colonnade.column
 import chisel3._
 import chisel3.util.{log2Ceil, Mux1H, PopCount}
 import colonnade.config.ColonnadeConfig
+import colonnade.memory.Banks
 
 /** Drives rows that request, withdraw and change addresses at any time, and banks that stall and respond at any time, in
   * order. It observes one read of each bank, any that is accepted while the bank's bit of `observed` is set, up to its
@@ -56,9 +57,9 @@ class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
     private val response = responds(bank) && held =/= 0.U
     held := held + accepts - response
     when(accepts) { underWay := VecInit(address +: underWay.init) }
-    memory.request.ready  := ready(bank)
-    memory.response.valid := response
-    memory.response.bits  := data(bank)
+    memory.request.ready        := ready(bank)
+    memory.response.valid       := response
+    memory.response.bits.record := data(bank)
 
     assert(PopCount(fires) <= 1.U, "one row at a time")
     assert(accepts === memory.request.fire, "a read for each request")
@@ -68,7 +69,10 @@ class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
     )
     assert(!accepts || memory.request.bits === Banks.addressIn(config, address), "the right address in the bank")
     assert(broadcast.valid === RegNext(response, false.B), "a broadcast for each response")
-    assert(!broadcast.valid || broadcast.bits.record === RegNext(memory.response.bits), "the record that was read")
+    assert(
+      !broadcast.valid || broadcast.bits.record === RegNext(memory.response.bits.record),
+      "the record that was read"
+    )
     val isIdle = held === 0.U && !broadcast.valid
 
     // Accepted requests of others while a row keeps requesting

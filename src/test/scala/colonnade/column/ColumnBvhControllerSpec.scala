@@ -5,6 +5,7 @@ import chisel3.util.{Decoupled, Valid}
 import chiseltest._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, RecordBroadcast, RecordFormats, RecordRequest}
+import colonnade.memory.ColumnBvhMemory
 import colonnade.{Proofs, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 

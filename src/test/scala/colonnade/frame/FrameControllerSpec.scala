@@ -90,6 +90,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       val retires = columns.map(_.drive()).reduce(_ || _)
       dut.io.traffic.retires.poke(retires)
       dut.io.traffic.stalls.poke(stalls)
+      dut.io.memoryIsIdle.poke(true)
       if (dut.io.aborts.peekBoolean()) aborts += 1
       if (dut.io.isRunning.peekBoolean()) running += 1
       columns.foreach(_.step())

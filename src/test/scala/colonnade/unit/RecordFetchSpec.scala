@@ -44,6 +44,16 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     }
   }
 
+  for ((contexts, recordBuffers) <- Seq((1, 1), (4, 1), (6, 2), (6, 4)))
+    it should s"serve $contexts contexts and $recordBuffers buffers when records come later" in {
+      val shape  = variant(contexts, banks = 2, snooping = true, recordBuffers)
+      val cached = TestConfigs.withCache().columnBvhMemory.cache
+      val config = shape.copy(columnBvhMemory = shape.columnBvhMemory.copy(depth = 256, cache = cached))
+      test(new RecordFetch(config)) { dut =>
+        new Column(dut, config, new Random(contexts)).run(fetches = 300)
+      }
+    }
+
   it should "report an address outside the section of its kind and request every other one" in {
     val config = variant(contexts = 1, banks = 1, snooping = true)
     test(new RecordFetch(config)) { dut =>
@@ -72,7 +82,9 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   private class Column(dut: RecordFetch, config: ColonnadeConfig, random: Random) {
     private val banks      = config.columnBvhMemory.banks
     private val contexts   = config.array.contexts
+    private val hasCache   = config.columnBvhMemory.cache.nonEmpty
     private val inFlight   = Seq.fill(banks)(mutable.Queue.empty[(Int, Int, Int)]) // (due, address, row)
+    private val later      = Seq.fill(banks)(mutable.Buffer.empty[(Int, Int)])     // (due, address)
     private val pending    = mutable.Map.empty[Int, (Int, RecordKind.Type)]
     private var now        = 0
     private var issued     = 0
@@ -118,13 +130,25 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       val port = dut.io.broadcasts(bank)
       if (random.nextInt(4) == 0)
         inFlight(bank).enqueue((now + 1 + random.nextInt(5), random.nextInt(recordCount / banks) * banks + bank, 2))
-      val isDue = inFlight(bank).headOption.exists(_._1 <= now)
-      port.valid.poke(isDue.B)
+      val isDue  = inFlight(bank).headOption.exists(_._1 <= now)
+      val filled = later(bank).indexWhere(_._1 <= now)
+      port.valid.poke((isDue || filled >= 0).B)
+      port.bits.isLater.foreach(_.poke(false.B))
       if (isDue) {
         val (_, address, reader) = inFlight(bank).dequeue()
+        val comesLater           = hasCache && (later(bank).exists(_._2 == address) || random.nextInt(2) == 0)
+        port.bits.address.poke(address.U)
+        port.bits.record.poke((if (comesLater) BigInt(random.nextInt(99)) else contentOf(address)).U)
+        port.bits.row.poke(reader.U)
+        if (comesLater) {
+          port.bits.isLater.get.poke(true.B)
+          if (!later(bank).exists(_._2 == address)) later(bank) += ((now + 1 + random.nextInt(30), address))
+        }
+      } else if (filled >= 0) {
+        val (_, address) = later(bank).remove(filled)
         port.bits.address.poke(address.U)
         port.bits.record.poke(contentOf(address).U)
-        port.bits.row.poke(reader.U)
+        port.bits.row.poke(random.nextInt(3).U)
       }
     }
 

@@ -1,4 +1,4 @@
-package colonnade.column
+package colonnade.memory
 
 import chisel3._
 import chisel3.util.{Decoupled, Pipe, Queue, Valid}
@@ -38,13 +38,13 @@ final class ColumnBvhMemory(config: ColonnadeConfig) extends Module {
     val address   = Mux(writes, Banks.addressIn(config, loadAddress), read.bits)
     val response  = Wire(Decoupled(new RecordFormats(config).record))
     val responses =
-      if (config.columnBvhMemory.holdable) Queue(response, ReadList.depth(config), flow = true) else response
+      if (config.columnBvhMemory.holdable) Queue(response, Banks.readsInFlight(config), flow = true) else response
     val isHeld = io.holds.map(_(bank)).getOrElse(false.B)
-    response.valid      := RegNext(read.valid, false.B)
-    response.bits       := records.readWrite(address, io.load.bits.record, writes || read.valid, writes)
-    responses.ready     := !isHeld
-    port.request.ready  := !isHeld
-    port.response.valid := responses.fire
-    port.response.bits  := responses.bits
+    response.valid            := RegNext(read.valid, false.B)
+    response.bits             := records.readWrite(address, io.load.bits.record, writes || read.valid, writes)
+    responses.ready           := !isHeld
+    port.request.ready        := !isHeld
+    port.response.valid       := responses.fire
+    port.response.bits.record := responses.bits
   }
 }

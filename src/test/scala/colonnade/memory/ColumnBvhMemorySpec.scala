@@ -1,4 +1,4 @@
-package colonnade.column
+package colonnade.memory
 
 import chisel3._
 import chiseltest._
@@ -29,7 +29,7 @@ class ColumnBvhMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
           memory.clock.step()
           port.request.valid.poke(false.B)
           port.response.valid.expect(true.B)
-          port.response.bits.expect((1000 + address).U)
+          port.response.bits.record.expect((1000 + address).U)
         }
       }
     }

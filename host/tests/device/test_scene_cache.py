@@ -1,0 +1,69 @@
+"""Scenes in DRAM: caches, latency and order of the memory never change a frame, and failed reads never hang it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from colonnade.common.framebuffer import Frame
+from colonnade.design import toolchain
+from colonnade.design.generator import GeneratedDesign, design_for
+from colonnade.device.bit_exact import render_model
+from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.parser import load_scene
+from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.packer import pack
+
+#: Counters that do not depend on time.
+EVENTS = ("raysPrimary", "raysShadow", "raysInBox", "nodeReads", "triangleTests", "hits")
+
+
+def design_with(rows: int, columns: int, banks: int, buffers: int, cache: str) -> GeneratedDesign:
+    memory = (f"columnBvhMemory.{field}" for field in (f"banks={banks}", f"recordBuffers={buffers}", f"cache={cache}"))
+    return design_for("tiny", (f"array.rows={rows}", f"array.columns={columns}", *memory))
+
+
+def scene_of(design: GeneratedDesign) -> tuple[SceneImage, Mapping[str, int]]:
+    image = pack(load_mesh("torus"), design.manifest)
+    scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")
+    return image, frame_registers(scene, image.header, design.manifest, 48, 36)
+
+
+def assert_same(frame: Frame, expected: Frame) -> None:
+    assert frame.errors == []
+    np.testing.assert_array_equal(frame.colour, expected.colour)
+    np.testing.assert_array_equal(frame.triangle, expected.triangle)
+    assert [frame.counters[name] for name in EVENTS] == [expected.counters[name] for name in EVENTS]
+
+
+#: Rows, columns, banks, record buffers, cache: from one line that is awaited at a time to caches of some lines.
+SHAPES = {
+    "one of everything": (1, 1, 1, 1, (1, 1, 1, 1, 1, 1, 4)),
+    "two columns": (3, 2, 2, 2, (8, 2, 4, 16, 2, 8, 32)),
+    "four banks": (2, 3, 4, 3, (16, 4, 16, 32, 8, 16, 128)),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_no_frame_depends_on_the_memory(shape: str) -> None:
+    rows, columns, banks, buffers, sizes = SHAPES[shape]
+    names = ("lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes")
+    cache = "{" + ", ".join(f'"{name}": {size}' for name, size in zip(names, sizes, strict=True)) + "}"
+    design = design_with(rows, columns, banks, buffers, cache)
+    image, registers = scene_of(design)
+    expected = render_model(design.manifest, image, registers)
+    for seed, (latency, random) in enumerate([(1, 0), (100, 0), (7, 60), (300, 20)]):
+        stalls = Stalls(percent=10 * seed, seed=seed, dram_latency=latency, dram_random=random)
+        first, second = render_rtl(design, image, [registers, registers], stalls).frames
+        assert_same(first, expected)
+        assert_same(second, expected)
+        assert first.counters["dramReads"] > 0
+    # A frame with failed reads ends and says so; the next one is right
+    stalls = Stalls(seed=1, dram_errors=60, dram_random=30)
+    failed, second = render_rtl(design, image, [registers, registers], stalls).frames
+    assert failed.errors == ["memory"]
+    assert_same(second, expected)

@@ -1,0 +1,72 @@
+package colonnade.config
+
+/** Caches between render units and a scene in DRAM: one in every column, and one that all columns share. A line is four
+  * records. Lines are interleaved over `columnBvhMemory.banks` banks in both.
+  *
+  * @param lines        lines of a column's cache
+  * @param ways         its associativity
+  * @param misses       lines that it can await at a time
+  * @param sharedLines  lines of the shared cache
+  * @param sharedWays   its associativity
+  * @param sharedMisses lines that it can await from DRAM at a time
+  * @param busBytes     width of the DRAM port
+  */
+final case class SceneCacheConfig(
+    lines:        Int,
+    ways:         Int,
+    misses:       Int,
+    sharedLines:  Int,
+    sharedWays:   Int,
+    sharedMisses: Int,
+    busBytes:     Int
+) {
+  Require.oneOf("columnBvhMemory.cache.ways", ways, Seq(1, 2, 4, 8, 16))
+  Require.oneOf("columnBvhMemory.cache.sharedWays", sharedWays, Seq(1, 2, 4, 8, 16))
+  Require.within("columnBvhMemory.cache.misses", misses, 1, 64)
+  Require.within("columnBvhMemory.cache.sharedMisses", sharedMisses, 1, 256)
+  Require.oneOf("columnBvhMemory.cache.busBytes", busBytes, Seq(4, 8, 16, 32, 64, 128))
+
+  /** Sets of a bank of the column's cache. */
+  def sets(banks: Int): Int = lines / (banks * ways)
+
+  /** Sets of a bank of the shared cache. */
+  def sharedSets(banks: Int): Int = sharedLines / (banks * sharedWays)
+
+  /** Checks it against the column memory that it is part of. */
+  private[config] def check(memory: ColumnBvhMemoryConfig): Unit = {
+    import memory.banks
+    powerOfTwoSets("lines", lines, ways, banks)
+    powerOfTwoSets("sharedLines", sharedLines, sharedWays, banks)
+    multiple("misses", misses, banks)
+    multiple("sharedMisses", sharedMisses, banks)
+    Require(
+      "columnBvhMemory.depth",
+      memory.depth >= SceneCacheConfig.leastDepth,
+      s"is ${memory.depth}, but must be at least ${SceneCacheConfig.leastDepth} with a cache"
+    )
+    Require("columnBvhMemory.snooping", memory.snooping, "must be true with a cache")
+    Require("columnBvhMemory.readLatency", memory.readLatency == 1, "must be 1 with a cache")
+    Require("columnBvhMemory.holdable", !memory.holdable, "must be false with a cache")
+  }
+
+  private def powerOfTwoSets(key: String, lines: Int, ways: Int, banks: Int): Unit = {
+    val sets = lines / (ways * banks)
+    Require(
+      s"columnBvhMemory.cache.$key",
+      lines > 0 && lines == sets * ways * banks && (sets & (sets - 1)) == 0 && sets <= (1 << 12),
+      s"is $lines, but must be a power of two, at most 4096, times $ways ways and $banks banks"
+    )
+  }
+
+  private def multiple(key: String, misses: Int, banks: Int): Unit =
+    Require(s"columnBvhMemory.cache.$key", misses % banks == 0, s"is $misses, but must be a multiple of $banks banks")
+}
+
+object SceneCacheConfig {
+
+  /** Records of a line. */
+  val lineRecords: Int = 4
+
+  /** Records of the smallest scene memory: a line in each of four banks, twice. */
+  val leastDepth: Int = 32
+}

@@ -1,0 +1,155 @@
+package colonnade.memory
+
+import chisel3._
+import chisel3.util._
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.RecordFormats
+
+/** Ports of [[ColumnCache]]. */
+final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
+  val port = Flipped(new BankPort(config))
+
+  /** A line that this bank awaits; may be withdrawn when another column's request has brought it. */
+  val request = Decoupled(UInt(Lines.lineBits(config).W))
+  val lines   = Input(new LineBroadcast(config))
+
+  /** Forgets all lines; only while idle. */
+  val invalidate = Input(Bool())
+
+  /** No request is in flight, and no line is awaited. */
+  val isIdle = Output(Bool())
+}
+
+/** One bank of a column's cache.
+  *
+  * {{{
+  * cycle      c        c+1                  c+2        |  cycle       a         a+1      a+2   a+3 … a+6
+  * request    accept   tags, awaited lines  response   |  line        announced  victim        records: written, filled
+  *            read     read of the record              |  requests              blocked ────────────── a+5
+  * }}}
+  *
+  * A request that misses is answered "later", and its line is entered among the awaited ones, once. So hits pass misses.
+  * The cache takes every line that is announced and awaited here, whichever column has requested it. A line that nobody
+  * awaits here is ignored. While records of a line arrive, no request is accepted: they use the same memory and the same
+  * broadcast.
+  *
+  * A record follows a "later" for certain: the line is awaited before the answer, until it is announced.
+  */
+final class ColumnCache(config: ColonnadeConfig) extends Module {
+  private val cache    = config.columnBvhMemory.cache.get
+  private val banks    = config.columnBvhMemory.banks
+  private val sets     = cache.sets(banks)
+  private val ways     = cache.ways
+  private val setBits  = log2Ceil(sets)
+  private val lineBits = Lines.lineBits(config)
+  private val tagBits  = (lineBits - setBits).max(1)
+
+  val io = IO(new ColumnCacheIO(config))
+
+  private val tags        = SyncReadMem(sets, Vec(ways, UInt(tagBits.W)))
+  private val records     = SyncReadMem(sets * ways * Lines.records, new RecordFormats(config).record)
+  private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U(ways.W))))
+  private val replacement = new Replacement(sets, ways)
+
+  private final class AwaitedLine {
+    val isUsed                = RegInit(false.B)
+    val isRequested           = Reg(Bool())
+    val line                  = Reg(UInt(lineBits.W))
+    def is(other: UInt): Bool = isUsed && line === other
+  }
+  private val awaited = Seq.fill(cache.misses / banks)(new AwaitedLine)
+
+  private def setOf(line:     UInt): UInt = line.pad(setBits + 1)(setBits - 1, 0)
+  private def tagOf(line:     UInt): UInt = (line >> setBits).asUInt.pad(tagBits)(tagBits - 1, 0)
+  private def lineOf(address: UInt): UInt = (address >> Lines.wordBits).asUInt
+
+  // Cycle a: an announced line is taken if it is awaited
+  private val takes    = io.lines.announced.valid && awaited.map(_.is(io.lines.announced.bits)).reduce(_ || _)
+  private val taken    = RegNext(takes, false.B)
+  private val line     = RegEnable(io.lines.announced.bits, takes)
+  private val blocked  = RegInit(0.U(3.W)) // cycles without requests
+  private val blockLog = LineBroadcast.latency + Lines.records - 2
+  when(takes) { blocked := blockLog.U }.elsewhen(blocked =/= 0.U) { blocked := blocked - 1.U }
+
+  // Cycle c: accept a request, if its line could be awaited even though the request before it misses
+  private val request   = io.port.request
+  private val accepted  = RegNext(request.fire, false.B)
+  private val address   = RegEnable(request.bits, request.fire)
+  private val freeCount = PopCount(awaited.map(!_.isUsed))
+  request.ready := blocked === 0.U && freeCount > accepted.asUInt
+
+  // Cycle c + 1: compare. A line is never both held and awaited
+  private val set   = setOf(lineOf(address))
+  private val found = Wire(Vec(ways, UInt(tagBits.W)))
+  private val hitOH = VecInit(found.zipWithIndex.map { case (tag, way) =>
+    isValid(set)(way) && tag === tagOf(lineOf(address))
+  }).asUInt
+  private val isHit  = accepted && hitOH.orR
+  private val awaits = awaited.map(_.is(lineOf(address))).reduce(_ || _)
+  private val hitWay = OHToUInt(hitOH)
+  private val freeOH = PriorityEncoderOH(awaited.map(!_.isUsed))
+  private val isMiss = accepted && !hitOH.orR
+  when(isHit) { replacement.use(set, hitWay) }
+  for ((entry, isFree) <- awaited.zip(freeOH)) {
+    when(isMiss && !awaits && isFree) {
+      entry.isUsed      := true.B
+      entry.isRequested := false.B
+      entry.line        := lineOf(address)
+    }
+  }
+  assert(!(isHit && awaits), "a line is held and awaited")
+
+  // Cycle a + 1: the line replaces another one, and is no longer awaited
+  private val lineSet  = setOf(line)
+  private val freeWays = ~isValid(lineSet)
+  private val victim   = Mux(freeWays.orR, PriorityEncoder(freeWays), replacement.victim(lineSet))
+  when(taken) {
+    isValid(lineSet) := isValid(lineSet) | UIntToOH(victim, ways)
+    replacement.use(lineSet, victim)
+    awaited.foreach(entry => when(entry.is(line)) { entry.isUsed := false.B })
+  }
+  found := tags.readWrite(
+    Mux(taken, lineSet, setOf(lineOf(request.bits))),
+    VecInit(Seq.fill(ways)(tagOf(line))),
+    UIntToOH(victim, ways).asBools,
+    taken || request.fire,
+    taken
+  )
+
+  // Cycles a + 3 to a + 6: its records
+  private val place      = RegEnable(lineSet ## victim(log2Ceil(ways) - 1, 0), taken) // valid from a + 2
+  private val placeNow   = RegNext(place)                                             // valid from a + 3
+  private val lineNow    = RegNext(RegEnable(line, taken))
+  private val firstComes = RegNext(RegNext(taken, false.B), false.B)
+  private val word       = RegInit(0.U(Lines.wordBits.W))
+  private val fills      = firstComes || word =/= 0.U
+  when(fills) { word := word + 1.U }
+
+  private val read = hitWay(log2Ceil(ways) - 1, 0)
+  private val data = records.readWrite(
+    Mux(fills, placeNow ## word, set ## read ## address(Lines.wordBits - 1, 0)),
+    io.lines.record,
+    fills || isHit,
+    fills
+  )
+  io.port.fill.get.valid        := fills
+  io.port.fill.get.bits.address := lineNow ## word
+  io.port.fill.get.bits.record  := io.lines.record
+
+  // Cycle c + 2: answer
+  io.port.response.valid            := RegNext(accepted, false.B)
+  io.port.response.bits.record      := data
+  io.port.response.bits.isLater.get := RegNext(isMiss, false.B)
+
+  // Request awaited lines
+  private val nextOH = PriorityEncoderOH(awaited.map(entry => entry.isUsed && !entry.isRequested))
+  io.request.valid := nextOH.reduce(_ || _)
+  io.request.bits  := Mux1H(nextOH, awaited.map(_.line))
+  when(io.request.fire) {
+    awaited.zip(nextOH).foreach { case (entry, isNext) => when(isNext) { entry.isRequested := true.B } }
+  }
+
+  when(io.invalidate) { isValid.foreach(_ := 0.U) }
+  io.isIdle := !(accepted || io.port.response.valid || fills || blocked =/= 0.U || awaited.map(_.isUsed).reduce(_ || _))
+  assert(!(io.invalidate && !io.isIdle), "lines are forgotten while some are awaited")
+}

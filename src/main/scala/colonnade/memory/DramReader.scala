@@ -1,0 +1,110 @@
+package colonnade.memory
+
+import chisel3._
+import chisel3.util._
+import colonnade.common.RoundRobin
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordFormats, SceneInDram, SceneLines}
+
+/** The address channel of an AXI4 read port. */
+final class AxiReadAddress(idBits: Int) extends Bundle {
+  val id    = UInt(idBits.W)
+  val addr  = UInt(AxiReadPort.addressBits.W)
+  val len   = UInt(8.W)
+  val size  = UInt(3.W)
+  val burst = UInt(2.W)
+}
+
+/** The data channel of an AXI4 read port. */
+final class AxiReadData(idBits: Int, busBytes: Int) extends Bundle {
+  val id   = UInt(idBits.W)
+  val data = UInt((8 * busBytes).W)
+  val resp = UInt(2.W)
+  val last = Bool()
+}
+
+/** The read channels of an AXI4 master. */
+final class AxiReadPort(config: ColonnadeConfig) extends Bundle {
+  private val idBits   = AxiReadPort.idBits(config)
+  private val busBytes = config.columnBvhMemory.cache.get.busBytes
+
+  val ar = Decoupled(new AxiReadAddress(idBits))
+  val r  = Flipped(Decoupled(new AxiReadData(idBits, busBytes)))
+}
+
+object AxiReadPort {
+  val addressBits: Int = SceneInDram.addressBits
+
+  /** One read id for each bank of the shared cache. */
+  def idBits(config: ColonnadeConfig): Int = log2Ceil(config.columnBvhMemory.banks.max(2))
+}
+
+/** Ports of [[DramReader]]. */
+final class DramReaderIO(config: ColonnadeConfig) extends Bundle {
+  private val banks = config.columnBvhMemory.banks
+
+  /** Address of record 0, a multiple of 4 KB; constant while lines are read. */
+  val base = Input(UInt(AxiReadPort.addressBits.W))
+
+  /** By bank; a bank's lines come in the order of its reads. */
+  val reads = Vec(banks, Flipped(Decoupled(UInt(Lines.lineBits(config).W))))
+  val lines = Vec(banks, Decoupled(new ReadLine(config)))
+  val axi   = new AxiReadPort(config)
+}
+
+/** Reads lines from DRAM over AXI4: one INCR burst for a line, with its bank as the id.
+  *
+  * A line begins at a multiple of [[SceneLines.pitch]], so no burst crosses 4 KB. A bank gathers one line at a time; until that
+  * line has been taken, further data for the bank have to wait.
+  */
+final class DramReader(config: ColonnadeConfig) extends Module {
+  private val banks     = config.columnBvhMemory.banks
+  private val busBytes  = config.columnBvhMemory.cache.get.busBytes
+  private val beats     = (SceneLines.bytes(config) + busBytes - 1) / busBytes
+  private val bankBits  = log2Ceil(banks)
+  private val pitchBits = log2Ceil(SceneLines.pitch(config))
+
+  val io = IO(new DramReaderIO(config))
+
+  // Addresses
+  private val arbiter = Module(new RoundRobin(banks))
+  private val address = Wire(Decoupled(new AxiReadAddress(AxiReadPort.idBits(config))))
+  private val bank    = OHToUInt(arbiter.io.grant)
+  private val line    = Mux1H(arbiter.io.grant, io.reads.map(_.bits))
+  arbiter.io.requests := VecInit(io.reads.map(_.valid)).asUInt
+  arbiter.io.isTaken  := address.fire
+  io.reads.zip(arbiter.io.grant.asBools).foreach { case (read, isGranted) => read.ready := isGranted && address.ready }
+  address.valid      := arbiter.io.requests.orR
+  address.bits.id    := bank
+  address.bits.addr  := io.base + ((line ## bank.pad(bankBits)(bankBits - 1, 0)) << pitchBits)
+  address.bits.len   := (beats - 1).U
+  address.bits.size  := log2Ceil(busBytes).U
+  address.bits.burst := 1.U
+  io.axi.ar :<>= Queue(address, 2)
+
+  // Data
+  private val data    = io.axi.r.bits
+  private val accepts = for ((port, index) <- io.lines.zipWithIndex) yield {
+    val isFor    = data.id === index.U
+    val isFull   = RegInit(false.B)
+    val isError  = Reg(Bool())
+    val beat     = RegInit(0.U(log2Ceil(beats.max(2)).W))
+    val gathered = Reg(Vec(beats, UInt((8 * busBytes).W)))
+    val ready    = !isFull || port.ready
+    val takes    = io.axi.r.valid && isFor && ready
+    when(takes) {
+      gathered(beat) := data.data
+      isError        := (isError && beat =/= 0.U) || data.resp =/= 0.U
+      beat           := Mux(beat === (beats - 1).U, 0.U, beat + 1.U)
+    }
+    isFull            := (takes && beat === (beats - 1).U) || (isFull && !port.ready)
+    port.valid        := isFull
+    port.bits.isError := isError
+    port.bits.records := gathered.asUInt(
+      Lines.records * new RecordFormats(config).recordBits - 1,
+      0
+    ).asTypeOf(port.bits.records)
+    isFor && ready
+  }
+  io.axi.r.ready := accepts.reduce(_ || _)
+}

@@ -1,0 +1,57 @@
+package colonnade.memory
+
+import chisel3._
+import chisel3.util._
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.SceneInDram
+
+/** Ports of [[SceneMemory]]. */
+final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
+  private val banks = config.columnBvhMemory.banks
+
+  /** The scene's page of 4 KB in DRAM; constant while a frame runs. */
+  val page = Input(UInt(SceneInDram.pageBits.W))
+
+  /** By column and bank. */
+  val requests = Vec(config.array.columns, Vec(banks, Flipped(Decoupled(UInt(Lines.lineBits(config).W)))))
+  val lines    = Output(Vec(banks, new LineBroadcast(config)))
+  val axi      = new AxiReadPort(config)
+
+  /** Forgets all lines; only while idle. */
+  val invalidate = Input(Bool())
+  val isIdle     = Output(Bool())
+  val events     = Output(new SceneMemoryEvents(config))
+}
+
+/** Events of [[SceneMemory]] in one cycle. */
+final class SceneMemoryEvents(config: ColonnadeConfig) extends Bundle {
+
+  /** Lines that are read from DRAM. */
+  val dramReads = UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)
+
+  /** A read from DRAM failed. */
+  val error = Bool()
+}
+
+/** The shared cache and its DRAM port. A reset of the columns does not reset it: reads that are in flight end, and a column
+  * ignores lines that it does not await.
+  */
+final class SceneMemory(config: ColonnadeConfig) extends Module {
+  val io = IO(new SceneMemoryIO(config))
+
+  private val caches = Seq.fill(config.columnBvhMemory.banks)(Module(new SharedCache(config)))
+  private val dram   = Module(new DramReader(config))
+
+  dram.io.base := io.page ## 0.U(SceneInDram.pageLog.W)
+  io.axi :<>= dram.io.axi
+  for ((cache, bank) <- caches.zipWithIndex) {
+    cache.io.requests.zip(io.requests).foreach { case (request, column) => request :<>= column(bank) }
+    dram.io.reads(bank) :<>= cache.io.reads
+    cache.io.data :<>= dram.io.lines(bank)
+    cache.io.invalidate := io.invalidate
+    io.lines(bank)      := cache.io.lines
+  }
+  io.isIdle           := caches.map(_.io.isIdle).reduce(_ && _)
+  io.events.dramReads := RegNext(PopCount(dram.io.reads.map(_.fire)))
+  io.events.error     := RegNext(dram.io.lines.map(line => line.fire && line.bits.isError).reduce(_ || _), false.B)
+}
