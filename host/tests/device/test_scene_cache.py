@@ -65,5 +65,5 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
     # A frame with failed reads ends and says so; the next one is right
     stalls = Stalls(seed=1, dram_errors=60, dram_random=30)
     failed, second = render_rtl(design, image, [registers, registers], stalls).frames
-    assert failed.errors == ["memory"]
+    assert "memory" in failed.errors
     assert_same(second, expected)
