@@ -36,7 +36,7 @@ SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
 @NEEDS_SIMULATOR
 @pytest.mark.parametrize("kind", ["diffuse", "mirror", "glass"])
 def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
-    """The relit room and the shadow window; two lights, one light, no bounces; a stalled sink."""
+    """The relit room and the shadow window; two lights, one light, no bounces; a sample; a stalled sink."""
     design = design_for("small", ())
     held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
     mesh = load_mesh("teapot:4")
@@ -45,7 +45,9 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
         pack(mesh, design.manifest, with_overrides(mesh.materials, material)), held, design.manifest
     )
     scene = replace(TABLE, material=material, more_lights=(SECOND,))
-    views = [(scene, True), (scene, False), (replace(scene, more_lights=(), paths=Paths(bounces=0)), False)]
+    beside = replace(scene, light=replace(scene.light, radius=0.2), sample=Sample((0.3, -0.4), lights=((0.6, 0.8),)))
+    still = replace(scene, more_lights=(), paths=Paths(bounces=0))
+    views = [(scene, True), (scene, False), (still, False), (beside, False)]
     registers: list[dict[str, int]] = [
         frame_registers(view, image.header, design.manifest, 80, 60, held, relit) for view, relit in views
     ]
