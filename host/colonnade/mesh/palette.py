@@ -1,0 +1,143 @@
+"""Materials of coloured faces, and their reduction to the number that a device has."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
+from colonnade.common.types import Floats, Indices
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.mesh import Mesh
+
+#: Limit of the 8-bit material index of a face.
+MAX_MATERIALS = 256
+
+#: Steps of the clustering, at most.
+_STEPS = 30
+
+
+def coloured_materials(
+    materials: tuple[MeshMaterial, ...], face_materials: Indices, colours: Floats | None
+) -> tuple[tuple[MeshMaterial, ...], Indices, int]:
+    """Materials of the faces, with their colours as albedo.
+
+    Args:
+        materials: Materials of the file.
+        face_materials: int64 [m].
+        colours: Linear colours of the faces, NaN for none, float64 [m, 3]; None: no face has one.
+
+    Returns:
+        The distinct used materials, any number of them without colours, else at most `MAX_MATERIALS` if the materials
+        without a colour leave space; the material of each face, int64 [m]; and the number of distinct colours.
+    """
+    distinct = {material: index for index, material in enumerate(dict.fromkeys(materials))}
+    index = np.array([distinct[material] for material in materials], dtype=np.int64)[face_materials]
+    found = list(distinct)
+    if colours is None:
+        return (*_used(found, index), 0)
+    has_colour = np.isfinite(colours).all(axis=1)
+    # 8 bits of sRGB per channel, as files have them
+    codes = np.rint(srgb_from_linear(colours[has_colour]) * 255).astype(np.int64)
+    rows = np.column_stack([index[has_colour], codes])
+    unique, owner = np.unique(rows, axis=0, return_inverse=True)
+    owner = owner.reshape(-1)
+    plain = len(np.unique(index[~has_colour]))
+    space = max(1, MAX_MATERIALS - plain)
+    if len(unique) > space:
+        # Colours of one kind of material share an equal part
+        bases = np.unique(unique[:, 0])
+        weights = np.bincount(owner, minlength=len(unique))
+        merged = np.empty_like(unique)
+        for base in bases:
+            of_base = np.flatnonzero(unique[:, 0] == base)
+            centres, nearest = clustered(unique[of_base, 1:] / 255.0, weights[of_base], max(1, space // len(bases)))
+            merged[of_base, 0] = base
+            merged[of_base, 1:] = np.rint(centres[nearest] * 255)
+        unique = merged
+    linear = linear_from_srgb(unique[:, 1:] / 255.0)
+    tinted = [
+        replace(found[int(base)], albedo=(float(red), float(green), float(blue)))
+        for base, (red, green, blue) in zip(unique[:, 0], linear, strict=True)
+    ]
+    index[has_colour] = len(found) + owner
+    number = len(np.unique(rows, axis=0))
+    return (*_used([*found, *tinted], index), number)
+
+
+def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
+    """Reduce a mesh to so many materials by merging diffuse ones of similar colours.
+
+    Returns:
+        The mesh, and a line on what was merged; the mesh itself and None if it has no more materials, or too many that
+        are not diffuse.
+    """
+    used = np.unique(mesh.face_materials)
+    if len(mesh.materials) <= count:
+        return mesh, None
+    diffuse = [int(index) for index in used if mesh.materials[index].kind == "diffuse"]
+    others = [int(index) for index in used if mesh.materials[index].kind != "diffuse"]
+    space = count - len(others)
+    if space < 1 or not diffuse:
+        return mesh, None
+    if len(diffuse) <= space:
+        kept = {index: position for position, index in enumerate([*diffuse, *others])}
+        chosen = tuple(mesh.materials[index] for index in kept)
+        table = np.array([kept.get(index, 0) for index in range(len(mesh.materials))])
+        return replace(mesh, materials=chosen, face_materials=table[mesh.face_materials].astype(np.uint8)), None
+    albedo = srgb_from_linear(np.array([mesh.materials[index].albedo for index in diffuse]))
+    weights = np.bincount(mesh.face_materials, minlength=len(mesh.materials))[diffuse]
+    centres, nearest = clustered(albedo, weights, space)
+    error = float(np.sqrt(np.average(((centres[nearest] - albedo) ** 2).mean(axis=1), weights=weights)))
+    table = np.zeros(len(mesh.materials), dtype=np.uint8)
+    table[diffuse] = nearest
+    table[others] = len(centres) + np.arange(len(others))
+    colours = [(float(red), float(green), float(blue)) for red, green, blue in linear_from_srgb(centres)]
+    materials = tuple(MeshMaterial(albedo=colour) for colour in colours)
+    line = (
+        f"mesh {mesh.name}: {len(diffuse)} diffuse colours become {len(centres)}, off by {error * 255:.1f}/255 on"
+        f" average: frame.materials is {count}"
+    )
+    merged = replace(
+        mesh,
+        materials=materials + tuple(mesh.materials[index] for index in others),
+        face_materials=table[mesh.face_materials],
+    )
+    return merged, line
+
+
+def clustered(colours: Floats, weights: npt.NDArray[np.int64], count: int) -> tuple[Floats, Indices]:
+    """Weighted k-means of colours: at most ``count`` centres, float64 [k, 3], and the nearest one of each, int64 [n].
+
+    It begins with the heaviest colour, then the one with the largest weighted distance to those chosen.
+    """
+    from scipy.spatial import cKDTree
+
+    chosen = [int(weights.argmax())]
+    distance = ((colours - colours[chosen[0]]) ** 2).sum(axis=1)
+    while len(chosen) < count and distance.max() > 0:
+        chosen.append(int((distance * weights).argmax()))
+        distance = np.minimum(distance, ((colours - colours[chosen[-1]]) ** 2).sum(axis=1))
+    centres = colours[chosen].astype(np.float64)
+    nearest = np.zeros(len(colours), dtype=np.int64)
+    for _ in range(_STEPS):
+        previous = nearest
+        nearest = np.asarray(cKDTree(centres).query(colours)[1], dtype=np.int64)
+        if (nearest == previous).all():
+            break
+        total = np.bincount(nearest, weights, len(centres))
+        sums = np.stack([np.bincount(nearest, weights * colours[:, axis], len(centres)) for axis in range(3)], axis=1)
+        filled = total > 0
+        centres[filled] = sums[filled] / total[filled, None]
+    return centres, nearest
+
+
+def _used(materials: list[MeshMaterial], index: Indices) -> tuple[tuple[MeshMaterial, ...], Indices]:
+    """The distinct materials that faces use, in their order, and the material of each face."""
+    distinct: dict[MeshMaterial, int] = {}
+    table = np.zeros(len(materials), dtype=np.int64)
+    for used in np.unique(index):
+        table[used] = distinct.setdefault(materials[used], len(distinct))
+    return tuple(distinct), table[index]
