@@ -179,6 +179,9 @@ def _primitive(
     corners = _corners(document, primitive, count)
     faces = _faces(corners, mode)
     colours = attribute("COLOR_0", 3)
+    if "COLOR_0" in attributes and document.array(attributes["COLOR_0"]).shape[1] == 4:
+        alpha = attribute("COLOR_0", 4)
+        losses.add(lost.ALPHA, 0 if alpha is None else int((alpha[:, 3] < 1.0).sum()))
     normals = attribute("NORMAL", 3)
     linear = matrix[:3, :3]
     determinant = float(np.linalg.det(linear))

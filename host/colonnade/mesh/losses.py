@@ -50,8 +50,10 @@ SCENES = Loss.of("further scene", "not shown", "only the default scene is render
 SHORT_FACES = Loss.of(
     "face of fewer than three corners", "left out", "it has no area", "faces of fewer than three corners"
 )
-CROSSED = Loss.of(
-    "polygon that crosses itself", "split as it comes", "triangles may overlap", "polygons that cross themselves"
+CROSSED = Loss(
+    "polygon crosses or folds over itself",
+    "polygons cross or fold over themselves",
+    "triangles may overlap",
 )
 FACET_COLOURS = Loss.of("facet colour", "not shown", "STL has no standard for them")
 COLOURS = Loss(
@@ -59,6 +61,7 @@ COLOURS = Loss(
     "colours of vertices or faces are the albedo of their faces",
     "a face has one colour, the mean of its corners",
 )
+ALPHA = Loss.of("partly transparent vertex", "opaque", "transparency is not rendered", "partly transparent vertices")
 FLIPPED = Loss(
     "face has normals that point to its back", "faces have normals that point to their back", "they are negated"
 )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
-from colonnade.common.types import Floats
+from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_mtl, mtl_losses
@@ -23,6 +24,8 @@ from colonnade.mesh.surface import RawSurface, from_polygons
 
 #: Statements of curves, surfaces and their parameter space.
 _CURVES = ("curv", "curv2", "surf")
+#: Corners that all have a normal.
+_WITH_NORMALS = re.compile(r"[^\s/]+/[^\s/]*/[^\s/]+(?: [^\s/]+/[^\s/]*/[^\s/]+)*")
 
 
 class _Statements:
@@ -71,7 +74,7 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
     text = re.sub(r"\\\r?\n", " ", data.decode("utf-8", "replace")).replace("\t", " ")
     file = _Statements(re.sub(r"#[^\r\n]*", "", text))
     vertices, vertex_colours = _vertices(file.vertices)
-    normals = _rows(file.normals, 3)
+    normals = _rows(file.normals, 3)[:, :3]
     sizes, corners, corner_normals = _corners(file, path)
     losses.add(lost.POINTS, file.losses.get("p", 0))
     losses.add(lost.LINES, file.losses.get("l", 0))
@@ -92,30 +95,42 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
 
 
 def _rows(lines: Sequence[str], columns: int) -> Floats:
-    """The first numbers of each line, float64 [lines, columns]."""
-    rows = [line.split()[:columns] for line in lines]
-    if any(len(row) < columns for row in rows):
+    """The numbers of each line, at least so many, float64 [lines, numbers of the shortest line]."""
+    rows = [line.split() for line in lines]
+    shortest = min(map(len, rows), default=columns)
+    if shortest < columns:
         raise ValueError(f"a vertex or normal has fewer than {columns} numbers")
-    return np.array([[float(word) for word in row] for row in rows], dtype=np.float64).reshape(-1, columns)
+    if any(len(row) > shortest for row in rows):
+        rows = [row[:shortest] for row in rows]
+    return np.array(list(map(float, chain.from_iterable(rows))), dtype=np.float64).reshape(-1, shortest)
 
 
 def _vertices(lines: Sequence[str]) -> tuple[Floats, Floats | None]:
     """Positions [n, 3] and, if all vertices have them, linear colours [n, 3]."""
-    if lines and min(len(line.split()) for line in lines) >= 6:
-        values = _rows(lines, 6)
-        colours = np.clip(np.nan_to_num(values[:, 3:]), 0.0, 1.0)
-        return values[:, :3], linear_from_srgb(colours)
-    return _rows(lines, 3), None
+    values = _rows(lines, 3)
+    if values.shape[1] < 6:
+        return values[:, :3], None
+    return values[:, :3], linear_from_srgb(np.clip(np.nan_to_num(values[:, 3:6]), 0.0, 1.0))
 
 
-def _corners(file: _Statements, path: Path) -> tuple[Any, Any, Any]:
-    """Sizes of the polygons, and vertex and normal (-1: none) of each corner, int64."""
+def _indices(words: Sequence[str]) -> tuple[list[int], list[int | None]]:
+    """Vertex and normal of each corner, as the file numbers them; None without a normal."""
+    joined = " ".join(words)
+    if "/" not in joined:
+        return list(map(int, words)), [None] * len(words)
+    if _WITH_NORMALS.fullmatch(joined):
+        numbers = list(map(int, joined.replace("//", "/0/").replace("/", " ").split()))
+        return numbers[::3], list(numbers[2::3])
+    parts = [word.split("/") for word in words]
+    return [int(part[0]) for part in parts], [int(part[2]) if len(part) > 2 and part[2] else None for part in parts]
+
+
+def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices]:
+    """Sizes of the polygons, and vertex and normal (-1: none) of each corner."""
     words = [face.split() for face in file.faces]
-    flat = [corner.split("/") for face in words for corner in face]
-    sizes = np.array([len(face) for face in words], dtype=np.int64)
+    sizes = np.array(list(map(len, words)), dtype=np.int64)
     try:
-        vertices = [int(corner[0]) for corner in flat]
-        normals = [int(corner[2]) if len(corner) > 2 and corner[2] else None for corner in flat]
+        vertices, normals = _indices(list(chain.from_iterable(words)))
     except ValueError:
         raise UserError(f"mesh {path}: a vertex index of a face is not an integer") from None
     for one, several, indices, count in (
@@ -144,7 +159,8 @@ def _materials(file: _Statements, references: References, losses: Losses) -> tup
     for names in file.libraries:
         library = references.materials(names)
         libraries = [library] if library is not None else [references.materials(name) for name in names.split()]
-        losses.add(lost.NO_MATERIALS, sum(content is None for content in libraries))
+        missing = sum(content is None for content in libraries)
+        losses.add(lost.NO_MATERIALS, 1 if missing == len(libraries) else missing)
         for content in libraries:
             defined |= {} if content is None else parse_mtl(content)
     used = np.array(file.face_materials, dtype=np.int64)

@@ -42,6 +42,8 @@ def read_off(data: bytes, path: Path, losses: Losses) -> RawSurface:
         )
     rows = lines[first : first + vertex_count]
     has_normals, has_colours = keyword[3] is not None, keyword[2] is not None
+    if not has_normals and not has_colours:
+        has_colours = bool(rows) and all(len(row) in (6, 7) for row in rows)  # some programs leave the C out
     columns = 3 + 3 * has_normals + 3 * has_colours
     if any(len(row) < columns for row in rows):
         raise UserError(f"mesh {path}: a vertex has fewer than {columns} numbers")

@@ -89,6 +89,9 @@ def read_ply(data: bytes, path: Path, losses: Losses) -> RawSurface:
             " numbered from 0"
         )
     losses.add(lost.LINES, content["edge"][0].rows if "edge" in content else 0)
+    alpha = vertex.get("alpha")
+    opaque = 255.0 if any(one.kind == "u1" for one in content["vertex"][0].properties if one.name == "alpha") else 1.0
+    losses.add(lost.ALPHA, int((alpha < opaque).sum()) if isinstance(alpha, np.ndarray) else 0)
     textures = set(re.findall(rb"(?m)^comment[ \t]+TextureFile[ \t]+(\S.*)$", data[: len(data) - len(body)]))
     losses.add(lost.TEXTURES, len(textures))
     return from_polygons(

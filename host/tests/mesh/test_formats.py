@@ -138,6 +138,25 @@ def test_strips_and_fans_of_gltf(tmp_path: Path, mode: int, order: list[int]) ->
     np.testing.assert_allclose(face_normals(mesh.vertices, mesh.faces), [[0, 0, 1]] * 2)
 
 
+def test_quantised_and_sparse_accessors_of_gltf(tmp_path: Path) -> None:
+    """Positions as bytes, 127 for 1, of which a sparse accessor replaces the second."""
+    whole = np.array([[0, 0, 0, 0], [0, 0, 0, 0], [0, 127, 0, 0]], np.int8)  # with padding to 4 bytes
+    arrays = [whole, np.array([1], np.uint16), np.array([[127, 0, 0, 0]], np.int8)]
+    file = gltf(tmp_path, [{"attributes": {"POSITION": 0}}], arrays, extensionsRequired=["KHR_mesh_quantization"])
+    document = json.loads(file.read_text())
+    document["bufferViews"][0]["byteStride"] = 4
+    sparse = {"count": 1, "indices": {"bufferView": 1, "componentType": 5123}, "values": {"bufferView": 2}}
+    document["accessors"] = [document["accessors"][0] | {"type": "VEC3", "normalized": True, "sparse": sparse}]
+    mesh = load_mesh(written(file, json.dumps(document)))
+    np.testing.assert_array_equal(mesh.vertices[mesh.faces[0]], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+
+
+def test_transparent_vertices_are_noted(tmp_path: Path) -> None:
+    clear = floats(np.array([[1, 1, 1, 1.0], [1, 1, 1, 0.5], [1, 1, 1, 0.0]]))
+    file = gltf(tmp_path, [{"attributes": {"POSITION": 0, "COLOR_0": 1}}], [floats(POINTS[:3]), clear])
+    assert lost(load_mesh(file)) == ["2 partly transparent vertices are opaque: transparency is not rendered"]
+
+
 def test_strips_of_ply(tmp_path: Path) -> None:
     header = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
     strips = "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
@@ -164,6 +183,7 @@ def test_colours_of_faces_and_vertices_become_albedo(tmp_path: Path) -> None:
     assert load_mesh(written(tmp_path / "vertices.ply", of_vertices)).materials[0].albedo == pytest.approx(half)
     off = "COFF\n4 1 0\n" + "".join(f"{row} 128 0 255 255\n" for row in rows) + "4 0 1 3 2\n"
     assert load_mesh(written(tmp_path / "a.off", off)).materials[0].albedo == pytest.approx(half)
+    assert load_mesh(written(tmp_path / "b.off", off[1:])).materials[0].albedo == pytest.approx(half)
     off = "OFF\n4 2 0\n" + "\n".join(rows) + "\n3 0 1 2 0.5 0.0 1.0\n3 1 3 2\n"
     assert len(load_mesh(written(tmp_path / "f.off", off)).materials) == 2
     obj = "".join(f"v {row} 1.0 0.0 0.0\n" for row in rows) + "f 1 2 4 3\n"
