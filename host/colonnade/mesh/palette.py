@@ -68,44 +68,42 @@ def coloured_materials(
 
 
 def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
-    """Reduce a mesh to so many materials by merging diffuse ones of similar colours.
+    """Reduce a mesh to so many materials by merging similar colours of the same kind and index of refraction.
 
     Returns:
-        The mesh, and a line on what was merged; the mesh itself and None if it has no more materials, or too many that
-        are not diffuse.
+        The mesh, and a line on what was merged; the mesh itself and None if it has no more materials, or too many
+        kinds.
     """
-    used = np.unique(mesh.face_materials)
     if len(mesh.materials) <= count:
         return mesh, None
-    diffuse = [int(index) for index in used if mesh.materials[index].kind == "diffuse"]
-    others = [int(index) for index in used if mesh.materials[index].kind != "diffuse"]
-    space = count - len(others)
-    if space < 1 or not diffuse:
+    materials, index = _used(list(mesh.materials), mesh.face_materials.astype(np.int64))
+    if len(materials) <= count:
+        return replace(mesh, materials=materials, face_materials=index.astype(np.uint8)), None
+    kinds: dict[tuple[str, float], list[int]] = {}
+    for number, material in enumerate(materials):
+        kinds.setdefault((material.kind, material.ior), []).append(number)
+    if len(kinds) > count:
         return mesh, None
-    if len(diffuse) <= space:
-        kept = {index: position for position, index in enumerate([*diffuse, *others])}
-        chosen = tuple(mesh.materials[index] for index in kept)
-        table = np.array([kept.get(index, 0) for index in range(len(mesh.materials))])
-        return replace(mesh, materials=chosen, face_materials=table[mesh.face_materials].astype(np.uint8)), None
-    albedo = srgb_from_linear(np.array([mesh.materials[index].albedo for index in diffuse]))
-    weights = np.bincount(mesh.face_materials, minlength=len(mesh.materials))[diffuse]
-    centres, nearest = clustered(albedo, weights, space)
-    error = float(np.sqrt(np.average(((centres[nearest] - albedo) ** 2).mean(axis=1), weights=weights)))
-    table = np.zeros(len(mesh.materials), dtype=np.uint8)
-    table[diffuse] = nearest
-    table[others] = len(centres) + np.arange(len(others))
-    colours = [(float(red), float(green), float(blue)) for red, green, blue in linear_from_srgb(centres)]
-    materials = tuple(MeshMaterial(albedo=colour) for colour in colours)
+    weights = np.bincount(index, minlength=len(materials))
+    table = np.zeros(len(materials), dtype=np.uint8)
+    found: list[MeshMaterial] = []
+    squares = 0.0
+    # Small kinds keep all of their colours, if an equal share suffices
+    for done, members in enumerate(sorted(kinds.values(), key=len)):
+        space = (count - len(found)) // (len(kinds) - done)
+        albedo = srgb_from_linear(np.array([materials[number].albedo for number in members]))
+        centres, nearest = clustered(albedo, weights[members], space)
+        squares += float((weights[members, None] * (centres[nearest] - albedo) ** 2).sum()) / 3
+        table[members] = len(found) + nearest
+        found += [
+            replace(materials[members[0]], albedo=(float(red), float(green), float(blue)))
+            for red, green, blue in linear_from_srgb(centres)
+        ]
     line = (
-        f"mesh {mesh.name}: {len(diffuse)} diffuse colours become {len(centres)}, off by {error * 255:.1f}/255 on"
-        f" average: frame.materials is {count}"
+        f"mesh {mesh.name}: {len(materials)} materials become {len(found)}, their colours off by"
+        f" {255 * (squares / len(index)) ** 0.5:.1f}/255 on average: frame.materials is {count}"
     )
-    merged = replace(
-        mesh,
-        materials=materials + tuple(mesh.materials[index] for index in others),
-        face_materials=table[mesh.face_materials],
-    )
-    return merged, line
+    return replace(mesh, materials=tuple(found), face_materials=table[index]), line
 
 
 def clustered(colours: Floats, weights: npt.NDArray[np.int64], count: int) -> tuple[Floats, Indices]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from colonnade.common import notes
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.palette import reduced
 from colonnade.scene.model import Scene
+from colonnade.scene.view import with_overrides
 
 if TYPE_CHECKING:
     from colonnade.mesh.mesh import Mesh
@@ -29,9 +31,9 @@ def object_mesh(scene: Scene, materials: int | None = None) -> Mesh:
 
 
 def with_materials(scene: Scene, mesh: Mesh, materials: int) -> Mesh:
-    """The mesh with so many materials at most, as `object_mesh`; the scene's albedo replaces all colours."""
-    if scene.material.albedo is not None:
+    """The mesh with so many materials at most, as `object_mesh`; the scene's values override them first."""
+    if len(mesh.materials) <= materials:
         return mesh
-    mesh, line = reduced(mesh, materials)
+    mesh, line = reduced(replace(mesh, materials=with_overrides(mesh.materials, scene.material)), materials)
     notes.report([] if line is None else [line])
     return mesh

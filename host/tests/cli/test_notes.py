@@ -45,4 +45,10 @@ def test_colours_beyond_the_material_table_are_merged_and_noted(folder: Path) ->
     for backend in ("model", "reference"):
         noted = invoked(folder, f"{arguments} --backend {backend}")
         assert noted.exit_code == 0, noted.output
-        assert "2 diffuse colours become 1, off by" in noted.stderr and "frame.materials is 1" in noted.stderr
+        assert "2 materials become 1, their colours off by" in noted.stderr and "frame.materials is 1" in noted.stderr
+
+
+def test_an_albedo_of_the_scene_replaces_all_colours(folder: Path) -> None:
+    (folder / "s.toml").write_text(f"{hostile.SCENE}[material]\nalbedo = [0.5, 0.5, 0.5]\n")
+    noted = invoked(folder, f"{hostile.RENDER} --mesh x.obj --set frame.materials=1")
+    assert noted.exit_code == 0 and "become" not in noted.stderr, noted.output

@@ -30,14 +30,27 @@ def test_colours_that_fit_are_kept() -> None:
 def test_similar_colours_are_merged_and_glass_is_kept() -> None:
     colours = np.array([[0.5, 0, 0], [0.51, 0, 0], [0, 0.5, 0], [0, 0.51, 0], [0, 0, 0.5], [0, 0, 0.51]])
     mesh, line = reduced(coloured(colours, MeshMaterial("glass")), 4)
-    assert len(mesh.materials) == 4 and mesh.materials[3] == MeshMaterial("glass")
-    assert line is not None and "6 diffuse colours become 3, off by 0.5/255 on average: frame.materials is 4" in line
+    assert len(mesh.materials) == 4 and mesh.materials[mesh.face_materials[0]].kind == "glass"
+    assert line is not None and "7 materials become 4, their colours off by 0." in line and "materials is 4" in line
     shown = np.array([mesh.materials[index].albedo for index in mesh.face_materials[1:]])
     wanted = colours[np.arange(len(mesh.faces)) % 6][1:]
     assert np.abs(shown - wanted).max() < 0.02
 
 
-def test_more_glass_than_materials_is_left_to_the_refusal() -> None:
+def test_colours_of_mirrors_are_merged_among_themselves() -> None:
+    tints = [MeshMaterial("mirror", (0.1 * k, 0.5, 0.5)) for k in range(1, 9)]
+    mesh, _ = reduced(coloured(np.eye(3), *tints), 6)
+    kinds = [material.kind for material in mesh.materials]
+    assert len(kinds) == 6 and kinds.count("diffuse") == 3
+    assert [mesh.materials[index].kind for index in mesh.face_materials[:9]] == ["mirror"] * 8 + ["diffuse"]
+
+
+def test_equal_materials_are_one() -> None:
+    mesh, line = reduced(coloured(np.ones((20, 3))), 2)
+    assert len(mesh.materials) == 1 and line is None and not mesh.face_materials.any()
+
+
+def test_more_kinds_than_materials_are_left_to_the_refusal() -> None:
     mesh = coloured(np.eye(3), MeshMaterial("glass"), MeshMaterial("mirror"))
     assert reduced(mesh, 2) == (mesh, None)
 
