@@ -17,6 +17,7 @@ from colonnade.cli.options import (
     mesh_option,
     require_outputs,
     size_option,
+    strict_option,
 )
 from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
 
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Write a VCD waveform of the device, its first column and first render unit; for small frames.",
 )
+@strict_option
 @json_option
 def render(
     scene: Path,

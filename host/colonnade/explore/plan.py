@@ -20,9 +20,9 @@ from colonnade.explore.jobs import KINDS, Job, JobFailed, figures_of
 from colonnade.explore.points import Point, config_of
 from colonnade.explore.schedule import Outcome
 from colonnade.explore.study import StudyFile
-from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.ppa.library.liberty_files import find_liberties
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 
 #: The library of Yosys's generic gates.
@@ -245,10 +245,10 @@ def _frames(file: StudyFile) -> list[Frame]:
             raise file.error(("workload", "scenes", name), str(error)) from None
         for source in workload.meshes or (None,):
             own = scene if source is None else scene.with_mesh(source)
-            key = str(own.mesh_source)
+            key = f"{own.mesh_source} {own.mesh.crease}"
             try:
                 if key not in meshes:
-                    meshes[key] = load_mesh(own.mesh_source)
+                    meshes[key] = object_mesh(own)
             except UserError as error:
                 where = ("workload", "scenes", name) if source is None else ("workload", "meshes", source)
                 raise file.error(where, str(error)) from None

@@ -18,7 +18,6 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.environment.encoded import EncodedEnvironment
-from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
@@ -26,6 +25,7 @@ from colonnade.render.report import FrameReport, frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.model import Scene
+from colonnade.scene.object_mesh import object_mesh, with_materials
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import View, make_view, with_overrides
 from colonnade.scene_image.file import SceneImage
@@ -76,7 +76,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     begun = time.perf_counter()
     with progress.step("packing the scene"):
         environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
-        image = pack_scene(scene, load_mesh(scene.mesh_source), manifest, environment)
+        image = pack_scene(scene, object_mesh(scene), manifest, environment)
         shows_environment = request.relit or environment is None or environment.environment.photo is None
         registers = [
             [
@@ -219,6 +219,7 @@ def pack_scene(
     scene: Scene, mesh: Mesh, manifest: Manifest, environment: EncodedEnvironment | None = None
 ) -> SceneImage:
     """The scene image of a mesh, with the scene's material and the maps of its room."""
+    mesh = with_materials(scene, mesh, int(manifest.config["frame"]["materials"]))
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     if environment is None:
         return image

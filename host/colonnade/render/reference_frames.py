@@ -9,12 +9,12 @@ from colonnade.common.accumulation import Accumulation
 from colonnade.common.progress import Progress
 from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
-from colonnade.mesh.load import load_mesh
 from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.render import ReferenceResult, render_reference
 from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
 from colonnade.scene.model import Scene
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.view import make_view
 
 
@@ -32,7 +32,7 @@ def reference_frames(
     """
     begun = time.perf_counter()
     scene = poses[0]
-    mesh = load_mesh(scene.mesh_source)
+    mesh = object_mesh(scene, int(manifest.config["frame"]["materials"]))
     environment = backdrop = None
     if scene.background.room is not None:
         environment = load_environment(scene.background.room)

@@ -53,10 +53,17 @@ _Pixel = tuple[_MapPixel, _MapPixel]
 
 @dataclass(frozen=True, config=_STRICT)
 class MeshSource:
-    """The mesh: a name (see `colonnade.mesh.load.load_mesh`), or a file relative to the scene file."""
+    """The mesh: a name (see `colonnade.mesh.load.load_mesh`), or a file relative to the scene file.
+
+    Attributes:
+        name, path: One of them.
+        crease: Angle up to which edges are smooth, degrees, in place of the file's normals. None: the file's normals,
+            without them 60 degrees.
+    """
 
     name: _Text | None = None
     path: _File | None = None
+    crease: Annotated[_Float, Interval(ge=0.0, le=180.0)] | None = None
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Self:
@@ -317,7 +324,7 @@ class Scene:
 
     def with_mesh(self, name_or_path: str) -> Scene:
         """The scene with another mesh, a name or a path relative to the working directory."""
-        return replace(self, mesh=MeshSource(name=name_or_path))
+        return replace(self, mesh=MeshSource(name=name_or_path, crease=self.mesh.crease))
 
     def with_environment(self, folder: Path) -> Scene:
         """The scene in the room of a folder."""
