@@ -15,6 +15,7 @@ from colonnade.cli.options import (
     json_option,
     mesh_option,
     require_outputs,
+    strict_option,
 )
 
 
@@ -26,6 +27,7 @@ from colonnade.cli.options import (
 @click.option(
     "--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; created if missing."
 )
+@strict_option
 @json_option
 def pack(
     scene: Path,
@@ -41,8 +43,8 @@ def pack(
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
     from colonnade.environment.encoded import EncodedEnvironment
-    from colonnade.mesh.load import load_mesh
     from colonnade.render.frames import pack_scene
+    from colonnade.scene.object_mesh import object_mesh
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.file import check_image_file, image_file
     from colonnade.scene_image.inspect import describe, print_report
@@ -62,7 +64,7 @@ def pack(
     folder = described.background.room
     with terminal.step("packing"):
         environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
-        image = pack_scene(described, load_mesh(described.mesh_source), manifest, environment)
+        image = pack_scene(described, object_mesh(described), manifest, environment)
     image.save(output)
 
     echo(f"packed      {file}")

@@ -14,12 +14,15 @@ import numpy as np
 from colonnade.common.types import Floats
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Extent
-from colonnade.scene.cameras import WorldCamera, environment_camera, scene_camera
+from colonnade.scene.cameras import WorldCamera, camera_axes, environment_camera, scene_camera, through_lens
 from colonnade.scene.model import Material, PointLight, Scene
 from colonnade.scene.object_pose import Pose, object_pose
+from colonnade.scene.samples import Point
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
+
+_UP = (0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -41,8 +44,8 @@ class PlacedLight:
 class View:
     """The view of one frame, in mesh space.
 
-    The ray through the centre of pixel (x, y) is ``origin + t * (direction + x * step_x + y * step_y)``. Pixel (0, 0)
-    is at the top left. Directions are not normalised: one unit of t is one mesh unit of depth.
+    The ray of pixel (x, y) is ``origin + t * (direction + x * step_x + y * step_y)``. Pixel (0, 0) is at the top left.
+    Directions are not normalised: one unit of t is one mesh unit of depth.
 
     Attributes:
         width, height: Size of the frame, pixels.
@@ -56,6 +59,7 @@ class View:
         shadow_transmittance: Fraction of light that a glass occluder transmits.
         bounces: Traced reflections and refractions of a path.
         view_to_mesh: Transform from a room's view space, metres, to mesh space, float64 [3, 4]; None without a room.
+        shift: Where the rays cross the picture, from the pixels' centres: pixels right and down.
     """
 
     width: int
@@ -74,6 +78,7 @@ class View:
     shadow_transmittance: float = 0.6
     bounces: int = 4
     view_to_mesh: Floats | None = None
+    shift: tuple[float, float] = (0.0, 0.0)
 
     @property
     def light(self) -> Floats:
@@ -99,7 +104,7 @@ def make_view(
     materials: tuple[MeshMaterial, ...] = (PLAIN,),
     environment: Environment | None = None,
 ) -> View:
-    """Make the view of a scene at its motion's progress.
+    """Make the view of a scene at its motion's progress and its sample.
 
     Cameras and lights that are relative to the object keep their positions from the start of the motion.
 
@@ -118,14 +123,20 @@ def make_view(
         camera = environment_camera(environment, width, height)
     else:
         camera = scene_camera(scene.camera, start, extent, width, height)
+        if scene.camera.aperture > 0:
+            camera = through_lens(camera, scene.camera, centre, scene.sample.lens)
+    shift_x, shift_y = scene.sample.pixel
     return View(
         width=width,
         height=height,
         origin=pose.to_mesh(camera.position),
-        direction=camera.corner @ pose.rotation,
+        direction=(camera.corner + shift_x * camera.step_x + shift_y * camera.step_y) @ pose.rotation,
         step_x=camera.step_x @ pose.rotation,
         step_y=camera.step_y @ pose.rotation,
-        lights=tuple(_placed(light, camera, centre, edge, pose) for light in scene.lights),
+        lights=tuple(
+            _placed(light, camera, centre, edge, pose, scene.sample.light(index))
+            for index, light in enumerate(scene.lights)
+        ),
         materials=with_overrides(materials, scene.material),
         ambient=np.array(scene.ambient.colour),
         background=np.array(scene.background.colour),
@@ -135,6 +146,7 @@ def make_view(
         shadow_transmittance=scene.paths.shadow_transmittance,
         bounces=scene.paths.bounces,
         view_to_mesh=None if environment is None else pose.from_view(environment.camera_to_world),
+        shift=scene.sample.pixel,
     )
 
 
@@ -144,10 +156,17 @@ def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tu
     return tuple(replace(material, **given) for material in materials)
 
 
-def _placed(light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose) -> PlacedLight:
+def _placed(
+    light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose, on_disc: Point
+) -> PlacedLight:
+    """A light in mesh space; of one with a radius the point ``on_disc``, of a disc that faces `centre`."""
     if light.position is not None:
         position = np.array(light.position)
     else:
         position = centre + edge * (np.array(light.offset) @ camera.axes)
+    if light.radius > 0:
+        away = position - centre
+        right, up, _ = camera_axes(away if away.any() else camera.axes[2], _UP)
+        position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
     reach = None if light.falloff is None else light.falloff / pose.scale
     return PlacedLight(pose.to_mesh(position), np.array(light.colour), reach)
