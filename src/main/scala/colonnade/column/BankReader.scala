@@ -81,5 +81,5 @@ final class BankReader(config: ColonnadeConfig) extends Module {
   io.events.recordReads   := accepts
   io.events.bankConflicts := Mux(accepts, PopCount(asking) - 1.U, 0.U)
   for (misses <- io.events.cacheMisses; isLater <- io.memory.response.bits.isLater) misses := answers && isLater
-  io.isIdle               := !inFlight.io.oldest.valid && !io.broadcast.valid
+  io.isIdle := !inFlight.io.oldest.valid && !io.broadcast.valid
 }
