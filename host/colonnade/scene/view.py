@@ -56,6 +56,7 @@ class View:
         shadow_transmittance: Fraction of light that a glass occluder transmits.
         bounces: Traced reflections and refractions of a path.
         view_to_mesh: Transform from a room's view space, metres, to mesh space, float64 [3, 4]; None without a room.
+        occlusion: The room hides the object where it is nearer.
     """
 
     width: int
@@ -74,6 +75,7 @@ class View:
     shadow_transmittance: float = 0.6
     bounces: int = 4
     view_to_mesh: Floats | None = None
+    occlusion: bool = True
 
     @property
     def light(self) -> Floats:
@@ -135,6 +137,7 @@ def make_view(
         shadow_transmittance=scene.paths.shadow_transmittance,
         bounces=scene.paths.bounces,
         view_to_mesh=None if environment is None else pose.from_view(environment.camera_to_world),
+        occlusion=scene.background.occlusion,
     )
 
 
