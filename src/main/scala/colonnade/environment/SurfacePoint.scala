@@ -51,7 +51,7 @@ final class SurfacePoint(
 
   /** Connects the result, which is valid in `Finish`. */
   def result(to: MarchResult): Unit = {
-    val isHit = resolver.kind =/= HitKind.miss.U
+    val isHit  = resolver.kind =/= HitKind.miss.U
     val isSeen = resolver.kind === HitKind.map.U && !stepper.isBehind
     to.albedo      := Mux(isHit, texel.albedo, 0.U.asTypeOf(texel.albedo))
     to.hidesObject := isSeen && isNearer && isAway

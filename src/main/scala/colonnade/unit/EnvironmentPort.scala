@@ -39,7 +39,7 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   private val control = io.control
   control.enabled   := io.view.enabled
   control.occlusion := io.view.occlusion
-  stage.io.view   := io.view
+  stage.io.view     := io.view
   io.maps <> stage.io.maps
   io.events := stage.io.events
 

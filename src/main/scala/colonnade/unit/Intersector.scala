@@ -136,8 +136,8 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   private val hasSurface = control.shades
   private val closest    = hitTable.io.closest
   drive(io.hasSurface, hasSurface, resolved)
-  private val reads      = hasSurface || control.measured.valid
-  private val readHit    = Mux(control.measured.valid, control.measured.bits, resolved)
+  private val reads   = hasSurface || control.measured.valid
+  private val readHit = Mux(control.measured.valid, control.measured.bits, resolved)
   closest.context              := RegEnable(readHit, reads)
   io.surfaceHit.valid          := RegNext(hasSurface, false.B)
   io.surfaceHit.bits.context   := closest.context
@@ -151,10 +151,10 @@ final class Intersector(config: ColonnadeConfig) extends Module {
     distance := Rounding.floor(tEntry, -config.numbers.gridFraction) +& closest.t.integer.asUInt
   }
   assert(!(hasSurface && control.measured.valid), "one hit is read in a cycle")
-  io.fetches(2).valid          := io.surfaceHit.valid
-  io.fetches(2).bits.context   := closest.context
-  io.fetches(2).bits.kind      := RecordKind.attributes
-  io.fetches(2).bits.address   := io.scene.attributeBase + (closest.id >> RecordFormats.faceSlotBits)
+  io.fetches(2).valid        := io.surfaceHit.valid
+  io.fetches(2).bits.context := closest.context
+  io.fetches(2).bits.kind    := RecordKind.attributes
+  io.fetches(2).bits.address := io.scene.attributeBase + (closest.id >> RecordFormats.faceSlotBits)
 
   io.nodesReadyNext     := traversal.io.readyNext
   io.trianglesReadyNext := triangles.io.readyNext

@@ -43,9 +43,10 @@ final class RtController(config: ColonnadeConfig) extends Module {
   private val hasEnvironment = io.environment.map(_.enabled).getOrElse(false.B)
 
   /** A hit of the ray still needs an occlusion test; it is tested. */
-  private val mayBeHidden     = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
-  private val isOcclusionTest = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
-  private val hasOcclusion    = io.environment.map(_.occlusion).getOrElse(false.B) && hasEnvironment
+  private val mayBeHidden = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val isOcclusionTest =
+    if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val hasOcclusion = io.environment.map(_.occlusion).getOrElse(false.B) && hasEnvironment
 
   /** By light: a shadow ray is still to be traced; the results of those that were traced. */
   private val shadowPending = Reg(Vec(contexts, Vec(lights, Bool())))

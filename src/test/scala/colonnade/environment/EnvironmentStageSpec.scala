@@ -67,7 +67,9 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
           ray.copy(context = free(random.nextInt(free.size)))
         }
         dut.io.ray.valid.poke(next.nonEmpty)
-        dut.ray.poke(next.fold(BigInt(packed.width, random))(ray => packed.pack(ray.fields - "isDirectView" - "hitDistance")))
+        dut.ray.poke(next.fold(BigInt(packed.width, random))(ray =>
+          packed.pack(ray.fields - "isDirectView" - "hitDistance")
+        ))
 
         val ready = free.filter(context => rays.contains(context) && !next.exists(_.context == context))
         if (offered.isEmpty && ready.nonEmpty && random.nextInt(4) == 0)
@@ -121,7 +123,9 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
       assert(visible == requests.zip(found).map { case (request, hit) => request.isOcclusionTest && hit.isEmpty })
       val tests = requests.zip(found).filter(_._1.isOcclusionTest)
       assert(tests.exists(_._2.isEmpty) && tests.exists(_._2.nonEmpty), "visible and hidden hits")
-      assert(requests.zip(found).exists { case (request, hit) => !request.isOcclusionTest && hit.isEmpty } && requests.exists(_.isFresnelReflection) && requests.exists(_.ray.isDirectView))
+      assert(requests.zip(found).exists { case (request, hit) =>
+        !request.isOcclusionTest && hit.isEmpty
+      } && requests.exists(_.isFresnelReflection) && requests.exists(_.ray.isDirectView))
       assert(requests.map(_.ray).distinct.size < requests.size, "a stored ray is requested again")
     }
 }

@@ -24,7 +24,7 @@ final case class MarchCase(
     axes.zip(origin).map { case (axis, value) => s"ray.origin.$axis" -> value }.toMap ++
       axes.zip(dir).map { case (axis, value) => s"ray.dir.$axis" -> value } ++
       axes.zip(pixel).map { case (axis, value) => s"ray.pixel.$axis" -> value } +
-      ("context" -> BigInt(context)) + ("isDirectView" -> BigInt(if (isDirectView) 1 else 0)) +
+      ("context"     -> BigInt(context)) + ("isDirectView" -> BigInt(if (isDirectView) 1 else 0)) +
       ("hitDistance" -> hitDistance)
   }
 }
@@ -66,15 +66,17 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
       val axes = Seq(Seq(1.0, 0, 0), Seq(0, 1.0, 0), Seq(0, 0, 1.0)).map(rotate)
       ViewCase
         .of(config, focal, middle, axes, steps(Seq(0, 0, 0)), metre, stepWidths(random.nextInt(2)))
-        .copy(occlusionTolerance = if (random.nextInt(4) == 0) 0 else BigDecimal(random.nextDouble() * metre / 9).toBigInt)
+        .copy(occlusionTolerance =
+          if (random.nextInt(4) == 0) 0 else BigDecimal(random.nextDouble() * metre / 9).toBigInt
+        )
     }
   }
 
   /** From a point of view space along a direction. */
   def ray(camera: Camera, from: Seq[Double], dir: Seq[Double]): MarchCase = {
-    val length  = dir.map(_.abs).max
-    val scale   = math.pow(2, numbers.shadeBits.toDouble) - 1
-    val rotated = camera.rotate(dir.map(_ / (1.5 * length)))
+    val length   = dir.map(_.abs).max
+    val scale    = math.pow(2, numbers.shadeBits.toDouble) - 1
+    val rotated  = camera.rotate(dir.map(_ / (1.5 * length)))
     val distance = BigDecimal(random.nextDouble() * 4 * metre).toBigInt
     MarchCase(context(), camera.steps(from), rotated.map(t => BigDecimal(t * scale).toBigInt), hitDistance = distance)
   }

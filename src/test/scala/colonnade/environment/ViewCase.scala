@@ -16,7 +16,10 @@ final case class ViewCase(
     occlusionTolerance: BigInt = 0
 ) {
   def words: Seq[BigInt] =
-    matrix ++ offset ++ Seq[BigInt](offsetShift, exponent) ++ rotation ++ steps :+ BigInt(boundingPlanes) :+ occlusionTolerance
+    matrix ++ offset ++ Seq[BigInt](
+      offsetShift,
+      exponent
+    ) ++ rotation ++ steps :+ BigInt(boundingPlanes) :+ occlusionTolerance
 
   def fields: Map[String, BigInt] =
     matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}].${"xyz" (i % 3)}" -> value }.toMap ++
@@ -24,8 +27,8 @@ final case class ViewCase(
       offset.zipWithIndex.map { case (value, i) => s"offset.${"xyz" (i)}" -> value } ++
       Seq("stepX", "stepY").zip(steps) ++
       Map(
-        "offsetShift"    -> BigInt(offsetShift),
-        "exponent"       -> BigInt(exponent),
+        "offsetShift"        -> BigInt(offsetShift),
+        "exponent"           -> BigInt(exponent),
         "boundingPlanes"     -> BigInt(boundingPlanes),
         "occlusionTolerance" -> occlusionTolerance
       )

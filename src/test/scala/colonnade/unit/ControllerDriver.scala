@@ -102,7 +102,8 @@ private class ControllerDriver(
     val shadowed = shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow)
     val ended    = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
     // The hit of an occlusion test is not read together with that of a surface
-    val shades = resolved.exists(index => !contexts(index).isShadow && contexts(index).hasHit && !contexts(index).mayBeHidden)
+    val shades =
+      resolved.exists(index => !contexts(index).isShadow && contexts(index).hasHit && !contexts(index).mayBeHidden)
     dut.io.trace.shades.expect(shades)
     val pending = at(ContextState.environmentPending)
     val waits   = shades && pending.headOption.exists(contexts(_).isOcclusionTest)

@@ -24,7 +24,12 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val rounds =
     Seq((1.0, 1, true, true, false), (0.3, 2, true, true, false), (0.6, 3, false, true, false))
   private val environmentRounds =
-    Seq((0.6, 4, true, false, false), (0.8, 5, true, true, true), (0.3, 6, true, true, true), (0.8, 7, true, false, true))
+    Seq(
+      (0.6, 4, true, false, false),
+      (0.8, 5, true, true, true),
+      (0.3, 6, true, true, true),
+      (0.8, 7, true, false, true)
+    )
 
   private def render(config: ColonnadeConfig, name: String): Unit =
     it should s"give each pixel once, equal to the model's: $name" in
@@ -48,7 +53,9 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
           if (occlusion) {
             val bare   = modelled(registers + ("environment.occlusion" -> BigInt(0)))
             val hidden = bare.zip(expected).count { case (bare, pixel) => bare("isObject") != pixel("isObject") }
-            val later  = bare.zip(expected).count { case (bare, pixel) => bare("isObject") == pixel("isObject") && bare != pixel }
+            val later  = bare.zip(expected).count { case (bare, pixel) =>
+              bare("isObject") == pixel("isObject") && bare != pixel
+            }
             assert(hits > 0 && (hidden > 1) == hasEnvironment, s"a part of the object is hidden, seed $seed")
             info(s"seed $seed: $hidden pixels hidden, $later with hidden hits of later rays")
           }
@@ -62,13 +69,17 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
             )
           assert(column.hits == hits)
           assert(
-            occlusion || hits > positions.size / 6 && (if (shadows) column.shadowRays > hits / 8 else column.shadowRays == 0) &&
+            occlusion || hits > positions.size / 6 && (if (shadows) column.shadowRays > hits / 8
+                                                       else column.shadowRays == 0) &&
               (column.bouncedRays > 0) == config.frame.hasBounces,
             "there is something to see"
           )
           if (config.hasEnvironment) {
             val isDarker = expected.exists(pixel => Seq("r", "g", "b").exists(c => pixel(s"ratio.$c") < 4096))
-            assert(occlusion || isDarker == (hasEnvironment && shadows), s"the object takes light from the room, seed $seed")
+            assert(
+              occlusion || isDarker == (hasEnvironment && shadows),
+              s"the object takes light from the room, seed $seed"
+            )
             assert(if (hasEnvironment) column.roomRays >= positions.size - hits else column.roomRays == 0)
           }
         }
