@@ -9,9 +9,9 @@
 //   cell   x y                                            -> id isIllegal
 //   plane  id                                             -> a b c exponent
 //   boundingPlane index                                     -> a b c exponent albedo[3] normal[3]
-//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY boundingPlanes isSeen pixel[2] origin[3] direction[3]
-//                                                         -> kind x y entry isHidden travel travelExponent steps point[3] albedo[3] normal[3] isIllegal
-//          the point hit by the ray, or with isSeen the point visible in the pixel; all 0 for a miss
+//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY boundingPlanes tolerance isSeen pixel[2] hitDistance origin[3] direction[3]
+//                                                         -> kind x y entry isHidden travel travelExponent steps point[3] albedo[3] normal[3] hidesObject isIllegal
+//          the point hit by the ray, or with isSeen the point visible in the pixel; all 0 for a miss. hidesObject: it is nearer than hitDistance
 #pragma once
 #include <map>
 #include <optional>
@@ -89,8 +89,10 @@ private:
         for (auto& row : view.rotation) row = query.vector();
         for (auto& step : view.step) step = query.number();
         view.boundingPlanes = static_cast<int>(query.number());
+        view.occlusionTolerance = query.number();
         const bool isSeen = query.number() != 0;
         const std::int64_t x = query.number(), y = query.number();
+        const Wide hitDistance = query.wide();
         const WideVector origin = query.wideVector();
         Vector direction;
         blockScale(query.wideVector(), numbers.shadeBits, direction);
@@ -99,9 +101,12 @@ private:
         Reply reply;
         reply << static_cast<int>(point.kind) << point.x << point.y << point.entry << point.isHidden;
         reply << point.travel << point.travelExponent << point.steps;
-        if (point.kind == EnvironmentPoint::Kind::miss) return reply.all(std::array<int, 9>{}) << point.isIllegal;
+        if (point.kind == EnvironmentPoint::Kind::miss) return reply.all(std::array<int, 10>{}) << point.isIllegal;
         const EnvironmentTexel texel = march.texelOf(point, view);
-        return reply.all(march.hitPosition(origin, direction, point)).all(texel.albedo).all(texel.normal) << (point.isIllegal || texel.isIllegal);
+        return reply.all(march.hitPosition(origin, direction, point))
+                   .all(texel.albedo)
+                   .all(texel.normal)
+               << march.hides(point, direction, hitDistance, isSeen, view) << (point.isIllegal || texel.isIllegal);
     }
 
     AttributeImage& image() {

@@ -12,21 +12,35 @@ from colonnade.cli.options import FILE, dists_option, echo, finish, json_option,
 
 
 @click.command(short_help="Measure reconstructed rooms, or AR frames in them.")
-@click.argument("rooms", type=FILE, nargs=-1, required=True)
+@click.argument("rooms", type=FILE, nargs=-1)
 @click.option("--frames", is_flag=True, help="Measure frames with objects instead of rays from probe spheres.")
+@click.option("--occlusion", is_flag=True, help="Measure objects behind furniture in synthetic rooms, without ROOMS.")
 @dists_option
-@click.option("--output", type=FILE, metavar="DIR", help="With --frames: write the frames as pictures.")
+@click.option("--output", type=FILE, metavar="DIR", help="With --frames or --occlusion: write the frames as pictures.")
 @json_option
-def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | None, json_file: Path | None) -> None:
+def study(
+    rooms: tuple[Path, ...],
+    frames: bool,
+    occlusion: bool,
+    no_dists: bool,
+    output: Path | None,
+    json_file: Path | None,
+) -> None:
     """Measure reconstructed rooms against their depth maps. ROOMS are folders.
 
     By default the command traces rays from mirror, matt and glass spheres, and prints the share that finds the correct
     point: with planes of the full maps, and with those of the attribute memory. With --frames it prints the loss from
     encoding, reconstruction and fixed-point arithmetic. The loss is PSNR, FLIP and DISTS of frame, object and shadow.
+    With --occlusion it prints the share of an object's pixels that correctly show the object, or the room before it.
     Tables are in Markdown.
     """
-    if output is not None and not frames:
-        raise click.UsageError("--output needs --frames", click.get_current_context())
+    context = click.get_current_context()
+    if output is not None and not frames and not occlusion:
+        raise click.UsageError("--output needs --frames or --occlusion", context)
+    if occlusion and (rooms or frames):
+        raise click.UsageError("--occlusion has its own rooms: leave out ROOMS and --frames", context)
+    if not occlusion and not rooms:
+        raise click.UsageError("Missing argument 'ROOMS...'.", context)
     require_outputs(json_file, folders=[output])
 
     from colonnade.common import progress
@@ -36,7 +50,13 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
         make_folder(output)
 
     report: dict[str, Any]
-    if frames:
+    if occlusion:
+        from colonnade.evaluation.studies import occlusion as study_of_occlusion
+
+        results = study_of_occlusion.study(progress.for_terminal(), output)
+        echo(study_of_occlusion.table(results))
+        report = {name: asdict(value) for name, value in results.items()}
+    elif frames:
         from colonnade.evaluation.studies import ar_losses
 
         terminal = progress.for_terminal()

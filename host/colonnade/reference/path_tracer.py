@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.reference.bounce import bounce
-from colonnade.reference.environment.surface import Backdrop, BackdropPoints
+from colonnade.reference.environment.surface import Backdrop, BackdropPoints, SurfaceHits
 from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, PlacedObject
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 Points = TypeVar("Points", ObjectPoints, BackdropPoints)
 
+#: A surface of the room hides a hit if it is nearer by more than this fraction of the hit's distance to the camera.
+OCCLUSION_TOLERANCE = 0.005
 #: Upper limit of a light's distance falloff, reached at half its reference distance.
 MAX_FALLOFF = 4.0
 
@@ -59,7 +61,7 @@ class PathTracer:
         """
         count = len(directions)
         self.rays["primary"] += count
-        faces = self._first_hits(origins, directions)
+        faces = self._visible_hits(self._first_hits(origins, directions), origins, directions, pixels)
         is_object = faces >= 0
         colours, t, ratio = np.empty((count, 3)), np.full(count, np.nan), np.ones((count, 3))
         outside = np.zeros(count, dtype=np.bool_)
@@ -132,7 +134,38 @@ class PathTracer:
             return origins, scattered.directions, np.full(len(path), -1, dtype=np.int64)
         self.rays["refraction"] += int(np.count_nonzero(scattered.refracted))
         self.rays["reflection"] += int(np.count_nonzero(~scattered.refracted))
-        return origins, scattered.directions, self._first_hits(origins, scattered.directions)
+        hit_faces = self._first_hits(origins, scattered.directions)
+        is_outside_glass = scattered.refracted != is_tinted
+        hit_faces[is_outside_glass] = self._visible_hits(
+            hit_faces[is_outside_glass], origins[is_outside_glass], scattered.directions[is_outside_glass]
+        )
+        return origins, scattered.directions, hit_faces
+
+    def _visible_hits(
+        self, faces: Indices, origins: Floats, directions: Floats, pixels: Floats | None = None
+    ) -> Indices:
+        """First faces that rays hit, -1 also for hits that the room hides; `pixels` as in `trace`, of primary rays."""
+        hit = np.flatnonzero(faces >= 0)
+        if self._backdrop is None or not self._view.occlusion or len(hit) == 0:
+            return faces
+        position = self._object.points(faces[hit], origins[hit], directions[hit]).position
+        matrix, shift = self._mesh_to_view()
+        starts = origins[hit] @ matrix.T + shift
+        surface: SurfaceHits | BackdropPoints
+        if pixels is None:
+            surface = self._backdrop.geometry.intersect(starts, unit_vectors(directions[hit] @ matrix.T))
+        else:
+            surface = self._backdrop.visible_points(*pixels[hit].T)
+        # In metres: along the ray to the object and to the room, and the tolerance at the object
+        ends = position @ matrix.T + shift
+        to_object, to_room = (np.linalg.norm(points - starts, axis=1) for points in (ends, surface.position))
+        tolerance = OCCLUSION_TOLERANCE * np.linalg.norm(ends, axis=1)
+        is_hidden = ~surface.outside & (to_room + tolerance < to_object)
+        if pixels is None:
+            is_hidden &= to_room > tolerance
+        visible = faces.copy()
+        visible[hit[is_hidden]] = -1
+        return visible
 
     def _first_hits(self, origins: Floats, directions: Floats) -> Indices:
         self.rays["in_box"] += int(np.count_nonzero(self._object.tracer.enters_box(origins, directions)[0]))

@@ -10,6 +10,7 @@ import numpy as np
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.environment.encoding.planes import SLOPE_PIXELS, PlaneProjection
+from colonnade.registers.occlusion import occlusion_registers
 from colonnade.registers.shadow_window import shadow_window, whole_frame
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def environment_registers(
         relit: Render the whole room, not only the pixels whose light the object may block.
     """
     registers = projection_registers(view, encoded.environment, encoded.image, header, manifest)
+    registers |= occlusion_registers(view, encoded, header, manifest)
     if relit:
         window = whole_frame(view)
     else:
@@ -52,7 +54,7 @@ def environment_registers(
 def projection_registers(
     view: View, environment: Environment, image: AttributeImage, header: ImageHeader, manifest: Manifest
 ) -> dict[str, int]:
-    """The registers ``room.*`` of a frame except the window.
+    """The registers ``room.*`` of a frame except the window and the occlusion.
 
     Args:
         view: With the room's pose, `View.view_to_mesh`.

@@ -38,7 +38,7 @@ def shadow_window(view: View, environment: Environment, depth: Floats, extent: E
     """
     if not view.shadows:
         return EMPTY
-    points = _points(view, environment, depth)
+    points = surface_points(view, environment, depth)
     margin = MARGIN * extent.edge
     low, high = extent.low - margin, extent.high + margin
     shaded = np.zeros((view.height, view.width), dtype=bool)
@@ -51,7 +51,7 @@ def shadow_window(view: View, environment: Environment, depth: Floats, extent: E
     return x0, y0, min(view.width, int(columns[-1]) + 2), min(view.height, int(rows[-1]) + 2)
 
 
-def _points(view: View, environment: Environment, depth: Floats) -> Floats:
+def surface_points(view: View, environment: Environment, depth: Floats) -> Floats:
     """The points where the device takes the room's surface in the frame, mesh space, float64 [height, width, 3].
 
     The depth is that of a pixel's centre, also where its ray is shifted.

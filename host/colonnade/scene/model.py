@@ -255,10 +255,12 @@ class Background:
     Attributes:
         colour: Linear.
         room: The folder of a room, relative to the scene file.
+        occlusion: The room hides the object where it is nearer.
     """
 
     colour: _Colour = (0.0, 0.0, 0.0)
     room: _File | None = None
+    occlusion: StrictBool = True
 
 
 @dataclass(frozen=True, config=_STRICT)

@@ -60,6 +60,7 @@ class View:
         bounces: Traced reflections and refractions of a path.
         view_to_mesh: Transform from a room's view space, metres, to mesh space, float64 [3, 4]; None without a room.
         shift: Where the rays cross the picture, from the pixels' centres: pixels right and down.
+        occlusion: The room hides the object where it is nearer.
     """
 
     width: int
@@ -79,6 +80,7 @@ class View:
     bounces: int = 4
     view_to_mesh: Floats | None = None
     shift: tuple[float, float] = (0.0, 0.0)
+    occlusion: bool = True
 
     @property
     def light(self) -> Floats:
@@ -147,6 +149,7 @@ def make_view(
         bounces=scene.paths.bounces,
         view_to_mesh=None if environment is None else pose.from_view(environment.camera_to_world),
         shift=scene.sample.pixel,
+        occlusion=scene.background.occlusion,
     )
 
 

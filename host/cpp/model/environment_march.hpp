@@ -66,12 +66,18 @@ public:
     WideVector hitPosition(const WideVector& origin, const Vector& direction, const EnvironmentPoint& point) const {
         WideVector result;
         const Wide maximum = largest(n_.sceneBits);
-        for (int a = 0; a < 3; ++a) {
-            const Wide step = Wide(point.travel) * direction[a];
-            const Wide way = point.travelExponent > f_ ? (step < 0 ? -maximum - 1 : step > 0 ? maximum : 0) : floorShift<Wide>(step, -point.travelExponent);
-            result[a] = clamp<Wide>(origin[a] + clamp<Wide>(way, -maximum - 1, maximum), -(maximum / 2) - 1, maximum / 2);
-        }
+        const WideVector way = wayTo(direction, point);
+        for (int a = 0; a < 3; ++a) result[a] = clamp<Wide>(origin[a] + way[a], -(maximum / 2) - 1, maximum / 2);
         return result;
+    }
+
+    /// Whether a point of the map hides a hit of the object on the same ray, `distance` grid steps away along the dominant axis. A point that
+    /// is in contact with the hit, or with the start of a bounced ray, hides nothing; neither does one that the camera does not see.
+    bool hides(const EnvironmentPoint& point, const Vector& direction, Wide distance, bool isDirectView, const EnvironmentView& view) const {
+        if (point.kind != EnvironmentPoint::Kind::map || point.isHidden) return false;
+        Wide travelled = 0;
+        for (const Wide way : wayTo(direction, point)) travelled = std::max(travelled, way < 0 ? ~way : way);
+        return travelled + view.occlusionTolerance < distance && (isDirectView || travelled > view.occlusionTolerance);
     }
 
 private:
@@ -108,6 +114,18 @@ private:
         const Normalised rate = normalise(bestQuotient, f_);
         point.travel = static_cast<std::int64_t>(divide(depth.mantissa, rate.mantissa, f_));
         point.travelExponent = depth.exponent - (bestExponent - f_) - f_ + ray.fromShift - ray.dirShift;
+    }
+
+    /// The vector from a ray's origin to a hit, grid steps; each component is clamped to the scene's range.
+    WideVector wayTo(const Vector& direction, const EnvironmentPoint& point) const {
+        const Wide maximum = largest(n_.sceneBits);
+        WideVector way;
+        for (int a = 0; a < 3; ++a) {
+            const Wide step = Wide(point.travel) * direction[a];
+            const Wide whole = point.travelExponent > f_ ? (step < 0 ? -maximum - 1 : step > 0 ? maximum : 0) : floorShift<Wide>(step, -point.travelExponent);
+            way[a] = clamp<Wide>(whole, -maximum - 1, maximum);
+        }
+        return way;
     }
 
     const Numbers& n_;

@@ -17,6 +17,9 @@ struct EnvironmentView {
     std::array<std::int64_t, 2> step;
     /// Pixels that show the environment itself: x0, y0, x1, y1, the latter two exclusive.
     std::array<std::int64_t, 4> window;
+    /// The environment may hide the object; by how much its point must then be nearer, grid steps along the ray's dominant axis.
+    bool occlusion;
+    std::int64_t occlusionTolerance;
 
     bool shows(std::int64_t x, std::int64_t y) const { return x >= window[0] && x < window[2] && y >= window[1] && y < window[3]; }
 };

@@ -16,10 +16,12 @@ struct Pixel {
     Wide distance;
 };
 
-/// State of a path: throughput (12 fraction bits per channel), accumulated radiance, and number of traced secondary rays.
+/// State of a path: throughput (12 fraction bits per channel), accumulated radiance, number of traced secondary rays, and whether its ray is
+/// inside glass.
 struct Path {
     Colour throughput, radiance;
     int bounces;
+    bool isInside;
 };
 
 class Device : public Tracer {
@@ -60,17 +62,23 @@ public:
         ++counters.raysPrimary;
         RayRequest request = primaryRay(x, y);
         if (!frame_.maySeeObject(x, y)) return directView(pixel, x, y, request);
-        Path path{{one, one, one}, {0, 0, 0}, 0};
+        Path path{{one, one, one}, {0, 0, 0}, 0, false};
         for (bool isPrimary = true;; isPrimary = false) {
             const Ray ray = prepareRay(request, frame_.bounds, numbers_);
             const Hit hit = trace(ray);
             if (!hit.found && isPrimary) return directView(pixel, x, y, request);
             if (!hit.found) return finish(pixel, path, missRadiance(request));
+            const Wide distance = floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t;
+            if (mayBeHidden(path)) {
+                const EnvironmentHit found = isPrimary ? findDirectView(x, y, request) : findHit(request);
+                if (march_->hides(found.point, found.direction, distance, isPrimary, frame_.environment))
+                    return isPrimary ? showDirectView(pixel, request, found) : finish(pixel, path, radianceOf(request, found, true));
+            }
             if (isPrimary) {
                 ++counters.hits;
                 pixel.isObject = true;
                 pixel.triangle = static_cast<std::uint32_t>(hit.id);
-                pixel.distance = floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t;
+                pixel.distance = distance;
             }
             const Face* const face = memory_.faceOf(hit.id);
             if (!face) {
@@ -134,41 +142,67 @@ private:
         return incoming(offSurface(point, normal, frame_.lighting.offset, numbers_), {normal[0], normal[1], normal[2]}, shadows);
     }
 
-    const EnvironmentPoint& count(const EnvironmentPoint& point) {
+    /// Where a ray hits the environment; its direction has components of shadeBits bits.
+    struct EnvironmentHit {
+        Vector direction;
+        EnvironmentPoint point;
+        EnvironmentTexel texel;
+    };
+
+    /// Counts a lookup, and reads its texel if it hits.
+    EnvironmentHit lookedUp(const Vector& direction, const EnvironmentPoint& point) {
+        EnvironmentHit found{direction, point, {}};
+        if (point.kind != EnvironmentPoint::Kind::miss) found.texel = march_->texelOf(point, frame_.environment);
         ++counters.raysEnvironment;
         counters.marchSteps += static_cast<std::uint64_t>(point.steps);
         counters.albedoReads += point.kind == EnvironmentPoint::Kind::map;
-        errors.illegalRecord = errors.illegalRecord || point.isIllegal;
-        return point;
+        errors.illegalRecord = errors.illegalRecord || point.isIllegal || found.texel.isIllegal;
+        return found;
     }
 
-    EnvironmentTexel texelOf(const EnvironmentPoint& point) {
-        const EnvironmentTexel texel = march_->texelOf(point, frame_.environment);
-        errors.illegalRecord = errors.illegalRecord || texel.isIllegal;
-        return texel;
+    EnvironmentHit findHit(const RayRequest& ray) {
+        Vector direction;
+        blockScale(ray.direction, numbers_.shadeBits, direction);
+        return lookedUp(direction, march_->findHit(ray.origin, direction, frame_.environment));
+    }
+
+    EnvironmentHit findDirectView(std::int64_t x, std::int64_t y, const RayRequest& ray) {
+        Vector direction;
+        blockScale(ray.direction, numbers_.shadeBits, direction);
+        return lookedUp(direction, march_->directView(x, y, direction, frame_.environment));
+    }
+
+    bool hasEnvironment() const { return frame_.hasEnvironment && march_.has_value(); }
+
+    /// Whether the environment may hide the hit of a path's ray: there is none of it inside glass.
+    bool mayBeHidden(const Path& path) const { return hasEnvironment() && frame_.environment.occlusion && !path.isInside; }
+
+    Incoming lightAt(const RayRequest& ray, const EnvironmentHit& found, bool shadows) {
+        return environmentLight(march_->hitPosition(ray.origin, found.direction, found.point), found.texel.normal, shadows);
+    }
+
+    /// The colour of the environment where a ray hits it; the background's if it misses.
+    Colour radianceOf(const RayRequest& ray, const EnvironmentHit& found, bool shadows) {
+        if (found.point.kind == EnvironmentPoint::Kind::miss) return frame_.lighting.background;
+        return reflectedBy(found.texel.albedo, lightAt(ray, found, shadows).visible);
     }
 
     /// The colour that a ray sees if it misses the object.
     Colour missRadiance(const RayRequest& ray, bool shadows = true) {
-        if (!frame_.hasEnvironment || !march_) return frame_.lighting.background;
-        Vector direction;
-        blockScale(ray.direction, numbers_.shadeBits, direction);
-        const EnvironmentPoint point = count(march_->findHit(ray.origin, direction, frame_.environment));
-        if (point.kind == EnvironmentPoint::Kind::miss) return frame_.lighting.background;
-        const EnvironmentTexel texel = texelOf(point);
-        return reflectedBy(texel.albedo, environmentLight(march_->hitPosition(ray.origin, direction, point), texel.normal, shadows).visible);
+        return hasEnvironment() ? radianceOf(ray, findHit(ray), shadows) : frame_.lighting.background;
+    }
+
+    /// Completes a pixel whose ray misses the object.
+    Pixel directView(const Pixel& pixel, std::int64_t x, std::int64_t y, const RayRequest& ray) {
+        if (!hasEnvironment() || (!frame_.maySeeObject(x, y) && !frame_.environment.shows(x, y))) return pixel;
+        return showDirectView(pixel, ray, findDirectView(x, y, ray));
     }
 
     /// Completes a pixel that shows the environment itself.
-    Pixel directView(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray) {
-        if (!frame_.hasEnvironment || !march_ || (!frame_.maySeeObject(x, y) && !frame_.environment.shows(x, y))) return pixel;
-        Vector direction;
-        blockScale(ray.direction, numbers_.shadeBits, direction);
-        const EnvironmentPoint point = count(march_->directView(x, y, direction, frame_.environment));
-        if (point.kind == EnvironmentPoint::Kind::miss) return pixel;
-        const EnvironmentTexel texel = texelOf(point);
-        const Incoming light = environmentLight(march_->hitPosition(ray.origin, direction, point), texel.normal, true);
-        pixel.colour = reflectedBy(texel.albedo, light.visible);
+    Pixel showDirectView(Pixel pixel, const RayRequest& ray, const EnvironmentHit& found) {
+        if (found.point.kind == EnvironmentPoint::Kind::miss) return pixel;
+        const Incoming light = lightAt(ray, found, true);
+        pixel.colour = reflectedBy(found.texel.albedo, light.visible);
         for (int channel = 0; channel < 3; ++channel) pixel.ratio[channel] = ratioOf(light.visible[channel], light.unoccluded[channel]);
         return pixel;
     }
@@ -187,11 +221,13 @@ private:
             for (int a = 0; a < 3; ++a) reflection.direction[a] = next.reflection[a];
             reflectionColour = missRadiance(reflection, false);
         }
+        const bool isTinted = !surface.backSide || material.kind == MaterialKind::mirror;
+        path.isInside = next.isRefraction == isTinted;
         for (int channel = 0; channel < 3; ++channel) {
             std::int64_t& throughput = path.throughput[channel];
             // A value of all ones is 1.0
             const std::int64_t albedo = material.albedo[channel] + (material.albedo[channel] >> (numbers_.colourBits - 1));
-            if (!surface.backSide || material.kind == MaterialKind::mirror) throughput = (throughput * albedo) >> numbers_.lightFraction;
+            if (isTinted) throughput = (throughput * albedo) >> numbers_.lightFraction;
             const std::int64_t reflected = (throughput * next.fresnelWeight) >> numbers_.lightFraction;
             path.radiance[channel] = std::min(white(), path.radiance[channel] + ((reflected * reflectionColour[channel]) >> numbers_.lightFraction));
             throughput -= reflected;

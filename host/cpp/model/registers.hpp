@@ -95,6 +95,8 @@ struct Frame {
         environment.boundingPlanes = static_cast<int>(take("environment.boundingPlanes"));
         environment.step = {take("environment.stepX"), take("environment.stepY")};
         environment.window = {take("environment.window.x0"), take("environment.window.y0"), take("environment.window.x1"), take("environment.window.y1")};
+        environment.occlusion = take("environment.occlusion") != 0;
+        environment.occlusionTolerance = take("environment.occlusionTolerance");
     }
 
     /// Name prefix of a table entry's registers.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +14,15 @@ from colonnade.design.generator import design_for, manifest_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.environment.encoded import EncodedEnvironment
+from colonnade.evaluation.studies.ar_losses import PLACEMENTS
 from colonnade.mesh.load import load_mesh
+from colonnade.mesh.mesh import Extent
 from colonnade.registers.frame import frame_registers
-from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene
+from colonnade.registers.occlusion import tolerance_registers
+from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene, Transform
+from colonnade.scene.object_pose import object_pose
 from colonnade.scene.samples import CENTRE, Sample
-from colonnade.scene.view import with_overrides
+from colonnade.scene.view import make_view, with_overrides
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 
@@ -53,6 +58,10 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
     ]
     # A large offset shows on which side of the surface a ray starts
     registers.append(registers[1] | {"shading.offset": 64 * registers[1]["shading.offset"]})
+    # An object that is half below the table's surface
+    sunk = frame_registers(sunken(scene, held, image.header.extent), image.header, design.manifest, 80, 60, held, False)
+    assert sunk["environment.occlusion"] == 1
+    registers += [sunk, sunk | {"environment.occlusionTolerance": 0}, sunk | {"environment.occlusion": 0}]
     simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
     for frame, settings in zip(simulated.frames, registers, strict=True):
         model = render_model(design.manifest, image, settings)
@@ -65,6 +74,57 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
     assert first.is_object.any()
     assert first.ratio is not None and first.ratio.min() < 4096, "there is a shadow"
     assert (first.counters["marchSteps"] > 0) == (kind != "diffuse")
+    hidden, exact, whole = simulated.frames[-3:]
+    assert 0 < hidden.is_object.sum() < whole.is_object.sum()
+    assert not (exact.is_object & ~hidden.is_object).any(), "a smaller tolerance hides more"
+    for frame in (hidden, exact, whole):
+        assert frame.counters["hits"] == frame.is_object.sum()
+        assert (frame.distance[~frame.is_object] == 0).all()
+    assert hidden.counters["raysEnvironment"] >= whole.is_object.sum(), "each hit is tested"
+    differs = (exact.colour != whole.colour).any(axis=2) & exact.is_object
+    assert differs.any() == (kind != "diffuse"), "the room hides hits of later rays"
+
+
+def sunken(scene: Scene, held: EncodedEnvironment, extent: Extent) -> Scene:
+    """The scene with its object 15 cm lower."""
+    pose = object_pose(scene, extent, held.environment)
+    x, y, z = (float(value) for value in pose.translate)
+    turn = (0.0, scene.placement.turn if scene.placement else 0.0, 0.0)
+    return replace(scene, placement=None, transform=Transform(turn, pose.scale, (x, y - 0.15, z)))
+
+
+@pytest.mark.parametrize("room", ["living", "office", "attic"])
+@pytest.mark.parametrize("mesh", ["teapot:8", "bunny"])
+def test_a_standing_object_keeps_its_foot(room: str, mesh: str) -> None:
+    """No pixel is lost where object and room are in contact."""
+    if mesh == "bunny" and "COLONNADE_MESHES" not in os.environ:
+        pytest.skip("COLONNADE_MESHES names no folder with bunny")
+    manifest = manifest_for("small").manifest
+    held = EncodedEnvironment.load(ROOMS / room, manifest)
+    image = with_environment(pack(load_mesh(mesh), manifest), held, manifest)
+    scene = replace(TABLE, placement=PLACEMENTS[room], background=Background(room=ROOMS / room))
+    registers = frame_registers(scene, image.header, manifest, 640, 480, held, relit=False)
+    view = make_view(scene, image.header.extent, 640, 480, image.header.materials, held.environment)
+    tested = registers | tolerance_registers(view, held, image.header, manifest) | {"environment.occlusion": 1}
+    without = render_model(manifest, image, registers | {"environment.occlusion": 0})
+    assert without.is_object.sum() > 500
+    for settings in (registers, tested):
+        np.testing.assert_array_equal(render_model(manifest, image, settings).is_object, without.is_object)
+
+
+def test_occlusion_is_off_where_the_room_cannot_hide_the_object() -> None:
+    """On a free table, and with the scene's key."""
+    manifest = manifest_for("small").manifest
+    held = EncodedEnvironment.load(ROOMS / "living", manifest)
+    header = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest).header
+
+    def occlusion(scene: Scene) -> int:
+        return frame_registers(scene, header, manifest, 160, 120, held)["environment.occlusion"]
+
+    free = replace(TABLE, placement=PLACEMENTS["living"])
+    sunk = sunken(TABLE, held, header.extent)
+    assert occlusion(free) == 0 and occlusion(sunk) == 1
+    assert occlusion(replace(sunk, background=replace(sunk.background, occlusion=False))) == 0
 
 
 @pytest.mark.parametrize("light", [TABLE.light, Light((1.2, 2.0, 2.0)), Light((0.1, 0.9, 2.4), radius=0.3)])

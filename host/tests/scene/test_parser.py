@@ -71,6 +71,7 @@ def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
         ('[mesh]\nname = "a"\n[paths]\nbounces = 16', "paths.bounces must be a whole number from 0 to 15"),
         ('[mesh]\nname = "a"\n[paths]\nshadow_transmittance = 2', "paths.shadow_transmittance must be a number"),
         ('[mesh]\nname = "a"\n[background]\nroom = 3', "background.room must be text"),
+        ('[mesh]\nname = "a"\n[background]\nocclusion = 1', "background.occlusion must be true or false"),
         ('[mesh]\nname = "a"\n[background]\nroom = "r"\n[camera]\nfov = 30', "the camera is the room's"),
         ('[mesh]\nname = "a"\n[object]\nsize = 1', "needs background.room"),
         ('[mesh]\nname = "a"\n[object]\n[transform]\nscale = 2\n[background]\nroom = "r"', "leave out transform.scale"),

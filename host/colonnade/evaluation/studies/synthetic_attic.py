@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,29 +54,38 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Attic:
-    """The room's maps, and its whole surface in world space."""
+class SyntheticRoom:
+    """A room's maps, and its whole surface in world space."""
 
     environment: Environment
     surface: Triangles
 
 
-def attic(width: int = 640, height: int = 480) -> Attic:
+def attic(width: int = 640, height: int = 480) -> SyntheticRoom:
     """Render the attic's maps."""
-    parts = _parts()
+    return synthetic_room("attic", _parts(), camera_at(EYE, TARGET, width, height), width, height)
+
+
+def synthetic_room(
+    name: str, parts: Sequence[Part], camera: EnvironmentCamera, width: int, height: int
+) -> SyntheticRoom:
+    """Render the maps of a room that is made of parts.
+
+    Raises:
+        ValueError: The camera sees through the room.
+    """
     starts = np.cumsum([0] + [len(part.vertices) for part in parts])
     faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
     owner = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
     surface = Triangles(np.concatenate([part.vertices for part in parts]), faces.astype(np.int32))
     tracer = RayTracer(surface)
 
-    camera = _camera(width, height)
     rotation, eye = camera.to_world[:, :3], camera.to_world[:, 3]
     directions = camera.directions(width, height).reshape(-1, 3) @ rotation.T
     origins = np.broadcast_to(eye, directions.shape)
     hit_faces = tracer.first_hits(origins, directions)
     if (hit_faces < 0).any():
-        raise ValueError("the attic has a hole")
+        raise ValueError(f"the {name} has a hole")
     points = tracer.surface_points(hit_faces, origins, directions)
     corners = tracer.corners[hit_faces]
     normals = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
@@ -94,7 +104,7 @@ def attic(width: int = 640, height: int = 480) -> Attic:
     light = albedo * (AMBIENT + LAMP_COLOUR * (cosine * lit * falloff)[:, None])
     shape = (height, width, 3)
     environment = Environment(
-        name="attic",
+        name=name,
         albedo=albedo.reshape(shape),
         normals=(normals @ rotation).reshape(shape),
         depth=points.t.reshape(height, width),
@@ -102,7 +112,7 @@ def attic(width: int = 640, height: int = 480) -> Attic:
         camera=camera,
         photo=encode_srgb(light).reshape(shape),
     )
-    return Attic(environment, surface)
+    return SyntheticRoom(environment, surface)
 
 
 def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
@@ -135,10 +145,11 @@ def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
         stream.write((json.dumps(meta, indent=1) + "\n").encode())
 
 
-def _camera(width: int, height: int) -> EnvironmentCamera:
-    forward = unit_vectors((TARGET - EYE)[None])[0]
+def camera_at(eye: Floats, target: Floats, width: int, height: int) -> EnvironmentCamera:
+    """A camera of the attic's focal length at a point, float64 [3], that looks at another one."""
+    forward = unit_vectors((target - eye)[None])[0]
     right = unit_vectors(np.cross(forward, [0.0, 1.0, 0.0])[None])[0]
-    pose = np.column_stack([right, np.cross(forward, right), forward, EYE])
+    pose = np.column_stack([right, np.cross(forward, right), forward, eye])
     return EnvironmentCamera(FOCAL * width, FOCAL * width, width / 2, height / 2, pose)
 
 
@@ -148,23 +159,23 @@ def _parts() -> list[Part]:
     walls, floor = plaster((0.72, 0.68, 0.60)), boards((0.52, 0.36, 0.22), 0, 2, 0.16)
     roof = boards((0.60, 0.47, 0.33), 2, 0, 0.45)
     parts = [
-        _quad([west, 0, front], [east, 0, front], [east, 0, far], [west, 0, far], floor),
-        _quad([west, 0, front], [west, knee, front], [west, knee, back], [west, 0, back], walls),
-        _quad([east, 0, front], [east, knee, front], [east, knee, far], [east, 0, far], walls),
-        _quad([west, knee, front], [0, ridge, front], [0, ridge, far], [west, knee, far], roof),
-        _quad([east, knee, front], [0, ridge, front], [0, ridge, far], [east, knee, far], roof),
+        quad([west, 0, front], [east, 0, front], [east, 0, far], [west, 0, far], floor),
+        quad([west, 0, front], [west, knee, front], [west, knee, back], [west, 0, back], walls),
+        quad([east, 0, front], [east, knee, front], [east, knee, far], [east, 0, far], walls),
+        quad([west, knee, front], [0, ridge, front], [0, ridge, far], [west, knee, far], roof),
+        quad([east, knee, front], [0, ridge, front], [0, ridge, far], [east, knee, far], roof),
         # The L: a wall to the left of the bend, and an arm to its right.
-        _quad([west, 0, back], [bend, 0, back], [bend, ridge, back], [west, ridge, back], plaster((0.35, 0.48, 0.58))),
-        _quad([bend, 0, back], [bend, 0, far], [bend, ridge, far], [bend, ridge, back], walls),
-        _quad([west, 0, far], [east, 0, far], [east, ridge, far], [west, ridge, far], plaster((0.66, 0.42, 0.34))),
-        _quad([west, 0, front], [east, 0, front], [east, ridge, front], [west, ridge, front], walls),
-        _cylinder((-0.95, 1.5, -1.55), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.45, 0.20, 0.16))),
-        _cylinder((1.45, 1.5, -2.75), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.16, 0.30, 0.22))),
+        quad([west, 0, back], [bend, 0, back], [bend, ridge, back], [west, ridge, back], plaster((0.35, 0.48, 0.58))),
+        quad([bend, 0, back], [bend, 0, far], [bend, ridge, far], [bend, ridge, back], walls),
+        quad([west, 0, far], [east, 0, far], [east, ridge, far], [west, ridge, far], plaster((0.66, 0.42, 0.34))),
+        quad([west, 0, front], [east, 0, front], [east, ridge, front], [west, ridge, front], walls),
+        cylinder((-0.95, 1.5, -1.55), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.45, 0.20, 0.16))),
+        cylinder((1.45, 1.5, -2.75), 0.13, 1.5, spiral((0.80, 0.78, 0.72), (0.16, 0.30, 0.22))),
         # A round table, a rug and a rotated chest.
-        _cylinder((0.15, 0.70, -0.35), 0.55, 0.025, rings((0.62, 0.42, 0.24), 0.055)),
-        _cylinder((0.15, 0.35, -0.35), 0.07, 0.35, plaster((0.30, 0.22, 0.16))),
-        _cylinder((-0.2, 0.004, -0.6), 1.25, 0.004, rings((0.55, 0.14, 0.16), 0.21)),
-        _box((1.6, 0.3, -0.9), (0.45, 0.3, 0.3), 32.0, boards((0.36, 0.44, 0.25), 0, 1, 0.14)),
+        cylinder((0.15, 0.70, -0.35), 0.55, 0.025, rings((0.62, 0.42, 0.24), 0.055)),
+        cylinder((0.15, 0.35, -0.35), 0.07, 0.35, plaster((0.30, 0.22, 0.16))),
+        cylinder((-0.2, 0.004, -0.6), 1.25, 0.004, rings((0.55, 0.14, 0.16), 0.21)),
+        box((1.6, 0.3, -0.9), (0.45, 0.3, 0.3), 32.0, boards((0.36, 0.44, 0.25), 0, 1, 0.14)),
     ]
     ball, faces = primitives.sphere(6)
     parts.append(Part(ball * 0.38 + (-1.5, 0.38, -0.5), faces, stripes, (-1.5, 0.38, -0.5), True))
@@ -173,11 +184,12 @@ def _parts() -> list[Part]:
     return parts
 
 
-def _quad(a: list[float], b: list[float], c: list[float], d: list[float], paint: Paint) -> Part:
+def quad(a: list[float], b: list[float], c: list[float], d: list[float], paint: Paint) -> Part:
+    """A flat part with four corners."""
     return Part(np.array([a, b, c, d], dtype=np.float64), np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32), paint)
 
 
-def _cylinder(centre: tuple[float, float, float], radius: float, half: float, paint: Paint) -> Part:
+def cylinder(centre: tuple[float, float, float], radius: float, half: float, paint: Paint) -> Part:
     """An upright cylinder."""
     vertices, faces = primitives.cylinder(128)
     axis = int(np.argmin([len(np.unique(vertices[:, k].round(9))) for k in range(3)]))
@@ -185,7 +197,8 @@ def _cylinder(centre: tuple[float, float, float], radius: float, half: float, pa
     return Part(upright * (radius, half, radius) + centre, faces, paint, centre)
 
 
-def _box(centre: tuple[float, float, float], half: tuple[float, float, float], degrees: float, paint: Paint) -> Part:
+def box(centre: tuple[float, float, float], half: tuple[float, float, float], degrees: float, paint: Paint) -> Part:
+    """A box, turned about the vertical."""
     vertices, faces = primitives.cube()
     angle = np.radians(degrees)
     rotation = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from colonnade.cli.main import cli
 from colonnade.evaluation.studies.environment_accuracy import study, table
 from colonnade.evaluation.studies.probe_spheres import RADIUS, cosine_rays, glass_rays, mirror_rays, standing_spheres
-from colonnade.evaluation.studies.synthetic_attic import Attic, attic, write_attic
+from colonnade.evaluation.studies.synthetic_attic import SyntheticRoom, attic, write_attic
 from colonnade.reference.embree import RayTracer
 from colonnade.reference.environment.ray_march import (
     HIDDEN,
@@ -30,11 +30,11 @@ from colonnade.reference.environment.surface import Backdrop
 
 
 @pytest.fixture(scope="module")
-def made() -> Attic:
+def made() -> SyntheticRoom:
     return attic(160, 120)
 
 
-def test_spheres_are_free_and_visible(made: Attic) -> None:
+def test_spheres_are_free_and_visible(made: SyntheticRoom) -> None:
     environment, tracer = made.environment, RayTracer(made.surface)
     centres = standing_spheres(environment)
     assert len(centres) == 6
@@ -48,7 +48,7 @@ def test_spheres_are_free_and_visible(made: Attic) -> None:
     assert gaps.min() > 2 * RADIUS
 
 
-def test_rays_leave_their_sphere(made: Attic) -> None:
+def test_rays_leave_their_sphere(made: SyntheticRoom) -> None:
     centre = standing_spheres(made.environment)[0]
     for rays in (mirror_rays(centre), glass_rays(centre), cosine_rays(centre, 500, np.random.default_rng(1))):
         outward = np.einsum("ni,ni->n", rays.origins - centre, rays.directions)
@@ -60,7 +60,7 @@ def test_rays_leave_their_sphere(made: Attic) -> None:
     np.testing.assert_allclose(straight.directions[middle], axis, atol=0.02)
 
 
-def test_the_march_hits_the_true_surface(made: Attic) -> None:
+def test_the_march_hits_the_true_surface(made: SyntheticRoom) -> None:
     environment = made.environment
     march = DepthMarch(environment)
     rays = cosine_rays(standing_spheres(environment)[0], 2000, np.random.default_rng(5))
@@ -76,7 +76,7 @@ def test_the_march_hits_the_true_surface(made: Attic) -> None:
     assert (away < 0.1).mean() > 0.9
 
 
-def test_the_study_separates_good_and_bad_marches(made: Attic) -> None:
+def test_the_study_separates_good_and_bad_marches(made: SyntheticRoom) -> None:
     environment = made.environment
     march = DepthMarch(environment)
 
@@ -101,7 +101,7 @@ def test_the_study_separates_good_and_bad_marches(made: Attic) -> None:
     assert len(table({"good": good, "none": none}).splitlines()) == 4
 
 
-def test_a_function_of_arrays_becomes_a_march_and_a_geometry(made: Attic) -> None:
+def test_a_function_of_arrays_becomes_a_march_and_a_geometry(made: SyntheticRoom) -> None:
     environment = made.environment
     march = DepthMarch(environment)
     rays = mirror_rays(standing_spheres(environment)[0])
@@ -115,7 +115,7 @@ def test_a_function_of_arrays_becomes_a_march_and_a_geometry(made: Attic) -> Non
     np.testing.assert_array_equal(points.outside, (met.kind != HIT) & (met.kind != HIDDEN))
 
 
-def test_an_origin_just_behind_the_surface_is_on_it(made: Attic) -> None:
+def test_an_origin_just_behind_the_surface_is_on_it(made: SyntheticRoom) -> None:
     environment = made.environment
     row, column = 100, 80
     point = environment.points()[row, column]

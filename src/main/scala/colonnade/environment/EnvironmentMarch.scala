@@ -42,7 +42,7 @@ final class EnvironmentMarch(config: ColonnadeConfig) extends Module {
       request
     )
   )
-  private val surface = prefix("surface")(new SurfacePoint(operations, texel, resolver, io.view, request))
+  private val surface = prefix("surface")(new SurfacePoint(operations, stepper, texel, resolver, io.view, request))
   private val isBusy  = WireInit(true.B)
 
   val program: Microprogram[MarchLabel] = operations.program

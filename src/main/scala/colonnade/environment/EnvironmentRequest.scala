@@ -13,4 +13,7 @@ final class EnvironmentRequest(config: ColonnadeConfig) extends Bundle {
 
   /** The ray is the deferred Fresnel reflection of a path. */
   val isFresnelReflection = Bool()
+
+  /** The ray has hit the object: does the environment hide the hit? */
+  val isOcclusionTest = Bool()
 }

@@ -24,9 +24,13 @@ final class EnvironmentStageIO(config: ColonnadeConfig) extends Bundle {
 
   val req = Flipped(Decoupled(new EnvironmentRequest(config)))
 
-  /** The result: a point to shade, or a context whose ray misses. */
+  /** In the cycle after an occlusion test's `req`: the distance of its hit. */
+  val hitDistance = Input(HitDistance(config))
+
+  /** The result: a point to shade, a context whose ray misses, or one whose occlusion test finds its hit visible. */
   val surface = Decoupled(new EnvironmentSurface(config))
   val miss    = Valid(Context(config))
+  val visible = Valid(Context(config))
   val maps    = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
   val events  = Output(new MarchEvents)
 }
@@ -56,11 +60,12 @@ final class EnvironmentStage(config: ColonnadeConfig) extends Module {
   march.io.request.bits.context      := req.context
   march.io.request.bits.isDirectView := req.isDirectView
   march.io.request.bits.ray          := held
+  march.io.request.bits.hitDistance  := RegEnable(io.hitDistance, isTaken)
   io.maps <> march.io.maps
   io.events := march.io.events
 
   private val result = march.io.result
-  private val isHit  = result.bits.kind =/= HitKind.miss.U
+  private val isHit  = Mux(req.isOcclusionTest, result.bits.hidesObject, result.bits.kind =/= HitKind.miss.U)
   io.surface.valid        := result.valid && isHit
   io.surface.bits.context := result.bits.context
   io.surface.bits.point   := result.bits.point
@@ -69,7 +74,9 @@ final class EnvironmentStage(config: ColonnadeConfig) extends Module {
   io.surface.bits.albedo.channels.zip(Seq(result.bits.albedo.r, result.bits.albedo.g, result.bits.albedo.b)).foreach {
     case (to, from) => to := from
   }
-  io.miss.valid := result.valid && !isHit
-  io.miss.bits  := result.bits.context
-  result.ready  := !isHit || io.surface.ready
+  io.miss.valid    := result.valid && !isHit && !req.isOcclusionTest
+  io.miss.bits     := result.bits.context
+  io.visible.valid := result.valid && !isHit && req.isOcclusionTest
+  io.visible.bits  := result.bits.context
+  result.ready     := !isHit || io.surface.ready
 }

@@ -29,6 +29,14 @@ final class MarchRequest(config: ColonnadeConfig) extends Bundle {
   /** The ray comes from the camera: it hits what the maps show in its pixel. */
   val isDirectView = Bool()
   val ray          = new EnvironmentRay(config)
+
+  /** The distance of the object on this ray; see [[MarchResult.hidesObject]]. */
+  val hitDistance = HitDistance(config)
+}
+
+/** The distance of the object's hit from the ray's origin along its dominant axis, in grid steps. */
+object HitDistance {
+  def apply(config: ColonnadeConfig): UInt = UInt((config.numbers.sceneBits + 1).W)
 }
 
 /** Kinds of [[MarchResult]]. */
@@ -73,6 +81,11 @@ final class MarchResult(config: ColonnadeConfig) extends Bundle {
   /** Of the maps; the normal is in the object's space. */
   val albedo = new AlbedoEntry
   val normal = Vec3(SInt(NumberFormats.normalBits.W))
+
+  /** The point is of the map, visible to the camera, and nearer than the request's `hitDistance` by more than the
+    * tolerance; and if the ray does not come from the camera, also farther than the tolerance from its origin.
+    */
+  val hidesObject = Bool()
 
   /** A response of the maps was illegal. */
   val isIllegal = Bool()

@@ -10,6 +10,7 @@ import colonnade.numbers.{Fixed, Rounding}
 /** The hit point, from its distance and the ray's origin; and its normal, rotated to the object's space. */
 final class SurfacePoint(
     m:        MarchOperations,
+    stepper:  TileStepper,
     texel:    TexelFetch,
     resolver: HitResolver,
     view:     EnvironmentView,
@@ -24,6 +25,10 @@ final class SurfacePoint(
   private val point    = Reg(Vec(3, SInt(sceneBits.W)))
   private val normal   = Reg(Vec(3, SInt(NumberFormats.normalBits.W)))
 
+  /** On the axes so far, the point is nearer than the object's hit; on one of them, it is off the ray's origin. */
+  private val isNearer = Reg(Bool())
+  private val isAway   = Reg(Bool())
+
   private val distance  = m.quotient.zext
   private val mapNormal = Seq(texel.normal.x, texel.normal.y, texel.normal.z).map(_.integer)
 
@@ -35,6 +40,10 @@ final class SurfacePoint(
     val max   = ((BigInt(1) << (bits - 1)) - 1).S(sceneBits.W)
     Mux(isFar, Mux(sign, ~max, max), Rounding.narrow(position, sceneBits))
   }
+
+  /** The length of the offset along its axis. */
+  private val travelled = Mux(offset < 0.S, ~offset, offset).asUInt
+
   private val rotated = {
     val exact = Rounding.narrow(m.sum, EnvironmentView.rotationBits + NumberFormats.normalBits + 2)
     Rounding.saturate(Rounding.nearestEven(exact, EnvironmentView.rotationFraction), NumberFormats.normalBits)
@@ -42,8 +51,10 @@ final class SurfacePoint(
 
   /** Connects the result, which is valid in `Finish`. */
   def result(to: MarchResult): Unit = {
-    val isHit = resolver.kind =/= HitKind.miss.U
-    to.albedo := Mux(isHit, texel.albedo, 0.U.asTypeOf(texel.albedo))
+    val isHit  = resolver.kind =/= HitKind.miss.U
+    val isSeen = resolver.kind === HitKind.map.U && !stepper.isBehind
+    to.albedo      := Mux(isHit, texel.albedo, 0.U.asTypeOf(texel.albedo))
+    to.hidesObject := isSeen && isNearer && isAway
     for (axis <- 0 until 3) {
       to.point.axes(axis)  := Fixed(to.point.x.format, Mux(isHit, point(axis), 0.S))
       to.normal.axes(axis) := Mux(isHit, normal(axis), 0.S)
@@ -54,7 +65,11 @@ final class SurfacePoint(
   def describe(): Unit = {
     label(Point)
     overlap { at =>
-      at(0)(await(texel.isReady, "texel"))
+      at(0) {
+        set(isNearer, true.B)
+        set(isAway, request.isDirectView)
+        await(texel.isReady, "texel")
+      }
       for (axis <- 0 until 3) rotateNormal(at, axis, begin = 3 * axis)
     }
     m.awaitDivision()
@@ -70,7 +85,11 @@ final class SurfacePoint(
       m.setShift(f.S - resolver.exponent)
     }
     at(begin + 3)(set(offset, m.summand))
-    at(begin + 4)(set(position, m.combine(offset, request.ray.origin.axes(axis).integer)))
+    at(begin + 4) {
+      set(position, m.combine(offset, request.ray.origin.axes(axis).integer))
+      set(isNearer, isNearer && travelled +& view.occlusionTolerance < request.hitDistance)
+      set(isAway, isAway || travelled > view.occlusionTolerance)
+    }
     at(begin + 5)(set(point(axis), clamped))
   }
 

@@ -33,6 +33,12 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
 
   /** The pixels that show the environment directly. Other background pixels have the background's colour and ratio 1. */
   val window = new PixelRect(numbers.coordinateBits)
+
+  /** The environment hides the object where its point is nearer by more than the tolerance, in grid steps along the ray's
+    * dominant axis.
+    */
+  val occlusion          = Bool()
+  val occlusionTolerance = UInt((numbers.gridBits - 2).W)
 }
 
 object EnvironmentView {

@@ -86,6 +86,7 @@ final class BounceScheduler(config: ColonnadeConfig) extends Module {
   io.bounced.valid         := bounce.fire
   io.bounced.bits.context  := context
   io.bounced.bits.isTraced := isTraced
+  io.bounced.bits.isInside := bounce.bits.isRefraction === bounce.bits.update.isTinted
   io.isRefraction          := bounce.bits.isRefraction
 
   private def deferBounces(environment: DeferredBounceIO): Unit = {

@@ -55,6 +55,9 @@ final class Bounced(config: ColonnadeConfig) extends Bundle {
 
   /** The ray is traced through the object; otherwise it only meets the background or the environment. */
   val isTraced = Bool()
+
+  /** The ray is inside glass, where the environment hides nothing. */
+  val isInside = Bool()
 }
 
 /** A context whose deferred Fresnel reflection is complete, so that its bounce may resume. */
@@ -65,11 +68,14 @@ final class ResumedBounce(config: ColonnadeConfig) extends Bundle {
   val isBackground = Bool()
 }
 
-/** Control of rays that miss the object, if there may be an environment. */
+/** Control of rays that miss the object or whose hit may be hidden, if there may be an environment. */
 final class EnvironmentControl(config: ColonnadeConfig) extends Bundle {
 
   /** This frame has an environment. */
   val enabled = Input(Bool())
+
+  /** The environment may hide the object. */
+  val occlusion = Input(Bool())
 
   /** A primary ray that cannot hit the object. */
   val bypass = Flipped(Valid(Context(config)))
@@ -77,10 +83,11 @@ final class EnvironmentControl(config: ColonnadeConfig) extends Bundle {
   /** A Fresnel reflection that is resolved first, while its path's bounce is deferred. */
   val fresnelReflection = Flipped(Valid(Context(config)))
 
-  /** A ray to march through the environment; its result. */
-  val req  = Decoupled(new EnvironmentRequest(config))
-  val hit  = Flipped(Valid(Context(config)))
-  val miss = Flipped(Valid(Context(config)))
+  /** A ray to march through the environment; its result. An occlusion test ends in `hit` or `visible`. */
+  val req     = Decoupled(new EnvironmentRequest(config))
+  val hit     = Flipped(Valid(Context(config)))
+  val miss    = Flipped(Valid(Context(config)))
+  val visible = Flipped(Valid(Context(config)))
 
   /** A deferred bounce that may resume. */
   val resume = Decoupled(new ResumedBounce(config))
@@ -110,6 +117,12 @@ final class TraceControl(config: ColonnadeConfig) extends Bundle {
 
   /** The ended ray that is resolved in this cycle. */
   val resolved = Flipped(Valid(Context(config)))
+
+  /** That ray has a surface to shade. */
+  val shades = Input(Bool())
+
+  /** A context whose hit's distance is read; not in a cycle with `shades`. */
+  val measured = Flipped(Valid(Context(config)))
 
   /** By context: its ray is a shadow ray; its ray is the primary ray. */
   val isShadow  = Input(Vec(contexts, Bool()))

@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Decoupled
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.environment.{AttributePort, EnvironmentStage, MarchEvents}
+import colonnade.environment.{AttributePort, EnvironmentStage, HitDistance, MarchEvents}
 import colonnade.formats.{EnvironmentView, PixelPosition}
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
@@ -20,6 +20,9 @@ final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
   val objectRays  = Decoupled(new RayRequest(config))
   val bounces     = if (config.frame.hasBounces) Some(Flipped(new DeferredBounceIO(config))) else None
 
+  /** In the cycle after an occlusion test's `control.req`: the distance of its hit. */
+  val hitDistance = Input(HitDistance(config))
+
   /** Points of the environment to shade. */
   val surfaces = Decoupled(new EnvironmentSurface(config))
   val maps     = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
@@ -27,21 +30,24 @@ final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Routes rays to the environment march: every ray that may miss the object is stored there. A primary ray that cannot
-  * hit the object bypasses ray set-up.
+  * hit the object bypasses ray set-up. The ray of a hit that the environment may hide is marched too.
   */
 final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentPortIO(config))
 
   private val stage   = Module(new EnvironmentStage(config))
   private val control = io.control
-  control.enabled := io.view.enabled
-  stage.io.view   := io.view
+  control.enabled   := io.view.enabled
+  control.occlusion := io.view.occlusion
+  stage.io.view     := io.view
   io.maps <> stage.io.maps
   io.events := stage.io.events
 
   // March
   stage.io.req :<>= control.req
-  control.miss := stage.io.miss
+  control.miss         := stage.io.miss
+  control.visible      := stage.io.visible
+  stage.io.hitDistance := io.hitDistance
   io.surfaces :<>= stage.io.surface
   control.hit.valid := stage.io.surface.fire
   control.hit.bits  := stage.io.surface.bits.context

@@ -2,10 +2,11 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, Arbiter, Decoupled, Pipe, RegEnable, Valid}
-import colonnade.common.Context
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
+import colonnade.environment.HitDistance
 import colonnade.formats.{RecordFormats, SceneMap}
-import colonnade.numbers.Fixed
+import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PreparedRay, RayFormats}
 import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanes}
 
@@ -17,6 +18,13 @@ final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
   /** Packed triangle id. */
   val id = UInt(RecordFormats.idBits(config).W)
   val t  = new Fixed(new RayFormats(config.numbers).grid)
+
+  /** From the ray's origin along its dominant axis. */
+  val distance = if (SurfaceHit.hasDistance(config)) Some(HitDistance(config)) else None
+}
+
+object SurfaceHit {
+  def hasDistance(config: ColonnadeConfig): Boolean = config.frame.hits || config.hasEnvironment
 }
 
 /** Events of [[Intersector]]; names as in `UnitEvents`. */
@@ -59,7 +67,9 @@ final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
   val nodesReadyNext     = Output(Bool())
   val trianglesReadyNext = Output(Bool())
 
-  /** A resolved context whose ray has a surface to shade; one cycle later its hit. */
+  /** A resolved context whose ray has a surface to shade; one cycle later its hit. After `control.measured`, the hit's
+    * distance comes in the same way.
+    */
   val hasSurface = Valid(Context(config))
   val surfaceHit = Valid(new SurfaceHit(config))
   val closestHit = Flipped(new GrantedHitReader(config))
@@ -123,19 +133,28 @@ final class Intersector(config: ColonnadeConfig) extends Module {
 
   // Fetch the attributes of a hit, unless it belongs to a shadow ray
   private val resolved   = control.resolved.bits
-  private val hasSurface = control.resolved.valid && hitTable.io.hasHit(resolved) && !control.isShadow(resolved)
+  private val hasSurface = control.shades
   private val closest    = hitTable.io.closest
   drive(io.hasSurface, hasSurface, resolved)
-  closest.context              := RegEnable(resolved, hasSurface)
+  private val reads   = hasSurface || control.measured.valid
+  private val readHit = Mux(control.measured.valid, control.measured.bits, resolved)
+  closest.context              := RegEnable(readHit, reads)
   io.surfaceHit.valid          := RegNext(hasSurface, false.B)
   io.surfaceHit.bits.context   := closest.context
   io.surfaceHit.bits.isPrimary := RegNext(control.isPrimary(resolved))
   io.surfaceHit.bits.id        := closest.id
   io.surfaceHit.bits.t         := closest.t
-  io.fetches(2).valid          := io.surfaceHit.valid
-  io.fetches(2).bits.context   := closest.context
-  io.fetches(2).bits.kind      := RecordKind.attributes
-  io.fetches(2).bits.address   := io.scene.attributeBase + (closest.id >> RecordFormats.faceSlotBits)
+  for (distance <- io.surfaceHit.bits.distance) {
+    val entries = ContextTable(config, UInt(config.numbers.entryBits.W))
+    when(io.entered.valid) { entries.write(ray.context, ray.tEntry.natural) }
+    val tEntry = entries.read(readHit, reads)
+    distance := Rounding.floor(tEntry, -config.numbers.gridFraction) +& closest.t.integer.asUInt
+  }
+  assert(!(hasSurface && control.measured.valid), "one hit is read in a cycle")
+  io.fetches(2).valid        := io.surfaceHit.valid
+  io.fetches(2).bits.context := closest.context
+  io.fetches(2).bits.kind    := RecordKind.attributes
+  io.fetches(2).bits.address := io.scene.attributeBase + (closest.id >> RecordFormats.faceSlotBits)
 
   io.nodesReadyNext     := traversal.io.readyNext
   io.trianglesReadyNext := triangles.io.readyNext

@@ -5,8 +5,6 @@ import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, PixelPosition, Rgb}
-import colonnade.numbers.Rounding
-import colonnade.ray.PreparedRay
 import colonnade.shading.PathColour
 
 /** Ports of [[PixelAssembler]]. */
@@ -14,8 +12,7 @@ final class PixelAssemblerIO(config: ColonnadeConfig) extends Bundle {
   val background = Input(Rgb(FrameRegisters.colour))
   val allocated  = Flipped(Valid(new AllocatedPixel(config)))
 
-  /** A ray that enters the object's box; a context whose ray has a surface; one cycle later its hit. */
-  val entered    = Flipped(Valid(new PreparedRay(config)))
+  /** A context whose ray has a surface; one cycle later its hit. */
   val hasSurface = Flipped(Valid(Context(config)))
   val surfaceHit = Flipped(Valid(new SurfaceHit(config)))
   val colour     = Flipped(Valid(new PathColour(config)))
@@ -67,17 +64,13 @@ final class PixelAssembler(config: ColonnadeConfig) extends Module {
     ratio.channels(channel) :=
       Mux(hasColour && !finished.bits.isObject, shadow.channels(channel), FrameRegisters.one)
 
-  // The primary ray's hit; its distance is the sum of the entry distance and t
-  for (hit <- finished.bits.hit) {
-    val hits    = ContextTable(config, new PixelHit(config))
-    val entries = ContextTable(config, UInt(config.numbers.entryBits.W))
-    when(io.entered.valid) { entries.write(io.entered.bits.context, io.entered.bits.tEntry.natural) }
-    val tEntry = entries.read(io.hasSurface.bits, io.hasSurface.valid)
+  // The primary ray's hit
+  for (hit <- finished.bits.hit; distance <- io.surfaceHit.bits.distance) {
+    val hits = ContextTable(config, new PixelHit(config))
     when(io.surfaceHit.valid && io.surfaceHit.bits.isPrimary) {
       val primary = Wire(new PixelHit(config))
       primary.triangle     := io.surfaceHit.bits.id
-      primary.distance.raw :=
-        Rounding.floor(tEntry, -config.numbers.gridFraction) +& io.surfaceHit.bits.t.integer.asUInt
+      primary.distance.raw := distance
       hits.write(io.surfaceHit.bits.context, primary)
     }
     val read = hits.read(done.bits, retires)

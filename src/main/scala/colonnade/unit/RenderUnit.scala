@@ -65,11 +65,12 @@ final class RenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config)
     colourUnit.bounce.get :<>= bounces.update
   }
 
-  // Rays that miss the object march through the environment
+  // Rays that miss the object, or whose hit may be hidden, march through the environment
   for (environment <- environment) {
     environment.primary :<>= primaryRays.ray
     environment.pixel       := primaryRays.pixel
     environment.meetsObject := primaryRays.meetsObject
+    environment.hitDistance := intersector.surfaceHit.bits.distance.get
     for (bounces <- bounces) environment.bounces.get :<>= bounces.environment.get
     shader.environment.get :<>= environment.surfaces
     io.maps.get <> environment.maps
@@ -79,7 +80,6 @@ final class RenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config)
   colourUnit.end :<>= controller.end
   colourUnit.surface   := lit
   assembler.allocated  := primaryRays.allocated
-  assembler.entered    := intersector.entered
   assembler.hasSurface := intersector.hasSurface
   assembler.surfaceHit := intersector.surfaceHit
   assembler.colour     := colourUnit.colour

@@ -14,7 +14,8 @@ import colonnade.shading.Occlusion
   * misses goes to accumulatePending.
   *
   * With an environment, a ray that misses goes environmentPending → environmentMarch → shading; if it hits nothing there
-  * either, it continues as above. At glass, the Fresnel reflection is resolved first: shading → environmentPending →
+  * either, it continues as above. A hit that the environment may hide is tested there as well: resolve →
+  * environmentPending → environmentMarch, and back to resolve if it is visible. At glass, the Fresnel reflection is resolved first: shading → environmentPending →
   * environmentMarch → shading → shadowTest, then the deferred bounce resumes. If the reflection misses, the context waits
   * in resumeBounce.
   *
@@ -41,6 +42,12 @@ final class RtController(config: ColonnadeConfig) extends Module {
     if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
   private val hasEnvironment = io.environment.map(_.enabled).getOrElse(false.B)
 
+  /** A hit of the ray still needs an occlusion test; it is tested. */
+  private val mayBeHidden = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val isOcclusionTest =
+    if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val hasOcclusion = io.environment.map(_.occlusion).getOrElse(false.B) && hasEnvironment
+
   /** By light: a shadow ray is still to be traced; the results of those that were traced. */
   private val shadowPending = Reg(Vec(contexts, Vec(lights, Bool())))
   private val occlusions    = Reg(Vec(contexts, Vec(lights, Occlusion())))
@@ -61,6 +68,8 @@ final class RtController(config: ColonnadeConfig) extends Module {
     if (config.hasEnvironment) {
       isFresnelReflection(free.bits) := false.B
       isDirectView(free.bits)        := false.B
+      mayBeHidden(free.bits)         := hasOcclusion
+      isOcclusionTest(free.bits)     := false.B
     }
   }
 
@@ -72,7 +81,10 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.trace.ended.foreach(ended => when(ended.valid) { state(ended.bits) := ContextState.resolve })
 
   // Resolve an ended ray
-  private val resolved = io.trace.resolved.bits
+  private val resolved   = io.trace.resolved.bits
+  private val hasVisible = io.trace.hasHit(resolved) && !mayBeHidden(resolved)
+  io.trace.shades   := io.trace.resolved.valid && !isShadow(resolved) && hasVisible
+  io.trace.measured := 0.U.asTypeOf(io.trace.measured)
   when(io.trace.resolved.valid) {
     when(isShadow(resolved)) {
       state(resolved) := ContextState.shadowTest
@@ -80,12 +92,16 @@ final class RtController(config: ColonnadeConfig) extends Module {
         when((lights == 1).B || shadowLight(resolved) === light.U) {
           occlusions(resolved)(light) := io.trace.occlusions(resolved)
         }
-    }.elsewhen(io.trace.hasHit(resolved)) {
+    }.elsewhen(hasVisible) {
       state(resolved) := ContextState.shading
     }.otherwise {
       state(resolved) := Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
     }
     isBackground(resolved) := !isShadow(resolved) && !io.trace.hasHit(resolved)
+    if (config.hasEnvironment) {
+      mayBeHidden(resolved)     := false.B
+      isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit(resolved) && mayBeHidden(resolved)
+    }
   }
 
   // Results of the shader
@@ -100,6 +116,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
     state(io.bounced.bits.context)        := Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced)
     isPrimary(io.bounced.bits.context)    := false.B
     isBackground(io.bounced.bits.context) := true.B
+    if (config.hasEnvironment) mayBeHidden(io.bounced.bits.context) := hasOcclusion && !io.bounced.bits.isInside
   }
   when(io.fetchFailed.valid) {
     state(io.fetchFailed.bits)        := ContextState.accumulatePending
@@ -148,7 +165,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.pixel.hasColour := hasColour(done.bits)
   when(io.pixel.retire) { state(done.bits) := ContextState.idle }
 
-  // Rays that miss the object, and bounces that wait for their Fresnel reflection
+  // Rays that miss the object, hits that may be hidden, and bounces that wait for their Fresnel reflection
   for (environment <- io.environment) {
     when(environment.bypass.valid) { state(environment.bypass.bits) := ContextState.environmentPending }
     val reflection = environment.fresnelReflection
@@ -160,16 +177,29 @@ final class RtController(config: ColonnadeConfig) extends Module {
     val pending = firstOf(isAt(ContextState.environmentPending))
     io.environmentCount.get :=
       PopCount(state.map(at => at === ContextState.environmentPending || at === ContextState.environmentMarch))
-    environment.req.valid                    := pending.valid
+    // The distance of a hit is read through the port that serves the surfaces to shade
+    val isTest = isOcclusionTest(pending.bits)
+    environment.req.valid                    := pending.valid && !(isTest && io.trace.shades)
     environment.req.bits.context             := pending.bits
     environment.req.bits.isDirectView        := isPrimary(pending.bits)
     environment.req.bits.isFresnelReflection := isFresnelReflection(pending.bits)
+    environment.req.bits.isOcclusionTest     := isTest
+    io.trace.measured.valid                  := environment.req.fire && isTest
+    io.trace.measured.bits                   := pending.bits
     when(environment.req.fire) {
       state(pending.bits)        := ContextState.environmentMarch
       isDirectView(pending.bits) := environment.req.bits.isDirectView
       isShadow(pending.bits)     := false.B
     }
-    when(environment.hit.valid) { state(environment.hit.bits) := ContextState.shading }
+    when(environment.hit.valid) {
+      state(environment.hit.bits)           := ContextState.shading
+      isOcclusionTest(environment.hit.bits) := false.B
+    }
+    when(environment.visible.valid) {
+      state(environment.visible.bits)           := ContextState.resolve
+      isDirectView(environment.visible.bits)    := false.B
+      isOcclusionTest(environment.visible.bits) := false.B
+    }
     val missed = environment.miss.bits
     when(environment.miss.valid) {
       state(missed)        := Mux(isFresnelReflection(missed), ContextState.resumeBounce, afterMiss(missed))

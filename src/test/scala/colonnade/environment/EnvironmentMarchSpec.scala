@@ -92,6 +92,9 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
         }
         val kinds = hits.flatten.map(_("kind").toInt)
         assert(Seq(HitKind.miss, HitKind.map, HitKind.boundingPlane).forall(kinds.contains), "every kind of result")
+        // With the widest formats the way to each point is saturated
+        for (isHidden <- if (config.numbers.sceneBits < 56) Seq(0, 1) else Seq(0))
+          assert(hits.flatten.exists(hit => hit("kind") == HitKind.map && hit("hidesObject") == isHidden), "occlusion")
         assert(hits.flatten.exists(_("isHidden") == 1) && hits.flatten.exists(_("steps") > 5))
 
         val image = new EnvironmentImage(config, random)

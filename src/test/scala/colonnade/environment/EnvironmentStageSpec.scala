@@ -35,7 +35,7 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val config = TestConfigs.withEnvironment(TestConfigs.environment)
 
   /** A request. */
-  private case class Request(ray: MarchCase, isFresnelReflection: Boolean)
+  private case class Request(ray: MarchCase, isFresnelReflection: Boolean, isOcclusionTest: Boolean)
 
   it should "process one request at a time, with the context's last ray, and hold a surface until it is taken" in
     test(new EnvironmentStageHarness(config)).withAnnotations(Simulation.verilator) { dut =>
@@ -53,7 +53,9 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
       var rays     = Map.empty[Int, MarchCase]
       var offered  = Option.empty[Request]
       var requests = Vector.empty[Request]
-      var found    = Vector.empty[Option[BigInt]] // a surface, or a miss, in order of time
+      var found    = Vector.empty[Option[BigInt]] // a surface, or none, in order of time
+      var visible  = Vector.empty[Boolean]        // the object's hit is visible
+      var distance = Option.empty[BigInt]
       var held     = Option.empty[BigInt]
       var idle     = 0
       while (found.size < 120) {
@@ -65,16 +67,21 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
           ray.copy(context = free(random.nextInt(free.size)))
         }
         dut.io.ray.valid.poke(next.nonEmpty)
-        dut.ray.poke(next.fold(BigInt(packed.width, random))(ray => packed.pack(ray.fields - "isDirectView")))
+        dut.ray.poke(next.fold(BigInt(packed.width, random))(ray =>
+          packed.pack(ray.fields - "isDirectView" - "hitDistance")
+        ))
 
         val ready = free.filter(context => rays.contains(context) && !next.exists(_.context == context))
         if (offered.isEmpty && ready.nonEmpty && random.nextInt(4) == 0)
-          offered = Some(Request(rays(ready(random.nextInt(ready.size))), random.nextBoolean()))
+          offered = Some(Request(rays(ready(random.nextInt(ready.size))), random.nextBoolean(), random.nextBoolean()))
+        dut.io.hitDistance.poke(distance.getOrElse(BigInt(config.numbers.sceneBits, random)))
+        distance = None
         dut.io.req.valid.poke(offered.nonEmpty)
         for (request <- offered) {
           dut.io.req.bits.context.poke(request.ray.context)
           dut.io.req.bits.isDirectView.poke(request.ray.isDirectView)
           dut.io.req.bits.isFresnelReflection.poke(request.isFresnelReflection)
+          dut.io.req.bits.isOcclusionTest.poke(request.isOcclusionTest)
         }
         val takes = random.nextInt(8) == 0
         dut.io.surface.ready.poke(takes)
@@ -82,12 +89,14 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
         val surface = Option.when(dut.io.surface.valid.peekBoolean())(dut.surface.peekInt())
         assert(held.isEmpty || held == surface, "a surface stays until it is taken")
         held = surface.filterNot(_ => takes)
-        val isMiss = dut.io.miss.valid.peekBoolean()
-        assert(!isMiss || surface.isEmpty)
-        if (isMiss) found :+= None else if (takes && surface.nonEmpty) found :+= surface
+        val (isMiss, isVisible) = (dut.io.miss.valid.peekBoolean(), dut.io.visible.valid.peekBoolean())
+        assert(Seq(isMiss, isVisible, surface.nonEmpty).count(identity) <= 1)
+        if (isMiss || isVisible) found :+= None else if (takes && surface.nonEmpty) found :+= surface
+        if (visible.size < found.size) visible :+= isVisible
         if (offered.nonEmpty && dut.io.req.ready.peekBoolean()) {
           assert(requests.size <= found.size, "one request at a time")
           requests ++= offered
+          distance = offered.map(_.ray.hitDistance)
           offered = None
           idle = 0
         }
@@ -100,7 +109,8 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
       val words   = requests.take(found.size).map(camera.view.words ++ _.ray.words)
       val answers = Model.attributes(config, scene.words, words, "march").map(MarchCase.answer.zip(_).toMap)
       for (((request, expected), surface) <- requests.zip(answers).zip(found)) {
-        assert(surface.isEmpty == (expected("kind") == HitKind.miss), s"of $request")
+        val isHit = if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss
+        assert(surface.nonEmpty == isHit, s"of $request")
         for (bits <- surface) {
           val values = answer.unpack(bits)
           val added  = Map(
@@ -110,7 +120,12 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
           assert(values == (expected.filter(value => values.contains(value._1)) ++ added), s"of $request")
         }
       }
-      assert(found.exists(_.isEmpty) && requests.exists(_.isFresnelReflection) && requests.exists(_.ray.isDirectView))
+      assert(visible == requests.zip(found).map { case (request, hit) => request.isOcclusionTest && hit.isEmpty })
+      val tests = requests.zip(found).filter(_._1.isOcclusionTest)
+      assert(tests.exists(_._2.isEmpty) && tests.exists(_._2.nonEmpty), "visible and hidden hits")
+      assert(requests.zip(found).exists { case (request, hit) =>
+        !request.isOcclusionTest && hit.isEmpty
+      } && requests.exists(_.isFresnelReflection) && requests.exists(_.ray.isDirectView))
       assert(requests.map(_.ray).distinct.size < requests.size, "a stored ray is requested again")
     }
 }

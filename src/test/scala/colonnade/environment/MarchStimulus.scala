@@ -6,22 +6,26 @@ import colonnade.formats.EnvironmentView
 
 import scala.util.Random
 
-/** A ray in grid steps, with a direction of any length. A direct view comes from the camera through `pixel`. */
+/** A ray in grid steps, with a direction of any length. A direct view comes from the camera through `pixel`. The object is
+  * `hitDistance` away.
+  */
 final case class MarchCase(
     context:      Int,
     origin:       Seq[BigInt],
     dir:          Seq[BigInt],
     pixel:        Seq[BigInt] = Seq(0, 0),
-    isDirectView: Boolean = false
+    isDirectView: Boolean = false,
+    hitDistance:  BigInt = 0
 ) {
-  def words: Seq[BigInt] = (BigInt(if (isDirectView) 1 else 0) +: pixel) ++ origin ++ dir
+  def words: Seq[BigInt] = (BigInt(if (isDirectView) 1 else 0) +: pixel :+ hitDistance) ++ origin ++ dir
 
   def fields: Map[String, BigInt] = {
     val axes = Seq("x", "y", "z")
     axes.zip(origin).map { case (axis, value) => s"ray.origin.$axis" -> value }.toMap ++
       axes.zip(dir).map { case (axis, value) => s"ray.dir.$axis" -> value } ++
       axes.zip(pixel).map { case (axis, value) => s"ray.pixel.$axis" -> value } +
-      ("context" -> BigInt(context)) + ("isDirectView" -> BigInt(if (isDirectView) 1 else 0))
+      ("context"     -> BigInt(context)) + ("isDirectView" -> BigInt(if (isDirectView) 1 else 0)) +
+      ("hitDistance" -> hitDistance)
   }
 }
 
@@ -31,7 +35,7 @@ object MarchCase {
   val answer: Seq[String] =
     Seq("kind", "x", "y", "boundingPlane", "isHidden", "distance", "distanceExponent", "steps") ++
       Seq("x", "y", "z").map(axis => s"point.$axis") ++ Seq("r", "g", "b").map(channel => s"albedo.$channel") ++
-      Seq("x", "y", "z").map(axis => s"normal.$axis") :+ "isIllegal"
+      Seq("x", "y", "z").map(axis => s"normal.$axis") :+ "hidesObject" :+ "isIllegal"
 }
 
 /** Views of an environment, and rays in it. */
@@ -60,16 +64,21 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
 
     val view: ViewCase = {
       val axes = Seq(Seq(1.0, 0, 0), Seq(0, 1.0, 0), Seq(0, 0, 1.0)).map(rotate)
-      ViewCase.of(config, focal, middle, axes, steps(Seq(0, 0, 0)), metre, stepWidths(random.nextInt(2)))
+      ViewCase
+        .of(config, focal, middle, axes, steps(Seq(0, 0, 0)), metre, stepWidths(random.nextInt(2)))
+        .copy(occlusionTolerance =
+          if (random.nextInt(4) == 0) 0 else BigDecimal(random.nextDouble() * metre / 9).toBigInt
+        )
     }
   }
 
   /** From a point of view space along a direction. */
   def ray(camera: Camera, from: Seq[Double], dir: Seq[Double]): MarchCase = {
-    val length  = dir.map(_.abs).max
-    val scale   = math.pow(2, numbers.shadeBits.toDouble) - 1
-    val rotated = camera.rotate(dir.map(_ / (1.5 * length)))
-    MarchCase(context(), camera.steps(from), rotated.map(t => BigDecimal(t * scale).toBigInt))
+    val length   = dir.map(_.abs).max
+    val scale    = math.pow(2, numbers.shadeBits.toDouble) - 1
+    val rotated  = camera.rotate(dir.map(_ / (1.5 * length)))
+    val distance = BigDecimal(random.nextDouble() * 4 * metre).toBigInt
+    MarchCase(context(), camera.steps(from), rotated.map(t => BigDecimal(t * scale).toBigInt), hitDistance = distance)
   }
 
   private def spread(size: Double): Double = (random.nextDouble() * 2 - 1) * size
@@ -113,7 +122,8 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
       (length - random.nextInt(12)).min(500),
       Seq.fill(9)(signed(16)),
       stepWidths(0),
-      random.nextInt(shells + 1)
+      random.nextInt(shells + 1),
+      BigInt(numbers.gridBits - 2, random)
     )
   }
 
@@ -130,7 +140,8 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
       number(view.exponent.getWidth).toInt,
       Seq.fill(9)(number(EnvironmentView.rotationBits)),
       Seq(steps(view.stepX), steps(view.stepY)),
-      natural(view.boundingPlanes)
+      natural(view.boundingPlanes),
+      steps(view.occlusionTolerance)
     )
   }
 
@@ -140,7 +151,12 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
 
   def anyRay(): MarchCase = {
     val directionBits = if (random.nextBoolean()) numbers.shadeBits + 1 else numbers.directionBits
-    MarchCase(context(), Seq.fill(3)(signed(numbers.sceneBits.min(60))), Seq.fill(3)(signed(directionBits)))
+    MarchCase(
+      context(),
+      Seq.fill(3)(signed(numbers.sceneBits.min(60))),
+      Seq.fill(3)(signed(directionBits)),
+      hitDistance = BigInt(random.nextInt(numbers.sceneBits + 2), random)
+    )
   }
 
   /** The ray of a pixel of the frame, with a direction of any length. */

@@ -10,10 +10,16 @@ final case class ViewCase(
     exponent:       Int,
     rotation:       Seq[BigInt],
     steps:          Seq[BigInt],
-    boundingPlanes: Int
+    boundingPlanes: Int,
+
+    /** Grid steps. */
+    occlusionTolerance: BigInt = 0
 ) {
   def words: Seq[BigInt] =
-    matrix ++ offset ++ Seq[BigInt](offsetShift, exponent) ++ rotation ++ steps :+ BigInt(boundingPlanes)
+    matrix ++ offset ++ Seq[BigInt](
+      offsetShift,
+      exponent
+    ) ++ rotation ++ steps :+ BigInt(boundingPlanes) :+ occlusionTolerance
 
   def fields: Map[String, BigInt] =
     matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}].${"xyz" (i % 3)}" -> value }.toMap ++
@@ -21,9 +27,10 @@ final case class ViewCase(
       offset.zipWithIndex.map { case (value, i) => s"offset.${"xyz" (i)}" -> value } ++
       Seq("stepX", "stepY").zip(steps) ++
       Map(
-        "offsetShift"    -> BigInt(offsetShift),
-        "exponent"       -> BigInt(exponent),
-        "boundingPlanes" -> BigInt(boundingPlanes)
+        "offsetShift"        -> BigInt(offsetShift),
+        "exponent"           -> BigInt(exponent),
+        "boundingPlanes"     -> BigInt(boundingPlanes),
+        "occlusionTolerance" -> occlusionTolerance
       )
 }
 

@@ -20,6 +20,10 @@ private class ContextModel(lights: Int) {
   var isDirectView        = false
   var isFresnelReflection = false
 
+  /** The ray's hit may be hidden; it is tested. */
+  var mayBeHidden     = false
+  var isOcclusionTest = false
+
   /** Its primary ray cannot hit the object. */
   var bypasses = false
 

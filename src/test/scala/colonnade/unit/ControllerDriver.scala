@@ -9,8 +9,15 @@ import scala.util.Random
 /** A model of all contexts beside the controller; it drives random events that are legal in their states.
   *
   * @param hasEnvironment the frame has an environment, if the configuration has one
+  * @param occlusion      it may hide the object
   */
-private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvironment: Boolean = false) {
+private class ControllerDriver(
+    dut:            RtController,
+    count:          Int,
+    seed:           Int,
+    hasEnvironment: Boolean = false,
+    occlusion:      Boolean = false
+) {
   private val random   = new Random(seed)
   private val lights   = dut.io.shaded.bits.needsShadowRays.size
   private val contexts = Seq.fill(count)(new ContextModel(lights))
@@ -19,6 +26,9 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
 
   /** Results of the environment march: of a Fresnel reflection or not, with a hit or without. */
   var outcomes = Set.empty[(Boolean, Boolean)]
+
+  /** Results of occlusion tests: of a primary ray or not, hidden or visible. */
+  var tests = Set.empty[(Boolean, Boolean)]
 
   private def contextsWith(claim: ContextModel => Boolean): Seq[Int] =
     contexts.indices.filter(index => claim(contexts(index)))
@@ -63,7 +73,9 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
       for (context <- shading.drop(1).find(contexts(_).willBounce.isEmpty) if happens && random.nextInt(3) == 0)
         events.fetchFailed = Some(context)
       for (context <- one(at(ContextState.environmentMarch)) if happens)
-        if (random.nextBoolean()) events.environmentHit = Some(context) else events.environmentMiss = Some(context)
+        if (random.nextBoolean()) events.environmentHit = Some(context)
+        else if (contexts(context).isOcclusionTest) events.visible = Some(context)
+        else events.environmentMiss = Some(context)
       for (context <- one(at(ContextState.accumulating)) if happens) events.accumulated = Some(context)
     }
     assert(started == pixels && at(ContextState.idle).size == count, "every pixel has retired")
@@ -71,11 +83,14 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
 
   private def finishShading(index: Int, events: ControllerEvents): Unit = {
     val context = contexts(index)
-    if (!context.willBounce.getOrElse(random.nextInt(3) == 0))
+    if (!context.willBounce.getOrElse(random.nextInt(3) < (if (occlusion) 2 else 1)))
       events.shaded = Some((index, Seq.fill(lights)(!context.isFresnelReflection && random.nextBoolean())))
     else if (hasEnvironment && context.willBounce.isEmpty && random.nextInt(4) > 0)
       events.fresnelReflection = Some(index)
-    else events.bounced = Some((index, random.nextInt(3) > 0))
+    else {
+      events.bounced = Some((index, random.nextInt(3) > 0))
+      events.isInside = random.nextInt(4) == 0
+    }
   }
 
   /** One cycle: checks all outputs, then drives the events that `happen` sets. */
@@ -86,8 +101,14 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
     val done     = shown(dut.io.pixel.done.valid, dut.io.pixel.done.bits, at(ContextState.done))
     val shadowed = shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow)
     val ended    = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
-    val marched  = dut.io.environment.flatMap(environment =>
-      shown(environment.req.valid, environment.req.bits.context, at(ContextState.environmentPending))
+    // The hit of an occlusion test is not read together with that of a surface
+    val shades =
+      resolved.exists(index => !contexts(index).isShadow && contexts(index).hasHit && !contexts(index).mayBeHidden)
+    dut.io.trace.shades.expect(shades)
+    val pending = at(ContextState.environmentPending)
+    val waits   = shades && pending.headOption.exists(contexts(_).isOcclusionTest)
+    val marched = dut.io.environment.flatMap(environment =>
+      shown(environment.req.valid, environment.req.bits.context, if (waits) Seq() else pending)
     )
     val resumed = dut.io.environment.flatMap(environment =>
       shown(environment.resume.valid, environment.resume.bits.context, resumable)
@@ -115,6 +136,7 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
     for (environment <- dut.io.environment; index <- marched) {
       environment.req.bits.isDirectView.expect(contexts(index).isPrimary)
       environment.req.bits.isFresnelReflection.expect(contexts(index).isFresnelReflection)
+      environment.req.bits.isOcclusionTest.expect(contexts(index).isOcclusionTest)
     }
     for (environment <- dut.io.environment; index <- resumed)
       environment.resume.bits.isBackground.expect(contexts(index).isBackground)
@@ -124,7 +146,11 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
     val allocated = free.filter(_ => events.allocate)
     val retires   = done.filter(_ => events.retire)
     val light     = dut.io.shadow.bits.light.peekInt().toInt
+    for (environment <- dut.io.environment) environment.occlusion.poke(occlusion)
     events.poke(dut, allocated.nonEmpty, retires.nonEmpty, hasEnvironment)(random.nextInt(count))
+    val measured = marched.filter(index => events.march && contexts(index).isOcclusionTest)
+    dut.io.trace.measured.valid.expect(measured.nonEmpty)
+    for (index <- measured) dut.io.trace.measured.bits.expect(index)
     dut.clock.step()
 
     def change(index: Option[Int])(how: ContextModel => Unit): Unit = index.foreach(index => how(contexts(index)))
@@ -135,6 +161,8 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
       context.hasColour = false
       context.isDirectView = false
       context.isFresnelReflection = false
+      context.mayBeHidden = hasEnvironment && occlusion
+      context.isOcclusionTest = false
       context.bypasses = hasEnvironment && random.nextInt(3) == 0
       started += 1
     }
@@ -159,6 +187,7 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
       else if (hasEnvironment) ContextState.environmentPending else ContextState.accumulatePending
       context.isPrimary = false
       context.isBackground = true
+      context.mayBeHidden = hasEnvironment && occlusion && !events.isInside
     }
     change(events.fetchFailed) { context =>
       context.state = ContextState.accumulatePending
@@ -193,6 +222,14 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
       context.state = ContextState.shading
       context.willBounce = Some(false)
       outcomes += ((context.isFresnelReflection, true))
+      if (context.isOcclusionTest) tests += ((context.isPrimary, true))
+      context.isOcclusionTest = false
+    }
+    change(events.visible) { context =>
+      context.state = ContextState.resolve
+      context.isDirectView = false
+      tests += ((context.isPrimary, false))
+      context.isOcclusionTest = false
     }
     change(events.environmentMiss) { context =>
       context.state = if (context.isFresnelReflection) ContextState.resumeBounce else afterMiss(context)
@@ -215,7 +252,13 @@ private class ControllerDriver(dut: RtController, count: Int, seed: Int, hasEnvi
     if (context.isShadow) {
       context.state = ContextState.shadowTest
       context.occlusions = context.occlusions.updated(context.shadowLight, context.occlusion)
+    } else if (context.hasHit && context.mayBeHidden) {
+      context.state = ContextState.environmentPending
+      context.mayBeHidden = false
+      context.isOcclusionTest = true
+      context.isBackground = false
     } else if (context.hasHit) {
+      context.isBackground = false
       context.state = ContextState.shading
       context.willBounce = None
     } else {

@@ -12,6 +12,7 @@ private class ControllerEvents {
   val ended       = Array.fill(3)(Option.empty[Int])
   var shaded      = Option.empty[(Int, Seq[Boolean])]
   var bounced     = Option.empty[(Int, Boolean)]
+  var isInside    = false
   var fetchFailed = Option.empty[Int]
   var shadow      = false
   var end         = false
@@ -23,6 +24,7 @@ private class ControllerEvents {
   var march             = false
   var environmentHit    = Option.empty[Int]
   var environmentMiss   = Option.empty[Int]
+  var visible           = Option.empty[Int]
   var resume            = false
 
   /** @param other the context on ports that are not valid */
@@ -46,6 +48,7 @@ private class ControllerEvents {
     for ((context, isTraced) <- bounced) {
       dut.io.bounced.bits.context.poke(context)
       dut.io.bounced.bits.isTraced.poke(isTraced)
+      dut.io.bounced.bits.isInside.poke(isInside)
     }
     name(dut.io.fetchFailed, fetchFailed)
     name(dut.io.accumulated, accumulated)
@@ -57,6 +60,7 @@ private class ControllerEvents {
       name(environment.fresnelReflection, fresnelReflection)
       name(environment.hit, environmentHit)
       name(environment.miss, environmentMiss)
+      name(environment.visible, visible)
     }
   }
 }

@@ -20,27 +20,45 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val names        = Seq("colour.r", "colour.g", "colour.b", "isObject", "hit.triangle", "hit.distance") ++
     Seq("r", "g", "b").map(channel => s"ratio.$channel")
 
-  /** Probability that a port is ready or valid, seed, shadow rays, and environment. */
-  private val rounds = Seq((1.0, 1, true, true), (0.3, 2, true, true), (0.6, 3, false, true))
+  /** Probability that a port is ready or valid, seed, shadow rays, environment, and whether it may hide the object. */
+  private val rounds =
+    Seq((1.0, 1, true, true, false), (0.3, 2, true, true, false), (0.6, 3, false, true, false))
+  private val environmentRounds =
+    Seq(
+      (0.6, 4, true, false, false),
+      (0.8, 5, true, true, true),
+      (0.3, 6, true, true, true),
+      (0.8, 7, true, false, true)
+    )
 
   private def render(config: ColonnadeConfig, name: String): Unit =
     it should s"give each pixel once, equal to the model's: $name" in
       test(new RenderUnitHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         for (
-          (willing, seed, shadows, hasEnvironment) <-
-            if (config.hasEnvironment) rounds :+ ((0.6, 4, true, false)) else rounds
+          (willing, seed, shadows, hasEnvironment, occlusion) <-
+            if (config.hasEnvironment) rounds ++ environmentRounds else rounds
         ) {
           val scene       = new SmallScene(config, seed, wide, high, triangleCount = 15, shadows)
           val environment = Option.when(config.hasEnvironment)(
-            new SmallEnvironment(config, scene, new Random(seed), Seq(wide, high), hasEnvironment = hasEnvironment)
+            new SmallEnvironment(config, scene, new Random(seed), Seq(wide, high), hasEnvironment, occlusion)
           )
           val registers = environment.fold(scene.registers)(_.registers)
           val positions = new Random(seed).shuffle(for (x <- 0 until wide; y <- 0 until high) yield (x, y))
           val column    = new UnitColumn(dut, config, registers, scene.records, environment.map(_.words), seed)
           val pixels    = column.run(positions, willing)
-          val expected  =
+          def modelled(registers: Map[String, BigInt]) =
             Model.pixels(config, registers, scene.records, positions, environment.map(_.words)).map(names.zip(_).toMap)
-          val hits = expected.count(_("isObject") == 1)
+          val expected = modelled(registers)
+          val hits     = expected.count(_("isObject") == 1)
+          if (occlusion) {
+            val bare   = modelled(registers + ("environment.occlusion" -> BigInt(0)))
+            val hidden = bare.zip(expected).count { case (bare, pixel) => bare("isObject") != pixel("isObject") }
+            val later  = bare.zip(expected).count { case (bare, pixel) =>
+              bare("isObject") == pixel("isObject") && bare != pixel
+            }
+            assert(hits > 0 && (hidden > 1) == hasEnvironment, s"a part of the object is hidden, seed $seed")
+            info(s"seed $seed: $hidden pixels hidden, $later with hidden hits of later rays")
+          }
 
           assert(pixels.map(_._1).sorted == positions.sorted, "every position comes out once")
           val found = pixels.toMap
@@ -51,13 +69,17 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
             )
           assert(column.hits == hits)
           assert(
-            hits > positions.size / 6 && (if (shadows) column.shadowRays > hits / 8 else column.shadowRays == 0) &&
+            occlusion || hits > positions.size / 6 && (if (shadows) column.shadowRays > hits / 8
+                                                       else column.shadowRays == 0) &&
               (column.bouncedRays > 0) == config.frame.hasBounces,
             "there is something to see"
           )
           if (config.hasEnvironment) {
             val isDarker = expected.exists(pixel => Seq("r", "g", "b").exists(c => pixel(s"ratio.$c") < 4096))
-            assert(isDarker == (hasEnvironment && shadows), s"the object takes light from the room, seed $seed")
+            assert(
+              occlusion || isDarker == (hasEnvironment && shadows),
+              s"the object takes light from the room, seed $seed"
+            )
             assert(if (hasEnvironment) column.roomRays >= positions.size - hits else column.roomRays == 0)
           }
         }

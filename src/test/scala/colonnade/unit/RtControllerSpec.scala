@@ -24,10 +24,14 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       test(new RtController(config(contexts, TestConfigs.withEnvironment(TestConfigs.environment)))) { dut =>
         val outcomes =
           for ((eagerness, hasEnvironment, seed) <- Seq((0.9, true, 3), (0.15, true, 4), (0.5, false, 5))) yield {
-            val rounds = new ControllerDriver(dut, contexts, seed, hasEnvironment)
+            val rounds = new ControllerDriver(dut, contexts, seed, hasEnvironment, occlusion = !hasEnvironment)
             rounds.run(pixels = 70, eagerness)
+            assert(rounds.tests.isEmpty)
             rounds.outcomes
           }
+        val rounds = new ControllerDriver(dut, contexts, seed = 6, hasEnvironment = true, occlusion = true)
+        rounds.run(pixels = 300, eagerness = 0.8)
+        assert(rounds.tests.size == 4, "hits of primary and later rays, hidden and visible")
         assert(outcomes.flatten.distinct.size == 4, "all results of the march occur")
         assert(outcomes.last.isEmpty)
       }

@@ -9,13 +9,15 @@ import scala.util.Random
   * are marked as unable to show the object.
   *
   * @param hasEnvironment the frame has an environment; otherwise only the maps are loaded
+  * @param occlusion      the environment may hide the object, which is then larger, and partly behind the walls
   */
 final class SmallEnvironment(
     config:         ColonnadeConfig,
     scene:          SmallScene,
     random:         Random,
     frame:          Seq[Int],
-    hasEnvironment: Boolean
+    hasEnvironment: Boolean,
+    occlusion:      Boolean
 ) {
   private val numbers = config.numbers
   private val maps    = new EnvironmentScene(config, random)
@@ -30,7 +32,7 @@ final class SmallEnvironment(
     val stepShift = scene.registers("camera.stepShift").toInt
     val forwards  = scene.registers("camera.direction.z") << stepShift
     val camera    = "xyz".map(axis => scene.registers(s"camera.position.$axis") << unitShift)
-    val metre     = (BigInt(1) << (numbers.vertexBits + numbers.gridFraction)).toDouble / 1.1
+    val metre     = (BigInt(1) << (numbers.vertexBits + numbers.gridFraction)).toDouble / (if (occlusion) 2.6 else 1.1)
     val axes      = Seq(Seq(1.0, 0, 0), Seq(0, -1.0, 0), Seq(0, 0, 1.0))
     val view      = ViewCase.of(
       config,
@@ -52,17 +54,19 @@ final class SmallEnvironment(
       String,
       BigInt
     ](
-      "environment.enabled"   -> (if (hasEnvironment) 1 else 0),
-      "environment.window.x0" -> 0,
-      "environment.window.y0" -> 0,
-      "environment.window.x1" -> frame(0),
-      "environment.window.y1" -> frame(1),
-      "camera.direction.x"    -> (scaled(corner(0)) >> stepShift),
-      "camera.direction.y"    -> (scaled(-corner(1)) >> stepShift),
-      "camera.stepX.x"        -> scaled(steps(0)),
-      "camera.stepY.y"        -> scaled(-steps(1)),
-      "frame.objectRect.x0"   -> (if (hasEnvironment) 2 else 0),
-      "frame.objectRect.y0"   -> (if (hasEnvironment) 1 else 0)
+      "environment.enabled"            -> (if (hasEnvironment) 1 else 0),
+      "environment.window.x0"          -> 0,
+      "environment.window.y0"          -> 0,
+      "environment.window.x1"          -> frame(0),
+      "environment.window.y1"          -> frame(1),
+      "environment.occlusion"          -> (if (occlusion) 1 else 0),
+      "environment.occlusionTolerance" -> BigDecimal(0.02 * metre).toBigInt,
+      "camera.direction.x"             -> (scaled(corner(0)) >> stepShift),
+      "camera.direction.y"             -> (scaled(-corner(1)) >> stepShift),
+      "camera.stepX.x"                 -> scaled(steps(0)),
+      "camera.stepY.y"                 -> scaled(-steps(1)),
+      "frame.objectRect.x0"            -> (if (hasEnvironment) 2 else 0),
+      "frame.objectRect.y0"            -> (if (hasEnvironment) 1 else 0)
     )
   }
 }

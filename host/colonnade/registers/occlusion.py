@@ -1,0 +1,108 @@
+"""Registers of occlusion by the room: whether it may hide the object, and by how much it must be nearer."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from colonnade.common.types import Floats
+from colonnade.environment.encoding.planes import PlaneProjection
+from colonnade.registers.shadow_window import surface_points
+
+if TYPE_CHECKING:
+    from colonnade.design.manifest import Manifest
+    from colonnade.environment.encoded import EncodedEnvironment
+    from colonnade.mesh.mesh import Extent
+    from colonnade.scene.view import View
+    from colonnade.scene_image.header import ImageHeader
+
+#: Surfaces of the room around the object, in edges of its cube from its box: their errors count.
+SURROUNDINGS = 0.5
+#: Fewer pixels do not tell an error.
+MIN_PIXELS = 64
+#: The tolerance is this multiple of this percentile of the errors of the plane map.
+FACTOR, PERCENTILE = 2.0, 90.0
+#: Least tolerance, as a fraction of the distance to the object; largest one, in edges of the object's cube.
+MIN_FRACTION, MAX_EDGES = 0.0025, 0.1
+
+
+def occlusion_registers(
+    view: View, encoded: EncodedEnvironment, header: ImageHeader, manifest: Manifest
+) -> dict[str, int]:
+    """The registers ``environment.occlusion`` and ``environment.occlusionTolerance`` of a frame.
+
+    Args:
+        view: With the room's pose, `View.view_to_mesh`.
+        encoded: The room and its encoded maps.
+        header: Header of the mesh's scene image.
+        manifest: The design's manifest.
+    """
+    tolerance = occlusion_tolerance(view, encoded, header.extent)
+    if not view.occlusion or not may_hide(view, encoded, header.extent, tolerance):
+        return {"environment.occlusion": 0, "environment.occlusionTolerance": 0}
+    return tolerance_registers(view, encoded, header, manifest) | {"environment.occlusion": 1}
+
+
+def tolerance_registers(
+    view: View, encoded: EncodedEnvironment, header: ImageHeader, manifest: Manifest
+) -> dict[str, int]:
+    """The register ``environment.occlusionTolerance``, grid steps; arguments as in `occlusion_registers`."""
+    steps = header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
+    limit = (1 << manifest.registers["environment.occlusionTolerance"].width) - 1
+    tolerance = occlusion_tolerance(view, encoded, header.extent)
+    return {"environment.occlusionTolerance": min(limit, math.ceil(tolerance * steps))}
+
+
+def occlusion_tolerance(view: View, encoded: EncodedEnvironment, extent: Extent) -> float:
+    """The distance, mesh units, by which a surface of the room must be nearer than the object to hide it.
+
+    Distances are measured along the dominant axis of a ray. The tolerance follows from the error of the plane map at
+    the surfaces around the object, which is the error of the surface that it stands on.
+    """
+    environment = encoded.environment
+    decoded = encoded.image.decoded_depth(PlaneProjection.of(environment, encoded.image.depth_unit))
+    assert view.view_to_mesh is not None
+    linear, origin = view.view_to_mesh[:, :3], view.view_to_mesh[:, 3]
+    directions = environment.camera.directions(environment.width, environment.height) @ linear.T
+    points = directions * environment.depth[..., None] + origin
+    margin = SURROUNDINGS * extent.edge
+    near = ((points >= extent.low - margin) & (points <= extent.high + margin)).all(axis=2)
+    with np.errstate(invalid="ignore"):
+        errors = (np.abs(decoded - environment.depth) * np.abs(directions).max(axis=2))[near]
+    distance = float(np.abs(extent.centre - view.origin).max())
+    low, high = MIN_FRACTION * distance, max(MAX_EDGES * extent.edge, MIN_FRACTION * distance)
+    if errors.size < MIN_PIXELS:
+        return high
+    return float(np.clip(FACTOR * np.percentile(errors, PERCENTILE), low, high))
+
+
+def may_hide(view: View, encoded: EncodedEnvironment, extent: Extent, tolerance: float) -> bool:
+    """Whether in some pixel the room is nearer than the end of the object's box by more than a tolerance."""
+    environment = encoded.environment
+    depth = encoded.image.decoded_depth(PlaneProjection.of(environment, encoded.image.depth_unit))
+    points = surface_points(view, environment, depth)
+    return bool((_margin_of_box_end(view.origin, points, extent) > tolerance).any())
+
+
+def _margin_of_box_end(origin: Floats, points: Floats, extent: Extent) -> Floats:
+    """By how much the object's box ends behind points of the room, seen from the camera along the ray's dominant axis.
+
+    Args:
+        origin: Mesh space, float64 [3].
+        points: Mesh space, float64 [..., 3].
+        extent: Bounds of the object.
+
+    Returns:
+        float64 [...], mesh units; minus infinity for rays that miss the box.
+    """
+    directions = points - origin
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossings = np.stack([(extent.low - origin) / directions, (extent.high - origin) / directions])
+    inside = (origin >= extent.low) & (origin <= extent.high)
+    parallel = directions == 0
+    enters = np.where(parallel, np.where(inside, -np.inf, np.inf), crossings.min(axis=0)).max(axis=-1)
+    leaves = np.where(parallel, np.where(inside, np.inf, -np.inf), crossings.max(axis=0)).min(axis=-1)
+    margin = (leaves - 1.0) * np.abs(directions).max(axis=-1)
+    return np.where((leaves >= np.maximum(enters, 0.0)), margin, -np.inf)
