@@ -40,6 +40,12 @@ if TYPE_CHECKING:
 @background_option
 @click.option("--relit", is_flag=True, help="Show the room shaded by the scene's lights instead of its photo.")
 @click.option(
+    "--truth",
+    type=FILE,
+    metavar="MESH",
+    help="With --backend reference: trace the room's real geometry, a mesh in the room's world, not its depth map.",
+)
+@click.option(
     "--frames",
     type=click.IntRange(min=1, max=MAX_FRAMES),
     metavar="N",
@@ -63,6 +69,7 @@ def render(
     mesh: str | None,
     background: Path | None,
     relit: bool,
+    truth: Path | None,
     frames: int | None,
     output: Path | None,
     hits_file: Path | None,
@@ -100,6 +107,7 @@ def render(
         background=background,
         hits=hits_file is not None,
         relit=relit,
+        truth=truth,
         waveform=waveform,
     )
     results = render_frames(request, progress)

@@ -14,19 +14,31 @@ from colonnade.cli.options import FILE, dists_option, echo, finish, json_option,
 @click.command(short_help="Measure reconstructed rooms, or AR frames in them.")
 @click.argument("rooms", type=FILE, nargs=-1, required=True)
 @click.option("--frames", is_flag=True, help="Measure frames with objects instead of rays from probe spheres.")
+@click.option("--light", is_flag=True, help="Measure relit rooms and mirrors against the photo.")
 @dists_option
-@click.option("--output", type=FILE, metavar="DIR", help="With --frames: write the frames as pictures.")
+@click.option("--output", type=FILE, metavar="DIR", help="With --frames or --light: write the frames as pictures.")
 @json_option
-def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | None, json_file: Path | None) -> None:
+def study(
+    rooms: tuple[Path, ...],
+    frames: bool,
+    light: bool,
+    no_dists: bool,
+    output: Path | None,
+    json_file: Path | None,
+) -> None:
     """Measure reconstructed rooms against their depth maps. ROOMS are folders.
 
     By default the command traces rays from mirror, matt and glass spheres, and prints the share that finds the correct
     point: with planes of the full maps, and with those of the attribute memory. With --frames it prints the loss from
     encoding, reconstruction and fixed-point arithmetic. The loss is PSNR, FLIP and DISTS of frame, object and shadow.
+    With --light it prints the PSNR of relit rooms and of a mirror against the photo, for default and for fitted lights.
     Tables are in Markdown.
     """
-    if output is not None and not frames:
-        raise click.UsageError("--output needs --frames", click.get_current_context())
+    context = click.get_current_context()
+    if frames and light:
+        raise click.UsageError("give either --frames or --light", context)
+    if output is not None and not (frames or light):
+        raise click.UsageError("--output needs --frames or --light", context)
     require_outputs(json_file, folders=[output])
 
     from colonnade.common import progress
@@ -47,6 +59,14 @@ def study(rooms: tuple[Path, ...], frames: bool, no_dists: bool, output: Path | 
             frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
             for frame, by_loss in by_frame.items()
         }
+    elif light:
+        from colonnade.evaluation.studies import room_light
+
+        terminal = progress.for_terminal()
+        with terminal.step("measuring the light"):
+            qualities = room_light.study_light(rooms, terminal, output)
+        echo(room_light.table(qualities))
+        report = {name: asdict(value) for name, value in qualities.items()}
     else:
         from colonnade.evaluation.studies import environment_accuracy
 

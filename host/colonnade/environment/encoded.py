@@ -28,11 +28,20 @@ class EncodedEnvironment:
         Raises:
             UserError: The folder is not a room, or the design has no memory for maps of this size.
         """
-        layout, environment = layout_of(manifest), load_environment(folder)
+        return EncodedEnvironment.of(load_environment(folder), manifest)
+
+    @staticmethod
+    def of(environment: Environment, manifest: Manifest) -> EncodedEnvironment:
+        """Encode a room's maps for a design.
+
+        Raises:
+            UserError: The design has no memory for maps of this size.
+        """
+        layout = layout_of(manifest)
         if (environment.width, environment.height) != (layout.width, layout.height):
             raise UserError(
-                f"the maps of {folder} are {environment.width}x{environment.height}, physicalAttributeMemory holds"
-                f" {layout.width}x{layout.height}: set its width and height"
+                f"the maps of room {environment.name} are {environment.width}x{environment.height},"
+                f" physicalAttributeMemory holds {layout.width}x{layout.height}: set its width and height"
             )
         return EncodedEnvironment(environment, encoded_environment(environment, layout))
 

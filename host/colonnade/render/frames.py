@@ -13,14 +13,17 @@ from colonnade.common.errors import UserError
 from colonnade.common.framebuffer import Frame
 from colonnade.common.limits import MAX_WAVEFORM_PIXELS
 from colonnade.common.progress import QUIET, Progress
+from colonnade.common.types import Floats
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.environment.encoded import EncodedEnvironment
+from colonnade.environment.model import Environment
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
+from colonnade.render.lit_room import LitRoom, lit_room
 from colonnade.render.report import FrameReport, frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
@@ -57,13 +60,15 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     check_size((width, height), manifest)
     if request.waveform is not None:
         _check_waveform(request, (width, height))
-    poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
+    progresses = scene.motion.frame_progress(request.frames)
     if request.backend == "reference":
         from colonnade.render.reference_frames import reference_frames
 
-        yield from reference_frames(poses, manifest, (width, height), progress)
+        poses = [scene.at(fraction) for fraction in progresses]
+        yield from reference_frames(poses, manifest, (width, height), progress, request.relit, request.truth)
         return
-    folder = scene.background.room
+    if request.truth is not None:
+        raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
     if request.hits and request.backend == "rtl":
         from colonnade.device.verilator import require_hits
 
@@ -71,9 +76,12 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
-        image = pack_scene(scene, load_mesh(scene.mesh_source), manifest, environment)
+        mesh = load_mesh(scene.mesh_source)
+        room = lit_room(scene, mesh.extent, max_lights(manifest), request.relit, progress)
+        scene, environment = room.scene, encoded(room, manifest)
+        image = pack_scene(scene, mesh, manifest, environment)
         shows_environment = request.relit or environment is None or environment.environment.photo is None
+        poses = [scene.at(fraction) for fraction in progresses]
         registers = [
             frame_registers(pose, image.header, manifest, width, height, environment, shows_environment)
             for pose in poses
@@ -97,7 +105,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         view = make_view(pose, image.header.extent, width, height, image.header.materials, seen)
         result = _result(frame, image, view, manifest, report)
         if environment is not None and not request.relit:
-            result = replace(result, image=composited(result.image, frame, environment.environment))
+            result = replace(result, image=_composited(result, frame, environment.environment))
         yield result
 
 
@@ -159,9 +167,9 @@ def render_model(
     scene: Scene, mesh: Mesh, manifest: Manifest, size: tuple[int, int], progress: Progress = QUIET
 ) -> RenderResult:
     """Render one frame with the model. The scene's own mesh is not read, and error bits only appear in the report."""
-    folder = scene.background.room
     with progress.step("packing the scene"):
-        environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
+        room = lit_room(scene, mesh.extent, max_lights(manifest), False, progress)
+        scene, environment = room.scene, encoded(room, manifest)
         image = pack_scene(scene, mesh, manifest, environment)
         seen = None if environment is None else environment.environment
         registers = frame_registers(
@@ -170,7 +178,22 @@ def render_model(
     ((frame, _, _),) = _model_frames(manifest, image, [registers], progress)
     view = make_view(scene, image.header.extent, *size, image.header.materials, seen)
     result = _result(frame, image, view, manifest, frame_report("model", manifest, image.header, frame))
-    return result if seen is None else replace(result, image=composited(result.image, frame, seen))
+    return result if seen is None else replace(result, image=_composited(result, frame, seen))
+
+
+def max_lights(manifest: Manifest) -> int:
+    """Lights that a design supports."""
+    return int(manifest.config["frame"]["lights"])
+
+
+def encoded(room: LitRoom, manifest: Manifest) -> EncodedEnvironment | None:
+    """The encoded maps of a scene's room; None without one."""
+    return None if room.environment is None else EncodedEnvironment.of(room.environment, manifest)
+
+
+def _composited(result: RenderResult, frame: Frame, environment: Environment) -> Floats:
+    ratio = None if frame.ratio is None else frame.ratio / 4096.0
+    return composited(result.image, frame.is_object, ratio, environment)
 
 
 def pack_scene(

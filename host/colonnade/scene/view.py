@@ -113,11 +113,11 @@ def make_view(
     """
     pose = object_pose(scene, extent, environment)
     start = object_pose(scene.at(0.0), extent, environment)
-    centre, edge = start.to_world(extent.centre), extent.edge * start.scale
     if environment is not None:
         camera = environment_camera(environment, width, height)
     else:
         camera = scene_camera(scene.camera, start, extent, width, height)
+    positions = [_world_position(light, camera, start, extent) for light in scene.lights]
     return View(
         width=width,
         height=height,
@@ -125,9 +125,12 @@ def make_view(
         direction=camera.corner @ pose.rotation,
         step_x=camera.step_x @ pose.rotation,
         step_y=camera.step_y @ pose.rotation,
-        lights=tuple(_placed(light, camera, centre, edge, pose) for light in scene.lights),
-        materials=with_overrides(materials, scene.material),
-        ambient=np.array(scene.ambient.colour),
+        lights=tuple(
+            _placed(light, position, scene.headroom, pose)
+            for light, position in zip(scene.lights, positions, strict=True)
+        ),
+        materials=_dimmed(with_overrides(materials, scene.material), scene.headroom),
+        ambient=np.array(scene.ambient.colour) * scene.headroom,
         background=np.array(scene.background.colour),
         flat=scene.material.flat,
         shadows=scene.light.shadows,
@@ -144,10 +147,34 @@ def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tu
     return tuple(replace(material, **given) for material in materials)
 
 
-def _placed(light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose) -> PlacedLight:
+def world_positions(scene: Scene, extent: Extent, environment: Environment) -> list[Floats]:
+    """World positions of a scene's lights in a room, float64 [3] each."""
+    camera = environment_camera(environment, environment.width, environment.height)
+    start = object_pose(scene.at(0.0), extent, environment)
+    return [_world_position(light, camera, start, extent) for light in scene.lights]
+
+
+def _world_position(light: PointLight, camera: WorldCamera, start: Pose, extent: Extent) -> Floats:
+    """World position of a light; `start` is the object's pose at the start of the motion."""
     if light.position is not None:
-        position = np.array(light.position)
-    else:
-        position = centre + edge * (np.array(light.offset) @ camera.axes)
+        return np.array(light.position)
+    return np.asarray(
+        start.to_world(extent.centre) + extent.edge * start.scale * (np.array(light.offset) @ camera.axes)
+    )
+
+
+def _placed(light: PointLight, position: Floats, headroom: float, pose: Pose) -> PlacedLight:
     reach = None if light.falloff is None else light.falloff / pose.scale
-    return PlacedLight(pose.to_mesh(position), np.array(light.colour), reach)
+    return PlacedLight(pose.to_mesh(position), np.array(light.colour) * headroom, reach)
+
+
+def _dimmed(materials: tuple[MeshMaterial, ...], headroom: float) -> tuple[MeshMaterial, ...]:
+    """The materials under lights that are brighter by ``headroom``: diffuse surfaces keep their colour."""
+
+    def dimmed(material: MeshMaterial) -> MeshMaterial:
+        if material.kind != "diffuse" or headroom == 1.0:
+            return material
+        red, green, blue = (value / headroom for value in material.albedo)
+        return replace(material, albedo=(red, green, blue))
+
+    return tuple(dimmed(material) for material in materials)
