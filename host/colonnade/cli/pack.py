@@ -42,7 +42,7 @@ def pack(
     from colonnade.design.generator import manifest_for
     from colonnade.mesh.load import load_mesh
     from colonnade.render.frames import encoded, max_lights, pack_scene
-    from colonnade.render.lit_room import lit_room
+    from colonnade.render.lit_room import lit_room, scene_room
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.file import check_image_file, image_file
     from colonnade.scene_image.inspect import describe, print_report
@@ -61,7 +61,7 @@ def pack(
     manifest = manifest_for(config, overrides, terminal).manifest
     with terminal.step("packing"):
         surface = load_mesh(described.mesh_source)
-        room = lit_room(described, surface.extent, max_lights(manifest), False, terminal)
+        room = lit_room(described, scene_room(described), surface.extent, max_lights(manifest), False, terminal)
         image = pack_scene(room.scene, surface, manifest, encoded(room, manifest))
     image.save(output)
 

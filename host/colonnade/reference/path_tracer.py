@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
+from colonnade.environment.lights import MAX_FALLOFF
 from colonnade.reference.bounce import bounce
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints
 from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, PlacedObject
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     from colonnade.scene.view import View
 
 Points = TypeVar("Points", ObjectPoints, BackdropPoints)
-
-#: Upper limit of a light's distance falloff, reached at half its reference distance.
-MAX_FALLOFF = 4.0
 
 
 @dataclass(frozen=True)

@@ -17,16 +17,17 @@ from colonnade.common.types import Floats
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoded import EncodedEnvironment
+from colonnade.environment.encoded import EncodedEnvironment, check_layout
 from colonnade.environment.model import Environment
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
-from colonnade.render.lit_room import LitRoom, lit_room
+from colonnade.render.lit_room import LitRoom, lit_room, scene_room
 from colonnade.render.report import FrameReport, frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
+from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import View, make_view, with_overrides
@@ -77,7 +78,11 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     begun = time.perf_counter()
     with progress.step("packing the scene"):
         mesh = load_mesh(scene.mesh_source)
-        room = lit_room(scene, mesh.extent, max_lights(manifest), request.relit, progress)
+        maps = scene_room(scene)
+        if maps is not None:
+            check_layout(maps, manifest)
+            environment_camera(maps, width, height)
+        room = lit_room(scene, maps, mesh.extent, max_lights(manifest), request.relit, progress)
         scene, environment = room.scene, encoded(room, manifest)
         image = pack_scene(scene, mesh, manifest, environment)
         shows_environment = request.relit or environment is None or environment.environment.photo is None
@@ -168,7 +173,7 @@ def render_model(
 ) -> RenderResult:
     """Render one frame with the model. The scene's own mesh is not read, and error bits only appear in the report."""
     with progress.step("packing the scene"):
-        room = lit_room(scene, mesh.extent, max_lights(manifest), False, progress)
+        room = lit_room(scene, scene_room(scene), mesh.extent, max_lights(manifest), False, progress)
         scene, environment = room.scene, encoded(room, manifest)
         image = pack_scene(scene, mesh, manifest, environment)
         seen = None if environment is None else environment.environment

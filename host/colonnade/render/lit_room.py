@@ -9,6 +9,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
+from colonnade.scene.object_pose import object_pose
 from colonnade.scene.room_lights import lights_of, with_lights
 
 if TYPE_CHECKING:
@@ -37,22 +38,35 @@ class LitRoom:
     colours: PhotoColours | None = None
 
 
-def lit_room(scene: Scene, extent: Extent, max_lights: int, relit: bool, progress: Progress = QUIET) -> LitRoom:
-    """Load the room of a scene, fit lights if the scene names none, and choose the colours that rays see.
+def scene_room(scene: Scene) -> Environment | None:
+    """Load the room of a scene; None without one."""
+    return None if scene.background.room is None else load_environment(scene.background.room)
+
+
+def lit_room(
+    scene: Scene,
+    room: Environment | None,
+    extent: Extent,
+    max_lights: int,
+    relit: bool,
+    progress: Progress = QUIET,
+) -> LitRoom:
+    """Fit lights to a scene's room if the scene names none, and choose the colours that rays see.
 
     Args:
         scene: The scene.
+        room: Its room (`scene_room`).
         extent: Bounds of the mesh, for lights relative to it.
         max_lights: Lights of the design.
         relit: The frame shows the room under the scene's lights, not its photo.
         progress: Shows the fit, and notes what was fitted.
 
     Raises:
-        UserError: The room is wrong, or `background.colours` asks for a photo that it lacks.
+        UserError: The object cannot stand in the room, or `background.colours` asks for a photo that it lacks.
     """
-    if scene.background.room is None:
+    if room is None:
         return LitRoom(scene)
-    room = load_environment(scene.background.room)
+    object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     if not scene.names_light:
         scene = _with_fitted_lights(scene, room, max_lights, progress)
     wanted = scene.background.colours

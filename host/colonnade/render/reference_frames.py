@@ -21,9 +21,10 @@ from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.environment.true_room import true_room
 from colonnade.reference.render import ReferenceResult, render_reference
 from colonnade.render.composite import composited
-from colonnade.render.lit_room import LitRoom, lit_room
+from colonnade.render.lit_room import LitRoom, lit_room, scene_room
 from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
+from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
 from colonnade.scene.view import make_view
 
@@ -92,7 +93,10 @@ def traced_frames(
     progress: Progress = QUIET,
 ) -> Iterator[TracedFrame]:
     """Trace poses of a scene; without a ``layout`` the room's bounding planes are those of the default one."""
-    room = lit_room(poses[0], mesh.extent, max_lights, relit, progress)
+    maps = scene_room(poses[0])
+    if maps is not None:
+        environment_camera(maps, *size)
+    room = lit_room(poses[0], maps, mesh.extent, max_lights, relit, progress)
     backdrop = room_backdrop(room, layout, truth, progress)
     for pose in poses:
         begun = time.perf_counter()

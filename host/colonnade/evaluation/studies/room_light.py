@@ -21,7 +21,7 @@ from colonnade.common.image_io import decode_srgb, encode_srgb, write_png
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
-from colonnade.environment.light_fit import relit_psnr
+from colonnade.environment.light_fit import DEFAULT_LIGHTS, relit_psnr
 from colonnade.evaluation.studies.environment_accuracy import NEAR_METRES, NEAR_PIXELS
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.bounce import bounce
@@ -30,7 +30,7 @@ from colonnade.reference.environment.ray_march import HIDDEN, HIT, RayMarch, pos
 from colonnade.reference.environment.surface import SurfaceHits
 from colonnade.reference.object import PlacedObject
 from colonnade.reference.render import primary_directions
-from colonnade.render.lit_room import LitRoom, lit_room
+from colonnade.render.lit_room import LitRoom, lit_room, scene_room
 from colonnade.scene.model import Background, Light, Material, MeshSource, Placement, Scene
 from colonnade.scene.room_lights import lights_of
 
@@ -97,7 +97,7 @@ def study_light(
         }
         for choice, (names_light, colours) in choices.items():
             scene = _scene(folder, names_light, colours)
-            room = lit_room(scene, mesh.extent, 2, False, QUIET if names_light else progress)
+            room = lit_room(scene, scene_room(scene), mesh.extent, DEFAULT_LIGHTS, False, progress)
             assert room.environment is not None
             quality, frame = _measure(mesh, room, progress)
             reports[f"{room.environment.name}: {choice}"] = quality
