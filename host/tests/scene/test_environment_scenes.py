@@ -141,7 +141,11 @@ THREE = LAMP.replace("light = ", "[[light]]\n").replace("{", "").replace("}", ""
             "lower paths.bounces or raise frame.maxBounces",
         ),
         (STANDING.replace("0.6", "0.001") + LAMP, (), "the camera is .* edges away, .*: make the object larger"),
-        (STANDING + "ambient.colour = [1, 1, 1]\nlight.position = [0.0, 1e6, 0.0]\n", (), "light 1 is .* edges away, .*: move it nearer"),
+        (
+            STANDING + "ambient.colour = [1, 1, 1]\nlight.position = [0.0, 1e6, 0.0]\n",
+            (),
+            "light 1 is .* edges away, .*: move it nearer",
+        ),
         (STANDING.replace("[48, 43]", "[96, 43]"), (), r"object.stand_at is \(96, 43\), outside the maps"),
         (STANDING.replace("[48, 43]", "[nan, 43]"), (), "object.stand_at must be two numbers"),
         (STANDING + "camera.fov = 30\n", (), "the camera is the room's: leave out"),
