@@ -8,6 +8,7 @@ venv := .venv/bin
 SCENE ?= scenes/room.toml
 CONFIG ?= small
 SIZE ?= 640x480
+SAMPLES ?= 4
 BENCH_CONFIG ?= edge
 
 help: ## what the targets do
@@ -16,9 +17,9 @@ help: ## what the targets do
 setup: ## install whatever is missing: system programs, .venv, sbt
 	@tools/setup
 
-render: setup ## render SCENE through the RTL of CONFIG at SIZE into out/render.png
+render: setup ## render SCENE through the RTL of CONFIG at SIZE with SAMPLES a pixel into out/render.png
 	@mkdir -p out
-	@$(venv)/colonnade render $(SCENE) --config $(CONFIG) --backend rtl --size $(SIZE) --output out/render.png --json out/render.json
+	@$(venv)/colonnade render $(SCENE) --config $(CONFIG) --backend rtl --size $(SIZE) --samples $(SAMPLES) --output out/render.png --json out/render.json
 
 test: setup ## the hardware's specs (sbt test) and the host's tests (pytest)
 	@tools/test

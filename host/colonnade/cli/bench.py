@@ -17,6 +17,7 @@ from colonnade.cli.options import (
     json_option,
     require_outputs,
     size_option,
+    strict_option,
 )
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 )
 @click.option("--mirror/--no-mirror", default=True, show_default=True, help="Also render the meshes as mirrors.")
 @click.option("--plot", type=FILE, metavar="FILE", help="Plot the utilisation of each stage as PNG.")
+@strict_option
 @json_option
 def bench(
     config: str,

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from colonnade.cli.options import FILE, echo
+from colonnade.cli.options import FILE, echo, strict_option
 
 
 @click.command(short_help="Measure quality, speed, area and power of many configurations.")
@@ -32,6 +32,7 @@ from colonnade.cli.options import FILE, echo
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Run the jobs on a Dask cluster, e.g. tcp://HOST:8786.")
 @click.option("--check", "only_check", is_flag=True, help="Check the study and list its points; run nothing.")
+@strict_option
 def explore(
     study: Path,
     output: Path,

@@ -18,12 +18,13 @@ from colonnade.cli.fuzz import fuzz
 from colonnade.cli.generate import generate
 from colonnade.cli.inspect import inspect
 from colonnade.cli.light import light
+from colonnade.cli.options import echo
 from colonnade.cli.pack import pack
 from colonnade.cli.ppa import ppa
 from colonnade.cli.render import render
 from colonnade.cli.study import study
 from colonnade.cli.verify import verify
-from colonnade.common import ledger
+from colonnade.common import ledger, notes
 from colonnade.common.errors import UserError, reason_of
 from colonnade.common.processes import guarded
 from colonnade.common.terminal_text import one_line
@@ -44,7 +45,7 @@ class OneLineErrors(click.Group):
         """Run a command line and exit with a status: 0 success, 1 internal error, 2 wrong input, 130 interrupted."""
         extra.pop("standalone_mode", None)
         try:
-            with ledger.opened():
+            with ledger.opened(), notes.opened(lambda line: echo(f"colonnade: note: {line}", err=True)):
                 status = super().main(args, prog_name, standalone_mode=False, **extra)
         except UserError as error:
             _fail(str(error), WRONG_INPUT)

@@ -69,6 +69,24 @@ def mesh_option(command: Command) -> Command:
     )
 
 
+def strict_option(command: Command) -> Command:
+    """Add ``--strict``, which makes a note on a mesh an error."""
+
+    def apply(context: click.Context, parameter: click.Parameter, value: bool) -> None:
+        from colonnade.common.notes import be_strict
+
+        if value:
+            be_strict()
+
+    return click.option(
+        "--strict",
+        is_flag=True,
+        expose_value=False,
+        callback=apply,
+        help="Refuse a mesh of which something is not shown, instead of noting it on standard error.",
+    )(command)
+
+
 def background_option(command: Command) -> Command:
     """Add ``--background``, which replaces the scene's background by a room."""
     return click.option(

@@ -15,6 +15,7 @@ from colonnade.cli.options import (
     json_option,
     mesh_option,
     require_outputs,
+    strict_option,
 )
 
 
@@ -26,6 +27,7 @@ from colonnade.cli.options import (
 @click.option(
     "--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; created if missing."
 )
+@strict_option
 @json_option
 def pack(
     scene: Path,
@@ -40,9 +42,9 @@ def pack(
     from colonnade.common import progress
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
-    from colonnade.mesh.load import load_mesh
     from colonnade.render.frames import encoded, max_lights, pack_scene
     from colonnade.render.lit_room import lit_room, scene_room
+    from colonnade.scene.object_mesh import object_mesh
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.file import check_image_file, image_file
     from colonnade.scene_image.inspect import describe, print_report
@@ -60,7 +62,7 @@ def pack(
         described = described.with_environment(background)
     manifest = manifest_for(config, overrides, terminal).manifest
     with terminal.step("packing"):
-        surface = load_mesh(described.mesh_source)
+        surface = object_mesh(described)
         room = lit_room(described, scene_room(described), surface.extent, max_lights(manifest), False, terminal)
         image = pack_scene(room.scene, surface, manifest, encoded(room, manifest))
     image.save(output)

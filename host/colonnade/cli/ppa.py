@@ -16,6 +16,7 @@ from colonnade.cli.options import (
     json_option,
     require_outputs,
     size_option,
+    strict_option,
 )
 
 
@@ -58,6 +59,7 @@ from colonnade.cli.options import (
     metavar="N",
     help="Maximum number of cycles to replay on the gate netlist, at some tens per second.",
 )
+@strict_option
 @json_option
 def ppa(
     config: str,

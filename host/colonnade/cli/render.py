@@ -17,8 +17,9 @@ from colonnade.cli.options import (
     mesh_option,
     require_outputs,
     size_option,
+    strict_option,
 )
-from colonnade.common.limits import MAX_FRAMES
+from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
 
 if TYPE_CHECKING:
     from colonnade.render.report import FrameReport
@@ -51,6 +52,12 @@ if TYPE_CHECKING:
     metavar="N",
     help="Render N frames of the scene's [motion], or of one full turn of the object. Output files are numbered.",
 )
+@click.option(
+    "--samples",
+    type=click.IntRange(min=1, max=MAX_SAMPLES),
+    metavar="N",
+    help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene]",
+)
 @click.option("--output", type=FILE, metavar="FILE", help="Write a PNG picture, or with --frames a .webp animation.")
 @click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances as .npz.")
 @click.option(
@@ -59,6 +66,7 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Write a VCD waveform of the device, its first column and first render unit; for small frames.",
 )
+@strict_option
 @json_option
 def render(
     scene: Path,
@@ -71,6 +79,7 @@ def render(
     relit: bool,
     truth: Path | None,
     frames: int | None,
+    samples: int | None,
     output: Path | None,
     hits_file: Path | None,
     waveform: Path | None,
@@ -103,6 +112,7 @@ def render(
         backend=backend,
         size=pixels,
         frames=frames or 1,
+        samples=samples,
         mesh=mesh,
         background=background,
         hits=hits_file is not None,
@@ -132,12 +142,16 @@ def render(
 def summary(report: FrameReport) -> str:
     """The report as one line of text."""
     sequence = f"{len(report.frames)} frames, " if report.frames else ""
+    if report.samples > 1:
+        sequence += f"{report.samples} samples a pixel, "
     words = [
         f"{report.backend}: {sequence}{report.mesh.triangles:,} triangles",
         f"{report.all_rays:,} rays",
     ]
     if report.cycles:
         words.append(f"{report.cycles:,} cycles")
+        if report.samples > 1:
+            words.append(f"{report.cycles_per_sample:,.0f} a sample")
         words.append(f"{report.rays_per_cycle_in_box:.3f} rays per cycle in box")
         words.append(f"{report.rays_per_cycle:.3f} of all")
     if report.room is not None:

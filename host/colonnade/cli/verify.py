@@ -7,7 +7,16 @@ from typing import Any
 
 import click
 
-from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs, size_option
+from colonnade.cli.options import (
+    FILE,
+    configuration_options,
+    echo,
+    finish,
+    json_option,
+    require_outputs,
+    size_option,
+    strict_option,
+)
 
 
 @click.command(short_help="Compare the RTL with its model, and the model with Embree.")
@@ -22,6 +31,7 @@ from colonnade.cli.options import FILE, configuration_options, echo, finish, jso
 @size_option("Frame size in pixels.  [default: that of the scene]")
 @click.option("--rtl/--no-rtl", default=True, show_default=True, help="Compare the RTL with the model.")
 @click.option("--reference/--no-reference", default=True, show_default=True, help="Compare the model with Embree.")
+@strict_option
 @json_option
 @click.pass_context
 def verify(

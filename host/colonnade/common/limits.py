@@ -12,6 +12,8 @@ MAX_TEXT = 4096
 MAX_PIXELS = 2 * 4096 * 4096
 #: Frames of one command.
 MAX_FRAMES = 10_000
+#: Samples of a pixel.
+MAX_SAMPLES = 1024
 #: Pixels of a frame that is recorded as a waveform; each takes on the order of 100 kB.
 MAX_WAVEFORM_PIXELS = 4096
 #: Points of a study's grid.

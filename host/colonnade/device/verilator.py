@@ -6,7 +6,7 @@ import os
 import shutil
 import subprocess
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,16 +82,36 @@ def render_rtl(
     through_port: bool = False,
     waveform: Path | None = None,
 ) -> Simulated:
+    """Render one frame per set of registers, as `simulate`, and keep all frames."""
+    frames: list[Frame] = []
+    rate = simulate(design, image, registers, frames.append, stalls, progress, through_port, waveform)
+    return Simulated(frames, rate)
+
+
+def simulate(
+    design: GeneratedDesign,
+    image: SceneImage,
+    registers: list[Mapping[str, int]],
+    each: Callable[[Frame], None],
+    stalls: Stalls | None = None,
+    progress: Progress = QUIET,
+    through_port: bool = False,
+    waveform: Path | None = None,
+) -> float:
     """Render one frame per set of registers. The image is loaded once.
 
     Args:
         design: The design to simulate.
         image: The scene image to load.
         registers: All rw registers by name, one set per frame.
+        each: Takes the frames in order; they are in memory one at a time.
         stalls: Random stalls; None: no stalls.
         progress: Shows the steps.
         through_port: Load records through the load port, one per cycle, and not directly into the memories.
         waveform: VCD file for the signals of the device, its first column and that column's first render unit.
+
+    Returns:
+        Simulated clock cycles per second of host time, without loading.
 
     Raises:
         UserError: The stalls include banks, and the design has no input for that.
@@ -108,9 +128,8 @@ def render_rtl(
                 options = [*stalls.options, *(["--waveform", WAVEFORM] if waveform else [])]
                 lines = run_program([str(program), *options, job.name], folder, report)
             outputs = parse_output(lines)
-            frames = [
-                _frame(design.manifest, *of_frame) for of_frame in zip(registers, pixel_files, outputs, strict=True)
-            ]
+            for of_frame in zip(registers, pixel_files, outputs, strict=True):
+                each(_frame(design.manifest, *of_frame))
         except RuntimeError:
             cache.discard(program.parent)
             raise
@@ -119,7 +138,7 @@ def render_rtl(
                 shutil.copyfileobj(written, stream)
     seconds = sum(output.seconds for output in outputs)
     cycles = sum(output.cycles for output in outputs)
-    return Simulated(frames, cycles / seconds if seconds > 0 else 0.0)
+    return cycles / seconds if seconds > 0 else 0.0
 
 
 def write_job(

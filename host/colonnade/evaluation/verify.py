@@ -11,6 +11,8 @@ import numpy as np
 
 from colonnade.common.image_io import encode_srgb
 from colonnade.common.progress import QUIET, Progress
+from colonnade.design.generator import manifest_for
+from colonnade.device.verilator import require_hits
 from colonnade.quality.image_metrics import compare_hits, psnr
 from colonnade.render.frames import render
 from colonnade.render.request import Backend, RenderRequest
@@ -22,8 +24,8 @@ class Equality:
     """Differences between a frame of the RTL and one of the model. Correct hardware has none.
 
     Attributes:
-        pixels: Pixels with different 12-bit colours or shadow ratios.
-        triangles: Pixels with different hit triangles or distances.
+        pixels: Pixels with different 12-bit colours or shadow ratios, or sums of them over the samples.
+        triangles: Pixels with different hit triangles or distances, in the first pass.
         counters: Timing-independent counters that differ.
     """
 
@@ -55,7 +57,7 @@ class Fidelity:
 def equality(rtl: RenderResult, model: RenderResult) -> Equality:
     """Compare a frame of the RTL with one of the model."""
     same_t = (rtl.t == model.t) | (np.isnan(rtl.t) & np.isnan(model.t))
-    differs = (rtl.image != model.image).any(axis=2)
+    differs = (rtl.image != model.image).any(axis=2) | ~rtl.sums.same_as(model.sums)
     if model.ratio is not None:
         assert rtl.ratio is not None
         differs |= (rtl.ratio != model.ratio).any(axis=2)
@@ -103,13 +105,14 @@ def verify(
     Returns:
         ``{"config", "equal", "meshes": {name: {"triangles", "rtl", "reference"}}}``; a skipped comparison is None.
     """
+    if with_rtl:
+        require_hits(manifest_for(config, overrides, progress).manifest)
     results: dict[str, dict[str, Any]] = {}
     equal = True
     for name in meshes:
 
         def frame(backend: Backend, mesh: str = name) -> RenderResult:
-            hits = backend == "rtl"
-            request = RenderRequest(scene, config, overrides, backend, size, mesh=mesh, hits=hits, relit=True)
+            request = RenderRequest(scene, config, overrides, backend, size, mesh=mesh, relit=True)
             return render(request, progress)
 
         model = frame("model")

@@ -11,8 +11,8 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.toolchain import project_root
 from colonnade.evaluation.bench import design_result
 from colonnade.explore.frames import cycles_job, design_of, frame_of, run_in_order
-from colonnade.mesh.load import load_mesh
 from colonnade.scene.model import Scene
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 
 #: Called after each mesh with its name and its report.
@@ -51,7 +51,7 @@ def bench(
     size = size or (scene.frame.width, scene.frame.height)
     names = list(dict.fromkeys(meshes))
     with progress.step("loading the meshes"):
-        loaded = [replace(load_mesh(scene.with_mesh(name).mesh_source), name=name) for name in names]
+        loaded = [replace(object_mesh(scene.with_mesh(name)), name=name) for name in names]
     design, manifest = design_of(config, overrides, progress)
     check_size(size, manifest)
     jobs = []

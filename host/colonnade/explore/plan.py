@@ -20,9 +20,9 @@ from colonnade.explore.jobs import KINDS, Job, JobFailed, figures_of
 from colonnade.explore.points import Point, config_of
 from colonnade.explore.schedule import Outcome
 from colonnade.explore.study import StudyFile
-from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.ppa.library.liberty_files import find_liberties
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 
 #: The library of Yosys's generic gates.
@@ -238,14 +238,17 @@ def _frames(file: StudyFile) -> list[Frame]:
     for name in workload.scenes:
         try:
             scene = load_scene(file.path.parent / name)
+            if scene.blurs or scene.frame.samples > 1:
+                key = "frame.samples" if scene.frame.samples > 1 else scene.blurs[0]
+                raise UserError(f"scene {name}: a study renders one sample a pixel: leave out {key}")
         except UserError as error:
             raise file.error(("workload", "scenes", name), str(error)) from None
         for source in workload.meshes or (None,):
             own = scene if source is None else scene.with_mesh(source)
-            key = str(own.mesh_source)
+            key = f"{own.mesh_source} {own.mesh.crease}"
             try:
                 if key not in meshes:
-                    meshes[key] = load_mesh(own.mesh_source)
+                    meshes[key] = object_mesh(own)
             except UserError as error:
                 where = ("workload", "scenes", name) if source is None else ("workload", "meshes", source)
                 raise file.error(where, str(error)) from None

@@ -31,7 +31,7 @@ def reference(folder: Path, *, scene: Scene, mesh: Mesh, size: Size) -> None:
 
     (rendered,) = traced_frames([scene], mesh, size, DEFAULT_LIGHTS)
     write_png(folder / PICTURE, rendered.image)
-    write_result(folder, {"rays": rendered.frame.rays})
+    write_result(folder, {"rays": rendered.rays})
 
 
 def picture(folder: Path, *, config: str, overrides: Sequence[str], scene: Scene, mesh: Mesh, size: Size) -> None:

@@ -1,48 +1,15 @@
-"""Checks mesh files for errors that trimesh would accept silently or crash on."""
+"""Checks the JSON of glTF files before it is used."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from colonnade.common.errors import UserError
 
-_FACE = re.compile(rb"(?m)^[ \t]*f[ \t]+([^\r\n#]*)")
-_VERTEX = re.compile(rb"(?m)^[ \t]*v[ \t]")
 #: Elements of an accessor, at most.
 _MAX_ELEMENTS = 100_000_000
-
-
-def check_obj(data: bytes, path: Path) -> None:
-    """Refuse an OBJ file whose faces name vertex 0 or a missing vertex."""
-    joined = re.sub(rb"\\\r?\n", b" ", data)
-    vertices = sum(1 for _ in _VERTEX.finditer(joined))
-    corners = re.sub(rb"/\S*", b"", b" ".join(face[1] for face in _FACE.finditer(joined))).split()
-    try:
-        indices = [int(corner) for corner in corners]
-    except ValueError:
-        raise UserError(f"mesh {path}: a vertex index of a face is not an integer") from None
-    if not indices:
-        return
-    if 0 in indices:
-        raise UserError(f"mesh {path}: a face names vertex 0; OBJ files number vertices from 1")
-    for worst in (min(indices), max(indices)):
-        if abs(worst) > vertices:
-            raise UserError(f"mesh {path}: a face names vertex {worst}, but the file has {vertices:,} vertices")
-
-
-def check_ply(data: bytes, path: Path) -> None:
-    """Refuse a PLY file with fewer elements than its header states."""
-    header, mark, body = data.partition(b"end_header")
-    counts = [int(count) for count in re.findall(rb"(?m)^element[ \t]+\S+[ \t]+(\d{1,18})[ \t]*\r?$", header)]
-    # An element takes one line in ASCII, and at least one byte in binary
-    capacity = len(body.split(b"\n")) if re.search(rb"(?m)^format[ \t]+ascii", header) else len(body)
-    if not mark:
-        raise UserError(f"{path} cannot be read as a mesh: its PLY header has no end")
-    if sum(counts) > capacity:
-        raise UserError(f"mesh {path} is truncated: its header states {sum(counts):,} elements")
 
 
 def check_gltf(document: Any, path: Path) -> None:

@@ -1,7 +1,7 @@
-"""Loads triangle meshes by name, or from a file that trimesh reads (OBJ, PLY, STL, OFF, glTF).
+"""Loads triangle meshes by name, or from a file (OBJ, PLY, STL, OFF, glTF).
 
-Every loaded mesh is clean: vertices are merged by position, and degenerate faces, duplicate faces and unused vertices
-are removed. Smooth normals are computed from the merged faces, weighted by angle; the file's normals are ignored.
+Every loaded mesh is clean: vertices are merged by position, degenerate faces, duplicate faces and unused vertices are
+removed, and closed parts point outward. Its corner normals are those of the file, else smooth up to a crease angle.
 """
 
 from __future__ import annotations
@@ -14,37 +14,55 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import is_file, require_regular
 from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import catalog, primitives, teapot
+from colonnade.mesh import losses as lost
 from colonnade.mesh.formats import SUFFIXES, read_surface
+from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.topology import Faces, drop_faces, merge_rows, subdivide, vertex_normals
+from colonnade.mesh.normals import corner_normals
+from colonnade.mesh.palette import MAX_MATERIALS, coloured_materials
+from colonnade.mesh.topology import Faces, drop_faces, merge_rows, subdivide, subdivide_corners
+from colonnade.mesh.winding import find_winding
 
 TEAPOT_LEVEL = 10
 TEAPOT_LIMIT = 200
 
 
-def load_mesh(name_or_path: str | Path) -> Mesh:
-    """Load the mesh of a name or a file.
+def load_mesh(name_or_path: str | Path, crease: float | None = None) -> Mesh:
+    """Load the mesh of a name or a file, and report its notes (`colonnade.common.notes`).
 
     Names are ``teapot`` and ``teapot:LEVEL``, the solids (``sphere:TRIANGLES``, ``cube`` …), the well-known meshes
     (``bunny`` …), and the files without their suffix in the folders of the environment variable COLONNADE_MESHES.
 
+    Args:
+        name_or_path: The name or file.
+        crease: Angle up to which edges are smooth, degrees, in place of the file's normals. None: the file's normals,
+            without them the default angle.
+
     Raises:
         UserError: The mesh does not exist or cannot be rendered.
     """
+    mesh = _loaded(name_or_path, crease)
+    notes.report(mesh.notes)
+    return mesh
+
+
+def _loaded(name_or_path: str | Path, crease: float | None) -> Mesh:
     text = str(name_or_path)
     if isinstance(name_or_path, str) and (built := _built_in(text)) is not None:
-        return clean_mesh(*built, name=text)
+        return clean_mesh(*built, name=text, crease=crease)
     looks_like_path = os.sep in text or Path(text).suffix.lower() in SUFFIXES
     if isinstance(name_or_path, str) and not looks_like_path and not is_file(Path(text)):
         found = catalog.find(text)
-        mesh = _read(found.path, found.subdivisions)
+        mesh = _read(found.path, found.subdivisions, crease)
         return replace(mesh, name=text)
-    return _read(Path(text), 0)
+    return _read(Path(text), 0, crease)
 
 
 def _built_in(name: str) -> tuple[Floats, Faces] | None:
@@ -68,7 +86,7 @@ def _size(name: str, argument: str, default: int, minimum: int, maximum: int, gi
     return int(argument)
 
 
-def _read(path: Path, subdivisions: int) -> Mesh:
+def _read(path: Path, subdivisions: int, crease: float | None) -> Mesh:
     """Read a mesh file and split each triangle into four ``subdivisions`` times."""
     require_regular(path, "mesh file")
     if path.suffix.lower() not in SUFFIXES:
@@ -76,30 +94,33 @@ def _read(path: Path, subdivisions: int) -> Mesh:
     if path.stat().st_size == 0:
         raise UserError(f"mesh file {path} is empty")
     try:
-        surface = read_surface(path)
-    except (UserError, ImportError, MemoryError):
+        file = read_surface(path)
+    except (ImportError, MemoryError):
         raise
-    except IndexError:
-        raise UserError(f"mesh {path}: a face names a vertex, or a node another part, that does not exist") from None
+    except UserError as error:
+        raise error if str(path) in str(error) else UserError(f"mesh {path}: {error}") from None
     except Exception as error:  # readers raise many types on invalid data
         raise UserError(f"{path} cannot be read as a mesh: {type(error).__name__}: {error}") from None
-    vertices, faces = surface.vertices, surface.faces
-    if len(faces) == 0:
-        raise UserError(f"mesh {path} has no faces")
-    vertices, faces = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
-        raise UserError(f"{path} cannot be read as a mesh of triangles")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise UserError(f"mesh {path}: a face names a vertex that does not exist")
+    surface, losses = file.surface, file.losses
+    vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     for _ in range(subdivisions):
         vertices, faces = subdivide(vertices, faces)
+        normals = None if normals is None else subdivide_corners(unit_vectors(normals))
+    materials, face_materials, colours = coloured_materials(surface.materials, surface.material_index, surface.colours)
+    if len(materials) > MAX_MATERIALS:
+        raise UserError(f"mesh {path} has {len(materials):,} materials: use at most {MAX_MATERIALS}")
+    if colours > 0:
+        losses.add(lost.COLOURS, colours)
     return clean_mesh(
         vertices,
         faces.astype(np.int32),
         name=path.stem,
         where=str(path),
-        materials=surface.materials,
-        face_materials=np.repeat(surface.face_materials, 4**subdivisions),
+        materials=materials,
+        face_materials=np.repeat(face_materials.astype(np.uint8), 4**subdivisions),
+        normals=normals,
+        crease=crease,
+        losses=losses,
     )
 
 
@@ -110,22 +131,35 @@ def clean_mesh(
     where: str | None = None,
     materials: tuple[MeshMaterial, ...] = (PLAIN,),
     face_materials: npt.NDArray[np.uint8] | None = None,
+    normals: Floats | None = None,
+    crease: float | None = None,
+    losses: Losses | None = None,
 ) -> Mesh:
-    """Clean raw vertices [n, 3] and faces [m, 3]; ``where`` names the source in errors.
+    """Clean raw vertices and faces.
 
-    Without ``face_materials``, uint8 [m], all faces have the first material.
+    Args:
+        vertices: float64 [n, 3].
+        faces: int32 [m, 3].
+        name: Name of the mesh.
+        where: Its source, in messages.
+        materials: The materials.
+        face_materials: uint8 [m]; None: all faces have the first material.
+        normals: Normals of the file, float64 [m, 3, 3]; see `colonnade.mesh.normals.corner_normals`.
+        crease: Crease angle, degrees, in place of ``normals``.
+        losses: What the file lost so far; what is repaired here is added.
 
     Raises:
         UserError: A vertex is not finite, the size is out of range, or no face has an area.
     """
     label = f"mesh {where or name}"
+    losses = Losses() if losses is None else losses
     if len(faces) == 0:
         raise UserError(f"{label} has no faces")
-    if not np.isfinite(vertices).all():
-        bad = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
+    used, numbered = np.unique(faces, return_inverse=True)
+    if not np.isfinite(vertices[used]).all():
+        bad = int(used[np.flatnonzero(~np.isfinite(vertices[used]).all(axis=1))[0]])
         raise UserError(f"{label}: vertex {bad} is not a finite number: repair the file")
     source_count = len(faces)
-    used, numbered = np.unique(faces, return_inverse=True)
     vertices = vertices[used]
     if np.abs(vertices).max() > 1e100:
         raise UserError(f"{label} has coordinates beyond 1e100: scale it down")
@@ -140,13 +174,26 @@ def clean_mesh(
         raise UserError(f"{label} is smaller than 1e-100: scale it up")
     used, renumbered = np.unique(corners[keep], return_inverse=True)
     vertices, faces = merged[used], renumbered.reshape(-1, 3).astype(np.int32)
+    normals = None if normals is None else normals[keep]
+    winding = find_winding(vertices, faces)
+    if winding.reversed.any():
+        losses.add(lost.MIXED, winding.mixed)
+        losses.add(lost.INVERTED, winding.inverted)
+        faces[winding.reversed] = faces[winding.reversed][:, ::-1]
+        if normals is not None:
+            normals[winding.reversed] = normals[winding.reversed][:, ::-1]
+    shading = corner_normals(vertices, faces, normals, crease)
+    losses.add(lost.FLIPPED, shading.flipped)
+    losses.add(lost.REPLACED, shading.replaced)
+    losses.add(lost.MISSING, shading.missing)
     return Mesh(
         vertices=vertices,
         faces=faces,
-        vertex_normals=vertex_normals(vertices, faces),
+        corner_normals=shading.normals,
         materials=materials,
         face_materials=np.zeros(len(faces), dtype=np.uint8) if face_materials is None else face_materials[keep],
         source_faces=keep.astype(np.int32),
         source_count=source_count,
         name=name,
+        notes=losses.lines(label),
     )

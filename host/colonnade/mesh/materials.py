@@ -7,7 +7,7 @@
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | index of refraction | `KHR_materials_ior` | `Ni` |
 
-Textures are not read.
+Textures are not read. What a material holds beyond this is counted as lost.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+from colonnade.mesh import losses as lost
+from colonnade.mesh.losses import Loss
+
 Vector = tuple[float, float, float]
 
 #: Surface kinds of the device.
@@ -25,6 +28,11 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 
 #: Default index of refraction of glass, as in glTF.
 GLASS_IOR = 1.5
+
+#: Roughness up to which a mirror or glass counts as smooth, and below which a diffuse surface counts as glossy.
+_SMOOTH, _GLOSSY = 0.1, 0.5
+#: Extensions of glTF materials that are used.
+_USED_EXTENSIONS = ("KHR_materials_transmission", "KHR_materials_ior")
 
 
 @dataclass(frozen=True)
@@ -72,6 +80,64 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
     if first("d", 1.0) < 0.5 or first("tr", 0.0) > 0.5 or model in (4.0, 6.0, 7.0, 9.0):
         return MeshMaterial("glass", _colour(entries.get("tf"), colour), _ior(first("ni", GLASS_IOR)))
     return MeshMaterial("mirror" if first("pm", 0.0) >= 0.5 or model in (3.0, 5.0) else "diffuse", colour)
+
+
+def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
+    """What a picture does not show of a material of a glTF file's JSON, apart from its extensions."""
+    shown, surface = from_gltf(material).kind, material.get("pbrMetallicRoughness")
+    surface = {"metallicFactor": 0.0, "roughnessFactor": 1.0} if surface is None else surface
+    extensions = material.get("extensions", {})
+    textures = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
+    found = [(lost.TEXTURES, len(textures))]
+    mode, colour = material.get("alphaMode", "OPAQUE"), surface.get("baseColorFactor", ())
+    if mode == "MASK":
+        found.append((lost.MASKED, 1))
+    elif mode == "BLEND" and shown != "glass" and (len(colour) < 4 or _number(colour[3], 1.0) < 1 or textures):
+        found.append((lost.BLENDED, 1))
+    if any(_colour(material.get("emissiveFactor"), (0.0, 0.0, 0.0))):
+        found.append((lost.EMISSION, 1))
+    transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
+    metallic, roughness = _number(surface.get("metallicFactor"), 1.0), _number(surface.get("roughnessFactor"), 1.0)
+    if 0.0 < transmission < 1.0:
+        found.append((lost.PARTLY_GLASS, 1))
+    elif 0.0 < metallic < 1.0:
+        found.append((lost.PARTLY_METAL, 1))
+    return [*found, *_roughness_losses(shown, roughness)]
+
+
+def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
+    """What a picture does not show of a material of an MTL file, given as for `from_mtl`."""
+
+    def first(key: str, default: float) -> float:
+        value = entries.get(key)
+        return _number(value[0] if isinstance(value, list | tuple) and value else value, default)
+
+    shown = from_mtl(entries).kind
+    maps = [key for key in entries if key.startswith("map_") or key in ("bump", "disp", "decal", "refl", "norm")]
+    found = [(lost.TEXTURE_OBJ, len(maps))]
+    if any(_colour(entries.get("ke"), (0.0, 0.0, 0.0))):
+        found.append((lost.EMISSION, 1))
+    opacity = min(first("d", 1.0), 1.0 - first("tr", 0.0))
+    if 0.0 < opacity < 1.0 and "tf" not in entries:
+        found.append((lost.PARTLY_GLASS if shown == "glass" else lost.BLENDED, 1))
+    if shown == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
+        found.append((lost.HIGHLIGHTS, 1))
+    if "pr" in entries:
+        found += _roughness_losses(shown, first("pr", 0.0))
+    return found
+
+
+def _roughness_losses(shown: str, roughness: float) -> list[tuple[Loss, int]]:
+    if shown == "diffuse":
+        return [(lost.HIGHLIGHTS, 1)] if roughness < _GLOSSY else []
+    if roughness <= _SMOOTH:
+        return []
+    return [(lost.ROUGH_MIRROR if shown == "mirror" else lost.ROUGH_GLASS, 1)]
+
+
+def unused_extensions(material: Mapping[str, Any]) -> list[str]:
+    """The extensions of a glTF material that are not used."""
+    return [name for name in material.get("extensions", {}) if name not in _USED_EXTENSIONS]
 
 
 def _ior(value: float) -> float:

@@ -45,22 +45,25 @@ class Mesh:
     Attributes:
         vertices: float64 [n, 3], mesh space.
         faces: int32 [m, 3], counter-clockwise seen from outside.
-        vertex_normals: float64 [n, 3], unit length, or 0 where the adjacent faces' normals cancel.
+        corner_normals: Shading normals at the corners of the faces, unit length, or 0 where those of the adjacent
+            faces cancel, float64 [m, 3, 3].
         materials: Materials of the mesh file; at least one.
         face_materials: uint8 [m], index into `materials`.
         source_faces: int32 [m], the face's index in the source, which includes dropped faces.
         source_count: Number of faces in the source.
         name: Name for reports.
+        notes: Lines on what the file holds and a picture does not show, and on what was repaired.
     """
 
     vertices: Floats
     faces: Faces
-    vertex_normals: Floats
+    corner_normals: Floats
     materials: tuple[MeshMaterial, ...]
     face_materials: npt.NDArray[np.uint8]
     source_faces: npt.NDArray[np.int32]
     source_count: int
     name: str
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def extent(self) -> Extent:

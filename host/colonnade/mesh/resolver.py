@@ -5,71 +5,59 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import NoReturn
-
-import trimesh
 
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import exists, read_input
 from colonnade.common.limits import MAX_MESH_BYTES, MAX_TEXT_BYTES
 
-#: A line of an MTL file that names a texture.
-_TEXTURE = re.compile(rb"(?im)^[ \t]*(map_\w+|bump|disp|decal|refl|norm)[ \t].*$")
 #: A line of an MTL file with numbers, which must be finite.
 _NUMBERS = re.compile(rb"(?im)^[ \t]*(k[asde]|tf|ni|ns|d|tr|illum|p[rmsc]\w*)[ \t]+(.*)$")
 
 
-class MeshResolver(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
-    """Reads regular files in the mesh's folder and its subfolders.
-
-    Attributes:
-        refused: The first error. trimesh would ignore a missing file, so the caller must raise it.
-    """
+class References:
+    """Reads regular files in the mesh's folder and its subfolders."""
 
     def __init__(self, mesh: Path) -> None:
-        super().__init__(str(mesh))
-        self.refused: UserError | None = None
-        self._suffix = mesh.suffix.lower()
+        self._folder = mesh.parent
 
-    def get(self, name: str) -> bytes:
-        """The content of the file ``name``, for trimesh."""
-        if self._suffix not in (".obj", ".gltf", ".glb"):
-            raise FileNotFoundError(name)
+    def materials(self, name: str) -> bytes | None:
+        """The checked content of an MTL file; None if it is missing.
+
+        Raises:
+            UserError: The file cannot be read, is outside the folder, or has a number that is negative or not finite.
+        """
         path = self._find(name)
-        try:
-            if self._suffix != ".obj":
-                return read_input(path, "the buffer", MAX_MESH_BYTES)
-            return _checked_mtl(read_input(path, "the materials", MAX_TEXT_BYTES * 16), path)
-        except UserError as error:
-            self.refused = self.refused or error
-            raise FileNotFoundError(name) from None
+        return None if path is None else _checked_mtl(read_input(path, "the materials", MAX_TEXT_BYTES * 16), path)
 
-    def namespaced(self, namespace: str) -> NoReturn:
-        """Refuse other folders."""
-        raise FileNotFoundError(namespace)
+    def buffer(self, name: str) -> bytes | None:
+        """The content of a glTF buffer; None if it is missing.
 
-    def _find(self, name: str) -> Path:
-        parent = Path(self.parent).resolve()
-        for candidate in (name.strip(), name.strip().lstrip("/"), name.rsplit("/", 1)[-1].strip()):
+        Raises:
+            UserError: The file cannot be read, or is outside the folder.
+        """
+        path = self._find(name)
+        return None if path is None else read_input(path, "the buffer", MAX_MESH_BYTES)
+
+    def _find(self, name: str) -> Path | None:
+        parent = self._folder.resolve()
+        outside = False
+        for candidate in (name.strip(), name.strip().lstrip("/"), re.split(r"[/\\]", name)[-1].strip()):
             try:
                 path = (parent / candidate).resolve()
+                if not candidate or not exists(path):
+                    continue
             except (OSError, ValueError, RuntimeError):
-                continue
-            if not exists(path):
                 continue
             if path.is_relative_to(parent):
                 return path
-            outside = UserError(f"{name}, which a mesh references, is outside its folder {parent}: copy it there")
-            self.refused = self.refused or outside
-        raise FileNotFoundError(name)
+            outside = True
+        if outside:
+            raise UserError(f"{name}, which a mesh references, is outside its folder {parent}: copy it there")
+        return None
 
 
 def _checked_mtl(data: bytes, path: Path) -> bytes:
-    """Remove the textures from an MTL file and check its numbers.
-
-    Raises:
-        UserError: A number is negative or not finite.
-    """
+    """Refuse an MTL file with a number that is negative or not finite."""
     for line in _NUMBERS.finditer(data):
         for word in line[2].split():
             try:
@@ -80,4 +68,4 @@ def _checked_mtl(data: bytes, path: Path) -> bytes:
                 row = data.count(b"\n", 0, line.start()) + 1
                 text = line[0].decode("latin-1").strip()
                 raise UserError(f"{path}, line {row}: {text}: a material's numbers must be finite and not negative")
-    return _TEXTURE.sub(b"", data)
+    return data

@@ -1,4 +1,4 @@
-"""Operations on indexed triangle meshes: subdivision, merging, cleaning and vertex normals."""
+"""Operations on indexed triangle meshes: subdivision, merging, cleaning and edges."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.types import Floats
-from colonnade.common.vectors import unit_vectors
 
 Faces = npt.NDArray[np.int32]
 
@@ -30,6 +29,14 @@ def subdivide(vertices: Floats, faces: npt.NDArray[np.int64]) -> tuple[Floats, n
     ab, bc, ca = middle.T
     quarters = np.stack([np.stack(corners, 1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))], 1)
     return np.concatenate([vertices, vertices[unique].mean(axis=1)]), quarters.reshape(-1, 3)
+
+
+def subdivide_corners(values: Floats) -> Floats:
+    """Values of the corners of faces after `subdivide`: float64 [m, 3, k] becomes [4·m, 3, k]."""
+    a, b, c = np.moveaxis(values, 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    quarters = np.stack([np.stack(corners, 1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))], 1)
+    return quarters.reshape(-1, 3, values.shape[2])
 
 
 def merge_rows(rows: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
@@ -55,16 +62,8 @@ def drop_faces(vertices: npt.NDArray[Any], faces: npt.NDArray[Any]) -> npt.NDArr
     return np.sort(first)
 
 
-def vertex_normals(vertices: Floats, faces: Faces) -> Floats:
-    """Unit normals float64 [n, 3]: the face normals weighted by their angle at the vertex; 0 where they cancel."""
-    corners = vertices[faces] / float((vertices.max(axis=0) - vertices.min(axis=0)).max())
-    sides = np.roll(corners, -1, axis=1) - corners
-    normals = unit_vectors(np.cross(sides[:, 0], -sides[:, 2]).astype(np.float64))
-    sides = unit_vectors(sides)
-    cosine = -np.einsum("mcx,mcx->mc", sides, np.roll(sides, 1, axis=1))
-    weighted = np.arccos(np.clip(cosine, -1.0, 1.0))[:, :, None] * normals[:, None, :]
-    flat, target = weighted.reshape(-1, 3), faces.reshape(-1)
-    sums = [np.bincount(target, flat[:, axis], len(vertices)) for axis in range(3)]
-    total = np.stack(sums, axis=1).astype(np.float64)
-    total[np.linalg.norm(total, axis=1) < 1e-9] = 0.0
-    return unit_vectors(total)
+def edge_keys(faces: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """A number for the edge from each corner to the next, the same for both directions, int64 [3 · m]."""
+    start = faces.astype(np.int64)
+    end = np.roll(start, -1, axis=1)
+    return (np.minimum(start, end) * (int(faces.max()) + 1) + np.maximum(start, end)).reshape(-1)

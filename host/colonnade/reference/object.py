@@ -75,8 +75,7 @@ class PlacedObject:
         facing = geometric * sign
         normals = facing
         if not self._flat:
-            mesh = self._mesh
-            smooth = np.einsum("nj,njk->nk", hits.weights, mesh.vertex_normals[mesh.faces[faces]]) * sign
+            smooth = np.einsum("nj,njk->nk", hits.weights, self._mesh.corner_normals[faces]) * sign
             normals = np.where(smooth.any(axis=1, keepdims=True), smooth, facing)
         return ObjectPoints(hits.position, facing, unit_vectors(normals), ~is_back, hits.t)
 

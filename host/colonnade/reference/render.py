@@ -93,9 +93,9 @@ def primary_directions(view: View, rows: slice) -> Floats:
 
 
 def _map_pixels(view: View, rows: slice, backdrop: Backdrop | None) -> Floats:
-    """Positions (u, v) in the room's maps of the pixels of some rows, float64 [rows * width, 2]."""
+    """Positions (u, v) in the room's maps that the rays of some rows show, float64 [rows * width, 2]."""
     u_scale = v_scale = 1.0
     if backdrop is not None:
         u_scale, v_scale = backdrop.environment.width / view.width, backdrop.environment.height / view.height
     v, u = np.mgrid[rows, : view.width] + 0.5
-    return np.stack([u.ravel() * u_scale, v.ravel() * v_scale], axis=1)
+    return np.stack([(u.ravel() + view.shift[0]) * u_scale, (v.ravel() + view.shift[1]) * v_scale], axis=1)

@@ -52,11 +52,16 @@ def shadow_window(view: View, environment: Environment, depth: Floats, extent: E
 
 
 def _points(view: View, environment: Environment, depth: Floats) -> Floats:
-    """The room's surface points at the frame's pixels, mesh space, float64 [height, width, 3]."""
+    """The points where the device takes the room's surface in the frame, mesh space, float64 [height, width, 3].
+
+    The depth is that of a pixel's centre, also where its ray is shifted.
+    """
     assert view.view_to_mesh is not None
     u = (np.arange(view.width) + 0.5) * environment.width / view.width
     v = (np.arange(view.height) + 0.5) * environment.height / view.height
     z = depth[np.ix_(v.astype(np.int64), u.astype(np.int64))]
+    u += view.shift[0] * environment.width / view.width
+    v += view.shift[1] * environment.height / view.height
     x, y = (u[None, :] - environment.cx) / environment.fx * z, (v[:, None] - environment.cy) / environment.fy * z
     return np.stack([x, y, z], axis=2) @ view.view_to_mesh[:, :3].T + view.view_to_mesh[:, 3]
 

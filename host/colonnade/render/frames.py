@@ -9,17 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
+from colonnade.common.accumulation import FramePasses
 from colonnade.common.errors import UserError
 from colonnade.common.framebuffer import Frame
 from colonnade.common.limits import MAX_WAVEFORM_PIXELS
 from colonnade.common.progress import QUIET, Progress
-from colonnade.common.types import Floats
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.environment.encoded import EncodedEnvironment, check_layout
-from colonnade.environment.model import Environment
-from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
@@ -29,6 +27,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
+from colonnade.scene.object_mesh import object_mesh, with_materials
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import View, make_view, with_overrides
 from colonnade.scene_image.file import SceneImage
@@ -56,17 +55,19 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         scene = scene.with_environment(request.background)
     if request.mesh is not None:
         scene = scene.with_mesh(request.mesh)
+    scene = with_requested_samples(scene, request)
     width, height = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size((width, height), manifest)
     if request.waveform is not None:
         _check_waveform(request, (width, height))
-    progresses = scene.motion.frame_progress(request.frames)
+    poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
+    exposure = scene.motion.exposure(request.frames)
     if request.backend == "reference":
-        from colonnade.render.reference_frames import reference_frames
+        from colonnade.render.reference_frames import ReferenceOptions, reference_frames
 
-        poses = [scene.at(fraction) for fraction in progresses]
-        yield from reference_frames(poses, manifest, (width, height), progress, request.relit, request.truth)
+        options = ReferenceOptions(exposure, request.relit, request.truth)
+        yield from reference_frames(poses, manifest, (width, height), progress, options)
         return
     if request.truth is not None:
         raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
@@ -77,19 +78,22 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        mesh = load_mesh(scene.mesh_source)
-        maps = scene_room(scene)
+        mesh, maps = object_mesh(scene), scene_room(scene)
         if maps is not None:
             check_layout(maps, manifest)
             environment_camera(maps, width, height)
         room = lit_room(scene, maps, mesh.extent, max_lights(manifest), request.relit, progress)
         scene, environment = room.scene, encoded(room, manifest)
         image = pack_scene(scene, mesh, manifest, environment)
+        poses = [scene.at(pose.motion_progress) for pose in poses]
+        passes = [pose.passes(exposure) for pose in poses]
         shows_environment = request.relit or environment is None or environment.environment.photo is None
-        poses = [scene.at(fraction) for fraction in progresses]
         registers = [
-            frame_registers(pose, image.header, manifest, width, height, environment, shows_environment)
-            for pose in poses
+            [
+                frame_registers(one, image.header, manifest, width, height, environment, shows_environment)
+                for one in of_frame
+            ]
+            for of_frame in passes
         ]
     packed = time.perf_counter() - begun
     seen = None if environment is None else environment.environment
@@ -98,7 +102,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         rendered = _rtl_frames(design, image, registers, progress, request.waveform)
     else:
         rendered = _model_frames(manifest, image, registers, progress)
-    for pose, (frame, seconds, rate) in zip(poses, rendered, strict=True):
+    for pose, of_frame, (rendered_passes, seconds, rate) in zip(poses, passes, rendered, strict=True):
+        frame = rendered_passes.frame
         require_no_errors(frame)
         report = replace(
             frame_report(request.backend, manifest, image.header, frame),
@@ -106,12 +111,32 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
             seconds={"pack": packed, "build": None} | seconds,
             simulated_cycles_per_second=rate,
             bytes=None if environment is None else environment.image.byte_counts(),
+            samples=len(of_frame),
         )
-        view = make_view(pose, image.header.extent, width, height, image.header.materials, seen)
-        result = _result(frame, image, view, manifest, report)
+        view = make_view(of_frame[0], image.header.extent, width, height, image.header.materials, seen)
+        result = _result(rendered_passes, image, view, report)
         if environment is not None and not request.relit:
-            result = replace(result, image=_composited(result, frame, environment.environment))
+            result = replace(result, image=composited(result.sums, environment.environment))
         yield result
+
+
+def with_requested_samples(scene: Scene, request: RenderRequest) -> Scene:
+    """The scene with the samples of the request.
+
+    Raises:
+        UserError: The request needs the rays of a single pass, or one sample hides what the scene asks for.
+    """
+    if request.samples is not None:
+        scene = scene.with_samples(request.samples)
+    elif scene.blurs and scene.frame.samples == 1:
+        raise UserError(
+            f"{scene.blurs[0]} shows only with several samples: give frame.samples or --samples;"
+            " --samples 1 renders the middle"
+        )
+    for what, is_used in (("hits are", request.hits), ("a waveform is", request.waveform is not None)):
+        if is_used and scene.frame.samples > 1:
+            raise UserError(f"{what} of one sample a pixel, this frame has {scene.frame.samples}: give --samples 1")
+    return scene
 
 
 def _check_waveform(request: RenderRequest, size: tuple[int, int]) -> None:
@@ -127,43 +152,54 @@ def _check_waveform(request: RenderRequest, size: tuple[int, int]) -> None:
         )
 
 
-#: A frame, its seconds by step, and the RTL's simulated cycles per second.
-Rendered = tuple[Frame, dict[str, float], float | None]
+#: The passes of a frame, its seconds by step, and the RTL's simulated cycles per second.
+Rendered = tuple[FramePasses, dict[str, float], float | None]
 
 
 def _rtl_frames(
     design: GeneratedDesign,
     image: SceneImage,
-    registers: list[dict[str, int]],
+    registers: list[list[dict[str, int]]],
     progress: Progress,
     waveform: Path | None = None,
 ) -> Iterator[Rendered]:
-    """Render all frames in one run of the simulator. Each frame reports an equal part of the run time."""
+    """Render all passes of all frames in one run of the simulator. Each frame reports an equal part of the run time."""
     from colonnade.device.simulator_build import build_simulator
-    from colonnade.device.verilator import render_rtl
+    from colonnade.device.verilator import simulate
 
     begun = time.perf_counter()
     build_simulator(design, progress, waveform=waveform is not None)
     built = time.perf_counter()
-    simulated = render_rtl(design, image, list(registers), progress=progress, waveform=waveform)
+    frames = [FramePasses() for _ in registers]
+    places = iter([frame for frame, of_frame in zip(frames, registers, strict=True) for _ in of_frame])
+    every = [one for of_frame in registers for one in of_frame]
+    rate = simulate(
+        design, image, list(every), lambda frame: next(places).add(frame), progress=progress, waveform=waveform
+    )
     run = (time.perf_counter() - built) / len(registers)
-    for frame in simulated.frames:
-        yield frame, {"build": built - begun, "run": run}, simulated.cycles_per_second
+    for frame in frames:
+        yield frame, {"build": built - begun, "run": run}, rate
 
 
 def _model_frames(
-    manifest: Manifest, image: SceneImage, registers: list[dict[str, int]], progress: Progress
+    manifest: Manifest, image: SceneImage, registers: list[list[dict[str, int]]], progress: Progress
 ) -> Iterator[Rendered]:
-    """Render frame by frame with a model that is loaded once."""
+    """Render pass by pass with a model that is loaded once."""
     from colonnade.device.bit_exact import loaded_model, model_frame
 
     model = loaded_model(manifest, image)
 
-    def one(values: dict[str, int]) -> Rendered:
+    def one(of_frame: list[dict[str, int]]) -> Rendered:
         begun = time.perf_counter()
-        with progress.step("rendering in the model") as share:
-            frame = model_frame(model, values, lambda done, total: share(done / total))
-        return frame, {"run": time.perf_counter() - begun}, None
+        passes = FramePasses()
+        with progress.step("rendering in the model") as report:
+            for index, values in enumerate(of_frame):
+
+                def share(done: int, total: int, before: int = index) -> None:
+                    report((before + done / total) / len(of_frame))
+
+                passes.add(model_frame(model, values, share))
+        return passes, {"run": time.perf_counter() - begun}, None
 
     yield from map(one, registers)
 
@@ -171,7 +207,10 @@ def _model_frames(
 def render_model(
     scene: Scene, mesh: Mesh, manifest: Manifest, size: tuple[int, int], progress: Progress = QUIET
 ) -> RenderResult:
-    """Render one frame with the model. The scene's own mesh is not read, and error bits only appear in the report."""
+    """Render one frame of one sample with the model.
+
+    The scene's own mesh is not read, and error bits only appear in the report.
+    """
     with progress.step("packing the scene"):
         room = lit_room(scene, scene_room(scene), mesh.extent, max_lights(manifest), False, progress)
         scene, environment = room.scene, encoded(room, manifest)
@@ -180,10 +219,10 @@ def render_model(
         registers = frame_registers(
             scene, image.header, manifest, *size, environment, seen is None or seen.photo is None
         )
-    ((frame, _, _),) = _model_frames(manifest, image, [registers], progress)
+    ((passes, _, _),) = _model_frames(manifest, image, [[registers]], progress)
     view = make_view(scene, image.header.extent, *size, image.header.materials, seen)
-    result = _result(frame, image, view, manifest, frame_report("model", manifest, image.header, frame))
-    return result if seen is None else replace(result, image=_composited(result, frame, seen))
+    result = _result(passes, image, view, frame_report("model", manifest, image.header, passes.frame))
+    return result if seen is None else replace(result, image=composited(result.sums, seen))
 
 
 def max_lights(manifest: Manifest) -> int:
@@ -196,15 +235,11 @@ def encoded(room: LitRoom, manifest: Manifest) -> EncodedEnvironment | None:
     return None if room.environment is None else EncodedEnvironment.of(room.environment, manifest)
 
 
-def _composited(result: RenderResult, frame: Frame, environment: Environment) -> Floats:
-    ratio = None if frame.ratio is None else frame.ratio / 4096.0
-    return composited(result.image, frame.is_object, ratio, environment)
-
-
 def pack_scene(
     scene: Scene, mesh: Mesh, manifest: Manifest, environment: EncodedEnvironment | None = None
 ) -> SceneImage:
     """The scene image of a mesh, with the scene's material and the maps of its room."""
+    mesh = with_materials(scene, mesh, int(manifest.config["frame"]["materials"]))
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     if environment is None:
         return image
@@ -224,17 +259,19 @@ def require_no_errors(frame: Frame) -> None:
         raise UserError("the frame failed: " + "; ".join(advice.get(error, error) for error in frame.errors))
 
 
-def _result(frame: Frame, image: SceneImage, view: View, manifest: Manifest, report: FrameReport) -> RenderResult:
-    white = (1 << manifest.numbers["colourBits"]) - 1
+def _result(passes: FramePasses, image: SceneImage, view: View, report: FrameReport) -> RenderResult:
+    """The result of a frame; `view` is that of its first pass."""
+    frame, sums = passes.frame, passes.sums
     source = np.append(image.source_faces.astype(np.int64), -1)
     x, y = np.arange(view.width)[None, :, None], np.arange(view.height)[:, None, None]
     longest = np.abs(view.direction + x * view.step_x + y * view.step_y).max(axis=2)
     depth = frame.distance / (image.header.frame.scale * longest)
     return RenderResult(
-        image=frame.colour.astype(np.float64) / white,
+        image=sums.image(),
         object_mask=frame.is_object,
         hit_triangles=source[np.where(frame.is_object, frame.triangle, -1)],
         t=np.where(frame.is_object, depth, np.nan),
         report=report,
+        sums=sums,
         ratio=frame.ratio,
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from colonnade.common.accumulation import Accumulation
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
@@ -15,7 +16,6 @@ from colonnade.design.manifest import Manifest
 from colonnade.environment.encoded import layout_of
 from colonnade.environment.encoding.cache import encoded_environment
 from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.mesh.load import load_mesh
 from colonnade.reference.environment.decoded import BoundingPlanes
 from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.environment.true_room import true_room
@@ -26,6 +26,7 @@ from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
 from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.view import make_view
 
 if TYPE_CHECKING:
@@ -33,52 +34,75 @@ if TYPE_CHECKING:
     from colonnade.reference.environment.surface import Backdrop
 
 
+@dataclass(frozen=True)
+class ReferenceOptions:
+    """Options of the reference's frames.
+
+    Attributes:
+        exposure: Progress of the motion during a frame (`Motion.exposure`).
+        relit: Show the room under the scene's lights, not its photo.
+        truth: Mesh file of the room's real geometry, which replaces its depth map.
+    """
+
+    exposure: float = 0.0
+    relit: bool = False
+    truth: Path | None = None
+
+
 def reference_frames(
     poses: Sequence[Scene],
     manifest: Manifest,
     size: tuple[int, int],
     progress: Progress,
-    relit: bool = False,
-    truth: Path | None = None,
+    options: ReferenceOptions = ReferenceOptions(),
 ) -> Iterator[RenderResult]:
-    """Render a scene's poses along its motion, composited with the room's photo as the device's frames are.
+    """Render a scene's poses along its motion, at the samples of the device's frames and composited as these are.
 
     Args:
-        poses: The scene at each progress, the first at rest.
+        poses: The scene at the beginning of each frame, the first at rest.
         manifest: The design's manifest, for the number of lights and the layout of the room's maps.
-        size: (width, height), pixels.
+        size: Width and height, pixels.
         progress: Shows the steps.
-        relit: Show the room under the scene's lights, not its photo.
-        truth: Mesh file of the room's real geometry, which replaces its depth map.
+        options: Further options.
     """
     begun = time.perf_counter()
-    mesh = load_mesh(poses[0].mesh_source)
+    mesh = object_mesh(poses[0], int(manifest.config["frame"]["materials"]))
     layout = None if manifest.config["physicalAttributeMemory"] is None else layout_of(manifest)
     max_lights = int(manifest.config["frame"]["lights"])
     for pose, traced in zip(
-        poses, traced_frames(poses, mesh, size, max_lights, layout, relit, truth, progress), strict=True
+        poses, traced_frames(poses, mesh, size, max_lights, layout, options, progress), strict=True
     ):
-        seconds = {"pack": time.perf_counter() - begun - traced.seconds, "build": None, "run": traced.seconds}
         report = FrameReport(
             backend="reference",
             config=manifest.config,
             mesh=MeshReport(mesh.name, len(mesh.faces), mesh.source_count),
             size=size,
-            rays=traced.frame.rays,
+            rays=traced.rays,
             share=pose.motion_progress,
-            seconds=seconds,
+            seconds={"pack": time.perf_counter() - begun - traced.seconds, "build": None, "run": traced.seconds},
+            samples=traced.sums.samples,
         )
-        frame = traced.frame
-        yield RenderResult(traced.image, frame.object_mask, frame.hit_triangles, frame.t, report)
+        first = traced.first
+        yield RenderResult(traced.image, first.object_mask, first.hit_triangles, first.t, report, traced.sums)
         begun = time.perf_counter()
 
 
 @dataclass(frozen=True)
 class TracedFrame:
-    """A frame of the reference: its picture, linear, float64 [height, width, 3], what was traced, and its seconds."""
+    """A frame of the reference.
+
+    Attributes:
+        image: Linear, float64 [height, width, 3].
+        first: The first pass.
+        sums: Sums over all passes.
+        rays: Rays of all passes, by kind.
+        seconds: Time of tracing.
+    """
 
     image: Floats
-    frame: ReferenceResult
+    first: ReferenceResult
+    sums: Accumulation
+    rays: dict[str, int]
     seconds: float
 
 
@@ -88,24 +112,32 @@ def traced_frames(
     size: tuple[int, int],
     max_lights: int,
     layout: AttributeLayout | None = None,
-    relit: bool = False,
-    truth: Path | None = None,
+    options: ReferenceOptions = ReferenceOptions(),
     progress: Progress = QUIET,
 ) -> Iterator[TracedFrame]:
     """Trace poses of a scene; without a ``layout`` the room's bounding planes are those of the default one."""
     maps = scene_room(poses[0])
     if maps is not None:
         environment_camera(maps, *size)
-    room = lit_room(poses[0], maps, mesh.extent, max_lights, relit, progress)
-    backdrop = room_backdrop(room, layout, truth, progress)
+    room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)
+    backdrop = room_backdrop(room, layout, options.truth, progress)
     for pose in poses:
         begun = time.perf_counter()
-        view = make_view(room.scene.at(pose.motion_progress), mesh.extent, *size, mesh.materials, room.environment)
-        frame = render_reference(mesh, view, progress, backdrop)
-        image = frame.image
-        if room.environment is not None and not relit:
-            image = composited(image, frame.object_mask, frame.shadow_ratio, room.environment)
-        yield TracedFrame(image, frame, time.perf_counter() - begun)
+        passes = room.scene.at(pose.motion_progress).passes(options.exposure)
+        views = [make_view(one, mesh.extent, *size, mesh.materials, room.environment) for one in passes]
+        first = render_reference(mesh, views[0], progress, backdrop)
+        sums, rays = _accumulated(first), first.rays
+        for view in views[1:]:
+            other = render_reference(mesh, view, progress, backdrop)
+            sums += _accumulated(other)
+            rays = {kind: count + other.rays[kind] for kind, count in rays.items()}
+        shows_photo = room.environment is not None and not options.relit
+        image = composited(sums, room.environment) if shows_photo and room.environment else sums.image()
+        yield TracedFrame(image, first, sums, rays, time.perf_counter() - begun)
+
+
+def _accumulated(frame: ReferenceResult) -> Accumulation:
+    return Accumulation.of_pixels(frame.image, frame.object_mask, frame.shadow_ratio)
 
 
 def room_backdrop(

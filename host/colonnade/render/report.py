@@ -14,7 +14,7 @@ from colonnade.scene_image.header import ImageHeader
 RAY_KINDS = ("primary", "shadow", "reflection", "refraction")
 
 #: Keys that all frames of a sequence share: its report has them once.
-_COMMON = ("backend", "config", "mesh", "size", "bytes")
+_COMMON = ("backend", "config", "mesh", "size", "samples", "bytes")
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class EnvironmentReport:
 
 @dataclass(frozen=True)
 class FrameReport:
-    """The report of a frame, or of all frames of a sequence.
+    """The report of a frame, or of all frames of a sequence. Counts and seconds are sums over the samples.
 
     Attributes:
         backend: rtl, model or reference.
@@ -62,6 +62,7 @@ class FrameReport:
         simulated_cycles_per_second: Simulation speed of the RTL.
         bytes: Sizes of the encoded maps.
         frames: Reports of a sequence's frames; empty in the report of one frame.
+        samples: Samples of a pixel.
     """
 
     backend: str
@@ -78,6 +79,12 @@ class FrameReport:
     simulated_cycles_per_second: float | None = None
     bytes: Mapping[str, int] | None = None
     frames: tuple[FrameReport, ...] = ()
+    samples: int = 1
+
+    @property
+    def cycles_per_sample(self) -> float | None:
+        """Cycles of a pass over a frame."""
+        return None if self.cycles is None else self.cycles / self.samples / max(len(self.frames), 1)
 
     @property
     def all_rays(self) -> int:
@@ -101,7 +108,9 @@ class FrameReport:
             "config": self.config,
             "mesh": asdict(self.mesh),
             "size": list(self.size),
+            "samples": self.samples,
             "cycles": self.cycles,
+            "cycles_per_sample": self.cycles_per_sample,
             "rays": dict(self.rays),
             "rays_per_cycle": self.rays_per_cycle,
             "rays_per_cycle_in_box": self.rays_per_cycle_in_box,
@@ -169,4 +178,5 @@ def sequence_report(frames: Sequence[FrameReport]) -> FrameReport:
         seconds=dict(first.seconds) | {"run": sum(frame.seconds["run"] or 0.0 for frame in frames)},
         bytes=first.bytes,
         frames=tuple(frames),
+        samples=first.samples,
     )

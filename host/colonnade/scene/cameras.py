@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.scene.model import Camera, Vector
 from colonnade.scene.object_pose import Pose
+from colonnade.scene.samples import Point
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
@@ -61,6 +62,21 @@ def scene_camera(camera: Camera, pose: Pose, extent: Extent, width: int, height:
     pixel = 2 * slope / height
     corner = -toward + (0.5 - width / 2) * pixel * right + (height / 2 - 0.5) * pixel * up
     return WorldCamera(position, corner, pixel * right, -pixel * up, np.stack([right, up, toward]))
+
+
+def through_lens(world: WorldCamera, camera: Camera, centre: Floats, on_lens: Point) -> WorldCamera:
+    """The camera at a point of its thin lens, with the same picture of the plane in focus.
+
+    Args:
+        world: The pinhole camera, whose directions have the depth 1.
+        camera: The scene's camera, for aperture and focus.
+        centre: Centre of the object's cube, world space.
+        on_lens: Point of a disc of radius 1.
+    """
+    target = centre if camera.target is None else np.array(camera.target)
+    focus = float((world.position - target) @ world.axes[2]) if camera.focus is None else camera.focus
+    offset = camera.aperture / 2 * (on_lens[0] * world.axes[0] + on_lens[1] * world.axes[1])
+    return replace(world, position=world.position + offset, corner=world.corner - offset / focus)
 
 
 def environment_camera(environment: Environment, width: int, height: int) -> WorldCamera:

@@ -16,8 +16,9 @@ from pydantic import BeforeValidator, ConfigDict, Field, Strict, StrictBool, mod
 from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
-from colonnade.common.limits import MAX_COORDINATE
+from colonnade.common.limits import MAX_COORDINATE, MAX_SAMPLES
 from colonnade.mesh.materials import Kind
+from colonnade.scene.samples import CENTRE, Sample, samples_of_frame
 
 _STRICT = ConfigDict(extra="forbid")
 
@@ -37,6 +38,7 @@ def _require_text(value: object) -> object:
 _Float = Annotated[float, Strict()]
 _Coordinate = Annotated[_Float, Interval(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
 _Fraction = Annotated[_Float, Interval(ge=0.0, le=1.0)]
+_Diameter = Annotated[_Float, Interval(ge=0.0, le=1e6)]
 _Intensity = Annotated[_Float, Interval(ge=0.0, le=15.0)]
 _MapPixel = Annotated[_Float, Interval(ge=0.0, le=MAX_EDGE)]
 _Text = Annotated[str, Field(min_length=1)]
@@ -51,10 +53,17 @@ _Pixel = tuple[_MapPixel, _MapPixel]
 
 @dataclass(frozen=True, config=_STRICT)
 class MeshSource:
-    """The mesh: a name (see `colonnade.mesh.load.load_mesh`), or a file relative to the scene file."""
+    """The mesh: a name (see `colonnade.mesh.load.load_mesh`), or a file relative to the scene file.
+
+    Attributes:
+        name, path: One of them.
+        crease: Angle up to which edges are smooth, degrees, in place of the file's normals. None: the file's normals,
+            without them 60 degrees.
+    """
 
     name: _Text | None = None
     path: _File | None = None
+    crease: Annotated[_Float, Interval(ge=0.0, le=180.0)] | None = None
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Self:
@@ -83,6 +92,9 @@ class Camera:
         framing: Fraction of the picture's height that the object's outline covers; less if its width would not fit.
         up: Up direction.
         fov: Vertical field of view, degrees.
+        aperture: Diameter of the lens, world units; 0: a pinhole, everything is in focus.
+        focus: Distance of the plane in focus along the view, world units; None: the plane through the target, or
+            through the centre of the object's cube.
     """
 
     position: _Vector | None = None
@@ -91,11 +103,15 @@ class Camera:
     framing: Annotated[_Float, Interval(ge=0.01, le=4.0)] = 0.7
     up: _Vector = (0.0, 1.0, 0.0)
     fov: Annotated[_Float, Interval(ge=1.0, le=150.0)] = 40.0
+    aperture: _Diameter = 0.0
+    focus: Annotated[_Float, Interval(ge=1e-6, le=1e9)] | None = None
 
     @model_validator(mode="after")
     def _has_axes(self) -> Self:
         if self.target is not None and self.position is None:
             raise ValueError("camera.target needs camera.position")
+        if self.focus is not None and self.aperture == 0.0:
+            raise ValueError("camera.focus needs camera.aperture: a pinhole has everything in focus")
         for name, value in (("up", self.up), ("direction", self.direction)):
             if not any(value):
                 raise ValueError(f"camera.{name} must not be zero")
@@ -112,12 +128,14 @@ class PointLight:
         colour: Intensity per channel; at 1 a surface that faces the light has its albedo as colour.
         falloff: Distance of that intensity, world units. The intensity falls with the squared distance, up to four
             times brighter when nearer. None: constant intensity.
+        radius: Radius of a light with an area, world units; 0: a point.
     """
 
     position: _Vector | None = None
     offset: _Vector = (1.2, 1.6, 1.5)
     colour: _BrightColour = (0.9, 0.9, 0.9)
     falloff: Annotated[_Float, Interval(ge=1e-6, le=1e6)] | None = None
+    radius: _Diameter = 0.0
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -181,12 +199,14 @@ class Motion:
         stand_at: Last value of ``object.stand_at``; the object moves straight to that surface point.
         translate: Last value of ``transform.translate``, for an object that does not stand in a room.
         light: Last world position of the first light.
+        shutter: How long each frame is exposed, as a fraction of the interval to the next one.
     """
 
     turn: Annotated[_Float, Interval(ge=-36000.0, le=36000.0)] = 360.0
     stand_at: _Pixel | None = None
     translate: _Vector | None = None
     light: _Vector | None = None
+    shutter: _Fraction = 0.0
 
     @property
     def is_closed(self) -> bool:
@@ -198,8 +218,14 @@ class Motion:
 
         A closed motion leaves out 1.0, so that an animation repeats without a pause.
         """
-        steps = frames if self.is_closed else frames - 1
-        return [frame / max(steps, 1) for frame in range(frames)]
+        return [frame / self._intervals(frames) for frame in range(frames)]
+
+    def exposure(self, frames: int) -> float:
+        """Progress during the exposure of one of `frames` frames. A single frame's interval is the whole motion."""
+        return self.shutter / self._intervals(frames)
+
+    def _intervals(self, frames: int) -> int:
+        return max(frames if self.is_closed else frames - 1, 1)
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -240,10 +266,11 @@ class Background:
 
 @dataclass(frozen=True, config=_STRICT)
 class FrameSize:
-    """Default size of the frame, pixels."""
+    """Default size of the frame, pixels, and the samples of each pixel."""
 
     width: Annotated[int, Strict(), Ge(1)] = 640
     height: Annotated[int, Strict(), Ge(1)] = 480
+    samples: Annotated[int, Strict(), Interval(ge=1, le=MAX_SAMPLES)] = 1
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -252,9 +279,10 @@ class Scene:
 
     With a room, the camera is the room's, and the world is the room's world, in metres.
 
-    Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``names_light`` tells whether
-    the scene names lights or ambient light; if not, those of a room are fitted to its photo. ``headroom`` scales all
-    lights up and diffuse albedos of the object down (`colonnade.environment.photo_colours`).
+    Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass
+    over the frame. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
+    fitted to its photo. ``headroom`` scales all lights up and diffuse albedos of the object down
+    (`colonnade.environment.photo_colours`).
     """
 
     mesh: MeshSource
@@ -270,6 +298,7 @@ class Scene:
     frame: FrameSize = field(default_factory=FrameSize)
     motion: Motion = field(default_factory=Motion)
     motion_progress: float = 0.0
+    sample: Sample = CENTRE
     names_light: bool = True
     headroom: float = 1.0
 
@@ -277,9 +306,34 @@ class Scene:
         """The scene at a progress along its motion."""
         return replace(self, motion_progress=progress)
 
+    def with_samples(self, samples: int) -> Scene:
+        """The scene with so many samples a pixel."""
+        return replace(self, frame=replace(self.frame, samples=samples))
+
+    def passes(self, exposure: float = 0.0) -> list[Scene]:
+        """The scene at each sample of its frame.
+
+        Args:
+            exposure: Progress of the motion while the shutter is open (`Motion.exposure`).
+        """
+        return [
+            replace(self, sample=sample, motion_progress=min(1.0, self.motion_progress + sample.time * exposure))
+            for sample in samples_of_frame(self.frame.samples, len(self.lights))
+        ]
+
+    @property
+    def blurs(self) -> list[str]:
+        """The keys that only several samples show."""
+        keys = {
+            "light.radius": any(light.radius > 0 for light in self.lights),
+            "camera.aperture": self.camera.aperture > 0 and self.background.room is None,
+            "motion.shutter": self.motion.shutter > 0,
+        }
+        return [key for key, is_used in keys.items() if is_used]
+
     def with_mesh(self, name_or_path: str) -> Scene:
         """The scene with another mesh, a name or a path relative to the working directory."""
-        return replace(self, mesh=MeshSource(name=name_or_path))
+        return replace(self, mesh=MeshSource(name=name_or_path, crease=self.mesh.crease))
 
     def with_environment(self, folder: Path) -> Scene:
         """The scene in the room of a folder."""

@@ -14,12 +14,15 @@ import numpy as np
 from colonnade.common.types import Floats
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Extent
-from colonnade.scene.cameras import WorldCamera, environment_camera, scene_camera
+from colonnade.scene.cameras import WorldCamera, camera_axes, environment_camera, scene_camera, through_lens
 from colonnade.scene.model import Material, PointLight, Scene
 from colonnade.scene.object_pose import Pose, object_pose
+from colonnade.scene.samples import Point
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
+
+_UP = (0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -41,8 +44,8 @@ class PlacedLight:
 class View:
     """The view of one frame, in mesh space.
 
-    The ray through the centre of pixel (x, y) is ``origin + t * (direction + x * step_x + y * step_y)``. Pixel (0, 0)
-    is at the top left. Directions are not normalised: one unit of t is one mesh unit of depth.
+    The ray of pixel (x, y) is ``origin + t * (direction + x * step_x + y * step_y)``. Pixel (0, 0) is at the top left.
+    Directions are not normalised: one unit of t is one mesh unit of depth.
 
     Attributes:
         width, height: Size of the frame, pixels.
@@ -56,6 +59,7 @@ class View:
         shadow_transmittance: Fraction of light that a glass occluder transmits.
         bounces: Traced reflections and refractions of a path.
         view_to_mesh: Transform from a room's view space, metres, to mesh space, float64 [3, 4]; None without a room.
+        shift: Where the rays cross the picture, from the pixels' centres: pixels right and down.
     """
 
     width: int
@@ -74,6 +78,7 @@ class View:
     shadow_transmittance: float = 0.6
     bounces: int = 4
     view_to_mesh: Floats | None = None
+    shift: tuple[float, float] = (0.0, 0.0)
 
     @property
     def light(self) -> Floats:
@@ -99,7 +104,7 @@ def make_view(
     materials: tuple[MeshMaterial, ...] = (PLAIN,),
     environment: Environment | None = None,
 ) -> View:
-    """Make the view of a scene at its motion's progress.
+    """Make the view of a scene at its motion's progress and its sample.
 
     Cameras and lights that are relative to the object keep their positions from the start of the motion.
 
@@ -113,21 +118,24 @@ def make_view(
     """
     pose = object_pose(scene, extent, environment)
     start = object_pose(scene.at(0.0), extent, environment)
+    centre, edge = start.to_world(extent.centre), extent.edge * start.scale
     if environment is not None:
         camera = environment_camera(environment, width, height)
     else:
         camera = scene_camera(scene.camera, start, extent, width, height)
-    positions = [_world_position(light, camera, start, extent) for light in scene.lights]
+        if scene.camera.aperture > 0:
+            camera = through_lens(camera, scene.camera, centre, scene.sample.lens)
+    shift_x, shift_y = scene.sample.pixel
     return View(
         width=width,
         height=height,
         origin=pose.to_mesh(camera.position),
-        direction=camera.corner @ pose.rotation,
+        direction=(camera.corner + shift_x * camera.step_x + shift_y * camera.step_y) @ pose.rotation,
         step_x=camera.step_x @ pose.rotation,
         step_y=camera.step_y @ pose.rotation,
         lights=tuple(
-            _placed(light, position, scene.headroom, pose)
-            for light, position in zip(scene.lights, positions, strict=True)
+            _placed(light, camera, centre, edge, pose, scene.sample.light(index), scene.headroom)
+            for index, light in enumerate(scene.lights)
         ),
         materials=_dimmed(with_overrides(materials, scene.material), scene.headroom),
         ambient=np.array(scene.ambient.colour) * scene.headroom,
@@ -138,6 +146,7 @@ def make_view(
         shadow_transmittance=scene.paths.shadow_transmittance,
         bounces=scene.paths.bounces,
         view_to_mesh=None if environment is None else pose.from_view(environment.camera_to_world),
+        shift=scene.sample.pixel,
     )
 
 
@@ -148,22 +157,28 @@ def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tu
 
 
 def world_positions(scene: Scene, extent: Extent, environment: Environment) -> list[Floats]:
-    """World positions of a scene's lights in a room, float64 [3] each."""
+    """World positions of a scene's lights in a room, float64 [3] each; of a light with a radius its middle."""
     camera = environment_camera(environment, environment.width, environment.height)
     start = object_pose(scene.at(0.0), extent, environment)
-    return [_world_position(light, camera, start, extent) for light in scene.lights]
+    centre, edge = start.to_world(extent.centre), extent.edge * start.scale
+    return [_world_position(light, camera, centre, edge) for light in scene.lights]
 
 
-def _world_position(light: PointLight, camera: WorldCamera, start: Pose, extent: Extent) -> Floats:
-    """World position of a light; `start` is the object's pose at the start of the motion."""
+def _world_position(light: PointLight, camera: WorldCamera, centre: Floats, edge: float) -> Floats:
     if light.position is not None:
         return np.array(light.position)
-    return np.asarray(
-        start.to_world(extent.centre) + extent.edge * start.scale * (np.array(light.offset) @ camera.axes)
-    )
+    return np.asarray(centre + edge * (np.array(light.offset) @ camera.axes))
 
 
-def _placed(light: PointLight, position: Floats, headroom: float, pose: Pose) -> PlacedLight:
+def _placed(
+    light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose, on_disc: Point, headroom: float
+) -> PlacedLight:
+    """A light in mesh space; of one with a radius the point ``on_disc``, of a disc that faces `centre`."""
+    position = _world_position(light, camera, centre, edge)
+    if light.radius > 0:
+        away = position - centre
+        right, up, _ = camera_axes(away if away.any() else camera.axes[2], _UP)
+        position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
     reach = None if light.falloff is None else light.falloff / pose.scale
     return PlacedLight(pose.to_mesh(position), np.array(light.colour) * headroom, reach)
 

@@ -131,13 +131,16 @@ def _check_fits(header: ImageHeader, manifest: Manifest, file: Path) -> None:
     if header.record_bits != manifest.record_bits or any(part.memory not in manifest.memories for part in memories):
         raise UserError(f"{file} is corrupt (its header does not match the hardware's format): {_ADVICE}")
     depth = int(manifest.memories["columnBvh"]["depth"])
+    enough = 1 << (header.record_count - 1).bit_length()
     if header.record_count > depth:
-        raise UserError(f"{file} holds {header.record_count:,} records, columnBvhMemory.depth is {depth:,}: raise it")
+        raise UserError(
+            f"{file} holds {header.record_count:,} records, columnBvhMemory.depth is {depth:,}: raise it to {enough}"
+        )
     stack_depth = int(manifest.config["columnBvhMemory"]["stackDepth"])
     if header.tree is not None and header.tree.stack_bound > stack_depth:
         raise UserError(
             f"{file} needs a stack of {header.tree.stack_bound} entries, columnBvhMemory.stackDepth is {stack_depth}:"
-            " raise it"
+            f" raise it to {header.tree.stack_bound}"
         )
     if header.room is not None:
         _check_environment_fits(header.room, manifest, file)

@@ -155,8 +155,11 @@ def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
 
 def _check_fits(name: str, manifest: Manifest, bvh: Bvh, record_count: int) -> None:
     depth = int(manifest.memories["columnBvh"]["depth"])
+    ids = 1 << manifest.layouts["triangles"].fields["firstTriangle"].width
+    # Ids have one bit more than addresses, and all ones is no id
+    enough = 1 << (max(record_count, len(bvh.order) // 2 + 1) - 1).bit_length()
+    advice = f"raise columnBvhMemory.depth to {enough}" if enough <= MAX_MEMORY_DEPTH else "use a coarser mesh"
     if record_count > depth:
-        advice = "raise columnBvhMemory.depth" if record_count <= MAX_MEMORY_DEPTH else "use a coarser mesh"
         raise UserError(f"mesh {name} needs {record_count:,} records, columnBvhMemory.depth is {depth:,}: {advice}")
     stack_depth, bound = int(manifest.config["columnBvhMemory"]["stackDepth"]), bvh.statistics.stack_bound
     if manifest.bvh and bound > stack_depth:
@@ -164,11 +167,8 @@ def _check_fits(name: str, manifest: Manifest, bvh: Bvh, record_count: int) -> N
             f"mesh {name} needs a stack of {bound} entries even with a balanced tree, columnBvhMemory.stackDepth is"
             f" {stack_depth}: raise columnBvhMemory.stackDepth"
         )
-    ids = 1 << manifest.layouts["triangles"].fields["firstTriangle"].width
     if len(bvh.order) >= ids:
-        raise UserError(
-            f"mesh {name} has {len(bvh.order):,} triangles, packed ids reach {ids - 2:,}: raise columnBvhMemory.depth"
-        )
+        raise UserError(f"mesh {name} has {len(bvh.order):,} triangles, packed ids reach {ids - 2:,}: {advice}")
 
 
 def _full_leaves(triangles: int, per_record: int) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]:
@@ -218,7 +218,7 @@ def _attribute_records(
     rows = quantised.mesh_faces[order]
     count = -(-len(order) // per_record)
     normals = np.zeros((count * per_record, 4, 3), dtype=np.int64)
-    normals[: len(order), :3] = np.rint(mesh.vertex_normals[mesh.faces[rows]] * one)
+    normals[: len(order), :3] = np.rint(mesh.corner_normals[rows] * one)
     normals[: len(order), 3] = np.rint(geometric_normals(quantised)[order] * one)
     materials = np.zeros(count * per_record, dtype=np.int64)
     materials[: len(order)] = mesh.face_materials[rows]

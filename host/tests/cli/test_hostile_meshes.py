@@ -1,4 +1,4 @@
-"""Hostile mesh files, which trimesh would accept silently or crash on."""
+"""Hostile mesh files: one line, never a crash."""
 
 from __future__ import annotations
 
@@ -110,10 +110,20 @@ CASES = {
         PLY, "x.ply", {"x.ply": PLY_HEADER.format(10**9, 10**9).replace("ascii", "binary_little_endian") + "xx"}
     ),
     "stl-count": Case(STL, "x.stl", {"x.stl": b"\0" * 80 + struct.pack("<I", 0xFFFFFFFF) + b"\0" * 50}),
+    "stl-cut": Case(
+        STL,
+        "truncated: its header states 3 facets, it holds 1",
+        {"x.stl": b"\0" * 80 + struct.pack("<I", 3) + b"\0" * 70},
+    ),
+    "stl-text-cut": Case(
+        STL, "truncated: it begins 1 facets", {"x.stl": "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"}
+    ),
     "stl-short": Case(STL, "x.stl", {"x.stl": b"\0" * 20}),
     "stl-nan": Case(STL, "x.stl", {"x.stl": b"\0" * 80 + struct.pack("<I", 1) + b"\xff" * 50}),
     "stl-text": Case(STL, "x.stl", {"x.stl": "solid x\nfacet normal a b c\nendsolid\n"}),
-    "off-index": Case(OFF, "face index outside", {"x.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"}),
+    "off-index": Case(
+        OFF, "names vertex 9, but the file has 3", {"x.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"}
+    ),
     "off-count": Case(OFF, "x.off", {"x.off": f"OFF\n{10**12} {10**12} 0\n0 0 0\n"}),
     "off-noise": Case(OFF, "x.off", {"x.off": "OFF\n\x1b[31m\n"}),
     "gltf-deep": Case(GLTF, "nested too deeply", {"x.gltf": "[" * 100_000}),
@@ -144,6 +154,25 @@ CASES = {
     "gltf-buffer-is-output": Case(
         f"{GLTF} --output b.bin", "would replace", of_gltf(buffers=buffer("b.bin")) | {"b.bin": b"\0" * 42}
     ),
+    "gltf-index": Case(
+        GLTF,
+        "names vertex 2, which does not exist: its primitive has 2 vertices",
+        of_gltf(accessors=[ACCESSORS[0] | {"count": 2}, ACCESSORS[1]]),
+    ),
+    "gltf-view": Case(
+        GLTF, "too short for 30 elements", of_gltf(accessors=[ACCESSORS[0] | {"count": 30}, ACCESSORS[1]])
+    ),
+    "gltf-offset": Case(GLTF, "too short", of_gltf(accessors=[ACCESSORS[0] | {"byteOffset": -12}, ACCESSORS[1]])),
+    "gltf-stride": Case(GLTF, "x.gltf", of_gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": -12}] * 2)),
+    "gltf-draco": Case(
+        GLTF,
+        "compressed (it requires the glTF extension KHR_draco_mesh_compression)",
+        of_gltf(extensionsRequired=["KHR_draco_mesh_compression"]),
+    ),
+    "gltf-extension": Case(
+        GLTF, "requires the glTF extension ACME_x, which is not supported", of_gltf(extensionsRequired=["ACME_x"])
+    ),
+    "strict": Case(f"{GLTF} --strict", "2 cameras are not used", of_gltf(cameras=[{}, {}])),
     "glb-long": Case(GLB, "x.glb", {"x.glb": glb(b"{}", 0xFFFFFFFF)}),
     "glb-short": Case(GLB, "x.glb", {"x.glb": b"glTF\x02"}),
     "glb-deep": Case(GLB, "nested too deeply", {"x.glb": glb(b'{"a":' + b"[" * 50_000 + b"]" * 50_000 + b"}")}),

@@ -16,6 +16,7 @@ from colonnade.environment.encoded import EncodedEnvironment
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene
+from colonnade.scene.samples import CENTRE, Sample
 from colonnade.scene.view import with_overrides
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
@@ -35,7 +36,7 @@ SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
 @NEEDS_SIMULATOR
 @pytest.mark.parametrize("kind", ["diffuse", "mirror", "glass"])
 def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
-    """The relit room and the shadow window; two lights, one light, no bounces; a stalled sink."""
+    """The relit room and the shadow window; two lights, one light, no bounces; a sample; a stalled sink."""
     design = design_for("small", ())
     held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
     mesh = load_mesh("teapot:4")
@@ -44,7 +45,9 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
         pack(mesh, design.manifest, with_overrides(mesh.materials, material)), held, design.manifest
     )
     scene = replace(TABLE, material=material, more_lights=(SECOND,))
-    views = [(scene, True), (scene, False), (replace(scene, more_lights=(), paths=Paths(bounces=0)), False)]
+    beside = replace(scene, light=replace(scene.light, radius=0.2), sample=Sample((0.3, -0.4), lights=((0.6, 0.8),)))
+    still = replace(scene, more_lights=(), paths=Paths(bounces=0))
+    views = [(scene, True), (scene, False), (still, False), (beside, False)]
     registers: list[dict[str, int]] = [
         frame_registers(view, image.header, design.manifest, 80, 60, held, relit) for view, relit in views
     ]
@@ -64,12 +67,13 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
     assert (first.counters["marchSteps"] > 0) == (kind != "diffuse")
 
 
-@pytest.mark.parametrize("light", [TABLE.light, Light((1.2, 2.0, 2.0)), Light((0.1, 0.9, 2.4))])
-def test_shadows_lie_within_the_shadow_window(light: Light) -> None:
+@pytest.mark.parametrize("light", [TABLE.light, Light((1.2, 2.0, 2.0)), Light((0.1, 0.9, 2.4), radius=0.3)])
+@pytest.mark.parametrize("sample", [CENTRE, Sample((0.49, -0.49), lights=((0.6, 0.8),))], ids=["centre", "corner"])
+def test_shadows_lie_within_the_shadow_window(light: Light, sample: Sample) -> None:
     manifest = manifest_for("small").manifest
     held = EncodedEnvironment.load(ROOMS / "living", manifest)
     image = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest)
-    scene = replace(TABLE, light=light)
+    scene = replace(TABLE, light=light, sample=sample)
     registers = frame_registers(scene, image.header, manifest, 320, 240, held, relit=False)
     x0, y0, x1, y1 = (registers[f"environment.window.{edge}"] for edge in ("x0", "y0", "x1", "y1"))
     assert 0 < (x1 - x0) * (y1 - y0) < 320 * 240

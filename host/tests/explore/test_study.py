@@ -8,6 +8,7 @@ import pytest
 
 from colonnade.common.errors import UserError
 from colonnade.design.toolchain import project_root
+from colonnade.explore.plan import Plan
 from colonnade.explore.points import grid_size, manifests_of, point_of, points_of
 from colonnade.explore.study import StudyFile, line_of, load_study
 
@@ -122,3 +123,10 @@ def test_the_studies_of_the_repository_are_legal(path: Path) -> None:
     file = load_study(path)
     points = points_of(file)
     assert len(manifests_of(file, points[:2])) == len(points[:2])
+
+
+@pytest.mark.parametrize("text", ["frame.samples = 4", "light.radius = 0.5"])
+def test_scenes_of_several_samples_are_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "object.toml").write_text(f'mesh.name = "cube"\n{text}\n')
+    with pytest.raises(UserError, match=rf"object\.toml: a study renders one sample a pixel: leave out {text[:5]}"):
+        Plan(study(tmp_path, STUDY), {})

@@ -17,6 +17,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.watchdog import TREE_VISITS
 from colonnade.scene.model import Camera, Light, Material, MeshSource, Scene, Transform
+from colonnade.scene.samples import Sample
 from colonnade.scene.view import make_view, with_overrides
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
@@ -112,6 +113,8 @@ def test_the_light_is_relative_to_cube_and_camera() -> None:
     target=st.tuples(*[st.floats(-3, 3)] * 3),
     fov=st.floats(5, 140),
     mac=st.sampled_from([16, 32]),
+    shift=st.tuples(*[st.floats(-0.5, 0.5)] * 2),
+    lens=st.tuples(*[st.floats(-0.7, 0.7)] * 2),
 )
 def test_no_vertex_is_seen_outside_rectangle_and_outline(
     make_manifest: MakeManifest,
@@ -119,13 +122,17 @@ def test_no_vertex_is_seen_outside_rectangle_and_outline(
     target: tuple[float, float, float],
     fov: float,
     mac: int,
+    shift: tuple[float, float],
+    lens: tuple[float, float],
 ) -> None:
-    """For any camera, also inside the object: each vertex in the frame projects into the rectangle."""
+    """For any camera and sample, also inside the object: each vertex in the frame projects into the rectangle."""
     manifest = make_manifest(mac=mac)
     header = pack(TEAPOT, manifest).header
     if np.linalg.norm(np.subtract(position, target)) < 1e-3:
         return
-    registers = frame_registers(placed(position, target=target, fov=fov), header, manifest, 160, 120)
+    scene = placed(position, target=target, fov=fov, aperture=0.5)
+    sampled = dataclasses.replace(scene, sample=Sample(pixel=shift, lens=lens))
+    registers = frame_registers(sampled, header, manifest, 160, 120)
     origin = vector(registers, "camera.position") * 2.0 ** (
         registers["frame.unitShift"] - manifest.numbers["gridFraction"]
     )

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from colonnade.design.manifest import Manifest
-from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.view import with_overrides
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
@@ -57,7 +57,7 @@ def _scenes(manifest: Manifest) -> Iterator[tuple[str, Scene]]:
 
 
 def _case(name: str, scene: Scene, manifest: Manifest) -> Case:
-    mesh = load_mesh(scene.mesh_source)
+    mesh = object_mesh(scene)
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     registers = frame_registers(scene, image.header, manifest, *SIZE)
     return Case(name, image, registers | {"frame.watchdogCycles": WATCHDOG_CYCLES})

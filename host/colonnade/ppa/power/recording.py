@@ -23,10 +23,10 @@ from colonnade.design.toolchain import project_root, require_program
 from colonnade.device.harness_job import parse_output
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import write_job
-from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Scene
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import with_overrides
 from colonnade.scene_image.packer import pack
@@ -133,7 +133,7 @@ class Stimulus:
     def of_benchmark(mesh: str, size: tuple[int, int] | None, cycles: int) -> Stimulus:
         """The benchmark scene with a mesh, a name or a file."""
         scene = load_scene(project_root() / "scenes" / "object.toml").with_mesh(mesh)
-        return Stimulus(scene, load_mesh(scene.mesh_source), size, cycles)
+        return Stimulus(scene, object_mesh(scene), size, cycles)
 
 
 def whole_frame(rows: int) -> tuple[int, int]:

@@ -1,0 +1,146 @@
+"""Sums of the passes over a frame: the picture of several samples a pixel (docs/sampling.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.framebuffer import Frame
+
+#: The device's numbers for the colour 1.0 and the shadow ratio 1.0.
+WHITE, UNSHADOWED = 4095, 4096
+
+#: A counter that is a level: the passes' maximum and not their sum.
+_LEVEL = "deepestStack"
+
+
+@dataclass(frozen=True)
+class Accumulation:
+    """Sums over the samples of each pixel. Those of the device are exact, so their order does not matter.
+
+    The arrays are uint32 from the device, and float64 from the reference.
+
+    Attributes:
+        samples: Number of samples of a pixel.
+        objects: Colours of the samples that show the object, [height, width, 3].
+        background: Colours of the others, [height, width, 3].
+        ratio: Shadow ratios of the others, [height, width, 3]; None without a room.
+        coverage: Number of samples that show the object, int64 [height, width].
+        white: The number for the colour 1.0.
+        unshadowed: The number for the shadow ratio 1.0.
+    """
+
+    samples: int
+    objects: npt.NDArray[Any]
+    background: npt.NDArray[Any]
+    ratio: npt.NDArray[Any] | None
+    coverage: npt.NDArray[np.int64]
+    white: float
+    unshadowed: float
+
+    @staticmethod
+    def of_frame(frame: Frame) -> Accumulation:
+        """One sample of each pixel from the device."""
+        ratio = None if frame.ratio is None else frame.ratio.astype(np.uint32)
+        return Accumulation.of_pixels(frame.colour.astype(np.uint32), frame.is_object, ratio, WHITE, UNSHADOWED)
+
+    @staticmethod
+    def of_pixels(
+        colour: npt.NDArray[Any],
+        is_object: npt.NDArray[np.bool_],
+        ratio: npt.NDArray[Any] | None,
+        white: float = 1.0,
+        unshadowed: float = 1.0,
+    ) -> Accumulation:
+        """One sample of each pixel."""
+        shows = is_object[..., None]
+        zero = colour.dtype.type(0)
+        return Accumulation(
+            samples=1,
+            objects=np.where(shows, colour, zero),
+            background=np.where(shows, zero, colour),
+            ratio=None if ratio is None else np.where(shows, zero, ratio),
+            coverage=is_object.astype(np.int64),
+            white=white,
+            unshadowed=unshadowed,
+        )
+
+    def __add__(self, other: Accumulation) -> Accumulation:
+        """The samples of both."""
+        assert (self.white, self.unshadowed) == (other.white, other.unshadowed)
+        ratio = None if self.ratio is None or other.ratio is None else self.ratio + other.ratio
+        return replace(
+            self,
+            samples=self.samples + other.samples,
+            objects=self.objects + other.objects,
+            background=self.background + other.background,
+            ratio=ratio,
+            coverage=self.coverage + other.coverage,
+        )
+
+    def same_as(self, other: Accumulation) -> npt.NDArray[np.bool_]:
+        """The pixels whose sums are equal, bool [height, width]."""
+        same = (self.objects == other.objects) & (self.background == other.background)
+        if self.ratio is not None and other.ratio is not None:
+            same &= self.ratio == other.ratio
+        return np.asarray(same.all(axis=2) & (self.coverage == other.coverage))
+
+    def image(self) -> npt.NDArray[np.float64]:
+        """The mean colours, linear, float64 [height, width, 3]."""
+        return np.asarray((self.objects + self.background) / self.white / self.samples, dtype=np.float64)
+
+    def over(self, photo: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """The object over a photo of the background, with its shadow.
+
+        Args:
+            photo: Linear, float64 [height, width, 3].
+
+        Returns:
+            Linear colours, float64 [height, width, 3]. Each sample that does not show the object shows the photo, times
+            its shadow ratio.
+        """
+        assert self.ratio is not None
+        return (self.objects / self.white + photo * (self.ratio / self.unshadowed)) / self.samples
+
+
+@dataclass
+class FramePasses:
+    """The frames of a frame's passes, added one by one.
+
+    Attributes:
+        first: Frame of the first pass.
+        sums: Sums over all passes.
+        counters: Sums over all passes; of a level the maximum.
+        errors: Error bits of any pass.
+    """
+
+    first: Frame | None = None
+    counters: dict[str, int] = field(default_factory=dict)
+    errors: list[str] = field(default_factory=list)
+    _sums: Accumulation | None = None
+
+    def add(self, frame: Frame) -> None:
+        """Add the frame of the next pass."""
+        if self.first is None:
+            self.first, self.counters, self.errors = frame, dict(frame.counters), list(frame.errors)
+            return
+        self._sums = self.sums + Accumulation.of_frame(frame)
+        for name, value in frame.counters.items():
+            before = self.counters[name]
+            self.counters[name] = max(before, value) if name == _LEVEL else before + value
+        self.errors += [error for error in frame.errors if error not in self.errors]
+
+    @property
+    def sums(self) -> Accumulation:
+        """Sums over all passes; those of a single one are made when they are needed."""
+        assert self.first is not None
+        return self._sums or Accumulation.of_frame(self.first)
+
+    @property
+    def frame(self) -> Frame:
+        """The first pass's pixels, with the counters and errors of all passes."""
+        assert self.first is not None
+        return replace(self.first, counters=self.counters, errors=self.errors)

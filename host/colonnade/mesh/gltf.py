@@ -1,0 +1,233 @@
+"""Reads glTF files: the triangles of the default scene with normals, materials and vertex colours.
+
+This is our own code because trimesh drops transmission, mixes up normals under scaling, and does not say what it
+leaves out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from colonnade.common.types import Floats, Indices
+from colonnade.common.vectors import unit_vectors
+from colonnade.mesh import losses as lost
+from colonnade.mesh.gltf_document import GltfDocument
+from colonnade.mesh.losses import Losses, extension_loss
+from colonnade.mesh.materials import PLAIN, from_gltf, gltf_losses, unused_extensions
+from colonnade.mesh.resolver import References
+from colonnade.mesh.surface import RawSurface, joined
+
+#: Required extensions that are read, or whose loss is reported.
+_KNOWN_EXTENSIONS = (
+    "KHR_mesh_quantization",
+    "KHR_materials_transmission",
+    "KHR_materials_ior",
+    "KHR_lights_punctual",
+    "KHR_texture_transform",
+    "KHR_texture_basisu",
+    "EXT_texture_webp",
+    "EXT_texture_avif",
+)
+#: Extensions that compress the mesh.
+_COMPRESSION = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+
+_POINTS, _LINE_MODES, _TRIANGLES, _STRIP, _FAN = 0, (1, 2, 3), 4, 5, 6
+
+
+def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -> RawSurface:
+    """Read a glTF file, text or binary, with the transforms of its nodes.
+
+    Raises:
+        UserError: The file is invalid, or requires an extension that is not supported.
+    """
+    document = GltfDocument(data, path, references)
+    _check_extensions(document)
+    materials = (*(from_gltf(material) for material in document.json.get("materials", [])), PLAIN)
+    used: set[int] = set()
+    parts = []
+    for node, matrix in _nodes(document, losses):
+        mesh = document.entry("meshes", node["mesh"])
+        for primitive in mesh.get("primitives", []):
+            part = _primitive(document, primitive, matrix, len(materials) - 1, losses)
+            if part is not None:
+                parts.append(part)
+                used.add(int(part[1]))
+    for index in sorted(used - {len(materials) - 1}):
+        material = document.entry("materials", index)
+        losses.update(gltf_losses(material))
+        losses.update((extension_loss(name), 1) for name in unused_extensions(material))
+    _count_other(document, losses)
+    if not parts:
+        return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    surface = joined([part for part, _ in parts])
+    face_materials = np.concatenate([np.full(len(part.faces), material) for part, material in parts])
+    colours = surface.colours
+    if colours is not None:
+        colours = colours * np.array([material.albedo for material in materials])[face_materials]
+    return RawSurface(surface.vertices, surface.faces, surface.normals, materials, face_materials, colours)
+
+
+def _check_extensions(document: GltfDocument) -> None:
+    required = document.json.get("extensionsRequired", [])
+    for name in required if isinstance(required, list) else []:
+        if name in _COMPRESSION:
+            raise document.error(
+                f"its meshes are compressed (it requires the glTF extension {name}): export it without compression"
+            )
+        if name not in _KNOWN_EXTENSIONS:
+            raise document.error(f"it requires the glTF extension {name}, which is not supported: export it without")
+
+
+def _count_other(document: GltfDocument, losses: Losses) -> None:
+    """Count what the file holds beside meshes and materials."""
+    json = document.json
+    for key, loss in (("cameras", lost.CAMERAS), ("animations", lost.ANIMATIONS)):
+        losses.add(loss, len(json.get(key, [])))
+    extensions = json.get("extensions", {})
+    extensions = extensions if isinstance(extensions, Mapping) else {}
+    for name, content in extensions.items():
+        lights = content.get("lights", []) if isinstance(content, Mapping) else []
+        if name == "KHR_lights_punctual":
+            losses.add(lost.LIGHTS, len(lights))
+        else:
+            losses.add(extension_loss(name))
+    for node in json.get("nodes", []):
+        names = node.get("extensions", {})
+        losses.update((extension_loss(name), 1) for name in names if name != "KHR_lights_punctual")
+
+
+def _nodes(document: GltfDocument, losses: Losses) -> Iterator[tuple[Mapping[str, Any], Floats]]:
+    """The nodes with a mesh of the default scene, and their transforms to the scene, float64 [4, 4]."""
+    json = document.json
+    scenes, nodes = json.get("scenes", []), json.get("nodes", [])
+    if scenes:
+        default = json.get("scene", 0)
+        losses.add(lost.SCENES, len(scenes) - 1)
+        roots = document.entry("scenes", default).get("nodes", [])
+    else:
+        children = {child for node in nodes for child in node.get("children", [])}
+        roots = [index for index in range(len(nodes)) if index not in children]
+    pending = [(root, np.eye(4)) for root in reversed(roots)]
+    while pending:
+        index, parent = pending.pop()
+        node = document.entry("nodes", index)
+        matrix = parent @ _local(document, index, node)
+        pending += [(child, matrix) for child in reversed(node.get("children", []))]
+        if "mesh" in node:
+            losses.add(lost.SKINS, "skin" in node)
+            yield node, matrix
+
+
+def _local(document: GltfDocument, index: int, node: Mapping[str, Any]) -> Floats:
+    """A node's transform to its parent, float64 [4, 4]."""
+    try:
+        if "matrix" in node:
+            matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        else:
+            x, y, z, w = np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64)
+            length = float(np.sqrt(x * x + y * y + z * z + w * w)) or 1.0
+            x, y, z, w = x / length, y / length, z / length, w / length
+            rotation = np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+                ]
+            )
+            matrix = np.eye(4)
+            matrix[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64).reshape(3)
+            matrix[:3, 3] = np.array(node.get("translation", (0.0, 0.0, 0.0)), dtype=np.float64).reshape(3)
+    except (ValueError, TypeError):
+        raise document.error(f"the transform of node {index} is not valid: export it again") from None
+    if not np.isfinite(matrix).all():
+        raise document.error(f"the transform of node {index} is not finite: export it again")
+    return matrix
+
+
+def _primitive(
+    document: GltfDocument, primitive: Mapping[str, Any], matrix: Floats, default: int, losses: Losses
+) -> tuple[RawSurface, int] | None:
+    """The triangles of a primitive in the scene's space, and their material; None for points and lines."""
+    mode, attributes = primitive.get("mode", _TRIANGLES), primitive.get("attributes", {})
+    if mode == _POINTS or mode in _LINE_MODES:
+        losses.add(lost.POINTS if mode == _POINTS else lost.LINES)
+        return None
+    if mode not in (_TRIANGLES, _STRIP, _FAN):
+        raise document.error(f"a primitive has the unknown mode {mode}")
+    for name in primitive.get("extensions", {}):
+        if name in _COMPRESSION and "bufferView" not in document.entry("accessors", attributes.get("POSITION")):
+            raise document.error(f"its meshes are compressed ({name}): export it without compression")
+        losses.add(extension_loss(name), name not in _COMPRESSION)
+    if "POSITION" not in attributes:
+        raise document.error("a primitive has no positions")
+    losses.add(lost.MORPHS, len(primitive.get("targets", [])))
+    positions = document.array(attributes["POSITION"]).astype(np.float64)
+    count = len(positions)
+
+    def attribute(name: str, width: int) -> Floats | None:
+        if name not in attributes:
+            return None
+        values = document.array(attributes[name])
+        if len(values) != count or values.shape[1] < width or positions.shape[1] != 3:
+            raise document.error(f"a primitive has {len(values):,} of {name} for {count:,} positions")
+        return np.asarray(values[:, :width], dtype=np.float64)
+
+    corners = _corners(document, primitive, count)
+    faces = _faces(corners, mode)
+    colours = attribute("COLOR_0", 3)
+    if "COLOR_0" in attributes and document.array(attributes["COLOR_0"]).shape[1] == 4:
+        alpha = attribute("COLOR_0", 4)
+        losses.add(lost.ALPHA, 0 if alpha is None else int((alpha[:, 3] < 1.0).sum()))
+    normals = attribute("NORMAL", 3)
+    linear = matrix[:3, :3]
+    determinant = float(np.linalg.det(linear))
+    if normals is not None:
+        # The cofactors are the inverse transpose but for a factor, and exist for flat transforms too
+        x, y, z = linear.T
+        cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
+        normals = unit_vectors(unit_vectors(normals) @ cofactors * (-1.0 if determinant < 0 else 1.0))
+    if determinant < 0:
+        faces = faces[:, ::-1]
+    material = primitive.get("material", default)
+    if material != default or "material" in primitive:
+        document.entry("materials", material)
+    return (
+        RawSurface(
+            vertices=positions @ linear.T + matrix[:3, 3],
+            faces=faces,
+            normals=None if normals is None else normals[faces],
+            colours=None if colours is None or (colours == 1.0).all() else np.clip(colours, 0, 1)[faces].mean(axis=1),
+        ),
+        int(material),
+    )
+
+
+def _corners(document: GltfDocument, primitive: Mapping[str, Any], count: int) -> Indices:
+    """The vertices of a primitive in order, int64 [k]."""
+    if "indices" not in primitive:
+        return np.arange(count, dtype=np.int64)
+    values = document.array(primitive["indices"])
+    if values.shape[1] != 1 or values.dtype.kind not in "iu":
+        raise document.error("the indices of a primitive are not whole numbers")
+    corners = values[:, 0].astype(np.int64)
+    if len(corners) and int(corners.max()) >= count:
+        raise document.error(
+            f"a face names vertex {corners.max()}, which does not exist: its primitive has {count:,} vertices,"
+            " numbered from 0"
+        )
+    return corners
+
+
+def _faces(corners: Indices, mode: int) -> Indices:
+    """The triangles of a primitive, int64 [m, 3]."""
+    if mode == _TRIANGLES:
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    start = np.arange(max(0, len(corners) - 2))
+    if mode == _FAN:
+        return np.stack([corners[start + 1], corners[start + 2], corners[np.zeros_like(start)]], axis=1)
+    odd = start % 2
+    return np.stack([corners[start], corners[start + 1 + odd], corners[start + 2 - odd]], axis=1)

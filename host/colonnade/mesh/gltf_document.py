@@ -1,0 +1,147 @@
+"""The document of a glTF file: its JSON, its buffers, and the arrays of its accessors."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import struct
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.errors import UserError
+from colonnade.common.input_files import parse_json
+from colonnade.mesh.checks import check_gltf
+from colonnade.mesh.resolver import References
+
+_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+
+
+class GltfDocument:
+    """A glTF 2.0 file, as text or binary.
+
+    Attributes:
+        json: The checked JSON object.
+    """
+
+    def __init__(self, data: bytes, path: Path, references: References) -> None:
+        """Parse the file.
+
+        Raises:
+            UserError: The JSON or the container is invalid.
+        """
+        self._path, self._references = path, references
+        self._binary: bytes | None = None
+        text = data
+        if data[:4] == b"glTF":
+            text, self._binary = self._chunks(data)
+        self.json: Mapping[str, Any] = parse_json(
+            text, f"{path} cannot be read as a mesh: its glTF document", len(data)
+        )
+        check_gltf(self.json, path)
+
+    def error(self, reason: str) -> UserError:
+        """An error of this file."""
+        return UserError(f"mesh {self._path}: {reason}")
+
+    def _chunks(self, data: bytes) -> tuple[bytes, bytes | None]:
+        """The JSON of a binary file, and the chunk after it."""
+        chunks: list[tuple[bytes, bytes]] = []
+        at = 12
+        while at + 8 <= len(data) and len(chunks) < 2:
+            length, kind = struct.unpack_from("<I4s", data, at)
+            if length > len(data) - at - 8:
+                raise UserError(
+                    f"mesh {self._path} is truncated: a part of {length:,} bytes begins, {len(data) - at - 8:,} follow"
+                )
+            chunks.append((kind, data[at + 8 : at + 8 + length]))
+            at += 8 + length
+        if not chunks or chunks[0][0] != b"JSON":
+            raise UserError(f"{self._path} cannot be read as a mesh: it is not a binary glTF file of version 2")
+        return chunks[0][1], chunks[1][1] if len(chunks) > 1 and chunks[1][0] == b"BIN\0" else None
+
+    def entry(self, kind: str, index: Any) -> Mapping[str, Any]:
+        """An entry of one of the document's lists, such as ``meshes``."""
+        entries = self.json.get(kind, [])
+        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(entries):
+            raise self.error(f"{kind}[{index}] is used, but does not exist: export it again")
+        entry: Mapping[str, Any] = entries[index]
+        return entry
+
+    def array(self, index: Any) -> npt.NDArray[Any]:
+        """The elements of an accessor, [count, components]; normalised integers as float64."""
+        accessor = self.entry("accessors", index)
+        kind, width = _COMPONENTS.get(accessor.get("componentType", 0)), _WIDTHS.get(accessor.get("type", ""))
+        if kind is None or width is None:
+            raise self.error(f"accessor {index} has an unknown type")
+        count = int(accessor["count"])
+        if "bufferView" in accessor:
+            values = self._view(accessor["bufferView"], accessor.get("byteOffset", 0), kind, count, width)
+        elif "sparse" in accessor:
+            values = np.zeros((count, width), dtype=kind)
+        else:
+            raise self.error(f"accessor {index} has no data, as of a compressed mesh: export it without compression")
+        if "sparse" in accessor:
+            values = self._with_sparse(values, accessor["sparse"], kind)
+        if accessor.get("normalized") and kind != "<f4":
+            return np.maximum(values / np.iinfo(kind).max, -1.0)
+        return values
+
+    def _with_sparse(self, values: npt.NDArray[Any], sparse: Mapping[str, Any], kind: str) -> npt.NDArray[Any]:
+        count = int(sparse["count"])
+        rows, changes = sparse["indices"], sparse["values"]
+        index_kind = _COMPONENTS[rows["componentType"]]
+        indices = self._view(rows["bufferView"], rows.get("byteOffset", 0), index_kind, count, 1)[:, 0]
+        if len(indices) and int(indices.max()) >= len(values):
+            raise self.error(f"a sparse accessor changes element {indices.max()} of {len(values):,}")
+        values = values.copy()
+        changed = self._view(changes["bufferView"], changes.get("byteOffset", 0), kind, count, values.shape[1])
+        values[indices] = changed
+        return values
+
+    def _view(self, index: Any, offset: Any, kind: str, count: int, width: int) -> npt.NDArray[Any]:
+        """Elements of a buffer view, [count, width]."""
+        view = self.entry("bufferViews", index)
+        buffer = self._buffer(view.get("buffer"))
+        element = np.dtype(kind).itemsize * width
+        start, stride = view.get("byteOffset", 0) + offset, view.get("byteStride") or element
+        end = start + (count - 1) * stride + element
+        size = min(len(buffer), view.get("byteOffset", 0) + view.get("byteLength", 0))
+        if min(start, offset, count, stride - element) < 0 or end > size:
+            raise self.error(f"bufferViews[{index}] is too short for {count:,} elements: the file may be truncated")
+        steps = np.ndarray((count, width), dtype=kind, buffer=buffer, offset=start, strides=(stride, element // width))
+        return np.array(steps)
+
+    def _buffer(self, index: Any) -> bytes:
+        self.entry("buffers", index)
+        if index not in self._buffers:
+            self._buffers[index] = self._read_buffer(index)
+        return self._buffers[index]
+
+    @cached_property
+    def _buffers(self) -> dict[int, bytes]:
+        return {}
+
+    def _read_buffer(self, index: int) -> bytes:
+        uri = self.entry("buffers", index).get("uri")
+        if uri is None:
+            if index != 0 or self._binary is None:
+                raise self.error(f"buffer {index} has no data")
+            return self._binary
+        if not isinstance(uri, str):
+            raise self.error(f"the uri of buffer {index} is not text")
+        if uri.startswith("data:"):
+            try:
+                return base64.b64decode(uri.partition(",")[2], validate=True)
+            except (ValueError, binascii.Error):
+                raise self.error(f"the data of buffer {index} are not base64") from None
+        content = self._references.buffer(unquote(uri))
+        if content is None:
+            raise self.error(f"its buffer {uri} is missing: copy it beside the mesh")
+        return content

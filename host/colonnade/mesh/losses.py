@@ -1,0 +1,106 @@
+"""What a mesh file holds and a picture does not show: for each kind a line, its number and what is done instead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A kind of content that is not shown, or shown otherwise.
+
+    Attributes:
+        one, several: Subject and verb of the line, in the singular and the plural.
+        instead: What is done instead.
+    """
+
+    one: str
+    several: str
+    instead: str
+
+    @staticmethod
+    def of(noun: str, what: str, instead: str, plural: str = "") -> Loss:
+        """The loss of things with a name; ``what`` is the participle, e.g. "not shown"."""
+        return Loss(f"{noun} is {what}", f"{plural or noun + 's'} are {what}", instead)
+
+
+TEXTURES = Loss.of("texture", "not shown", "surfaces have their base colour")
+TEXTURE_OBJ = Loss.of("texture map", "not shown", "surfaces have the colour Kd")
+LIGHTS = Loss.of("light", "not used", "the scene file has the lights")
+CAMERAS = Loss.of("camera", "not used", "the scene file has the camera")
+ANIMATIONS = Loss.of("animation", "not played", "nodes stand as the file places them")
+SKINS = Loss.of("skin", "not applied", "its mesh has the pose in which it was bound")
+MORPHS = Loss.of("morph target", "not applied", "its mesh has its base shape")
+LINES = Loss.of("line primitive", "not shown", "only faces are rendered")
+POINTS = Loss.of("point primitive", "not shown", "only faces are rendered")
+CURVES = Loss.of("free-form curve or surface", "not shown", "only faces are rendered", "free-form curves and surfaces")
+BLENDED = Loss.of("partly transparent material", "opaque", "only transmission above 1/2 is glass")
+MASKED = Loss.of("material with an alpha mask", "not cut out", "its faces are whole", "materials with an alpha mask")
+EMISSION = Loss.of("emissive material", "not emitting", "only the lights of the scene shine")
+ROUGH_MIRROR = Loss.of("rough metal", "a perfect mirror", "roughness is not rendered")
+ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "roughness is not rendered", "rough glasses")
+PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror", "1/2 and above is a mirror")
+PARTLY_GLASS = Loss.of("partly transmissive material", "rounded to opaque or glass", "above 1/2 is glass")
+HIGHLIGHTS = Loss.of("glossy material", "diffuse", "highlights are not rendered")
+NO_MATERIALS = Loss.of("file of materials", "missing", "faces have the default material", "files of materials")
+UNKNOWN_MATERIALS = Loss.of("material name", "not defined", "faces have the default material")
+GROUPS = Loss.of("smoothing group", "not used", "edges are smooth up to the crease angle")
+SCENES = Loss.of("further scene", "not shown", "only the default scene is rendered")
+SHORT_FACES = Loss.of(
+    "face of fewer than three corners", "left out", "it has no area", "faces of fewer than three corners"
+)
+CROSSED = Loss(
+    "polygon crosses or folds over itself",
+    "polygons cross or fold over themselves",
+    "triangles may overlap",
+)
+FACET_COLOURS = Loss.of("facet colour", "not shown", "STL has no standard for them")
+COLOURS = Loss(
+    "colour of vertices or faces is the albedo of its faces",
+    "colours of vertices or faces are the albedo of their faces",
+    "a face has one colour, the mean of its corners",
+)
+ALPHA = Loss.of("partly transparent vertex", "opaque", "transparency is not rendered", "partly transparent vertices")
+FLIPPED = Loss(
+    "face has normals that point to its back", "faces have normals that point to their back", "they are negated"
+)
+REPLACED = Loss(
+    "corner normal points to the back of its face",
+    "corner normals point to the back of their face",
+    "they are computed from the faces",
+)
+MISSING = Loss("corner has no normal", "corners have no normal", "they are computed from the faces")
+MIXED = Loss.of(
+    "closed part with mixed winding", "repaired", "all faces point outward", "closed parts with mixed winding"
+)
+INVERTED = Loss.of("inside-out closed part", "turned outward", "the faces are reversed")
+
+
+def extension_loss(name: str) -> Loss:
+    """The loss of an optional glTF extension."""
+    return Loss(f"use of the extension {name} is ignored", f"uses of the extension {name} are ignored", "not supported")
+
+
+@dataclass
+class Losses:
+    """What one file loses, in the order of discovery."""
+
+    counts: dict[Loss, int] = field(default_factory=dict)
+
+    def add(self, loss: Loss, count: int = 1) -> None:
+        """Count a loss; none for a count of 0."""
+        if count > 0:
+            self.counts[loss] = self.counts.get(loss, 0) + count
+
+    def lines(self, label: str) -> tuple[str, ...]:
+        """One line for each kind."""
+        return tuple(
+            f"{label}: {count:,} {loss.one if count == 1 else loss.several}: {loss.instead}"
+            for loss, count in self.counts.items()
+        )
+
+    def update(self, others: Iterable[tuple[Loss, int]]) -> None:
+        """Add several losses."""
+        for loss, count in others:
+            self.add(loss, count)

@@ -1,0 +1,188 @@
+"""Reads OBJ files with their MTL files: corners with normals, materials, and vertex colours.
+
+This is our own code because trimesh splits concave polygons wrongly and does not say what it leaves out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from colonnade.common.errors import UserError
+from colonnade.common.srgb import linear_from_srgb
+from colonnade.common.types import Floats, Indices
+from colonnade.mesh import losses as lost
+from colonnade.mesh.losses import Losses
+from colonnade.mesh.materials import PLAIN, MeshMaterial, from_mtl, mtl_losses
+from colonnade.mesh.resolver import References
+from colonnade.mesh.surface import RawSurface, from_polygons
+
+#: Statements of curves, surfaces and their parameter space.
+_CURVES = ("curv", "curv2", "surf")
+#: Corners that all have a normal.
+_WITH_NORMALS = re.compile(r"[^\s/]+/[^\s/]*/[^\s/]+(?: [^\s/]+/[^\s/]*/[^\s/]+)*")
+
+
+class _Statements:
+    """The statements of a file, sorted by their keyword."""
+
+    def __init__(self, text: str) -> None:
+        self.vertices: list[str] = []
+        self.normals: list[str] = []
+        self.faces: list[str] = []
+        #: Vertices and normals before each face, for relative indices.
+        self.counts: list[tuple[int, int]] = []
+        self.face_materials: list[int] = []
+        self.names: list[str] = []
+        self.libraries: list[str] = []
+        self.losses: dict[str, int] = {}
+        groups: set[str] = set()
+        index, material = {"": 0}, 0
+        for line in text.splitlines():
+            keyword, _, rest = line.strip().partition(" ")
+            if keyword == "v":
+                self.vertices.append(rest)
+            elif keyword == "f":
+                self.faces.append(rest)
+                self.counts.append((len(self.vertices), len(self.normals)))
+                self.face_materials.append(material)
+            elif keyword == "vn":
+                self.normals.append(rest)
+            elif keyword == "usemtl":
+                material = index.setdefault(rest.strip(), len(index))
+            elif keyword == "mtllib":
+                self.libraries.append(rest.strip())
+            elif keyword == "s" and rest.strip() not in ("off", "0"):
+                groups.add(rest.strip())
+            elif keyword in ("l", "p") or keyword in _CURVES:
+                self.losses[keyword] = self.losses.get(keyword, 0) + 1
+        self.names = list(index)
+        self.groups = len(groups)
+
+
+def read_obj(data: bytes, path: Path, references: References, losses: Losses) -> RawSurface:
+    """Read an OBJ file. A face is a polygon in the order of the file.
+
+    Raises:
+        UserError: A face names a vertex or a normal that does not exist, or an MTL file is invalid.
+    """
+    text = re.sub(r"\\\r?\n", " ", data.decode("utf-8", "replace")).replace("\t", " ")
+    file = _Statements(re.sub(r"#[^\r\n]*", "", text))
+    vertices, vertex_colours = _vertices(file.vertices)
+    normals = _rows(file.normals, 3)[:, :3]
+    sizes, corners, corner_normals = _corners(file, path)
+    losses.add(lost.POINTS, file.losses.get("p", 0))
+    losses.add(lost.LINES, file.losses.get("l", 0))
+    losses.add(lost.CURVES, sum(file.losses.get(name, 0) for name in _CURVES))
+    if file.groups > 1 and not len(normals):
+        losses.add(lost.GROUPS, file.groups)
+    materials, used = _materials(file, references, losses)
+    return from_polygons(
+        vertices,
+        corners,
+        sizes,
+        losses,
+        corner_normals=np.concatenate([normals, np.zeros((1, 3))])[corner_normals] if len(normals) else None,
+        materials=materials,
+        polygon_materials=used,
+        vertex_colours=vertex_colours,
+    )
+
+
+def _rows(lines: Sequence[str], columns: int) -> Floats:
+    """The numbers of each line, at least so many, float64 [lines, numbers of the shortest line]."""
+    rows = [line.split() for line in lines]
+    shortest = min(map(len, rows), default=columns)
+    if shortest < columns:
+        raise ValueError(f"a vertex or normal has fewer than {columns} numbers")
+    if any(len(row) > shortest for row in rows):
+        rows = [row[:shortest] for row in rows]
+    return np.array(list(map(float, chain.from_iterable(rows))), dtype=np.float64).reshape(-1, shortest)
+
+
+def _vertices(lines: Sequence[str]) -> tuple[Floats, Floats | None]:
+    """Positions [n, 3] and, if all vertices have them, linear colours [n, 3]."""
+    values = _rows(lines, 3)
+    if values.shape[1] < 6:
+        return values[:, :3], None
+    return values[:, :3], linear_from_srgb(np.clip(np.nan_to_num(values[:, 3:6]), 0.0, 1.0))
+
+
+def _indices(words: Sequence[str]) -> tuple[list[int], list[int | None]]:
+    """Vertex and normal of each corner, as the file numbers them; None without a normal."""
+    joined = " ".join(words)
+    if "/" not in joined:
+        return list(map(int, words)), [None] * len(words)
+    if _WITH_NORMALS.fullmatch(joined):
+        numbers = list(map(int, joined.replace("//", "/0/").replace("/", " ").split()))
+        return numbers[::3], list(numbers[2::3])
+    parts = [word.split("/") for word in words]
+    return [int(part[0]) for part in parts], [int(part[2]) if len(part) > 2 and part[2] else None for part in parts]
+
+
+def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices]:
+    """Sizes of the polygons, and vertex and normal (-1: none) of each corner."""
+    words = [face.split() for face in file.faces]
+    sizes = np.array(list(map(len, words)), dtype=np.int64)
+    try:
+        vertices, normals = _indices(list(chain.from_iterable(words)))
+    except ValueError:
+        raise UserError(f"mesh {path}: a vertex index of a face is not an integer") from None
+    for one, several, indices, count in (
+        ("vertex", "vertices", vertices, len(file.vertices)),
+        ("normal", "normals", normals, len(file.normals)),
+    ):
+        given = [index for index in indices if index is not None]
+        if 0 in given:
+            raise UserError(f"mesh {path}: a face names {one} 0; OBJ files number {several} from 1")
+        for worst in (min(given, default=1), max(given, default=1)):
+            if abs(worst) > count and given:
+                raise UserError(f"mesh {path}: a face names {one} {worst}, but the file has {count:,} {several}")
+    corners = np.array(vertices, dtype=np.int64)
+    corner_normals = np.array([0 if index is None else index for index in normals], dtype=np.int64)
+    before = np.repeat(np.array(file.counts, dtype=np.int64).reshape(-1, 2), sizes, axis=0)
+    corners = np.where(corners < 0, before[:, 0] + corners, corners - 1)
+    corner_normals = np.where(corner_normals < 0, before[:, 1] + corner_normals, corner_normals - 1)
+    if len(corners) and corners.min() < 0:
+        raise UserError(f"mesh {path}: a relative index of a face names a vertex before the first")
+    return sizes, corners, np.maximum(corner_normals, -1)
+
+
+def _materials(file: _Statements, references: References, losses: Losses) -> tuple[tuple[MeshMaterial, ...], Any]:
+    """The distinct materials of the faces, and the material of each face, int64."""
+    defined: dict[str, Mapping[str, Any]] = {}
+    for names in file.libraries:
+        library = references.materials(names)
+        libraries = [library] if library is not None else [references.materials(name) for name in names.split()]
+        missing = sum(content is None for content in libraries)
+        losses.add(lost.NO_MATERIALS, 1 if missing == len(libraries) else missing)
+        for content in libraries:
+            defined |= {} if content is None else parse_mtl(content)
+    used = np.array(file.face_materials, dtype=np.int64)
+    materials = [PLAIN] * len(file.names)
+    for index in np.unique(used):
+        name = file.names[index]
+        if name in defined:
+            materials[index] = from_mtl(defined[name])
+            losses.update(mtl_losses(defined[name]))
+        elif name and defined:
+            losses.add(lost.UNKNOWN_MATERIALS)
+    return tuple(materials), used
+
+
+def parse_mtl(data: bytes) -> dict[str, dict[str, list[str]]]:
+    """The materials of an MTL file by name: the words after each keyword, in lower case."""
+    materials: dict[str, dict[str, list[str]]] = {}
+    current: dict[str, list[str]] = {}
+    for line in re.sub(r"#[^\r\n]*", "", data.decode("utf-8", "replace")).splitlines():
+        keyword, *words = line.split() or [""]
+        if keyword.lower() == "newmtl":
+            current = materials.setdefault(" ".join(words), {})
+        elif keyword:
+            current[keyword.lower()] = words
+    return materials

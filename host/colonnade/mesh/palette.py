@@ -1,0 +1,141 @@
+"""Materials of coloured faces, and their reduction to the number that a device has."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
+from colonnade.common.types import Floats, Indices
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.mesh import Mesh
+
+#: Limit of the 8-bit material index of a face.
+MAX_MATERIALS = 256
+
+#: Steps of the clustering, at most.
+_STEPS = 30
+
+
+def coloured_materials(
+    materials: tuple[MeshMaterial, ...], face_materials: Indices, colours: Floats | None
+) -> tuple[tuple[MeshMaterial, ...], Indices, int]:
+    """Materials of the faces, with their colours as albedo.
+
+    Args:
+        materials: Materials of the file.
+        face_materials: int64 [m].
+        colours: Linear colours of the faces, NaN for none, float64 [m, 3]; None: no face has one.
+
+    Returns:
+        The distinct used materials, any number of them without colours, else at most `MAX_MATERIALS` if the materials
+        without a colour leave space; the material of each face, int64 [m]; and the number of distinct colours.
+    """
+    distinct = {material: index for index, material in enumerate(dict.fromkeys(materials))}
+    index = np.array([distinct[material] for material in materials], dtype=np.int64)[face_materials]
+    found = list(distinct)
+    if colours is None:
+        return (*_used(found, index), 0)
+    has_colour = np.isfinite(colours).all(axis=1)
+    # 8 bits of sRGB per channel, as files have them
+    codes = np.rint(srgb_from_linear(colours[has_colour]) * 255).astype(np.int64)
+    rows = np.column_stack([index[has_colour], codes])
+    unique, owner = np.unique(rows, axis=0, return_inverse=True)
+    owner = owner.reshape(-1)
+    plain = len(np.unique(index[~has_colour]))
+    space = max(1, MAX_MATERIALS - plain)
+    if len(unique) > space:
+        # Colours of one kind of material share an equal part
+        bases = np.unique(unique[:, 0])
+        weights = np.bincount(owner, minlength=len(unique))
+        merged = np.empty_like(unique)
+        for base in bases:
+            of_base = np.flatnonzero(unique[:, 0] == base)
+            centres, nearest = clustered(unique[of_base, 1:] / 255.0, weights[of_base], max(1, space // len(bases)))
+            merged[of_base, 0] = base
+            merged[of_base, 1:] = np.rint(centres[nearest] * 255)
+        unique = merged
+    linear = linear_from_srgb(unique[:, 1:] / 255.0)
+    tinted = [
+        replace(found[int(base)], albedo=(float(red), float(green), float(blue)))
+        for base, (red, green, blue) in zip(unique[:, 0], linear, strict=True)
+    ]
+    index[has_colour] = len(found) + owner
+    number = len(np.unique(rows, axis=0))
+    return (*_used([*found, *tinted], index), number)
+
+
+def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
+    """Reduce a mesh to so many materials by merging similar colours of the same kind and index of refraction.
+
+    Returns:
+        The mesh, and a line on what was merged; the mesh itself and None if it has no more materials, or too many
+        kinds.
+    """
+    if len(mesh.materials) <= count:
+        return mesh, None
+    materials, index = _used(list(mesh.materials), mesh.face_materials.astype(np.int64))
+    if len(materials) <= count:
+        return replace(mesh, materials=materials, face_materials=index.astype(np.uint8)), None
+    kinds: dict[tuple[str, float], list[int]] = {}
+    for number, material in enumerate(materials):
+        kinds.setdefault((material.kind, material.ior), []).append(number)
+    if len(kinds) > count:
+        return mesh, None
+    weights = np.bincount(index, minlength=len(materials))
+    table = np.zeros(len(materials), dtype=np.uint8)
+    found: list[MeshMaterial] = []
+    squares = 0.0
+    # Small kinds keep all of their colours, if an equal share suffices
+    for done, members in enumerate(sorted(kinds.values(), key=len)):
+        space = (count - len(found)) // (len(kinds) - done)
+        albedo = srgb_from_linear(np.array([materials[number].albedo for number in members]))
+        centres, nearest = clustered(albedo, weights[members], space)
+        squares += float((weights[members, None] * (centres[nearest] - albedo) ** 2).sum()) / 3
+        table[members] = len(found) + nearest
+        found += [
+            replace(materials[members[0]], albedo=(float(red), float(green), float(blue)))
+            for red, green, blue in linear_from_srgb(centres)
+        ]
+    line = (
+        f"mesh {mesh.name}: {len(materials)} materials become {len(found)}, their colours off by"
+        f" {255 * (squares / len(index)) ** 0.5:.1f}/255 on average: frame.materials is {count}"
+    )
+    return replace(mesh, materials=tuple(found), face_materials=table[index]), line
+
+
+def clustered(colours: Floats, weights: npt.NDArray[np.int64], count: int) -> tuple[Floats, Indices]:
+    """Weighted k-means of colours: at most ``count`` centres, float64 [k, 3], and the nearest one of each, int64 [n].
+
+    It begins with the heaviest colour, then the one with the largest weighted distance to those chosen.
+    """
+    from scipy.spatial import cKDTree
+
+    chosen = [int(weights.argmax())]
+    distance = ((colours - colours[chosen[0]]) ** 2).sum(axis=1)
+    while len(chosen) < count and distance.max() > 0:
+        chosen.append(int((distance * weights).argmax()))
+        distance = np.minimum(distance, ((colours - colours[chosen[-1]]) ** 2).sum(axis=1))
+    centres = colours[chosen].astype(np.float64)
+    nearest = np.zeros(len(colours), dtype=np.int64)
+    for _ in range(_STEPS):
+        previous = nearest
+        nearest = np.asarray(cKDTree(centres).query(colours)[1], dtype=np.int64)
+        if (nearest == previous).all():
+            break
+        total = np.bincount(nearest, weights, len(centres))
+        sums = np.stack([np.bincount(nearest, weights * colours[:, axis], len(centres)) for axis in range(3)], axis=1)
+        filled = total > 0
+        centres[filled] = sums[filled] / total[filled, None]
+    return centres, nearest
+
+
+def _used(materials: list[MeshMaterial], index: Indices) -> tuple[tuple[MeshMaterial, ...], Indices]:
+    """The distinct materials that faces use, in their order, and the material of each face."""
+    distinct: dict[MeshMaterial, int] = {}
+    table = np.zeros(len(materials), dtype=np.int64)
+    for used in np.unique(index):
+        table[used] = distinct.setdefault(materials[used], len(distinct))
+    return tuple(distinct), table[index]

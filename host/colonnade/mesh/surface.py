@@ -1,0 +1,103 @@
+"""The content of a mesh file before cleaning, and its assembly from polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from colonnade.common.types import Floats, Indices
+from colonnade.mesh.losses import CROSSED, SHORT_FACES, Losses
+from colonnade.mesh.materials import PLAIN, MeshMaterial
+from colonnade.mesh.polygons import triangulate
+
+
+@dataclass(frozen=True)
+class RawSurface:
+    """The triangles of a mesh file.
+
+    Attributes:
+        vertices: float64 [n, 3].
+        faces: int64 [m, 3].
+        normals: The file's normals at the corners, of any length, 0 where it has none, float64 [m, 3, 3]; None: none.
+        materials: At least one.
+        face_materials: int64 [m], index into `materials`.
+        colours: Colours of the faces, which replace the albedo of their materials, linear, 0 to 1, NaN where the file
+            has none, float64 [m, 3]; None: none.
+    """
+
+    vertices: Floats
+    faces: Indices
+    normals: Floats | None = None
+    materials: tuple[MeshMaterial, ...] = (PLAIN,)
+    face_materials: Indices | None = None
+    colours: Floats | None = None
+
+    @property
+    def material_index(self) -> Indices:
+        """`face_materials`, or zeros, int64 [m]."""
+        return np.zeros(len(self.faces), dtype=np.int64) if self.face_materials is None else self.face_materials
+
+
+def from_polygons(
+    vertices: Floats,
+    corners: Indices,
+    sizes: Indices,
+    losses: Losses,
+    *,
+    corner_normals: Floats | None = None,
+    materials: tuple[MeshMaterial, ...] = (PLAIN,),
+    polygon_materials: Indices | None = None,
+    vertex_colours: Floats | None = None,
+    polygon_colours: Floats | None = None,
+) -> RawSurface:
+    """Split polygons into triangles, with what they carry.
+
+    Args:
+        vertices: float64 [n, 3].
+        corners: Vertices of all polygons' corners, one polygon after the other, int64 [k], each below n.
+        sizes: Corners of each polygon, int64 [p].
+        losses: Counts polygons without area.
+        corner_normals: float64 [k, 3], 0 for none.
+        materials: The materials.
+        polygon_materials: int64 [p].
+        vertex_colours: float64 [n, 3], linear; a face has the mean of its corners'.
+        polygon_colours: float64 [p, 3], linear, NaN for none.
+    """
+    split = triangulate(vertices[corners], sizes)
+    losses.add(SHORT_FACES, split.short)
+    losses.add(CROSSED, split.crossed)
+    faces = corners[split.corners]
+    colours = None if polygon_colours is None else polygon_colours[split.polygons]
+    if colours is None and vertex_colours is not None:
+        colours = vertex_colours[faces].mean(axis=1)
+    return RawSurface(
+        vertices=vertices,
+        faces=faces,
+        normals=None if corner_normals is None else corner_normals[split.corners],
+        materials=materials,
+        face_materials=None if polygon_materials is None else polygon_materials[split.polygons],
+        colours=colours,
+    )
+
+
+def joined(parts: Sequence[RawSurface]) -> RawSurface:
+    """The parts of a file as one surface; at least one part. All have the same materials."""
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+
+    def filled(name: str, shape: tuple[int, ...], value: float) -> Floats | None:
+        values = [getattr(part, name) for part in parts]
+        if all(one is None for one in values):
+            return None
+        blanks = [np.full((len(part.faces), *shape), value) for part in parts]
+        return np.concatenate([blank if one is None else one for one, blank in zip(values, blanks, strict=True)])
+
+    return RawSurface(
+        vertices=np.concatenate([part.vertices for part in parts]),
+        faces=np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
+        normals=filled("normals", (3, 3), 0.0),
+        materials=parts[0].materials,
+        face_materials=np.concatenate([part.material_index for part in parts]),
+        colours=filled("colours", (3,), np.nan),
+    )

@@ -1,0 +1,39 @@
+"""The mesh of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from colonnade.common import notes
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.palette import reduced
+from colonnade.scene.model import Scene
+from colonnade.scene.view import with_overrides
+
+if TYPE_CHECKING:
+    from colonnade.mesh.mesh import Mesh
+
+
+def object_mesh(scene: Scene, materials: int | None = None) -> Mesh:
+    """Load the mesh of a scene, and report its notes.
+
+    Args:
+        scene: The scene.
+        materials: Entries of the device's material table: of more diffuse colours, similar ones are merged. None: all
+            are kept.
+
+    Raises:
+        UserError: The mesh does not exist or cannot be rendered.
+    """
+    mesh = load_mesh(scene.mesh_source, scene.mesh.crease)
+    return mesh if materials is None else with_materials(scene, mesh, materials)
+
+
+def with_materials(scene: Scene, mesh: Mesh, materials: int) -> Mesh:
+    """The mesh with so many materials at most, as `object_mesh`; the scene's values override them first."""
+    if len(mesh.materials) <= materials:
+        return mesh
+    mesh, line = reduced(replace(mesh, materials=with_overrides(mesh.materials, scene.material)), materials)
+    notes.report([] if line is None else [line])
+    return mesh

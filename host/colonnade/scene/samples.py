@@ -1,0 +1,99 @@
+"""The samples of a frame: a point in pixel, shutter, lens and lights for each of its passes (docs/sampling.md)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from colonnade.common.types import Floats
+
+#: A point of a disc of radius 1, or a shift in pixels: right and down.
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Where one pass of a frame lies. The default is the only sample of a frame with one.
+
+    Attributes:
+        pixel: Shift of the rays from the pixels' centres, -0.5 to 0.5 pixels.
+        time: Fraction of the shutter's opening, 0 to 1.
+        lens: Point of the lens, a disc of radius 1.
+        lights: Point of each light's disc of radius 1; missing ones are the centre.
+    """
+
+    pixel: Point = (0.0, 0.0)
+    time: float = 0.5
+    lens: Point = (0.0, 0.0)
+    lights: tuple[Point, ...] = ()
+
+    def light(self, index: int) -> Point:
+        """The point of a light's disc."""
+        return self.lights[index] if index < len(self.lights) else (0.0, 0.0)
+
+
+#: The middle of everything.
+CENTRE = Sample()
+
+
+def samples_of_frame(count: int, lights: int) -> list[Sample]:
+    """The samples of a frame; they are the same for every frame with as many passes.
+
+    Args:
+        count: Number of samples, from 1.
+        lights: Number of lights.
+    """
+    pixel, time, lens, *on_lights = (square_points(count, dimension) for dimension in range(3 + lights))
+    return [
+        Sample(
+            pixel=(float(pixel[index, 0] - 0.5), float(pixel[index, 1] - 0.5)),
+            time=float(time[index, 0]),
+            lens=disc_point(*lens[index]),
+            lights=tuple(disc_point(*points[index]) for points in on_lights),
+        )
+        for index in range(count)
+    ]
+
+
+def square_points(count: int, dimension: int) -> Floats:
+    """Well-distributed points in the unit square, float64 [count, 2].
+
+    On each axis there is one point in the middle of each of `count` equal intervals. If `count` is a power of two,
+    there is also one in each of `count` equal rectangles, whatever their proportions.
+
+    Args:
+        count: Number of points, from 1.
+        dimension: What the points are for. Each dimension has the same points in another order.
+    """
+    order = np.arange(count)
+    if dimension > 0:
+        # The legacy generator, since numpy guarantees its numbers for all time
+        order = np.random.RandomState(dimension).permutation(count)
+    sequence = np.array([_sobol(index) for index in range(count)], dtype=np.int64)
+    ranks = np.argsort(np.argsort(sequence, axis=0), axis=0)
+    return np.asarray((ranks[order] + 0.5) / count, dtype=np.float64)
+
+
+def _sobol(index: int) -> tuple[int, int]:
+    """A point of Sobol's sequence in the first two dimensions, as fractions of 2^32."""
+    x = y = 0
+    bit, direction = 1 << 31, 1 << 31
+    while index:
+        if index & 1:
+            x, y = x ^ bit, y ^ direction
+        bit, direction, index = bit >> 1, direction ^ (direction >> 1), index >> 1
+    return x, y
+
+
+def disc_point(x: float, y: float) -> Point:
+    """A point of the disc of radius 1 for one of the unit square, with equal areas (Shirley and Chiu 1997)."""
+    a, b = 2.0 * float(x) - 1.0, 2.0 * float(y) - 1.0
+    if a == 0.0 and b == 0.0:
+        return 0.0, 0.0
+    if abs(a) > abs(b):
+        radius, angle = a, math.pi / 4 * (b / a)
+    else:
+        radius, angle = b, math.pi / 2 - math.pi / 4 * (a / b)
+    return radius * math.cos(angle), radius * math.sin(angle)

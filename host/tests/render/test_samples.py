@@ -1,0 +1,180 @@
+"""Frames of several samples a pixel: the RTL against the model, the model against the reference, and their files."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from colonnade.cli.main import cli
+from colonnade.common.errors import UserError
+from colonnade.common.image_io import encode_srgb
+from colonnade.evaluation.studies.synthetic_attic import write_attic
+from colonnade.evaluation.verify import equality, verify
+from colonnade.quality.image_metrics import psnr
+from colonnade.render.frames import render, render_frames
+from colonnade.render.request import Backend, RenderRequest
+from colonnade.render.result import RenderResult
+
+NEEDS_SIMULATOR = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+SIZE = (40, 30)
+#: An attribute memory for maps of 96 by 72 pixels.
+MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
+ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
+
+EVERYTHING = """
+mesh.name = "teapot:3"
+camera = {position = [2.0, 4.0, 8.0], target = [0.0, 1.0, 0.0], aperture = 0.3, focus = 7.0}
+light = {offset = [-0.75, 0.85, 0.9], radius = 1.5}
+background.colour = [0.1, 0.2, 0.4]
+frame.samples = 5
+motion = {turn = 30.0, shutter = 0.5}
+"""
+SOFT = """
+mesh.name = "teapot:4"
+camera = {direction = [-0.35, 0.55, 1.0]}
+light = {offset = [-0.75, 0.85, 0.9], radius = 1.8}
+"""
+STANDING = """
+mesh.name = "teapot:2"
+background = {room = "rooms/attic", colours = "albedo"}
+object = {stand_at = [48, 43], size = 0.6}
+material.kind = "mirror"
+paths.bounces = 1
+light = {position = [0.6, 2.2, 0.6], falloff = 1.5, radius = 0.2}
+motion = {stand_at = [52, 43], turn = 20.0, shutter = 1.0}
+frame.samples = 4
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("samples")
+    write_attic(folder / "rooms" / "attic", 96, 72)
+    return folder
+
+
+def scene_file(folder: Path, text: str) -> Path:
+    file = folder / "scene.toml"
+    file.write_text(text)
+    return file
+
+
+def of(file: Path, backend: Backend, samples: int | None = None, config: str = "tiny") -> RenderResult:
+    return render(RenderRequest(file, config, (), backend, SIZE, samples=samples))
+
+
+@NEEDS_SIMULATOR
+@pytest.mark.parametrize("config", ["tiny", "16b16s32d", "24b20s40d"])
+def test_the_hardware_renders_the_passes_of_the_model(folder: Path, config: str) -> None:
+    file = scene_file(folder, EVERYTHING)
+    overrides = () if config == "tiny" else ("array.rows=1", "array.columns=1")
+    rtl, model = (render(RenderRequest(file, config, overrides, backend, SIZE)) for backend in ("rtl", "model"))
+    assert equality(rtl, model).holds
+    assert rtl.report.samples == 5 and rtl.report.rays["primary"] == 5 * SIZE[0] * SIZE[1]
+    assert rtl.report.cycles == rtl.report.counters["cycles"] == 5 * (rtl.report.cycles_per_sample or 0)
+    assert np.count_nonzero((rtl.sums.coverage > 0) & (rtl.sums.coverage < 5)) > 0
+
+
+@NEEDS_SIMULATOR
+def test_verify_compares_frames_of_several_samples(folder: Path) -> None:
+    file = scene_file(folder, SOFT + "frame.samples = 3\n")
+    report = verify(file, "tiny", (), ["teapot:3"], SIZE)
+    assert report["equal"]
+    assert report["meshes"]["teapot:3"]["reference"]["psnr"] > 40
+
+
+def test_one_sample_is_the_frame_without_samples(folder: Path) -> None:
+    plain = "\n".join(line for line in EVERYTHING.splitlines() if not line.startswith(("frame", "motion")))
+    sharp = plain.replace(", aperture = 0.3, focus = 7.0", "").replace(", radius = 1.5", "")
+    one = of(scene_file(folder, plain), "model", samples=1)
+    without = of(scene_file(folder, sharp), "model")
+    np.testing.assert_array_equal(one.image, without.image)
+    np.testing.assert_array_equal(one.t, without.t)
+    assert one.report.counters == without.report.counters and one.report.samples == 1
+
+
+def test_soft_shadows_converge_to_the_reference(folder: Path) -> None:
+    file = scene_file(folder, SOFT)
+    wanted = encode_srgb(of(file, "reference", samples=64).image)
+    found = [psnr(wanted, encode_srgb(of(file, "model", samples=samples).image)) for samples in (1, 4, 16, 64)]
+    assert found == sorted(found)
+    assert found[1] > found[0] + 4 and found[2] > found[1] + 4
+    assert found[3] > 50, found
+    # Points that have nothing to do with those of the model
+    independent = encode_srgb(of(file, "reference", samples=81).image)
+    assert psnr(independent, encode_srgb(of(file, "model", samples=64).image)) > 40
+
+
+@pytest.mark.parametrize("backend", ["model", "reference"])
+def test_frames_of_a_motion_are_exposed(folder: Path, backend: Backend) -> None:
+    """The passes of each frame are the frames of its moments; the last frame rests."""
+    request = RenderRequest(scene_file(folder, STANDING), "small", ROOM, backend, (96, 72), 3)
+    frames = list(render_frames(request))
+    assert [frame.report.share for frame in frames] == [0.0, 0.5, 1.0]
+    still = STANDING.replace(", shutter = 1.0", "")
+    sharp = list(render_frames(replace(request, scene=scene_file(folder, still))))
+    assert not np.array_equal(frames[0].image, sharp[0].image)
+    np.testing.assert_array_equal(frames[2].image, sharp[2].image)
+    seen = frames[0].sums.coverage
+    assert (
+        0
+        < np.count_nonzero((seen > 0) & (seen < 4))
+        > np.count_nonzero((sharp[0].sums.coverage > 0) & (sharp[0].sums.coverage < 4))
+    )
+
+
+def test_the_photo_shows_through_in_proportion(folder: Path) -> None:
+    """Pixels without object and shadow are the photo; those at the object's edge mix it with the object."""
+    file = scene_file(folder, STANDING)
+    result = render(RenderRequest(file, "small", ROOM, "model", (96, 72)))
+    assert result.sums.ratio is not None
+    lit = (result.sums.coverage == 0) & (result.sums.ratio == 4 * 4096).all(axis=2)
+    soft = (result.sums.ratio % 4096 != 0).any(axis=2) & (result.sums.coverage == 0)
+    assert lit.any() and soft.any()
+    relit = render(RenderRequest(file, "small", ROOM, "model", (96, 72), relit=True))
+    whole = result.sums.coverage == 4
+    np.testing.assert_array_equal(result.image[whole], relit.image[whole])
+    assert result.report.counters["raysPrimary"] == relit.report.counters["raysPrimary"]
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(cli, [str(argument) for argument in arguments])
+
+
+def test_the_report_names_samples_and_cycles(folder: Path, tmp_path: Path) -> None:
+    common = ("render", scene_file(folder, EVERYTHING), "--config", "tiny", "--backend", "model", "--size", "32x24")
+    result = run(*common, "--samples", 3, "--frames", 2, "--json", tmp_path / "r.json")
+    assert result.exit_code == 0, result.output
+    assert "2 frames, 3 samples a pixel" in result.output
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["samples"] == 3 and report["rays"]["primary"] == 2 * 3 * 32 * 24
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        (SOFT, (), "light.radius shows only with several samples: give frame.samples or --samples"),
+        (EVERYTHING, ("--hits", "h.npz"), "hits are of one sample a pixel, this frame has 5: give --samples 1"),
+        (EVERYTHING, ("--backend", "rtl", "--waveform", "w.vcd", "--size", "8x8"), "a waveform is of one sample"),
+        (EVERYTHING, ("--samples", 0), "--samples"),
+        (EVERYTHING, ("--samples", 1025), "--samples"),
+    ],
+)
+def test_what_samples_do_not_show_is_one_line(
+    tmp_path: Path, text: str, options: tuple[object, ...], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run("render", scene_file(tmp_path, text), "--config", "tiny", "--backend", "model", *options)
+    assert result.exit_code == 2
+    assert message in result.stderr and len(result.stderr.splitlines()) == 1
+
+
+def test_a_shutter_of_one_sample_is_refused(folder: Path) -> None:
+    with pytest.raises(UserError, match=r"motion\.shutter"):
+        of(scene_file(folder, 'mesh.name = "cube"\nmotion = {shutter = 0.5}\n'), "model")
