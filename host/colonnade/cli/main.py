@@ -17,6 +17,7 @@ from colonnade.cli.explore import explore
 from colonnade.cli.fuzz import fuzz
 from colonnade.cli.generate import generate
 from colonnade.cli.inspect import inspect
+from colonnade.cli.light import light
 from colonnade.cli.options import echo
 from colonnade.cli.pack import pack
 from colonnade.cli.ppa import ppa
@@ -113,7 +114,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, render, compare, study, verify, fuzz, bench, explore, ppa):
+for command in (generate, pack, inspect, light, render, compare, study, verify, fuzz, bench, explore, ppa):
     cli.add_command(command)
 
 

@@ -42,8 +42,8 @@ def pack(
     from colonnade.common import progress
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
-    from colonnade.environment.encoded import EncodedEnvironment
-    from colonnade.render.frames import pack_scene
+    from colonnade.render.frames import encoded, max_lights, pack_scene
+    from colonnade.render.lit_room import lit_room, scene_room
     from colonnade.scene.object_mesh import object_mesh
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.file import check_image_file, image_file
@@ -61,10 +61,10 @@ def pack(
     if background is not None:
         described = described.with_environment(background)
     manifest = manifest_for(config, overrides, terminal).manifest
-    folder = described.background.room
     with terminal.step("packing"):
-        environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
-        image = pack_scene(described, object_mesh(described), manifest, environment)
+        surface = object_mesh(described)
+        room = lit_room(described, scene_room(described), surface.extent, max_lights(manifest), False, terminal)
+        image = pack_scene(room.scene, surface, manifest, encoded(room, manifest))
     image.save(output)
 
     echo(f"packed      {file}")

@@ -41,6 +41,12 @@ if TYPE_CHECKING:
 @background_option
 @click.option("--relit", is_flag=True, help="Show the room shaded by the scene's lights instead of its photo.")
 @click.option(
+    "--truth",
+    type=FILE,
+    metavar="MESH",
+    help="With --backend reference: trace the room's real geometry, a mesh in the room's world, not its depth map.",
+)
+@click.option(
     "--frames",
     type=click.IntRange(min=1, max=MAX_FRAMES),
     metavar="N",
@@ -71,6 +77,7 @@ def render(
     mesh: str | None,
     background: Path | None,
     relit: bool,
+    truth: Path | None,
     frames: int | None,
     samples: int | None,
     output: Path | None,
@@ -110,6 +117,7 @@ def render(
         background=background,
         hits=hits_file is not None,
         relit=relit,
+        truth=truth,
         waveform=waveform,
     )
     results = render_frames(request, progress)

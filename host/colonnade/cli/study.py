@@ -15,13 +15,15 @@ from colonnade.cli.options import FILE, dists_option, echo, finish, json_option,
 @click.argument("rooms", type=FILE, nargs=-1)
 @click.option("--frames", is_flag=True, help="Measure frames with objects instead of rays from probe spheres.")
 @click.option("--occlusion", is_flag=True, help="Measure objects behind furniture in synthetic rooms, without ROOMS.")
+@click.option("--light", is_flag=True, help="Measure relit rooms and mirrors against the photo.")
 @dists_option
-@click.option("--output", type=FILE, metavar="DIR", help="With --frames or --occlusion: write the frames as pictures.")
+@click.option("--output", type=FILE, metavar="DIR", help="Not for rays: write the frames as pictures.")
 @json_option
 def study(
     rooms: tuple[Path, ...],
     frames: bool,
     occlusion: bool,
+    light: bool,
     no_dists: bool,
     output: Path | None,
     json_file: Path | None,
@@ -32,13 +34,16 @@ def study(
     point: with planes of the full maps, and with those of the attribute memory. With --frames it prints the loss from
     encoding, reconstruction and fixed-point arithmetic. The loss is PSNR, FLIP and DISTS of frame, object and shadow.
     With --occlusion it prints the share of an object's pixels that correctly show the object, or the room before it.
+    With --light it prints the PSNR of relit rooms and of a mirror against the photo, for default and for fitted lights.
     Tables are in Markdown.
     """
     context = click.get_current_context()
-    if output is not None and not frames and not occlusion:
-        raise click.UsageError("--output needs --frames or --occlusion", context)
-    if occlusion and (rooms or frames):
-        raise click.UsageError("--occlusion has its own rooms: leave out ROOMS and --frames", context)
+    if frames + occlusion + light > 1:
+        raise click.UsageError("give one of --frames, --occlusion and --light", context)
+    if output is not None and not (frames or occlusion or light):
+        raise click.UsageError("--output needs --frames, --occlusion or --light", context)
+    if occlusion and rooms:
+        raise click.UsageError("--occlusion has its own rooms: leave out ROOMS", context)
     if not occlusion and not rooms:
         raise click.UsageError("Missing argument 'ROOMS...'.", context)
     require_outputs(json_file, folders=[output])
@@ -67,6 +72,14 @@ def study(
             frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
             for frame, by_loss in by_frame.items()
         }
+    elif light:
+        from colonnade.evaluation.studies import room_light
+
+        terminal = progress.for_terminal()
+        with terminal.step("measuring the light"):
+            qualities = room_light.study_light(rooms, terminal, output)
+        echo(room_light.table(qualities))
+        report = {name: asdict(value) for name, value in qualities.items()}
     else:
         from colonnade.evaluation.studies import environment_accuracy
 

@@ -28,13 +28,31 @@ class EncodedEnvironment:
         Raises:
             UserError: The folder is not a room, or the design has no memory for maps of this size.
         """
-        layout, environment = layout_of(manifest), load_environment(folder)
-        if (environment.width, environment.height) != (layout.width, layout.height):
-            raise UserError(
-                f"the maps of {folder} are {environment.width}x{environment.height}, physicalAttributeMemory holds"
-                f" {layout.width}x{layout.height}: set its width and height"
-            )
-        return EncodedEnvironment(environment, encoded_environment(environment, layout))
+        return EncodedEnvironment.of(load_environment(folder), manifest)
+
+    @staticmethod
+    def of(environment: Environment, manifest: Manifest) -> EncodedEnvironment:
+        """Encode a room's maps for a design.
+
+        Raises:
+            UserError: The design has no memory for maps of this size.
+        """
+        check_layout(environment, manifest)
+        return EncodedEnvironment(environment, encoded_environment(environment, layout_of(manifest)))
+
+
+def check_layout(environment: Environment, manifest: Manifest) -> None:
+    """Check that a design can hold maps of a room's size.
+
+    Raises:
+        UserError: It cannot.
+    """
+    layout = layout_of(manifest)
+    if (environment.width, environment.height) != (layout.width, layout.height):
+        raise UserError(
+            f"the maps of room {environment.name} are {environment.width}x{environment.height},"
+            f" physicalAttributeMemory holds {layout.width}x{layout.height}: set its width and height"
+        )
 
 
 def layout_of(manifest: Manifest) -> AttributeLayout:

@@ -57,7 +57,7 @@ _SCENE = ("mesh", "scene", "environment", "scene_image", "registers")
 KINDS = {
     kind.name: kind
     for kind in (
-        Kind("reference", (*_SCENE, "reference"), {"memory": 1000}),
+        Kind("reference", (*_SCENE, "reference", "render"), {"memory": 1000}),
         Kind("picture", (*_SCENE, "device", "render"), {"memory": 1000, "java": 1}, uses_model=True),
         Kind("comparison", ("quality",), {"memory": 1000}),
         Kind(

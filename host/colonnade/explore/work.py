@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from colonnade.common.image_io import read_picture, write_png
-from colonnade.common.progress import QUIET
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
@@ -27,14 +26,10 @@ Size = tuple[int, int]
 
 def reference(folder: Path, *, scene: Scene, mesh: Mesh, size: Size) -> None:
     """Render a frame with Embree."""
-    from colonnade.environment.load import load_environment
-    from colonnade.reference.environment.depth_mesh import full_backdrop
-    from colonnade.reference.render import render_reference
-    from colonnade.scene.view import make_view
+    from colonnade.environment.light_fit import DEFAULT_LIGHTS
+    from colonnade.render.reference_frames import traced_frames
 
-    room = None if scene.background.room is None else load_environment(scene.background.room)
-    view = make_view(scene, mesh.extent, *size, mesh.materials, room)
-    rendered = render_reference(mesh, view, QUIET, None if room is None else full_backdrop(room))
+    (rendered,) = traced_frames([scene], mesh, size, DEFAULT_LIGHTS)
     write_png(folder / PICTURE, rendered.image)
     write_result(folder, {"rays": rendered.rays})
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
+from colonnade.environment.lights import MAX_FALLOFF
 from colonnade.reference.bounce import bounce
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints, SurfaceHits
 from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, PlacedObject
@@ -21,8 +22,6 @@ Points = TypeVar("Points", ObjectPoints, BackdropPoints)
 
 #: A surface of the room hides a hit if it is nearer by more than this fraction of the hit's distance to the camera.
 OCCLUSION_TOLERANCE = 0.005
-#: Upper limit of a light's distance falloff, reached at half its reference distance.
-MAX_FALLOFF = 4.0
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,15 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoded import EncodedEnvironment
+from colonnade.environment.encoded import EncodedEnvironment, check_layout
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
+from colonnade.render.lit_room import LitRoom, lit_room, scene_room
 from colonnade.render.report import FrameReport, frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
+from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import object_mesh, with_materials
 from colonnade.scene.parser import load_scene
@@ -61,13 +63,14 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         _check_waveform(request, (width, height))
     poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
     exposure = scene.motion.exposure(request.frames)
-    passes = [pose.passes(exposure) for pose in poses]
     if request.backend == "reference":
-        from colonnade.render.reference_frames import reference_frames
+        from colonnade.render.reference_frames import ReferenceOptions, reference_frames
 
-        yield from reference_frames(poses, manifest, (width, height), progress, exposure)
+        options = ReferenceOptions(exposure, request.relit, request.truth)
+        yield from reference_frames(poses, manifest, (width, height), progress, options)
         return
-    folder = scene.background.room
+    if request.truth is not None:
+        raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
     if request.hits and request.backend == "rtl":
         from colonnade.device.verilator import require_hits
 
@@ -75,8 +78,15 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
-        image = pack_scene(scene, object_mesh(scene), manifest, environment)
+        mesh, maps = object_mesh(scene), scene_room(scene)
+        if maps is not None:
+            check_layout(maps, manifest)
+            environment_camera(maps, width, height)
+        room = lit_room(scene, maps, mesh.extent, max_lights(manifest), request.relit, progress)
+        scene, environment = room.scene, encoded(room, manifest)
+        image = pack_scene(scene, mesh, manifest, environment)
+        poses = [scene.at(pose.motion_progress) for pose in poses]
+        passes = [pose.passes(exposure) for pose in poses]
         shows_environment = request.relit or environment is None or environment.environment.photo is None
         registers = [
             [
@@ -201,9 +211,9 @@ def render_model(
 
     The scene's own mesh is not read, and error bits only appear in the report.
     """
-    folder = scene.background.room
     with progress.step("packing the scene"):
-        environment = None if folder is None else EncodedEnvironment.load(folder, manifest)
+        room = lit_room(scene, scene_room(scene), mesh.extent, max_lights(manifest), False, progress)
+        scene, environment = room.scene, encoded(room, manifest)
         image = pack_scene(scene, mesh, manifest, environment)
         seen = None if environment is None else environment.environment
         registers = frame_registers(
@@ -213,6 +223,16 @@ def render_model(
     view = make_view(scene, image.header.extent, *size, image.header.materials, seen)
     result = _result(passes, image, view, frame_report("model", manifest, image.header, passes.frame))
     return result if seen is None else replace(result, image=composited(result.sums, seen))
+
+
+def max_lights(manifest: Manifest) -> int:
+    """Lights that a design supports."""
+    return int(manifest.config["frame"]["lights"])
+
+
+def encoded(room: LitRoom, manifest: Manifest) -> EncodedEnvironment | None:
+    """The encoded maps of a scene's room; None without one."""
+    return None if room.environment is None else EncodedEnvironment.of(room.environment, manifest)
 
 
 def pack_scene(

@@ -4,64 +4,156 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from colonnade.common.accumulation import Accumulation
-from colonnade.common.progress import Progress
+from colonnade.common.errors import UserError
+from colonnade.common.progress import QUIET, Progress
+from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.environment.load import load_environment
+from colonnade.environment.encoded import layout_of
+from colonnade.environment.encoding.cache import encoded_environment
+from colonnade.environment.encoding.layout import AttributeLayout
+from colonnade.reference.environment.decoded import BoundingPlanes
 from colonnade.reference.environment.depth_mesh import full_backdrop
+from colonnade.reference.environment.true_room import true_room
 from colonnade.reference.render import ReferenceResult, render_reference
+from colonnade.render.composite import composited
+from colonnade.render.lit_room import LitRoom, lit_room, scene_room
 from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
+from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.view import make_view
 
+if TYPE_CHECKING:
+    from colonnade.mesh.mesh import Mesh
+    from colonnade.reference.environment.surface import Backdrop
+
+
+@dataclass(frozen=True)
+class ReferenceOptions:
+    """Options of the reference's frames.
+
+    Attributes:
+        exposure: Progress of the motion during a frame (`Motion.exposure`).
+        relit: Show the room under the scene's lights, not its photo.
+        truth: Mesh file of the room's real geometry, which replaces its depth map.
+    """
+
+    exposure: float = 0.0
+    relit: bool = False
+    truth: Path | None = None
+
 
 def reference_frames(
-    poses: Sequence[Scene], manifest: Manifest, size: tuple[int, int], progress: Progress, exposure: float = 0.0
+    poses: Sequence[Scene],
+    manifest: Manifest,
+    size: tuple[int, int],
+    progress: Progress,
+    options: ReferenceOptions = ReferenceOptions(),
 ) -> Iterator[RenderResult]:
-    """Render a scene's poses along its motion, at the samples of the device's frames.
+    """Render a scene's poses along its motion, at the samples of the device's frames and composited as these are.
 
     Args:
-        poses: The scene at the beginning of each frame.
-        manifest: Of the design, for its configuration.
+        poses: The scene at the beginning of each frame, the first at rest.
+        manifest: The design's manifest, for the number of lights and the layout of the room's maps.
         size: Width and height, pixels.
         progress: Shows the steps.
-        exposure: Progress of the motion during a frame (`Motion.exposure`).
+        options: Further options.
     """
     begun = time.perf_counter()
-    scene = poses[0]
-    mesh = object_mesh(scene, int(manifest.config["frame"]["materials"]))
-    environment = backdrop = None
-    if scene.background.room is not None:
-        environment = load_environment(scene.background.room)
-        backdrop = full_backdrop(environment)
-    views = [
-        [make_view(one, mesh.extent, *size, mesh.materials, environment) for one in pose.passes(exposure)]
-        for pose in poses
-    ]
-    packed = time.perf_counter() - begun
-    for pose, of_frame in zip(poses, views, strict=True):
-        begun = time.perf_counter()
-        first = render_reference(mesh, of_frame[0], progress, backdrop)
-        sums, rays = _accumulated(first), first.rays
-        for view in of_frame[1:]:
-            other = render_reference(mesh, view, progress, backdrop)
-            sums += _accumulated(other)
-            rays = {kind: count + other.rays[kind] for kind, count in rays.items()}
+    mesh = object_mesh(poses[0], int(manifest.config["frame"]["materials"]))
+    layout = None if manifest.config["physicalAttributeMemory"] is None else layout_of(manifest)
+    max_lights = int(manifest.config["frame"]["lights"])
+    for pose, traced in zip(
+        poses, traced_frames(poses, mesh, size, max_lights, layout, options, progress), strict=True
+    ):
         report = FrameReport(
             backend="reference",
             config=manifest.config,
             mesh=MeshReport(mesh.name, len(mesh.faces), mesh.source_count),
             size=size,
-            rays=rays,
+            rays=traced.rays,
             share=pose.motion_progress,
-            seconds={"pack": packed, "build": None, "run": time.perf_counter() - begun},
-            samples=len(of_frame),
+            seconds={"pack": time.perf_counter() - begun - traced.seconds, "build": None, "run": traced.seconds},
+            samples=traced.sums.samples,
         )
-        yield RenderResult(sums.image(), first.object_mask, first.hit_triangles, first.t, report, sums)
+        first = traced.first
+        yield RenderResult(traced.image, first.object_mask, first.hit_triangles, first.t, report, traced.sums)
+        begun = time.perf_counter()
+
+
+@dataclass(frozen=True)
+class TracedFrame:
+    """A frame of the reference.
+
+    Attributes:
+        image: Linear, float64 [height, width, 3].
+        first: The first pass.
+        sums: Sums over all passes.
+        rays: Rays of all passes, by kind.
+        seconds: Time of tracing.
+    """
+
+    image: Floats
+    first: ReferenceResult
+    sums: Accumulation
+    rays: dict[str, int]
+    seconds: float
+
+
+def traced_frames(
+    poses: Sequence[Scene],
+    mesh: Mesh,
+    size: tuple[int, int],
+    max_lights: int,
+    layout: AttributeLayout | None = None,
+    options: ReferenceOptions = ReferenceOptions(),
+    progress: Progress = QUIET,
+) -> Iterator[TracedFrame]:
+    """Trace poses of a scene; without a ``layout`` the room's bounding planes are those of the default one."""
+    maps = scene_room(poses[0])
+    if maps is not None:
+        environment_camera(maps, *size)
+    room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)
+    backdrop = room_backdrop(room, layout, options.truth, progress)
+    for pose in poses:
+        begun = time.perf_counter()
+        passes = room.scene.at(pose.motion_progress).passes(options.exposure)
+        views = [make_view(one, mesh.extent, *size, mesh.materials, room.environment) for one in passes]
+        first = render_reference(mesh, views[0], progress, backdrop)
+        sums, rays = _accumulated(first), first.rays
+        for view in views[1:]:
+            other = render_reference(mesh, view, progress, backdrop)
+            sums += _accumulated(other)
+            rays = {kind: count + other.rays[kind] for kind, count in rays.items()}
+        shows_photo = room.environment is not None and not options.relit
+        image = composited(sums, room.environment) if shows_photo and room.environment else sums.image()
+        yield TracedFrame(image, first, sums, rays, time.perf_counter() - begun)
 
 
 def _accumulated(frame: ReferenceResult) -> Accumulation:
     return Accumulation.of_pixels(frame.image, frame.object_mask, frame.shadow_ratio)
+
+
+def room_backdrop(
+    room: LitRoom, layout: AttributeLayout | None, truth: Path | None = None, progress: Progress = QUIET
+) -> Backdrop | None:
+    """The room of a scene as background: full maps, the device's bounding planes, and depth map or real geometry."""
+    environment = room.environment
+    if environment is None:
+        if truth is not None:
+            raise UserError("--truth is the real geometry of a room, but the scene has none: set background.room")
+        return None
+    if layout is None or (layout.width, layout.height) != (environment.width, environment.height):
+        layout = AttributeLayout(environment.width, environment.height)
+    with progress.step("finding the bounding planes"):
+        bounding = BoundingPlanes(environment, encoded_environment(environment, layout))
+    if truth is not None:
+        assert room.albedo is not None
+        return true_room(truth, environment, room.albedo.albedo, 1.0 / room.scene.headroom, bounding)
+    return full_backdrop(environment, bounding)

@@ -27,6 +27,7 @@ class RenderRequest:
         background: Folder of a room that replaces the scene's background.
         hits: Whether the caller needs hit triangles; the configuration must then have them.
         relit: Whether the scene's lights shade the room even if it has a photo.
+        truth: Mesh file of the room's real geometry, in its world space; for the reference.
         waveform: VCD file for the signals of one small RTL frame.
     """
 
@@ -41,4 +42,5 @@ class RenderRequest:
     background: Path | None = None
     hits: bool = False
     relit: bool = False
+    truth: Path | None = None
     waveform: Path | None = None

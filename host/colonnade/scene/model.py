@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from annotated_types import Ge, Interval
 from pydantic import BeforeValidator, ConfigDict, Field, Strict, StrictBool, model_validator
@@ -256,11 +256,14 @@ class Background:
         colour: Linear.
         room: The folder of a room, relative to the scene file.
         occlusion: The room hides the object where it is nearer.
+        colours: Colours of the room in reflections and refractions: ``photo``, those of its photo, or ``albedo``, its
+            albedo under the scene's lights. None: ``photo`` in a frame that shows the photo, else ``albedo``.
     """
 
     colour: _Colour = (0.0, 0.0, 0.0)
     room: _File | None = None
     occlusion: StrictBool = True
+    colours: Literal["photo", "albedo"] | None = None
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -276,8 +279,12 @@ class FrameSize:
 class Scene:
     """One object, one camera, at least one light.
 
-    With a room, the camera is the room's, and the world is the room's world, in metres. ``motion_progress`` is the
-    progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass over the frame.
+    With a room, the camera is the room's, and the world is the room's world, in metres.
+
+    Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass
+    over the frame. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
+    fitted to its photo. ``headroom`` scales all lights up and diffuse albedos of the object down
+    (`colonnade.environment.photo_colours`).
     """
 
     mesh: MeshSource
@@ -294,6 +301,8 @@ class Scene:
     motion: Motion = field(default_factory=Motion)
     motion_progress: float = 0.0
     sample: Sample = CENTRE
+    names_light: bool = True
+    headroom: float = 1.0
 
     def at(self, progress: float) -> Scene:
         """The scene at a progress along its motion."""

@@ -60,7 +60,7 @@ def load_scene(path: str | Path) -> Scene:
 
 def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
     """Rename the file's tables to the fields of `Scene`; several ``[[light]]`` become `light` and `more_lights`."""
-    tables = dict(data)
+    tables = dict(data) | {"names_light": "light" in data or "ambient" in data}
     if isinstance(light := tables.get("light"), list) and light:
         tables |= {"light": light[0], "more_lights": light[1:]}
     if "object" in tables:
@@ -84,6 +84,8 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     camera, transform, background = (data.get(name, {}) for name in ("camera", "transform", "background"))
     if "room" in background and "camera" in data:
         raise ValueError("the camera is the room's: leave out [camera], or background.room")
+    if "room" not in background and "colours" in background:
+        raise ValueError("background.colours chooses the colours of a room: it needs background.room")
     if "room" not in background and "object" in data:
         raise ValueError("[object] places the object in a room: it needs background.room")
     if "object" in data and ("scale" in transform or "translate" in transform):

@@ -136,11 +136,11 @@ def make_view(
         step_x=camera.step_x @ pose.rotation,
         step_y=camera.step_y @ pose.rotation,
         lights=tuple(
-            _placed(light, camera, centre, edge, pose, scene.sample.light(index))
+            _placed(light, camera, centre, edge, pose, scene.sample.light(index), scene.headroom)
             for index, light in enumerate(scene.lights)
         ),
-        materials=with_overrides(materials, scene.material),
-        ambient=np.array(scene.ambient.colour),
+        materials=_dimmed(with_overrides(materials, scene.material), scene.headroom),
+        ambient=np.array(scene.ambient.colour) * scene.headroom,
         background=np.array(scene.background.colour),
         flat=scene.material.flat,
         shadows=scene.light.shadows,
@@ -159,17 +159,40 @@ def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tu
     return tuple(replace(material, **given) for material in materials)
 
 
+def world_positions(scene: Scene, extent: Extent, environment: Environment) -> list[Floats]:
+    """World positions of a scene's lights in a room, float64 [3] each; of a light with a radius its middle."""
+    camera = environment_camera(environment, environment.width, environment.height)
+    start = object_pose(scene.at(0.0), extent, environment)
+    centre, edge = start.to_world(extent.centre), extent.edge * start.scale
+    return [_world_position(light, camera, centre, edge) for light in scene.lights]
+
+
+def _world_position(light: PointLight, camera: WorldCamera, centre: Floats, edge: float) -> Floats:
+    if light.position is not None:
+        return np.array(light.position)
+    return np.asarray(centre + edge * (np.array(light.offset) @ camera.axes))
+
+
 def _placed(
-    light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose, on_disc: Point
+    light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose, on_disc: Point, headroom: float
 ) -> PlacedLight:
     """A light in mesh space; of one with a radius the point ``on_disc``, of a disc that faces `centre`."""
-    if light.position is not None:
-        position = np.array(light.position)
-    else:
-        position = centre + edge * (np.array(light.offset) @ camera.axes)
+    position = _world_position(light, camera, centre, edge)
     if light.radius > 0:
         away = position - centre
         right, up, _ = camera_axes(away if away.any() else camera.axes[2], _UP)
         position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
     reach = None if light.falloff is None else light.falloff / pose.scale
-    return PlacedLight(pose.to_mesh(position), np.array(light.colour), reach)
+    return PlacedLight(pose.to_mesh(position), np.array(light.colour) * headroom, reach)
+
+
+def _dimmed(materials: tuple[MeshMaterial, ...], headroom: float) -> tuple[MeshMaterial, ...]:
+    """The materials under lights that are brighter by ``headroom``: diffuse surfaces keep their colour."""
+
+    def dimmed(material: MeshMaterial) -> MeshMaterial:
+        if material.kind != "diffuse" or headroom == 1.0:
+            return material
+        red, green, blue = (value / headroom for value in material.albedo)
+        return replace(material, albedo=(red, green, blue))
+
+    return tuple(dimmed(material) for material in materials)

@@ -38,7 +38,7 @@ camera.position = [2.0, 3.0, 8.0]
 """
 STANDING = """
 mesh.name = "teapot:2"
-background.room = "rooms/attic"
+background = {{room = "rooms/attic", colours = "{colours}"}}
 object = {{stand_at = {stand_at}, size = 0.6, turn = {turn}}}
 material.kind = "mirror"
 paths.bounces = 1
@@ -60,9 +60,12 @@ def scene_file(folder: Path, text: str, motion: str = "") -> Path:
 
 
 def standing(
-    turn: float = 10.0, stand_at: tuple[float, ...] = (48, 43), light: tuple[float, ...] = (0.6, 2.2, 0.6)
+    turn: float = 10.0,
+    stand_at: tuple[float, ...] = (48, 43),
+    light: tuple[float, ...] = (0.6, 2.2, 0.6),
+    colours: str = "albedo",
 ) -> str:
-    return STANDING.format(turn=turn, stand_at=list(stand_at), light=list(light))
+    return STANDING.format(turn=turn, stand_at=list(stand_at), light=list(light), colours=colours)
 
 
 def same(one: RenderResult, other: RenderResult) -> bool:
@@ -158,7 +161,7 @@ def test_camera_and_lights_stay_where_they_are(folder: Path) -> None:
 )
 def test_an_invalid_motion_is_one_line(folder: Path, text: str, motion: str, message: str) -> None:
     file = scene_file(folder, text, motion)
-    environment = load_environment(folder / "rooms" / "attic") if "background.room" in text else None
+    environment = load_environment(folder / "rooms" / "attic") if "rooms/attic" in text else None
     with pytest.raises(UserError, match=message):
         object_pose(load_scene(file), load_mesh("teapot:2").extent, environment)
 

@@ -42,7 +42,7 @@ light = {offset = [-0.75, 0.85, 0.9], radius = 1.8}
 """
 STANDING = """
 mesh.name = "teapot:2"
-background.room = "rooms/attic"
+background = {room = "rooms/attic", colours = "albedo"}
 object = {stand_at = [48, 43], size = 0.6}
 material.kind = "mirror"
 paths.bounces = 1

@@ -45,7 +45,7 @@ def both(folder: Path, text: str) -> tuple[RenderResult, RenderResult]:
     """The frames of the model and of the reference."""
     (folder / "scene.toml").write_text(text)
     model = render(RenderRequest(folder / "scene.toml", "small", ROOM, "model", SIZE, relit=True))
-    return model, render(RenderRequest(folder / "scene.toml", "small", ROOM, "reference", SIZE))
+    return model, render(RenderRequest(folder / "scene.toml", "small", ROOM, "reference", SIZE, relit=True))
 
 
 def assert_alike(model: RenderResult, reference: RenderResult) -> None:
@@ -131,17 +131,21 @@ THREE = LAMP.replace("light = ", "[[light]]\n").replace("{", "").replace("}", ""
     [
         (STANDING.replace("attic", "nowhere"), (), "there is no room .*nowhere: name a folder with meta.json"),
         (STANDING.replace("attic", "attic/meta.json"), (), "there is no room .*meta.json: name a folder"),
-        (STANDING, ("--config", "tiny"), "no memory for a room: set physicalAttributeMemory"),
+        (STANDING + LAMP, ("--config", "tiny"), "no memory for a room: set physicalAttributeMemory"),
         (STANDING, ("--config", "small"), "are 96x72, physicalAttributeMemory holds 640x480: set its width and height"),
         (STANDING, ("--size", "96x96"), "96x96 pixels does not have the proportions of room attic"),
         (STANDING + THREE, (), "the scene has 3 lights, the hardware supports 2: leave some out or raise frame.lights"),
         (
-            STANDING + 'material.kind = "glass"\npaths.bounces = 9\n',
+            STANDING + LAMP + 'material.kind = "glass"\npaths.bounces = 9\n',
             (),
             "lower paths.bounces or raise frame.maxBounces",
         ),
-        (STANDING.replace("0.6", "0.001"), (), "the camera is .* edges away, .*: make the object larger"),
-        (STANDING + "light.position = [0.0, 1e6, 0.0]\n", (), "light 1 is .* edges away, .*: move it nearer"),
+        (STANDING.replace("0.6", "0.001") + LAMP, (), "the camera is .* edges away, .*: make the object larger"),
+        (
+            STANDING + "ambient.colour = [1, 1, 1]\nlight.position = [0.0, 1e6, 0.0]\n",
+            (),
+            "light 1 is .* edges away, .*: move it nearer",
+        ),
         (STANDING.replace("[48, 43]", "[96, 43]"), (), r"object.stand_at is \(96, 43\), outside the maps"),
         (STANDING.replace("[48, 43]", "[nan, 43]"), (), "object.stand_at must be two numbers"),
         (STANDING + "camera.fov = 30\n", (), "the camera is the room's: leave out"),

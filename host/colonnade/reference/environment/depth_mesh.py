@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from colonnade.common.types import Floats
 from colonnade.reference.embree import RayTracer, Triangles
-from colonnade.reference.environment.surface import Backdrop, SurfaceHits
+from colonnade.reference.environment.surface import Backdrop, BoundingSurface, SurfaceHits
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
@@ -52,9 +52,9 @@ class DepthMesh:
         return SurfaceHits(position, u, v, outside)
 
 
-def full_backdrop(environment: Environment) -> Backdrop:
-    """The room with its full maps and its depth mesh, the ground truth."""
-    return Backdrop(environment, DepthMesh(environment), environment.albedo, environment.normals)
+def full_backdrop(environment: Environment, bounding: BoundingSurface | None = None) -> Backdrop:
+    """The room with its full maps and its depth mesh, the ground truth; ``bounding`` closes it."""
+    return Backdrop(environment, DepthMesh(environment), environment.albedo, environment.normals, bounding=bounding)
 
 
 def _faces(points: Floats, normals: Floats, split: bool) -> NDArray[np.int32]:

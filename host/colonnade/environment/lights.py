@@ -1,0 +1,73 @@
+"""Lights of a room in world space, and the device's light rules without shadows (docs/shading.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from colonnade.common.types import Floats
+from colonnade.environment.model import Environment
+
+#: Upper limit of a light's distance falloff, reached at half its reference distance.
+MAX_FALLOFF = 4.0
+
+
+@dataclass(frozen=True)
+class RoomLight:
+    """A point light.
+
+    Attributes:
+        position: World space, metres, float64 [3].
+        colour: Linear intensity, float64 [3].
+        falloff: Distance of that intensity, metres; None for constant intensity.
+    """
+
+    position: Floats
+    colour: Floats
+    falloff: float | None
+
+
+@dataclass(frozen=True)
+class RoomLights:
+    """Ambient light, linear, float64 [3], and point lights."""
+
+    ambient: Floats
+    lights: tuple[RoomLight, ...] = ()
+
+
+def irradiance(points: Floats, normals: Floats, lights: RoomLights) -> Floats:
+    """Irradiance of unshadowed surfaces, float64 [..., 3].
+
+    Args:
+        points: World space, metres, float64 [..., 3].
+        normals: Unit, world space, float64 [..., 3].
+        lights: The lights.
+    """
+    total = np.broadcast_to(lights.ambient, points.shape).astype(np.float64)
+    for light in lights.lights:
+        total = total + light.colour * exposure(points, normals, light.position, light.falloff)[..., None]
+    return total
+
+
+def exposure(points: Floats, normals: Floats, position: Floats, falloff: float | None) -> Floats:
+    """Irradiance of unshadowed surfaces by a point light of intensity 1, float64 [...].
+
+    Args:
+        points: World space, metres, float64 [..., 3].
+        normals: Unit, world space, float64 [..., 3].
+        position: Of the light, float64 [3].
+        falloff: Distance of that intensity, metres; None for constant intensity.
+    """
+    to_light = position - points
+    squared = np.einsum("...i,...i->...", to_light, to_light).clip(min=1e-12)
+    cosine = np.einsum("...i,...i->...", normals, to_light).clip(min=0.0) / np.sqrt(squared)
+    if falloff is None:
+        return np.asarray(cosine)
+    return np.asarray(cosine * np.minimum(falloff**2 / squared, MAX_FALLOFF))
+
+
+def world_surface(environment: Environment) -> tuple[Floats, Floats]:
+    """Points and unit normals of the room's pixels in world space, float64 [height, width, 3] each."""
+    rotation, eye = environment.camera_to_world[:, :3], environment.camera_to_world[:, 3]
+    return environment.points() @ rotation.T + eye, environment.normals @ rotation.T

@@ -1,0 +1,103 @@
+"""The light of a scene in a room: lights fitted where the scene names none, and colours that show the photo."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from colonnade.common.errors import UserError
+from colonnade.common.progress import QUIET, Progress
+from colonnade.environment.load import load_environment
+from colonnade.environment.photo_colours import PhotoColours, photo_colours
+from colonnade.scene.object_pose import object_pose
+from colonnade.scene.room_lights import lights_of, with_lights
+
+if TYPE_CHECKING:
+    from colonnade.environment.model import Environment
+    from colonnade.mesh.mesh import Extent
+    from colonnade.scene.model import Scene
+
+#: Share of the pixels darker than the photo from which a note reports it.
+_REPORTED_CLAMPED = 0.02
+
+
+@dataclass(frozen=True)
+class LitRoom:
+    """A scene and its room, ready for a view.
+
+    Attributes:
+        scene: With lights, and with the headroom of `environment`.
+        environment: With the colours that rays see; None without a room.
+        albedo: The room with its albedo, as its folder has it; None without a room.
+        colours: How the photo's colours were made; None where the colours are the albedo.
+    """
+
+    scene: Scene
+    environment: Environment | None = None
+    albedo: Environment | None = None
+    colours: PhotoColours | None = None
+
+
+def scene_room(scene: Scene) -> Environment | None:
+    """Load the room of a scene; None without one."""
+    return None if scene.background.room is None else load_environment(scene.background.room)
+
+
+def lit_room(
+    scene: Scene,
+    room: Environment | None,
+    extent: Extent,
+    max_lights: int,
+    relit: bool,
+    progress: Progress = QUIET,
+) -> LitRoom:
+    """Fit lights to a scene's room if the scene names none, and choose the colours that rays see.
+
+    Args:
+        scene: The scene.
+        room: Its room (`scene_room`).
+        extent: Bounds of the mesh, for lights relative to it.
+        max_lights: Lights of the design.
+        relit: The frame shows the room under the scene's lights, not its photo.
+        progress: Shows the fit, and notes what was fitted.
+
+    Raises:
+        UserError: The object cannot stand in the room, or `background.colours` asks for a photo that it lacks.
+    """
+    if room is None:
+        return LitRoom(scene)
+    object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
+    if not scene.names_light:
+        scene = _with_fitted_lights(scene, room, max_lights, progress)
+    wanted = scene.background.colours
+    if wanted == "photo" and room.photo is None:
+        raise UserError(f"background.colours is photo, but room {room.name} has no photo.png or render.png")
+    if wanted == "albedo" or room.photo is None or (wanted is None and relit):
+        return LitRoom(scene, room, room)
+    colours = photo_colours(room, lights_of(scene, extent, room))
+    if colours.clamped > _REPORTED_CLAMPED:
+        progress.note(
+            f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
+            " photo in reflections: raise the ambient light, or leave out all lights so that they are fitted"
+        )
+    return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours)
+
+
+def _with_fitted_lights(scene: Scene, room: Environment, max_lights: int, progress: Progress) -> Scene:
+    from colonnade.environment.fitted_lights import fitted_lights
+    from colonnade.environment.light_fit import DEFAULT_LIGHTS
+
+    if room.photo is None:
+        progress.note(
+            f"the scene names no light, and room {room.name} has no photo to fit lights to: one light beside the object"
+            " and ambient light 0.1 are used"
+        )
+        return scene
+    with progress.step("fitting lights to the photo"):
+        fit = fitted_lights(room, min(DEFAULT_LIGHTS, max_lights))
+    count = len(fit.lights.lights)
+    progress.note(
+        f"the scene names no light: ambient light and {count} point light{'' if count == 1 else 's'} were fitted to the"
+        f" photo of room {room.name}, {fit.psnr:.1f} dB"
+    )
+    return with_lights(scene, fit.lights)

@@ -1,0 +1,69 @@
+"""The lights of a scene in a room: fitted to the room's photo, and as `RoomLights` in world space."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from colonnade.common.types import Floats
+from colonnade.environment.lights import RoomLight, RoomLights
+from colonnade.scene.model import Colour, Light, PointLight, Scene, Vector
+from colonnade.scene.view import world_positions
+
+if TYPE_CHECKING:
+    from colonnade.environment.model import Environment
+    from colonnade.mesh.mesh import Extent
+
+
+def lights_of(scene: Scene, extent: Extent, environment: Environment) -> RoomLights:
+    """The lights of a scene at the start of its motion."""
+    scene = scene.at(0.0)
+    positions = world_positions(scene, extent, environment)
+    return RoomLights(
+        np.array(scene.ambient.colour),
+        tuple(
+            RoomLight(position, np.array(light.colour), light.falloff)
+            for position, light in zip(positions, scene.lights, strict=True)
+        ),
+    )
+
+
+def with_lights(scene: Scene, lights: RoomLights) -> Scene:
+    """The scene with other lights; the settings of all lights stay."""
+    first, *more = lights.lights or (RoomLight(np.zeros(3), np.zeros(3), None),)
+    return replace(
+        scene,
+        light=Light(
+            _vector(first.position),
+            colour=_vector(first.colour),
+            falloff=first.falloff,
+            shadows=scene.light.shadows,
+            shadow_offset=scene.light.shadow_offset,
+        ),
+        more_lights=tuple(
+            PointLight(_vector(light.position), colour=_vector(light.colour), falloff=light.falloff) for light in more
+        ),
+        ambient=Colour(_vector(lights.ambient)),
+    )
+
+
+def scene_text(lights: RoomLights) -> str:
+    """The tables of a scene file for these lights, TOML."""
+    lines = ["[ambient]", f"colour = {_list(lights.ambient)}"]
+    for light in lights.lights:
+        lines += ["", "[[light]]", f"position = {_list(light.position)}", f"colour = {_list(light.colour)}"]
+        lines += [] if light.falloff is None else [f"falloff = {light.falloff:g}"]
+    if not lights.lights:
+        lines += ["", "[light]", "colour = [0.0, 0.0, 0.0]"]
+    return "\n".join(lines)
+
+
+def _vector(values: Floats) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def _list(values: Floats) -> str:
+    return "[" + ", ".join(str(float(value)) for value in values) + "]"

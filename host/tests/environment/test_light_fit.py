@@ -1,0 +1,86 @@
+"""Lights that are fitted to a room's photo, and colours that show it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.common.image_io import encode_srgb
+from colonnade.environment.fitted_lights import fitted_lights
+from colonnade.environment.light_fit import fit_lights, relit, relit_psnr
+from colonnade.environment.lights import MAX_FALLOFF, RoomLight, RoomLights, exposure, irradiance, world_surface
+from colonnade.environment.model import Environment
+from colonnade.environment.photo_colours import MAX_CLAMPED, photo_colours
+from colonnade.evaluation.studies.synthetic_attic import AMBIENT, LAMP, LAMP_COLOUR, attic
+
+
+@pytest.fixture(scope="module")
+def environment() -> Environment:
+    return attic(96, 72).environment
+
+
+def test_the_lamp_of_the_attic_is_found(environment: Environment) -> None:
+    """The attic's photo has shadows of furniture, which are outliers, and one lamp."""
+    fit = fit_lights(environment)
+    (lamp,) = fit.lights.lights
+    np.testing.assert_allclose(lamp.position, LAMP, atol=0.05)
+    assert lamp.falloff is not None
+    np.testing.assert_allclose(lamp.colour * lamp.falloff**2, LAMP_COLOUR, rtol=0.06)
+    np.testing.assert_allclose(fit.lights.ambient, AMBIENT, rtol=0.06)
+    assert fit.psnr > 30 > 23 > fit.ambient_psnr
+    assert fit.psnr == relit_psnr(environment, fit.lights)
+
+
+def test_a_fit_is_deterministic_and_cached(environment: Environment, tmp_path: Path) -> None:
+    first = fitted_lights(environment, 1, tmp_path)
+    (file,) = tmp_path.glob("*.json")
+    assert repr(fitted_lights(environment, 1, tmp_path)) == repr(first) == repr(fit_lights(environment, 1))
+    fitted_lights(replace(environment, albedo=environment.albedo * 0.9), 1, tmp_path)
+    assert len(list(tmp_path.glob("*.json"))) == 2
+    file.write_text("damaged")
+    assert repr(fitted_lights(environment, 1, tmp_path)) == repr(first)
+
+
+def test_two_lamps_and_ambient_light_are_told_apart(environment: Environment) -> None:
+    lamps = (
+        RoomLight(np.array([-1.2, 1.6, 0.4]), np.array([0.9, 0.6, 0.3]), 1.2),
+        RoomLight(np.array([1.6, 1.4, -0.2]), np.array([0.2, 0.4, 0.9]), 1.2),
+    )
+    lights = RoomLights(np.array([0.15, 0.15, 0.15]), lamps)
+    lit = replace(environment, photo=encode_srgb(relit(environment, lights)))
+    assert fit_lights(lit, 0).lights.lights == ()
+    fit = fit_lights(lit, 2)
+    assert len(fit.lights.lights) == 2 and fit.psnr > 38
+
+
+def test_a_room_without_a_useful_photo_is_one_line(environment: Environment) -> None:
+    with pytest.raises(UserError, match=r"room attic has no photo.png or render.png"):
+        fit_lights(replace(environment, photo=None))
+    with pytest.raises(UserError, match="nearly all black or saturated"):
+        fit_lights(replace(environment, photo=np.full_like(environment.albedo, 255, dtype=np.uint8)))
+
+
+def test_light_follows_the_rules_of_the_reference() -> None:
+    points, normals = np.array([[0.0, 0.0, 0.0]]), np.array([[0.0, 1.0, 0.0]])
+    assert exposure(points, normals, np.array([0.0, 2.0, 0.0]), 1.0) == pytest.approx(0.25)
+    assert exposure(points, normals, np.array([0.0, 0.1, 0.0]), 1.0) == pytest.approx(MAX_FALLOFF)
+    assert exposure(points, normals, np.array([0.0, -1.0, 0.0]), None) == 0.0
+    assert exposure(points, normals, np.array([1.0, 1.0, 0.0]), None) == pytest.approx(np.sqrt(0.5))
+
+
+@pytest.mark.parametrize("ambient", [0.6, 0.2, 0.06])
+def test_colours_under_their_lights_are_the_photo(environment: Environment, ambient: float) -> None:
+    """Lights that are too dark are scaled up, as far as the range of an albedo needs."""
+    lights = RoomLights(np.full(3, ambient), (RoomLight(LAMP, LAMP_COLOUR * ambient, 1.0),))
+    colours = photo_colours(environment, lights)
+    assert colours.environment.albedo.max() <= 1.0 and colours.headroom >= 1.0
+    light = irradiance(*world_surface(environment), lights) * colours.headroom
+    shown, photo = encode_srgb(colours.environment.albedo * light), environment.photo
+    assert photo is not None
+    different = (np.abs(shown.astype(int) - photo) > 1).any(axis=2).mean()
+    assert different <= max(colours.clamped, MAX_CLAMPED)
+    assert (colours.clamped <= MAX_CLAMPED + 1e-3) == (ambient > 0.1)

@@ -1,0 +1,149 @@
+"""The light of a scene in a room, in frames of the model and of the reference."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+
+from colonnade.cli.main import cli
+from colonnade.common.errors import UserError
+from colonnade.common.image_io import decode_srgb, encode_srgb
+from colonnade.evaluation.studies.synthetic_attic import attic, write_attic
+from colonnade.quality.image_metrics import psnr
+from colonnade.render.frames import render
+from colonnade.render.request import RenderRequest
+from colonnade.render.result import RenderResult
+
+SIZE = (96, 72)
+#: An attribute memory for maps of this size.
+MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
+ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
+
+MIRROR = """
+mesh.name = "teapot:4"
+object = {stand_at = [48, 43], size = 0.6}
+material.kind = "mirror"
+background.room = "attic"
+"""
+LAMP = "light = {position = [0.6, 2.2, 0.6], colour = [0.5, 0.5, 0.5], falloff = 1.5}\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lit")
+    write_attic(folder / "attic", *SIZE)
+    write_attic(folder / "dark", *SIZE)
+    (folder / "dark" / "photo.png").unlink()
+    surface = attic(*SIZE).surface
+    trimesh.Trimesh(surface.vertices, surface.faces, process=False).export(folder / "attic.ply")
+    return folder
+
+
+def frame(folder: Path, text: str, backend: str = "model", **options: object) -> RenderResult:
+    (folder / "scene.toml").write_text(text)
+    return render(RenderRequest(folder / "scene.toml", "small", ROOM, backend, SIZE, **options))
+
+
+def decibels(one: RenderResult, other: RenderResult, mask: np.ndarray | None = None) -> float:
+    where = np.ones(one.object_mask.shape, dtype=bool) if mask is None else mask
+    return psnr(encode_srgb(one.image[where])[None], encode_srgb(other.image[where])[None])
+
+
+def test_a_scene_without_lights_gets_those_of_the_photo(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    frame(folder, MIRROR)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "names no light: ambient light and 1 point light were fitted to the photo of room attic, 3" in line
+    for named in (LAMP, "ambient.colour = [0.3, 0.3, 0.3]\n"):
+        frame(folder, MIRROR + named)
+        assert capsys.readouterr().err == ""
+    frame(folder, MIRROR.replace("attic", "dark"))
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "room dark has no photo to fit lights to: one light beside the object" in line
+
+
+@pytest.mark.parametrize("light", ["", LAMP, "ambient.colour = [0.3, 0.3, 0.3]\n"])
+def test_the_reference_is_composited_as_the_device_is(folder: Path, light: str) -> None:
+    model, reference = frame(folder, MIRROR + light), frame(folder, MIRROR + light, "reference")
+    np.testing.assert_array_equal(model.object_mask, reference.object_mask)
+    assert decibels(model, reference) > 30
+    # Mirrors are not black where the camera saw nothing
+    assert decibels(model, reference, model.object_mask) > 18
+    assert (reference.image[reference.object_mask].max(axis=1) > 0.01).mean() > 0.95
+    relit = [frame(folder, MIRROR + light, backend, relit=True) for backend in ("model", "reference")]
+    assert decibels(*relit) > 24
+    assert decibels(reference, relit[1]) < 40
+
+
+def test_the_colours_of_a_room_can_be_chosen(folder: Path) -> None:
+    """Without shadows a room that is relit in the photo's colours is the photo."""
+    photo = decode_srgb(attic(*SIZE).environment.photo)
+    quiet = LAMP.replace("falloff", "shadows = false, falloff") + "ambient.colour = [0.4, 0.4, 0.4]\n"
+    shown = {
+        colours: frame(folder, MIRROR + quiet + f'background.colours = "{colours}"\n', "reference", relit=True)
+        for colours in ("photo", "albedo")
+    }
+    seen = ~shown["photo"].object_mask
+    errors = {name: psnr(encode_srgb(photo[seen])[None], encode_srgb(f.image[seen])[None]) for name, f in shown.items()}
+    assert errors["photo"] > 40 and errors["albedo"] < 25
+
+
+def test_the_headroom_of_the_lights_does_not_change_the_object(folder: Path) -> None:
+    """Lights are brighter by the headroom, and the object's albedo is darker by it."""
+    dim = MIRROR.replace("mirror", "diffuse") + LAMP.replace("0.5, 0.5, 0.5", "0.2, 0.2, 0.2")
+    photo, albedo = (
+        frame(folder, dim + f'background.colours = "{colours}"\n', backend)
+        for colours, backend in (("photo", "model"), ("albedo", "model"))
+    )
+    assert np.abs(encode_srgb(photo.image).astype(int) - encode_srgb(albedo.image)).max() <= 3
+
+
+def test_colours_need_a_room_with_a_photo(folder: Path) -> None:
+    with pytest.raises(UserError, match=r"background.colours is photo, but room dark has no photo.png"):
+        frame(folder, MIRROR.replace("attic", "dark") + LAMP + 'background.colours = "photo"\n')
+    with pytest.raises(UserError, match=r"background.colours chooses the colours of a room: it needs background.room"):
+        frame(folder, 'mesh.name = "cube"\nbackground.colours = "photo"\n')
+    with pytest.raises(UserError, match=r"background.colours must be one of photo, albedo"):
+        frame(folder, MIRROR + 'background.colours = "grey"\n')
+
+
+def test_the_truth_of_a_room_replaces_its_depth_map(folder: Path) -> None:
+    text, truth = MIRROR + LAMP, folder / "attic.ply"
+    by_map, by_mesh = frame(folder, text, "reference"), frame(folder, text, "reference", truth=truth)
+    # The attic's maps are those of its mesh, so only what the camera did not see may differ
+    assert decibels(by_map, by_mesh) > 28
+    background = ~by_map.object_mask
+    assert decibels(by_map, by_mesh, background) > 40
+    assert decibels(by_map, by_mesh, by_map.object_mask) < 40
+    with pytest.raises(UserError, match="--truth is for --backend reference"):
+        frame(folder, text, truth=truth)
+    with pytest.raises(UserError, match="--truth is the real geometry of a room, but the scene has none"):
+        frame(folder, 'mesh.name = "cube"\n', "reference", truth=truth)
+
+
+def test_the_truth_has_its_own_colours_where_the_photo_has_none(folder: Path) -> None:
+    surface = attic(*SIZE).surface
+    red = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+    red.visual.face_colors = np.tile(np.array([255, 0, 0, 255], dtype=np.uint8), (len(surface.faces), 1))
+    red.export(folder / "red.ply")
+    plain, coloured = (
+        frame(folder, MIRROR + LAMP, "reference", truth=folder / f"{name}.ply").image for name in ("attic", "red")
+    )
+    changed = np.abs(plain - coloured).max(axis=2) > 0.02
+    assert 10 < changed.sum() < 0.1 * changed.size
+    assert (coloured[changed][:, 0] > 4 * coloured[changed][:, 1]).mean() > 0.9
+
+
+def test_the_light_command_prints_a_scene(folder: Path, tmp_path: Path) -> None:
+    runner = CliRunner()
+    result = runner.invoke(cli, ["light", str(folder / "attic"), "--output", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "out" / "light.png").is_file()
+    text = MIRROR + "\n" + result.stdout
+    fitted, named = frame(folder, MIRROR), frame(folder, text)
+    np.testing.assert_array_equal(fitted.image, named.image)
+    failed = runner.invoke(cli, ["light", str(folder / "dark")])
+    assert failed.exit_code == 2 and "has no photo.png or render.png" in failed.stderr
