@@ -110,6 +110,7 @@ def measure(
     output: Path | None = None,
 ) -> OcclusionResult:
     """Compare the device's frame of a case, by the bit-exact model, with the truth; ``output`` is its picture."""
+    from colonnade.common.accumulation import Accumulation
     from colonnade.design.generator import manifest_for
     from colonnade.device.bit_exact import render_model
     from colonnade.environment.encoded import EncodedEnvironment
@@ -134,8 +135,7 @@ def measure(
     registers |= environment_registers(view, encoded, packed.header, manifest, relit=False)
     frame = render_model(manifest, packed, registers)
     if output is not None:
-        white = float((1 << manifest.numbers["colourBits"]) - 1)
-        write_png(output, composited(frame.colour / white, frame, environment))
+        write_png(output, composited(Accumulation.of_frame(frame), environment))
 
     meets, visible = true_occlusion(mesh, view, made)
     steps = packed.header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
