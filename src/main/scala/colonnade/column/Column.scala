@@ -68,6 +68,7 @@ final class Column(
 ) extends Module {
   @public val io = IO(new ColumnIO(config))
 
+  private val hasCache   = config.columnBvhMemory.cache.nonEmpty
   private val walker     = Module(new TileWalker(config))
   private val background = Module(new BackgroundWalker(config))
   // A definition: the unit is elaborated once, not once per row. Without prefix the instances are RenderUnit, RenderUnit_1…
@@ -93,22 +94,21 @@ final class Column(
   units.foreach(_.broadcasts := controller.io.broadcasts)
 
   // The whole scene, or a cache of it
-  private val cachesAreIdle = config.columnBvhMemory.cache match {
-    case None =>
-      val memory = Module(new ColumnBvhMemory(config))
-      memory.io.banks <> controller.io.memory
-      memory.io.load := io.load
-      memory.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
-      true.B
-    case Some(_) =>
-      val caches = Seq.fill(config.columnBvhMemory.banks)(Module(new ColumnCache(config)).io)
-      for ((cache, bank) <- caches.zipWithIndex) {
-        cache.port <> controller.io.memory(bank)
-        io.lineRequests.get(bank) :<>= cache.request
-        cache.lines      := io.lines.get(bank)
-        cache.invalidate := io.invalidate.get
-      }
-      caches.map(_.isIdle).reduce(_ && _)
+  private val memory = if (hasCache) None else Some(Module(new ColumnBvhMemory(config)))
+  for (scratchpad <- memory) {
+    scratchpad.io.banks <> controller.io.memory
+    scratchpad.io.load := io.load
+    scratchpad.io.holds.zip(io.holds).foreach { case (memoryHolds, holds) => memoryHolds := holds }
+  }
+  private val caches = controller.io.memory.filter(_ => hasCache).map { port =>
+    val cache = Module(new ColumnCache(config))
+    cache.io.port <> port
+    cache.io
+  }
+  for ((cache, bank) <- caches.zipWithIndex) {
+    io.lineRequests.get(bank) :<>= cache.request
+    cache.lines      := io.lines.get(bank)
+    cache.invalidate := io.invalidate.get
   }
 
   // Environment: units read the column's own maps, or those that all columns share
@@ -139,8 +139,11 @@ final class Column(
   inFlight := inFlight + enters - retired
 
   io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === retired.asUInt
-  io.progress.isIdle    := RegNext(units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle && cachesAreIdle, true.B)
-  io.events             := RegNext(EventSums.ofColumn(
+  io.progress.isIdle    := RegNext(
+    units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle && caches.map(_.isIdle).fold(true.B)(_ && _),
+    true.B
+  )
+  io.events := RegNext(EventSums.ofColumn(
     config,
     enters,
     units.map(_.events),
