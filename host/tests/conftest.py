@@ -61,7 +61,7 @@ def manifest_data(
                 "trianglesPerRecord": per_record,
                 "bvh": bvh,
             },
-            "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth, "readLatency": 1},
+            "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth, "readLatency": 1, "cache": None},
             "physicalAttributeMemory": None,
             "frame": {"maxWidth": max_width, "maxHeight": max_height, "materials": 2, "lights": 2, "maxBounces": 4},
         },
@@ -175,7 +175,7 @@ def manifest_json() -> dict[str, Any]:
 SMALL_ARRAY = {
     "array": {"rows": 2, "columns": 3, "contexts": 4},
     "units": {"boxLanes": 2, "triangleLanes": 1},
-    "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1},
+    "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1, "cache": None},
 }
 
 #: Counters of a frame of 100 cycles on `SMALL_ARRAY`: 600 unit, 2,400 context, 600 bank and 300 stream cycles.

@@ -43,7 +43,7 @@ def pack(
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
     from colonnade.render.frames import encoded, max_lights, pack_scene
-    from colonnade.render.lit_room import lit_room, scene_room
+    from colonnade.render.lit_room import device_room, lit_room
     from colonnade.scene.object_mesh import object_mesh
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.file import check_image_file, image_file
@@ -63,7 +63,9 @@ def pack(
     manifest = manifest_for(config, overrides, terminal).manifest
     with terminal.step("packing"):
         surface = object_mesh(described)
-        room = lit_room(described, scene_room(described), surface.extent, max_lights(manifest), False, terminal)
+        room = lit_room(
+            described, device_room(described, manifest), surface.extent, max_lights(manifest), False, terminal
+        )
         image = pack_scene(room.scene, surface, manifest, encoded(room, manifest))
     image.save(output)
 

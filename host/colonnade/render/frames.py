@@ -21,7 +21,7 @@ from colonnade.environment.encoded import EncodedEnvironment, check_layout
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
-from colonnade.render.lit_room import LitRoom, lit_room, scene_room
+from colonnade.render.lit_room import LitRoom, device_room, lit_room
 from colonnade.render.report import FrameReport, frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
@@ -78,7 +78,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        mesh, maps = object_mesh(scene), scene_room(scene)
+        mesh, maps = object_mesh(scene), device_room(scene, manifest)
         if maps is not None:
             check_layout(maps, manifest)
             environment_camera(maps, width, height)
@@ -212,7 +212,7 @@ def render_model(
     The scene's own mesh is not read, and error bits only appear in the report.
     """
     with progress.step("packing the scene"):
-        room = lit_room(scene, scene_room(scene), mesh.extent, max_lights(manifest), False, progress)
+        room = lit_room(scene, device_room(scene, manifest), mesh.extent, max_lights(manifest), False, progress)
         scene, environment = room.scene, encoded(room, manifest)
         image = pack_scene(scene, mesh, manifest, environment)
         seen = None if environment is None else environment.environment

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
+from colonnade.environment.encoded import layout_of
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.room_lights import lights_of, with_lights
 
 if TYPE_CHECKING:
+    from colonnade.design.manifest import Manifest
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.model import Scene
@@ -41,6 +43,17 @@ class LitRoom:
 def scene_room(scene: Scene) -> Environment | None:
     """Load the room of a scene; None without one."""
     return None if scene.background.room is None else load_environment(scene.background.room)
+
+
+def device_room(scene: Scene, manifest: Manifest) -> Environment | None:
+    """Load the room of a scene for a device.
+
+    Raises:
+        UserError: The device has no memory for a room, which is checked first; or the room cannot be read.
+    """
+    if scene.background.room is not None:
+        layout_of(manifest)
+    return scene_room(scene)
 
 
 def lit_room(

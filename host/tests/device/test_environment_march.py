@@ -44,8 +44,9 @@ def scene(tmp_path: Path) -> Path:
 
 def test_a_frame_in_a_room_is_near_the_reference(scene: Path) -> None:
     model = render(RenderRequest(scene, "small", (), "model", (320, 240), relit=True))
-    reference = render(RenderRequest(scene, "small", (), "reference", (320, 240)))
-    np.testing.assert_array_equal(model.object_mask, reference.object_mask)
+    reference = render(RenderRequest(scene, "small", (), "reference", (320, 240), relit=True))
+    # Their tolerances differ where the room hides the object
+    assert np.count_nonzero(model.object_mask != reference.object_mask) <= 2
     # Encoding alone limits the picture of the living room to 30 dB
     assert psnr(encode_srgb(reference.image), encode_srgb(model.image)) > 24
     assert model.report.bytes is not None
