@@ -60,7 +60,7 @@ public:
     }
 
     /// From now on no read fails.
-    void mend() { options_.errorsPer1024 = 0; }
+    void stopFailing() { options_.errorsPer1024 = 0; }
 
 private:
     struct Read {

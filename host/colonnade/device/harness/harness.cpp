@@ -219,7 +219,7 @@ public:
         std::memset(&top_.io_memoryHolds, 0, sizeof top_.io_memoryHolds);
 #endif
 #ifdef DRAM_BUS_BYTES
-        dram_.mend();
+        dram_.stopFailing();
 #endif
         mayChangeRegisters_ = true;
         // The waveform includes the cycle in which `done` is high

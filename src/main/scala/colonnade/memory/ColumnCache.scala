@@ -64,12 +64,12 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private def lineOf(address: UInt): UInt = (address >> Lines.wordBits).asUInt
 
   // Cycle a: an announced line is taken if it is awaited
-  private val takes    = io.lines.announced.valid && awaited.map(_.is(io.lines.announced.bits)).reduce(_ || _)
-  private val taken    = RegNext(takes, false.B)
-  private val line     = RegEnable(io.lines.announced.bits, takes)
-  private val blocked  = RegInit(0.U(3.W)) // cycles without requests
-  private val blockLog = LineBroadcast.latency + Lines.records - 2
-  when(takes) { blocked := blockLog.U }.elsewhen(blocked =/= 0.U) { blocked := blocked - 1.U }
+  private val takes         = io.lines.announced.valid && awaited.map(_.is(io.lines.announced.bits)).reduce(_ || _)
+  private val taken         = RegNext(takes, false.B)
+  private val line          = RegEnable(io.lines.announced.bits, takes)
+  private val blocked       = RegInit(0.U(3.W)) // cycles without requests
+  private val blockedCycles = LineBroadcast.latency + Lines.records - 2
+  when(takes) { blocked := blockedCycles.U }.elsewhen(blocked =/= 0.U) { blocked := blocked - 1.U }
 
   // Cycle c: accept a request, if its line could be awaited even though the request before it misses
   private val request   = io.port.request

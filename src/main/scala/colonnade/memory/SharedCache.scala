@@ -28,8 +28,7 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
   /** Forgets all lines; only while idle. */
   val invalidate = Input(Bool())
 
-  /** A request is looked up, and is not held. */
-  val misses = Output(Bool())
+  /** No request is looked up, and no line is awaited or announced. */
   val isIdle = Output(Bool())
 }
 
@@ -98,8 +97,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   awaited.io.line        := line
   awaited.io.enter.valid := isMiss
   awaited.io.enter.bits  := line
-  leaves    := isWaiting && isFresh && (delivers || (!hitOH.orR && (awaited.io.isAwaited || awaited.io.enter.ready)))
-  io.misses := awaited.io.enter.fire
+  leaves := isWaiting && isFresh && (delivers || (!hitOH.orR && (awaited.io.isAwaited || awaited.io.enter.ready)))
   when(fills || delivers) { busy := (Lines.records - 1).U }.elsewhen(!isFree) { busy := busy - 1.U }
   isFilling := fills || (isFilling && !io.data.fire)
 
