@@ -59,7 +59,7 @@ private:
     /// Guard bits of accumulated distances along the ray.
     static constexpr int guardBits = 8;
     /// Log2 of the fraction of w by which a ray may be behind a plane and still count as on it.
-    static constexpr int surfaceToleranceLog = 5;
+    static constexpr int surfaceToleranceLog = 8;
 
     /// State of a march. `isBehind`: the ray is behind the visible surfaces.
     struct MarchState {

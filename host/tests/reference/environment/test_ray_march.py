@@ -11,6 +11,11 @@ import pytest
 from click.testing import CliRunner
 
 from colonnade.cli.main import cli
+from colonnade.design.generator import manifest_for
+from colonnade.device.environment_march import DeviceMarch
+from colonnade.environment.encoding.image import encode_environment
+from colonnade.environment.encoding.layout import AttributeLayout
+from colonnade.environment.model import Environment, EnvironmentCamera
 from colonnade.evaluation.studies.environment_accuracy import study, table
 from colonnade.evaluation.studies.probe_spheres import RADIUS, cosine_rays, glass_rays, mirror_rays, standing_spheres
 from colonnade.evaluation.studies.synthetic_attic import SyntheticRoom, attic, write_attic
@@ -122,6 +127,27 @@ def test_an_origin_just_behind_the_surface_is_on_it(made: SyntheticRoom) -> None
     inward = -environment.normals[row, column] + [0.3, 0, 0]
     met = DepthMarch(environment)((point * 1.002)[None], inward[None])
     assert met.kind[0] == HIT and np.hypot(met.u[0] - column - 0.5, met.v[0] - row - 0.5) < 2
+
+
+@pytest.mark.parametrize(("gap", "passes"), [(0.015, True), (0.001, False)])
+def test_the_device_passes_closely_behind_a_thin_board(gap: float, passes: bool) -> None:
+    """A ray behind a board by 1.5 % of its depth reaches the wall beside it; by 0.1 %, it is on the board."""
+    width, height, distance = 160, 120, 2.0
+    pose = np.array([[1.0, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, -1, 0]])
+    camera = EnvironmentCamera(120.0, 120.0, width / 2, height / 2, pose)
+    rays = camera.directions(width, height)
+    normals, along = np.array([[0.0, 0, -1], [-1, 0, 0]]), np.stack([rays[..., 2] / 4, rays[..., 0] / 1.2], axis=2)
+    wall = along.argmax(axis=2)
+    board = np.abs(rays[..., 0] + 0.2) < 0.05
+    depth, facing = np.where(board, distance, 1 / along.max(axis=2)), normals[np.where(board, 0, wall)]
+    environment = Environment("board", np.full((height, width, 3), 0.5), facing, depth, True, camera, None)
+    layout = AttributeLayout(width, height)
+    manifest = manifest_for("small", (f"physicalAttributeMemory={json.dumps(layout.to_config())}",)).manifest
+    march = DeviceMarch(environment, encode_environment(environment, layout), manifest)
+    hits = march(np.array([[-1.0, 0.05, distance * (1 + gap)]]), np.array([[1.0, 0.0, 0.0]]))
+    assert hits.kind[0] == HIT
+    (x, _, _) = positions(environment, hits)[0]
+    np.testing.assert_allclose(x, 1.2 if passes else -0.5, atol=0.04)
 
 
 def test_the_command_prints_a_table_and_writes_json(tmp_path: Path) -> None:

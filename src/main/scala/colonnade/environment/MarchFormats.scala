@@ -29,7 +29,7 @@ final class MarchFormats(config: ColonnadeConfig) {
   val distanceBits: Int = alongBits + guardBits
 
   /** Log2 of a share of w: a ray that is behind a surface by less is on it. */
-  val nearLog:  Int = 5
+  val nearLog:  Int = 8
   val maxSteps: Int = 128
   val stepBits: Int = 8
 
