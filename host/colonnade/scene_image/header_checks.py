@@ -45,6 +45,7 @@ def check_header(header: Any) -> None:
         _require(material["kind"] in KINDS)
         _numbers(material["albedo"], 3)
         _number(material["ior"])
+        _require(isinstance(material["has_corner_colours"], bool))
     _check_tree(header["tree"])
     _check_environment(header["room"])
 
