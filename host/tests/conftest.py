@@ -46,6 +46,8 @@ def manifest_data(
         "lightBits": 16,
         "lightFraction": 12,
         "mantissaBits": 32,
+        "weightBits": min(32, mac - 1),
+        "distanceDigits": min(32, mac),
         "etaFraction": 13,
     }
     layouts = _layouts(vertex_bits, box_bits, arity, per_record, address)

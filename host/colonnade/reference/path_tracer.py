@@ -119,7 +119,7 @@ class PathTracer:
         )
         is_tinted = (kinds == MIRROR) | points.front
         weight[path] *= np.where(is_tinted[:, None], points.albedo, 1.0)
-        offset = self._view.shadow_offset * points.facing
+        offset = self._object.tracer.offset * points.facing
         split = np.flatnonzero(scattered.fresnel_weights > 0)
         if len(split):
             origins = points.position[split] + offset[split]
@@ -173,13 +173,13 @@ class PathTracer:
     def _shade_object(self, points: ObjectPoints) -> Floats:
         """Colours of diffuse surfaces, float64 [n, 3]."""
         # The shadow ray starts slightly above the visible side of the surface.
-        origins = points.position + self._view.shadow_offset * points.facing
+        origins = points.position + self._object.tracer.offset * points.facing
         irradiance, _ = self._irradiance(origins, points.normals, self._view.shadows)
         return np.asarray((points.albedo * irradiance).clip(max=1.0), dtype=np.float64)
 
     def _shade_background(self, points: BackdropPoints, shadows: bool = True) -> tuple[Floats, Floats]:
         """Colours and shadow ratios of background surfaces, float64 [n, 3] each."""
-        origins = points.position + self._view.shadow_offset * points.normals
+        origins = points.position + self._object.tracer.offset * points.normals
         shadowed, unshadowed = self._irradiance(origins, points.normals, shadows and self._view.shadows)
         ratio = np.divide(shadowed, unshadowed, out=np.ones_like(shadowed), where=unshadowed > 0)
         return np.asarray((points.albedo * shadowed).clip(max=1.0)), np.asarray(ratio, dtype=np.float64)

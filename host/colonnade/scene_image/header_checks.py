@@ -9,7 +9,15 @@ from typing import Any
 from colonnade.mesh.materials import KINDS
 
 #: Integer keys of the header, and the limits of their values.
-_COUNTS = ("source_triangles", "triangles", "record_count", "triangle_base", "triangle_records", "attribute_base")
+_COUNTS = (
+    "source_triangles",
+    "triangles",
+    "record_count",
+    "triangle_base",
+    "triangle_records",
+    "attribute_base",
+    "largest_triangle",
+)
 _MAX = 1 << 31
 _MAX_RECORD_BITS = 1 << 16
 _MAX_WORD_BYTES = 1 << 12

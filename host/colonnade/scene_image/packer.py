@@ -112,7 +112,7 @@ def pack(
     sections.append(_triangle_records(quantised, bvh.order, leaf_first, leaf_count, is_clear, manifest))
     colours = _corner_colours(mesh, manifest, materials, headroom)
     sections.append(_attribute_records(mesh, quantised, bvh.order, manifest, faces_per_record, colours))
-    used = quantised.vertices[quantised.faces.reshape(-1)]
+    corners = quantised.vertices[quantised.faces]
     header = ImageHeader(
         format_hash=manifest.format_hash,
         mesh=mesh.name,
@@ -123,8 +123,9 @@ def pack(
         triangle_base=triangle_base,
         triangle_records=len(leaf_first),
         attribute_base=attribute_base,
-        bounds_low=_corner(used.min(axis=0)),
-        bounds_high=_corner(used.max(axis=0)),
+        bounds_low=_corner(corners.min(axis=(0, 1))),
+        bounds_high=_corner(corners.max(axis=(0, 1))),
+        largest_triangle=int(np.ptp(corners, axis=1).max()),
         frame=quantised.frame,
         extent=mesh.extent,
         materials=tuple(materials),

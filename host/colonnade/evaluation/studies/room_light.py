@@ -227,7 +227,7 @@ def single_bounce(mesh: Mesh, view: View, environment: Environment) -> SingleBou
         np.zeros(len(hit), dtype=np.bool_),
         target.ior[faces[hit]],
     ).directions
-    starts = points.position + view.shadow_offset * points.facing
+    starts = points.position + target.tracer.offset * points.facing
     leaves = target.tracer.first_hits(starts, reflected) < 0
     to_view = np.linalg.inv(view.view_to_mesh[:, :3])
     view_origins, view_directions = (starts - view.view_to_mesh[:, 3]) @ to_view.T, unit_vectors(reflected @ to_view.T)

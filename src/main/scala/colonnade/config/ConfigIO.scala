@@ -10,7 +10,7 @@ import java.nio.file.{Files, InvalidPathException, Path, Paths}
 object ConfigIO {
 
   /** The presets, by name. */
-  val presets: Seq[String] = Seq("tiny", "small", "edge")
+  val presets: Seq[String] = Seq("tiny", "small", "edge", "lean")
 
   /** Maximum size of a configuration file. */
   private val mostBytes = 1 << 20
