@@ -72,7 +72,7 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
 
 def test_corner_colours_equal_the_model() -> None:
     """Diffuse, mirroring and clear faces with colours at their corners, and faces without."""
-    design = design_for("tiny", ("geometry.cornerColours=true",))
+    design = design_for("tiny", ("geometry.cornerColours=true", "frame.maxBounces=4", "frame.materials=4"))
     mesh = load_mesh("teapot:4")
     kinds = (("diffuse", True), ("mirror", True), ("glass", True), ("diffuse", False))
     materials = tuple(MeshMaterial(kind, (0.9, 0.8, 0.7), has_corner_colours=has) for kind, has in kinds)

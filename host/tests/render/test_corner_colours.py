@@ -48,8 +48,8 @@ def rainbow(points: np.ndarray) -> np.ndarray:
     return np.rint(255 * (0.4 + 0.4 * np.cos(2 * np.pi * phase) + 0.2 * place)).astype(np.uint8)
 
 
-def ply(file: Path, name: str, kind: str = "uchar") -> Path:
-    """Write a mesh with a colour at each vertex."""
+def ply(file: Path, name: str, kind: str = "uchar", inward: bool = False) -> Path:
+    """Write a mesh with a colour at each vertex; its faces point outward, or inward."""
     mesh = load_mesh(name)
     colours = rainbow(mesh.vertices) / (1 if kind == "uchar" else 255)
     properties = [f"property float {axis}" for axis in "xyz"]
@@ -58,7 +58,7 @@ def ply(file: Path, name: str, kind: str = "uchar") -> Path:
     lines += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header"]
     for point, colour in zip(mesh.vertices, colours, strict=True):
         lines.append(" ".join(f"{value:.9g}" for value in (*point, *colour)))
-    lines += [f"3 {a} {b} {c}" for a, b, c in mesh.faces]
+    lines += [f"3 {a} {b} {c}" for a, b, c in (mesh.faces[:, ::-1] if inward else mesh.faces)]
     file.write_text("\n".join(lines))
     return file
 
@@ -67,6 +67,13 @@ def ply(file: Path, name: str, kind: str = "uchar") -> Path:
 def test_vertices_of_a_ply_file_keep_their_srgb_colours(tmp_path: Path, kind: str) -> None:
     mesh = load_mesh(ply(tmp_path / "a.ply", "sphere:1", kind), corner_colours=True)
     assert mesh.notes == () and mesh.materials == (MeshMaterial(albedo=(1.0, 1.0, 1.0), has_corner_colours=True),)
+    expected = linear_from_srgb(rainbow(mesh.vertices) / 255)[mesh.faces]
+    np.testing.assert_allclose(mesh.corner_colours, expected, atol=2e-6)
+
+
+def test_colours_stay_at_their_vertices_where_faces_are_reversed(tmp_path: Path) -> None:
+    mesh = load_mesh(ply(tmp_path / "a.ply", "sphere:1", inward=True), corner_colours=True)
+    assert "turned outward" in mesh.notes[0]
     expected = linear_from_srgb(rainbow(mesh.vertices) / 255)[mesh.faces]
     np.testing.assert_allclose(mesh.corner_colours, expected, atol=2e-6)
 

@@ -73,7 +73,7 @@ final class Colonnade(
     val hasFailed  = memory.events.error || controller.io.memoryTimeout
     val isStale    = RegInit(false.B)
     val invalidate = isStale && controller.io.frameStart
-    isStale            := (isStale && !invalidate) || registers.io.invalidate.get || hasFailed
+    isStale     := (isStale && !invalidate) || registers.io.invalidate.get || hasFailed
     memory.page := registers.io.frame.dram.get.page
     io.memory.get :<>= memory.axi
     memory.invalidate := invalidate

@@ -82,7 +82,6 @@ final class Shader(config: ColonnadeConfig) extends Module {
     multiplier.io.corners.get <> unit.io.operands
     unit
   }
-  private val hasAlbedo    = corners.map(unit => unit.io.isDone || !unit.io.isUsed).getOrElse(true.B)
   private val objectAlbedo =
     corners.map(unit => Mux(unit.io.isUsed, unit.io.colour, material.albedo)).getOrElse(material.albedo)
 
@@ -102,7 +101,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
   private val isLast = Reg(Bool())
   private val lit    = Reg(new LitSurface(config))
   private val isOn   = point.bits.light < io.shading.lights
-  private val isFree = !isHeld && cosine.io.angle.ready && hasAlbedo
+  private val isFree = withAlbedo(!isHeld && cosine.io.angle.ready)
   cosine.io.angle.valid        := point.valid && !isBounce && isFree
   cosine.io.angle.bits         := point.bits.angle
   cosine.io.angle.bits.isAcute := point.bits.angle.isAcute && isOn
@@ -138,7 +137,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
     val albedo   = Reg(Rgb(FrameRegisters.colour))
     val isTinted = Reg(Bool())
     unit.io.offset               := io.shading.offset
-    unit.io.request.valid        := point.valid && isBounce && hasAlbedo
+    unit.io.request.valid        := withAlbedo(point.valid && isBounce)
     unit.io.request.bits.context := surface.context
     unit.io.request.bits.origin.axes.zip(surface.origin.axes).foreach { case (to, from) =>
       to := Rounding.narrow(from, to.getWidth)
@@ -166,7 +165,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
     unit.io.result.ready  := bounced.ready
     unit
   }
-  point.ready := Mux(isBounce, bounces.map(_.io.request.ready && hasAlbedo).getOrElse(false.B), isFree)
+  point.ready := Mux(isBounce, bounces.map(unit => withAlbedo(unit.io.request.ready)).getOrElse(false.B), isFree)
 
   // Multiplier
   multiplier.io.geometry := geometry.io.operands
@@ -175,6 +174,10 @@ final class Shader(config: ColonnadeConfig) extends Module {
   direct.io.product   := multiplier.io.product
 
   io.busy := !geometry.io.request.ready
+
+  /** The condition, once the hit's albedo is known. */
+  private def withAlbedo(condition: Bool): Bool =
+    corners.map(unit => condition && (unit.io.isDone || !unit.io.isUsed)).getOrElse(condition)
 
   /** A light's entry; a single light needs no index. */
   private def at[T <: Data](entries: Vec[T], index: UInt): T =
