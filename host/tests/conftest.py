@@ -46,6 +46,8 @@ def manifest_data(
         "lightBits": 16,
         "lightFraction": 12,
         "mantissaBits": 32,
+        "weightBits": min(32, mac - 1),
+        "distanceDigits": min(32, mac),
         "etaFraction": 13,
     }
     layouts = _layouts(vertex_bits, box_bits, arity, per_record, address)
@@ -60,6 +62,7 @@ def manifest_data(
                 "arity": arity,
                 "trianglesPerRecord": per_record,
                 "bvh": bvh,
+                "cornerColours": False,
             },
             "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth, "readLatency": 1, "cache": None},
             "physicalAttributeMemory": None,

@@ -62,7 +62,7 @@ def pack(
         described = described.with_environment(background)
     manifest = manifest_for(config, overrides, terminal).manifest
     with terminal.step("packing"):
-        surface = object_mesh(described)
+        surface = object_mesh(described, corner_colours=manifest.corner_colours)
         room = lit_room(
             described, device_room(described, manifest), surface.extent, max_lights(manifest), False, terminal
         )

@@ -53,6 +53,8 @@ class Mesh:
         source_count: Number of faces in the source.
         name: Name for reports.
         notes: Lines on what the file holds and a picture does not show, and on what was repaired.
+        corner_colours: Linear colours at the corners of the faces, 0 to 1, 0 on faces whose material has none, float64
+            [m, 3, 3]; None: no material has any.
     """
 
     vertices: Floats
@@ -64,6 +66,7 @@ class Mesh:
     source_count: int
     name: str
     notes: tuple[str, ...] = ()
+    corner_colours: Floats | None = None
 
     @cached_property
     def extent(self) -> Extent:

@@ -16,6 +16,10 @@ from colonnade.common.types import Floats
 #: Rays start this share of the box's longest edge before the box, which keeps float32 coordinates small.
 _START_MARGIN = 1 / 64
 
+#: Secondary rays start this share of the box's longest edge off the surface. Rounding to float32 moves a vertex and an
+#: origin by at most √3 · 2^-26 of the edge each, so the start stays on its side with a margin of four.
+_OFFSET = 2.0**-22
+
 
 class Surface(Protocol):
     """A triangle surface, such as a `Mesh`: vertices float64 [n, 3], faces int32 [m, 3]."""
@@ -70,6 +74,8 @@ class RayTracer:
         self.high: Floats = mesh.vertices.max(axis=0)
         self._centre: Floats = (self.low + self.high) / 2
         self._edge = float((self.high - self.low).max())
+        #: Distance from a surface at which rays that leave it start, mesh units.
+        self.offset = self._edge * _OFFSET
         self._scene = EmbreeScene(robust=True)
         TriangleMesh(self._scene, self._scaled(mesh.vertices), np.ascontiguousarray(mesh.faces, dtype=np.int32))
 

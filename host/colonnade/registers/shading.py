@@ -10,6 +10,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.materials import MeshMaterial
+from colonnade.registers.surface_offset import surface_offset
 from colonnade.scene.view import PlacedLight, View
 from colonnade.scene_image.header import ImageHeader
 
@@ -58,8 +59,11 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
     white = (1 << numbers["colourBits"]) - 1
     step = header.frame.scale * 2.0 ** numbers["gridFraction"]
     maximum = min(2.0 ** (numbers["vertexBits"] - 2 + numbers["gridFraction"]), 2.0 ** (numbers["gridBits"] - 2) - 1)
+    offset = (
+        surface_offset(numbers, header.largest_triangle) if view.shadow_offset is None else view.shadow_offset * step
+    )
     result = {
-        "shading.offset": int(np.clip(np.rint(view.shadow_offset * step), 1, max(1.0, maximum))),
+        "shading.offset": int(np.clip(np.rint(offset), 1, max(1.0, maximum))),
         "shading.flat": int(view.flat),
         "shading.shadows": int(view.shadows),
         "shading.lights": len(view.lights),
@@ -73,6 +77,8 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
         result |= _reach(f"lights[{index}]", light, step, numbers["mantissaBits"])
     for index, material in enumerate(view.materials):
         result |= _colour(f"materials[{index}].albedo", np.array(material.albedo) * white, white)
+        if manifest.corner_colours:
+            result[f"materials[{index}].hasCornerColours"] = int(material.has_corner_colours)
     if int(manifest.config["frame"]["maxBounces"]) > 0:
         result["shading.bounces"] = min(view.bounces, int(manifest.config["frame"]["maxBounces"]))
         result["shading.shadowTransmittance"] = int(np.rint(view.shadow_transmittance * one))

@@ -66,7 +66,7 @@ def reference_frames(
         options: Further options.
     """
     begun = time.perf_counter()
-    mesh = object_mesh(poses[0], int(manifest.config["frame"]["materials"]))
+    mesh = object_mesh(poses[0], int(manifest.config["frame"]["materials"]), manifest.corner_colours)
     layout = None if manifest.config["physicalAttributeMemory"] is None else layout_of(manifest)
     max_lights = int(manifest.config["frame"]["lights"])
     for pose, traced in zip(

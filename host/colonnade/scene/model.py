@@ -144,11 +144,12 @@ class Light(PointLight):
 
     Attributes:
         shadows: Whether lights cast shadows.
-        shadow_offset: Distance of secondary rays' origins from the surface, in edges of the object's cube.
+        shadow_offset: Distance of the device's secondary rays' origins from the surface, in edges of the object's
+            cube. None: the least one that its rounding allows (`colonnade.registers.surface_offset`).
     """
 
     shadows: StrictBool = True
-    shadow_offset: Annotated[_Float, Interval(ge=0.0, le=0.25)] = 1 / 2048
+    shadow_offset: Annotated[_Float, Interval(ge=0.0, le=0.25)] | None = None
 
 
 @dataclass(frozen=True, config=_STRICT)

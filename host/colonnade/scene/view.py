@@ -55,7 +55,8 @@ class View:
         ambient, background: float64 [3], linear.
         flat: Shade with geometric normals instead of smooth ones.
         shadows: Trace shadow rays.
-        shadow_offset: Distance of secondary rays' origins from the surface, mesh units.
+        shadow_offset: Distance of the device's secondary rays' origins from the surface, mesh units. None: by its
+            rounding. The reference has its own (`colonnade.reference.embree.RayTracer.offset`).
         shadow_transmittance: Fraction of light that a glass occluder transmits.
         bounces: Traced reflections and refractions of a path.
         view_to_mesh: Transform from a room's view space, metres, to mesh space, float64 [3, 4]; None without a room.
@@ -75,7 +76,7 @@ class View:
     background: Floats
     flat: bool
     shadows: bool
-    shadow_offset: float
+    shadow_offset: float | None = None
     shadow_transmittance: float = 0.6
     bounces: int = 4
     view_to_mesh: Floats | None = None
@@ -144,7 +145,7 @@ def make_view(
         background=np.array(scene.background.colour),
         flat=scene.material.flat,
         shadows=scene.light.shadows,
-        shadow_offset=scene.light.shadow_offset * extent.edge,
+        shadow_offset=None if scene.light.shadow_offset is None else scene.light.shadow_offset * extent.edge,
         shadow_transmittance=scene.paths.shadow_transmittance,
         bounces=scene.paths.bounces,
         view_to_mesh=None if environment is None else pose.from_view(environment.camera_to_world),
@@ -154,8 +155,10 @@ def make_view(
 
 
 def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tuple[MeshMaterial, ...]:
-    """Replace values of a mesh's materials by those that the scene gives."""
+    """Replace values of a mesh's materials by those that the scene gives; an albedo replaces corner colours too."""
     given = {key: value for key in ("kind", "albedo", "ior") if (value := getattr(overrides, key)) is not None}
+    if "albedo" in given:
+        given["has_corner_colours"] = False
     return tuple(replace(material, **given) for material in materials)
 
 

@@ -24,7 +24,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.scene_image.header import EnvironmentHeader, ImageHeader
 from colonnade.scene_image.header_checks import check_header
 
-MAGIC = b"CLNDIMG2"
+MAGIC = b"CLNDIMG3"
 FILE_NAME = "scene.image"
 _DIGEST_BYTES = 32
 _ADVICE = "pack the scene again"

@@ -72,6 +72,7 @@ class ImageHeader:
         record_bits, record_count: Width and number of the column memory's records.
         triangle_base, triangle_records, attribute_base: Bounds of the sections, in records.
         bounds_low, bounds_high: The object's bounding box, vertex units, inclusive.
+        largest_triangle: Greatest extent of a triangle along an axis, vertex units.
         frame: Transform from mesh space to vertex units.
         extent: Bounds in mesh space, for framing.
         materials: Materials by the faces' material index.
@@ -90,6 +91,7 @@ class ImageHeader:
     attribute_base: int
     bounds_low: tuple[int, int, int]
     bounds_high: tuple[int, int, int]
+    largest_triangle: int
     frame: ObjectFrame
     extent: Extent
     materials: tuple[MeshMaterial, ...]

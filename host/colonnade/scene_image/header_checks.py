@@ -9,7 +9,15 @@ from typing import Any
 from colonnade.mesh.materials import KINDS
 
 #: Integer keys of the header, and the limits of their values.
-_COUNTS = ("source_triangles", "triangles", "record_count", "triangle_base", "triangle_records", "attribute_base")
+_COUNTS = (
+    "source_triangles",
+    "triangles",
+    "record_count",
+    "triangle_base",
+    "triangle_records",
+    "attribute_base",
+    "largest_triangle",
+)
 _MAX = 1 << 31
 _MAX_RECORD_BITS = 1 << 16
 _MAX_WORD_BYTES = 1 << 12
@@ -45,6 +53,7 @@ def check_header(header: Any) -> None:
         _require(material["kind"] in KINDS)
         _numbers(material["albedo"], 3)
         _number(material["ior"])
+        _require(isinstance(material["has_corner_colours"], bool))
     _check_tree(header["tree"])
     _check_environment(header["room"])
 

@@ -48,7 +48,6 @@ def placed(environment: Environment | None, material: MeshMaterial, **changes: o
         background=np.array([0.3, 0.2, 0.1]),
         flat=True,
         shadows=True,
-        shadow_offset=1e-6,
         view_to_mesh=None if environment is None else np.eye(3, 4),
     )
     return replace(view, **changes)  # type: ignore[arg-type]

@@ -227,7 +227,7 @@ def single_bounce(mesh: Mesh, view: View, environment: Environment) -> SingleBou
         np.zeros(len(hit), dtype=np.bool_),
         target.ior[faces[hit]],
     ).directions
-    starts = points.position + view.shadow_offset * points.facing
+    starts = points.position + target.tracer.offset * points.facing
     leaves = target.tracer.first_hits(starts, reflected) < 0
     to_view = np.linalg.inv(view.view_to_mesh[:, :3])
     view_origins, view_directions = (starts - view.view_to_mesh[:, 3]) @ to_view.T, unit_vectors(reflected @ to_view.T)
@@ -237,7 +237,7 @@ def single_bounce(mesh: Mesh, view: View, environment: Environment) -> SingleBou
     mask[hit[is_known]] = True
     column = np.clip(seen.u[is_known], 0, environment.width - 1).astype(np.intp)
     row = np.clip(seen.v[is_known], 0, environment.height - 1).astype(np.intp)
-    tint = target.albedo[faces[hit[is_known]]]
+    tint = points.albedo[is_known]
     return SingleBounce(
         mask.reshape(view.height, view.width),
         tint * decode_srgb(environment.photo[row, column]),
