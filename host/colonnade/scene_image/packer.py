@@ -126,6 +126,7 @@ def pack(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | Non
         extent=mesh.extent,
         materials=tuple(materials),
         tree=bvh.statistics if manifest.bvh else None,
+        parts=mesh.parts,
     )
     return SceneImage(header, np.concatenate(sections), mesh.source_faces[quantised.mesh_faces[bvh.order]])
 
