@@ -9,6 +9,7 @@
 //   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat shadows
 //          count, count * (position[3] colour[3] reachMantissa reachExponent)
 //                                                         -> origin[3], count * (direct[3] needsShadowRay)
+//   cornercolour weights[3] colours[9]                    -> colour[3]
 //   lightenvironment point[3] normal[3] offset shadows count, count * (position[3] colour[3] reachMantissa reachExponent)
 //                                                         -> as shade, for a point of the environment
 //   bounce axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat kind etaFront etaBack reflectance
@@ -133,6 +134,15 @@ void replyShade(Query& query, const Numbers& n) {
     replyLights(query, origin, shadingNormal(surface, flat), shadows, n);
 }
 
+void replyCornerColour(Query& query, const Numbers& n) {
+    Hit hit{true, 0, 0, {}, false};
+    for (auto& weight : hit.weights) weight = query.number();
+    Face face{};
+    for (auto& colour : face.colours) colour = query.vector();
+    Reply reply;
+    reply.all(cornerColour(hit, face, n)).print();
+}
+
 void replyEnvironmentLight(Query& query, const Numbers& n) {
     const WideVector point = query.wideVector();
     const Vector normal = query.vector();
@@ -145,7 +155,7 @@ void replyBounce(Query& query, const Numbers& n) {
     const Surface surface = readSurface(query, n);
     const std::int64_t offset = query.number();
     const bool flat = query.number() != 0;
-    Material material{{}, static_cast<MaterialKind>(query.number()), {}, 0};
+    Material material{{}, false, static_cast<MaterialKind>(query.number()), {}, 0};
     for (auto& eta : material.eta) eta = query.number();
     material.reflectance = query.number();
     const Bounce next = bounce(surface, material, flat, offset, n);
@@ -231,6 +241,7 @@ int main() try {
         else if (kind == "box") replyBox(query, numbers);
         else if (kind == "triangle") replyTriangle(query, numbers);
         else if (kind == "shade") replyShade(query, numbers);
+        else if (kind == "cornercolour") replyCornerColour(query, numbers);
         else if (kind == "lightenvironment") replyEnvironmentLight(query, numbers);
         else if (kind == "bounce") replyBounce(query, numbers);
         else if (kind == "layout") scene.readLayout(words);

@@ -62,6 +62,7 @@ def manifest_data(
                 "arity": arity,
                 "trianglesPerRecord": per_record,
                 "bvh": bvh,
+                "cornerColours": False,
             },
             "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth, "readLatency": 1, "cache": None},
             "physicalAttributeMemory": None,

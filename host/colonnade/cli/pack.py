@@ -63,7 +63,7 @@ def pack(
     manifest = manifest_for(config, overrides, terminal).manifest
     with terminal.step("packing"):
         maps = device_room(described, manifest) if described.objects else None
-        surface = object_mesh(described, environment=maps)
+        surface = object_mesh(described, corner_colours=manifest.corner_colours, environment=maps)
         if maps is None:
             maps = device_room(described, manifest)
         room = lit_room(described, maps, surface.extent, max_lights(manifest), False, terminal)

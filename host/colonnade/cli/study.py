@@ -16,6 +16,7 @@ from colonnade.cli.options import FILE, dists_option, echo, finish, json_option,
 @click.option("--frames", is_flag=True, help="Measure frames with objects instead of rays from probe spheres.")
 @click.option("--occlusion", is_flag=True, help="Measure objects behind furniture in synthetic rooms, without ROOMS.")
 @click.option("--light", is_flag=True, help="Measure relit rooms and mirrors against the photo.")
+@click.option("--rooms", "seeds", metavar="SEEDS", help="Measure generated rooms, such as 0-9,100, without ROOMS.")
 @dists_option
 @click.option("--output", type=FILE, metavar="DIR", help="Not for rays: write the frames as pictures.")
 @json_option
@@ -24,6 +25,7 @@ def study(
     frames: bool,
     occlusion: bool,
     light: bool,
+    seeds: str | None,
     no_dists: bool,
     output: Path | None,
     json_file: Path | None,
@@ -35,16 +37,19 @@ def study(
     encoding, reconstruction and fixed-point arithmetic. The loss is PSNR, FLIP and DISTS of frame, object and shadow.
     With --occlusion it prints the share of an object's pixels that correctly show the object, or the room before it.
     With --light it prints the PSNR of relit rooms and of a mirror against the photo, for default and for fitted lights.
+    With --rooms it measures rays and encoded maps in rooms that a seed generates, and counts why rays are wrong.
     Tables are in Markdown.
     """
     context = click.get_current_context()
-    if frames + occlusion + light > 1:
-        raise click.UsageError("give one of --frames, --occlusion and --light", context)
+    generated = seeds is not None
+    if frames + occlusion + light + generated > 1:
+        raise click.UsageError("give one of --frames, --occlusion, --light and --rooms", context)
     if output is not None and not (frames or occlusion or light):
         raise click.UsageError("--output needs --frames, --occlusion or --light", context)
-    if occlusion and rooms:
-        raise click.UsageError("--occlusion has its own rooms: leave out ROOMS", context)
-    if not occlusion and not rooms:
+    if (occlusion or generated) and rooms:
+        option = "--occlusion" if occlusion else "--rooms"
+        raise click.UsageError(f"{option} has its own rooms: leave out ROOMS", context)
+    if not (occlusion or generated or rooms):
         raise click.UsageError("Missing argument 'ROOMS...'.", context)
     require_outputs(json_file, folders=[output])
 
@@ -72,6 +77,14 @@ def study(
             frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
             for frame, by_loss in by_frame.items()
         }
+    elif seeds is not None:
+        from colonnade.evaluation.studies import unseen_rooms
+
+        rooms_of_seeds = unseen_rooms.study_seeds(
+            unseen_rooms.parse_seeds(seeds), not no_dists, progress.for_terminal()
+        )
+        echo(unseen_rooms.table(rooms_of_seeds))
+        report = {str(seed): asdict(value) for seed, value in rooms_of_seeds.items()}
     elif light:
         from colonnade.evaluation.studies import room_light
 

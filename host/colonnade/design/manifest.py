@@ -162,6 +162,11 @@ class Manifest:
         """Whether the design traverses a BVH; False for the linear-scan baseline, which has no nodes."""
         return bool(self.config["geometry"]["bvh"])
 
+    @property
+    def corner_colours(self) -> bool:
+        """Whether faces have a colour at each corner."""
+        return bool(self.config["geometry"]["cornerColours"])
+
     @staticmethod
     def load(path: str | Path) -> Manifest:
         """Read ``manifest.json``, given the file or its folder.

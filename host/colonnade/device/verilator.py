@@ -42,6 +42,7 @@ class Stalls:
         dram_latency: Cycles from a read to its first data, for designs with a cache.
         dram_random: Percentage of cycles in which DRAM accepts or delivers nothing; reads then overtake each other.
         dram_errors: Beats of 1024 that DRAM answers with an error in the first frame.
+        dram_silent: Reads of the first frame after which DRAM answers no more until the frame has ended; 0: all.
     """
 
     percent: int = 0
@@ -52,6 +53,7 @@ class Stalls:
     dram_latency: int = 100
     dram_random: int = 0
     dram_errors: int = 0
+    dram_silent: int = 0
 
     def __post_init__(self) -> None:
         bursts = self.memory_burst >= 1 and self.check_interval >= 1
@@ -63,7 +65,7 @@ class Stalls:
         """Command-line options of the harness."""
         dram = [
             *("--dram", str(self.dram_latency), "--dram-random", str(self.dram_random)),
-            *("--dram-errors", str(self.dram_errors)),
+            *("--dram-errors", str(self.dram_errors), "--dram-silent", str(self.dram_silent)),
         ]
         memory = ["--memory", str(self.memory_percent), "--burst", str(self.memory_burst)]
         sink = ["--stall", str(self.percent), "--seed", str(self.seed), "--check", str(self.check_interval)]

@@ -51,7 +51,7 @@ def bench(
     size = size or (scene.frame.width, scene.frame.height)
     names = list(dict.fromkeys(meshes))
     with progress.step("loading the meshes"):
-        loaded = [replace(object_mesh(scene.with_mesh(name)), name=name) for name in names]
+        loaded = [replace(object_mesh(scene.with_mesh(name), corner_colours=True), name=name) for name in names]
     design, manifest = design_of(config, overrides, progress)
     check_size(size, manifest)
     jobs = []

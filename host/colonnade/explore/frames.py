@@ -49,7 +49,8 @@ def frame_of(name: str, scene: Scene, mesh: Mesh, source: str | None) -> Frame:
     """The frame of a scene with a mesh. Its identity is the content of mesh and room, and the scene without paths."""
     plain = _SCENE.dump_python(scene, mode="json", exclude={"mesh": True, "background": {"room": True}})
     digest = hashlib.sha256()
-    for array in (mesh.vertices, mesh.faces, mesh.corner_normals, mesh.face_materials, mesh.source_faces):
+    arrays = (mesh.vertices, mesh.faces, mesh.corner_normals, mesh.face_materials, mesh.source_faces)
+    for array in (*arrays, *(() if mesh.corner_colours is None else (mesh.corner_colours,))):
         digest.update(f"{array.shape} {array.dtype}\n".encode() + array.tobytes())
     digest.update(repr((mesh.materials, mesh.source_count)).encode())
     room = None

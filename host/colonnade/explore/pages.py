@@ -1,7 +1,7 @@
-"""Generates the tables of ``docs/mixed-precision.md`` from the data of `tools/studies`.
+"""Generates the tables of the pages that show a study of `tools/studies`.
 
 A table replaces the text between ``<!-- NAME -->`` and ``<!-- end -->``; the rest of the page stays as it is.
-Run as ``python -m colonnade.explore.pages DOCS``.
+Run as ``python -m colonnade.explore.pages DOCS``: the data are ``DOCS/data/STUDY.json``, the pages ``DOCS/STUDY.md``.
 """
 
 from __future__ import annotations
@@ -9,158 +9,41 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from colonnade.common.atomic_files import replacing
-from colonnade.common.markdown import markdown
+from colonnade.explore import precision_tables, search_tables
 
 Data = Mapping[str, Any]
 
-#: The page and the study of its data.
-PAGE, STUDY = "mixed-precision.md", "mixed-precision"
-
-#: The paper's savings of 32b32s64d against its baseline, and its DISTS loss.
-PAPER = ("source paper, 28 nm", "32b32s64d", "–", "33.4 %", "16.7 %", "0.6 to 1.65 %")
-
-#: Titles of libraries.
-LIBRARIES = {"asap7": "ASAP7", "sky130": "sky130"}
+#: The tables of each study's page.
+PAGES: Mapping[str, Mapping[str, Callable[[Data], str]]] = {
+    "mixed-precision": precision_tables.TABLES,
+    "energy-area": search_tables.TABLES,
+}
 
 _TABLE = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
-def page(text: str, study: Data | None) -> str:
-    """The page with new tables from ``study.json``; None: not measured."""
+def page(text: str, name: str, study: Data | None) -> str:
+    """The page of the study `name` with new tables from its ``study.json``; None: not measured."""
 
     def replaced(match: re.Match[str]) -> str:
-        body = "Not measured: run `tools/studies mixed-precision`." if study is None else TABLES[match[2]](study)
+        body = f"Not measured: run `tools/studies {name}`." if study is None else PAGES[name][match[2]](study)
         return f"{match[1]}{body}\n{match[3]}"
 
     return _TABLE.sub(replaced, text)
 
 
-def quality(study: Data) -> str:
-    """Loss of each design, over the meshes."""
-    rows = [
-        [
-            f"**{point['name']}**" if point["name"] == _best(study) else point["name"],
-            _number(own["dists_loss"], ".3f"),
-            _number(own["dists_loss_max"], ".3f"),
-            _number(own["psnr_baseline_min"], ".1f"),
-            _number(own["psnr_min"], ".1f"),
-            _number(own["psnr_mean"], ".1f"),
-            _number(own["dists"], ".4f"),
-            _number(own["flip"], ".4f"),
-            str(sum(len(frame["error_bits"] or ()) for frame in point["workloads"].values())),
-        ]
-        for point in study["points"]
-        if (own := point["figures"])
-    ]
-    titles = ["design", "DISTS loss, mean, %", "largest, %", "PSNR to baseline, lowest, dB"]
-    titles += ["PSNR to Embree, lowest, dB", "mean, dB", "DISTS to Embree", "FLIP to Embree", "error bits"]
-    return markdown(titles, rows)
-
-
-def cost(study: Data) -> str:
-    """Area, power, energy and RenderIndex of each design, with each library."""
-    titles = ["design"]
-    for library in study["libraries"]:
-        name = LIBRARIES.get(library, library)
-        titles += [f"render unit, kGE, {name}", f"array, MGE, {name}", f"FO4, {name}", f"mW, {name}"]
-        titles += [f"nJ per ray, {name}", f"RenderIndex, {name}"]
-    rows = []
-    for point in study["points"]:
-        own, cells = point["figures"], []
-        for library in study["libraries"]:
-            cells += [
-                _number(own[f"unit_kge.{library}"], ".1f"),
-                _number(own[f"array_kge.{library}"], ".2f", 1e-3),
-                _number(own[f"fo4.{library}"], ".0f"),
-                _number(own[f"mw.{library}"], ".2f"),
-                _number(own[f"nj.{library}"], ".3f"),
-                _number(own[f"render_index.{library}"], ".3f"),
-            ]
-        rows.append([f"**{point['name']}**" if point["name"] == _best(study) else point["name"], *cells])
-    return markdown(titles, rows)
-
-
-def savings(study: Data) -> str:
-    """What the best design saves against the baseline, beside the paper."""
-    points = {point["name"]: point for point in study["points"]}
-    base = points[study["baseline"]]["figures"]
-    rows: list[Sequence[str]] = [PAPER]
-    for library in study["libraries"]:
-        for name in {_best(study, library) or PAPER[1]: None, PAPER[1]: None}:
-            own = points[name]["figures"]
-            losses = [100 * frame["dists_baseline"] for frame in points[name]["workloads"].values()]
-            saved = [1 - own[f"{key}.{library}"] / base[f"{key}.{library}"] for key in ("nj", "mw", "array_kge")]
-            loss = f"{min(losses):.4f} to {max(losses):.4f} %"
-            rows.append([LIBRARIES.get(library, library), name, *(f"{100 * share:.1f} %" for share in saved), loss])
-    return markdown(["", "design", "energy per ray saved", "power saved", "area saved", "DISTS loss of a frame"], rows)
-
-
-def ranking(study: Data) -> str:
-    """The three best designs by each choice of Norm."""
-    rows = [
-        [each["choice"], LIBRARIES.get(each["library"], each["library"]), *each["ranking"][:3], each["ranking"][-1]]
-        for each in study["render_index"]["sensitivity"]
-    ]
-    return markdown(["Norm(loss), or all norms", "library", "best", "second", "third", "last"], rows)
-
-
-def meshes(study: Data) -> str:
-    """DISTS loss and PSNR against Embree of each frame."""
-    names = [workload["name"] for workload in study["workloads"]]
-    rows = []
-    for point in study["points"]:
-        frames = [point["workloads"][name] for name in names]
-        cells = [
-            f"{_number(frame['dists_baseline'], '.2f', 100)} / {_number(frame['psnr'], '.1f')}" for frame in frames
-        ]
-        rows.append([point["name"], *cells])
-    return markdown(["loss, % / PSNR, dB", *names], rows)
-
-
-def conditions(study: Data) -> str:
-    """The windows of the power runs."""
-    rows = []
-    for library in study["libraries"]:
-        for name, run in study["points"][-1]["power"][library].items():
-            cells = [f"{run['cycles']:,}", f"{run['rays_in_box']:,}", f"{run['clock_mhz']:g}"]
-            rows.append([LIBRARIES.get(library, library), name, *cells])
-    return markdown(["library", "mesh", f"cycles, {study['points'][-1]['name']}", "in-box rays", "MHz"], rows)
-
-
-#: The tables of the page.
-TABLES: Mapping[str, Callable[[Data], str]] = {
-    "quality": quality,
-    "cost": cost,
-    "savings": savings,
-    "ranking": ranking,
-    "meshes": meshes,
-    "conditions": conditions,
-}
-
-
-def _best(study: Data, library: str | None = None) -> str | None:
-    """The design of the lowest RenderIndex, with a library or with the first one."""
-    wanted = library or study["libraries"][0]
-    rows = [row for row in study["render_index"]["rows"] if row["library"] == wanted]
-    return min(rows, key=lambda row: float(row["index"]))["name"] if rows else None
-
-
-def _number(value: float | None, form: str, scale: float = 1.0) -> str:
-    return "–" if value is None else format(value * scale, form)
-
-
 def main(docs: Path) -> None:
-    """Rewrite the page in the folder `docs`."""
-    data = docs / "data" / f"{STUDY}.json"
-    study = json.loads(data.read_text()) if data.is_file() else None
-    text = page((docs / PAGE).read_text(), study)
-    with replacing(docs / PAGE) as stream:
-        stream.write(text.encode())
+    """Rewrite the pages in the folder `docs`."""
+    for name in PAGES:
+        data, file = docs / "data" / f"{name}.json", docs / f"{name}.md"
+        text = page(file.read_text(), name, json.loads(data.read_text()) if data.is_file() else None)
+        with replacing(file) as stream:
+            stream.write(text.encode())
 
 
 if __name__ == "__main__":

@@ -248,7 +248,7 @@ def _frames(file: StudyFile) -> list[Frame]:
             key = f"{own.mesh_source} {own.mesh.crease}"
             try:
                 if key not in meshes:
-                    meshes[key] = object_mesh(own)
+                    meshes[key] = object_mesh(own, corner_colours=True)
             except UserError as error:
                 where = ("workload", "scenes", name) if source is None else ("workload", "meshes", source)
                 raise file.error(where, str(error)) from None

@@ -67,7 +67,7 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     face_materials = np.concatenate([np.full(len(part.faces), material) for part, material in parts])
     colours = surface.colours
     if colours is not None:
-        colours = colours * np.array([material.albedo for material in materials])[face_materials]
+        colours = colours * np.array([material.albedo for material in materials])[face_materials][:, None]
     return RawSurface(surface.vertices, surface.faces, surface.normals, materials, face_materials, colours)
 
 
@@ -200,7 +200,7 @@ def _primitive(
             vertices=positions @ linear.T + matrix[:3, 3],
             faces=faces,
             normals=None if normals is None else normals[faces],
-            colours=None if colours is None or (colours == 1.0).all() else np.clip(colours, 0, 1)[faces].mean(axis=1),
+            colours=None if colours is None or (colours == 1.0).all() else np.clip(colours, 0, 1)[faces],
         ),
         int(material),
     )

@@ -26,7 +26,7 @@ from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.normals import corner_normals
-from colonnade.mesh.palette import MAX_MATERIALS, coloured_materials
+from colonnade.mesh.palette import MAX_MATERIALS, coloured_materials, corner_coloured_materials
 from colonnade.mesh.topology import Faces, drop_faces, merge_rows, subdivide, subdivide_corners
 from colonnade.mesh.winding import find_winding
 
@@ -34,7 +34,7 @@ TEAPOT_LEVEL = 10
 TEAPOT_LIMIT = 200
 
 
-def load_mesh(name_or_path: str | Path, crease: float | None = None) -> Mesh:
+def load_mesh(name_or_path: str | Path, crease: float | None = None, corner_colours: bool = False) -> Mesh:
     """Load the mesh of a name or a file, and report its notes (`colonnade.common.notes`).
 
     Names are ``teapot`` and ``teapot:LEVEL``, the solids (``sphere:TRIANGLES``, ``cube`` …), the well-known meshes
@@ -44,25 +44,26 @@ def load_mesh(name_or_path: str | Path, crease: float | None = None) -> Mesh:
         name_or_path: The name or file.
         crease: Angle up to which edges are smooth, degrees, in place of the file's normals. None: the file's normals,
             without them the default angle.
+        corner_colours: Keep the colours of the corners. Otherwise a face has one colour, the mean of its corners.
 
     Raises:
         UserError: The mesh does not exist or cannot be rendered.
     """
-    mesh = _loaded(name_or_path, crease)
+    mesh = _loaded(name_or_path, crease, corner_colours)
     notes.report(mesh.notes)
     return mesh
 
 
-def _loaded(name_or_path: str | Path, crease: float | None) -> Mesh:
+def _loaded(name_or_path: str | Path, crease: float | None, corner_colours: bool) -> Mesh:
     text = str(name_or_path)
     if isinstance(name_or_path, str) and (built := _built_in(text)) is not None:
         return clean_mesh(*built, name=text, crease=crease)
     looks_like_path = os.sep in text or Path(text).suffix.lower() in SUFFIXES
     if isinstance(name_or_path, str) and not looks_like_path and not is_file(Path(text)):
         found = catalog.find(text)
-        mesh = _read(found.path, found.subdivisions, crease)
+        mesh = _read(found.path, found.subdivisions, crease, corner_colours)
         return replace(mesh, name=text)
-    return _read(Path(text), 0, crease)
+    return _read(Path(text), 0, crease, corner_colours)
 
 
 def _built_in(name: str) -> tuple[Floats, Faces] | None:
@@ -86,7 +87,7 @@ def _size(name: str, argument: str, default: int, minimum: int, maximum: int, gi
     return int(argument)
 
 
-def _read(path: Path, subdivisions: int, crease: float | None) -> Mesh:
+def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: bool) -> Mesh:
     """Read a mesh file and split each triangle into four ``subdivisions`` times."""
     require_regular(path, "mesh file")
     if path.suffix.lower() not in SUFFIXES:
@@ -103,14 +104,20 @@ def _read(path: Path, subdivisions: int, crease: float | None) -> Mesh:
         raise UserError(f"{path} cannot be read as a mesh: {type(error).__name__}: {error}") from None
     surface, losses = file.surface, file.losses
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
+    materials, face_materials, colours = surface.materials, surface.material_index, surface.colours
+    if colours is not None and corner_colours:
+        materials, face_materials, colours = corner_coloured_materials(materials, face_materials, colours)
+    else:
+        means = None if colours is None else colours.mean(axis=1)
+        materials, face_materials, number = coloured_materials(materials, face_materials, means)
+        losses.add(lost.COLOURS, number)
+        colours = None
     for _ in range(subdivisions):
         vertices, faces = subdivide(vertices, faces)
         normals = None if normals is None else subdivide_corners(unit_vectors(normals))
-    materials, face_materials, colours = coloured_materials(surface.materials, surface.material_index, surface.colours)
+        colours = None if colours is None else subdivide_corners(colours)
     if len(materials) > MAX_MATERIALS:
         raise UserError(f"mesh {path} has {len(materials):,} materials: use at most {MAX_MATERIALS}")
-    if colours > 0:
-        losses.add(lost.COLOURS, colours)
     return clean_mesh(
         vertices,
         faces.astype(np.int32),
@@ -121,6 +128,7 @@ def _read(path: Path, subdivisions: int, crease: float | None) -> Mesh:
         normals=normals,
         crease=crease,
         losses=losses,
+        colours=colours,
     )
 
 
@@ -134,6 +142,7 @@ def clean_mesh(
     normals: Floats | None = None,
     crease: float | None = None,
     losses: Losses | None = None,
+    colours: Floats | None = None,
 ) -> Mesh:
     """Clean raw vertices and faces.
 
@@ -147,6 +156,7 @@ def clean_mesh(
         normals: Normals of the file, float64 [m, 3, 3]; see `colonnade.mesh.normals.corner_normals`.
         crease: Crease angle, degrees, in place of ``normals``.
         losses: What the file lost so far; what is repaired here is added.
+        colours: Corner colours, float64 [m, 3, 3]; see `Mesh.corner_colours`.
 
     Raises:
         UserError: A vertex is not finite, the size is out of range, or no face has an area.
@@ -174,14 +184,15 @@ def clean_mesh(
         raise UserError(f"{label} is smaller than 1e-100: scale it up")
     used, renumbered = np.unique(corners[keep], return_inverse=True)
     vertices, faces = merged[used], renumbered.reshape(-1, 3).astype(np.int32)
-    normals = None if normals is None else normals[keep]
+    normals, colours = (None if values is None else values[keep] for values in (normals, colours))
     winding = find_winding(vertices, faces)
     if winding.reversed.any():
         losses.add(lost.MIXED, winding.mixed)
         losses.add(lost.INVERTED, winding.inverted)
         faces[winding.reversed] = faces[winding.reversed][:, ::-1]
-        if normals is not None:
-            normals[winding.reversed] = normals[winding.reversed][:, ::-1]
+        for values in (normals, colours):
+            if values is not None:
+                values[winding.reversed] = values[winding.reversed][:, ::-1]
     shading = corner_normals(vertices, faces, normals, crease)
     losses.add(lost.FLIPPED, shading.flipped)
     losses.add(lost.REPLACED, shading.replaced)
@@ -196,4 +207,5 @@ def clean_mesh(
         source_count=source_count,
         name=name,
         notes=losses.lines(label),
+        corner_colours=colours,
     )

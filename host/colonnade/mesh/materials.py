@@ -43,11 +43,13 @@ class MeshMaterial:
         kind: diffuse, mirror or glass.
         albedo: Linear, 0 to 1: diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
+        has_corner_colours: The surface has the colours of `colonnade.mesh.mesh.Mesh.corner_colours`, times `albedo`.
     """
 
     kind: str = "diffuse"
     albedo: Vector = (0.8, 0.8, 0.8)
     ior: float = GLASS_IOR
+    has_corner_colours: bool = False
 
 
 #: Material of meshes without one.

@@ -69,6 +69,8 @@ class Mesh:
         name: Name for reports.
         notes: Lines on what the file holds and a picture does not show, and on what was repaired.
         parts: The objects of a joined mesh, in the order of their source faces; none of a single mesh.
+        corner_colours: Linear colours at the corners of the faces, 0 to 1, 0 on faces whose material has none, float64
+            [m, 3, 3]; None: no material has any.
     """
 
     vertices: Floats
@@ -81,6 +83,7 @@ class Mesh:
     name: str
     notes: tuple[str, ...] = ()
     parts: tuple[MeshPart, ...] = ()
+    corner_colours: Floats | None = None
 
     @cached_property
     def extent(self) -> Extent:

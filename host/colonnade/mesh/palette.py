@@ -1,4 +1,4 @@
-"""Materials of coloured faces, and their reduction to the number that a device has."""
+"""Materials of coloured faces: with the colours of the corners, or reduced to the number that a device has."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 from colonnade.common.types import Floats, Indices
+from colonnade.mesh import losses as lost
+from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
 
@@ -67,6 +69,39 @@ def coloured_materials(
     return (*_used([*found, *tinted], index), number)
 
 
+def corner_coloured_materials(
+    materials: tuple[MeshMaterial, ...], face_materials: Indices, colours: Floats
+) -> tuple[tuple[MeshMaterial, ...], Indices, Floats]:
+    """Materials of the faces that leave their colours to the corners.
+
+    Args:
+        materials: Materials of the file.
+        face_materials: int64 [m].
+        colours: Linear colours of the corners, NaN on faces without, float64 [m, 3, 3].
+
+    Returns:
+        The distinct used materials, the material of each face, int64 [m], and the colours with 0 for NaN.
+    """
+    has_colour = np.asarray(np.isfinite(colours).all(axis=(1, 2)))
+    coloured = [replace(material, albedo=(1.0, 1.0, 1.0), has_corner_colours=True) for material in materials]
+    index = face_materials + np.where(has_colour, len(materials), 0)
+    return (*_used([*materials, *coloured], index), np.where(has_colour[:, None, None], colours, 0.0))
+
+
+def with_face_colours(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
+    """A mesh with corner colours as one with a colour for each face, the mean of its corners, and lines on this."""
+    if mesh.corner_colours is None:
+        return mesh, ()
+    is_coloured = np.array([material.has_corner_colours for material in mesh.materials])[mesh.face_materials]
+    colours = np.where(is_coloured[:, None], mesh.corner_colours.mean(axis=1), np.nan)
+    plain = tuple(replace(material, has_corner_colours=False) for material in mesh.materials)
+    materials, index, number = coloured_materials(plain, mesh.face_materials.astype(np.int64), colours)
+    losses = Losses()
+    losses.add(lost.COLOURS, number)
+    faces = replace(mesh, materials=materials, face_materials=index.astype(np.uint8), corner_colours=None)
+    return faces, losses.lines(f"mesh {mesh.name}")
+
+
 def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     """Reduce a mesh to so many materials by merging similar colours of the same kind and index of refraction.
 
@@ -79,9 +114,9 @@ def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     materials, index = _used(list(mesh.materials), mesh.face_materials.astype(np.int64))
     if len(materials) <= count:
         return replace(mesh, materials=materials, face_materials=index.astype(np.uint8)), None
-    kinds: dict[tuple[str, float], list[int]] = {}
+    kinds: dict[tuple[str, float, bool], list[int]] = {}
     for number, material in enumerate(materials):
-        kinds.setdefault((material.kind, material.ior), []).append(number)
+        kinds.setdefault((material.kind, material.ior, material.has_corner_colours), []).append(number)
     if len(kinds) > count:
         return mesh, None
     weights = np.bincount(index, minlength=len(materials))

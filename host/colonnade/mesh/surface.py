@@ -23,8 +23,8 @@ class RawSurface:
         normals: The file's normals at the corners, of any length, 0 where it has none, float64 [m, 3, 3]; None: none.
         materials: At least one.
         face_materials: int64 [m], index into `materials`.
-        colours: Colours of the faces, which replace the albedo of their materials, linear, 0 to 1, NaN where the file
-            has none, float64 [m, 3]; None: none.
+        colours: Colours at the corners, which replace the albedo of their materials, linear, 0 to 1, NaN on faces
+            without, float64 [m, 3, 3]; None: none.
     """
 
     vertices: Floats
@@ -62,16 +62,16 @@ def from_polygons(
         corner_normals: float64 [k, 3], 0 for none.
         materials: The materials.
         polygon_materials: int64 [p].
-        vertex_colours: float64 [n, 3], linear; a face has the mean of its corners'.
-        polygon_colours: float64 [p, 3], linear, NaN for none.
+        vertex_colours: float64 [n, 3], linear.
+        polygon_colours: float64 [p, 3], linear, NaN for none; before `vertex_colours`.
     """
     split = triangulate(vertices[corners], sizes)
     losses.add(SHORT_FACES, split.short)
     losses.add(CROSSED, split.crossed)
     faces = corners[split.corners]
-    colours = None if polygon_colours is None else polygon_colours[split.polygons]
-    if colours is None and vertex_colours is not None:
-        colours = vertex_colours[faces].mean(axis=1)
+    colours = None if vertex_colours is None else vertex_colours[faces]
+    if polygon_colours is not None:
+        colours = np.repeat(polygon_colours[split.polygons][:, None], 3, axis=1)
     return RawSurface(
         vertices=vertices,
         faces=faces,
@@ -99,5 +99,5 @@ def joined(parts: Sequence[RawSurface]) -> RawSurface:
         normals=filled("normals", (3, 3), 0.0),
         materials=parts[0].materials,
         face_materials=np.concatenate([part.material_index for part in parts]),
-        colours=filled("colours", (3,), np.nan),
+        colours=filled("colours", (3, 3), np.nan),
     )

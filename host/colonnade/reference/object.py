@@ -32,6 +32,7 @@ class ObjectPoints:
         normals: Unit shading normals, flipped as `facing`; they may still face away from the ray, float64 [n, 3].
         front: The ray hits the triangle's front, bool [n].
         t: Distance in lengths of the ray's direction, float64 [n].
+        albedo: Linear, float64 [n, 3].
     """
 
     position: Floats
@@ -39,6 +40,7 @@ class ObjectPoints:
     normals: Floats
     front: NDArray[np.bool_]
     t: Floats
+    albedo: Floats
 
 
 class PlacedObject:
@@ -49,7 +51,8 @@ class PlacedObject:
         self.tracer = RayTracer(mesh)
         index = np.minimum(mesh.face_materials, len(view.materials) - 1)
         self.kinds = np.array([_KINDS[material.kind] for material in view.materials])[index]
-        self.albedo: Floats = np.array([material.albedo for material in view.materials])[index]
+        self._albedo: Floats = np.array([material.albedo for material in view.materials])[index]
+        self._has_colours = np.array([material.has_corner_colours for material in view.materials])[index]
         self.ior: Floats = np.array([material.ior for material in view.materials])[index]
         is_glass = self.kinds == GLASS
         self._transmittance = view.shadow_transmittance
@@ -77,7 +80,11 @@ class PlacedObject:
         if not self._flat:
             smooth = np.einsum("nj,njk->nk", hits.weights, self._mesh.corner_normals[faces]) * sign
             normals = np.where(smooth.any(axis=1, keepdims=True), smooth, facing)
-        return ObjectPoints(hits.position, facing, unit_vectors(normals), ~is_back, hits.t)
+        albedo = self._albedo[faces]
+        if self._mesh.corner_colours is not None:
+            colours = np.einsum("nj,njk->nk", hits.weights, self._mesh.corner_colours[faces])
+            albedo = np.where(self._has_colours[faces][:, None], albedo * colours, albedo)
+        return ObjectPoints(hits.position, facing, unit_vectors(normals), ~is_back, hits.t, albedo)
 
     def light_transmittance(self, origins: Floats, to_light: Floats) -> Floats:
         """Transmittance from the light at origin + ``to_light`` to each origin, 0 behind opaque faces, float64 [n]."""

@@ -80,7 +80,7 @@ class PathTracer:
             if bounces_done == 0:
                 t[path] = hits.t
             is_diffuse = self._object.kinds[hit_faces] == DIFFUSE
-            colours[path[is_diffuse]] = self._shade_object(_select(hits, is_diffuse), hit_faces[is_diffuse])
+            colours[path[is_diffuse]] = self._shade_object(_select(hits, is_diffuse))
             specular = np.flatnonzero(~is_diffuse)
             path, hit_faces, hits = path[specular], hit_faces[specular], _select(hits, specular)
             if len(path) == 0:
@@ -118,7 +118,7 @@ class PathTracer:
             directions, points.normals, points.facing, points.front, kinds == GLASS, self._object.ior[faces]
         )
         is_tinted = (kinds == MIRROR) | points.front
-        weight[path] *= np.where(is_tinted[:, None], self._object.albedo[faces], 1.0)
+        weight[path] *= np.where(is_tinted[:, None], points.albedo, 1.0)
         offset = self._object.tracer.offset * points.facing
         split = np.flatnonzero(scattered.fresnel_weights > 0)
         if len(split):
@@ -170,12 +170,12 @@ class PathTracer:
         self.rays["in_box"] += int(np.count_nonzero(self._object.tracer.enters_box(origins, directions)[0]))
         return self._object.tracer.first_hits(origins, directions)
 
-    def _shade_object(self, points: ObjectPoints, faces: Indices) -> Floats:
+    def _shade_object(self, points: ObjectPoints) -> Floats:
         """Colours of diffuse surfaces, float64 [n, 3]."""
         # The shadow ray starts slightly above the visible side of the surface.
         origins = points.position + self._object.tracer.offset * points.facing
         irradiance, _ = self._irradiance(origins, points.normals, self._view.shadows)
-        return np.asarray((self._object.albedo[faces] * irradiance).clip(max=1.0), dtype=np.float64)
+        return np.asarray((points.albedo * irradiance).clip(max=1.0), dtype=np.float64)
 
     def _shade_background(self, points: BackdropPoints, shadows: bool = True) -> tuple[Floats, Floats]:
         """Colours and shadow ratios of background surfaces, float64 [n, 3] each."""

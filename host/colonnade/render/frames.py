@@ -84,7 +84,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     begun = time.perf_counter()
     with progress.step("packing the scene"):
         maps = device_room(scene, manifest) if scene.objects else None
-        mesh = object_mesh(scene, environment=maps)
+        mesh = object_mesh(scene, corner_colours=manifest.corner_colours, environment=maps)
         if maps is None:
             maps = device_room(scene, manifest)
         if maps is not None:
@@ -249,8 +249,8 @@ def pack_scene(
     scene: Scene, mesh: Mesh, manifest: Manifest, environment: EncodedEnvironment | None = None
 ) -> SceneImage:
     """The scene image of a mesh, with the scene's material and the maps of its room."""
-    mesh = with_materials(scene, mesh, int(manifest.config["frame"]["materials"]))
-    image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
+    mesh = with_materials(scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours)
+    image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material), scene.headroom)
     if environment is None:
         return image
     from colonnade.scene_image.environment import with_environment

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from colonnade.environment.model import Environment
 
 
-def joined_mesh(scene: Scene, environment: Environment | None) -> Mesh:
+def joined_mesh(scene: Scene, environment: Environment | None, corner_colours: bool = False) -> Mesh:
     """Load the objects of a scene and place them in the world, one after the other.
 
     Faces are numbered through all objects in their order, and `Mesh.parts` says where each begins.
@@ -36,7 +36,7 @@ def joined_mesh(scene: Scene, environment: Environment | None) -> Mesh:
     for number, described in enumerate(scene.objects, 1):
         key = f"{described.mesh.source} {described.mesh.crease}"
         if key not in loaded:
-            loaded[key] = load_mesh(described.mesh.source, described.mesh.crease)
+            loaded[key] = load_mesh(described.mesh.source, described.mesh.crease, corner_colours)
         mesh = replace(loaded[key], materials=with_overrides(loaded[key].materials, described.material))
         poses.append(_pose(described, mesh, environment, f"object {number}", taken))
         meshes.append(_flat(mesh) if described.material.flat else mesh)
@@ -92,8 +92,18 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
         ).astype(np.int32),
         source_count=int(first_faces[-1]),
         name=" + ".join(mesh.name for mesh in meshes),
+        corner_colours=_colours(meshes),
         parts=tuple(
             MeshPart(mesh.name, int(first), mesh.extent.edge * pose.scale)
             for mesh, pose, first in zip(meshes, poses, first_faces[:-1], strict=True)
         ),
+    )
+
+
+def _colours(meshes: list[Mesh]) -> Floats | None:
+    """The corner colours of all faces, 0 on meshes without; None if no mesh has any."""
+    if all(mesh.corner_colours is None for mesh in meshes):
+        return None
+    return np.concatenate(
+        [np.zeros((len(mesh.faces), 3, 3)) if mesh.corner_colours is None else mesh.corner_colours for mesh in meshes]
     )

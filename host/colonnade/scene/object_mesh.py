@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from colonnade.common import notes
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.palette import reduced
+from colonnade.mesh.palette import reduced, with_face_colours
 from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Scene
 from colonnade.scene.view import with_overrides
@@ -17,24 +17,33 @@ if TYPE_CHECKING:
     from colonnade.mesh.mesh import Mesh
 
 
-def object_mesh(scene: Scene, materials: int | None = None, environment: Environment | None = None) -> Mesh:
+def object_mesh(
+    scene: Scene, materials: int | None = None, corner_colours: bool = False, environment: Environment | None = None
+) -> Mesh:
     """Load the mesh of a scene, of several objects joined, and report its notes.
 
     Args:
         scene: The scene.
         materials: Entries of the device's material table: of more diffuse colours, similar ones are merged. None: all
             are kept.
+        corner_colours: Keep the colours of the corners, for a device that has them.
         environment: The room of `scene.background`, in which several objects stand.
 
     Raises:
         UserError: The mesh does not exist or cannot be rendered, or one of several objects has no place.
     """
-    mesh = joined_mesh(scene, environment) if scene.objects else load_mesh(scene.mesh_source, scene.mesh.crease)
-    return mesh if materials is None else with_materials(scene, mesh, materials)
+    if scene.objects:
+        mesh = joined_mesh(scene, environment, corner_colours)
+    else:
+        mesh = load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours)
+    return mesh if materials is None else with_materials(scene, mesh, materials, corner_colours)
 
 
-def with_materials(scene: Scene, mesh: Mesh, materials: int) -> Mesh:
-    """The mesh with so many materials at most, as `object_mesh`; the scene's values override them first."""
+def with_materials(scene: Scene, mesh: Mesh, materials: int, corner_colours: bool) -> Mesh:
+    """The mesh with what a device has, as `object_mesh`; the scene's values override its materials first."""
+    if not corner_colours:
+        mesh, lines = with_face_colours(mesh)
+        notes.report(lines)
     if len(mesh.materials) <= materials:
         return mesh
     mesh, line = reduced(replace(mesh, materials=with_overrides(mesh.materials, scene.material)), materials)

@@ -72,16 +72,19 @@ def quantise(mesh: Mesh, vertex_bits: int) -> QuantisedMesh:
     return QuantisedMesh(vertices.astype(np.int32), mesh.faces[keep], keep, frame)
 
 
-def pack(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | None = None) -> SceneImage:
+def pack(
+    mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | None = None, headroom: float = 1.0
+) -> SceneImage:
     """Pack a mesh into a scene image for a design.
 
     Args:
         mesh: The mesh.
         manifest: The design's manifest.
         materials: Materials that replace the mesh's. The records only contain which faces are glass.
+        headroom: Factor of the scene's lights, by which the corner colours of diffuse faces are darker.
 
     Raises:
-        UserError: The mesh does not fit; the message names the size and the setting.
+        UserError: The mesh does not fit or has corner colours that the design lacks; the message names the setting.
     """
     geometry, memory = manifest.config["geometry"], manifest.config["columnBvhMemory"]
     quantised = quantise(mesh, int(geometry["vertexBits"]))
@@ -107,7 +110,8 @@ def pack(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | Non
     is_glass = np.array([material.kind == "glass" for material in materials])
     is_clear = is_glass[mesh.face_materials[quantised.mesh_faces]]
     sections.append(_triangle_records(quantised, bvh.order, leaf_first, leaf_count, is_clear, manifest))
-    sections.append(_attribute_records(mesh, quantised, bvh.order, manifest, faces_per_record))
+    colours = _corner_colours(mesh, manifest, materials, headroom)
+    sections.append(_attribute_records(mesh, quantised, bvh.order, manifest, faces_per_record, colours))
     corners = quantised.vertices[quantised.faces]
     header = ImageHeader(
         format_hash=manifest.format_hash,
@@ -212,8 +216,33 @@ def _triangle_records(
     return manifest.layouts["triangles"].pack(values)
 
 
+def _corner_colours(
+    mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], headroom: float
+) -> npt.NDArray[np.int64] | None:
+    """The colours of the records, int64 [faces of the mesh, 3, 3]; None for a design without them."""
+    if not manifest.corner_colours:
+        if any(material.has_corner_colours for material in materials):
+            raise UserError(
+                f"mesh {mesh.name} has colours at its corners, the hardware has none: set geometry.cornerColours=true"
+            )
+        return None
+    if mesh.corner_colours is None:
+        return np.zeros((len(mesh.faces), 3, 3), dtype=np.int64)
+    white = (1 << manifest.numbers["colourBits"]) - 1
+    factors = [
+        np.array(material.albedo) / (headroom if material.kind == "diffuse" else 1.0) * material.has_corner_colours
+        for material in materials
+    ]
+    return np.rint(mesh.corner_colours * np.array(factors)[mesh.face_materials][:, None] * white).astype(np.int64)
+
+
 def _attribute_records(
-    mesh: Mesh, quantised: QuantisedMesh, order: npt.NDArray[np.uint32], manifest: Manifest, per_record: int
+    mesh: Mesh,
+    quantised: QuantisedMesh,
+    order: npt.NDArray[np.uint32],
+    manifest: Manifest,
+    per_record: int,
+    colours: npt.NDArray[np.int64] | None,
 ) -> Bytes:
     """Pack the attribute records in the order of packed ids; the last record may have empty slots."""
     one = (1 << manifest.numbers["normalFraction"]) - 1
@@ -231,6 +260,9 @@ def _attribute_records(
             values |= _vector(f"faces[{k}].normals[{j}]", normals[face, j])
         values |= _vector(f"faces[{k}].geometricNormal", normals[face, 3])
         values[f"faces[{k}].material"] = materials[face]
+        if colours is not None:
+            for j in range(3):
+                values |= {f"faces[{k}].colours[{j}].{name}": colours[rows, j, c] for c, name in enumerate("rgb")}
     return manifest.layouts["attributes"].pack(values)
 
 

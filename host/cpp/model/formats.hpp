@@ -111,6 +111,8 @@ struct Triangles {
 struct Face {
     std::array<Vector, 3> normals;
     Vector geometricNormal;
+    /// By corner, linear; zeros in a record without them.
+    std::array<Vector, 3> colours;
     int material;
 };
 
@@ -143,6 +145,9 @@ public:
             for (int corner = 0; corner < 3; ++corner)
                 fields.normals[corner] = vectorOf(attributes, prefix + "normals[" + std::to_string(corner) + "]");
             fields.geometricNormal = vectorOf(attributes, prefix + "geometricNormal");
+            fields.hasColours = attributes.count(prefix + "colours[0].r") != 0;
+            for (int corner = 0; corner < 3 && fields.hasColours; ++corner)
+                fields.colours[corner] = vectorOf(attributes, prefix + "colours[" + std::to_string(corner) + "]", "rgb");
             fields.material = attributes.at(prefix + "material");
             faces_.push_back(fields);
         }
@@ -197,6 +202,7 @@ public:
         Face result{};
         for (int corner = 0; corner < 3; ++corner) result.normals[corner] = read(fields.normals[corner], record);
         result.geometricNormal = read(fields.geometricNormal, record);
+        for (int corner = 0; corner < 3 && fields.hasColours; ++corner) result.colours[corner] = read(fields.colours[corner], record);
         result.material = static_cast<int>(fields.material.read(record));
         return result;
     }
@@ -206,12 +212,14 @@ private:
     struct FaceFields {
         std::array<VectorFields, 3> normals;
         VectorFields geometricNormal;
+        bool hasColours;
+        std::array<VectorFields, 3> colours;
         Field material;
     };
 
     static std::uint32_t maskOf(const Field& field) { return static_cast<std::uint32_t>((std::uint64_t(1) << field.width) - 1); }
-    static VectorFields vectorOf(const Layout& layout, const std::string& name) {
-        return {layout.at(name + ".x"), layout.at(name + ".y"), layout.at(name + ".z")};
+    static VectorFields vectorOf(const Layout& layout, const std::string& name, const char* components = "xyz") {
+        return {layout.at(name + "." + components[0]), layout.at(name + "." + components[1]), layout.at(name + "." + components[2])};
     }
     static Vector read(const VectorFields& fields, const std::uint8_t* record) {
         return {fields[0].read(record), fields[1].read(record), fields[2].read(record)};

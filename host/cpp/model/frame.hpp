@@ -87,8 +87,9 @@ public:
             }
             const Surface surface = surfaceOf(ray, hit, *face, numbers_);
             const Material& material = frame_.lighting.materialOf(*face);
-            if (material.kind == MaterialKind::diffuse) return finish(pixel, path, light(surface, material));
-            if (!continuePath(surface, material, path, request)) return finish(pixel, path, missRadiance(request));
+            const Colour albedo = albedoOf(material, hit, *face, numbers_);
+            if (material.kind == MaterialKind::diffuse) return finish(pixel, path, light(surface, albedo));
+            if (!continuePath(surface, material, albedo, path, request)) return finish(pixel, path, missRadiance(request));
         }
     }
 
@@ -132,9 +133,9 @@ private:
         return colour;
     }
 
-    Colour light(const Surface& surface, const Material& material) {
+    Colour light(const Surface& surface, const Colour& albedo) {
         const WideVector origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
-        return reflectedBy(material.albedo, incoming(origin, shadingNormal(surface, frame_.lighting.flat), true).visible);
+        return reflectedBy(albedo, incoming(origin, shadingNormal(surface, frame_.lighting.flat), true).visible);
     }
 
     /// Incoming light at a point of the environment; `normal` has 11 fraction bits.
@@ -211,7 +212,7 @@ private:
     std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const { return part == whole ? std::int64_t(1) << numbers_.lightFraction : (part << numbers_.lightFraction) / whole; }
 
     /// Continues a path at a mirror or glass; false if the next ray sees only the background.
-    bool continuePath(const Surface& surface, const Material& material, Path& path, RayRequest& request) {
+    bool continuePath(const Surface& surface, const Material& material, const Colour& albedo, Path& path, RayRequest& request) {
         const Bounce next = bounce(surface, material, frame_.lighting.flat, frame_.lighting.offset, numbers_);
         Colour reflectionColour = frame_.lighting.background;
         if (frame_.hasEnvironment && next.fresnelWeight != 0) {
@@ -226,8 +227,8 @@ private:
         for (int channel = 0; channel < 3; ++channel) {
             std::int64_t& throughput = path.throughput[channel];
             // A value of all ones is 1.0
-            const std::int64_t albedo = material.albedo[channel] + (material.albedo[channel] >> (numbers_.colourBits - 1));
-            if (isTinted) throughput = (throughput * albedo) >> numbers_.lightFraction;
+            const std::int64_t tint = albedo[channel] + (albedo[channel] >> (numbers_.colourBits - 1));
+            if (isTinted) throughput = (throughput * tint) >> numbers_.lightFraction;
             const std::int64_t reflected = (throughput * next.fresnelWeight) >> numbers_.lightFraction;
             path.radiance[channel] = std::min(white(), path.radiance[channel] + ((reflected * reflectionColour[channel]) >> numbers_.lightFraction));
             throughput -= reflected;

@@ -12,6 +12,8 @@ enum class MaterialKind : std::uint8_t { diffuse = 0, mirror = 1, glass = 2 };
 /// A material. `eta` is the relative index of refraction on the front and the back side; `reflectance` is at normal incidence, 12 fraction bits.
 struct Material {
     Colour albedo;
+    /// The albedo is that of the corners of the face.
+    bool hasCornerColours;
     MaterialKind kind;
     std::array<std::int64_t, 2> eta;
     std::int64_t reflectance;
@@ -106,6 +108,23 @@ inline Surface surfaceOf(const Ray& ray, const Hit& hit, const Face& face, const
         if (hit.backSide) surface.smooth[axis] = -surface.smooth[axis];
     }
     return surface;
+}
+
+/// The colours at the corners of a face, interpolated at a hit: a quotient of sums, rounded to nearest. White if all weights are 0.
+inline Colour cornerColour(const Hit& hit, const Face& face, const Numbers& n) {
+    const std::int64_t total = hit.weights[0] + hit.weights[1] + hit.weights[2];
+    Colour colour;
+    for (int channel = 0; channel < 3; ++channel) {
+        std::int64_t sum = total / 2;
+        for (int corner = 0; corner < 3; ++corner) sum += hit.weights[corner] * face.colours[corner][channel];
+        colour[channel] = total == 0 ? (std::int64_t(1) << n.colourBits) - 1 : sum / total;
+    }
+    return colour;
+}
+
+/// The albedo of the object at a hit.
+inline Colour albedoOf(const Material& material, const Hit& hit, const Face& face, const Numbers& n) {
+    return material.hasCornerColours ? cornerColour(hit, face, n) : material.albedo;
 }
 
 /// Moves a position off the surface, along the normal for a positive offset.

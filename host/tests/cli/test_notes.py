@@ -48,6 +48,14 @@ def test_colours_beyond_the_material_table_are_merged_and_noted(folder: Path) ->
         assert "2 materials become 1, their colours off by" in noted.stderr and "frame.materials is 1" in noted.stderr
 
 
+@pytest.mark.parametrize("backend", ["model", "reference"])
+def test_hardware_with_corner_colours_keeps_them_all(folder: Path, backend: str) -> None:
+    command = f"{hostile.RENDER} --mesh x.obj --backend {backend}"
+    noted = invoked(folder, f"{command} --set geometry.cornerColours=true --set frame.materials=1")
+    assert noted.exit_code == 0, noted.output
+    assert noted.stderr.splitlines() == [LINE]
+
+
 def test_an_albedo_of_the_scene_replaces_all_colours(folder: Path) -> None:
     (folder / "s.toml").write_text(f"{hostile.SCENE}[material]\nalbedo = [0.5, 0.5, 0.5]\n")
     noted = invoked(folder, f"{hostile.RENDER} --mesh x.obj --set frame.materials=1")

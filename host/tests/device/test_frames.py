@@ -16,8 +16,10 @@ from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.evaluation.fuzz.cases import coloured
 from colonnade.evaluation.throughput import figures, records_taken
 from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import MeshMaterial
 from colonnade.registers.frame import frame_registers
 from colonnade.render.report import frame_report
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
@@ -66,6 +68,27 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     for frame, settings in zip(simulated.frames, registers, strict=True):
         assert_equal(frame, render_model(design.manifest, image, settings))
     assert simulated.frames[0].is_object.any()
+
+
+def test_corner_colours_equal_the_model() -> None:
+    """Diffuse, mirroring and clear faces with colours at their corners, and faces without."""
+    design = design_for("tiny", ("geometry.cornerColours=true", "frame.maxBounces=4", "frame.materials=4"))
+    mesh = load_mesh("teapot:4")
+    kinds = (("diffuse", True), ("mirror", True), ("glass", True), ("diffuse", False))
+    materials = tuple(MeshMaterial(kind, (0.9, 0.8, 0.7), has_corner_colours=has) for kind, has in kinds)
+    index = np.arange(len(mesh.faces), dtype=np.uint8) // 8 % 4
+    mixed = replace(coloured(mesh), materials=materials, face_materials=index)
+    image = pack(mixed, design.manifest)
+    scene = replace(TEAPOT, background=SKY, paths=Paths(bounces=2))
+    registers = [
+        frame_registers(replace(scene, camera=camera), image.header, design.manifest, 48, 37)
+        for camera in (Camera(), Camera(direction=(-1.0, -0.2, 0.1)))
+    ]
+    simulated = render_rtl(design, image, registers, Stalls(10, 3))
+    for frame, settings in zip(simulated.frames, registers, strict=True):
+        assert_equal(frame, render_model(design.manifest, image, settings))
+        plain = settings | {f"materials[{i}].hasCornerColours": 0 for i in range(4)}
+        assert (frame.colour != render_model(design.manifest, image, plain).colour).any(axis=2).mean() > 0.1
 
 
 @pytest.mark.parametrize("mesh", ["teapot:4", "torus"])

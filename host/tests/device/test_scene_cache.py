@@ -67,3 +67,8 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
     failed, second = render_rtl(design, image, [registers, registers], stalls).frames
     assert "memory" in failed.errors
     assert_same(second, expected)
+    # So does a frame whose reads are not answered. The next one waits for the late answers, and forgets them
+    late = registers | {"frame.watchdogCycles": 20_000}
+    failed, second = render_rtl(design, image, [late, registers], Stalls(seed=2, dram_silent=20)).frames
+    assert set(failed.errors) == {"memory", "watchdog"}
+    assert_same(second, expected)

@@ -1,4 +1,4 @@
-"""The generated tables of docs/mixed-precision.md."""
+"""The generated tables of the pages that show studies."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ from colonnade.design.toolchain import project_root
 from colonnade.explore import pages
 
 DOCS = project_root() / "docs"
-DATA = DOCS / "data" / f"{pages.STUDY}.json"
 
 
-def test_without_data_the_page_says_what_to_run() -> None:
-    text = pages.page((DOCS / pages.PAGE).read_text(), None)
-    assert text.count("Not measured: run `tools/studies mixed-precision`.") == len(pages.TABLES)
+@pytest.mark.parametrize("name", pages.PAGES)
+def test_without_data_a_page_says_what_to_run(name: str) -> None:
+    text = pages.page((DOCS / f"{name}.md").read_text(), name, None)
+    assert text.count(f"Not measured: run `tools/studies {name}`.") == len(pages.PAGES[name])
 
 
-@pytest.mark.skipif(not DATA.is_file(), reason="the study is not in docs/data")
-def test_the_page_is_that_of_the_data() -> None:
-    text = (DOCS / pages.PAGE).read_text()
-    assert pages.page(text, json.loads(DATA.read_text())) == text
+@pytest.mark.parametrize("name", pages.PAGES)
+def test_a_page_is_that_of_its_data(name: str) -> None:
+    data = DOCS / "data" / f"{name}.json"
+    if not data.is_file():
+        pytest.skip(f"the study {name} is not in docs/data")
+    text = (DOCS / f"{name}.md").read_text()
+    assert pages.page(text, name, json.loads(data.read_text())) == text

@@ -2,8 +2,8 @@
 //
 // Reads take `latency` cycles and then deliver a beat per cycle, in the order of the reads: a pipe of fixed latency. With
 // `randomPercent`, addresses and beats are refused or withheld in that share of the cycles, and reads of different ids
-// overtake each other. A read beyond the scene is answered with DECERR; with `errorsPer1024`, so many of 1024 beats of the
-// first frame with SLVERR.
+// overtake each other. A read beyond the scene is answered with DECERR. Two failures end with the first frame: with
+// `errorsPer1024`, so many of 1024 beats are answered with SLVERR; with `silentAfter`, reads are answered no more after so many.
 #pragma once
 #include <cstdint>
 #include <cstring>
@@ -13,9 +13,10 @@
 #include <vector>
 
 struct DramOptions {
-    unsigned latency = 100, randomPercent = 0, errorsPer1024 = 0, seed = 1;
+    unsigned latency = 100, randomPercent = 0, errorsPer1024 = 0, silentAfter = 0, seed = 1;
 };
 
+#ifdef DRAM_BUS_BYTES
 /// Layout of the scene: lines of `lineRecords` records at a pitch of `linePitch` bytes, from address 0.
 template <class Top> class Dram {
 public:
@@ -50,7 +51,10 @@ public:
         ++now_;
         if (top_.io_memory_r_valid && top_.io_memory_r_ready) {
             offers_ = false;
-            if (++reads_[chosen_].sent == reads_[chosen_].beats) reads_.erase(reads_.begin() + static_cast<std::ptrdiff_t>(chosen_));
+            if (++reads_[chosen_].sent == reads_[chosen_].beats) {
+                reads_.erase(reads_.begin() + static_cast<std::ptrdiff_t>(chosen_));
+                ++answered_;
+            }
         }
         if (!top_.io_memory_ar_valid || !top_.io_memory_ar_ready) return;
         const std::uint64_t address = top_.io_memory_ar_bits_addr;
@@ -60,7 +64,7 @@ public:
     }
 
     /// From now on no read fails.
-    void stopFailing() { options_.errorsPer1024 = 0; }
+    void stopFailing() { options_.errorsPer1024 = options_.silentAfter = 0; }
 
 private:
     struct Read {
@@ -72,6 +76,7 @@ private:
 
     /// Chooses the read whose next beat is offered: the oldest, or any that is the oldest of its id.
     void choose() {
+        if (options_.silentAfter != 0 && answered_ >= options_.silentAfter) return;
         std::vector<std::size_t> candidates;
         bool isSeen[256] = {};
         for (std::size_t i = 0; i < reads_.size(); ++i) {
@@ -93,5 +98,6 @@ private:
     std::deque<Read> reads_;
     std::size_t chosen_ = 0;
     bool offers_ = false, fails_ = false;
-    std::uint64_t now_ = 0;
+    std::uint64_t now_ = 0, answered_ = 0;
 };
+#endif

@@ -11,7 +11,7 @@
 //
 // Options: --stall PERCENT of cycles in which the pixel sink is not ready; --seed N; for designs with memory stalls:
 // --memory PERCENT of cycles in which each bank is stalled, --burst N, the longest stall in cycles;
-// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-random PERCENT, --dram-errors N (dram.hpp);
+// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-random PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
 // --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
 // With WAVEFORM defined, --waveform FILE writes the signals of the frames as VCD; the time unit is a cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
@@ -33,13 +33,7 @@
 // EACH_COLUMN(DO): DO(column) for each column. If the design has them: HIT_DISTANCE(column) of the hit,
 // RATIO(column, channel), the shadow ratio, and MEMORY_BANKS, the number of banks of all columns.
 #include "ports.hpp"
-#ifdef DRAM_BUS_BYTES
 #include "dram.hpp"
-#else
-struct DramOptions {
-    unsigned latency = 100, randomPercent = 0, errorsPer1024 = 0, seed = 1;
-};
-#endif
 
 namespace {
 
@@ -59,8 +53,9 @@ template <class Port> double numberOf(const Port& port) {
     return static_cast<double>(value);
 }
 
-/// Maximum cycles from the watchdog's abort to the end of the frame.
-constexpr std::uint64_t watchdogMargin = 100'000;
+/// Maximum cycles from the watchdog's last expiry to the end of the frame, and expiries: an abort, and the end of waiting
+/// for a DRAM that is silent.
+constexpr std::uint64_t watchdogMargin = 100'000, watchdogs = 2;
 
 /// A common multiple of the periods of all free-running counters, such as the beats of shared arithmetic units.
 constexpr std::uint64_t freePeriods = 840;
@@ -209,7 +204,7 @@ public:
             stalls_.next(top_.io_memoryHolds);
 #endif
             cycle();
-            if (watchdog != 0 && quiet_ > watchdog + watchdogMargin) throw std::runtime_error("the watchdog did not abort the frame in time");
+            if (watchdog != 0 && quiet_ > watchdogs * watchdog + watchdogMargin) throw std::runtime_error("the watchdog did not abort the frame in time");
             if ((cycles_ & 0xff) == 0 && std::chrono::steady_clock::now() - lastReport > std::chrono::milliseconds(250)) {
                 lastReport = std::chrono::steady_clock::now();
                 std::cerr << "progress " << static_cast<double>(received_) / static_cast<double>(pixels_.size()) << std::endl;
@@ -353,7 +348,7 @@ int main(int argc, char** argv) try {
     Options options;
     const std::pair<const char*, unsigned*> named[] = {
         {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}, {"--check", &options.checkInterval},
-        {"--dram", &options.dram.latency}, {"--dram-random", &options.dram.randomPercent}, {"--dram-errors", &options.dram.errorsPer1024}};
+        {"--dram", &options.dram.latency}, {"--dram-random", &options.dram.randomPercent}, {"--dram-errors", &options.dram.errorsPer1024}, {"--dram-silent", &options.dram.silentAfter}};
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });

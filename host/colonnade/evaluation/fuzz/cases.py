@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from colonnade.design.manifest import Manifest
+from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
 from colonnade.scene.object_mesh import object_mesh
@@ -18,6 +19,9 @@ SIZE = (16, 12)
 
 #: Far more cycles than a legal frame of this size takes.
 WATCHDOG_CYCLES = 400_000
+
+#: Name of the scene whose corners have colours.
+COLOURED = "corner colours"
 
 SKY = Background(colour=(0.2, 0.3, 0.5))
 
@@ -50,6 +54,8 @@ def _scenes(manifest: Manifest) -> Iterator[tuple[str, Scene]]:
     yield "inside", replace(sphere, camera=Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0)))
     if int(frame["lights"]) > 1:
         yield "two lights", replace(sphere, light=Light(falloff=3.0), more_lights=(Light(offset=(-1.0, 0.5, 2.0)),))
+    if manifest.corner_colours:
+        yield COLOURED, sphere
     if int(frame["maxBounces"]) > 0:
         mirror, glass = Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Material(kind="glass", ior=1.45)
         yield "mirror", replace(cube, material=mirror, paths=Paths(bounces=3))
@@ -58,6 +64,15 @@ def _scenes(manifest: Manifest) -> Iterator[tuple[str, Scene]]:
 
 def _case(name: str, scene: Scene, manifest: Manifest) -> Case:
     mesh = object_mesh(scene)
+    if name == COLOURED:
+        mesh = coloured(mesh)
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     registers = frame_registers(scene, image.header, manifest, *SIZE)
     return Case(name, image, registers | {"frame.watchdogCycles": WATCHDOG_CYCLES})
+
+
+def coloured(mesh: Mesh) -> Mesh:
+    """The mesh with a colour at each vertex, by position."""
+    colours = (mesh.vertices - mesh.extent.low) / mesh.extent.edge
+    materials = tuple(replace(material, has_corner_colours=True) for material in mesh.materials)
+    return replace(mesh, materials=materials, corner_colours=colours[mesh.faces])

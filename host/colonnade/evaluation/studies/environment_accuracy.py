@@ -95,8 +95,16 @@ class EnvironmentAccuracy:
 
 
 @dataclass(frozen=True)
-class _Comparison:
-    """Hits of the same rays on the depth mesh (`truth`) and in the march (`marched`)."""
+class Comparison:
+    """Hits of the same rays on the depth mesh (`truth`) and in the march (`marched`).
+
+    Attributes:
+        rays: The rays.
+        truth: Hits on the mesh; a hit from behind is outside.
+        misses_mesh: Rays without any hit on the mesh, bool [n].
+        marched: Hits in the march.
+        ok: Known rays that are right, bool [n].
+    """
 
     rays: Rays
     truth: SurfaceHits
@@ -106,6 +114,7 @@ class _Comparison:
 
     @property
     def found(self) -> NDArray[np.bool_]:
+        """Rays with a hit on the map, bool [n]."""
         return _found(self.marched)
 
 
@@ -125,9 +134,9 @@ def study(environment: Environment, march: RayMarch, depth: Floats | None = None
     centres = standing_spheres(environment)
     if len(centres) == 0:
         raise UserError(f"room {environment.name} has no level surface on which a sphere is in full view")
-    mirror = [_compare(environment, mesh, march, mirror_rays(centre)) for centre in centres]
-    cosine = [_compare(environment, mesh, march, cosine_rays(centre, COSINE_RAYS, random)) for centre in centres]
-    glass = [_compare(environment, mesh, march, glass_rays(centre)) for centre in centres]
+    mirror = [compare(environment, mesh, march, mirror_rays(centre)) for centre in centres]
+    cosine = [compare(environment, mesh, march, cosine_rays(centre, COSINE_RAYS, random)) for centre in centres]
+    glass = [compare(environment, mesh, march, glass_rays(centre)) for centre in centres]
     steps = np.concatenate([comparison.marched.steps for comparison in (*mirror, *cosine, *glass)])
     pictures = [_pictures(environment, comparison) for comparison in mirror]
     known = np.concatenate([mask for _, _, mask in pictures], axis=1)
@@ -147,19 +156,25 @@ def study(environment: Environment, march: RayMarch, depth: Floats | None = None
     )
 
 
-def _compare(environment: Environment, mesh: DepthMesh, march: RayMarch, rays: Rays) -> _Comparison:
+def compare(environment: Environment, mesh: DepthMesh, march: RayMarch, rays: Rays) -> Comparison:
+    """Trace rays through the room's mesh and through a march of it."""
     truth = mesh.intersect(rays.origins, rays.directions)
     marched = march(rays.origins, rays.directions)
+    return Comparison(rays, truth, np.isnan(truth.u), marched, are_right(environment, truth, marched))
+
+
+def are_right(environment: Environment, truth: SurfaceHits, marched: MarchHits) -> NDArray[np.bool_]:
+    """Rays whose true hit is in the maps and near that of the march, bool [n]."""
     near = np.hypot(marched.seen_u - truth.u, marched.seen_v - truth.v) <= NEAR_PIXELS
     near |= np.linalg.norm(positions(environment, marched) - truth.position, axis=1) <= NEAR_METRES
-    return _Comparison(rays, truth, np.isnan(truth.u), marched, near & _found(marched) & ~truth.outside)
+    return np.asarray(near & _found(marched) & ~truth.outside, dtype=np.bool_)
 
 
 def _found(marched: MarchHits) -> NDArray[np.bool_]:
     return np.asarray((marched.kind == HIT) | (marched.kind == HIDDEN), dtype=np.bool_)
 
 
-def _ray_accuracy(parts: list[_Comparison]) -> RayAccuracy:
+def _ray_accuracy(parts: list[Comparison]) -> RayAccuracy:
     def all_of(values: Iterable[NDArray[Any]]) -> NDArray[Any]:
         return np.concatenate(list(values))
 
@@ -178,7 +193,7 @@ def _ray_accuracy(parts: list[_Comparison]) -> RayAccuracy:
 
 
 def _pictures(
-    environment: Environment, comparison: _Comparison
+    environment: Environment, comparison: Comparison
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.bool_]]:
     """Pictures of a mirror sphere by depth mesh and by march, uint8 [h, w, 3], and the mask of known rays.
 

@@ -237,7 +237,7 @@ def single_bounce(mesh: Mesh, view: View, environment: Environment) -> SingleBou
     mask[hit[is_known]] = True
     column = np.clip(seen.u[is_known], 0, environment.width - 1).astype(np.intp)
     row = np.clip(seen.v[is_known], 0, environment.height - 1).astype(np.intp)
-    tint = target.albedo[faces[hit[is_known]]]
+    tint = points.albedo[is_known]
     return SingleBounce(
         mask.reshape(view.height, view.width),
         tint * decode_srgb(environment.photo[row, column]),

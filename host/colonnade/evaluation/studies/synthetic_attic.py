@@ -67,9 +67,9 @@ def attic(width: int = 640, height: int = 480) -> SyntheticRoom:
 
 
 def synthetic_room(
-    name: str, parts: Sequence[Part], camera: EnvironmentCamera, width: int, height: int
+    name: str, parts: Sequence[Part], camera: EnvironmentCamera, width: int, height: int, lamp: Floats = LAMP
 ) -> SyntheticRoom:
-    """Render the maps of a room that is made of parts.
+    """Render the maps of a room that is made of parts, with a photo by the light of a lamp at a point, float64 [3].
 
     Raises:
         ValueError: The camera sees through the room.
@@ -97,7 +97,7 @@ def synthetic_room(
             normals[rows] = _smooth(points.position[rows], normals[rows], part)
     normals *= np.where(np.einsum("ni,ni->n", normals, directions) > 0, -1.0, 1.0)[:, None]
 
-    to_lamp = LAMP - points.position
+    to_lamp = lamp - points.position
     cosine = np.einsum("ni,ni->n", normals, unit_vectors(to_lamp)).clip(min=0)
     lit = ~tracer.occluded(points.position + 1e-3 * normals, to_lamp)
     falloff = 1 / np.einsum("ni,ni->n", to_lamp, to_lamp).clip(min=0.25)
@@ -115,23 +115,22 @@ def synthetic_room(
     return SyntheticRoom(environment, surface)
 
 
-def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
-    """Write the attic as the folder of a room."""
+def write_room(folder: Path, environment: Environment) -> None:
+    """Write a synthetic room as the folder of a room."""
     from PIL import Image
 
-    environment = attic(width, height).environment
     folder.mkdir(parents=True, exist_ok=True)
     pose = environment.camera_to_world * np.array([-1.0, -1.0, 1.0, 1.0])
     meta: dict[str, Any] = {
-        "width": width,
-        "height": height,
+        "width": environment.width,
+        "height": environment.height,
         "fx": environment.fx,
         "fy": environment.fy,
         "cx": environment.cx,
         "cy": environment.cy,
     }
     meta |= {"cam_to_world": [*pose.tolist(), [0.0, 0.0, 0.0, 1.0]], "albedo_encoding": "srgb"}
-    meta |= {"depth_step": DEPTH_STEP, "licence": "CC0: made by colonnade.evaluation.studies.synthetic_attic"}
+    meta |= {"depth_step": DEPTH_STEP, "licence": "CC0: made by colonnade.evaluation.studies"}
     write_png(folder / "albedo.png", environment.albedo)
     pictures = {
         "normal.png": np.rint((environment.normals * np.array([1.0, -1.0, -1.0]) * 0.5 + 0.5) * 255).astype(np.uint8),
@@ -145,12 +144,17 @@ def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
         stream.write((json.dumps(meta, indent=1) + "\n").encode())
 
 
-def camera_at(eye: Floats, target: Floats, width: int, height: int) -> EnvironmentCamera:
-    """A camera of the attic's focal length at a point, float64 [3], that looks at another one."""
+def write_attic(folder: Path, width: int = 640, height: int = 480) -> None:
+    """Write the attic as the folder of a room."""
+    write_room(folder, attic(width, height).environment)
+
+
+def camera_at(eye: Floats, target: Floats, width: int, height: int, focal: float = FOCAL) -> EnvironmentCamera:
+    """A camera at a point, float64 [3], that looks at another one; focal length in picture widths."""
     forward = unit_vectors((target - eye)[None])[0]
     right = unit_vectors(np.cross(forward, [0.0, 1.0, 0.0])[None])[0]
     pose = np.column_stack([right, np.cross(forward, right), forward, eye])
-    return EnvironmentCamera(FOCAL * width, FOCAL * width, width / 2, height / 2, pose)
+    return EnvironmentCamera(focal * width, focal * width, width / 2, height / 2, pose)
 
 
 def _parts() -> list[Part]:
@@ -177,10 +181,8 @@ def _parts() -> list[Part]:
         cylinder((-0.2, 0.004, -0.6), 1.25, 0.004, rings((0.55, 0.14, 0.16), 0.21)),
         box((1.6, 0.3, -0.9), (0.45, 0.3, 0.3), 32.0, boards((0.36, 0.44, 0.25), 0, 1, 0.14)),
     ]
-    ball, faces = primitives.sphere(6)
-    parts.append(Part(ball * 0.38 + (-1.5, 0.38, -0.5), faces, stripes, (-1.5, 0.38, -0.5), True))
-    lamp = ball * (0.14, 0.10, 0.14) + (-0.25, 2.35, -1.2)
-    parts.append(Part(lamp, faces, plaster((0.82, 0.80, 0.70)), (-0.25, 2.35, -1.2), True))
+    parts.append(ball((-1.5, 0.38, -0.5), (0.38, 0.38, 0.38), stripes))
+    parts.append(ball((-0.25, 2.35, -1.2), (0.14, 0.10, 0.14), plaster((0.82, 0.80, 0.70))))
     return parts
 
 
@@ -203,6 +205,12 @@ def box(centre: tuple[float, float, float], half: tuple[float, float, float], de
     angle = np.radians(degrees)
     rotation = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     return Part(vertices * half @ rotation.T + centre, faces, lambda points: paint(points @ rotation))
+
+
+def ball(centre: tuple[float, float, float], radii: tuple[float, float, float], paint: Paint, level: int = 6) -> Part:
+    """A ball with a radius along each axis; ``level`` as in `primitives.sphere`."""
+    vertices, faces = primitives.sphere(level)
+    return Part(vertices * radii + centre, faces, paint, centre, True)
 
 
 def _smooth(points: Floats, flat: Floats, part: Part) -> Floats:

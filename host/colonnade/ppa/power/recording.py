@@ -26,7 +26,7 @@ from colonnade.device.verilator import write_job
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Scene
-from colonnade.scene.object_mesh import object_mesh
+from colonnade.scene.object_mesh import object_mesh, with_materials
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import with_overrides
 from colonnade.scene_image.packer import pack
@@ -133,7 +133,7 @@ class Stimulus:
     def of_benchmark(mesh: str, size: tuple[int, int] | None, cycles: int) -> Stimulus:
         """The benchmark scene with a mesh, a name or a file."""
         scene = load_scene(project_root() / "scenes" / "object.toml").with_mesh(mesh)
-        return Stimulus(scene, object_mesh(scene), size, cycles)
+        return Stimulus(scene, object_mesh(scene, corner_colours=True), size, cycles)
 
 
 def whole_frame(rows: int) -> tuple[int, int]:
@@ -177,8 +177,10 @@ def record(
     design = design_for(config, one_column, progress)
     size = require_recordable(stimulus, design.manifest)
     with progress.step("packing the scene"):
-        image = pack(stimulus.mesh, design.manifest, with_overrides(stimulus.mesh.materials, stimulus.scene.material))
-        registers = frame_registers(stimulus.scene, image.header, design.manifest, *size)
+        scene, manifest = stimulus.scene, design.manifest
+        mesh = with_materials(scene, stimulus.mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours)
+        image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
+        registers = frame_registers(scene, image.header, manifest, *size)
     joined = {
         direction: tuple(
             Port(name, len(port["bits"]))

@@ -67,10 +67,13 @@ final class Colonnade(
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
   }
 
-  // The scene in DRAM. Caches are forgotten on request, and after a failed read
+  // The scene in DRAM. After a request or a failed read, the caches forget it at the next start
   private val sceneMemory = config.columnBvhMemory.cache.map(_ => Module(new SceneMemory(config)).io)
   for (memory <- sceneMemory) {
-    val invalidate = registers.io.invalidate.get || (controller.io.frameStart && counters.io.isMemoryError.get)
+    val hasFailed  = memory.events.error || controller.io.memoryTimeout
+    val isStale    = RegInit(false.B)
+    val invalidate = isStale && controller.io.frameStart
+    isStale     := (isStale && !invalidate) || registers.io.invalidate.get || hasFailed
     memory.page := registers.io.frame.dram.get.page
     io.memory.get :<>= memory.axi
     memory.invalidate := invalidate
@@ -80,7 +83,7 @@ final class Colonnade(
       column.io.invalidate.get := invalidate
     }
     counters.io.dramReads.get   := memory.events.dramReads
-    counters.io.memoryError.get := memory.events.error
+    counters.io.memoryError.get := hasFailed
   }
   controller.io.memoryIsIdle := sceneMemory.fold(true.B)(_.isIdle)
 

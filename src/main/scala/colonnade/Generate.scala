@@ -14,7 +14,7 @@ object Generate {
       |
       |usage: colonnade.Generate --config CONFIG --output DIR [OPTION...]
       |
-      |  --config CONFIG       tiny, small, edge, a JSON file, or a precision like 32b32s64d
+      |  --config CONFIG       tiny, small, edge, lean, a JSON file, or a precision like 32b32s64d
       |  --set KEY=VALUE       overrides one field, as in array.rows=4; may be repeated
       |  --output DIR          takes the place of an earlier output that nobody changed; never half-written
       |  --manifest-only       writes no Verilog

@@ -25,7 +25,8 @@ object ArbitraryConfig {
     arity              <- Gen.oneOf(2, 4)
     trianglesPerRecord <- Gen.oneOf(1, 2)
     bvh                <- flag
-  } yield GeometryConfig(vertexBits, boxBits, triangleBits, arity, trianglesPerRecord, bvh)
+    cornerColours      <- flag
+  } yield GeometryConfig(vertexBits, boxBits, triangleBits, arity, trianglesPerRecord, bvh, cornerColours)
 
   private def units(arity: Int) = for {
     boxLanes      <- Gen.oneOf(Seq(1, 2, 4).filter(_ <= arity))

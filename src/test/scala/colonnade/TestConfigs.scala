@@ -9,7 +9,15 @@ object TestConfigs {
   val tiny: ColonnadeConfig = ColonnadeConfig(
     ArrayConfig(rows = 1, columns = 1, contexts = 4),
     PrecisionConfig(mac = 32, sqrt = 32, div = 64),
-    GeometryConfig(vertexBits = 16, boxBits = 8, triangleBits = None, arity = 4, trianglesPerRecord = 2, bvh = true),
+    GeometryConfig(
+      vertexBits = 16,
+      boxBits = 8,
+      triangleBits = None,
+      arity = 4,
+      trianglesPerRecord = 2,
+      bvh = true,
+      cornerColours = false
+    ),
     UnitsConfig(boxLanes = 2, triangleLanes = 1),
     ColumnBvhMemoryConfig(
       depth = 1024,
@@ -98,4 +106,10 @@ object TestConfigs {
     withPrecision(64, 64, 64),
     tiny.copy(geometry = tiny.geometry.copy(vertexBits = 20))
   )
+
+  /** With corner colours, from the presets' precision to the narrowest. */
+  val withColours: Seq[ColonnadeConfig] =
+    Seq(tiny, withPrecision(24, 24, 64), withPrecision(16, 16, 32), withPrecision(16, 16, 16)).map(config =>
+      config.copy(geometry = config.geometry.copy(cornerColours = true))
+    )
 }

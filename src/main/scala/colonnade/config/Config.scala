@@ -43,6 +43,7 @@ final case class PrecisionConfig(mac: Int, sqrt: Int, div: Int) {
   * @param arity              children of a node
   * @param trianglesPerRecord triangles of one leaf record
   * @param bvh                false: every ray tests every triangle (the exhaustive baseline)
+  * @param cornerColours      a face holds a colour for each corner, and a material may take its albedo from them
   */
 final case class GeometryConfig(
     vertexBits:         Int,
@@ -50,7 +51,8 @@ final case class GeometryConfig(
     triangleBits:       Option[Int],
     arity:              Int,
     trianglesPerRecord: Int,
-    bvh:                Boolean
+    bvh:                Boolean,
+    cornerColours:      Boolean
 ) {
   Require.within("geometry.vertexBits", vertexBits, 10, 24)
   Require.within("geometry.boxBits", boxBits, 4, 12)

@@ -10,7 +10,7 @@ import java.nio.file.{Files, InvalidPathException, Path, Paths}
 object ConfigIO {
 
   /** The presets, by name. */
-  val presets: Seq[String] = Seq("tiny", "small", "edge")
+  val presets: Seq[String] = Seq("tiny", "small", "edge", "lean")
 
   /** Maximum size of a configuration file. */
   private val mostBytes = 1 << 20
@@ -45,7 +45,8 @@ object ConfigIO {
       "triangleBits",
       "arity",
       "trianglesPerRecord",
-      "bvh"
+      "bvh",
+      "cornerColours"
     )
     val units  = root.section("units", "boxLanes", "triangleLanes")
     val memory = root.section(
@@ -74,7 +75,8 @@ object ConfigIO {
         triangleBits = shape.optionalInt("triangleBits"),
         arity = shape.int("arity"),
         trianglesPerRecord = shape.int("trianglesPerRecord"),
-        bvh = shape.boolean("bvh")
+        bvh = shape.boolean("bvh"),
+        cornerColours = shape.boolean("cornerColours")
       ),
       units = UnitsConfig(boxLanes = units.int("boxLanes"), triangleLanes = units.int("triangleLanes")),
       columnBvhMemory = ColumnBvhMemoryConfig(
@@ -132,7 +134,8 @@ object ConfigIO {
         "triangleBits"       -> geometry.triangleBits.fold[ujson.Value](ujson.Null)(ujson.Num(_)),
         "arity"              -> geometry.arity,
         "trianglesPerRecord" -> geometry.trianglesPerRecord,
-        "bvh"                -> geometry.bvh
+        "bvh"                -> geometry.bvh,
+        "cornerColours"      -> geometry.cornerColours
       ),
       "units"           -> ujson.Obj("boxLanes" -> units.boxLanes, "triangleLanes" -> units.triangleLanes),
       "columnBvhMemory" -> ujson.Obj(

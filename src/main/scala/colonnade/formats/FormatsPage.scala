@@ -28,8 +28,7 @@ object FormatsPage {
         |Packed ids follow the leaves of one binary tree, depth first, whatever the arity.""".stripMargin,
       table(formats.triangles),
       "### Attributes",
-      s"""What shading needs of a face: unit normals at the vertices and of the plane, and the index of its material. The face
-         |with packed id t is in record `scene.attributeBase + t / ${RecordFormats.facesPerRecord}`, slot `t % ${RecordFormats.facesPerRecord}`.""".stripMargin,
+      attributes(config),
       table(formats.attributes),
       "## Physical-attribute memory",
       room(config),
@@ -73,6 +72,20 @@ object FormatsPage {
       registers(RegisterMap(config))
     )
     page.mkString("\n\n") + "\n"
+  }
+
+  private def attributes(config: ColonnadeConfig): String = {
+    val slots = RecordFormats.facesPerRecord(config)
+    val place =
+      s"""What shading needs of a face: unit normals at the vertices and of the plane, and the index of its material. The face
+         |with packed id t is in record `scene.attributeBase + t / $slots`, slot `t % $slots`.""".stripMargin
+    val colours =
+      if (config.geometry.cornerColours)
+        "A face also has a linear colour for each vertex, where all ones is 1.0."
+      else
+        """With `geometry.cornerColours` a record holds one face, which also has the linear colours `colours[0]` to `colours[2]` of its
+          |vertices: channels of 12 bits, where all ones is 1.0.""".stripMargin
+    s"$place\n\n$colours"
   }
 
   private def room(config: ColonnadeConfig): String = config.physicalAttributeMemory match {

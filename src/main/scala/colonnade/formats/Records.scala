@@ -73,12 +73,15 @@ final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The attributes of one face for shading. Normals have unit length. */
-final class Face extends Bundle {
+final class Face(config: ColonnadeConfig) extends Bundle {
   private val component = new Fixed(FixedPointFormat.signed(NumberFormats.normalBits, NumberFormats.normalFraction))
 
   /** One per vertex. */
   val normals         = Vec(3, Vec3(component))
   val geometricNormal = Vec3(component)
+
+  /** The linear albedo at each vertex, for materials with `hasCornerColours`. */
+  val colours = if (config.geometry.cornerColours) Some(Vec(3, Rgb(FrameRegisters.colour))) else None
 
   /** Index into the material table. */
   val material = UInt(RecordFormats.materialBits.W)
@@ -87,8 +90,8 @@ final class Face extends Bundle {
 /** Faces in the order of packed ids: face t lies in record `attributeBase + t / facesPerRecord`, slot
   * `t % facesPerRecord`.
   */
-final class AttributesRecord extends Bundle {
-  val faces = Vec(RecordFormats.facesPerRecord, new Face)
+final class AttributesRecord(config: ColonnadeConfig) extends Bundle {
+  val faces = Vec(RecordFormats.facesPerRecord(config), new Face(config))
 }
 
 /** The records of the column BVH memory. All kinds have one width; a kind uses the low bits that it needs. */
@@ -104,7 +107,7 @@ final class RecordFormats(config: ColonnadeConfig) {
 
   def triangles: TrianglesRecord = new TrianglesRecord(config)
 
-  def attributes: AttributesRecord = new AttributesRecord
+  def attributes: AttributesRecord = new AttributesRecord(config)
 
   /** The widest kind, rounded up to whole 32-bit words. */
   val recordBits: Int = (Seq(node, triangles, attributes).map(_.getWidth).max + 31) / 32 * 32
@@ -127,8 +130,8 @@ object RecordFormats {
   val materialBits: Int = 8
 
   /** Faces per attribute record: a power of two, so that a packed id splits into record and slot. */
-  val facesPerRecord: Int = 2
-  val faceSlotBits:   Int = log2Ceil(facesPerRecord)
+  def facesPerRecord(config: ColonnadeConfig): Int = if (config.geometry.cornerColours) 1 else 2
+  def faceSlotBits(config:   ColonnadeConfig): Int = log2Ceil(facesPerRecord(config))
 
   def addressBits(config: ColonnadeConfig): Int = log2Ceil(config.columnBvhMemory.depth)
 

@@ -60,12 +60,15 @@ object MaterialKind {
   val last: BigInt = 2
 }
 
-/** A record, not a bundle, because a material without bounces has an albedo only. */
+/** A record, not a bundle, because a material without bounces has no kind. */
 final class Material(config: ColonnadeConfig) extends Record {
   private def ifBounces[T](field: => T): Option[T] = if (config.frame.hasBounces) Some(field) else None
   private def eta = new Fixed(FixedPointFormat.unsigned(NumberFormats.etaBits, NumberFormats.etaFraction))
 
   val albedo = Rgb(FrameRegisters.colour)
+
+  /** The albedo is interpolated from the colours at the corners of the face; `albedo` has no effect. */
+  val hasCornerColours = if (config.geometry.cornerColours) Some(Bool()) else None
 
   /** See [[MaterialKind]]. */
   val kind = ifBounces(UInt(MaterialKind.bits.W))
@@ -80,7 +83,7 @@ final class Material(config: ColonnadeConfig) extends Record {
   val reflectance = ifBounces(FrameRegisters.weight)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
-    Seq("albedo" -> albedo) ++ kind.map("kind" -> _) ++ etaFront.map("etaFront" -> _) ++ etaBack.map("etaBack" -> _) ++
-      reflectance.map("reflectance" -> _): _*
+    Seq("albedo" -> albedo) ++ hasCornerColours.map("hasCornerColours" -> _) ++ kind.map("kind" -> _) ++
+      etaFront.map("etaFront" -> _) ++ etaBack.map("etaBack" -> _) ++ reflectance.map("reflectance" -> _): _*
   )
 }

@@ -56,6 +56,9 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   /** Resets the columns. */
   val aborts = Output(Bool())
 
+  /** A frame ends without the answers to its reads, see [[memoryIsIdle]]. */
+  val memoryTimeout = Output(Bool())
+
   val status = Output(new Status)
 
   /** Sticky until the next start. */
@@ -68,6 +71,9 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   * The first tile comes four cycles after the start. `done` follows the last pixel by [[FrameController.settleCycles]] or
   * more, so that counters and errors are complete. A frame without pixels ends at once. The watchdog aborts a frame in
   * which no pixel leaves for `watchdogCycles`, not counting stalls of the sink; the frame then ends with an error.
+  *
+  * After an abort the frame waits for reads in flight, for `watchdogCycles` at most: a memory that never answers does not
+  * hang the device. The next frame does not start before these reads have ended, and waits as long at most, too.
   */
 final class FrameController(config: ColonnadeConfig) extends Module {
   import FrameController._
@@ -85,15 +91,18 @@ final class FrameController(config: ColonnadeConfig) extends Module {
   private val watchdog = Module(new Watchdog(io.frame.watchdogCycles.getWidth))
 
   private val isFinished = schedulers.map(_.io.isIdle).reduce(_ && _) && io.progress.map(_.isDrained).reduce(_ && _)
-  private val isAtRest   = settling === 0.U && io.progress.map(_.isIdle).reduce(_ && _) && io.memoryIsIdle
+  private val isSettled  = settling === 0.U && io.progress.map(_.isIdle).reduce(_ && _)
 
   switch(state) {
     is(State.waiting) {
       when(io.start) {
-        state := State.running
+        state := Mux(io.memoryIsIdle, State.running, State.draining)
         done  := false.B
         error := false.B
       }
+    }
+    is(State.draining) {
+      when(io.memoryIsIdle) { state := State.running }
     }
     is(State.running) {
       settling := settleCycles.U
@@ -109,7 +118,7 @@ final class FrameController(config: ColonnadeConfig) extends Module {
     }
     is(State.settling) {
       when(settling =/= 0.U) { settling := settling - 1.U }
-      when(isAtRest) {
+      when(isSettled && io.memoryIsIdle) {
         state := State.waiting
         done  := true.B
       }.elsewhen(watchdog.io.isExpired) {
@@ -117,13 +126,21 @@ final class FrameController(config: ColonnadeConfig) extends Module {
       }
     }
   }
+  when(io.memoryTimeout) {
+    state := State.waiting
+    done  := true.B
+    error := true.B
+  }
 
-  io.frameStart := state === State.waiting && io.start
-  io.isRunning  := state === State.running
-  io.aborts     := state === State.aborting
+  private val starts = state === State.waiting && io.start
+  io.frameStart    := (starts || state === State.draining) && io.memoryIsIdle
+  io.memoryTimeout := watchdog.io.isExpired && !io.memoryIsIdle &&
+    (state === State.draining || (state === State.settling && error && isSettled))
+  io.isRunning := state === State.running
+  io.aborts    := state === State.aborting
 
   watchdog.io.limit   := io.frame.watchdogCycles
-  watchdog.io.restart := io.frameStart || io.aborts || io.traffic.retires
+  watchdog.io.restart := starts || io.frameStart || io.aborts || io.traffic.retires
   watchdog.io.hold    := io.traffic.stalls || state === State.waiting
 
   schedulers.zip(Seq(io.tiles, io.backgroundTiles)).foreach { case (scheduler, tiles) =>
@@ -144,6 +161,6 @@ object FrameController {
   val settleCycles: Int = CounterFile.settleCycles
 
   private object State extends ChiselEnum {
-    val waiting, running, aborting, settling = Value
+    val waiting, draining, running, aborting, settling = Value
   }
 }

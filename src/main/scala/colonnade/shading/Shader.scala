@@ -52,7 +52,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
   private val geometry   = Module(new ShaderGeometry(config))
   private val cosine     = Module(new CosineUnit(config.numbers))
   private val direct     = Module(new DirectUnit(config))
-  private val multiplier = Module(new ShaderMultiplier(formats))
+  private val multiplier = Module(new ShaderMultiplier(formats, config.geometry.cornerColours))
 
   // Geometry
   private val point    = geometry.io.result
@@ -71,13 +71,27 @@ final class Shader(config: ColonnadeConfig) extends Module {
   geometry.io.unitShift  := io.unitShift
   geometry.io.lightCount := Mux(isBounce, 1.U, io.shading.lights)
 
+  // Colours of the hit's corners, in the material's place; the hit waits for them
+  private val corners = material.hasCornerColours.map { hasCornerColours =>
+    val unit = Module(new CornerColours(config))
+    unit.io.start   := io.request.fire
+    unit.io.weights := io.request.bits.hit.weights
+    unit.io.colours := io.request.bits.face.colours.get
+    unit.io.isUsed  := hasCornerColours && !surface.isEnvironment
+    unit.io.product := multiplier.io.product
+    multiplier.io.corners.get <> unit.io.operands
+    unit
+  }
+  private val objectAlbedo =
+    corners.map(unit => Mux(unit.io.isUsed, unit.io.colour, material.albedo)).getOrElse(material.albedo)
+
   // Albedo and shadows of an environment's point in the geometry
   private val environment = geometry.io.environment.zip(io.environment).map { case (taker, offered) =>
     taker <> offered
     RegEnable(offered.bits, offered.fire)
   }
   private val albedo =
-    environment.map(point => Mux(surface.isEnvironment, point.albedo, material.albedo)).getOrElse(material.albedo)
+    environment.map(point => Mux(surface.isEnvironment, point.albedo, objectAlbedo)).getOrElse(objectAlbedo)
   private val shadows =
     io.shading.shadows && environment.map(point => !surface.isEnvironment || point.shadows).getOrElse(true.B)
 
@@ -87,7 +101,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
   private val isLast = Reg(Bool())
   private val lit    = Reg(new LitSurface(config))
   private val isOn   = point.bits.light < io.shading.lights
-  private val isFree = !isHeld && cosine.io.angle.ready
+  private val isFree = withAlbedo(!isHeld && cosine.io.angle.ready)
   cosine.io.angle.valid        := point.valid && !isBounce && isFree
   cosine.io.angle.bits         := point.bits.angle
   cosine.io.angle.bits.isAcute := point.bits.angle.isAcute && isOn
@@ -123,7 +137,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
     val albedo   = Reg(Rgb(FrameRegisters.colour))
     val isTinted = Reg(Bool())
     unit.io.offset               := io.shading.offset
-    unit.io.request.valid        := point.valid && isBounce
+    unit.io.request.valid        := withAlbedo(point.valid && isBounce)
     unit.io.request.bits.context := surface.context
     unit.io.request.bits.origin.axes.zip(surface.origin.axes).foreach { case (to, from) =>
       to := Rounding.narrow(from, to.getWidth)
@@ -141,7 +155,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
       origin.axes.zip(origins).foreach { case (to, from) => to := Fixed(scene, from) }
     }
     when(unit.io.request.fire) {
-      albedo   := material.albedo
+      albedo   := objectAlbedo
       isTinted := !surface.backSide || material.kind.get === MaterialKind.mirror
     }
     bounced.valid         := unit.io.result.valid
@@ -151,7 +165,7 @@ final class Shader(config: ColonnadeConfig) extends Module {
     unit.io.result.ready  := bounced.ready
     unit
   }
-  point.ready := Mux(isBounce, bounces.map(_.io.request.ready).getOrElse(false.B), isFree)
+  point.ready := Mux(isBounce, bounces.map(unit => withAlbedo(unit.io.request.ready)).getOrElse(false.B), isFree)
 
   // Multiplier
   multiplier.io.geometry := geometry.io.operands
@@ -160,6 +174,10 @@ final class Shader(config: ColonnadeConfig) extends Module {
   direct.io.product   := multiplier.io.product
 
   io.busy := !geometry.io.request.ready
+
+  /** The condition, once the hit's albedo is known. */
+  private def withAlbedo(condition: Bool): Bool =
+    corners.map(unit => condition && (unit.io.isDone || !unit.io.isUsed)).getOrElse(condition)
 
   /** A light's entry; a single light needs no index. */
   private def at[T <: Data](entries: Vec[T], index: UInt): T =

@@ -4,13 +4,16 @@ import chisel3._
 import chisel3.util.{Decoupled, Valid}
 
 /** Ports of [[ShaderMultiplier]]. */
-final class ShaderMultiplierIO(formats: ShaderFormats) extends Bundle {
+final class ShaderMultiplierIO(formats: ShaderFormats, hasCornerColours: Boolean) extends Bundle {
 
   /** Has priority; never waits. */
   val geometry = Flipped(Valid(new MultiplierOperands(formats)))
 
   /** Uses the cycles that the geometry leaves free. */
   val colour = Flipped(Decoupled(new MultiplierOperands(formats)))
+
+  /** Uses the cycles that both leave free. */
+  val corners = if (hasCornerColours) Some(Flipped(Decoupled(new MultiplierOperands(formats)))) else None
 
   /** Of the operands of the cycle before; valid for one cycle. */
   val product = Output(SInt(formats.productBits.W))
@@ -19,13 +22,15 @@ final class ShaderMultiplierIO(formats: ShaderFormats) extends Bundle {
 /** The shader's only multiplier; exact products.
   *
   * Latency one cycle, one product per cycle. The geometry's program leaves a third of its cycles free, and all cycles in
-  * which it waits for the cosine unit. So colours cannot starve.
+  * which it waits for the cosine unit or the corner colours. So colours cannot starve.
   */
-final class ShaderMultiplier(formats: ShaderFormats) extends Module {
-  val io = IO(new ShaderMultiplierIO(formats))
+final class ShaderMultiplier(formats: ShaderFormats, hasCornerColours: Boolean) extends Module {
+  val io = IO(new ShaderMultiplierIO(formats, hasCornerColours))
 
-  private val operands = Mux(io.geometry.valid, io.geometry.bits, io.colour.bits)
+  private val colour   = io.corners.map(corners => Mux(io.colour.valid, io.colour.bits, corners.bits))
+  private val operands = Mux(io.geometry.valid, io.geometry.bits, colour.getOrElse(io.colour.bits))
 
   io.colour.ready := !io.geometry.valid
-  io.product      := RegNext(operands.wide * operands.narrow)
+  io.corners.foreach(_.ready := !io.geometry.valid && !io.colour.valid)
+  io.product := RegNext(operands.wide * operands.narrow)
 }

@@ -13,7 +13,7 @@ final class ShadeRequest(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val ray     = new TriangleRay(config.numbers)
   val hit     = new TriangleHit(config)
-  val face    = new Face
+  val face    = new Face(config)
 }
 
 /** A point of the environment, to be lit like a diffuse surface. */

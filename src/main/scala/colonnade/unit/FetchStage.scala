@@ -79,12 +79,13 @@ final class FetchStage(config: ColonnadeConfig) extends Module {
   io.triangles.bits.record  := formats.asTriangles(response.record)
   io.triangles.bits.ray     := ray.forTriangles
 
-  private val faceSlot = io.closestHit.hit.id(RecordFormats.faceSlotBits - 1, 0)
+  private val faces    = formats.asAttributes(response.record).faces
+  private val slotBits = RecordFormats.faceSlotBits(config)
   io.hits.valid        := isFor(RecordKind.attributes)
   io.hits.bits.context := response.context
   io.hits.bits.ray     := ray.forTriangles
   io.hits.bits.hit     := io.closestHit.hit
-  io.hits.bits.face    := formats.asAttributes(response.record).faces(faceSlot)
+  io.hits.bits.face    := (if (slotBits == 0) faces.head else faces(io.closestHit.hit.id(slotBits - 1, 0)))
 
   assert(!io.nodes.valid || io.nodes.ready, "the box unit does not accept its node")
   assert(!io.triangles.valid || io.triangles.ready, "the triangle unit does not accept its record")

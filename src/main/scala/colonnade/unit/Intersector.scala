@@ -154,7 +154,12 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   io.fetches(2).valid        := io.surfaceHit.valid
   io.fetches(2).bits.context := closest.context
   io.fetches(2).bits.kind    := RecordKind.attributes
-  io.fetches(2).bits.address := io.scene.attributeBase + (closest.id >> RecordFormats.faceSlotBits)
+  io.fetches(2).bits.address := {
+    val slotBits = RecordFormats.faceSlotBits(config)
+    // With one face per record the sum may be too large: all ones is no legal address
+    if (slotBits == 0) Rounding.saturate(io.scene.attributeBase +& closest.id, closest.id.getWidth)
+    else io.scene.attributeBase + (closest.id >> slotBits)
+  }
 
   io.nodesReadyNext     := traversal.io.readyNext
   io.trianglesReadyNext := triangles.io.readyNext

@@ -15,7 +15,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
 
   it should "load every preset" in {
     ConfigIO.presets.map(ConfigIO.load(_).array) shouldBe
-      Seq(ArrayConfig(1, 1, 8), ArrayConfig(2, 2, 8), ArrayConfig(10, 8, 12))
+      Seq(ArrayConfig(1, 1, 8), ArrayConfig(2, 2, 8), ArrayConfig(10, 8, 12), ArrayConfig(10, 8, 12))
   }
 
   it should "read back what it writes" in {

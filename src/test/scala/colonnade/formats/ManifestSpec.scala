@@ -95,6 +95,21 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
     (others.map(hash) :+ hash(environment) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 6
   }
 
+  it should "give faces and materials corner colours only where the configuration has them" in {
+    def names(whole: ujson.Value): Seq[String] =
+      (whole("records")("layouts")("attributes").arr ++ whole("registers")("fields").arr).map(_("name").str).toSeq
+    val (without, coloured) = (manifest(), manifest("geometry.cornerColours=true"))
+    names(without).filter(name => name.contains("olours")) shouldBe empty
+    names(coloured) should contain.allOf(
+      "faces[0].colours[0].r",
+      "faces[0].colours[2].b",
+      "materials[7].hasCornerColours"
+    )
+    names(coloured).filter(_.startsWith("faces[1]")) shouldBe empty
+    coloured("records")("bits").num shouldBe 320
+    coloured("formatHash") should not be without("formatHash")
+  }
+
   it should "assign every word of the register map to one register" in {
     for (precision <- Seq("16b16s16d", "33b32s64d", "64b64s64d")) {
       val registers = manifest(s"precision=$precision")("registers")("fields").arr.toSeq

@@ -46,11 +46,15 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   private final class Bench(dut: FrameController) {
-    val random  = new Random(3)
-    var stalls  = false
-    var aborts  = 0
-    var running = 0
-    var columns = Seq.empty[FakeColumn]
+    val random                       = new Random(3)
+    var stalls                       = false
+    var isMemoryIdle: Int => Boolean = _ => true // by cycle of the frame
+    var cycle                        = 0
+    var aborts                       = 0
+    var timeouts                     = 0
+    var starts                       = 0
+    var running                      = 0
+    var columns                      = Seq.empty[FakeColumn]
 
     /** Runs one frame; returns its cycles, or none if it does not end within `limit`.
       *
@@ -74,7 +78,10 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.frame.watchdogCycles.poke(watchdog)
       columns = dut.io.tiles.indices.map(new FakeColumn(dut, _, random))
       stuck.foreach(columns(_).isStuck = true)
+      cycle = 0
       aborts = 0
+      timeouts = 0
+      starts = 0
       running = 0
       dut.io.start.poke(true)
       step()
@@ -90,7 +97,10 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       val retires = columns.map(_.drive()).reduce(_ || _)
       dut.io.traffic.retires.poke(retires)
       dut.io.traffic.stalls.poke(stalls)
-      dut.io.memoryIsIdle.poke(true)
+      dut.io.memoryIsIdle.poke(isMemoryIdle(cycle))
+      cycle += 1
+      if (dut.io.memoryTimeout.peekBoolean()) timeouts += 1
+      if (dut.io.frameStart.peekBoolean()) starts += 1
       if (dut.io.aborts.peekBoolean()) aborts += 1
       if (dut.io.isRunning.peekBoolean()) running += 1
       columns.foreach(_.step())
@@ -176,6 +186,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.frame.pixelsHigh.poke(64)
       dut.io.frame.objectRect.x1.poke(64)
       dut.io.frame.objectRect.y1.poke(64)
+      dut.io.memoryIsIdle.poke(true)
       dut.io.tiles.foreach(_.ready.poke(true))
       dut.io.start.poke(true)
       dut.clock.step()
@@ -204,6 +215,29 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
+  it should "end although the memory is silent, and start no frame before it is idle" in {
+    test(new FrameController(config)) { dut =>
+      dut.clock.setTimeout(0)
+      val bench = new Bench(dut)
+      // The frame is aborted, and ends after as many cycles again
+      bench.isMemoryIdle = _ == 0
+      assert(bench.frame(32, 32, watchdog = 100, stuck = Some(1)).exists(cycles => cycles > 200 && cycles < 900))
+      assert((bench.starts, bench.aborts, bench.timeouts) == ((1, 1, 1)))
+      dut.io.watchdogError.expect(true)
+      // The next one does not begin
+      bench.isMemoryIdle = _ => false
+      assert(bench.frame(32, 32, watchdog = 100).exists(cycles => cycles >= 100 && cycles < 110))
+      assert((bench.starts, bench.aborts, bench.timeouts) == ((0, 0, 1)))
+      dut.io.watchdogError.expect(true)
+      // With late answers it begins late
+      bench.isMemoryIdle = _ >= 50
+      assert(bench.frame(32, 32, watchdog = 100).nonEmpty)
+      assert((bench.starts, bench.aborts, bench.timeouts) == ((1, 0, 0)))
+      dut.io.watchdogError.expect(false)
+      bench.expectTiles(32, 32)
+    }
+  }
+
   it should "not end without a watchdog, or while the sink stalls" in {
     test(new FrameController(config)) { dut =>
       dut.clock.setTimeout(0)
@@ -222,6 +256,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     test(new FrameController(config)) { dut =>
       dut.io.frame.pixelsWide.poke(8)
       dut.io.frame.pixelsHigh.poke(8)
+      dut.io.memoryIsIdle.poke(true)
       dut.io.start.poke(true)
       dut.io.frameStart.expect(true)
       for (_ <- 0 until 10) {

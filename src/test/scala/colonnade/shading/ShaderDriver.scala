@@ -33,6 +33,8 @@ object ShaderDriver {
     io.shading.flat.poke(light.isFlat)
     io.shading.shadows.poke(light.shadows)
     io.materials.zip(light.albedos).foreach { case (to, value) => pokeColour(to.albedo, value) }
+    for ((material, claim) <- io.materials.zip(light.cornerColoured); port <- material.hasCornerColours)
+      port.poke(claim)
   }
 
   def pokeHit(port: ShadeRequest, hit: HitCase): Unit = {
@@ -47,6 +49,7 @@ object ShaderDriver {
     port.hit.backSide.poke(hit.backSide)
     port.face.normals.zip(hit.normals).foreach { case (to, value) => pokeVector(to, value) }
     pokeVector(port.face.geometricNormal, hit.geometricNormal)
+    for (colours <- port.face.colours; (to, value) <- colours.zip(hit.colours)) pokeColour(to, value)
     port.face.material.poke(hit.material)
   }
 

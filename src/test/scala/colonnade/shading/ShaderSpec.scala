@@ -17,9 +17,15 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   /** Faster than the interpreter for wide units. */
   private val verilator = Simulation.verilator
 
-  /** The expected result: the model's answer, zeros for lights that are off, albedo and context. */
-  private def expected(answer: Seq[BigInt], hit: HitCase, light: LightCase): Seq[BigInt] =
-    expected(answer, light, light.albedos(hit.material), hit.context)
+  /** The model's results of hits: origin and lights, zeros for lights that are off, albedo and context. */
+  private def expected(config: ColonnadeConfig, light: LightCase, hits: Seq[HitCase]): Seq[Seq[BigInt]] = {
+    val answers = Model.answers(config, hits.map(ShaderStimulus.words(_, light)), "shade")
+    val colours = Model.answers(config, hits.map(ShaderStimulus.colourWords), "cornercolour")
+    hits.zip(answers).zip(colours).map { case ((hit, answer), colour) =>
+      val albedo = if (light.cornerColoured(hit.material)) colour else light.albedos(hit.material)
+      expected(answer, light, albedo, hit.context)
+    }
+  }
 
   private def expected(answer: Seq[BigInt], light: LightCase, albedo: Seq[BigInt], context: Int): Seq[BigInt] =
     answer ++ Seq.fill(4 * (light.sources.size - light.shining))(BigInt(0)) ++ albedo :+ BigInt(context)
@@ -32,8 +38,6 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       random: Random,
       stalls: Int => Double = _ => 0
   ): Unit = {
-    val stimulus = rounds.flatMap { case (light, hits) => hits.map(ShaderStimulus.words(_, light)) }
-    val answers  = Model.answers(config, stimulus, "shade").iterator
     for (((light, hits), round) <- rounds.zipWithIndex) {
       var poked                                        = Option.empty[HitCase]
       def poke(port: ShadeRequest, hit: HitCase): Unit = if (!poked.exists(_ eq hit)) {
@@ -46,15 +50,14 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
           poke,
           peek
         )(random, stalls(round), 400)
-      results.zip(hits).foreach { case (result, hit) =>
-        val answer = expected(answers.next(), hit, light)
+      for (((hit, result), answer) <- hits.zip(results).zip(expected(config, light, hits))) {
         assert(unpack(result, answer.size) == answer, s"of $hit under $light in ${config.precision}")
       }
     }
   }
 
-  for (config <- TestConfigs.formats) {
-    val name = s"${config.precision} and ${config.geometry.vertexBits}-bit vertices"
+  for (config <- TestConfigs.formats ++ TestConfigs.withColours) {
+    val name = nameOf(config)
 
     it should s"equal the model with $name" in test(new Shader(config)).withAnnotations(verilator) { shader =>
       val random   = new Random(20)
@@ -68,6 +71,10 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       check(shader, config, rounds ++ ties ++ extremes(config, stimulus) ++ atTheLight(stimulus), random, _ % 2 * 0.7)
     }
   }
+
+  private def nameOf(config: ColonnadeConfig): String =
+    s"${config.precision} and ${config.geometry.vertexBits}-bit vertices" +
+      (if (config.geometry.cornerColours) " with corner colours" else "")
 
   /** Every number at a limit of its range. */
   private def extremes(config: ColonnadeConfig, stimulus: ShaderStimulus): Seq[(LightCase, Seq[HitCase])] = {
@@ -110,35 +117,37 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       light -> Seq(hit.copy(backSide = false), hit.copy(backSide = true))
     }
 
-  it should "take a hit with a light at least every 50 cycles at 32b32s64d" in test(new Shader(TestConfigs.tiny)) {
-    shader =>
-      val random   = new Random(23)
-      val stimulus = new ShaderStimulus(TestConfigs.tiny, random)
-      val light    = stimulus.light().at(Seq(3000, 5000, 9000)).copy(
-        shining = 1,
-        unitShift = 12,
-        isFlat = false,
-        shadows = true
-      )
-      pokeLight(shader.io, light)
-      shader.io.request.valid.poke(true)
-      shader.io.lit.ready.poke(true)
-      val taken = for (_ <- 0 until 20) yield {
-        pokeHit(
-          shader.io.request.bits,
-          stimulus.surfaceHit(light).copy(weights = Seq(BigInt(1), BigInt(1), BigInt(2)))
+  for ((config, limit) <- Seq(TestConfigs.tiny -> 50, TestConfigs.withColours.head -> 60))
+    it should s"take a hit with a light at least every $limit cycles at ${nameOf(config)}" in test(new Shader(config)) {
+      shader =>
+        val random   = new Random(23)
+        val stimulus = new ShaderStimulus(config, random)
+        val light    = stimulus.light().at(Seq(3000, 5000, 9000)).copy(
+          cornerColoured = Seq.fill(config.frame.materials)(config.geometry.cornerColours),
+          shining = 1,
+          unitShift = 12,
+          isFlat = false,
+          shadows = true
         )
-        var cycles = 1
-        while (!shader.io.request.ready.peekBoolean()) {
+        pokeLight(shader.io, light)
+        shader.io.request.valid.poke(true)
+        shader.io.lit.ready.poke(true)
+        val taken = for (_ <- 0 until 20) yield {
+          pokeHit(
+            shader.io.request.bits,
+            stimulus.surfaceHit(light).copy(weights = Seq(BigInt(1), BigInt(1), BigInt(2)))
+          )
+          var cycles = 1
+          while (!shader.io.request.ready.peekBoolean()) {
+            shader.clock.step()
+            cycles += 1
+          }
           shader.clock.step()
-          cycles += 1
+          cycles
         }
-        shader.clock.step()
-        cycles
-      }
-      info(s"${taken.sum / taken.size} cycles a hit, at most ${taken.max}")
-      assert(taken.max <= 50, s"cycles from a hit to the next: $taken")
-  }
+        info(s"${taken.sum / taken.size} cycles a hit, at most ${taken.max}")
+        assert(taken.max <= limit, s"cycles from a hit to the next: $taken")
+    }
 
   it should "tell the materials of a table apart, whatever its size" in {
     for (materials <- Seq(1, 5, 8)) {
@@ -204,8 +213,12 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     (taken, results)
   }
 
-  for (config <- TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment))))
-    it should s"light points of an environment between hits, with ${config.precision} and ${config.geometry.vertexBits}-bit vertices" in
+  for (
+    config <- (TestConfigs.formats ++ TestConfigs.withColours).map(_.copy(physicalAttributeMemory =
+      Some(TestConfigs.environment)
+    ))
+  )
+    it should s"light points of an environment between hits, with ${nameOf(config)}" in
       test(new Shader(config)).withAnnotations(verilator) { shader =>
         val random   = new Random(25)
         val stimulus = new ShaderStimulus(config, random)
@@ -215,11 +228,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
           val hits             = Seq.fill(12)(stimulus.surfaceHit(light))
           val points           = Seq.fill(12)(stimulus.environmentPoint())
           val (taken, results) = mix(shader, hits, points, random, stalls)
-          val ofHits           =
-            hits.zip(Model.answers(config, hits.map(ShaderStimulus.words(_, light)), "shade")).map {
-              case (hit, answer) =>
-                Left(hit) -> expected(answer, hit, light)
-            }
+          val ofHits   = hits.zip(expected(config, light, hits)).map { case (hit, answer) => Left(hit) -> answer }
           val ofPoints =
             points.zip(Model.answers(config, points.map(ShaderStimulus.words(_, light)), "lightenvironment")).map {
               case (point, answer) => Right(point) -> expected(answer, light, point.albedo, point.context)

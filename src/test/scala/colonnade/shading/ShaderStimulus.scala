@@ -16,6 +16,7 @@ final case class HitCase(
     backSide:        Boolean,
     normals:         Seq[Seq[BigInt]],
     geometricNormal: Seq[BigInt],
+    colours:         Seq[Seq[BigInt]],
     material:        Int
 )
 
@@ -31,15 +32,18 @@ final case class EnvironmentPointCase(
 /** A light, in raw integers. */
 final case class LightSource(position: Seq[BigInt], colour: Seq[BigInt], reachMantissa: BigInt, reachExponent: Int)
 
-/** The shading registers in raw integers; the first `shining` lights are on. */
+/** The shading registers in raw integers; the first `shining` lights are on. `cornerColoured` says which materials have corner
+  * colours.
+  */
 final case class LightCase(
-    sources:   Seq[LightSource],
-    shining:   Int,
-    unitShift: Int,
-    albedos:   Seq[Seq[BigInt]],
-    offset:    BigInt,
-    isFlat:    Boolean,
-    shadows:   Boolean
+    sources:        Seq[LightSource],
+    shining:        Int,
+    unitShift:      Int,
+    albedos:        Seq[Seq[BigInt]],
+    cornerColoured: Seq[Boolean],
+    offset:         BigInt,
+    isFlat:         Boolean,
+    shadows:        Boolean
 ) {
 
   /** All lights in one position. */
@@ -62,6 +66,9 @@ object ShaderStimulus {
       source.position.map(_ << light.unitShift) ++ source.colour ++
         Seq(source.reachMantissa, BigInt(source.reachExponent))
     )
+
+  /** The words of the model's colour at a hit. */
+  def colourWords(hit: HitCase): Seq[BigInt] = hit.weights ++ hit.colours.flatten
 
   def bit(claim: Boolean): BigInt = if (claim) 1 else 0
 }
@@ -98,12 +105,15 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
       sources = Seq.fill(config.frame.lights)(source(bits)),
       shining = if (chance(4)) random.nextInt(config.frame.lights + 1) else config.frame.lights,
       unitShift = shift,
-      albedos = Seq.fill(config.frame.materials)(xyz(natural(NumberFormats.colourBits))),
+      albedos = Seq.fill(config.frame.materials)(colour()),
+      cornerColoured = Seq.fill(config.frame.materials)(config.geometry.cornerColours && !chance(3)),
       offset = natural(numbers.gridBits - 2),
       isFlat = chance(4),
       shadows = !chance(4)
     )
   }
+
+  private def colour(): Seq[BigInt] = xyz(natural(NumberFormats.colourBits))
 
   /** A light without falloff, or with a reference distance near the scene, or with any. */
   private def source(positionBits: Int): LightSource = {
@@ -146,7 +156,7 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
     context = random.nextInt(config.array.contexts),
     point = xyz(signed(if (random.nextBoolean()) numbers.gridBits else numbers.sceneBits - 1)),
     normal = if (chance(10)) xyz(signed(NumberFormats.normalBits)) else if (chance(20)) xyz(BigInt(0)) else anyUnit,
-    albedo = xyz(natural(NumberFormats.colourBits)),
+    albedo = colour(),
     shadows = random.nextBoolean()
   )
 
@@ -196,6 +206,8 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
       backSide = random.nextBoolean(),
       normals = normals,
       geometricNormal = geometricNormal,
+      colours = if (chance(6)) { val same = colour(); xyz(same) }
+      else xyz(colour()),
       material = random.nextInt(config.frame.materials)
     )
   }

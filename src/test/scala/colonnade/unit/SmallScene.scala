@@ -48,7 +48,7 @@ final class SmallScene(
   val records: Seq[BigInt] =
     nodes.map(_(nodes.size)) ++
       ordered.zip(ordered.scanLeft(0)(_ + _.size)).map { case (leaf, first) => triangles(leaf, first) } ++
-      ordered.flatten.grouped(RecordFormats.facesPerRecord).map(attributes)
+      ordered.flatten.grouped(RecordFormats.facesPerRecord(config)).map(attributes)
 
   /** The host's registers, by name. */
   val registers: Map[String, BigInt] = {
@@ -67,7 +67,9 @@ final class SmallScene(
     )
     val materials = Seq.tabulate(config.frame.materials) { i =>
       vector(s"materials[$i].albedo", "rgb", Seq.fill(3)(BigInt(1000 + random.nextInt(3000)))) ++
-        (if (config.frame.hasBounces) glossy(i) else Map.empty[String, BigInt])
+        (if (config.frame.hasBounces) glossy(i) else Map.empty[String, BigInt]) ++
+        (if (config.geometry.cornerColours) Map(s"materials[$i].hasCornerColours" -> BigInt(seed >> i & 1))
+         else Map.empty[String, BigInt])
     }
     val lights = Seq.tabulate(config.frame.lights) { i =>
       vector(s"lights[$i].position", "xyz", at(cube / 4 + cube * i / 2, cube * 3 / 2, -cube)) ++
@@ -181,9 +183,13 @@ final class SmallScene(
       val corners = (0 until 3).flatMap { corner =>
         vector(s"faces[$slot].normals[$corner]", "xyz", unit(normal.map(_ / length + random.nextDouble() - 0.5)))
       }
-      (corners ++ vector(s"faces[$slot].geometricNormal", "xyz", unit(normal))) :+
+      val colours = if (config.geometry.cornerColours) 0 until 3 else Nil
+      (corners ++ vector(s"faces[$slot].geometricNormal", "xyz", unit(normal))) ++
+        colours.flatMap(corner => vector(s"faces[$slot].colours[$corner]", "rgb", Seq.fill(3)(anyColour))) :+
         (s"faces[$slot].material" -> BigInt(random.nextInt(config.frame.materials)))
     }.toMap)
+
+  private def anyColour: BigInt = BigInt(NumberFormats.colourBits, random.self)
 
   private def unit(direction: Seq[Double]): Seq[BigInt] = {
     val length = math.sqrt(direction.map(d => d * d).sum)
