@@ -97,7 +97,7 @@ def render(
         hits_files = numbered(hits_file, frames) if hits_file is not None else []
     require_outputs(*pictures, *hits_files, waveform, json_file)
 
-    from colonnade.common.hits import Hits, write_hits
+    from colonnade.common.hits import write_hits
     from colonnade.common.image_io import encode_srgb, write_png, write_webp
     from colonnade.common.progress import for_terminal
     from colonnade.render.frames import render_frames
@@ -129,7 +129,7 @@ def render(
         elif pictures:
             write_png(pictures[index], result.image)
         if hits_files:
-            write_hits(hits_files[index], Hits(result.hit_triangles, result.t))
+            write_hits(hits_files[index], result.hits())
         reports.append(result.report)
     if is_film:
         with progress.step(f"writing {pictures[0].name}"):

@@ -76,3 +76,8 @@ def _member(archive: zipfile.ZipFile, name: str) -> bytes:
     if len(content) > maximum:
         raise too_large
     return content
+
+
+def has_array(data: bytes, name: str) -> bool:
+    """Whether a ``.npz`` file, which was parsed before, holds an array of that name."""
+    return f"{name}.npy" in zipfile.ZipFile(io.BytesIO(data)).namelist()

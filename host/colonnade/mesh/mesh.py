@@ -39,6 +39,21 @@ class Extent:
 
 
 @dataclass(frozen=True)
+class MeshPart:
+    """One of the objects of a joined mesh.
+
+    Attributes:
+        name: Name of its mesh.
+        first_face: Number of its face 0 in the source faces of the joined mesh.
+        edge: Longest edge of its mesh's box, units of the joined mesh.
+    """
+
+    name: str
+    first_face: int
+    edge: float
+
+
+@dataclass(frozen=True)
 class Mesh:
     """A clean triangle mesh: no duplicate vertices, no degenerate or duplicate triangles.
 
@@ -53,6 +68,7 @@ class Mesh:
         source_count: Number of faces in the source.
         name: Name for reports.
         notes: Lines on what the file holds and a picture does not show, and on what was repaired.
+        parts: The objects of a joined mesh, in the order of their source faces; none of a single mesh.
         corner_colours: Linear colours at the corners of the faces, 0 to 1, 0 on faces whose material has none, float64
             [m, 3, 3]; None: no material has any.
     """
@@ -66,6 +82,7 @@ class Mesh:
     source_count: int
     name: str
     notes: tuple[str, ...] = ()
+    parts: tuple[MeshPart, ...] = ()
     corner_colours: Floats | None = None
 
     @cached_property

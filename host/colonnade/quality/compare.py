@@ -67,7 +67,7 @@ def _compare_pictures(first: Path, second: Path, with_dists: bool) -> dict[str, 
 def _compare_hits(first: Path, second: Path) -> dict[str, Any]:
     hits: tuple[Hits, Hits] = read_hits(first), read_hits(second)
     _require_same_size((first, second), (hits[0].triangle.shape, hits[1].triangle.shape))
-    difference = compare_hits(hits[0].triangle, hits[1].triangle)
+    difference = compare_hits(hits[0].numbers(), hits[1].numbers())
     return {key: getattr(difference, key) for key in HIT_KEYS}
 
 

@@ -31,6 +31,7 @@ from colonnade.scene.object_mesh import object_mesh, with_materials
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import View, make_view, with_overrides
 from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.inspect import coarse_line
 from colonnade.scene_image.packer import pack
 
 
@@ -59,6 +60,10 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     width, height = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size((width, height), manifest)
+    if request.frames > 1 and scene.objects and scene.motion.light is None:
+        raise UserError(
+            f"nothing moves in these {request.frames} frames, since several objects stand still: give motion.light"
+        )
     if request.waveform is not None:
         _check_waveform(request, (width, height))
     poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
@@ -78,14 +83,18 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        mesh = object_mesh(scene, corner_colours=manifest.corner_colours)
-        maps = device_room(scene, manifest)
+        maps = device_room(scene, manifest) if scene.objects else None
+        mesh = object_mesh(scene, corner_colours=manifest.corner_colours, environment=maps)
+        if maps is None:
+            maps = device_room(scene, manifest)
         if maps is not None:
             check_layout(maps, manifest)
             environment_camera(maps, width, height)
         room = lit_room(scene, maps, mesh.extent, max_lights(manifest), request.relit, progress)
         scene, environment = room.scene, encoded(room, manifest)
         image = pack_scene(scene, mesh, manifest, environment)
+        if (line := coarse_line(image.header)) is not None:
+            progress.note(line)
         poses = [scene.at(pose.motion_progress) for pose in poses]
         passes = [pose.passes(exposure) for pose in poses]
         shows_environment = request.relit or environment is None or environment.environment.photo is None
@@ -276,4 +285,5 @@ def _result(passes: FramePasses, image: SceneImage, view: View, report: FrameRep
         report=report,
         sums=sums,
         ratio=frame.ratio,
+        parts=image.header.parts,
     )

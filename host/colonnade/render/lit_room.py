@@ -10,7 +10,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.encoded import layout_of
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import object_pose, settled
 from colonnade.scene.room_lights import lights_of, with_lights
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class LitRoom:
     """A scene and its room, ready for a view.
 
     Attributes:
-        scene: With lights, and with the headroom of `environment`.
+        scene: With lights, a place for the object, and the headroom of `environment`.
         environment: With the colours that rays see; None without a room.
         albedo: The room with its albedo, as its folder has it; None without a room.
         colours: How the photo's colours were made; None where the colours are the albedo.
@@ -79,6 +79,7 @@ def lit_room(
     """
     if room is None:
         return LitRoom(scene)
+    scene = settled(scene, extent, room)
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     if not scene.names_light:
         scene = _with_fitted_lights(scene, room, max_lights, progress)

@@ -66,7 +66,8 @@ def reference_frames(
         options: Further options.
     """
     begun = time.perf_counter()
-    mesh = object_mesh(poses[0], int(manifest.config["frame"]["materials"]), manifest.corner_colours)
+    room = scene_room(poses[0]) if poses[0].objects else None
+    mesh = object_mesh(poses[0], int(manifest.config["frame"]["materials"]), manifest.corner_colours, room)
     layout = None if manifest.config["physicalAttributeMemory"] is None else layout_of(manifest)
     max_lights = int(manifest.config["frame"]["lights"])
     for pose, traced in zip(
@@ -83,7 +84,9 @@ def reference_frames(
             samples=traced.sums.samples,
         )
         first = traced.first
-        yield RenderResult(traced.image, first.object_mask, first.hit_triangles, first.t, report, traced.sums)
+        yield RenderResult(
+            traced.image, first.object_mask, first.hit_triangles, first.t, report, traced.sums, parts=mesh.parts
+        )
         begun = time.perf_counter()
 
 

@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.accumulation import Accumulation
+from colonnade.common.hits import Hits
+from colonnade.mesh.mesh import MeshPart
 from colonnade.render.report import FrameReport
 
 
@@ -18,11 +20,13 @@ class RenderResult:
     Attributes:
         image: Linear colours, 0 to 1, float64 [height, width, 3].
         object_mask: Pixels that show the object, bool [height, width].
-        hit_triangles: Face index in the mesh's file, -1 for a miss, int64 [height, width].
+        hit_triangles: Face index in the mesh's file, or through the files of `parts`, -1 for a miss, int64 [height,
+            width].
         t: Depth in mesh units (lengths of the pixel's direction), NaN for a miss, float64 [height, width].
         report: The report of the frame.
         sums: Sums over the samples.
         ratio: Shadow ratios, uint16 [height, width, 3], see `Frame`; None without a room.
+        parts: The objects of a scene with several; see `hits`.
     """
 
     image: npt.NDArray[np.float64]
@@ -32,3 +36,14 @@ class RenderResult:
     report: FrameReport
     sums: Accumulation
     ratio: npt.NDArray[np.uint16] | None = None
+    parts: tuple[MeshPart, ...] = ()
+
+    def hits(self) -> Hits:
+        """The hits by object, and by face of its mesh's file."""
+        if not self.parts:
+            return Hits(self.hit_triangles, self.t)
+        starts = np.array([part.first_face for part in self.parts])
+        number = np.searchsorted(starts, self.hit_triangles, side="right") - 1
+        is_hit = self.hit_triangles >= 0
+        face = np.where(is_hit, self.hit_triangles - starts[number], -1)
+        return Hits(face, self.t, np.where(is_hit, number, -1))

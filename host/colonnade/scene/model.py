@@ -16,6 +16,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, Strict, StrictBool, mod
 from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
+from colonnade.common.errors import UserError
 from colonnade.common.limits import MAX_COORDINATE, MAX_SAMPLES
 from colonnade.mesh.materials import Kind
 from colonnade.scene.samples import CENTRE, Sample, samples_of_frame
@@ -24,6 +25,8 @@ _STRICT = ConfigDict(extra="forbid")
 
 #: Largest width or height of a room's maps, pixels.
 MAX_EDGE = 4096
+#: The most objects of a scene.
+MAX_OBJECTS = 64
 #: The most bounces that any configuration supports.
 MAX_BOUNCES = 15
 
@@ -70,6 +73,14 @@ class MeshSource:
         if (self.name is None) == (self.path is None):
             raise ValueError("[mesh] needs either a name or a path")
         return self
+
+    @property
+    def source(self) -> str | Path:
+        """The argument for `colonnade.mesh.load.load_mesh`."""
+        if self.path is not None:
+            return self.path
+        assert self.name is not None
+        return self.name
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -180,8 +191,8 @@ class Placement:
     """The object's place in a room, instead of scale and translation: the file's table ``[object]``.
 
     Attributes:
-        stand_at: Pixel (u, v) of the room's maps; the object stands on its surface point, with the world's y up. None
-            is the middle column, at 0.7 of the height.
+        stand_at: Pixel (u, v) of the room's maps; the object stands on its surface point, with the world's y up. None:
+            on a level surface in view that has room for it (`colonnade.scene.standing.free_place`).
         size: Longest edge of the mesh's bounding box, metres.
         turn: Rotation about the vertical, degrees, after the transform's rotation.
     """
@@ -189,6 +200,26 @@ class Placement:
     stand_at: _Pixel | None = None
     size: Annotated[_Float, Interval(ge=1e-3, le=1e3)] = 0.3
     turn: Annotated[_Float, Interval(ge=-360.0, le=360.0)] = 0.0
+
+
+@dataclass(frozen=True, config=_STRICT)
+class SceneObject(Placement):
+    """One of several objects: a table ``[[object]]``. In a room it stands, unless its transform scales or moves it.
+
+    Attributes:
+        mesh: Its mesh.
+        transform: Its pose in the world; if it stands, only the rotation.
+        material: Overrides of its mesh's materials.
+    """
+
+    mesh: MeshSource = field(kw_only=True)
+    transform: Transform = field(default_factory=Transform, kw_only=True)
+    material: Material = field(default_factory=Material, kw_only=True)
+
+    @property
+    def stands(self) -> bool:
+        """Whether a room places it."""
+        return self.transform.scale == 1.0 and not any(self.transform.translate)
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -278,7 +309,7 @@ class FrameSize:
 
 @dataclass(frozen=True, config=_STRICT)
 class Scene:
-    """One object, one camera, at least one light.
+    """One object or several, one camera, at least one light.
 
     With a room, the camera is the room's, and the world is the room's world, in metres.
 
@@ -297,6 +328,7 @@ class Scene:
     ambient: Colour = field(default_factory=lambda: Colour((0.1, 0.1, 0.1)))
     background: Background = field(default_factory=Background)
     placement: Placement | None = None  # in a room without a [transform]: the default one
+    objects: tuple[SceneObject, ...] = ()  # in place of mesh, transform, material and placement, which are unused then
     paths: Paths = field(default_factory=Paths)
     frame: FrameSize = field(default_factory=FrameSize)
     motion: Motion = field(default_factory=Motion)
@@ -335,7 +367,12 @@ class Scene:
         return [key for key, is_used in keys.items() if is_used]
 
     def with_mesh(self, name_or_path: str) -> Scene:
-        """The scene with another mesh, a name or a path relative to the working directory."""
+        """The scene with another mesh, a name or a path relative to the working directory.
+
+        Raises:
+            UserError: The scene has several objects.
+        """
+        self.require_one_object("a mesh replaces that of a single object")
         return replace(self, mesh=MeshSource(name=name_or_path, crease=self.mesh.crease))
 
     def with_environment(self, folder: Path) -> Scene:
@@ -352,11 +389,22 @@ class Scene:
 
     @property
     def mesh_source(self) -> str | Path:
-        """The argument for `colonnade.mesh.load.load_mesh`."""
-        if self.mesh.path is not None:
-            return self.mesh.path
-        assert self.mesh.name is not None
-        return self.mesh.name
+        """The argument for `colonnade.mesh.load.load_mesh`, of a scene of one object.
+
+        Raises:
+            UserError: The scene has several objects.
+        """
+        self.require_one_object("this command is for a scene of one object")
+        return self.mesh.source
+
+    def require_one_object(self, reason: str) -> None:
+        """Refuse a scene with ``[[object]]`` tables.
+
+        Raises:
+            UserError: The message begins with the reason.
+        """
+        if self.objects:
+            raise UserError(f"{reason}, but the scene has {len(self.objects)} [[object]]: use [mesh] and [object]")
 
 
 def interpolate(start: Sequence[float], end: Sequence[float], fraction: float) -> Vector:

@@ -8,26 +8,34 @@ from typing import TYPE_CHECKING
 from colonnade.common import notes
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.palette import reduced, with_face_colours
+from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Scene
 from colonnade.scene.view import with_overrides
 
 if TYPE_CHECKING:
+    from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Mesh
 
 
-def object_mesh(scene: Scene, materials: int | None = None, corner_colours: bool = False) -> Mesh:
-    """Load the mesh of a scene, and report its notes.
+def object_mesh(
+    scene: Scene, materials: int | None = None, corner_colours: bool = False, environment: Environment | None = None
+) -> Mesh:
+    """Load the mesh of a scene, of several objects joined, and report its notes.
 
     Args:
         scene: The scene.
         materials: Entries of the device's material table: of more diffuse colours, similar ones are merged. None: all
             are kept.
         corner_colours: Keep the colours of the corners, for a device that has them.
+        environment: The room of `scene.background`, in which several objects stand.
 
     Raises:
-        UserError: The mesh does not exist or cannot be rendered.
+        UserError: The mesh does not exist or cannot be rendered, or one of several objects has no place.
     """
-    mesh = load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours)
+    if scene.objects:
+        mesh = joined_mesh(scene, environment, corner_colours)
+    else:
+        mesh = load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours)
     return mesh if materials is None else with_materials(scene, mesh, materials, corner_colours)
 
 

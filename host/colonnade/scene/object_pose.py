@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,14 +12,11 @@ import numpy as np
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.scene.model import Placement, Scene, Transform, Vector, interpolate
+from colonnade.scene.standing import Footprint, free_place, surface_point
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Extent
-
-
-#: Default row where an object stands in a room, as a fraction of the height.
-_DEFAULT_ROW = 0.7
 
 
 @dataclass(frozen=True)
@@ -52,12 +50,15 @@ class Pose:
 def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -> Pose:
     """The pose of the scene's mesh at its motion's progress: by its transform, or standing in a room.
 
+    The joined mesh of several objects is in world space already.
+
     Raises:
         UserError: A pixel is outside the room's maps, or the motion does not match the kind of pose.
     """
+    if scene.objects:
+        return Pose(np.eye(3), 1.0, np.zeros(3))
+    scene = settled(scene, extent, environment)
     placement, motion, progress = scene.placement, scene.motion, scene.motion_progress
-    if placement is None and environment is not None and scene.transform == Transform():
-        placement = Placement()
     rotation = rotation_matrix(scene.transform)
     if environment is None or placement is None:
         if motion.stand_at is not None:
@@ -71,34 +72,65 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
         return Pose(turned, scale, np.array(moved) + scale * (rotation - turned) @ extent.centre)
     if motion.translate is not None:
         raise UserError("motion.translate is for an object that does not stand in a room: give motion.stand_at")
-    turned = rotation_matrix(Transform(rotate=(0.0, placement.turn + motion.turn * progress, 0.0))) @ rotation
+    assert placement.stand_at is not None
+    point = surface_point(placement.stand_at, environment, "object.stand_at")
+    if motion.stand_at is not None:
+        point = (1.0 - progress) * point + progress * surface_point(motion.stand_at, environment, "motion.stand_at")
+    return standing_pose(placement, rotation, extent, point, motion.turn * progress)
+
+
+def settled(scene: Scene, extent: Extent, environment: Environment | None) -> Scene:
+    """The scene with the place that is chosen for an object that stands in a room without a given one.
+
+    Raises:
+        UserError: No level surface in view has room for the object.
+    """
+    placement = _placement(scene, environment)
+    if environment is None or placement is None or placement.stand_at is not None:
+        return scene
+    return replace(scene, placement=chosen(placement, rotation_matrix(scene.transform), extent, environment, "object"))
+
+
+def chosen(
+    placement: Placement,
+    rotation: Floats,
+    extent: Extent,
+    environment: Environment,
+    key: str,
+    taken: Sequence[tuple[Floats, float]] = (),
+) -> Placement:
+    """The placement with the pixel that `free_place` finds for a mesh; ``key`` is the table's name in errors."""
+    footprint = footprint_of(placement, rotation, extent)
+    place = free_place(environment, footprint, taken)
+    if place is None:
+        raise UserError(
+            f"no level surface in view of room {environment.name} has room for an object {2 * footprint.radius:.2g} m"
+            f" wide and {footprint.height:.2g} m high: give {key}.stand_at, or a smaller {key}.size"
+        )
+    return replace(placement, stand_at=place)
+
+
+def footprint_of(placement: Placement, rotation: Floats, extent: Extent) -> Footprint:
+    """The upright cylinder around a standing mesh, whatever its turn."""
+    outline = (extent.outline - extent.centre) @ rotation.T * (placement.size / extent.edge)
+    return Footprint(float(np.hypot(outline[:, 0], outline[:, 2]).max()), float(np.ptp(outline[:, 1])))
+
+
+def standing_pose(placement: Placement, rotation: Floats, extent: Extent, point: Floats, turn: float = 0.0) -> Pose:
+    """The pose of a mesh that stands on a point, turned by more degrees about the vertical."""
+    turned = rotation_matrix(Transform(rotate=(0.0, placement.turn + turn, 0.0))) @ rotation
     outline = extent.outline @ turned.T
     foot = extent.centre @ turned.T
     foot[1] = outline[:, 1].min()
     scale = placement.size / extent.edge
-    point = standing_point(placement, environment)
-    if motion.stand_at is not None:
-        point = (1.0 - progress) * point + progress * _surface_point(motion.stand_at, environment, "motion.stand_at")
     return Pose(turned, scale, point - foot * scale)
 
 
-def standing_point(placement: Placement, environment: Environment) -> Floats:
-    """The room's surface point under the object, world space, float64 [3]."""
-    return _surface_point(
-        placement.stand_at or (environment.width / 2, environment.height * _DEFAULT_ROW), environment, "object.stand_at"
-    )
-
-
-def _surface_point(pixel: tuple[float, float], environment: Environment, key: str) -> Floats:
-    u, v = pixel
-    if u >= environment.width or v >= environment.height:
-        raise UserError(
-            f"{key} is ({u:g}, {v:g}), outside the maps of room {environment.name}:"
-            f" they are {environment.width}x{environment.height} pixels"
-        )
-    depth = environment.depth[int(v), int(u)]
-    seen = np.array([(u - environment.cx) / environment.fx, (v - environment.cy) / environment.fy, 1.0]) * depth
-    return np.asarray(environment.camera_to_world[:, :3] @ seen + environment.camera_to_world[:, 3], dtype=np.float64)
+def _placement(scene: Scene, environment: Environment | None) -> Placement | None:
+    """How a scene's one object stands in a room; None if its transform places it."""
+    if scene.objects or environment is None:
+        return None
+    return Placement() if scene.placement is None and scene.transform == Transform() else scene.placement
 
 
 def rotation_about(axis: Vector, degrees: float) -> Floats:

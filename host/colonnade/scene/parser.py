@@ -14,14 +14,15 @@ from pydantic_core import ErrorDetails
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import check_values, read_input
 from colonnade.common.limits import MAX_COORDINATE, MAX_DEPTH
-from colonnade.scene.model import MAX_EDGE, Scene
+from colonnade.scene.model import MAX_EDGE, MAX_OBJECTS, MeshSource, Scene
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-#: Tables of the file in the order of messages. `Scene` names ``object`` placement, and splits several ``light``.
+#: Tables of the file in the order of messages. `Scene` names ``object`` placement, and splits several
+#: ``light``; several ``object`` are its objects.
 _TABLES = "mesh transform object camera light material paths ambient background motion frame".split()
 
 _SCHEMA = TypeAdapter(Scene)
@@ -50,12 +51,17 @@ def load_scene(path: str | Path) -> Scene:
         raise UserError(f"scene {file}: {_message(error.errors(include_url=False)[0])}") from None
     except ValueError as error:
         raise UserError(f"scene {file}: {error}") from None
-    mesh, background = scene.mesh, scene.background
-    if mesh.path is not None:
-        scene = replace(scene, mesh=replace(mesh, path=file.parent / mesh.path))
+    background = scene.background
+    objects = tuple(replace(one, mesh=_beside(one.mesh, file)) for one in scene.objects)
+    scene = replace(scene, mesh=objects[0].mesh if objects else _beside(scene.mesh, file), objects=objects)
     if background.room is not None:
         scene = scene.with_environment(file.parent / background.room)
     return scene
+
+
+def _beside(mesh: MeshSource, file: Path) -> MeshSource:
+    """The mesh with a path relative to the working directory, not to the scene file."""
+    return mesh if mesh.path is None else replace(mesh, path=file.parent / mesh.path)
 
 
 def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -63,7 +69,10 @@ def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
     tables = dict(data) | {"names_light": "light" in data or "ambient" in data}
     if isinstance(light := tables.get("light"), list) and light:
         tables |= {"light": light[0], "more_lights": light[1:]}
-    if "object" in tables:
+    if isinstance(tables.get("object"), list):
+        tables["objects"] = tables.pop("object")
+        tables["mesh"] = {"name": "unused"}
+    elif "object" in tables:
         tables["placement"] = tables.pop("object")
     return {"mesh": {}} | tables
 
@@ -77,8 +86,11 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     for name, value in data.items():
         if name not in _TABLES:
             raise ValueError(f"unknown key {name}; known here: {', '.join(_TABLES)}")
-        if not isinstance(value, dict) and not (name == "light" and isinstance(value, list) and value):
+        if not isinstance(value, dict) and not (name in ("light", "object") and isinstance(value, list) and value):
             raise ValueError(f"{name} must be a table: [{name}]")
+    if isinstance(data.get("object"), list):
+        _check_objects(data)
+        data = {name: value for name, value in data.items() if name != "object"}
     lights = data.get("light", {})
     lights = lights if isinstance(lights, list) else [lights]
     camera, transform, background = (data.get(name, {}) for name in ("camera", "transform", "background"))
@@ -100,11 +112,49 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
         raise ValueError("motion.light starts at the first light's position: give light.position")
 
 
+def _check_objects(data: Mapping[str, Any]) -> None:
+    """Refuse contradictory keys of a scene with ``[[object]]`` tables.
+
+    Raises:
+        ValueError: The message for the user.
+    """
+    objects, in_room = data["object"], "room" in data.get("background", {})
+    if len(objects) > MAX_OBJECTS:
+        raise ValueError(f"the scene has {len(objects)} [[object]], at most {MAX_OBJECTS} are possible: join meshes")
+    for table in ("mesh", "transform", "material"):
+        if table in data:
+            raise ValueError(f"[[object]] has a {table} of its own: leave out [{table}], give object.{table}")
+    for key in ("turn", "stand_at", "translate"):
+        if key in data.get("motion", {}):
+            raise ValueError(f"motion.{key} moves a single object, the scene has [[object]]: give motion.light")
+    for number, one in enumerate(objects, 1):
+        if not isinstance(one, dict):
+            raise ValueError("object must be tables: [[object]]")
+        if "mesh" not in one:
+            raise ValueError(f"object {number} has no mesh: give object.mesh")
+        placing = [key for key in ("stand_at", "size", "turn") if key in one]
+        moving = [key for key in ("scale", "translate") if key in _table(one, "transform")]
+        if placing and not in_room:
+            raise ValueError(f"object {number}: object.{placing[0]} places it in a room: it needs background.room")
+        if placing and moving:
+            raise ValueError(f"object {number}: leave out object.{placing[0]}, or object.transform.{moving[0]}")
+
+
+def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    value = data.get(name, {})
+    return value if isinstance(value, dict) else {}
+
+
 def _message(error: ErrorDetails) -> str:
     """Format a validation error in one line: the key as in the file, and its valid values."""
     table, *rest = (str(part) for part in error["loc"] if isinstance(part, str))
-    name = {"placement": "object", "more_lights": "light"}.get(table, table)
+    name = {"placement": "object", "more_lights": "light", "objects": "object"}.get(table, table)
     node = _node(table)
+    if table == "objects" and rest and rest[0] in ("mesh", "transform", "material"):
+        inner, *rest = rest
+        name, node = f"object.{inner}", _plain(node["properties"][inner])
+        if error["type"] == "dataclass_type":
+            return f"{name} must be a table"
     if error["type"] == "dataclass_type":
         return f"{name} must be a table: [{name}]"
     if error["type"] == "unexpected_keyword_argument":

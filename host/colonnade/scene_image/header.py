@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Extent
+from colonnade.mesh.mesh import Extent, MeshPart
 from colonnade.scene_image.bvh import TreeStatistics
 
 
@@ -78,6 +78,7 @@ class ImageHeader:
         materials: Materials by the faces' material index.
         tree: Size and cost of the tree; None without nodes.
         room: The room; None without a room's maps.
+        parts: The objects of a scene with several, by their source faces.
     """
 
     format_hash: str
@@ -97,6 +98,7 @@ class ImageHeader:
     materials: tuple[MeshMaterial, ...]
     tree: TreeStatistics | None
     room: EnvironmentHeader | None = None
+    parts: tuple[MeshPart, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Convert to a JSON object; floats keep their exact values."""
@@ -112,6 +114,7 @@ class ImageHeader:
         values["bounds_high"] = tuple(values["bounds_high"])
         frame = values["frame"]
         values["frame"] = ObjectFrame(frame["scale"], tuple(frame["offset"]))
+        values["parts"] = tuple(MeshPart(**part) for part in values["parts"])
         extent = {name: np.array(value, dtype=np.float64) for name, value in values["extent"].items()}
         values["extent"] = Extent(**extent)
         values["materials"] = tuple(

@@ -54,6 +54,9 @@ def check_header(header: Any) -> None:
         _numbers(material["albedo"], 3)
         _number(material["ior"])
         _require(isinstance(material["has_corner_colours"], bool))
+    for part in _list(header["parts"]):
+        _require(isinstance(part["name"], str) and _number(part["edge"]) > 0)
+        _count(part["first_face"])
     _check_tree(header["tree"])
     _check_environment(header["room"])
 

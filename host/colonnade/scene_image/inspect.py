@@ -11,6 +11,9 @@ from colonnade.design.manifest import Manifest
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.header import ImageHeader
 
+#: Steps of the grid along an object's longest edge from which its rounding is fine.
+FINE_UNITS = 1024
+
 
 def describe(image: SceneImage) -> dict[str, Any]:
     """Describe mesh, memory map and tree as a JSON object."""
@@ -35,6 +38,7 @@ def describe(image: SceneImage) -> dict[str, Any]:
             "bytes": image.records.nbytes,
             "sections": {name: {"first": first, "records": count} for name, first, count in sections(header)},
         },
+        "objects": [asdict(part) | {"units": part.edge * header.frame.scale} for part in header.parts],
         "tree": asdict(header.tree) if header.tree is not None else None,
         "room": _environment(image),
         "format_hash": header.format_hash,
@@ -68,6 +72,26 @@ def sections(header: ImageHeader) -> list[tuple[str, int, int]]:
     ]
 
 
+def coarse_line(header: ImageHeader) -> str | None:
+    """A line on the objects whose vertices the common grid rounds coarsely; None if there are none."""
+    coarse = [
+        f"object {number} ({one_line(part.name)}) is {part.edge * header.frame.scale:.0f} steps long"
+        for number, part in enumerate(header.parts, 1)
+        if part.edge * header.frame.scale < FINE_UNITS
+    ]
+    if not coarse:
+        return None
+    return (
+        f"the vertices of all objects share a grid of {_step(header)}, and {', '.join(coarse)}: raise"
+        " geometry.vertexBits, or bring the objects nearer to one another"
+    )
+
+
+def _step(header: ImageHeader) -> str:
+    """The step of the grid: in a room, whose world is in metres, in millimetres."""
+    return f"{1e3 / header.frame.scale:.3g} mm" if header.room is not None else f"{1 / header.frame.scale:.3g} units"
+
+
 def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[str]:
     """Describe the image in text lines; a manifest adds the use of its memories."""
     dropped = header.source_triangles - header.triangles
@@ -75,6 +99,11 @@ def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[
         f"mesh        {one_line(header.mesh)}: {header.triangles:,} triangles"
         + (f" ({dropped:,} dropped)" if dropped else "")
     ]
+    lines += [
+        f"object {number:<4} {one_line(part.name)}: {part.edge * header.frame.scale:,.0f} steps of {_step(header)} long"
+        for number, part in enumerate(header.parts, 1)
+    ]
+    lines += [] if (coarse := coarse_line(header)) is None else [f"warning     {coarse}"]
     lines.append(
         f"box         {header.bounds_low} to {header.bounds_high} units, {header.frame.scale:.6g} units per mesh unit"
     )

@@ -130,6 +130,7 @@ def pack(
         extent=mesh.extent,
         materials=tuple(materials),
         tree=bvh.statistics if manifest.bvh else None,
+        parts=mesh.parts,
     )
     return SceneImage(header, np.concatenate(sections), mesh.source_faces[quantised.mesh_faces[bvh.order]])
 

@@ -126,6 +126,34 @@ CASES |= {
     "negative-colour": Case(X, "from 0", scene("[background]\ncolour = [-1, 0, 0]\n")),
     "negative-falloff": Case(X, "light.falloff", scene("[light]\nfalloff = -1\n")),
     "infinite-pixel": Case(X, "two numbers", scene('[object]\nstand_at = [inf, 1]\n[background]\nroom = "room"\n')),
+    **{
+        f"objects-{name}": Case(X, message, {"x.toml": text})
+        for name, message, text in (
+            ("none", "object must be a table", "object = []\n"),
+            ("numbers", "must be tables", "object = [1]\n"),
+            ("without-mesh", "object 2 has no mesh", '[[object]]\nmesh.name = "cube"\n[[object]]\n'),
+            ("mesh-number", "object.mesh must be a table", "[[object]]\nmesh = 1\n"),
+            ("mesh-nothing", "either a name or a path", "[[object]]\nmesh = {}\n"),
+            ("unknown", "unknown key object.colour", '[[object]]\nmesh.name = "cube"\ncolour = 1\n'),
+            ("deep-unknown", "unknown key object.material.x", '[[object]]\nmesh.name = "cube"\nmaterial.x = 1\n'),
+            ("nan", "object.transform.scale", '[[object]]\nmesh.name = "cube"\ntransform.scale = nan\n'),
+            ("albedo", "object.material.albedo", '[[object]]\nmesh.name = "cube"\nmaterial.albedo = [2, 0, 0]\n'),
+            ("no-room", "needs background.room", '[[object]]\nmesh.name = "cube"\nsize = 0.2\n'),
+            ("and-mesh", "leave out [mesh]", 'mesh.name = "cube"\n[[object]]\nmesh.name = "cube"\n'),
+            ("and-motion", "motion.turn", '[[object]]\nmesh.name = "cube"\n[motion]\nturn = 9\n'),
+            ("many", "at most 64", '[[object]]\nmesh.name = "cube"\n' * 65),
+            ("far", "beyond", '[[object]]\nmesh.name = "cube"\ntransform.translate = [1e300, 0, 0]\n'),
+            (
+                "both",
+                "leave out object.size, or object.transform.scale",
+                '[[object]]\nmesh.name = "cube"\nsize = 1\ntransform.scale = 2\n[background]\nroom = "room"\n',
+            ),
+        )
+    },
+    "objects-and-mesh-option": Case(
+        f"{X} --mesh cube", "has 1 [[object]]", {"x.toml": '[[object]]\nmesh.name = "cube"\n'}
+    ),
+    "objects-and-frames": Case(f"{X} --frames 2", "give motion.light", {"x.toml": '[[object]]\nmesh.name = "cube"\n'}),
     "nan-ior": Case(X, "material.ior", scene('[material]\nkind = "glass"\nior = nan\n')),
     "zero-width": Case(X, "frame.width", scene("[frame]\nwidth = 0\n")),
     "negative-bounces": Case(X, "paths.bounces", scene("[paths]\nbounces = -1\n")),

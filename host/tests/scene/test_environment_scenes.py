@@ -76,7 +76,10 @@ def test_the_pose_of_the_camera_does_not_change_its_maps(folder: Path, turn: tup
     meta = json.loads((folder / "attic" / "meta.json").read_text())
     meta["cam_to_world"] = (np.array(meta["cam_to_world"]) @ np.diag([*turn, 1])).tolist()
     (folder / "turned" / "meta.json").write_text(json.dumps(meta))
-    model, reference = both(folder, STANDING.replace("attic", "turned") + "background.occlusion = false\n")
+    turned = load_environment(folder / "turned")
+    x, y, z = turned.camera_to_world[:, :3] @ turned.points()[43, 48] + turned.camera_to_world[:, 3]
+    place = f"transform = {{translate = [{x}, {y}, {z}], scale = 0.2}}\nbackground.occlusion = false\n"
+    model, reference = both(folder, IN_ATTIC.replace("attic", "turned") + LAMP + place)
     assert model.object_mask.any()
     assert_alike(model, reference)
 

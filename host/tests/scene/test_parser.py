@@ -32,7 +32,9 @@ def test_every_scene_of_the_project_is_read() -> None:
     files = sorted(SCENES.glob("*.toml"))
     assert {"object.toml", "first-light.toml"} <= {file.name for file in files}
     for file in files:
-        load_mesh(load_scene(file).mesh_source)
+        scene = load_scene(file)
+        for mesh in [one.mesh for one in scene.objects] or [scene.mesh]:
+            load_mesh(mesh.source)
 
 
 def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from colonnade.quality.region_metrics import RegionDifference, compare_regions, 
 from colonnade.reference.environment.decoded import backdrops
 from colonnade.reference.render import ReferenceResult, render_reference
 from colonnade.registers.environment import environment_registers
-from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Placement, Scene
+from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Placement, Scene, Transform
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
@@ -103,9 +103,14 @@ OBJECTS = {
 
 def placed_scene(mesh: str, material: Material, environment: Environment, placement: Placement) -> Scene:
     """A scene with an object in a room, a lamp about 1.5 m away from it, and ambient light."""
-    from colonnade.scene.object_pose import standing_point
+    from colonnade.mesh.load import load_mesh
+    from colonnade.scene.object_pose import chosen, rotation_matrix
+    from colonnade.scene.standing import surface_point
 
-    x, y, z = standing_point(placement, environment)
+    if placement.stand_at is None:
+        placement = chosen(placement, rotation_matrix(Transform()), load_mesh(mesh).extent, environment, "object")
+    assert placement.stand_at is not None
+    x, y, z = surface_point(placement.stand_at, environment, "object.stand_at")
     return Scene(
         MeshSource(mesh),
         placement=placement,

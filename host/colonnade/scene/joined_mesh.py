@@ -1,0 +1,109 @@
+"""The meshes of several objects as one mesh in world space."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.mesh import Mesh, MeshPart
+from colonnade.mesh.palette import MAX_MATERIALS
+from colonnade.scene.model import Scene, SceneObject
+from colonnade.scene.object_pose import Pose, chosen, footprint_of, rotation_matrix, standing_pose
+from colonnade.scene.standing import surface_point
+from colonnade.scene.view import with_overrides
+
+if TYPE_CHECKING:
+    from colonnade.environment.model import Environment
+
+
+def joined_mesh(scene: Scene, environment: Environment | None, corner_colours: bool = False) -> Mesh:
+    """Load the objects of a scene and place them in the world, one after the other.
+
+    Faces are numbered through all objects in their order, and `Mesh.parts` says where each begins.
+
+    Raises:
+        UserError: A mesh cannot be rendered, an object has no place, or there are too many materials.
+    """
+    loaded: dict[str, Mesh] = {}
+    meshes, poses = [], []
+    taken: list[tuple[Floats, float]] = []
+    for number, described in enumerate(scene.objects, 1):
+        key = f"{described.mesh.source} {described.mesh.crease}"
+        if key not in loaded:
+            loaded[key] = load_mesh(described.mesh.source, described.mesh.crease, corner_colours)
+        mesh = replace(loaded[key], materials=with_overrides(loaded[key].materials, described.material))
+        poses.append(_pose(described, mesh, environment, f"object {number}", taken))
+        meshes.append(_flat(mesh) if described.material.flat else mesh)
+    return _joined(meshes, poses)
+
+
+def _pose(
+    described: SceneObject, mesh: Mesh, environment: Environment | None, name: str, taken: list[tuple[Floats, float]]
+) -> Pose:
+    """The pose of an object; the place where it stands is added to ``taken``."""
+    rotation, transform = rotation_matrix(described.transform), described.transform
+    if environment is None or not described.stands:
+        return Pose(rotation, transform.scale, np.array(transform.translate))
+    placed = described
+    if described.stand_at is None:
+        placed = replace(
+            described, stand_at=chosen(described, rotation, mesh.extent, environment, name, taken).stand_at
+        )
+    assert placed.stand_at is not None
+    point = surface_point(placed.stand_at, environment, f"{name}.stand_at")
+    taken.append((point, footprint_of(described, rotation, mesh.extent).radius))
+    return standing_pose(placed, rotation, mesh.extent, point)
+
+
+def _flat(mesh: Mesh) -> Mesh:
+    """The mesh with the geometric normals of its faces."""
+    corners = mesh.vertices[mesh.faces]
+    normals = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return replace(mesh, corner_normals=np.repeat(normals[:, None], 3, axis=1))
+
+
+def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
+    materials = list(dict.fromkeys(material for mesh in meshes for material in mesh.materials))
+    if len(materials) > MAX_MATERIALS:
+        raise UserError(f"the objects have {len(materials):,} materials: use at most {MAX_MATERIALS}")
+    first_vertices = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    first_faces = np.cumsum([0, *(mesh.source_count for mesh in meshes)])
+    index = [np.array([materials.index(material) for material in mesh.materials]) for mesh in meshes]
+    return Mesh(
+        vertices=np.concatenate([pose.to_world(mesh.vertices) for mesh, pose in zip(meshes, poses, strict=True)]),
+        faces=np.concatenate(
+            [mesh.faces + first for mesh, first in zip(meshes, first_vertices[:-1], strict=True)]
+        ).astype(np.int32),
+        corner_normals=np.concatenate(
+            [mesh.corner_normals @ pose.rotation.T for mesh, pose in zip(meshes, poses, strict=True)]
+        ),
+        materials=tuple(materials),
+        face_materials=np.concatenate(
+            [own[mesh.face_materials] for mesh, own in zip(meshes, index, strict=True)]
+        ).astype(np.uint8),
+        source_faces=np.concatenate(
+            [mesh.source_faces + first for mesh, first in zip(meshes, first_faces[:-1], strict=True)]
+        ).astype(np.int32),
+        source_count=int(first_faces[-1]),
+        name=" + ".join(mesh.name for mesh in meshes),
+        corner_colours=_colours(meshes),
+        parts=tuple(
+            MeshPart(mesh.name, int(first), mesh.extent.edge * pose.scale)
+            for mesh, pose, first in zip(meshes, poses, first_faces[:-1], strict=True)
+        ),
+    )
+
+
+def _colours(meshes: list[Mesh]) -> Floats | None:
+    """The corner colours of all faces, 0 on meshes without; None if no mesh has any."""
+    if all(mesh.corner_colours is None for mesh in meshes):
+        return None
+    return np.concatenate(
+        [np.zeros((len(mesh.faces), 3, 3)) if mesh.corner_colours is None else mesh.corner_colours for mesh in meshes]
+    )

@@ -1,0 +1,121 @@
+"""Several objects of a scene: their poses, materials and face ids, and the places where they stand."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.common.hits import read_hits, write_hits
+from colonnade.common.image_io import encode_srgb
+from colonnade.environment.model import Environment
+from colonnade.evaluation.studies.synthetic_attic import attic
+from colonnade.mesh.load import load_mesh
+from colonnade.quality.image_metrics import psnr
+from colonnade.render.frames import render
+from colonnade.render.request import RenderRequest
+from colonnade.scene.joined_mesh import joined_mesh
+from colonnade.scene.model import Material, MeshSource, Scene, SceneObject, Transform
+from colonnade.scene.standing import Footprint, free_place, surface_point
+
+TWO = """
+[[object]]
+mesh.name = "cube"
+transform = {translate = [-1.5, 0, 0], rotate = [0, 30, 0]}
+material = {albedo = [0.8, 0.1, 0.1]}
+[[object]]
+mesh.name = "sphere:3"
+transform = {translate = [1.5, 0, 0], scale = 0.8}
+material = {kind = "mirror"}
+"""
+
+
+@pytest.fixture(scope="module")
+def room() -> Environment:
+    return attic(320, 240).environment
+
+
+def objects(*described: SceneObject) -> Scene:
+    return Scene(described[0].mesh, objects=described)
+
+
+def test_objects_keep_their_poses_materials_and_faces() -> None:
+    red = Material(albedo=(0.8, 0.1, 0.1), flat=True)
+    moved = SceneObject(
+        mesh=MeshSource("sphere:2"), material=red, transform=Transform((0.0, 90.0, 0.0), 2.0, (5.0, 0.0, 0.0))
+    )
+    joined = joined_mesh(
+        objects(SceneObject(mesh=MeshSource("cube")), moved, SceneObject(mesh=MeshSource("cube"))), None
+    )
+    cube, sphere = load_mesh("cube"), load_mesh("sphere:2")
+    own = slice(len(cube.faces), len(cube.faces) + len(sphere.faces))
+    corners = sphere.vertices[sphere.faces] * 2.0
+    turned = np.stack([corners[..., 2] + 5.0, corners[..., 1], -corners[..., 0]], axis=-1)
+    np.testing.assert_allclose(joined.vertices[joined.faces[own]], turned, atol=1e-12)
+    assert [joined.materials[k].albedo for k in joined.face_materials[[0, own.start, -1]]] == [
+        (0.8, 0.8, 0.8),
+        (0.8, 0.1, 0.1),
+        (0.8, 0.8, 0.8),
+    ]
+    geometric = np.cross(turned[:, 1] - turned[:, 0], turned[:, 2] - turned[:, 0])
+    assert (
+        np.einsum("ni,nji->nj", geometric, joined.corner_normals[own])
+        > 0.999 * np.linalg.norm(geometric, axis=1)[:, None]
+    ).all()
+    assert [part.first_face for part in joined.parts] == [0, 12, 12 + sphere.source_count]
+    assert joined.parts[1].edge == pytest.approx(2 * sphere.extent.edge)
+
+
+def test_model_and_reference_show_the_same_objects(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(TWO)
+    request = RenderRequest(tmp_path / "a.toml", "small", backend="model", size=(96, 72))
+    model, reference = render(request), render(dataclasses.replace(request, backend="reference"))
+    assert psnr(encode_srgb(reference.image), encode_srgb(model.image)) > 35.0
+    hits = model.hits()
+    assert hits.object is not None
+    assert {int(k): int(hits.triangle[hits.object == k].max()) < n for k, n in ((-1, 0), (0, 12), (1, 5120))} == {
+        -1: True,
+        0: True,
+        1: True,
+    }
+    assert (hits.object[:, :40] != 1).all() and (hits.object[:, 56:] != 0).all()
+    assert np.mean(hits.numbers() != reference.hits().numbers()) < 0.01
+    write_hits(tmp_path / "h.npz", hits)
+    np.testing.assert_array_equal(read_hits(tmp_path / "h.npz").numbers(), hits.numbers())
+
+
+def test_objects_without_a_place_stand_apart_on_level_surfaces(room: Environment) -> None:
+    joined = joined_mesh(objects(*[SceneObject(mesh=MeshSource("cube"), size=0.2) for _ in range(3)]), room)
+    cubes = joined.vertices.reshape(3, 8, 3)
+    centres = cubes.mean(axis=1)
+    apart = [np.linalg.norm(centres[a] - centres[b]) for a, b in ((0, 1), (0, 2), (1, 2))]
+    assert min(apart) > 0.2
+    for cube in cubes:
+        seen = (cube - room.camera_to_world[:, 3]) @ room.camera_to_world[:, :3]
+        u = seen[:, 0] / seen[:, 2] * room.fx + room.cx
+        v = seen[:, 1] / seen[:, 2] * room.fy + room.cy
+        assert (u > 0).all() and (u < 320).all() and (v > 0).all() and (v < 240).all()
+
+
+def test_a_place_is_level_and_too_large_an_object_has_none(room: Environment) -> None:
+    place = free_place(room, Footprint(0.2, 0.2))
+    assert place is not None
+    surface_point(place, room, "object.stand_at")
+    assert free_place(room, Footprint(4.0, 0.2)) is None
+    with pytest.raises(UserError, match="no level surface in view of room attic has room for an object"):
+        joined_mesh(objects(SceneObject(mesh=MeshSource("cube"), size=9.0)), room)
+
+
+@pytest.mark.parametrize("is_steep", ["wall", "ceiling"])
+def test_walls_and_ceilings_are_refused(room: Environment, is_steep: str) -> None:
+    upward = room.normals @ room.camera_to_world[1, :3]
+    mask = np.abs(upward) < 0.2 if is_steep == "wall" else upward < -0.75
+    kernel = np.lib.stride_tricks.sliding_window_view(mask, (7, 7)).all(axis=(2, 3))
+    if not kernel.any():
+        pytest.skip("the room has no such surface")
+    y, x = np.argwhere(kernel)[0] + 3
+    with pytest.raises(UserError, match=rf"object 1.stand_at is .*, on a {is_steep}.*choose a pixel of a floor"):
+        joined_mesh(objects(SceneObject((float(x), float(y)), mesh=MeshSource("cube"))), room)
