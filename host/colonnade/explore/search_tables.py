@@ -20,6 +20,8 @@ def designs(study: Data) -> str:
     rows = []
     for point in sorted(points.values(), key=lambda point: point["figures"][key] or float("inf")):
         own = point["figures"]
+        if point is not base and own == base["figures"]:
+            continue  # the baseline again, with a null written out
         name = point["name"] if point is base else _changes(point, base)
         rows.append(
             [
