@@ -115,11 +115,11 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     ),
     "with an environment, one context, no bounces"
   )
-  for (config <- TestConfigs.withColours.take(3)) render(config, s"corner colours at ${config.precision}")
   render(
     TestConfigs.withColours.head.copy(physicalAttributeMemory = Some(TestConfigs.environment)),
-    "corner colours with an environment"
+    s"corner colours at ${TestConfigs.withColours.head.precision} with an environment"
   )
+  for (config <- TestConfigs.withColours.slice(1, 3)) render(config, s"corner colours at ${config.precision}")
 }
 
 /** Packs registers and pixel into one port each; with an environment, adds its maps, with random latency. */
