@@ -109,7 +109,7 @@ object TestConfigs {
 
   /** With corner colours, from the presets' precision to the narrowest. */
   val withColours: Seq[ColonnadeConfig] =
-    Seq(tiny, withPrecision(24, 24, 64), withPrecision(16, 16, 32), withPrecision(16, 16, 16)).map(config =>
+    Seq(tiny, withPrecision(24, 24, 64), withPrecision(16, 16, 32)).map(config =>
       config.copy(geometry = config.geometry.copy(cornerColours = true))
     )
 }

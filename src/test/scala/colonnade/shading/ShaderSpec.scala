@@ -214,7 +214,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   for (
-    config <- (TestConfigs.formats ++ TestConfigs.withColours).map(_.copy(physicalAttributeMemory =
+    config <- (TestConfigs.formats :+ TestConfigs.withColours.head).map(_.copy(physicalAttributeMemory =
       Some(TestConfigs.environment)
     ))
   )
