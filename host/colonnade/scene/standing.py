@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.errors import UserError
-from colonnade.common.types import Floats
+from colonnade.common.types import Floats, Indices
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
@@ -101,6 +101,17 @@ def free_place(
     return None
 
 
+def _pixels(environment: Environment, seen: Floats) -> tuple[Indices, Indices] | None:
+    """The pixels u and v of points [n, 3] in the camera's space; None if one is out of view."""
+    if seen[:, 2].min() <= 0:
+        return None
+    u = np.floor(seen[:, 0] / seen[:, 2] * environment.fx + environment.cx).astype(np.int64)
+    v = np.floor(seen[:, 1] / seen[:, 2] * environment.fy + environment.cy).astype(np.int64)
+    if min(u.min(), v.min()) < 0 or u.max() >= environment.width or v.max() >= environment.height:
+        return None
+    return u, v
+
+
 def _is_supported(environment: Environment, radius: float, foot: Floats, noise: float) -> bool:
     """Whether the whole disc under a cylinder is seen, on a level surface."""
     rotation, origin = environment.camera_to_world[:, :3], environment.camera_to_world[:, 3]
@@ -108,12 +119,10 @@ def _is_supported(environment: Environment, radius: float, foot: Floats, noise: 
     ring = np.stack([np.cos(angle), np.zeros(16), np.sin(angle)], axis=1)
     disc = foot + radius * np.concatenate([0.5 * ring, ring])
     seen = (disc - origin) @ rotation
-    if seen[:, 2].min() <= 0:
+    pixels = _pixels(environment, seen)
+    if pixels is None:
         return False
-    u = np.floor(seen[:, 0] / seen[:, 2] * environment.fx + environment.cx).astype(np.int64)
-    v = np.floor(seen[:, 1] / seen[:, 2] * environment.fy + environment.cy).astype(np.int64)
-    if min(u.min(), v.min()) < 0 or u.max() >= environment.width or v.max() >= environment.height:
-        return False
+    u, v = pixels
     direction = np.stack(
         [(u + 0.5 - environment.cx) / environment.fx, (v + 0.5 - environment.cy) / environment.fy, np.ones(len(u))],
         axis=1,
@@ -128,10 +137,8 @@ def _is_in_view(environment: Environment, footprint: Footprint, foot: Floats, no
     across, up = np.meshgrid(np.linspace(-1, 1, 7) * footprint.radius, np.linspace(0.1, 1, 7) * footprint.height)
     upright = foot - origin + up.reshape(-1, 1) * (0.0, 1.0, 0.0)
     seen = (upright + across.reshape(-1, 1) * rotation[:, 0]) @ rotation
-    if seen[:, 2].min() <= 0:
+    pixels = _pixels(environment, seen)
+    if pixels is None:
         return False
-    u = np.floor(seen[:, 0] / seen[:, 2] * environment.fx + environment.cx).astype(np.int64)
-    v = np.floor(seen[:, 1] / seen[:, 2] * environment.fy + environment.cy).astype(np.int64)
-    if min(u.min(), v.min()) < 0 or u.max() >= environment.width or v.max() >= environment.height:
-        return False
+    u, v = pixels
     return bool(np.mean(environment.depth[v, u] < seen[:, 2] - noise) <= _BLOCKED)
