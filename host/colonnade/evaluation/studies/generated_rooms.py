@@ -152,7 +152,6 @@ class _Plan:
     def _table(self, x: float, z: float, wide: float, deep: float) -> list[Part]:
         """A table with four legs, and things on it."""
         top, leg, wood = self.uniform(0.42, 0.78), self.uniform(0.012, 0.03), self.paint()
-        dark, half = plaster((0.3, 0.22, 0.16)), top / 2 - 0.02
         legs = [(x + i * (wide - leg), z + j * (deep - leg)) for i in (-1, 1) for j in (-1, 1)]
         half, dark = top / 2 - 0.02, plaster((0.3, 0.22, 0.16))
         parts = [box((x, top - 0.02, z), (wide, 0.02, deep), 0.0, wood)]
