@@ -1,9 +1,9 @@
 package colonnade.memory
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordFormats, SceneInDram, SceneLines}
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -19,7 +19,7 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   )
     it should s"serve $columns columns from $banks banks of $sets sets of $ways ways over a bus of $bus bytes" in {
       val config = TestConfigs.withCache(columns = columns, banks = banks, sets = sets, ways = ways, bus = bus)
-      test(new SceneMemory(config)) { dut =>
+      test(new SceneMemory(config)).withAnnotations(Simulation.verilator) { dut =>
         val dram = new Dram(dut, config, new Random(columns))
         dram.run(requests = 120)
         val warm = dram.reads
@@ -35,7 +35,7 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
 
   it should "announce zeros for a line whose read fails, report it, and read it again" in {
     val config = TestConfigs.withCache(columns = 2)
-    test(new SceneMemory(config)) { dut =>
+    test(new SceneMemory(config)).withAnnotations(Simulation.verilator) { dut =>
       val dram = new Dram(dut, config, new Random(1))
       dram.failing = Set(1, 4)
       dram.run(requests = 100)

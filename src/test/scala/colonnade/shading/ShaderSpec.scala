@@ -122,10 +122,8 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
 
   for ((config, limit) <- Seq(TestConfigs.tiny -> 50, TestConfigs.withColours.head -> 60))
-    it should s"take a hit with a light at least every $limit cycles at ${nameOf(config)}" in test(
-      new ShaderHarness(config)
-    ) {
-      shader =>
+    it should s"take a hit with a light at least every $limit cycles at ${nameOf(config)}" in
+      test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
         val random   = new Random(23)
         val stimulus = new ShaderStimulus(config, random)
         val light    = stimulus.light().at(Seq(3000, 5000, 9000)).copy(
@@ -153,12 +151,12 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
         }
         info(s"${taken.sum / taken.size} cycles a hit, at most ${taken.max}")
         assert(taken.max <= limit, s"cycles from a hit to the next: $taken")
-    }
+      }
 
   it should "tell the materials of a table apart, whatever its size" in {
     for (materials <- Seq(1, 5, 8)) {
       val config = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(materials = materials, maxBounces = 0))
-      test(new ShaderHarness(config)) { shader =>
+      test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
         val random   = new Random(24)
         val stimulus = new ShaderStimulus(config, random)
         val light    = stimulus.light()
