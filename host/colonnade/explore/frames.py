@@ -85,6 +85,7 @@ def cycles_job(
     size: tuple[int, int],
     *,
     reuse: bool = True,
+    dram_latency: int | None = None,
 ) -> Job:
     """The job that renders a frame with the RTL and counts its cycles.
 
@@ -95,9 +96,16 @@ def cycles_job(
         frame: The frame.
         size: Width and height, pixels.
         reuse: Use the cached counters of the same Verilog and scene image.
+        dram_latency: Cycles from a read of DRAM to its first data, for designs with a cache; None: the default.
     """
-    identity = {"config": manifest.config, "frame": frame.identity, "size": size}
-    arguments = {"scene": frame.scene, "mesh": frame.mesh, "size": size, "reuse": reuse}
+    identity = {"config": manifest.config, "frame": frame.identity, "size": size, "dramLatency": dram_latency}
+    arguments = {
+        "scene": frame.scene,
+        "mesh": frame.mesh,
+        "size": size,
+        "reuse": reuse,
+        "dram_latency": dram_latency,
+    }
     return Job(KINDS["cycles"], title, identity, {**design, **arguments})
 
 
