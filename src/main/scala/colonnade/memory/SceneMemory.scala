@@ -15,7 +15,7 @@ final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
   /** By column and bank. */
   val requests = Vec(config.array.columns, Vec(banks, Flipped(Decoupled(UInt(Lines.lineBits(config).W)))))
   val lines    = Output(Vec(banks, new LineBroadcast(config)))
-  val axi      = new AxiReadPort(config)
+  val axi      = DramPort(config)
 
   /** Forgets all lines; only while idle. */
   val invalidate = Input(Bool())
