@@ -49,7 +49,7 @@ lazy val colonnade = (project in file("."))
       "CXXFLAGS",
       "CPPFLAGS",
       "LDFLAGS"
-    ).map(_ -> "").toMap,
+    ).map(_ -> "").toMap + ("OBJCACHE" -> s"'${baseDirectory.value / "tools" / "verilated-object"}'"),
     Test / testOptions += Tests.Argument(TestFrameworks.ScalaTest, "-oD")
   )
 

@@ -41,6 +41,12 @@ if TYPE_CHECKING:
     help="Reuse cached results of earlier runs, also those of explore.",
 )
 @click.option("--mirror/--no-mirror", default=True, show_default=True, help="Also render the meshes as mirrors.")
+@click.option(
+    "--dram-latency",
+    type=click.IntRange(1, 100_000),
+    metavar="CYCLES",
+    help="Cycles from a read of DRAM to its first data, with a cache.  [default: 100]",
+)
 @click.option("--plot", type=FILE, metavar="FILE", help="Plot the utilisation of each stage as PNG.")
 @strict_option
 @json_option
@@ -52,6 +58,7 @@ def bench(
     jobs: int | None,
     reuse: bool,
     mirror: bool,
+    dram_latency: int | None,
     plot: Path | None,
     json_file: Path | None,
 ) -> None:
@@ -89,6 +96,7 @@ def bench(
             partial(_show, table),
             reuse=reuse,
             mirror=mirror,
+            dram_latency=dram_latency,
         )
         in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
         means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])

@@ -14,7 +14,7 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.device.simulator_build import build_simulator
-from colonnade.device.verilator import render_rtl
+from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.frames import require_no_errors
@@ -27,7 +27,14 @@ from colonnade.scene_image.packer import pack
 
 
 def measure_frame(
-    config: str, overrides: Sequence[str], scene: Scene, mesh: Mesh, size: tuple[int, int], *, reuse: bool = True
+    config: str,
+    overrides: Sequence[str],
+    scene: Scene,
+    mesh: Mesh,
+    size: tuple[int, int],
+    *,
+    reuse: bool = True,
+    dram_latency: int | None = None,
 ) -> dict[str, Any]:
     """Render a frame with the RTL.
 
@@ -37,7 +44,8 @@ def measure_frame(
         scene: The scene; its own mesh is not read.
         mesh: The mesh.
         size: Width and height, pixels.
-        reuse: Use the cached counters of the same Verilog, scene image and registers.
+        reuse: Use the cached counters of the same Verilog, scene image, registers and memory.
+        dram_latency: Cycles from a read of DRAM to its first data, for designs with a cache; None: those of `Stalls`.
 
     Returns:
         `colonnade.render.report.frame_report` with ``config_hash``, ``cycles_per_second`` and ``seconds``.
@@ -46,11 +54,16 @@ def measure_frame(
     manifest = design.manifest
     check_size(size, manifest)
     begun = time.perf_counter()
-    mesh = with_materials(scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours)
+    mesh = with_materials(
+        scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours, manifest.texture is not None
+    )
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     registers = frame_registers(scene, image.header, manifest, *size)
     pack_seconds = time.perf_counter() - begun
+    stalls = Stalls() if dram_latency is None else Stalls(dram_latency=dram_latency)
     key = _key(design, image, registers)
+    if manifest.config["columnBvhMemory"]["cache"] is not None:
+        key["dramLatency"] = stalls.dram_latency
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
     file = cache_directory(project_root()) / "measurements" / f"{name}.json"
     cached = cache.stored(file, key) if reuse else None
@@ -59,7 +72,7 @@ def measure_frame(
         return cached | of_today | {"mesh": asdict(mesh_report(image.header))}
     build_simulator(design)
     begun = time.perf_counter()
-    simulated = render_rtl(design, image, [registers])
+    simulated = render_rtl(design, image, [registers], stalls)
     run_seconds = time.perf_counter() - begun
     frame = simulated.frames[0]
     require_no_errors(frame)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.toolchain import project_root
@@ -30,6 +31,7 @@ def bench(
     *,
     reuse: bool = False,
     mirror: bool = False,
+    dram_latency: int | None = None,
 ) -> dict[str, Any]:
     """Render each mesh once and collect its figures. All meshes are loaded before the first frame.
 
@@ -43,9 +45,13 @@ def bench(
         finished: Called after each mesh, in order.
         reuse: Use the cached result of an earlier run.
         mirror: Render the meshes as mirrors with one reflection.
+        dram_latency: Cycles from a read of DRAM to its first data; None: the default.
 
     Returns:
         The report that `colonnade bench --json` writes.
+
+    Raises:
+        UserError: A DRAM latency for a configuration that reads no DRAM.
     """
     scene = load_scene(project_root() / "scenes" / "object.toml")
     size = size or (scene.frame.width, scene.frame.height)
@@ -54,12 +60,14 @@ def bench(
         loaded = [replace(object_mesh(scene.with_mesh(name), corner_colours=True), name=name) for name in names]
     design, manifest = design_of(config, overrides, progress)
     check_size(size, manifest)
+    if dram_latency is not None and manifest.config["columnBvhMemory"]["cache"] is None:
+        raise UserError("this configuration reads no DRAM: --dram-latency needs columnBvhMemory.cache")
     jobs = []
     for name, mesh in zip(names, loaded, strict=True):
         own = scene.with_mesh(name)
         frame = frame_of(name, _as_mirror(own) if mirror else own, mesh, name)
         title = f"cycles of {name}{' as a mirror' * mirror}"
-        jobs.append(cycles_job(title, design, manifest, frame, size, reuse=reuse))
+        jobs.append(cycles_job(title, design, manifest, frame, size, reuse=reuse, dram_latency=dram_latency))
     results = run_in_order(
         jobs,
         parallel,

@@ -50,8 +50,11 @@ def frame_of(name: str, scene: Scene, mesh: Mesh, source: str | None) -> Frame:
     plain = _SCENE.dump_python(scene, mode="json", exclude={"mesh": True, "background": {"room": True}})
     digest = hashlib.sha256()
     arrays = (mesh.vertices, mesh.faces, mesh.corner_normals, mesh.face_materials, mesh.source_faces)
-    for array in (*arrays, *(() if mesh.corner_colours is None else (mesh.corner_colours,))):
+    of_corners = tuple(array for array in (mesh.corner_colours, mesh.corner_positions) if array is not None)
+    for array in arrays + of_corners:
         digest.update(f"{array.shape} {array.dtype}\n".encode() + array.tobytes())
+    for texture in mesh.textures:
+        digest.update(f"{texture.wrap} {texture.pixels.shape}\n".encode() + texture.pixels.tobytes())
     digest.update(repr((mesh.materials, mesh.source_count)).encode())
     room = None
     if scene.background.room is not None:
@@ -85,6 +88,7 @@ def cycles_job(
     size: tuple[int, int],
     *,
     reuse: bool = True,
+    dram_latency: int | None = None,
 ) -> Job:
     """The job that renders a frame with the RTL and counts its cycles.
 
@@ -95,9 +99,16 @@ def cycles_job(
         frame: The frame.
         size: Width and height, pixels.
         reuse: Use the cached counters of the same Verilog and scene image.
+        dram_latency: Cycles from a read of DRAM to its first data, for designs with a cache; None: the default.
     """
-    identity = {"config": manifest.config, "frame": frame.identity, "size": size}
-    arguments = {"scene": frame.scene, "mesh": frame.mesh, "size": size, "reuse": reuse}
+    identity = {"config": manifest.config, "frame": frame.identity, "size": size, "dramLatency": dram_latency}
+    arguments = {
+        "scene": frame.scene,
+        "mesh": frame.mesh,
+        "size": size,
+        "reuse": reuse,
+        "dram_latency": dram_latency,
+    }
     return Job(KINDS["cycles"], title, identity, {**design, **arguments})
 
 

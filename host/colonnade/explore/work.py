@@ -70,14 +70,22 @@ def comparison(folder: Path, first: Content, second: Content, *, with_dists: boo
 
 
 def cycles(
-    folder: Path, *, config: str, overrides: Sequence[str], scene: Scene, mesh: Mesh, size: Size, reuse: bool
+    folder: Path,
+    *,
+    config: str,
+    overrides: Sequence[str],
+    scene: Scene,
+    mesh: Mesh,
+    size: Size,
+    reuse: bool,
+    dram_latency: int | None,
 ) -> None:
     """Render a frame with the RTL and take its counters."""
     from colonnade.evaluation.bench import mesh_result
     from colonnade.evaluation.measure import measure_frame
 
     with _configuration(config) as path:
-        report = measure_frame(str(path), overrides, scene, mesh, size, reuse=reuse)
+        report = measure_frame(str(path), overrides, scene, mesh, size, reuse=reuse, dram_latency=dram_latency)
     write_result(folder, mesh_result(report))
 
 

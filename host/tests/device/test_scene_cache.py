@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 
 import numpy as np
@@ -22,7 +23,10 @@ from colonnade.scene_image.packer import pack
 EVENTS = ("raysPrimary", "raysShadow", "raysInBox", "nodeReads", "triangleTests", "hits")
 
 
-def design_with(rows: int, columns: int, banks: int, buffers: int, cache: str) -> GeneratedDesign:
+def design_with(rows: int, columns: int, banks: int, buffers: int, sizes: tuple[int, ...]) -> GeneratedDesign:
+    """A design with a cache of these sizes, in the order of its fields."""
+    names = ("lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes")
+    cache = json.dumps(dict(zip(names, sizes, strict=True)))
     memory = (f"columnBvhMemory.{field}" for field in (f"banks={banks}", f"recordBuffers={buffers}", f"cache={cache}"))
     return design_for("tiny", (f"array.rows={rows}", f"array.columns={columns}", *memory))
 
@@ -44,16 +48,14 @@ def assert_same(frame: Frame, expected: Frame) -> None:
 SHAPES = {
     "one of everything": (1, 1, 1, 1, (1, 1, 1, 1, 1, 1, 4)),
     "two columns": (3, 2, 2, 2, (8, 2, 4, 16, 2, 8, 32)),
-    "four banks": (2, 3, 4, 3, (16, 4, 16, 32, 8, 16, 128)),
+    "four banks and two buses": (1, 5, 4, 3, (16, 4, 16, 32, 8, 16, 128)),
 }
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_no_frame_depends_on_the_memory(shape: str) -> None:
     rows, columns, banks, buffers, sizes = SHAPES[shape]
-    names = ("lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes")
-    cache = "{" + ", ".join(f'"{name}": {size}' for name, size in zip(names, sizes, strict=True)) + "}"
-    design = design_with(rows, columns, banks, buffers, cache)
+    design = design_with(rows, columns, banks, buffers, sizes)
     image, registers = scene_of(design)
     expected = render_model(design.manifest, image, registers)
     for seed, (latency, random) in enumerate([(1, 0), (100, 0), (7, 60), (300, 20)]):
@@ -72,3 +74,17 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
     failed, second = render_rtl(design, image, [late, registers], Stalls(seed=2, dram_silent=20)).frames
     assert set(failed.errors) == {"memory", "watchdog"}
     assert_same(second, expected)
+
+
+def test_a_scene_that_fits_is_read_once() -> None:
+    """A line that the shared cache holds is never read again, whatever else happens while it is looked up."""
+    design = design_with(1, 5, 1, 2, (4, 1, 4, 1024, 16, 8, 32))
+    image, registers = scene_of(design)
+    lines = -(-len(image.records) // 4)
+    assert lines <= 1024
+    expected = render_model(design.manifest, image, registers)
+    first, second = render_rtl(design, image, [registers, registers], Stalls(dram_latency=20)).frames
+    assert_same(first, expected)
+    assert_same(second, expected)
+    assert 0 < first.counters["dramReads"] <= lines
+    assert second.counters["dramReads"] == 0

@@ -8,7 +8,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, EnvironmentWindow, FrameController}
-import colonnade.memory.{DramPort, SceneMemory}
+import colonnade.memory.{DramPort, SceneMemory, SharedCache}
 import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** Ports of [[Colonnade]]. */
@@ -77,9 +77,9 @@ final class Colonnade(
     memory.page := registers.io.frame.dram.get.page
     io.memory.get :<>= memory.axi
     memory.invalidate := invalidate
-    for ((column, requests) <- columns.zip(memory.requests)) {
+    for (((column, requests), index) <- columns.zip(memory.requests).zipWithIndex) {
       requests :<>= column.io.lineRequests.get
-      column.io.lines.get      := memory.lines
+      column.io.lines.get      := memory.lines(SharedCache.busOf(config, index))
       column.io.invalidate.get := invalidate
     }
     counters.io.dramReads.get   := memory.events.dramReads

@@ -1,7 +1,7 @@
 package colonnade
 
 import chiseltest.VerilatorBackendAnnotation
-import chiseltest.simulator.VerilatorCFlags
+import chiseltest.simulator.{VerilatorCFlags, VerilatorFlags}
 
 /** Simulation settings of specs. */
 object Simulation {
@@ -9,6 +9,9 @@ object Simulation {
   /** For all C++ of Verilator: g++ 12.2 miscompiles population counts when it vectorises them. */
   val safeFlags: Seq[String] = Seq("-fno-tree-slp-vectorize")
 
-  /** Verilator, for units that are slow in the interpreter. */
-  val verilator = Seq(VerilatorBackendAnnotation, VerilatorCFlags(safeFlags))
+  /** Verilator, for units that are slow in the interpreter. Its headers take longer to compile than the unit: so all is one
+    * file.
+    */
+  val verilator =
+    Seq(VerilatorBackendAnnotation, VerilatorFlags(Seq("--output-split", "0")), VerilatorCFlags(safeFlags))
 }

@@ -60,7 +60,8 @@ object ShellMap {
       config.hasEnvironment,
       config.columnBvhMemory.cache.nonEmpty,
       config.frame.hasBounces,
-      config.geometry.cornerColours
+      config.geometry.cornerColours,
+      config.geometry.texture.nonEmpty
     )
     val bits = flags.zipWithIndex.collect { case (true, bit) => 1 << bit }.sum
     BigInt(bits | (Integer.numberOfTrailingZeros(busBytes) << 8))

@@ -40,16 +40,12 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val banks    = config.columnBvhMemory.banks
   private val sets     = cache.sets(banks)
   private val ways     = cache.ways
-  private val setBits  = log2Ceil(sets)
   private val lineBits = Lines.lineBits(config)
-  private val tagBits  = (lineBits - setBits).max(1)
 
   val io = IO(new ColumnCacheIO(config))
 
-  private val tags        = SyncReadMem(sets, Vec(ways, UInt(tagBits.W)))
-  private val records     = SyncReadMem(sets * ways * Lines.records, new RecordFormats(config).record)
-  private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U(ways.W))))
-  private val replacement = new Replacement(sets, ways)
+  private val tags    = new TagStore(sets, ways, lineBits)
+  private val records = SyncReadMem(sets * ways * Lines.records, new RecordFormats(config).record)
 
   private final class AwaitedLine {
     val isUsed                = RegInit(false.B)
@@ -59,8 +55,6 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   }
   private val awaited = Seq.fill(cache.misses / banks)(new AwaitedLine)
 
-  private def setOf(line:     UInt): UInt = line.pad(setBits + 1)(setBits - 1, 0)
-  private def tagOf(line:     UInt): UInt = (line >> setBits).asUInt.pad(tagBits)(tagBits - 1, 0)
   private def lineOf(address: UInt): UInt = (address >> Lines.wordBits).asUInt
 
   // Cycle a: an announced line is taken if it is awaited
@@ -79,17 +73,13 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   request.ready := blocked === 0.U && freeCount > accepted.asUInt
 
   // Cycle c + 1: compare. A line is never both held and awaited
-  private val set   = setOf(lineOf(address))
-  private val found = Wire(Vec(ways, UInt(tagBits.W)))
-  private val hitOH = VecInit(found.zipWithIndex.map { case (tag, way) =>
-    isValid(set)(way) && tag === tagOf(lineOf(address))
-  }).asUInt
+  private val hitOH  = tags.hitOH(lineOf(address))
   private val isHit  = accepted && hitOH.orR
   private val awaits = awaited.map(_.is(lineOf(address))).reduce(_ || _)
   private val hitWay = OHToUInt(hitOH)
   private val freeOH = PriorityEncoderOH(awaited.map(!_.isUsed))
   private val isMiss = accepted && !hitOH.orR
-  when(isHit) { replacement.use(set, hitWay) }
+  when(isHit) { tags.use(lineOf(address), hitWay) }
   for ((entry, isFree) <- awaited.zip(freeOH)) {
     when(isMiss && !awaits && isFree) {
       entry.isUsed      := true.B
@@ -100,34 +90,24 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   assert(!(isHit && awaits), "a line is held and awaited")
 
   // Cycle a + 1: the line replaces another one, and is no longer awaited
-  private val lineSet  = setOf(line)
-  private val freeWays = ~isValid(lineSet)
-  private val victim   = Mux(freeWays.orR, PriorityEncoder(freeWays), replacement.victim(lineSet))
+  private val victim = tags.victim(line)
   when(taken) {
-    isValid(lineSet) := isValid(lineSet) | UIntToOH(victim, ways)
-    replacement.use(lineSet, victim)
+    tags.replace(line, victim, isKept = true.B)
     awaited.foreach(entry => when(entry.is(line)) { entry.isUsed := false.B })
   }
-  found := tags.readWrite(
-    Mux(taken, lineSet, setOf(lineOf(request.bits))),
-    VecInit(Seq.fill(ways)(tagOf(line))),
-    UIntToOH(victim, ways).asBools,
-    taken || request.fire,
-    taken
-  )
+  tags.access(Mux(taken, line, lineOf(request.bits)), victim, request.fire, taken)
 
   // Cycles a + 3 to a + 6: its records
-  private val place      = RegEnable(lineSet ## victim(log2Ceil(ways) - 1, 0), taken) // valid from a + 2
-  private val placeNow   = RegNext(place)                                             // valid from a + 3
+  private val place      = RegEnable(tags.place(line, victim), taken) // valid from a + 2
+  private val placeNow   = RegNext(place)                             // valid from a + 3
   private val lineNow    = RegNext(RegEnable(line, taken))
   private val firstComes = RegNext(RegNext(taken, false.B), false.B)
   private val word       = RegInit(0.U(Lines.wordBits.W))
   private val fills      = firstComes || word =/= 0.U
   when(fills) { word := word + 1.U }
 
-  private val read = hitWay(log2Ceil(ways) - 1, 0)
   private val data = records.readWrite(
-    Mux(fills, placeNow ## word, set ## read ## address(Lines.wordBits - 1, 0)),
+    Mux(fills, placeNow ## word, tags.place(lineOf(address), hitWay) ## address(Lines.wordBits - 1, 0)),
     io.lines.record,
     fills || isHit,
     fills
@@ -149,7 +129,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
     awaited.zip(nextOH).foreach { case (entry, isNext) => when(isNext) { entry.isRequested := true.B } }
   }
 
-  when(io.invalidate) { isValid.foreach(_ := 0.U) }
+  when(io.invalidate) { tags.clear() }
   io.isIdle := !(accepted || io.port.response.valid || fills || blocked =/= 0.U || awaited.map(_.isUsed).reduce(_ || _))
   assert(!(io.invalidate && !io.isIdle), "lines are forgotten while some are awaited")
 }

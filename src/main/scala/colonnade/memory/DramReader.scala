@@ -32,8 +32,8 @@ final class DramReaderIO(config: ColonnadeConfig) extends Bundle {
 
 /** Reads lines from DRAM over AXI4: one INCR burst for a line, with its bank as the id.
   *
-  * A line begins at a multiple of [[SceneLines.pitch]], so no burst crosses 4 KB. A bank gathers one line at a time; until that
-  * line has been taken, further data for the bank have to wait.
+  * A line begins at a multiple of [[SceneLines.pitch]], so no burst crosses 4 KB. A bank gathers one line while
+  * another one waits to be taken; until then, further data for the bank have to wait, and those of other banks behind them.
   */
 final class DramReader(config: ColonnadeConfig) extends Module {
   private val banks     = config.columnBvhMemory.banks
@@ -68,20 +68,22 @@ final class DramReader(config: ColonnadeConfig) extends Module {
     val isError  = Reg(Bool())
     val beat     = RegInit(0.U(log2Ceil(beats.max(2)).W))
     val gathered = Reg(Vec(beats, UInt((8 * busBytes).W)))
-    val ready    = !isFull || port.ready
+    val line     = Wire(Decoupled(new ReadLine(config)))
+    val ready    = !isFull || line.ready
     val takes    = io.axi.r.valid && isFor && ready
     when(takes) {
       gathered(beat) := data.data
       isError        := (isError && beat =/= 0.U) || data.resp =/= 0.U
       beat           := Mux(beat === (beats - 1).U, 0.U, beat + 1.U)
     }
-    isFull            := (takes && beat === (beats - 1).U) || (isFull && !port.ready)
-    port.valid        := isFull
-    port.bits.isError := isError
-    port.bits.records := gathered.asUInt(
+    isFull            := (takes && beat === (beats - 1).U) || (isFull && !line.ready)
+    line.valid        := isFull
+    line.bits.isError := isError
+    line.bits.records := gathered.asUInt(
       Lines.records * new RecordFormats(config).recordBits - 1,
       0
-    ).asTypeOf(port.bits.records)
+    ).asTypeOf(line.bits.records)
+    port :<>= Queue(line, 1, pipe = true)
     isFor && ready
   }
   io.axi.r.ready := accepts.reduce(_ || _)

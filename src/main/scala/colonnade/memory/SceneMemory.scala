@@ -14,8 +14,10 @@ final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
 
   /** By column and bank. */
   val requests = Vec(config.array.columns, Vec(banks, Flipped(Decoupled(UInt(Lines.lineBits(config).W)))))
-  val lines    = Output(Vec(banks, new LineBroadcast(config)))
-  val axi      = DramPort(config)
+
+  /** By bus and bank. */
+  val lines = Output(Vec(SharedCache.buses(config), Vec(banks, new LineBroadcast(config))))
+  val axi   = DramPort(config)
 
   /** Forgets all lines; only while idle. */
   val invalidate = Input(Bool())
@@ -49,7 +51,7 @@ final class SceneMemory(config: ColonnadeConfig) extends Module {
     dram.io.reads(bank) :<>= cache.io.reads
     cache.io.data :<>= dram.io.lines(bank)
     cache.io.invalidate := io.invalidate
-    io.lines(bank)      := cache.io.lines
+    io.lines.zip(cache.io.lines).foreach { case (bus, lines) => bus(bank) := lines }
   }
   io.isIdle           := caches.map(_.io.isIdle).reduce(_ && _)
   io.events.dramReads := RegNext(PopCount(dram.io.reads.map(_.fire)))

@@ -6,7 +6,7 @@ import chiseltest._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Load, RecordBroadcast, RecordFormats, RecordRequest}
 import colonnade.memory.ColumnBvhMemory
-import colonnade.{Proofs, TestConfigs}
+import colonnade.{Proofs, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -64,7 +64,7 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
       val depth         = configuration.columnBvhMemory.depth
       val random        = new Random(rows)
       val records       = Seq.fill(depth)(BigInt(new RecordFormats(configuration).recordBits, random))
-      test(new ControllerAndMemory(configuration)) { dut =>
+      test(new ControllerAndMemory(configuration)).withAnnotations(Simulation.verilator) { dut =>
         dut.clock.setTimeout(0)
         load(dut, records)
         val wants    = Array.fill(rows)(Option.empty[Int])

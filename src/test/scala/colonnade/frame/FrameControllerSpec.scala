@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -124,7 +124,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "dispatch every tile of several frames once, in Morton order" in {
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       for ((wide, high) <- Seq((64, 48), (1, 1), (60, 9), (8, 100), (8, 8))) {
@@ -138,7 +138,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "dispatch tiles outside the object's rectangle to the background" in {
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       for (
@@ -153,7 +153,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "dispatch the tiles of the environment's window to the columns, whatever the object's rectangle" in {
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       dut.clock.setTimeout(0)
       val bench  = new Bench(dut)
       val window = dut.io.window
@@ -171,7 +171,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "end a frame without pixels at once" in {
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       val bench = new Bench(dut)
       for ((wide, high) <- Seq((0, 0), (0, 8), (8, 0))) {
         assert(bench.frame(wide, high, watchdog = 0).exists(_ < 10))
@@ -181,7 +181,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "dispatch tiles to ready columns without a pause" in {
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       dut.io.frame.pixelsWide.poke(64)
       dut.io.frame.pixelsHigh.poke(64)
       dut.io.frame.objectRect.x1.poke(64)
@@ -201,7 +201,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "abort a frame that hangs, with an error that the next start clears" in {
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       for (stuck <- 0 until columns) {
@@ -216,7 +216,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "end although the memory is silent, and start no frame before it is idle" in {
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       // The frame is aborted, and ends after as many cycles again
@@ -239,12 +239,12 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "not end without a watchdog, or while the sink stalls" in {
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       assert(bench.frame(16, 16, watchdog = 0, stuck = Some(1), limit = 600).isEmpty)
     }
-    test(new FrameController(config)) { dut =>
+    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       bench.stalls = true

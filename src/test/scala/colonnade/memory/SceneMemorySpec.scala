@@ -1,9 +1,9 @@
 package colonnade.memory
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordFormats, SceneInDram, SceneLines}
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -15,11 +15,11 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   behavior of "SceneMemory"
 
   for (
-    (columns, banks, sets, ways, bus) <- Seq((1, 1, 1, 1, 64), (3, 2, 2, 2, 32), (3, 4, 1, 4, 16), (2, 2, 4, 1, 128))
+    (columns, banks, sets, ways, bus) <- Seq((1, 1, 1, 1, 64), (3, 2, 2, 2, 32), (3, 4, 1, 4, 16), (6, 2, 4, 1, 128))
   )
     it should s"serve $columns columns from $banks banks of $sets sets of $ways ways over a bus of $bus bytes" in {
       val config = TestConfigs.withCache(columns = columns, banks = banks, sets = sets, ways = ways, bus = bus)
-      test(new SceneMemory(config)) { dut =>
+      test(new SceneMemory(config)).withAnnotations(Simulation.verilator) { dut =>
         val dram = new Dram(dut, config, new Random(columns))
         dram.run(requests = 120)
         val warm = dram.reads
@@ -35,7 +35,7 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
 
   it should "announce zeros for a line whose read fails, report it, and read it again" in {
     val config = TestConfigs.withCache(columns = 2)
-    test(new SceneMemory(config)) { dut =>
+    test(new SceneMemory(config)).withAnnotations(Simulation.verilator) { dut =>
       val dram = new Dram(dut, config, new Random(1))
       dram.failing = Set(1, 4)
       dram.run(requests = 100)
@@ -57,7 +57,7 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     private val inFlight = Seq.fill(banks)(mutable.Queue.empty[(Int, Int)]) // due, line in its bank
     private val sent     = Array.fill(banks)(0)                             // beats of the first one
     private val wants    = mutable.Map.empty[(Int, Int), (Int, Int)]        // column, bank: line, since
-    private val coming   = mutable.Map.empty[(Int, Int), (Int, Int)]        // cycle, bank: line, word
+    private val coming   = mutable.Map.empty[(Int, Int, Int), (Int, Int)]   // cycle, bus, bank: line, word
     var failing          = Set.empty[Int]
     var reads            = 0
     var errors           = 0
@@ -162,20 +162,23 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     }
 
     /** Announcements, and the records that follow them. */
-    private def listen(): Unit = for ((port, bank) <- dut.io.lines.zipWithIndex) {
+    private def listen(): Unit = for {
+      (ports, bus) <- dut.io.lines.zipWithIndex
+      (port, bank) <- ports.zipWithIndex
+    } {
       if (port.announced.valid.peekBoolean()) {
         val line = port.announced.bits.peekInt().toInt
         for (word <- 0 until Lines.records) {
-          coming.contains((now + 3 + word, bank)) shouldBe false
-          coming((now + 3 + word, bank)) = (line, word)
+          coming.contains((now + 3 + word, bus, bank)) shouldBe false
+          coming((now + 3 + word, bus, bank)) = (line, word)
         }
         wants.filterInPlace { case ((column, of), (wanted, _)) =>
-          val gets = of == bank && wanted == line
+          val gets = SharedCache.busOf(config, column) == bus && of == bank && wanted == line
           if (gets) asking -= ((column, of))
           !gets
         }
       }
-      for ((line, word) <- coming.remove((now, bank))) {
+      for ((line, word) <- coming.remove((now, bus, bank))) {
         val record = port.record.peekInt()
         if (!(failing(line) && record == 0)) record shouldBe recordOf(bank, line, word)
       }

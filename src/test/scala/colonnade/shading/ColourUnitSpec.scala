@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Rgb
 import colonnade.numbers.Fixed
 import colonnade.numbers.FixedPorts._
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -22,7 +22,9 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   } {
     val config = base.copy(frame = base.frame.copy(lights = lights, maxBounces = maxBounces))
     it should s"colour paths with $lights lights and $maxBounces bounces$where" in
-      test(new ColourUnit(config)) { dut => new ColouredPaths(dut, config, seed = lights).run(paths = 60) }
+      test(new ColourUnit(config)).withAnnotations(Simulation.verilator) { dut =>
+        new ColouredPaths(dut, config, seed = lights).run(paths = 60)
+      }
   }
 }
 

@@ -2,8 +2,8 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -13,6 +13,9 @@ import scala.util.Random
 /** Every fetch gets one response with its record, whichever row reads it and however the ports stall. */
 class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "RecordFetch"
+
+  /** The interpreter is slow with many contexts. */
+  private def simulation(contexts: Int) = if (contexts > 4) Simulation.verilator else Seq()
 
   private def variant(contexts: Int, banks: Int, snooping: Boolean, recordBuffers: Int = 2): ColonnadeConfig =
     TestConfigs.tiny.copy(
@@ -38,7 +41,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   } {
     it should s"serve $contexts contexts from $banks banks and $recordBuffers buffers, snooping $snooping" in {
       val config = variant(contexts, banks, snooping, recordBuffers)
-      test(new RecordFetch(config)) { dut =>
+      test(new RecordFetch(config)).withAnnotations(simulation(contexts)) { dut =>
         new Column(dut, config, new Random(contexts * 10 + banks)).run(fetches = 200)
       }
     }
@@ -49,7 +52,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       val shape  = variant(contexts, banks = 2, snooping = true, recordBuffers)
       val cached = TestConfigs.withCache().columnBvhMemory.cache
       val config = shape.copy(columnBvhMemory = shape.columnBvhMemory.copy(depth = 256, cache = cached))
-      test(new RecordFetch(config)) { dut =>
+      test(new RecordFetch(config)).withAnnotations(simulation(contexts)) { dut =>
         new Column(dut, config, new Random(contexts)).run(fetches = 300)
       }
     }

@@ -1,8 +1,8 @@
 package colonnade.unit
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 /** A context changes its state on the events of its stage, and only then. */
@@ -14,27 +14,28 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for (contexts <- Seq(1, 3, 16))
     it should s"follow $contexts contexts through random events" in
-      test(new RtController(config(contexts))) { dut =>
+      test(new RtController(config(contexts))).withAnnotations(Simulation.verilator) { dut =>
         for ((eagerness, seed) <- Seq((0.9, 1), (0.15, 2)))
           new ControllerDriver(dut, contexts, seed).run(pixels = 70, eagerness)
       }
 
   for (contexts <- Seq(1, 3, 16))
     it should s"follow $contexts contexts with an environment, enabled or not" in
-      test(new RtController(config(contexts, TestConfigs.withEnvironment(TestConfigs.environment)))) { dut =>
-        val outcomes =
-          for ((eagerness, hasEnvironment, seed) <- Seq((0.9, true, 3), (0.15, true, 4), (0.5, false, 5))) yield {
-            val rounds = new ControllerDriver(dut, contexts, seed, hasEnvironment, occlusion = !hasEnvironment)
-            rounds.run(pixels = 70, eagerness)
-            assert(rounds.tests.isEmpty)
-            rounds.outcomes
-          }
-        val rounds = new ControllerDriver(dut, contexts, seed = 6, hasEnvironment = true, occlusion = true)
-        rounds.run(pixels = if (contexts > 3) 120 else 300, eagerness = 0.8)
-        assert(rounds.tests.size == 4, "hits of primary and later rays, hidden and visible")
-        assert(outcomes.flatten.distinct.size == 4, "all results of the march occur")
-        assert(outcomes.last.isEmpty)
-      }
+      test(new RtController(config(contexts, TestConfigs.withEnvironment(TestConfigs.environment))))
+        .withAnnotations(Simulation.verilator) { dut =>
+          val outcomes =
+            for ((eagerness, hasEnvironment, seed) <- Seq((0.9, true, 3), (0.15, true, 4), (0.5, false, 5))) yield {
+              val rounds = new ControllerDriver(dut, contexts, seed, hasEnvironment, occlusion = !hasEnvironment)
+              rounds.run(pixels = 70, eagerness)
+              assert(rounds.tests.isEmpty)
+              rounds.outcomes
+            }
+          val rounds = new ControllerDriver(dut, contexts, seed = 6, hasEnvironment = true, occlusion = true)
+          rounds.run(pixels = if (contexts > 3) 120 else 300, eagerness = 0.8)
+          assert(rounds.tests.size == 4, "hits of primary and later rays, hidden and visible")
+          assert(outcomes.flatten.distinct.size == 4, "all results of the march occur")
+          assert(outcomes.last.isEmpty)
+        }
 
   it should "resolve one ended ray and retire one pixel per cycle" in
     test(new RtController(config(contexts = 4))) { dut =>

@@ -54,7 +54,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
       (changed("kinds[3]" -> 3), 0, false),
       (changed("exponent.y" -> (shape.numbers.mostExponent + 1)), 0, false)
     )
-    test(new TraversalHarness(shape)).withAnnotations(Seq(VerilatorBackendAnnotation)) { dut =>
+    test(new TraversalHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
       dut.io.steps.ready.poke(true)
       dut.io.tMaxUnits(0).pokeRaw((BigInt(1) << (shape.numbers.boxDistanceBits - 1)) - 1)
       for (((fields, address, isLegal), index) <- cases.zipWithIndex) withClue(s"case $index: ") {

@@ -1,0 +1,59 @@
+package colonnade.memory
+
+import chisel3._
+import chisel3.util.{log2Ceil, PriorityEncoder, UIntToOH}
+
+/** Which lines one bank of a cache holds, and where: a memory of tags with a single port, valid bits and the replacement.
+  *
+  * @param sets     sets of the bank, a power of two
+  * @param ways     ways of a set, a power of two
+  * @param lineBits width of the number of a line
+  */
+private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int) {
+  private val setBits     = log2Ceil(sets)
+  private val tagBits     = (lineBits - setBits).max(1)
+  private val tags        = SyncReadMem(sets, Vec(ways, UInt(tagBits.W)))
+  private val found       = Wire(Vec(ways, UInt(tagBits.W)))
+  private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U(ways.W))))
+  private val replacement = new Replacement(sets, ways)
+
+  private def setOf(line: UInt): UInt = line.pad(setBits + 1)(setBits - 1, 0)
+  private def tagOf(line: UInt): UInt = (line >> setBits).asUInt.pad(tagBits)(tagBits - 1, 0)
+
+  /** Uses the port: writes the tag of a line, or else reads the tags of its set for the next cycle. Call it once. */
+  def access(line: UInt, way: UInt, isRead: Bool, isWrite: Bool): Unit =
+    found := tags.readWrite(
+      setOf(line),
+      VecInit(Seq.fill(ways)(tagOf(line))),
+      UIntToOH(way, ways).asBools,
+      isRead || isWrite,
+      isWrite
+    )
+
+  /** The way that holds a line, one-hot; 0 if none does. The tags of its set were read in the cycle before. */
+  def hitOH(line: UInt): UInt = VecInit(found.zipWithIndex.map { case (tag, way) =>
+    isValid(setOf(line))(way) && tag === tagOf(line)
+  }).asUInt
+
+  /** The way for a new line: an empty one, or the one to replace. */
+  def victim(line: UInt): UInt = {
+    val free = ~isValid(setOf(line))
+    Mux(free.orR, PriorityEncoder(free), replacement.victim(setOf(line)))
+  }
+
+  /** Marks a way of the line's set as used. */
+  def use(line: UInt, way: UInt): Unit = replacement.use(setOf(line), way)
+
+  /** From the next cycle the way holds the line, or nothing. */
+  def replace(line: UInt, way: UInt, isKept: Bool): Unit = {
+    val rest = isValid(setOf(line)) & ~UIntToOH(way, ways)
+    isValid(setOf(line)) := Mux(isKept, rest | UIntToOH(way, ways), rest)
+    replacement.use(setOf(line), way)
+  }
+
+  /** The number of a line's place in the bank. */
+  def place(line: UInt, way: UInt): UInt = setOf(line) ## way(log2Ceil(ways) - 1, 0)
+
+  /** Forgets all lines. */
+  def clear(): Unit = isValid.foreach(_ := 0.U)
+}
