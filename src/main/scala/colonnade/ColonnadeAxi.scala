@@ -50,6 +50,7 @@ final class ColonnadeAxi(
   interrupt                      := registers.io.interrupt
   control.io.commands            := registers.io.commands
   control.io.settings            := registers.io.framebuffer
+  control.io.writesAreDone       := registers.io.writesAreDone
 
   // The device's register port: the host's, or the start of a frame
   private val start = RegisterMap(config).find(_.name == "control.start").get

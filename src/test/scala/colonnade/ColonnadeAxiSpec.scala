@@ -23,6 +23,7 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val stride  = 64
   private val pixels  = BigInt(0x40000)
   private val window  = (pixels, pixels + stride * h)
+  private val other   = BigInt(0x50000)
   private val allDone = Set("frameDone")
 
   private def records(seed: Int): Seq[BigInt] = {
@@ -154,6 +155,23 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     bench.host.set("control", 1)
     assert(bench.until("frameDone") == allDone && bench.framebufferErrors.isEmpty)
     expectPicture(bench, scene)
+
+    // The next frame is written while one runs, and starts after it
+    bench.memory.maxDelay = 200
+    bench.host.set("control", 1)
+    bench.size(w - 4, h)
+    assert(bench.read("frame.width") == w)
+    bench.framebuffer(other, stride, 1, (other, other + stride * h))
+    bench.host.set("control", 1)
+    assert(bench.host("status") == 3)
+    assert(!bench.host.write(0x40, 1) && !bench.host.write(ShellMap.deviceBase + 400, 1) && !bench.host.write(0x80, 0))
+    assert(bench.until("frameDone") == allDone)
+    val first = bench.memory.written.filter(_ < other)
+    assert(first.size == 4 * w * h)
+    assert(bench.until("frameDone") == allDone)
+    assert(bench.memory.written.size - first.size == 2 * (w - 4) * h && bench.host("status") == 0)
+    bench.memory.maxDelay = 20
+    bench.memory.written.clear()
 
     // A soft reset recovers from any state
     val host = bench.host

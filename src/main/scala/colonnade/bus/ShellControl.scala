@@ -7,8 +7,12 @@ import colonnade.config.ColonnadeConfig
 final class ShellControlIO extends Bundle {
   val commands = Input(new ShellCommands)
   val settings = Input(new FramebufferSettings)
-  val status   = Output(new ShellStatus)
-  val events   = Output(UInt(Interrupts.count.W))
+
+  /** The device has all of its registers. */
+  val writesAreDone = Input(Bool())
+
+  val status = Output(new ShellStatus)
+  val events = Output(UInt(Interrupts.count.W))
 
   /** Of the frame that runs: constant until its end. */
   val framebuffer = Output(new FramebufferSettings)
@@ -64,9 +68,10 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
   private val loadDone  = state === State.loading && io.loaderIsIdle
   private val isLoading = RegNext(state === State.loading, false.B) // from the second cycle on
 
+  when(io.commands.start) { isQueued := true.B }
   switch(state) {
     is(State.idle) {
-      when(io.commands.start || isQueued) {
+      when((io.commands.start || isQueued) && io.writesAreDone) {
         state    := State.begin
         isQueued := false.B
         settings := io.settings
@@ -92,7 +97,6 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
         .elsewhen(io.busIsIdle) { state := State.idle }
     }
   }
-  when(io.commands.start && state =/= State.idle) { isQueued := true.B }
   when(io.commands.reset) {
     state    := State.resetting
     isQueued := false.B

@@ -29,6 +29,12 @@ final class ShellStatus extends Bundle {
   val isRunning = Bool()
 }
 
+/** A write to a register of the device. */
+final class PostedWrite(config: ColonnadeConfig) extends Bundle {
+  val address = UInt(RegisterFile.addressBits(config).W)
+  val data    = UInt(AxiLite.dataBits.W)
+}
+
 final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
   val access = Flipped(new RegisterAccess(ShellMap.addressBits))
 
@@ -40,6 +46,9 @@ final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
   val image       = Output(new ImageSettings)
   val commands    = Output(new ShellCommands)
 
+  /** All writes to the device's registers have arrived there. */
+  val writesAreDone = Output(Bool())
+
   val status            = Input(new ShellStatus)
   val framebufferErrors = Input(new FramebufferError)
   val imageErrors       = Input(new ImageError)
@@ -49,7 +58,8 @@ final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
   val interrupt = Output(Bool())
 }
 
-/** The registers of [[ShellMap]], and the way to those of the device.
+/** The registers of [[ShellMap]], and the way to those of the device. What is written there while a frame runs waits for
+  * its end; all of the device's registers fit.
   *
   * A request is answered in the next cycle. The answer is an error, and a write has no effect, if the address has no
   * register, the register cannot be written or not now, some bytes of the word are not written, or the value does not fit.
@@ -63,7 +73,15 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private val deviceWords = RegisterMap.size(RegisterMap(config))
   require(ShellMap.deviceBase + 4 * deviceWords <= (1 << ShellMap.addressBits), "the device's registers fit")
 
-  io.access.request.ready := !isDevice || io.deviceIsFree
+  // Writes to the device wait while a frame runs
+  private val posted = withReset(reset.asBool || io.status.isResetting) {
+    Module(new Queue(new PostedWrite(config), 1 << log2Ceil(deviceWords), useSyncReadMem = true))
+  }
+  private val delivers = posted.io.deq.valid && !io.status.isRunning
+  posted.io.deq.ready := !io.status.isRunning
+  io.writesAreDone    := !posted.io.deq.valid
+
+  io.access.request.ready := !isDevice || request.isWrite || (io.deviceIsFree && !delivers)
   private val accepts = io.access.request.fire
   private val writes  = accepts && request.isWrite && request.isWhole
 
@@ -124,14 +142,17 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   io.image.window.base       := value("image.windowBase")
   io.image.window.end        := value("image.windowEnd")
 
-  // Registers of the device: written while it is not running and no frame is queued
+  // Registers of the device
   private val deviceWritable =
-    VecInit(ShellMap.writableWords(config).map(_.U === deviceWord)).asUInt.orR && isIdle
+    VecInit(ShellMap.writableWords(config).map(_.U === deviceWord)).asUInt.orR && canChange && posted.io.enq.ready
   private val inDevice = isDevice && request.address < (ShellMap.deviceBase / 4 + deviceWords).U
-  io.device.address   := deviceWord
-  io.device.read      := accepts && !request.isWrite && inDevice
-  io.device.write     := writes && inDevice && deviceWritable
-  io.device.writeData := request.data
+  posted.io.enq.valid        := writes && inDevice && deviceWritable
+  posted.io.enq.bits.address := deviceWord
+  posted.io.enq.bits.data    := request.data
+  io.device.address          := Mux(delivers, posted.io.deq.bits.address, deviceWord)
+  io.device.read             := accepts && !request.isWrite && inDevice
+  io.device.write            := delivers
+  io.device.writeData        := posted.io.deq.bits.data
 
   // Answers
   private val constants = Map(
