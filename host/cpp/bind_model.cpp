@@ -26,6 +26,17 @@ public:
         device_.load(*environment_);
     }
 
+    /// Adds a texture memory to the device.
+    void addTexture(const Values& sizes, const FieldTuples& layouts) {
+        texture_ = std::make_unique<TextureImage>(sizes, layoutsOf(layouts));
+        device_.load(*texture_);
+    }
+
+    void loadTexture(const std::string& memory, const Records& words) {
+        if (!texture_) throw std::invalid_argument("there is no texture memory");
+        texture_->load(memory, words.data(), words.shape(0), words.shape(1));
+    }
+
     /// Loads the registers and clears counters and errors.
     void start(const Values& registers) { device_.start(registers); }
 
@@ -138,6 +149,7 @@ private:
     Numbers numbers_;
     Device device_;
     std::unique_ptr<AttributeImage> environment_;
+    std::unique_ptr<TextureImage> texture_;
 };
 
 } // namespace
@@ -149,6 +161,8 @@ void bind_model(nb::module_& module) {
         .def("load", &Model::load, "records"_a, "Loads the column memory: uint8 [records, bytes].")
         .def("add_environment", &Model::addEnvironment, "sizes"_a, "layouts"_a, "Adds a physical-attribute memory with the manifest's attribute sizes and layouts.")
         .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a, "Loads one of its memories, by its name in the manifest: uint8 [words, bytes], low byte first.")
+        .def("add_texture", &Model::addTexture, "sizes"_a, "layouts"_a, "Adds a texture memory with the manifest's texture sizes and layouts.")
+        .def("load_texture", &Model::loadTexture, "memory"_a, "words"_a, "As load_environment, for a memory of the textures.")
         .def("start", &Model::start, "registers"_a, "Starts a frame: loads the registers (name -> value); clears counters and errors.")
         .def("rows", &Model::rows, "first"_a, "last"_a,
              "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")

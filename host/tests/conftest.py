@@ -63,6 +63,7 @@ def manifest_data(
                 "trianglesPerRecord": per_record,
                 "bvh": bvh,
                 "cornerColours": False,
+                "textureBytes": 0,
             },
             "columnBvhMemory": {"depth": depth, "stackDepth": stack_depth, "readLatency": 1, "cache": None},
             "physicalAttributeMemory": None,

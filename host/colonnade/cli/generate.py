@@ -17,6 +17,7 @@ from colonnade.common.errors import UserError
 @click.option("--manifest-only", is_flag=True, help="Write only manifest.json, which is much faster.")
 @click.option("--print", "print_manifest", is_flag=True, help="Print the manifest instead of writing files.")
 @click.option("--black-box-memories", is_flag=True, help="Emit memories as black boxes, for SRAM macros.")
+@click.option("--axi", "bus_bytes", type=int, metavar="BYTES", help="Add the AXI4 shell, with a bus of 4 to 128 BYTES.")
 @json_option
 def generate(
     config: str,
@@ -25,6 +26,7 @@ def generate(
     manifest_only: bool,
     print_manifest: bool,
     black_box_memories: bool,
+    bus_bytes: int | None,
     json_file: Path | None,
 ) -> None:
     """Generate the accelerator: SystemVerilog files, their list filelist.f, and manifest.json.
@@ -49,7 +51,7 @@ def generate(
         design = generator.manifest_for(config, overrides, terminal)
         echo((design.dir / "manifest.json").read_text().rstrip("\n"))
     else:
-        design = generator.generate(config, overrides, output, manifest_only, black_box_memories, terminal)
+        design = generator.generate(config, overrides, output, manifest_only, black_box_memories, terminal, bus_bytes)
     files = design_folder.listed(design.dir)
     manifest = json.loads((design.dir / "manifest.json").read_text())
     if output is not None:

@@ -27,6 +27,7 @@ from colonnade.cli.options import (
 @click.option(
     "--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; created if missing."
 )
+@click.option("--device-image", type=FILE, metavar="FILE", help="Also write the image that the AXI4 shell loads.")
 @strict_option
 @json_option
 def pack(
@@ -36,23 +37,26 @@ def pack(
     mesh: str | None,
     background: Path | None,
     output: Path,
+    device_image: Path | None,
     json_file: Path | None,
 ) -> None:
     """Pack SCENE, a TOML file, for one configuration, and print its use of each memory."""
     from colonnade.common import progress
+    from colonnade.common.atomic_files import replacing
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
     from colonnade.render.frames import encoded, max_lights, pack_scene
     from colonnade.render.lit_room import device_room, lit_room
     from colonnade.scene.object_mesh import object_mesh
     from colonnade.scene.parser import load_scene
+    from colonnade.scene_image.device_image import device_image as encode_device_image
     from colonnade.scene_image.file import check_image_file, image_file
     from colonnade.scene_image.inspect import describe, print_report
     from colonnade.scene_image.packer import memory_use
 
     file = image_file(output)
     check_image_file(file)
-    require_outputs(json_file, folders=[file.parent])
+    require_outputs(json_file, device_image, folders=[file.parent])
     declare_output(file)
     terminal = progress.for_terminal()
     described = load_scene(scene)
@@ -69,7 +73,10 @@ def pack(
         room = lit_room(described, maps, surface.extent, max_lights(manifest), False, terminal)
         image = pack_scene(room.scene, surface, manifest, encoded(room, manifest))
     image.save(output)
-
     echo(f"packed      {file}")
+    if device_image is not None:
+        with replacing(device_image) as stream:
+            stream.write(encode_device_image(image, manifest))
+        echo(f"for a bus   {device_image}")
     print_report(image.header, manifest, echo)
     finish({"file": str(file), **describe(image), "use": memory_use(image.header, manifest)}, json_file)

@@ -75,10 +75,15 @@ def opened_picture(path: Path, missing: str | None = None) -> Iterator[PillowIma
     Raises:
         UserError: The file has another format, too many pixels, or cannot be decoded.
     """
+    with _opened(read_input(path, "the picture", MAX_PICTURE_BYTES, missing), str(path)) as picture:
+        yield picture
+
+
+@contextlib.contextmanager
+def _opened(data: bytes, name: str) -> Iterator[PillowImage]:
     from PIL import Image, UnidentifiedImageError
 
-    data = read_input(path, "the picture", MAX_PICTURE_BYTES, missing)
-    too_large = UserError(f"{path} has too many pixels: a picture may have {MAX_PIXELS:,}")
+    too_large = UserError(f"{name} has too many pixels: a picture may have {MAX_PIXELS:,}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -91,17 +96,27 @@ def opened_picture(path: Path, missing: str | None = None) -> Iterator[PillowIma
     except Image.DecompressionBombError:
         raise too_large from None
     except UnidentifiedImageError:
-        raise UserError(f"{path} is not a readable picture: give a PNG, JPEG or WebP file") from None
+        raise UserError(f"{name} is not a readable picture: give a PNG, JPEG or WebP file") from None
     except Exception as error:  # decoders raise many types on invalid data
-        raise UserError(f"{path} is not a readable picture: {type(error).__name__}: {error}") from None
+        raise UserError(f"{name} is not a readable picture: {type(error).__name__}: {error}") from None
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:
     """Read a picture of 8 or 16 bits per channel as 8-bit sRGB, uint8 [height, width, 3]; alpha is dropped."""
+    with opened_picture(path, f"no picture {path}: check the path") as picture:
+        return _rgb(picture)
+
+
+def decoded_picture(data: bytes, name: str) -> NDArray[np.uint8]:
+    """As `read_picture`, of a picture's bytes; ``name`` names it in messages."""
+    with _opened(data, name) as picture:
+        return _rgb(picture)
+
+
+def _rgb(picture: PillowImage) -> NDArray[np.uint8]:
     import numpy as np
 
-    with opened_picture(path, f"no picture {path}: check the path") as picture:
-        if picture.mode.startswith("I"):  # 16-bit grey, which Pillow's convert would clip at 255
-            grey = np.rint(np.clip(np.asarray(picture, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
-            return np.repeat(grey[..., np.newaxis], 3, axis=2)
-        return np.asarray(picture.convert("RGB"))
+    if picture.mode.startswith("I"):  # 16-bit grey, which Pillow's convert would clip at 255
+        grey = np.rint(np.clip(np.asarray(picture, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
+        return np.repeat(grey[..., np.newaxis], 3, axis=2)
+    return np.asarray(picture.convert("RGB"))

@@ -81,6 +81,13 @@ def black_boxed_design_for(config: str, overrides: Sequence[str] = (), progress:
     return _cached(config, overrides, ("--black-box-memories",), progress)
 
 
+def shell_design_for(
+    config: str, overrides: Sequence[str] = (), bus_bytes: int = 16, progress: Progress = QUIET
+) -> GeneratedDesign:
+    """Generate the device in its AXI4 shell, for simulation; ``shell.json`` has the shell's registers."""
+    return _cached(config, overrides, _shell_options(bus_bytes), progress)
+
+
 def generate(
     config: str,
     overrides: Sequence[str],
@@ -88,10 +95,20 @@ def generate(
     manifest_only: bool = False,
     black_box_memories: bool = False,
     progress: Progress = QUIET,
+    bus_bytes: int | None = None,
 ) -> GeneratedDesign:
-    """Generate into the user's folder ``output``; `design_folder` defines which folders it may replace."""
+    """Generate into the user's folder ``output``; `design_folder` defines which folders it may replace.
+
+    Args:
+        config, overrides: The configuration.
+        output: The folder.
+        manifest_only, black_box_memories: Options of the generator.
+        progress: Shows the steps.
+        bus_bytes: Generate the AXI4 shell, too, with a bus of so many bytes.
+    """
     check_replaceable(output)
     options = ("--manifest-only",) * manifest_only + ("--black-box-memories",) * black_box_memories
+    options += () if bus_bytes is None else _shell_options(bus_bytes)
     design = _cached(config, overrides, options, progress)
     replace_folder(design.dir, output)
     return GeneratedDesign(output, design.manifest)
@@ -122,6 +139,10 @@ def _cached(config: str, overrides: Sequence[str], options: tuple[str, ...], pro
     entry = cache.entry(state / _key(source, options), make, "design", progress)
     cache.touch(state)
     return GeneratedDesign(entry / DESIGN, Manifest.load(entry / DESIGN / "manifest.json"))
+
+
+def _shell_options(bus_bytes: int) -> tuple[str, ...]:
+    return ("--axi", str(bus_bytes))
 
 
 def _key(source: ConfigurationSource, options: Sequence[str]) -> str:

@@ -131,7 +131,7 @@ class Register:
 
 @dataclass(frozen=True)
 class AttributeFormats:
-    """Formats of the physical-attribute memory.
+    """Formats of the physical-attribute memory, or of the texture memory.
 
     Attributes:
         sizes: Sizes of the maps, by name.
@@ -154,6 +154,7 @@ class Manifest:
     streams: Mapping[str, RecordLayout]
     memories: Mapping[str, Mapping[str, Any]]
     attributes: AttributeFormats | None
+    texture: AttributeFormats | None
     format_hash: str
     config_hash: str
 
@@ -199,6 +200,7 @@ class Manifest:
             streams={name: _layout(name, fields, None) for name, fields in data["streams"].items()},
             memories=data["memories"],
             attributes=_attributes(data.get("attributes")),
+            texture=_attributes(data.get("texture")),
             format_hash=data["formatHash"],
             config_hash=data["configHash"],
         )

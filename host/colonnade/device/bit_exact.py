@@ -49,7 +49,17 @@ def load_environment(model: Any, image: SceneImage, manifest: Manifest) -> None:
     assert manifest.attributes is not None
     model.add_environment(dict(manifest.attributes.sizes), field_places(manifest.attributes.layouts))
     for section in image.attributes:
-        model.load_environment(section.memory, section.words)
+        if not section.memory.startswith("texture."):
+            model.load_environment(section.memory, section.words)
+
+
+def load_textures(model: Any, image: SceneImage, manifest: Manifest) -> None:
+    """Add a texture memory to the model and load the atlas of a scene image into it."""
+    assert manifest.texture is not None
+    model.add_texture(dict(manifest.texture.sizes), field_places(manifest.texture.layouts))
+    for section in image.attributes:
+        if section.memory.startswith("texture."):
+            model.load_texture(section.memory, section.words)
 
 
 def render_model(
@@ -66,8 +76,10 @@ def loaded_model(manifest: Manifest, image: SceneImage) -> Any:
     """A model whose memories hold a scene image."""
     model = new_model(manifest)
     load_scene(model, image)
-    if image.attributes:
+    if image.header.room is not None:
         load_environment(model, image, manifest)
+    if manifest.texture is not None:
+        load_textures(model, image, manifest)
     return model
 
 

@@ -54,7 +54,9 @@ def measure_frame(
     manifest = design.manifest
     check_size(size, manifest)
     begun = time.perf_counter()
-    mesh = with_materials(scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours)
+    mesh = with_materials(
+        scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours, manifest.texture is not None
+    )
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     registers = frame_registers(scene, image.header, manifest, *size)
     pack_seconds = time.perf_counter() - begun

@@ -50,8 +50,11 @@ def frame_of(name: str, scene: Scene, mesh: Mesh, source: str | None) -> Frame:
     plain = _SCENE.dump_python(scene, mode="json", exclude={"mesh": True, "background": {"room": True}})
     digest = hashlib.sha256()
     arrays = (mesh.vertices, mesh.faces, mesh.corner_normals, mesh.face_materials, mesh.source_faces)
-    for array in (*arrays, *(() if mesh.corner_colours is None else (mesh.corner_colours,))):
+    of_corners = tuple(array for array in (mesh.corner_colours, mesh.corner_positions) if array is not None)
+    for array in arrays + of_corners:
         digest.update(f"{array.shape} {array.dtype}\n".encode() + array.tobytes())
+    for texture in mesh.textures:
+        digest.update(f"{texture.wrap} {texture.pixels.shape}\n".encode() + texture.pixels.tobytes())
     digest.update(repr((mesh.materials, mesh.source_count)).encode())
     room = None
     if scene.background.room is not None:

@@ -20,7 +20,18 @@ def check_gltf(document: Any, path: Path) -> None:
 
     if not isinstance(document, Mapping):
         raise fail("its JSON is not an object")
-    for key in ("nodes", "meshes", "accessors", "bufferViews", "buffers", "materials", "scenes"):
+    for key in (
+        "nodes",
+        "meshes",
+        "accessors",
+        "bufferViews",
+        "buffers",
+        "materials",
+        "scenes",
+        "textures",
+        "images",
+        "samplers",
+    ):
         entries = document.get(key, [])
         if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
             raise fail(f"{key} must be a list of objects")

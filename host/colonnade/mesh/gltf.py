@@ -1,4 +1,4 @@
-"""Reads glTF files: the triangles of the default scene with normals, materials and vertex colours.
+"""Reads glTF files: the triangles of the default scene with normals, materials, base-colour textures, vertex colours.
 
 This is our own code because trimesh drops transmission, mixes up normals under scaling, and does not say what it
 leaves out.
@@ -7,6 +7,7 @@ leaves out.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,9 @@ from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
 from colonnade.mesh.gltf_document import GltfDocument
+from colonnade.mesh.gltf_textures import GltfTextures
 from colonnade.mesh.losses import Losses, extension_loss
-from colonnade.mesh.materials import PLAIN, from_gltf, gltf_losses, unused_extensions
+from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, gltf_losses, unused_extensions
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, joined
 
@@ -47,12 +49,13 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     document = GltfDocument(data, path, references)
     _check_extensions(document)
     materials = (*(from_gltf(material) for material in document.json.get("materials", [])), PLAIN)
+    textures = GltfTextures(document, references, losses)
     used: set[int] = set()
     parts = []
     for node, matrix in _nodes(document, losses):
         mesh = document.entry("meshes", node["mesh"])
         for primitive in mesh.get("primitives", []):
-            part = _primitive(document, primitive, matrix, len(materials) - 1, losses)
+            part = _primitive(document, primitive, matrix, len(materials) - 1, losses, textures)
             if part is not None:
                 parts.append(part)
                 used.add(int(part[1]))
@@ -64,11 +67,35 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     if not parts:
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     surface = joined([part for part, _ in parts])
-    face_materials = np.concatenate([np.full(len(part.faces), material) for part, material in parts])
+    materials, numbers = _textured(materials, parts, textures)
+    face_materials = np.concatenate(
+        [np.full(len(part.faces), number) for (part, _), number in zip(parts, numbers, strict=True)]
+    )
     colours = surface.colours
     if colours is not None:
         colours = colours * np.array([material.albedo for material in materials])[face_materials][:, None]
-    return RawSurface(surface.vertices, surface.faces, surface.normals, materials, face_materials, colours)
+    return replace(
+        surface,
+        materials=materials,
+        face_materials=face_materials,
+        colours=colours,
+        textures=tuple(textures.textures),
+    )
+
+
+def _textured(
+    materials: tuple[MeshMaterial, ...], parts: list[tuple[RawSurface, int]], textures: GltfTextures
+) -> tuple[tuple[MeshMaterial, ...], list[int]]:
+    """The materials, with further ones for parts that show their texture, and the material of each part."""
+    found, numbers = list(materials), []
+    for part, number in parts:
+        use = None if part.positions is None else textures.uses[number]
+        if use is not None:
+            material = replace(materials[number], texture=use.texture)
+            number = found.index(material) if material in found else len(found)
+            found += [material] if number == len(found) else []
+        numbers.append(number)
+    return tuple(found), numbers
 
 
 def _check_extensions(document: GltfDocument) -> None:
@@ -149,7 +176,12 @@ def _local(document: GltfDocument, index: int, node: Mapping[str, Any]) -> Float
 
 
 def _primitive(
-    document: GltfDocument, primitive: Mapping[str, Any], matrix: Floats, default: int, losses: Losses
+    document: GltfDocument,
+    primitive: Mapping[str, Any],
+    matrix: Floats,
+    default: int,
+    losses: Losses,
+    textures: GltfTextures,
 ) -> tuple[RawSurface, int] | None:
     """The triangles of a primitive in the scene's space, and their material; None for points and lines."""
     mode, attributes = primitive.get("mode", _TRIANGLES), primitive.get("attributes", {})
@@ -195,12 +227,21 @@ def _primitive(
     material = primitive.get("material", default)
     if material != default or "material" in primitive:
         document.entry("materials", material)
+    use = textures.use_of(int(material)) if material != default else None
+    places = None if use is None else attribute(use.coordinates, 2)
+    if use is not None:
+        losses.add(lost.NO_POSITIONS, len(faces) if places is None else 0)
+    shows_colours = colours is not None and not (colours == 1.0).all()
+    if places is not None:
+        losses.add(lost.TEXTURED_COLOURS, len(faces) if shows_colours else 0)
+        shows_colours = False
     return (
         RawSurface(
             vertices=positions @ linear.T + matrix[:3, 3],
             faces=faces,
             normals=None if normals is None else normals[faces],
-            colours=None if colours is None or (colours == 1.0).all() else np.clip(colours, 0, 1)[faces],
+            colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
+            positions=None if places is None or use is None else use.positions(places)[faces],
         ),
         int(material),
     )

@@ -118,6 +118,20 @@ class GltfDocument:
         steps = np.ndarray((count, width), dtype=kind, buffer=buffer, offset=start, strides=(stride, element // width))
         return np.array(steps)
 
+    def view_bytes(self, index: Any) -> bytes:
+        """The bytes of a buffer view, such as a picture."""
+        size = self.entry("bufferViews", index).get("byteLength", 0)
+        if not isinstance(size, int) or isinstance(size, bool) or size < 1:
+            raise self.error(f"bufferViews[{index}] is empty: export it again")
+        return self._view(index, 0, "<u1", size, 1).tobytes()
+
+    def embedded(self, uri: str, name: str) -> bytes:
+        """The content of a ``data:`` URI."""
+        try:
+            return base64.b64decode(uri.partition(",")[2], validate=True)
+        except (ValueError, binascii.Error):
+            raise self.error(f"the data of {name} are not base64") from None
+
     def _buffer(self, index: Any) -> bytes:
         self.entry("buffers", index)
         if index not in self._buffers:
@@ -137,10 +151,7 @@ class GltfDocument:
         if not isinstance(uri, str):
             raise self.error(f"the uri of buffer {index} is not text")
         if uri.startswith("data:"):
-            try:
-                return base64.b64decode(uri.partition(",")[2], validate=True)
-            except (ValueError, binascii.Error):
-                raise self.error(f"the data of buffer {index} are not base64") from None
+            return self.embedded(uri, f"buffer {index}")
         content = self._references.buffer(unquote(uri))
         if content is None:
             raise self.error(f"its buffer {uri} is missing: copy it beside the mesh")

@@ -27,6 +27,7 @@ from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.normals import corner_normals
 from colonnade.mesh.palette import MAX_MATERIALS, coloured_materials, corner_coloured_materials
+from colonnade.mesh.texture import Texture
 from colonnade.mesh.topology import Faces, drop_faces, merge_rows, subdivide, subdivide_corners
 from colonnade.mesh.winding import find_winding
 
@@ -105,6 +106,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
     surface, losses = file.surface, file.losses
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     materials, face_materials, colours = surface.materials, surface.material_index, surface.colours
+    positions = surface.positions
     if colours is not None and corner_colours:
         materials, face_materials, colours = corner_coloured_materials(materials, face_materials, colours)
     else:
@@ -116,6 +118,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         vertices, faces = subdivide(vertices, faces)
         normals = None if normals is None else subdivide_corners(unit_vectors(normals))
         colours = None if colours is None else subdivide_corners(colours)
+        positions = None if positions is None else subdivide_corners(positions)
     if len(materials) > MAX_MATERIALS:
         raise UserError(f"mesh {path} has {len(materials):,} materials: use at most {MAX_MATERIALS}")
     return clean_mesh(
@@ -129,6 +132,8 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         crease=crease,
         losses=losses,
         colours=colours,
+        textures=surface.textures,
+        positions=positions,
     )
 
 
@@ -143,6 +148,8 @@ def clean_mesh(
     crease: float | None = None,
     losses: Losses | None = None,
     colours: Floats | None = None,
+    textures: tuple[Texture, ...] = (),
+    positions: Floats | None = None,
 ) -> Mesh:
     """Clean raw vertices and faces.
 
@@ -157,6 +164,8 @@ def clean_mesh(
         crease: Crease angle, degrees, in place of ``normals``.
         losses: What the file lost so far; what is repaired here is added.
         colours: Corner colours, float64 [m, 3, 3]; see `Mesh.corner_colours`.
+        textures: The textures of the materials.
+        positions: Positions of the corners in them, float64 [m, 3, 2]; see `Mesh.corner_positions`.
 
     Raises:
         UserError: A vertex is not finite, the size is out of range, or no face has an area.
@@ -184,13 +193,13 @@ def clean_mesh(
         raise UserError(f"{label} is smaller than 1e-100: scale it up")
     used, renumbered = np.unique(corners[keep], return_inverse=True)
     vertices, faces = merged[used], renumbered.reshape(-1, 3).astype(np.int32)
-    normals, colours = (None if values is None else values[keep] for values in (normals, colours))
+    normals, colours, positions = (None if values is None else values[keep] for values in (normals, colours, positions))
     winding = find_winding(vertices, faces)
     if winding.reversed.any():
         losses.add(lost.MIXED, winding.mixed)
         losses.add(lost.INVERTED, winding.inverted)
         faces[winding.reversed] = faces[winding.reversed][:, ::-1]
-        for values in (normals, colours):
+        for values in (normals, colours, positions):
             if values is not None:
                 values[winding.reversed] = values[winding.reversed][:, ::-1]
     shading = corner_normals(vertices, faces, normals, crease)
@@ -208,4 +217,6 @@ def clean_mesh(
         name=name,
         notes=losses.lines(label),
         corner_colours=colours,
+        textures=textures,
+        corner_positions=positions,
     )

@@ -25,8 +25,19 @@ class Loss:
         return Loss(f"{noun} is {what}", f"{plural or noun + 's'} are {what}", instead)
 
 
-TEXTURES = Loss.of("texture", "not shown", "surfaces have their base colour")
-TEXTURE_OBJ = Loss.of("texture map", "not shown", "surfaces have the colour Kd")
+TEXTURES = Loss.of("texture", "not shown", "only textures of the base colour are")
+TEXTURE_OBJ = Loss.of("texture map", "not shown", "only map_Kd is")
+NO_PICTURES = Loss.of("picture of a texture", "missing", "surfaces have their base colour", "pictures of textures")
+PICTURE_FORMATS = Loss.of(
+    "picture of a texture", "not readable", "pictures must be PNG, JPEG or WebP", "pictures of textures"
+)
+NO_POSITIONS = Loss.of(
+    "face of a textured material", "untextured", "it has no texture coordinates", "faces of a textured material"
+)
+TEXTURED_COLOURS = Loss.of("colour of a textured face", "not shown", "its texture is", "colours of textured faces")
+TEXTURE_OPTIONS = Loss.of(
+    "option of a texture map", "not used", "only -s, -o and -clamp are", "options of texture maps"
+)
 LIGHTS = Loss.of("light", "not used", "the scene file has the lights")
 CAMERAS = Loss.of("camera", "not used", "the scene file has the camera")
 ANIMATIONS = Loss.of("animation", "not played", "nodes stand as the file places them")

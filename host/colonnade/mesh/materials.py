@@ -7,7 +7,7 @@
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | index of refraction | `KHR_materials_ior` | `Ni` |
 
-Textures are not read. What a material holds beyond this is counted as lost.
+The readers add base-colour textures. What a material holds beyond this is counted as lost.
 """
 
 from __future__ import annotations
@@ -44,12 +44,14 @@ class MeshMaterial:
         albedo: Linear, 0 to 1: diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
         has_corner_colours: The surface has the colours of `colonnade.mesh.mesh.Mesh.corner_colours`, times `albedo`.
+        texture: The surface has the colours of this one of `colonnade.mesh.mesh.Mesh.textures`, times `albedo`.
     """
 
     kind: str = "diffuse"
     albedo: Vector = (0.8, 0.8, 0.8)
     ior: float = GLASS_IOR
     has_corner_colours: bool = False
+    texture: int | None = None
 
 
 #: Material of meshes without one.
@@ -85,12 +87,15 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
 
 
 def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
-    """What a picture does not show of a material of a glTF file's JSON, apart from its extensions."""
+    """What a picture does not show of a material of a glTF file's JSON, apart from its extensions.
+
+    The texture of the base colour is not counted.
+    """
     shown, surface = from_gltf(material).kind, material.get("pbrMetallicRoughness")
     surface = {"metallicFactor": 0.0, "roughnessFactor": 1.0} if surface is None else surface
     extensions = material.get("extensions", {})
     textures = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
-    found = [(lost.TEXTURES, len(textures))]
+    found = [(lost.TEXTURES, len(textures) - ("baseColorTexture" in surface))]
     mode, colour = material.get("alphaMode", "OPAQUE"), surface.get("baseColorFactor", ())
     if mode == "MASK":
         found.append((lost.MASKED, 1))
@@ -115,7 +120,11 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         return _number(value[0] if isinstance(value, list | tuple) and value else value, default)
 
     shown = from_mtl(entries).kind
-    maps = [key for key in entries if key.startswith("map_") or key in ("bump", "disp", "decal", "refl", "norm")]
+    maps = [
+        key
+        for key in entries
+        if (key.startswith("map_") and key != "map_kd") or key in ("bump", "disp", "decal", "refl", "norm")
+    ]
     found = [(lost.TEXTURE_OBJ, len(maps))]
     if any(_colour(entries.get("ke"), (0.0, 0.0, 0.0))):
         found.append((lost.EMISSION, 1))

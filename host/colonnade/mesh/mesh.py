@@ -11,6 +11,7 @@ import numpy.typing as npt
 from colonnade.common.types import Floats
 from colonnade.mesh import primitives
 from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.texture import Texture
 from colonnade.mesh.topology import Faces
 
 
@@ -71,6 +72,9 @@ class Mesh:
         parts: The objects of a joined mesh, in the order of their source faces; none of a single mesh.
         corner_colours: Linear colours at the corners of the faces, 0 to 1, 0 on faces whose material has none, float64
             [m, 3, 3]; None: no material has any.
+        textures: Base-colour textures of the materials.
+        corner_positions: Positions (u, v) of the corners of the faces in the texture of their material, 0 on faces
+            without one, float64 [m, 3, 2]; None: no material has a texture.
     """
 
     vertices: Floats
@@ -84,6 +88,8 @@ class Mesh:
     notes: tuple[str, ...] = ()
     parts: tuple[MeshPart, ...] = ()
     corner_colours: Floats | None = None
+    textures: tuple[Texture, ...] = ()
+    corner_positions: Floats | None = None
 
     @cached_property
     def extent(self) -> Extent:

@@ -1,4 +1,4 @@
-"""Reads OBJ files with their MTL files: corners with normals, materials, and vertex colours.
+"""Reads OBJ files with their MTL files: corners with normals, materials, base-colour textures and vertex colours.
 
 This is our own code because trimesh splits concave polygons wrongly and does not say what it leaves out.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,15 @@ from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_mtl, mtl_losses
+from colonnade.mesh.obj_textures import MtlTextures, TextureMap, positions_of
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, from_polygons
+from colonnade.mesh.texture import Texture
 
 #: Statements of curves, surfaces and their parameter space.
 _CURVES = ("curv", "curv2", "surf")
-#: Corners that all have a normal.
-_WITH_NORMALS = re.compile(r"[^\s/]+/[^\s/]*/[^\s/]+(?: [^\s/]+/[^\s/]*/[^\s/]+)*")
+#: Corners that all have a position and a normal.
+_COMPLETE = re.compile(r"[^\s/]+/[^\s/]+/[^\s/]+(?: [^\s/]+/[^\s/]+/[^\s/]+)*")
 
 
 class _Statements:
@@ -34,9 +37,10 @@ class _Statements:
     def __init__(self, text: str) -> None:
         self.vertices: list[str] = []
         self.normals: list[str] = []
+        self.positions: list[str] = []
         self.faces: list[str] = []
-        #: Vertices and normals before each face, for relative indices.
-        self.counts: list[tuple[int, int]] = []
+        #: Vertices, normals and texture positions before each face, for relative indices.
+        self.counts: list[tuple[int, int, int]] = []
         self.face_materials: list[int] = []
         self.names: list[str] = []
         self.libraries: list[str] = []
@@ -49,10 +53,12 @@ class _Statements:
                 self.vertices.append(rest)
             elif keyword == "f":
                 self.faces.append(rest)
-                self.counts.append((len(self.vertices), len(self.normals)))
+                self.counts.append((len(self.vertices), len(self.normals), len(self.positions)))
                 self.face_materials.append(material)
             elif keyword == "vn":
                 self.normals.append(rest)
+            elif keyword == "vt":
+                self.positions.append(rest)
             elif keyword == "usemtl":
                 material = index.setdefault(rest.strip(), len(index))
             elif keyword == "mtllib":
@@ -75,13 +81,19 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
     file = _Statements(re.sub(r"#[^\r\n]*", "", text))
     vertices, vertex_colours = _vertices(file.vertices)
     normals = _rows(file.normals, 3)[:, :3]
-    sizes, corners, corner_normals = _corners(file, path)
+    sizes, corners, corner_normals, corner_positions = _corners(file, path)
     losses.add(lost.POINTS, file.losses.get("p", 0))
     losses.add(lost.LINES, file.losses.get("l", 0))
     losses.add(lost.CURVES, sum(file.losses.get(name, 0) for name in _CURVES))
     if file.groups > 1 and not len(normals):
         losses.add(lost.GROUPS, file.groups)
-    materials, used = _materials(file, references, losses)
+    materials, used, maps, textures = _materials(file, references, losses)
+    positions = None
+    if textures:
+        materials, used, positions = _placed(file, materials, used, maps, sizes, corner_positions, losses)
+        if vertex_colours is not None:
+            is_textured = np.array([material.texture is not None for material in materials])[used]
+            losses.add(lost.TEXTURED_COLOURS, int(is_textured.sum()))
     return from_polygons(
         vertices,
         corners,
@@ -91,7 +103,33 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
         materials=materials,
         polygon_materials=used,
         vertex_colours=vertex_colours,
+        textures=textures,
+        corner_positions=positions,
     )
+
+
+def _placed(
+    file: _Statements,
+    materials: tuple[MeshMaterial, ...],
+    used: Indices,
+    maps: Sequence[TextureMap | None],
+    sizes: Indices,
+    corner_positions: Indices,
+    losses: Losses,
+) -> tuple[tuple[MeshMaterial, ...], Indices, Floats]:
+    """Materials, the material of each polygon, and the positions of the corners in the textures.
+
+    A polygon with a corner without a position shows no texture.
+    """
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    lacks = np.bincount(owner, corner_positions < 0, len(sizes)) > 0
+    is_textured = np.array([material.texture is not None for material in materials])[used]
+    losses.add(lost.NO_POSITIONS, int((is_textured & lacks).sum()))
+    plain = tuple(replace(material, texture=None) for material in materials)
+    rows = np.nan_to_num(_rows(file.positions, 2)[:, :2])
+    values = np.concatenate([rows, np.zeros((1, 2))])[corner_positions]
+    positions = positions_of(values, maps, used[owner])
+    return (*materials, *plain), used + np.where(lacks, len(materials), 0), positions
 
 
 def _rows(lines: Sequence[str], columns: int) -> Floats:
@@ -113,24 +151,28 @@ def _vertices(lines: Sequence[str]) -> tuple[Floats, Floats | None]:
     return values[:, :3], linear_from_srgb(np.clip(np.nan_to_num(values[:, 3:6]), 0.0, 1.0))
 
 
-def _indices(words: Sequence[str]) -> tuple[list[int], list[int | None]]:
-    """Vertex and normal of each corner, as the file numbers them; None without a normal."""
+def _indices(words: Sequence[str]) -> tuple[list[int], list[int | None], list[int | None]]:
+    """Vertex, normal and position of each corner, as the file numbers them; None without one."""
     joined = " ".join(words)
     if "/" not in joined:
-        return list(map(int, words)), [None] * len(words)
-    if _WITH_NORMALS.fullmatch(joined):
-        numbers = list(map(int, joined.replace("//", "/0/").replace("/", " ").split()))
-        return numbers[::3], list(numbers[2::3])
+        return list(map(int, words)), [None] * len(words), [None] * len(words)
+    if _COMPLETE.fullmatch(joined):
+        numbers = list(map(int, joined.replace("/", " ").split()))
+        return numbers[::3], list(numbers[2::3]), list(numbers[1::3])
     parts = [word.split("/") for word in words]
-    return [int(part[0]) for part in parts], [int(part[2]) if len(part) > 2 and part[2] else None for part in parts]
+
+    def numbers_of(place: int) -> list[int | None]:
+        return [int(part[place]) if len(part) > place and part[place] else None for part in parts]
+
+    return [int(part[0]) for part in parts], numbers_of(2), numbers_of(1)
 
 
-def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices]:
-    """Sizes of the polygons, and vertex and normal (-1: none) of each corner."""
+def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices, Indices]:
+    """Sizes of the polygons, and vertex, normal and position (-1: none) of each corner."""
     words = [face.split() for face in file.faces]
     sizes = np.array(list(map(len, words)), dtype=np.int64)
     try:
-        vertices, normals = _indices(list(chain.from_iterable(words)))
+        vertices, normals, positions = _indices(list(chain.from_iterable(words)))
     except ValueError:
         raise UserError(f"mesh {path}: a vertex index of a face is not an integer") from None
     for one, several, indices, count in (
@@ -144,17 +186,25 @@ def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices]:
             if abs(worst) > count and given:
                 raise UserError(f"mesh {path}: a face names {one} {worst}, but the file has {count:,} {several}")
     corners = np.array(vertices, dtype=np.int64)
-    corner_normals = np.array([0 if index is None else index for index in normals], dtype=np.int64)
-    before = np.repeat(np.array(file.counts, dtype=np.int64).reshape(-1, 2), sizes, axis=0)
+    corner_normals, corner_positions = (
+        np.array([0 if index is None else index for index in indices], dtype=np.int64)
+        for indices in (normals, positions)
+    )
+    before = np.repeat(np.array(file.counts, dtype=np.int64).reshape(-1, 3), sizes, axis=0)
     corners = np.where(corners < 0, before[:, 0] + corners, corners - 1)
     corner_normals = np.where(corner_normals < 0, before[:, 1] + corner_normals, corner_normals - 1)
+    corner_positions = np.where(corner_positions < 0, before[:, 2] + corner_positions, corner_positions - 1)
+    # A position that does not exist shows no texture, as none does
+    corner_positions = np.where(corner_positions < len(file.positions), corner_positions, -1)
     if len(corners) and corners.min() < 0:
         raise UserError(f"mesh {path}: a relative index of a face names a vertex before the first")
-    return sizes, corners, np.maximum(corner_normals, -1)
+    return sizes, corners, np.maximum(corner_normals, -1), np.maximum(corner_positions, -1)
 
 
-def _materials(file: _Statements, references: References, losses: Losses) -> tuple[tuple[MeshMaterial, ...], Any]:
-    """The distinct materials of the faces, and the material of each face, int64."""
+def _materials(
+    file: _Statements, references: References, losses: Losses
+) -> tuple[tuple[MeshMaterial, ...], Indices, list[TextureMap | None], tuple[Texture, ...]]:
+    """The materials of the faces, that of each face, int64, their texture maps, and the textures."""
     defined: dict[str, Mapping[str, Any]] = {}
     for names in file.libraries:
         library = references.materials(names)
@@ -165,14 +215,16 @@ def _materials(file: _Statements, references: References, losses: Losses) -> tup
             defined |= {} if content is None else parse_mtl(content)
     used = np.array(file.face_materials, dtype=np.int64)
     materials = [PLAIN] * len(file.names)
+    maps: list[TextureMap | None] = [None] * len(file.names)
+    textures = MtlTextures(references, losses)
     for index in np.unique(used):
         name = file.names[index]
         if name in defined:
-            materials[index] = from_mtl(defined[name])
+            materials[index], maps[index] = textures.textured(from_mtl(defined[name]), defined[name])
             losses.update(mtl_losses(defined[name]))
         elif name and defined:
             losses.add(lost.UNKNOWN_MATERIALS)
-    return tuple(materials), used
+    return tuple(materials), used, maps, tuple(textures.textures)
 
 
 def parse_mtl(data: bytes) -> dict[str, dict[str, list[str]]]:

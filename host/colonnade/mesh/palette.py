@@ -17,6 +17,9 @@ from colonnade.mesh.mesh import Mesh
 #: Limit of the 8-bit material index of a face.
 MAX_MATERIALS = 256
 
+#: Settings of hardware with textures, for messages.
+TEXTURE_SETTINGS = "geometry.cornerColours=true and geometry.textureBytes=16384"
+
 #: Steps of the clustering, at most.
 _STEPS = 30
 
@@ -102,6 +105,26 @@ def with_face_colours(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
     return faces, losses.lines(f"mesh {mesh.name}")
 
 
+def without_textures(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
+    """A mesh whose textured materials have the mean colours of their textures, and a line on this."""
+    if all(material.texture is None for material in mesh.materials):
+        return mesh, ()
+    materials = tuple(_untextured(material, mesh) for material in mesh.materials)
+    count = len({material.texture for material in mesh.materials} - {None})
+    line = (
+        f"mesh {mesh.name}: {count} {'texture is' if count == 1 else 'textures are'} not shown: surfaces have their"
+        f" mean colour, as the hardware has no textures: set {TEXTURE_SETTINGS}"
+    )
+    return replace(mesh, materials=materials, textures=(), corner_positions=None), (line,)
+
+
+def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:
+    if material.texture is None:
+        return material
+    red, green, blue = (mesh.textures[material.texture].mean * material.albedo).tolist()
+    return replace(material, albedo=(red, green, blue), texture=None)
+
+
 def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     """Reduce a mesh to so many materials by merging similar colours of the same kind and index of refraction.
 
@@ -114,9 +137,11 @@ def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     materials, index = _used(list(mesh.materials), mesh.face_materials.astype(np.int64))
     if len(materials) <= count:
         return replace(mesh, materials=materials, face_materials=index.astype(np.uint8)), None
-    kinds: dict[tuple[str, float, bool], list[int]] = {}
+    kinds: dict[tuple[str, float, bool, int | None], list[int]] = {}
     for number, material in enumerate(materials):
-        kinds.setdefault((material.kind, material.ior, material.has_corner_colours), []).append(number)
+        kinds.setdefault((material.kind, material.ior, material.has_corner_colours, material.texture), []).append(
+            number
+        )
     if len(kinds) > count:
         return mesh, None
     weights = np.bincount(index, minlength=len(materials))

@@ -1,4 +1,4 @@
-"""Reads the files that a mesh file references: an OBJ file's MTL, a glTF file's buffers, but no textures."""
+"""Reads the files that a mesh file references: an OBJ file's MTL, a glTF file's buffers, and pictures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import exists, read_input
-from colonnade.common.limits import MAX_MESH_BYTES, MAX_TEXT_BYTES
+from colonnade.common.limits import MAX_MESH_BYTES, MAX_PICTURE_BYTES, MAX_TEXT_BYTES
 
 #: A line of an MTL file with numbers, which must be finite.
 _NUMBERS = re.compile(rb"(?im)^[ \t]*(k[asde]|tf|ni|ns|d|tr|illum|p[rmsc]\w*)[ \t]+(.*)$")
@@ -37,6 +37,15 @@ class References:
         """
         path = self._find(name)
         return None if path is None else read_input(path, "the buffer", MAX_MESH_BYTES)
+
+    def picture(self, name: str) -> bytes | None:
+        """The content of a texture's picture; None if it is missing.
+
+        Raises:
+            UserError: The file cannot be read, or is outside the folder.
+        """
+        path = self._find(name)
+        return None if path is None else read_input(path, "the texture", MAX_PICTURE_BYTES)
 
     def _find(self, name: str) -> Path | None:
         parent = self._folder.resolve()

@@ -11,6 +11,7 @@ from colonnade.common.types import Floats, Indices
 from colonnade.mesh.losses import CROSSED, SHORT_FACES, Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.polygons import triangulate
+from colonnade.mesh.texture import Texture
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class RawSurface:
         face_materials: int64 [m], index into `materials`.
         colours: Colours at the corners, which replace the albedo of their materials, linear, 0 to 1, NaN on faces
             without, float64 [m, 3, 3]; None: none.
+        textures: Textures of the materials.
+        positions: Positions (u, v) of the corners in them, 0 on faces without, float64 [m, 3, 2]; None: none.
     """
 
     vertices: Floats
@@ -33,6 +36,8 @@ class RawSurface:
     materials: tuple[MeshMaterial, ...] = (PLAIN,)
     face_materials: Indices | None = None
     colours: Floats | None = None
+    textures: tuple[Texture, ...] = ()
+    positions: Floats | None = None
 
     @property
     def material_index(self) -> Indices:
@@ -51,6 +56,8 @@ def from_polygons(
     polygon_materials: Indices | None = None,
     vertex_colours: Floats | None = None,
     polygon_colours: Floats | None = None,
+    textures: tuple[Texture, ...] = (),
+    corner_positions: Floats | None = None,
 ) -> RawSurface:
     """Split polygons into triangles, with what they carry.
 
@@ -64,6 +71,8 @@ def from_polygons(
         polygon_materials: int64 [p].
         vertex_colours: float64 [n, 3], linear.
         polygon_colours: float64 [p, 3], linear, NaN for none; before `vertex_colours`.
+        textures: Textures of the materials.
+        corner_positions: Positions in them, float64 [k, 2].
     """
     split = triangulate(vertices[corners], sizes)
     losses.add(SHORT_FACES, split.short)
@@ -79,6 +88,8 @@ def from_polygons(
         materials=materials,
         face_materials=None if polygon_materials is None else polygon_materials[split.polygons],
         colours=colours,
+        textures=textures,
+        positions=None if corner_positions is None else corner_positions[split.corners],
     )
 
 
@@ -100,4 +111,6 @@ def joined(parts: Sequence[RawSurface]) -> RawSurface:
         materials=parts[0].materials,
         face_materials=np.concatenate([part.material_index for part in parts]),
         colours=filled("colours", (3, 3), np.nan),
+        textures=parts[0].textures,
+        positions=filled("positions", (3, 2), 0.0),
     )

@@ -53,6 +53,8 @@ class PlacedObject:
         self.kinds = np.array([_KINDS[material.kind] for material in view.materials])[index]
         self._albedo: Floats = np.array([material.albedo for material in view.materials])[index]
         self._has_colours = np.array([material.has_corner_colours for material in view.materials])[index]
+        textures = [-1 if material.texture is None else material.texture for material in view.materials]
+        self._textures = np.array(textures)[index]
         self.ior: Floats = np.array([material.ior for material in view.materials])[index]
         is_glass = self.kinds == GLASS
         self._transmittance = view.shadow_transmittance
@@ -84,6 +86,11 @@ class PlacedObject:
         if self._mesh.corner_colours is not None:
             colours = np.einsum("nj,njk->nk", hits.weights, self._mesh.corner_colours[faces])
             albedo = np.where(self._has_colours[faces][:, None], albedo * colours, albedo)
+        if self._mesh.corner_positions is not None:
+            positions = np.einsum("nj,njk->nk", hits.weights, self._mesh.corner_positions[faces])
+            for number, texture in enumerate(self._mesh.textures):
+                shows = np.flatnonzero(self._textures[faces] == number)
+                albedo[shows] = albedo[shows] * texture.colours(positions[shows])
         return ObjectPoints(hits.position, facing, unit_vectors(normals), ~is_back, hits.t, albedo)
 
     def light_transmittance(self, origins: Floats, to_light: Floats) -> Floats:

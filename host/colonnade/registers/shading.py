@@ -79,6 +79,8 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
         result |= _colour(f"materials[{index}].albedo", np.array(material.albedo) * white, white)
         if manifest.corner_colours:
             result[f"materials[{index}].hasCornerColours"] = int(material.has_corner_colours)
+        if manifest.texture is not None:
+            result[f"materials[{index}].hasTexture"] = int(material.texture is not None)
     if int(manifest.config["frame"]["maxBounces"]) > 0:
         result["shading.bounces"] = min(view.bounces, int(manifest.config["frame"]["maxBounces"]))
         result["shading.shadowTransmittance"] = int(np.rint(view.shadow_transmittance * one))

@@ -249,7 +249,9 @@ def pack_scene(
     scene: Scene, mesh: Mesh, manifest: Manifest, environment: EncodedEnvironment | None = None
 ) -> SceneImage:
     """The scene image of a mesh, with the scene's material and the maps of its room."""
-    mesh = with_materials(scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours)
+    mesh = with_materials(
+        scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours, manifest.texture is not None
+    )
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material), scene.headroom)
     if environment is None:
         return image

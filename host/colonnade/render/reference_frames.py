@@ -67,7 +67,13 @@ def reference_frames(
     """
     begun = time.perf_counter()
     room = scene_room(poses[0]) if poses[0].objects else None
-    mesh = object_mesh(poses[0], int(manifest.config["frame"]["materials"]), manifest.corner_colours, room)
+    mesh = object_mesh(
+        poses[0],
+        int(manifest.config["frame"]["materials"]),
+        manifest.corner_colours,
+        room,
+        manifest.texture is not None,
+    )
     layout = None if manifest.config["physicalAttributeMemory"] is None else layout_of(manifest)
     max_lights = int(manifest.config["frame"]["lights"])
     for pose, traced in zip(

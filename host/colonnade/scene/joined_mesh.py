@@ -13,6 +13,7 @@ from colonnade.common.vectors import unit_vectors
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh, MeshPart
 from colonnade.mesh.palette import MAX_MATERIALS
+from colonnade.mesh.texture import Texture
 from colonnade.scene.model import Scene, SceneObject
 from colonnade.scene.object_pose import Pose, chosen, footprint_of, rotation_matrix, standing_pose
 from colonnade.scene.standing import surface_point
@@ -69,6 +70,8 @@ def _flat(mesh: Mesh) -> Mesh:
 
 
 def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
+    textures = list(dict.fromkeys(texture for mesh in meshes for texture in mesh.textures))
+    meshes = [_renumbered(mesh, textures) for mesh in meshes]
     materials = list(dict.fromkeys(material for mesh in meshes for material in mesh.materials))
     if len(materials) > MAX_MATERIALS:
         raise UserError(f"the objects have {len(materials):,} materials: use at most {MAX_MATERIALS}")
@@ -92,7 +95,9 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
         ).astype(np.int32),
         source_count=int(first_faces[-1]),
         name=" + ".join(mesh.name for mesh in meshes),
-        corner_colours=_colours(meshes),
+        corner_colours=_filled([mesh.corner_colours for mesh in meshes], meshes, 3),
+        textures=tuple(textures),
+        corner_positions=_filled([mesh.corner_positions for mesh in meshes], meshes, 2),
         parts=tuple(
             MeshPart(mesh.name, int(first), mesh.extent.edge * pose.scale)
             for mesh, pose, first in zip(meshes, poses, first_faces[:-1], strict=True)
@@ -100,10 +105,24 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
     )
 
 
-def _colours(meshes: list[Mesh]) -> Floats | None:
-    """The corner colours of all faces, 0 on meshes without; None if no mesh has any."""
-    if all(mesh.corner_colours is None for mesh in meshes):
+def _renumbered(mesh: Mesh, textures: list[Texture]) -> Mesh:
+    """The mesh with materials that name their textures by their number among those of all meshes."""
+    materials = tuple(
+        material
+        if material.texture is None
+        else replace(material, texture=textures.index(mesh.textures[material.texture]))
+        for material in mesh.materials
+    )
+    return replace(mesh, materials=materials)
+
+
+def _filled(values: list[Floats | None], meshes: list[Mesh], width: int) -> Floats | None:
+    """Values at the corners of all faces, 0 on meshes without; None if no mesh has any."""
+    if all(value is None for value in values):
         return None
     return np.concatenate(
-        [np.zeros((len(mesh.faces), 3, 3)) if mesh.corner_colours is None else mesh.corner_colours for mesh in meshes]
+        [
+            np.zeros((len(mesh.faces), 3, width)) if value is None else value
+            for value, mesh in zip(values, meshes, strict=True)
+        ]
     )

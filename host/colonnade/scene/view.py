@@ -155,10 +155,13 @@ def make_view(
 
 
 def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tuple[MeshMaterial, ...]:
-    """Replace values of a mesh's materials by those that the scene gives; an albedo replaces corner colours too."""
+    """Replace values of a mesh's materials by those that the scene gives.
+
+    An albedo replaces corner colours and textures too.
+    """
     given = {key: value for key in ("kind", "albedo", "ior") if (value := getattr(overrides, key)) is not None}
     if "albedo" in given:
-        given["has_corner_colours"] = False
+        given |= {"has_corner_colours": False, "texture": None}
     return tuple(replace(material, **given) for material in materials)
 
 

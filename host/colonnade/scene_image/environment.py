@@ -31,7 +31,7 @@ def with_environment(image: SceneImage, environment: EncodedEnvironment, manifes
         sections.append(LoadSection(memory, np.ascontiguousarray(words[:, :word_bytes])))
     memories = tuple(LoadedMemory(section.memory, *section.words.shape) for section in sections)
     header = EnvironmentHeader(environment.environment.name, environment.image.depth_unit, memories)
-    return replace(image, header=replace(image.header, room=header), attributes=tuple(sections))
+    return replace(image, header=replace(image.header, room=header), attributes=(*sections, *image.attributes))
 
 
 def tiles_beyond_heap(image: SceneImage) -> dict[str, int]:

@@ -1,8 +1,8 @@
 """The scene image file, with the memory contents of a packed scene.
 
 The layout, little-endian, is: 8 bytes magic; uint32 length of the header; header as JSON; records; face table, int32
-for each packed id; words of a room's memories in the header's order; SHA-256 of all preceding bytes. The frame
-registers, such as camera and lights, are not part of the file.
+for each packed id; words of the memories of a room and of the textures, in the header's order; SHA-256 of all preceding
+bytes. The frame registers, such as camera and lights, are not part of the file.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.input_files import exists, is_folder, parse_json, read_input
 from colonnade.common.limits import MAX_HEADER_BYTES, MAX_IMAGE_BYTES
 from colonnade.design.manifest import Manifest
-from colonnade.scene_image.header import EnvironmentHeader, ImageHeader
+from colonnade.scene_image.header import ImageHeader
 from colonnade.scene_image.header_checks import check_header
 
 MAGIC = b"CLNDIMG3"
@@ -51,7 +51,7 @@ class SceneImage:
         header: Description of the content.
         records: uint8 [record_count, record_bits / 8], little-endian.
         source_faces: int32 [triangles], index in the mesh file of each packed id's face.
-        attributes: A room's maps in the order of `EnvironmentHeader.memories`; empty without a room.
+        attributes: A room's maps and textures in the order of `ImageHeader.memories`.
     """
 
     header: ImageHeader
@@ -101,7 +101,7 @@ class SceneImage:
         header, start = _header(data, file)
         records_end = start + header.record_count * header.record_bits // 8
         faces_end = records_end + 4 * header.triangles
-        memories = header.room.memories if header.room else ()
+        memories = header.memories
         end = faces_end + sum(memory.bytes for memory in memories)
         if len(data) < end + _DIGEST_BYTES:
             raise UserError(f"{file} is truncated ({len(data):,} of {end + _DIGEST_BYTES:,} bytes): {_ADVICE}")
@@ -127,7 +127,7 @@ def _check_fits(header: ImageHeader, manifest: Manifest, file: Path) -> None:
             f"{file} was packed for another format ({header.format_hash[:12]}, the hardware's is"
             f" {manifest.format_hash[:12]}): pack the scene again for this configuration"
         )
-    memories = header.room.memories if header.room else ()
+    memories = header.memories
     if header.record_bits != manifest.record_bits or any(part.memory not in manifest.memories for part in memories):
         raise UserError(f"{file} is corrupt (its header does not match the hardware's format): {_ADVICE}")
     depth = int(manifest.memories["columnBvh"]["depth"])
@@ -142,14 +142,17 @@ def _check_fits(header: ImageHeader, manifest: Manifest, file: Path) -> None:
             f"{file} needs a stack of {header.tree.stack_bound} entries, columnBvhMemory.stackDepth is {stack_depth}:"
             f" raise it to {header.tree.stack_bound}"
         )
-    if header.room is not None:
-        _check_environment_fits(header.room, manifest, file)
+    _check_memories_fit(header, manifest, file)
 
 
-def _check_environment_fits(environment: EnvironmentHeader, manifest: Manifest, file: Path) -> None:
+def _check_memories_fit(header: ImageHeader, manifest: Manifest, file: Path) -> None:
     """Refuse maps that do not fill the design's memories exactly: words would be lost or undefined."""
-    available = {memory.memory: (memory.words, memory.word_bytes) for memory in environment.memories}
-    shapes = {name: shape for name, shape in manifest.memories.items() if name != "columnBvh"}
+    available = {memory.memory: (memory.words, memory.word_bytes) for memory in header.memories}
+    shapes = {
+        name: shape
+        for name, shape in manifest.memories.items()
+        if name != "columnBvh" and (header.room is not None or name.startswith("texture."))
+    }
     needed = {name: (int(shape["depth"]), -(-int(shape["bits"]) // 8)) for name, shape in shapes.items()}
     for name in sorted(available.keys() | needed.keys()):
         (words, size), (depth, needed_size) = available.get(name, (0, 0)), needed.get(name, (0, 0))

@@ -61,6 +61,23 @@ class EnvironmentHeader:
 
 
 @dataclass(frozen=True)
+class TextureHeader:
+    """The textures of an image, for hardware with a texture memory.
+
+    Attributes:
+        textures: Their number; with 0 the memory holds zeros.
+        scale: Texels of the atlas for each pixel of a texture, along an axis.
+        source_bytes: Size of the textures, three bytes a pixel.
+        memories: Memories of the textures, in the file's order, after those of a room.
+    """
+
+    textures: int
+    scale: float
+    source_bytes: int
+    memories: tuple[LoadedMemory, ...]
+
+
+@dataclass(frozen=True)
 class ImageHeader:
     """Description of a scene image's content.
 
@@ -79,6 +96,7 @@ class ImageHeader:
         tree: Size and cost of the tree; None without nodes.
         room: The room; None without a room's maps.
         parts: The objects of a scene with several, by their source faces.
+        texture: The textures; None for hardware without.
     """
 
     format_hash: str
@@ -99,6 +117,12 @@ class ImageHeader:
     tree: TreeStatistics | None
     room: EnvironmentHeader | None = None
     parts: tuple[MeshPart, ...] = ()
+    texture: TextureHeader | None = None
+
+    @property
+    def memories(self) -> tuple[LoadedMemory, ...]:
+        """Memories of a room and of the textures, in the file's order."""
+        return (*(self.room.memories if self.room else ()), *(self.texture.memories if self.texture else ()))
 
     def to_json(self) -> dict[str, Any]:
         """Convert to a JSON object; floats keep their exact values."""
@@ -124,4 +148,7 @@ class ImageHeader:
         if environment := values["room"]:
             memories = tuple(LoadedMemory(**memory) for memory in environment["memories"])
             values["room"] = EnvironmentHeader(environment["name"], environment["depth_unit"], memories)
+        if texture := values["texture"]:
+            memories = tuple(LoadedMemory(**memory) for memory in texture["memories"])
+            values["texture"] = TextureHeader(**{**texture, "memories": memories})
         return ImageHeader(**values)

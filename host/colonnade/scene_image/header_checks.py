@@ -54,11 +54,14 @@ def check_header(header: Any) -> None:
         _numbers(material["albedo"], 3)
         _number(material["ior"])
         _require(isinstance(material["has_corner_colours"], bool))
+        if material["texture"] is not None:
+            _count(material["texture"])
     for part in _list(header["parts"]):
         _require(isinstance(part["name"], str) and _number(part["edge"]) > 0)
         _count(part["first_face"])
     _check_tree(header["tree"])
     _check_environment(header["room"])
+    _check_texture(header["texture"])
 
 
 def _check_tree(tree: Any) -> None:
@@ -75,7 +78,20 @@ def _check_environment(environment: Any) -> None:
     if environment is None:
         return
     _require(isinstance(environment["name"], str) and _number(environment["depth_unit"]) > 0)
-    for memory in _list(environment["memories"]):
+    _check_memories(environment["memories"])
+
+
+def _check_texture(texture: Any) -> None:
+    if texture is None:
+        return
+    _count(texture["textures"])
+    _count(texture["source_bytes"])
+    _number(texture["scale"])
+    _check_memories(texture["memories"])
+
+
+def _check_memories(memories: Any) -> None:
+    for memory in _list(memories):
         _require(isinstance(memory["memory"], str))
         _count(memory["words"])
         _require(0 < _count(memory["word_bytes"]) <= _MAX_WORD_BYTES)

@@ -41,6 +41,7 @@ def describe(image: SceneImage) -> dict[str, Any]:
         "objects": [asdict(part) | {"units": part.edge * header.frame.scale} for part in header.parts],
         "tree": asdict(header.tree) if header.tree is not None else None,
         "room": _environment(image),
+        "texture": None if header.texture is None else asdict(header.texture),
         "format_hash": header.format_hash,
     }
 
@@ -113,7 +114,9 @@ def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[
         used += f", {header.record_count / depth:.1%} of {depth:,}"
     lines.append(f"memory      {used} ({header.record_count * header.record_bits // 8:,} bytes per column)")
     lines += [f"  {name:<10}{count:>9,} records from {first:,}" for name, first, count in sections(header) if count]
-    return lines + _tree_lines(header, manifest) + _environment_lines(header, manifest)
+    return (
+        lines + _tree_lines(header, manifest) + _environment_lines(header, manifest) + _texture_lines(header, manifest)
+    )
 
 
 def _tree_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
@@ -149,6 +152,15 @@ def _environment_lines(header: ImageHeader, manifest: Manifest | None) -> list[s
         target = "" if manifest is None else f", load target {manifest.memories[memory.memory]['target']}"
         lines.append(f"  {one_line(memory.memory):<19}{memory.words:>6,} words of {memory.word_bytes} bytes{target}")
     return lines
+
+
+def _texture_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
+    texture = header.texture
+    if texture is None or texture.textures == 0:
+        return []
+    count = f"{texture.textures} texture{'s' if texture.textures > 1 else ''} of {texture.source_bytes:,} bytes"
+    used = "" if manifest is None else f", in {manifest.config['geometry']['textureBytes']:,} bytes"
+    return [f"textures    {count}, {texture.scale:.2f} texels for each of their pixels along an axis{used} per column"]
 
 
 def print_report(header: ImageHeader, manifest: Manifest | None = None, write: Callable[[str], None] = print) -> None:

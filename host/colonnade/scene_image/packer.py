@@ -14,15 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.errors import UserError
-from colonnade.common.types import Bytes
+from colonnade.common.types import Bytes, Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.palette import TEXTURE_SETTINGS
 from colonnade.mesh.topology import drop_faces, merge_rows
+from colonnade.scene_image.atlas import Atlas, make_atlas, position_codes
 from colonnade.scene_image.bvh import LEAF, NODE, Bvh, build_bvh
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.header import ImageHeader, ObjectFrame
+from colonnade.scene_image.textures import with_textures
 
 Units = npt.NDArray[np.int32]
 AXES = "xyz"
@@ -84,7 +87,8 @@ def pack(
         headroom: Factor of the scene's lights, by which the corner colours of diffuse faces are darker.
 
     Raises:
-        UserError: The mesh does not fit or has corner colours that the design lacks; the message names the setting.
+        UserError: The mesh does not fit, or has corner colours or textures that the design lacks; the message names the
+            setting.
     """
     geometry, memory = manifest.config["geometry"], manifest.config["columnBvhMemory"]
     quantised = quantise(mesh, int(geometry["vertexBits"]))
@@ -110,7 +114,8 @@ def pack(
     is_glass = np.array([material.kind == "glass" for material in materials])
     is_clear = is_glass[mesh.face_materials[quantised.mesh_faces]]
     sections.append(_triangle_records(quantised, bvh.order, leaf_first, leaf_count, is_clear, manifest))
-    colours = _corner_colours(mesh, manifest, materials, headroom)
+    atlas = _atlas(mesh, manifest, materials, headroom)
+    colours = _corner_colours(mesh, manifest, materials, headroom, atlas)
     sections.append(_attribute_records(mesh, quantised, bvh.order, manifest, faces_per_record, colours))
     corners = quantised.vertices[quantised.faces]
     header = ImageHeader(
@@ -132,7 +137,8 @@ def pack(
         tree=bvh.statistics if manifest.bvh else None,
         parts=mesh.parts,
     )
-    return SceneImage(header, np.concatenate(sections), mesh.source_faces[quantised.mesh_faces[bvh.order]])
+    image = SceneImage(header, np.concatenate(sections), mesh.source_faces[quantised.mesh_faces[bvh.order]])
+    return with_textures(image, atlas, len({material.texture for material in materials} - {None}), manifest)
 
 
 def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
@@ -216,24 +222,46 @@ def _triangle_records(
     return manifest.layouts["triangles"].pack(values)
 
 
+def _atlas(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], headroom: float) -> Atlas | None:
+    """The atlas of a mesh; None without textures."""
+    if manifest.texture is None:
+        if any(material.texture is not None for material in materials):
+            raise UserError(f"mesh {mesh.name} has textures, the hardware has none: set {TEXTURE_SETTINGS}")
+        return None
+    return make_atlas(mesh, materials, headroom, manifest.texture.sizes["width"])
+
+
 def _corner_colours(
-    mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], headroom: float
+    mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], headroom: float, atlas: Atlas | None
 ) -> npt.NDArray[np.int64] | None:
-    """The colours of the records, int64 [faces of the mesh, 3, 3]; None for a design without them."""
+    """The colours of the records, int64 [faces of the mesh, 3, 3]; None for a design without them.
+
+    On textured faces red and green are positions in the atlas.
+    """
     if not manifest.corner_colours:
         if any(material.has_corner_colours for material in materials):
             raise UserError(
                 f"mesh {mesh.name} has colours at its corners, the hardware has none: set geometry.cornerColours=true"
             )
         return None
-    if mesh.corner_colours is None:
-        return np.zeros((len(mesh.faces), 3, 3), dtype=np.int64)
+    values = np.zeros((len(mesh.faces), 3, 3), dtype=np.int64)
+    if mesh.corner_colours is not None:
+        values = _colour_codes(mesh, mesh.corner_colours, manifest, materials, headroom)
+    if atlas is not None and manifest.texture is not None:
+        is_textured = np.array([material.texture is not None for material in materials])[mesh.face_materials]
+        values[is_textured, :, :2] = position_codes(atlas, manifest.texture.sizes["fractionBits"])[is_textured]
+    return values
+
+
+def _colour_codes(
+    mesh: Mesh, colours: Floats, manifest: Manifest, materials: Sequence[MeshMaterial], headroom: float
+) -> npt.NDArray[np.int64]:
     white = (1 << manifest.numbers["colourBits"]) - 1
     factors = [
         np.array(material.albedo) / (headroom if material.kind == "diffuse" else 1.0) * material.has_corner_colours
         for material in materials
     ]
-    return np.rint(mesh.corner_colours * np.array(factors)[mesh.face_materials][:, None] * white).astype(np.int64)
+    return np.rint(colours * np.array(factors)[mesh.face_materials][:, None] * white).astype(np.int64)
 
 
 def _attribute_records(

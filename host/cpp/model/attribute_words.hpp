@@ -42,6 +42,12 @@ struct AttributeSizes {
         isSlic = take("sliding") != 0;
     }
 
+    /// Sizes of the texture memory, by the manifest's `texture.sizes`: an atlas in the encoding `twoLevel`, without planes.
+    static AttributeSizes ofTexture(std::map<std::string, std::int64_t> values) {
+        for (const char* key : {"blockLog", "blockColumns", "blockRows", "planes", "boundingPlanes", "planeHeapWords", "labelWords", "sliding"}) values[key] = 0;
+        return AttributeSizes(values);
+    }
+
     int tiles() const { return tileColumns * tileRows; }
     bool covers(int x, int y) const { return x >= 0 && y >= 0 && x < width && y < height; }
     int tileOf(int x, int y) const { return (y >> tileLog) * tileColumns + (x >> tileLog); }

@@ -106,6 +106,35 @@ private:
     AttributeHeap heap_; // of masks (two-level) or labels (SLIC)
 };
 
+/// The texture memory: one atlas as a two-level map (docs/textures.md).
+class TextureImage {
+public:
+    /// @param sizes the manifest's `texture.sizes`
+    /// @param layouts its `texture.layouts`
+    TextureImage(const std::map<std::string, std::int64_t>& sizes, const std::map<std::string, Layout>& layouts)
+        : layouts_(layouts), fractionBits_(static_cast<int>(lookUp(sizes, "fractionBits"))), atlas_(AttributeSizes::ofTexture(sizes)) {}
+
+    /// Loads a memory as `AttributeImage::load`.
+    void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
+        if (memory == "texture.descriptors") atlas_.loadDescriptors(AttributeWords(layouts_.at("mapDescriptor"), words, count, stride));
+        else if (memory == "texture.palette") atlas_.loadEntries(AttributeWords(layouts_.at("albedo"), words, count, stride), "rgb");
+        else if (memory == "texture.heap") atlas_.heap().load(words, count, stride);
+        else throw std::invalid_argument("there is no texture memory '" + memory + "'");
+    }
+
+    /// The texel at a position, which has fraction bits and lies in the atlas.
+    Rgb12 texelAt(std::int64_t u, std::int64_t v) const {
+        const MapEntry entry = atlas_.paletteEntryAt(static_cast<int>(u >> fractionBits_), static_cast<int>(v >> fractionBits_));
+        const auto [r, g, b] = atlas_.components(entry);
+        return {r, g, b, entry.isIllegal};
+    }
+
+private:
+    std::map<std::string, Layout> layouts_;
+    int fractionBits_;
+    ComponentMap atlas_;
+};
+
 /// The map from pixels to plane ids.
 class PlaneIds {
 public:

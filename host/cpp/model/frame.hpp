@@ -36,6 +36,9 @@ public:
     /// Uses the contents of the physical-attribute memory, which must outlive the device.
     void load(const AttributeImage& image) { march_.emplace(numbers_, image); }
 
+    /// Uses the contents of the texture memory, which must outlive the device.
+    void load(const TextureImage& image) { texture_ = &image; }
+
     /// Starts a frame: loads the registers, and clears counters and errors.
     void start(const Registers& registers) {
         Registers legal = registers;
@@ -87,7 +90,7 @@ public:
             }
             const Surface surface = surfaceOf(ray, hit, *face, numbers_);
             const Material& material = frame_.lighting.materialOf(*face);
-            const Colour albedo = albedoOf(material, hit, *face, numbers_);
+            const Colour albedo = albedoOf(material, hit, *face);
             if (material.kind == MaterialKind::diffuse) return finish(pixel, path, light(surface, albedo));
             if (!continuePath(surface, material, albedo, path, request)) return finish(pixel, path, missRadiance(request));
         }
@@ -98,6 +101,17 @@ private:
         for (int channel = 0; channel < 3; ++channel)
             pixel.colour[channel] = std::min(white(), path.radiance[channel] + ((path.throughput[channel] * colour[channel]) >> numbers_.lightFraction));
         return pixel;
+    }
+
+    /// The albedo of the object at a hit.
+    Colour albedoOf(const Material& material, const Hit& hit, const Face& face) {
+        if (material.hasTexture && texture_) {
+            const Colour position = cornerColour(hit, face, numbers_);
+            const Rgb12 texel = texture_->texelAt(position[0], position[1]);
+            errors.illegalRecord = errors.illegalRecord || texel.isIllegal;
+            return {texel.r, texel.g, texel.b};
+        }
+        return material.hasCornerColours ? cornerColour(hit, face, numbers_) : material.albedo;
     }
 
     std::int64_t white() const { return (std::int64_t(1) << numbers_.colourBits) - 1; }
@@ -242,6 +256,7 @@ private:
 
     Registers limits_;
     std::optional<EnvironmentMarch> march_;
+    const TextureImage* texture_ = nullptr;
 };
 
 } // namespace colonnade

@@ -14,6 +14,8 @@ struct Material {
     Colour albedo;
     /// The albedo is that of the corners of the face.
     bool hasCornerColours;
+    /// The albedo is that of the texture, at the position that the corners give.
+    bool hasTexture;
     MaterialKind kind;
     std::array<std::int64_t, 2> eta;
     std::int64_t reflectance;
@@ -120,11 +122,6 @@ inline Colour cornerColour(const Hit& hit, const Face& face, const Numbers& n) {
         colour[channel] = total == 0 ? (std::int64_t(1) << n.colourBits) - 1 : sum / total;
     }
     return colour;
-}
-
-/// The albedo of the object at a hit.
-inline Colour albedoOf(const Material& material, const Hit& hit, const Face& face, const Numbers& n) {
-    return material.hasCornerColours ? cornerColour(hit, face, n) : material.albedo;
 }
 
 /// Moves a position off the surface, along the normal for a positive offset.

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hostile import RENDER, TRIANGLE, Case, Content, fifo, link_to
 
+from colonnade.common.errors import UserError
 from colonnade.mesh.load import load_mesh
 
 OBJ, PLY, STL, OFF = (f"{RENDER} --mesh x.{suffix}" for suffix in ("obj", "ply", "stl", "off"))
@@ -185,15 +186,22 @@ def test_mesh_is_refused(case: Case, folder: Any, monkeypatch: pytest.MonkeyPatc
     hostile.run(case, folder, monkeypatch)
 
 
-def test_textures_are_not_opened(folder: Any) -> None:
+def test_textures_are_read_as_pictures_only(folder: Any) -> None:
     """A texture may be a pipe, or a picture for which Pillow starts another program."""
     hostile.make(folder / "x.obj", f"mtllib x.mtl\nusemtl a\n{TRIANGLE}")
+    hostile.make(folder / "y.obj", f"mtllib y.mtl\nusemtl a\n{TRIANGLE}")
+    hostile.make(folder / "y.mtl", "newmtl a\nKd 0.25 0.5 0.75\nmap_Kd x.eps\n")
+    hostile.make(folder / "x.eps", "%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n")
     hostile.make(folder / "x.mtl", "newmtl a\nKd 0.25 0.5 0.75\nmap_Kd pipe.png\n")
     hostile.make(folder / "pipe.png", fifo)
     hostile.make(folder / "x.gltf", json.dumps(gltf(images=[{"uri": "pipe.png"}], textures=[{"source": 0}])))
     with hostile.no_longer_than(hostile.MAX_SECONDS):
-        assert load_mesh(folder / "x.obj").materials[0].albedo == (0.25, 0.5, 0.75)
+        with pytest.raises(UserError, match="it is a pipe"):
+            load_mesh(folder / "x.obj")
         assert len(load_mesh(folder / "x.gltf").faces) == 1
+        mesh = load_mesh(folder / "y.obj")
+    assert mesh.materials[0].albedo == (0.25, 0.5, 0.75) and mesh.textures == ()
+    assert any("1 picture of a texture is not readable" in note for note in mesh.notes)
 
 
 def test_relative_indices_of_obj_are_read(folder: Any) -> None:

@@ -16,7 +16,7 @@ from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
-from colonnade.evaluation.fuzz.cases import coloured
+from colonnade.evaluation.fuzz.cases import coloured, textured
 from colonnade.evaluation.throughput import figures, records_taken
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import MeshMaterial
@@ -70,14 +70,20 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     assert simulated.frames[0].is_object.any()
 
 
-def test_corner_colours_equal_the_model() -> None:
-    """Diffuse, mirroring and clear faces with colours at their corners, and faces without."""
-    design = design_for("tiny", ("geometry.cornerColours=true", "frame.maxBounces=4", "frame.materials=4"))
+@pytest.mark.parametrize("precision", ["16b16s32d", "32b32s64d"])
+def test_corner_colours_and_textures_equal_the_model(precision: str) -> None:
+    """Diffuse, mirroring and clear faces with textures or colours at their corners, and faces with neither."""
+    options = ("geometry.cornerColours=true", "geometry.textureBytes=16384", "frame.maxBounces=4", "array.rows=2")
+    design = design_for("tiny", (f"precision={precision}", *options))
     mesh = load_mesh("teapot:4")
-    kinds = (("diffuse", True), ("mirror", True), ("glass", True), ("diffuse", False))
-    materials = tuple(MeshMaterial(kind, (0.9, 0.8, 0.7), has_corner_colours=has) for kind, has in kinds)
-    index = np.arange(len(mesh.faces), dtype=np.uint8) // 8 % 4
-    mixed = replace(coloured(mesh), materials=materials, face_materials=index)
+    kinds = [(kind, shown) for shown in ("texture", "colours") for kind in ("diffuse", "mirror", "glass")]
+    materials = tuple(
+        MeshMaterial(kind, (0.9, 0.8, 0.7), has_corner_colours=True, texture=0 if shown == "texture" else None)
+        for kind, shown in kinds
+    )
+    materials += (MeshMaterial(albedo=(0.9, 0.8, 0.7)),)
+    index = np.arange(len(mesh.faces), dtype=np.uint8) // 8 % 7
+    mixed = replace(textured(coloured(mesh)), materials=materials, face_materials=index)
     image = pack(mixed, design.manifest)
     scene = replace(TEAPOT, background=SKY, paths=Paths(bounces=2))
     registers = [
@@ -87,8 +93,9 @@ def test_corner_colours_equal_the_model() -> None:
     simulated = render_rtl(design, image, registers, Stalls(10, 3))
     for frame, settings in zip(simulated.frames, registers, strict=True):
         assert_equal(frame, render_model(design.manifest, image, settings))
-        plain = settings | {f"materials[{i}].hasCornerColours": 0 for i in range(4)}
-        assert (frame.colour != render_model(design.manifest, image, plain).colour).any(axis=2).mean() > 0.1
+        for register in ("hasTexture", "hasCornerColours"):
+            plain = settings | {f"materials[{i}].{register}": 0 for i in range(7)}
+            assert (frame.colour != render_model(design.manifest, image, plain).colour).any(axis=2).mean() > 0.1
 
 
 @pytest.mark.parametrize("mesh", ["teapot:4", "torus"])

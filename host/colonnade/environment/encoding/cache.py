@@ -34,7 +34,7 @@ def encoded_environment(
 
 def _key(environment: Environment, layout: AttributeLayout) -> str:
     """Hash of the encoders' inputs and of their source files."""
-    digest = hashlib.sha256(_sources())
+    digest = hashlib.sha256(encoder_sources())
     camera = environment.camera
     digest.update(repr((astuple(layout), camera.fx, camera.fy, camera.cx, camera.cy)).encode())
     for array in (environment.albedo, environment.normals, environment.depth, camera.to_world):
@@ -44,7 +44,8 @@ def _key(environment: Environment, layout: AttributeLayout) -> str:
 
 
 @functools.cache
-def _sources() -> bytes:
+def encoder_sources() -> bytes:
+    """Digest of the encoders' source files."""
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(file.read_bytes())

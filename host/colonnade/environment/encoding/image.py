@@ -118,5 +118,10 @@ def memory_words(image: AttributeImage) -> Iterator[tuple[str, NDArray[np.uint8]
     """Yield the name and the words of each memory, uint8 [words, bytes], low byte first."""
     for map_name, words in image.memories().items():
         for name, values in words.items():
-            rows = np.ascontiguousarray(values).reshape(len(values), -1)
-            yield f"{map_name}.{name}", rows.view(np.uint8).reshape(len(rows), -1)
+            yield f"{map_name}.{name}", words_of(values)
+
+
+def words_of(values: NDArray[Any]) -> NDArray[np.uint8]:
+    """The words of one memory, whose address is the first axis, as uint8 [words, bytes], low byte first."""
+    rows = np.ascontiguousarray(values).reshape(len(values), -1)
+    return rows.view(np.uint8).reshape(len(rows), -1)

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.texture import Texture
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
 from colonnade.scene.object_mesh import object_mesh
@@ -20,8 +23,8 @@ SIZE = (16, 12)
 #: Far more cycles than a legal frame of this size takes.
 WATCHDOG_CYCLES = 400_000
 
-#: Name of the scene whose corners have colours.
-COLOURED = "corner colours"
+#: Names of the scenes whose corners have colours, or positions in a texture.
+COLOURED, TEXTURED = "corner colours", "texture"
 
 SKY = Background(colour=(0.2, 0.3, 0.5))
 
@@ -56,6 +59,8 @@ def _scenes(manifest: Manifest) -> Iterator[tuple[str, Scene]]:
         yield "two lights", replace(sphere, light=Light(falloff=3.0), more_lights=(Light(offset=(-1.0, 0.5, 2.0)),))
     if manifest.corner_colours:
         yield COLOURED, sphere
+    if manifest.texture is not None:
+        yield TEXTURED, sphere
     if int(frame["maxBounces"]) > 0:
         mirror, glass = Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Material(kind="glass", ior=1.45)
         yield "mirror", replace(cube, material=mirror, paths=Paths(bounces=3))
@@ -66,6 +71,8 @@ def _case(name: str, scene: Scene, manifest: Manifest) -> Case:
     mesh = object_mesh(scene)
     if name == COLOURED:
         mesh = coloured(mesh)
+    if name == TEXTURED:
+        mesh = textured(mesh)
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     registers = frame_registers(scene, image.header, manifest, *SIZE)
     return Case(name, image, registers | {"frame.watchdogCycles": WATCHDOG_CYCLES})
@@ -76,3 +83,13 @@ def coloured(mesh: Mesh) -> Mesh:
     colours = (mesh.vertices - mesh.extent.low) / mesh.extent.edge
     materials = tuple(replace(material, has_corner_colours=True) for material in mesh.materials)
     return replace(mesh, materials=materials, corner_colours=colours[mesh.faces])
+
+
+def textured(mesh: Mesh) -> Mesh:
+    """The mesh with a texture of random squares, placed by two of the axes."""
+    random = np.random.default_rng(1)
+    squares = random.integers(0, 256, (24, 24, 3), dtype=np.uint8)
+    texture = Texture("squares", squares.repeat(8, axis=0).repeat(8, axis=1))
+    positions = ((mesh.vertices - mesh.extent.low) / mesh.extent.edge)[:, :2]
+    materials = tuple(replace(material, texture=0) for material in mesh.materials)
+    return replace(mesh, materials=materials, textures=(texture,), corner_positions=positions[mesh.faces])

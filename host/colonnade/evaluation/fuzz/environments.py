@@ -59,7 +59,7 @@ def environment_cases(manifest: Manifest) -> tuple[Case, ...]:
 
 
 def corrupt_maps(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
-    """Corrupt words, pointers or heaps of a room's maps, the room's registers, or both."""
+    """Corrupt words, pointers or heaps of a room's maps or of textures, the room's registers, or both."""
     changes = []
     if random.random() < 0.75:
         for _ in range(int(random.integers(1, 4))):
@@ -114,9 +114,10 @@ _MUTATIONS = (_pointers, _pointers, _words, _fields)
 
 
 def _registers(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
-    """Set one to three registers of the room to any value that fits."""
-    all_of_room = [r for r in manifest.registers.values() if r.access == "rw" and r.name.startswith("environment.")]
-    scalars = [r for r in all_of_room if "[" not in r.name]
+    """Set one to three registers of the room, or without one of the materials, to any value that fits."""
+    part = "environment." if case.image.header.room is not None else "materials["
+    all_of_room = [r for r in manifest.registers.values() if r.access == "rw" and r.name.startswith(part)]
+    scalars = [r for r in all_of_room if "[" not in r.name] or all_of_room
     values, changes = dict(case.registers), []
     for _ in range(int(random.integers(1, 4))):
         candidates = scalars if random.random() < 0.7 else all_of_room
@@ -150,9 +151,10 @@ def _with(case: Case, index: int, words: Bytes) -> Case:
 
 def _layout(manifest: Manifest, memory: str) -> Mapping[str, Field]:
     """The fields of a memory's words; empty for a heap."""
-    assert manifest.attributes is not None
+    formats = manifest.texture if memory.startswith("texture.") else manifest.attributes
+    assert formats is not None
     part, _, name = memory.partition(".")
-    entries = {"albedo": "albedo", "normals": "normal"}.get(part, "plane")
+    entries = {"albedo": "albedo", "normals": "normal", "texture": "albedo"}.get(part, "plane")
     kinds = {"descriptors": "planeDescriptor" if part == "planes" else "mapDescriptor", "planes": "plane"}
     kinds |= {"bounding": "boundingPlaneEntry", "palette": entries, "seeds": entries}
-    return manifest.attributes.layouts[kinds[name]].fields if name in kinds else {}
+    return formats.layouts[kinds[name]].fields if name in kinds else {}

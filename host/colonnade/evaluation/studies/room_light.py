@@ -59,6 +59,7 @@ class LightQuality:
         relit_encoded: The same from the encoded maps.
         mirror_full: Single-bounce pixels of the float reference with full maps.
         mirror_encoded: The same with encoded albedo and normals, and the depth map as geometry.
+        mirror_marched: The same with the device's planes as geometry, marched in float64.
         mirror_device: The same of the device's frame.
         right: Share of these pixels whose ray hits the right point in the device's march, within 5 pixels or 5 cm.
         mirror_right: As `mirror_device`, of those pixels alone.
@@ -71,6 +72,7 @@ class LightQuality:
     relit_encoded: float
     mirror_full: float
     mirror_encoded: float
+    mirror_marched: float
     mirror_device: float
     right: float
     mirror_right: float
@@ -111,7 +113,7 @@ def table(reports: dict[str, LightQuality]) -> str:
     header = (
         "room: lights, colours",
         "relit: full, encoded, dB",
-        "mirror: full maps, encoded maps, device, dB",
+        "mirror: full maps, encoded maps, float64 march, device, dB",
         "pixels: all, right",
         "device, right pixels, dB",
         "clamped",
@@ -121,7 +123,8 @@ def table(reports: dict[str, LightQuality]) -> str:
         (
             name,
             f"{report.relit:.1f}, {report.relit_encoded:.1f}",
-            f"{report.mirror_full:.1f}, {report.mirror_encoded:.1f}, {report.mirror_device:.1f}",
+            f"{report.mirror_full:.1f}, {report.mirror_encoded:.1f}, {report.mirror_marched:.1f}, "
+            f"{report.mirror_device:.1f}",
             f"{report.pixels:,}, {report.right:.1%}",
             f"{report.mirror_right:.1f}",
             "-" if report.clamped is None else f"{report.clamped:.1%}",
@@ -162,12 +165,14 @@ def _measure(mesh: Mesh, room: LitRoom, progress: Progress) -> tuple[LightQualit
     manifest = manifest_for("small", (f"physicalAttributeMemory={json.dumps(layout.to_config())}",), progress).manifest
     view = make_view(room.scene, mesh.extent, environment.width, environment.height, mesh.materials, environment)
     sources = backdrops(environment, image, float_plane_march(environment, image))
-    full, encoded = (render_reference(mesh, view, progress, sources[name]).image for name in ("full", "clustering"))
+    references = [
+        render_reference(mesh, view, progress, sources[name]).image for name in ("full", "clustering", "both")
+    ]
     device = device_frame(mesh, view, EncodedEnvironment(environment, image), manifest)
     bounced = single_bounce(mesh, view, environment)
     mask, expected = bounced.mask, encode_srgb(bounced.colours)[None]
-    mirrors = (psnr(expected, encode_srgb(frame[mask])[None]) for frame in (full, encoded, device))
-    mirror_full, mirror_encoded, mirror_device = mirrors
+    mirrors = (psnr(expected, encode_srgb(frame[mask])[None]) for frame in (*references, device))
+    mirror_full, mirror_encoded, mirror_marched, mirror_device = mirrors
     right = bounced.is_right(environment, DeviceMarch(environment, image, manifest))
     relit, relit_encoded = _relit(room, mesh, image)
     clamped = None if room.colours is None else room.colours.clamped
@@ -176,6 +181,7 @@ def _measure(mesh: Mesh, room: LitRoom, progress: Progress) -> tuple[LightQualit
         relit_encoded,
         mirror_full,
         mirror_encoded,
+        mirror_marched,
         mirror_device,
         float(right.mean()),
         psnr(expected[:, right], encode_srgb(device[mask][right])[None]),

@@ -178,7 +178,13 @@ def record(
     size = require_recordable(stimulus, design.manifest)
     with progress.step("packing the scene"):
         scene, manifest = stimulus.scene, design.manifest
-        mesh = with_materials(scene, stimulus.mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours)
+        mesh = with_materials(
+            scene,
+            stimulus.mesh,
+            int(manifest.config["frame"]["materials"]),
+            manifest.corner_colours,
+            manifest.texture is not None,
+        )
         image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
         registers = frame_registers(scene, image.header, manifest, *size)
     joined = {

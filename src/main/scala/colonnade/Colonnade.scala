@@ -8,7 +8,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, EnvironmentWindow, FrameController}
-import colonnade.memory.{AxiReadPort, SceneMemory, SharedCache}
+import colonnade.memory.{DramPort, SceneMemory, SharedCache}
 import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** Ports of [[Colonnade]]. */
@@ -27,7 +27,7 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
     else None
 
   /** With a cache: reads of the scene in DRAM. */
-  val memory = config.columnBvhMemory.cache.map(_ => new AxiReadPort(config))
+  val memory = config.columnBvhMemory.cache.map(_ => DramPort(config))
 
   /** The frame is complete; cleared by the next start. */
   val done = Output(Bool())

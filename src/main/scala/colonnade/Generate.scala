@@ -1,7 +1,8 @@
 package colonnade
 
 import chisel3.RawModule
-import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO}
+import colonnade.bus.ShellMap
+import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO, ShellConfig}
 import colonnade.formats.{FormatsPage, Manifest}
 
 import java.io.IOException
@@ -18,6 +19,7 @@ object Generate {
       |  --set KEY=VALUE       overrides one field, as in array.rows=4; may be repeated
       |  --output DIR          takes the place of an earlier output that nobody changed; never half-written
       |  --manifest-only       writes no Verilog
+      |  --axi BYTES           puts the device into its AXI4 shell, with a bus of 4 to 128 BYTES; shell.json has its registers
       |  --black-box-memories  leaves memories to be filled in; memories.json lists their shapes
       |  --formats-page FILE   writes the formats as a Markdown page
       |  --help                prints this
@@ -28,6 +30,7 @@ object Generate {
       overrides:        Vector[String] = Vector.empty,
       output:           Option[String] = None,
       formatsPage:      Option[String] = None,
+      axi:              Option[ShellConfig] = None,
       manifestOnly:     Boolean = false,
       blackBoxMemories: Boolean = false,
       help:             Boolean = false
@@ -49,7 +52,8 @@ object Generate {
       case error: IOException => refuse(s"cannot write ${reason(error)}")
     }
 
-  private def top(config: ColonnadeConfig): RawModule = new Colonnade(config)
+  private def top(config: ColonnadeConfig, axi: Option[ShellConfig]): RawModule =
+    axi.fold[RawModule](new Colonnade(config))(new ColonnadeAxi(config, _))
 
   private def generate(options: Options): Unit = {
     val name   = options.config.getOrElse(throw new ConfigError("--config is missing; see --help"))
@@ -60,28 +64,33 @@ object Generate {
     options.formatsPage.foreach(file => OutputFiles.writeFile(path(file), FormatsPage(config)))
     options.output.foreach { directory =>
       OutputFiles.replaceDirectory(path(directory)) { fresh =>
-        if (!options.manifestOnly) Emit(top(config), fresh, options.blackBoxMemories)
+        if (!options.manifestOnly) Emit(top(config, options.axi), fresh, options.blackBoxMemories)
         OutputFiles.writeFile(fresh.resolve("manifest.json"), formats.Json.pretty(Manifest(config)))
+        for (shell <- options.axi)
+          OutputFiles.writeFile(fresh.resolve("shell.json"), ShellMap.json(config, shell.busBytes))
       }
     }
   }
 
   private def parse(arguments: List[String], options: Options): Options = arguments match {
-    case Nil                                   => options
-    case "--help" :: rest                      => parse(rest, options.copy(help = true))
-    case "--manifest-only" :: rest             => parse(rest, options.copy(manifestOnly = true))
-    case "--black-box-memories" :: rest        => parse(rest, options.copy(blackBoxMemories = true))
-    case Valued(name, "", _)                   => throw new ConfigError(s"$name needs a value; see --help")
-    case Valued("--config", value, rest)       => parse(rest, options.copy(config = Some(value)))
-    case Valued("--set", value, rest)          => parse(rest, options.copy(overrides = options.overrides :+ value))
-    case Valued("--output", value, rest)       => parse(rest, options.copy(output = Some(value)))
+    case Nil                             => options
+    case "--help" :: rest                => parse(rest, options.copy(help = true))
+    case "--manifest-only" :: rest       => parse(rest, options.copy(manifestOnly = true))
+    case "--black-box-memories" :: rest  => parse(rest, options.copy(blackBoxMemories = true))
+    case Valued(name, "", _)             => throw new ConfigError(s"$name needs a value; see --help")
+    case Valued("--config", value, rest) => parse(rest, options.copy(config = Some(value)))
+    case Valued("--set", value, rest)    => parse(rest, options.copy(overrides = options.overrides :+ value))
+    case Valued("--output", value, rest) => parse(rest, options.copy(output = Some(value)))
+    case Valued("--axi", value, rest)    =>
+      val bytes = value.toIntOption.getOrElse(throw new ConfigError(s"--axi is '$value'; it must be a number of bytes"))
+      parse(rest, options.copy(axi = Some(ShellConfig(bytes))))
     case Valued("--formats-page", value, rest) => parse(rest, options.copy(formatsPage = Some(value)))
     case unknown :: _                          => throw new ConfigError(s"unknown option $unknown; see --help")
   }
 
   /** An option with a value, as `--name value` or `--name=value`; an empty value when there is none. */
   private object Valued {
-    private val names = Set("--config", "--set", "--output", "--formats-page")
+    private val names = Set("--config", "--set", "--output", "--axi", "--formats-page")
 
     def unapply(arguments: List[String]): Option[(String, String, List[String])] = arguments match {
       case name :: rest if names(name) =>

@@ -26,7 +26,8 @@ object ArbitraryConfig {
     trianglesPerRecord <- Gen.oneOf(1, 2)
     bvh                <- flag
     cornerColours      <- flag
-  } yield GeometryConfig(vertexBits, boxBits, triangleBits, arity, trianglesPerRecord, bvh, cornerColours)
+    textureBytes       <- Gen.oneOf(Seq(0) ++ (if (cornerColours) Seq(5314, 16384, 21632) else Nil))
+  } yield GeometryConfig(vertexBits, boxBits, triangleBits, arity, trianglesPerRecord, bvh, cornerColours, textureBytes)
 
   private def units(arity: Int) = for {
     boxLanes      <- Gen.oneOf(Seq(1, 2, 4).filter(_ <= arity))

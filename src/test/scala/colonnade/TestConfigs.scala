@@ -16,7 +16,8 @@ object TestConfigs {
       arity = 4,
       trianglesPerRecord = 2,
       bvh = true,
-      cornerColours = false
+      cornerColours = false,
+      textureBytes = 0
     ),
     UnitsConfig(boxLanes = 2, triangleLanes = 1),
     ColumnBvhMemoryConfig(
@@ -109,9 +110,12 @@ object TestConfigs {
     tiny.copy(geometry = tiny.geometry.copy(vertexBits = 20))
   )
 
-  /** With corner colours, from the presets' precision to the narrowest. */
+  /** With corner colours, from the presets' precision to the narrowest; the last one also has textures. */
   val withColours: Seq[ColonnadeConfig] =
-    Seq(tiny, withPrecision(24, 24, 64), withPrecision(16, 16, 32)).map(config =>
-      config.copy(geometry = config.geometry.copy(cornerColours = true))
-    )
+    Seq((tiny, 0), (withPrecision(24, 24, 64), 0), (withPrecision(16, 16, 32), 16384)).map {
+      case (config, textureBytes) =>
+        config.copy(geometry = config.geometry.copy(cornerColours = true, textureBytes = textureBytes))
+    }
+
+  val withTextures: ColonnadeConfig = withColours.last
 }

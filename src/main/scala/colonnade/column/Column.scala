@@ -5,7 +5,7 @@ import chisel3.experimental.hierarchy.{instantiable, public, Definition, Instanc
 import chisel3.experimental.noPrefix
 import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.{AttributePort, ColumnEnvironment}
+import colonnade.environment.{AttributePort, ColumnEnvironment, TextureMemory}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{
   BackgroundWalker,
@@ -121,6 +121,13 @@ final class Column(
     maps.load := io.load
     maps.shared.zip(io.environment).foreach { case (shared, port) => port <> shared }
     maps.ports.zip(units.flatMap(_.maps)).foreach { case (port, unit) => port <> unit }
+  }
+
+  // Textures: units read the column's own copy
+  for (layout <- config.geometry.texture) {
+    val memory = Module(new TextureMemory(config)).io
+    memory.load := io.load
+    memory.ports.zip(units.flatMap(_.texture)).foreach { case (port, unit) => port <> unit }
   }
 
   // Collect finished pixels

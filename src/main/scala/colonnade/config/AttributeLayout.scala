@@ -4,9 +4,12 @@ package colonnade.config
   *
   * A map has a descriptor per tile. The bytes that the fixed parts leave are its heap, to which descriptors point.
   */
-final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) {
+final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends TileGrid {
   import AttributeLayout._
   import config._
+
+  val mapWidth:  Int = width
+  val mapHeight: Int = height
 
   /** Log2 of a tile's edge. */
   val tileLog:     Int = log2(tileSize)

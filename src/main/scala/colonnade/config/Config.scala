@@ -44,6 +44,8 @@ final case class PrecisionConfig(mac: Int, sqrt: Int, div: Int) {
   * @param trianglesPerRecord triangles of one leaf record
   * @param bvh                false: every ray tests every triangle (the exhaustive baseline)
   * @param cornerColours      a face holds a colour for each corner, and a material may take its albedo from them
+  * @param textureBytes       of the texture memory; with one, a material may take the colours of the corners as positions
+  *                           in it; 0: no textures
   */
 final case class GeometryConfig(
     vertexBits:         Int,
@@ -52,13 +54,18 @@ final case class GeometryConfig(
     arity:              Int,
     trianglesPerRecord: Int,
     bvh:                Boolean,
-    cornerColours:      Boolean
+    cornerColours:      Boolean,
+    textureBytes:       Int
 ) {
   Require.within("geometry.vertexBits", vertexBits, 10, 24)
   Require.within("geometry.boxBits", boxBits, 4, 12)
   triangleBits.foreach(Require.within("geometry.triangleBits", _, 16, 64))
   Require.oneOf("geometry.arity", arity, Seq(2, 4))
   Require.oneOf("geometry.trianglesPerRecord", trianglesPerRecord, Seq(1, 2))
+  Require("geometry.textureBytes", textureBytes == 0 || cornerColours, "needs geometry.cornerColours=true")
+
+  /** The texture memory, if there is one. */
+  val texture: Option[TextureLayout] = Option.when(textureBytes != 0)(TextureLayout(textureBytes))
 }
 
 /** Parallel lanes in a render unit.

@@ -46,7 +46,8 @@ object ConfigIO {
       "arity",
       "trianglesPerRecord",
       "bvh",
-      "cornerColours"
+      "cornerColours",
+      "textureBytes"
     )
     val units  = root.section("units", "boxLanes", "triangleLanes")
     val memory = root.section(
@@ -76,7 +77,8 @@ object ConfigIO {
         arity = shape.int("arity"),
         trianglesPerRecord = shape.int("trianglesPerRecord"),
         bvh = shape.boolean("bvh"),
-        cornerColours = shape.boolean("cornerColours")
+        cornerColours = shape.boolean("cornerColours"),
+        textureBytes = shape.int("textureBytes")
       ),
       units = UnitsConfig(boxLanes = units.int("boxLanes"), triangleLanes = units.int("triangleLanes")),
       columnBvhMemory = ColumnBvhMemoryConfig(
@@ -145,7 +147,8 @@ object ConfigIO {
         "arity"              -> geometry.arity,
         "trianglesPerRecord" -> geometry.trianglesPerRecord,
         "bvh"                -> geometry.bvh,
-        "cornerColours"      -> geometry.cornerColours
+        "cornerColours"      -> geometry.cornerColours,
+        "textureBytes"       -> geometry.textureBytes
       ),
       "units"           -> ujson.Obj("boxLanes" -> units.boxLanes, "triangleLanes" -> units.triangleLanes),
       "columnBvhMemory" -> ujson.Obj(

@@ -6,8 +6,10 @@ private[config] object Require {
   def apply(field: String, holds: Boolean, rule: String): Unit =
     if (!holds) throw new ConfigError(s"$field $rule")
 
-  def within(field: String, value: Int, low: Int, high: Int): Unit =
-    if (value < low || value > high) throw new ConfigError(s"$field is $value; it must be from $low to $high")
+  /** @param orElse a legal value outside the range, for the message */
+  def within(field: String, value: Int, low: Int, high: Int, orElse: String = ""): Unit =
+    if (value < low || value > high)
+      throw new ConfigError(s"$field is $value; it must be ${orElse}from $low to $high")
 
   def product(first: String, one: Int, second: String, other: Int, max: Int): Unit =
     if (one.toLong * other > max)

@@ -2,18 +2,20 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.Valid
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{AttributeLayout, ColonnadeConfig, TileGrid}
 import colonnade.formats.Load
 
 /** Ports of [[AttributeMap]]. */
-final class AttributeMapIO[T <: Data](config: ColonnadeConfig, entry: T, tagBits: Int) extends Bundle {
+final class AttributeMapIO[T <: Data](config: ColonnadeConfig, layout: TileGrid, entry: T, tagBits: Int)
+    extends Bundle {
   val load   = Flipped(Valid(new Load(config)))
-  val pixels = Flipped(new AttributeChannel(new MapPixel(AttributeLayout.of(config)), entry, tagBits))
+  val pixels = Flipped(new AttributeChannel(new MapPixel(layout), entry, tagBits))
 }
 
 /** A map with an entry (a colour or a normal) for each pixel, in one of the encodings. */
-abstract class AttributeMap[T <: Data](config: ColonnadeConfig, entry: T, tagBits: Int) extends Module {
-  final val io = IO(new AttributeMapIO(config, entry, tagBits))
+abstract class AttributeMap[T <: Data](config: ColonnadeConfig, layout: TileGrid, entry: T, tagBits: Int)
+    extends Module {
+  final val io = IO(new AttributeMapIO(config, layout, entry, tagBits))
 }
 
 object AttributeMap {
@@ -24,5 +26,5 @@ object AttributeMap {
     */
   def apply[T <: Data](config: ColonnadeConfig, name: String, entry: T, tagBits: Int): AttributeMap[T] =
     if (AttributeLayout.of(config).isSliding) new SlidingMap(config, name, entry, tagBits)
-    else new TwoLevelMap(config, name, entry, tagBits)
+    else new TwoLevelMap(config, AttributeLayout.of(config), name, entry, tagBits)
 }

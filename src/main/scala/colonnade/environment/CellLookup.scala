@@ -29,7 +29,7 @@ final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   }
 
   private val layout = AttributeLayout.of(config)
-  private val tiles  = Module(new TileLookup(config, "planes.descriptors", new PlaneDescriptor, new Sideband))
+  private val tiles  = Module(new TileLookup(config, layout, "planes.descriptors", new PlaneDescriptor, new Sideband))
   private val heap   = new AttributeHeap(config, "planes.heap", io.load)
   private val req    = io.cells.req
 

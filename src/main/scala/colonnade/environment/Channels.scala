@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{AttributeLayout, ColonnadeConfig, TileGrid}
 import colonnade.formats.{AlbedoEntry, AttributeEvents, BoundingPlaneEntry, NormalEntry}
 
 /** A request with a tag, which its response carries as well. */
@@ -30,7 +30,7 @@ final class AttributeChannel[Q <: Data, R <: Data](private val request: Q, priva
 }
 
 /** A pixel of the maps. A requester must keep it inside them. */
-final class MapPixel(layout: AttributeLayout) extends Bundle {
+final class MapPixel(layout: TileGrid) extends Bundle {
   val x = UInt(layout.xBits.W)
   val y = UInt(layout.yBits.W)
 }

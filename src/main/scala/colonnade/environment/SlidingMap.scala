@@ -11,7 +11,7 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
   * Latency five cycles, one pixel a cycle.
   */
 final class SlidingMap[T <: Data](config: ColonnadeConfig, name: String, entry: T, tagBits: Int)
-    extends AttributeMap(config, entry, tagBits) {
+    extends AttributeMap(config, AttributeLayout.of(config), entry, tagBits) {
   private val layout = AttributeLayout.of(config)
   private val labels = AttributeStore(config, s"$name.labels", io.load)
   private val seeds  = AttributeStore(config, s"$name.seeds", io.load)

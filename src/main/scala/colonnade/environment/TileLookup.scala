@@ -2,17 +2,17 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled, Pipe, Queue, RegEnable, Valid}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{ColonnadeConfig, TileGrid}
 import colonnade.formats.Load
 
 /** A pixel with sideband data. */
-final class TaggedPixel[T <: Data](layout: AttributeLayout, private val extra: T) extends Bundle {
+final class TaggedPixel[T <: Data](layout: TileGrid, private val extra: T) extends Bundle {
   val pixel    = new MapPixel(layout)
   val sideband = extra.cloneType
 }
 
 /** A tile's descriptor and the pixel's position in the tile. */
-final class PixelInTile[D <: Data, T <: Data](layout: AttributeLayout, private val kind: D, private val extra: T)
+final class PixelInTile[D <: Data, T <: Data](layout: TileGrid, private val kind: D, private val extra: T)
     extends Bundle {
   val descriptor = kind.cloneType
   val x          = UInt(layout.tileLog.W)
@@ -24,9 +24,8 @@ final class PixelInTile[D <: Data, T <: Data](layout: AttributeLayout, private v
 }
 
 /** Ports of [[TileLookup]]; D is the descriptor, T the sideband data. */
-final class TileLookupIO[D <: Data, T <: Data](config: ColonnadeConfig, descriptor: D, sideband: T) extends Bundle {
-  private val layout = AttributeLayout.of(config)
-
+final class TileLookupIO[D <: Data, T <: Data](config: ColonnadeConfig, layout: TileGrid, descriptor: D, sideband: T)
+    extends Bundle {
   val load  = Flipped(Valid(new Load(config)))
   val pixel = Flipped(Decoupled(new TaggedPixel(layout, sideband)))
   val tile  = Decoupled(new PixelInTile(layout, descriptor, sideband))
@@ -37,11 +36,15 @@ final class TileLookupIO[D <: Data, T <: Data](config: ColonnadeConfig, descript
   *
   * @param memory name of the descriptors' memory
   */
-final class TileLookup[D <: Data, T <: Data](config: ColonnadeConfig, memory: String, descriptor: D, sideband: T)
-    extends Module {
-  val io = IO(new TileLookupIO(config, descriptor, sideband))
+final class TileLookup[D <: Data, T <: Data](
+    config:     ColonnadeConfig,
+    layout:     TileGrid,
+    memory:     String,
+    descriptor: D,
+    sideband:   T
+) extends Module {
+  val io = IO(new TileLookupIO(config, layout, descriptor, sideband))
 
-  private val layout      = AttributeLayout.of(config)
   private val descriptors = AttributeStore(config, memory, io.load)
   private val pixel       = io.pixel.bits.pixel
   private val found       = Wire(Decoupled(chiselTypeOf(io.tile.bits)))
@@ -52,7 +55,7 @@ final class TileLookup[D <: Data, T <: Data](config: ColonnadeConfig, memory: St
   inFlight       := inFlight + io.pixel.fire - io.tile.fire
   io.pixel.ready := inFlight =/= queueDepth.U
   assert(
-    !io.pixel.fire || (pixel.x < layout.config.width.U && pixel.y < layout.config.height.U),
+    !io.pixel.fire || (pixel.x < layout.mapWidth.U && pixel.y < layout.mapHeight.U),
     "a pixel outside the map"
   )
 

@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{Cat, MuxLookup, Pipe, RegEnable}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{ColonnadeConfig, TileGrid}
 import colonnade.formats.MapDescriptor
 
 /** A map of tiles with two or four palette entries each. A mask selects the entry of each cell; a cell's size depends on
@@ -12,10 +12,9 @@ import colonnade.formats.MapDescriptor
   * word with two of them, which is read before the mask: its pixels take two cycles and a latency of seven. A word beyond
   * the heap is 0 and makes the response illegal; the mask's word is the last one of a tile.
   */
-final class TwoLevelMap[T <: Data](config: ColonnadeConfig, name: String, entry: T, tagBits: Int)
-    extends AttributeMap(config, entry, tagBits) {
-  private val layout  = AttributeLayout.of(config)
-  private val tiles   = Module(new TileLookup(config, s"$name.descriptors", new MapDescriptor, UInt(tagBits.W)))
+final class TwoLevelMap[T <: Data](config: ColonnadeConfig, layout: TileGrid, name: String, entry: T, tagBits: Int)
+    extends AttributeMap(config, layout, entry, tagBits) {
+  private val tiles   = Module(new TileLookup(config, layout, s"$name.descriptors", new MapDescriptor, UInt(tagBits.W)))
   private val heap    = new AttributeHeap(config, s"$name.heap", io.load)
   private val palette = AttributeStore(config, s"$name.palette", io.load)
 

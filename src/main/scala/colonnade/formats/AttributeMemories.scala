@@ -12,23 +12,34 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
   */
 final case class AttributeMemory(name: String, depth: Int, bits: Int, target: Int)
 
-/** All memories of the environment's maps. */
+/** All memories of the environment's maps, and those of the textures. */
 object AttributeMemories {
 
-  /** Empty for a device without an environment. */
+  /** Those of the environment, if there is one, then those of the textures, if there are any. */
   def apply(config: ColonnadeConfig): Seq[AttributeMemory] =
+    (environment(config) ++ textures(config)).zipWithIndex.map { case ((name, depth, bits), index) =>
+      AttributeMemory(name, depth, bits, LoadTarget.firstAttributes + index)
+    }
+
+  private def environment(config: ColonnadeConfig): Seq[(String, Int, Int)] =
     config.physicalAttributeMemory.toSeq.flatMap { memory =>
       val layout = memory.layout
-      val shapes = map("albedo", layout) ++ map("normals", layout) ++ Seq(
+      map("albedo", layout) ++ map("normals", layout) ++ Seq(
         ("planes.descriptors", layout.tiles, (new PlaneDescriptor).getWidth),
         ("planes.heap", layout.planeHeapWords, AttributeLayout.heapWordBits),
         ("planes.planes", memory.planes, (new Plane).getWidth),
         ("planes.bounding", memory.boundingPlanes, (new BoundingPlaneEntry).getWidth)
       )
-      shapes.zip(LoadTarget.firstAttributes until LoadTarget.firstAttributes + shapes.size).map {
-        case ((name, depth, bits), target) => AttributeMemory(name, depth, bits, target)
-      }
     }
+
+  private def textures(config: ColonnadeConfig): Seq[(String, Int, Int)] =
+    config.geometry.texture.toSeq.flatMap(layout =>
+      twoLevel("texture", layout.tiles, layout.paletteSize, layout.heapWords)
+    )
+
+  /** Types of the words of the texture memory, as [[layouts]]. */
+  def textureLayouts: Seq[(String, () => Bundle)] =
+    layouts.filter { case (name, _) => Seq("mapDescriptor", "albedo").contains(name) }
 
   /** Types of words by their manifest key; a heap's words are plain bits. */
   val layouts: Seq[(String, () => Bundle)] = Seq(
@@ -46,10 +57,11 @@ object AttributeMemories {
         (s"$name.labels", layout.labelWords, AttributeLayout.heapWordBits),
         (s"$name.seeds", layout.tiles, AttributeLayout.entryBits)
       )
-    else
-      Seq(
-        (s"$name.descriptors", layout.tiles, (new MapDescriptor).getWidth),
-        (s"$name.palette", layout.config.paletteSize, AttributeLayout.entryBits),
-        (s"$name.heap", layout.mapHeapWords, AttributeLayout.heapWordBits)
-      )
+    else twoLevel(name, layout.tiles, layout.config.paletteSize, layout.mapHeapWords)
+
+  private def twoLevel(name: String, tiles: Int, paletteSize: Int, heapWords: Int): Seq[(String, Int, Int)] = Seq(
+    (s"$name.descriptors", tiles, (new MapDescriptor).getWidth),
+    (s"$name.palette", paletteSize, AttributeLayout.entryBits),
+    (s"$name.heap", heapWords, AttributeLayout.heapWordBits)
+  )
 }

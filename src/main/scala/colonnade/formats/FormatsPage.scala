@@ -85,7 +85,10 @@ object FormatsPage {
       else
         """With `geometry.cornerColours` a record holds one face, which also has the linear colours `colours[0]` to `colours[2]` of its
           |vertices: channels of 12 bits, where all ones is 1.0.""".stripMargin
-    s"$place\n\n$colours"
+    val textures =
+      """With `geometry.textureBytes` the red and green channels of a textured face are positions u and v in the atlas, texels with 3
+        |fraction bits.""".stripMargin
+    s"$place\n\n$colours\n\n$textures"
   }
 
   private def room(config: ColonnadeConfig): String = config.physicalAttributeMemory match {

@@ -2,6 +2,7 @@ package colonnade.formats
 
 import chisel3._
 import chisel3.util.log2Ceil
+import colonnade.axi.Axi
 import colonnade.config.{ColonnadeConfig, NumberFormats, SceneCacheConfig}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
@@ -118,7 +119,7 @@ object SceneLines {
 }
 
 object SceneInDram {
-  val addressBits: Int = 40
+  val addressBits: Int = Axi.addressBits
   val pageLog:     Int = 12
   val pageBits:    Int = addressBits - pageLog
 }

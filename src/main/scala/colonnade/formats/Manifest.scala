@@ -1,6 +1,7 @@
 package colonnade.formats
 
-import colonnade.config.{ColonnadeConfig, ConfigIO}
+import chisel3.Bundle
+import colonnade.config.{ColonnadeConfig, ConfigIO, TextureLayout}
 
 /** The description of a design for the host: configuration, number formats, and the bit position of every number in
   * records, registers and streams. The generator writes it beside the Verilog; packer, model and harness read it.
@@ -52,7 +53,9 @@ object Manifest {
       "numbers"   -> numbers,
       "bvh"       -> config.geometry.bvh // an image without nodes says nothing to hardware that walks them
     )
+    val texture = config.geometry.texture.map(textures)
     maps.foreach(hashed("attributes") = _)
+    texture.foreach(hashed("texture") = _)
     val formatHash = Json.hash(hashed)
 
     val manifest = ujson.Obj(
@@ -66,6 +69,7 @@ object Manifest {
       "attributes" -> maps.getOrElse[ujson.Value](ujson.Null),
       "formatHash" -> formatHash
     )
+    texture.foreach(manifest("texture") = _)
     manifest("configHash") = Json.hash(manifest)
     manifest
   }
@@ -75,10 +79,17 @@ object Manifest {
     "sizes" -> ujson.Obj.from(config.physicalAttributeMemory.toSeq.flatMap(_.layout.entries).map {
       case (name, value) => name -> ujson.Num(value)
     }),
-    "layouts" -> ujson.Obj.from(AttributeMemories.layouts.map { case (name, kind) =>
-      name -> fields(Layout.of(kind()))
-    })
+    "layouts" -> wordLayouts(AttributeMemories.layouts)
   )
+
+  /** The settings that determine an image of the textures; a manifest without them has no such key. */
+  private def textures(layout: TextureLayout): ujson.Obj = ujson.Obj(
+    "sizes"   -> ujson.Obj.from(layout.entries.map { case (name, value) => name -> ujson.Num(value) }),
+    "layouts" -> wordLayouts(AttributeMemories.textureLayouts)
+  )
+
+  private def wordLayouts(kinds: Seq[(String, () => Bundle)]): ujson.Obj =
+    ujson.Obj.from(kinds.map { case (name, kind) => name -> fields(Layout.of(kind())) })
 
   private def fields(layout: Seq[Field]): ujson.Arr = ujson.Arr.from(layout.map { field =>
     ujson.Obj(

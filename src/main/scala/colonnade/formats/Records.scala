@@ -80,7 +80,9 @@ final class Face(config: ColonnadeConfig) extends Bundle {
   val normals         = Vec(3, Vec3(component))
   val geometricNormal = Vec3(component)
 
-  /** The linear albedo at each vertex, for materials with `hasCornerColours`. */
+  /** The linear albedo at each vertex, for materials with `hasCornerColours`; for those with `hasTexture` red and
+    * green are a position in the atlas.
+    */
   val colours = if (config.geometry.cornerColours) Some(Vec(3, Rgb(FrameRegisters.colour))) else None
 
   /** Index into the material table. */

@@ -70,6 +70,9 @@ final class Material(config: ColonnadeConfig) extends Record {
   /** The albedo is interpolated from the colours at the corners of the face; `albedo` has no effect. */
   val hasCornerColours = if (config.geometry.cornerColours) Some(Bool()) else None
 
+  /** The albedo is that of the texture at a position, interpolated from the red and green channels of the corners. */
+  val hasTexture = config.geometry.texture.map(_ => Bool())
+
   /** See [[MaterialKind]]. */
   val kind = ifBounces(UInt(MaterialKind.bits.W))
 
@@ -83,7 +86,8 @@ final class Material(config: ColonnadeConfig) extends Record {
   val reflectance = ifBounces(FrameRegisters.weight)
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
-    Seq("albedo" -> albedo) ++ hasCornerColours.map("hasCornerColours" -> _) ++ kind.map("kind" -> _) ++
+    Seq("albedo" -> albedo) ++ hasCornerColours.map("hasCornerColours" -> _) ++
+      hasTexture.map("hasTexture" -> _) ++ kind.map("kind" -> _) ++
       etaFront.map("etaFront" -> _) ++ etaBack.map("etaBack" -> _) ++ reflectance.map("reflectance" -> _): _*
   )
 }

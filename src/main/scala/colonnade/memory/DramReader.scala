@@ -2,41 +2,19 @@ package colonnade.memory
 
 import chisel3._
 import chisel3.util._
+import colonnade.axi.{Axi, AxiAddress, AxiReadPort}
 import colonnade.common.RoundRobin
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordFormats, SceneInDram, SceneLines}
+import colonnade.formats.{RecordFormats, SceneLines}
 
-/** The address channel of an AXI4 read port. */
-final class AxiReadAddress(idBits: Int) extends Bundle {
-  val id    = UInt(idBits.W)
-  val addr  = UInt(AxiReadPort.addressBits.W)
-  val len   = UInt(8.W)
-  val size  = UInt(3.W)
-  val burst = UInt(2.W)
-}
-
-/** The data channel of an AXI4 read port. */
-final class AxiReadData(idBits: Int, busBytes: Int) extends Bundle {
-  val id   = UInt(idBits.W)
-  val data = UInt((8 * busBytes).W)
-  val resp = UInt(2.W)
-  val last = Bool()
-}
-
-/** The read channels of an AXI4 master. */
-final class AxiReadPort(config: ColonnadeConfig) extends Bundle {
-  private val idBits   = AxiReadPort.idBits(config)
-  private val busBytes = config.columnBvhMemory.cache.get.busBytes
-
-  val ar = Decoupled(new AxiReadAddress(idBits))
-  val r  = Flipped(Decoupled(new AxiReadData(idBits, busBytes)))
-}
-
-object AxiReadPort {
-  val addressBits: Int = SceneInDram.addressBits
+/** The AXI4 read port for scenes in DRAM. */
+object DramPort {
 
   /** One read id for each bank of the shared cache. */
   def idBits(config: ColonnadeConfig): Int = log2Ceil(config.columnBvhMemory.banks.max(2))
+
+  def apply(config: ColonnadeConfig): AxiReadPort =
+    new AxiReadPort(idBits(config), config.columnBvhMemory.cache.get.busBytes)
 }
 
 /** Ports of [[DramReader]]. */
@@ -44,12 +22,12 @@ final class DramReaderIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 
   /** Address of record 0, a multiple of 4 KB; constant while lines are read. */
-  val base = Input(UInt(AxiReadPort.addressBits.W))
+  val base = Input(UInt(Axi.addressBits.W))
 
   /** By bank; a bank's lines come in the order of its reads. */
   val reads = Vec(banks, Flipped(Decoupled(UInt(Lines.lineBits(config).W))))
   val lines = Vec(banks, Decoupled(new ReadLine(config)))
-  val axi   = new AxiReadPort(config)
+  val axi   = DramPort(config)
 }
 
 /** Reads lines from DRAM over AXI4: one INCR burst for a line, with its bank as the id.
@@ -68,7 +46,7 @@ final class DramReader(config: ColonnadeConfig) extends Module {
 
   // Addresses
   private val arbiter = Module(new RoundRobin(banks))
-  private val address = Wire(Decoupled(new AxiReadAddress(AxiReadPort.idBits(config))))
+  private val address = Wire(Decoupled(new AxiAddress(DramPort.idBits(config))))
   private val bank    = OHToUInt(arbiter.io.grant)
   private val line    = Mux1H(arbiter.io.grant, io.reads.map(_.bits))
   arbiter.io.requests := VecInit(io.reads.map(_.valid)).asUInt
@@ -78,8 +56,8 @@ final class DramReader(config: ColonnadeConfig) extends Module {
   address.bits.id    := bank
   address.bits.addr  := io.base + ((line ## bank.pad(bankBits)(bankBits - 1, 0)) << pitchBits)
   address.bits.len   := (beats - 1).U
-  address.bits.size  := log2Ceil(busBytes).U
-  address.bits.burst := 1.U
+  address.bits.size  := Axi.size(busBytes)
+  address.bits.burst := Axi.incr
   io.axi.ar :<>= Queue(address, 2)
 
   // Data

@@ -17,7 +17,7 @@ final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
 
   /** By bus and bank. */
   val lines = Output(Vec(SharedCache.buses(config), Vec(banks, new LineBroadcast(config))))
-  val axi   = new AxiReadPort(config)
+  val axi   = DramPort(config)
 
   /** Forgets all lines; only while idle. */
   val invalidate = Input(Bool())

@@ -23,6 +23,10 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   /** `request` is ready in the next cycle. */
   val readyNext = Output(Bool())
 
+  /** To the textures, and whether a texel was illegal. */
+  val texture        = config.geometry.texture.map(_ => new TexturePort(config))
+  val isIllegalTexel = config.geometry.texture.map(_ => Output(Bool()))
+
   /** Hits on diffuse surfaces. */
   val lit = Decoupled(new LitSurface(config))
 
@@ -71,19 +75,34 @@ final class Shader(config: ColonnadeConfig) extends Module {
   geometry.io.unitShift  := io.unitShift
   geometry.io.lightCount := Mux(isBounce, 1.U, io.shading.lights)
 
-  // Colours of the hit's corners, in the material's place; the hit waits for them
-  private val corners = material.hasCornerColours.map { hasCornerColours =>
+  // Colours of the hit's corners, or of the texel that they place, in the material's place; the hit waits for them
+  private val isTextured = material.hasTexture.getOrElse(false.B)
+  private val corners    = material.hasCornerColours.map { hasCornerColours =>
     val unit = Module(new CornerColours(config))
     unit.io.start   := io.request.fire
     unit.io.weights := io.request.bits.hit.weights
     unit.io.colours := io.request.bits.face.colours.get
-    unit.io.isUsed  := hasCornerColours && !surface.isEnvironment
+    unit.io.isUsed  := (hasCornerColours || isTextured) && !surface.isEnvironment
     unit.io.product := multiplier.io.product
     multiplier.io.corners.get <> unit.io.operands
     unit
   }
-  private val objectAlbedo =
-    corners.map(unit => Mux(unit.io.isUsed, unit.io.colour, material.albedo)).getOrElse(material.albedo)
+  private val texture = corners.zip(io.texture).map { case (position, port) =>
+    val unit = Module(new TextureLookup(config))
+    unit.io.start         := io.request.fire
+    unit.io.isKnown       := position.io.isDone && isTextured && !surface.isEnvironment
+    unit.io.position      := position.io.colour
+    io.isIllegalTexel.get := unit.io.isIllegal
+    port <> unit.io.port
+    unit
+  }
+  private val cornerAlbedo =
+    corners.map(unit =>
+      texture.map(texel => Mux(isTextured, texel.io.colour, unit.io.colour)).getOrElse(unit.io.colour)
+    )
+  private val objectAlbedo = corners.zip(cornerAlbedo).map { case (unit, colour) =>
+    Mux(unit.io.isUsed, colour, material.albedo)
+  }.getOrElse(material.albedo)
 
   // Albedo and shadows of an environment's point in the geometry
   private val environment = geometry.io.environment.zip(io.environment).map { case (taker, offered) =>
@@ -177,7 +196,10 @@ final class Shader(config: ColonnadeConfig) extends Module {
 
   /** The condition, once the hit's albedo is known. */
   private def withAlbedo(condition: Bool): Bool =
-    corners.map(unit => condition && (unit.io.isDone || !unit.io.isUsed)).getOrElse(condition)
+    corners.map { unit =>
+      val isDone = texture.map(texel => Mux(isTextured, texel.io.isDone, unit.io.isDone)).getOrElse(unit.io.isDone)
+      condition && (isDone || !unit.io.isUsed)
+    }.getOrElse(condition)
 
   /** A light's entry; a single light needs no index. */
   private def at[T <: Data](entries: Vec[T], index: UInt): T =

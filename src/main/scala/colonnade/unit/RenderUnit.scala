@@ -58,6 +58,7 @@ final class RenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config)
   shader.lit.ready := true.B
   lit.valid        := shader.lit.valid
   lit.bits         := shader.lit.bits
+  io.texture.zip(shader.texture).foreach { case (port, requests) => port <> requests }
   shadowRays.req :<>= controller.shadow
   shadowRays.surface := lit
   for (bounces <- bounces) {

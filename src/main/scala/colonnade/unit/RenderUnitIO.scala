@@ -6,6 +6,7 @@ import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.environment.AttributePort
 import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitEvents, UnitPosition}
+import colonnade.shading.TexturePort
 
 /** Ports of a render unit. `registers` is constant while a frame runs; `start` precedes the first position. */
 final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
@@ -21,6 +22,9 @@ final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
   val maps =
     if (config.hasEnvironment) Some(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config)))
     else None
+
+  /** To the textures. */
+  val texture = config.geometry.texture.map(_ => new TexturePort(config))
 
   /** No pixel is in flight. */
   val isIdle = Output(Bool())

@@ -54,7 +54,7 @@ object UnitCounters {
     events.busyEnvironment.foreach(_ := environment.get.events.busy)
 
     events.illegalRecord := fetch.events.illegalRecord || intersector.events.illegalRecord ||
-      environment.map(_.events.illegal).getOrElse(false.B)
+      environment.map(_.events.illegal).getOrElse(false.B) || shader.isIllegalTexel.getOrElse(false.B)
     events
   }
 }

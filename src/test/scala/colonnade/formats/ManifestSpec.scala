@@ -1,7 +1,7 @@
 package colonnade.formats
 
 import colonnade.TestConfigs
-import colonnade.config.{ConfigIO, MapEncoding, PhysicalAttributeMemoryConfig}
+import colonnade.config.{ConfigError, ConfigIO, MapEncoding, PhysicalAttributeMemoryConfig}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -93,6 +93,23 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
       environment.copy(planeBytes = 8190)
     )
     (others.map(hash) :+ hash(environment) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 6
+  }
+
+  it should "have textures only where the configuration does" in {
+    val (without, textured) =
+      (manifest("geometry.cornerColours=true"), manifest("geometry.cornerColours=true", "geometry.textureBytes=16384"))
+    without.obj.keys should not contain "texture"
+    textured("texture")("sizes")("mapHeapWords").num shouldBe (16384 - 4096 - 1152) / 2
+    textured("memories").obj.keys should contain.allOf("texture.descriptors", "texture.palette", "texture.heap")
+    textured("formatHash") should not be without("formatHash")
+    for (bytes <- Seq(5313, 21633))
+      the[ConfigError] thrownBy manifest(
+        "geometry.cornerColours=true",
+        s"geometry.textureBytes=$bytes"
+      ) should have message
+        s"geometry.textureBytes is $bytes; it must be 0, or from 5314 to 21632"
+    the[ConfigError] thrownBy manifest("geometry.textureBytes=16384") should have message
+      "geometry.textureBytes needs geometry.cornerColours=true"
   }
 
   it should "give faces and materials corner colours only where the configuration has them" in {

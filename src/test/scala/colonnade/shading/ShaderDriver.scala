@@ -35,6 +35,7 @@ object ShaderDriver {
     io.materials.zip(light.albedos).foreach { case (to, value) => pokeColour(to.albedo, value) }
     for ((material, claim) <- io.materials.zip(light.cornerColoured); port <- material.hasCornerColours)
       port.poke(claim)
+    for ((material, claim) <- io.materials.zip(light.textured); port <- material.hasTexture) port.poke(claim)
   }
 
   def pokeHit(port: ShadeRequest, hit: HitCase): Unit = {

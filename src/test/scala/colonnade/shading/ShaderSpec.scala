@@ -22,7 +22,10 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     val answers = Model.answers(config, hits.map(ShaderStimulus.words(_, light)), "shade")
     val colours = Model.answers(config, hits.map(ShaderStimulus.colourWords), "cornercolour")
     hits.zip(answers).zip(colours).map { case ((hit, answer), colour) =>
-      val albedo = if (light.cornerColoured(hit.material)) colour else light.albedos(hit.material)
+      val albedo =
+        if (light.textured(hit.material)) ShaderHarness.texel(colour)
+        else if (light.cornerColoured(hit.material)) colour
+        else light.albedos(hit.material)
       expected(answer, light, albedo, hit.context)
     }
   }
@@ -32,7 +35,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   /** Compares shaded hits with the model, one light after another. */
   private def check(
-      shader: Shader,
+      shader: ShaderHarness,
       config: ColonnadeConfig,
       rounds: Seq[(LightCase, Seq[HitCase])],
       random: Random,
@@ -59,7 +62,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (config <- TestConfigs.formats ++ TestConfigs.withColours) {
     val name = nameOf(config)
 
-    it should s"equal the model with $name" in test(new Shader(config)).withAnnotations(verilator) { shader =>
+    it should s"equal the model with $name" in test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
       val random   = new Random(20)
       val stimulus = new ShaderStimulus(config, random)
       val rounds   = Seq.fill(8) {
@@ -74,7 +77,8 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private def nameOf(config: ColonnadeConfig): String =
     s"${config.precision} and ${config.geometry.vertexBits}-bit vertices" +
-      (if (config.geometry.cornerColours) " with corner colours" else "")
+      (if (config.geometry.cornerColours) " with corner colours" else "") +
+      (if (config.geometry.texture.nonEmpty) " and textures" else "")
 
   /** Every number at a limit of its range. */
   private def extremes(config: ColonnadeConfig, stimulus: ShaderStimulus): Seq[(LightCase, Seq[HitCase])] = {
@@ -119,7 +123,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for ((config, limit) <- Seq(TestConfigs.tiny -> 50, TestConfigs.withColours.head -> 60))
     it should s"take a hit with a light at least every $limit cycles at ${nameOf(config)}" in
-      test(new Shader(config)).withAnnotations(verilator) { shader =>
+      test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
         val random   = new Random(23)
         val stimulus = new ShaderStimulus(config, random)
         val light    = stimulus.light().at(Seq(3000, 5000, 9000)).copy(
@@ -152,7 +156,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   it should "tell the materials of a table apart, whatever its size" in {
     for (materials <- Seq(1, 5, 8)) {
       val config = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(materials = materials, maxBounces = 0))
-      test(new Shader(config)).withAnnotations(verilator) { shader =>
+      test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
         val random   = new Random(24)
         val stimulus = new ShaderStimulus(config, random)
         val light    = stimulus.light()
@@ -167,7 +171,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     * @return what was taken, in order, and the results
     */
   private def mix(
-      shader: Shader,
+      shader: ShaderHarness,
       hits:   Seq[HitCase],
       points: Seq[EnvironmentPointCase],
       random: Random,
@@ -219,7 +223,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     ))
   )
     it should s"light points of an environment between hits, with ${nameOf(config)}" in
-      test(new Shader(config)).withAnnotations(verilator) { shader =>
+      test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
         val random   = new Random(25)
         val stimulus = new ShaderStimulus(config, random)
         for (stalls <- Seq(0, 0.3, 0.6, 0.9, 0.5, 0.8)) {

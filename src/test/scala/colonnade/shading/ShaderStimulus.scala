@@ -33,7 +33,7 @@ final case class EnvironmentPointCase(
 final case class LightSource(position: Seq[BigInt], colour: Seq[BigInt], reachMantissa: BigInt, reachExponent: Int)
 
 /** The shading registers in raw integers; the first `shining` lights are on. `cornerColoured` says which materials have corner
-  * colours.
+  * colours, `textured` which have a texture.
   */
 final case class LightCase(
     sources:        Seq[LightSource],
@@ -41,6 +41,7 @@ final case class LightCase(
     unitShift:      Int,
     albedos:        Seq[Seq[BigInt]],
     cornerColoured: Seq[Boolean],
+    textured:       Seq[Boolean],
     offset:         BigInt,
     isFlat:         Boolean,
     shadows:        Boolean
@@ -107,6 +108,7 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
       unitShift = shift,
       albedos = Seq.fill(config.frame.materials)(colour()),
       cornerColoured = Seq.fill(config.frame.materials)(config.geometry.cornerColours && !chance(3)),
+      textured = Seq.fill(config.frame.materials)(config.geometry.texture.nonEmpty && !chance(3)),
       offset = natural(numbers.gridBits - 2),
       isFlat = chance(4),
       shadows = !chance(4)

@@ -119,7 +119,10 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     TestConfigs.withColours.head.copy(physicalAttributeMemory = Some(TestConfigs.environment)),
     s"corner colours at ${TestConfigs.withColours.head.precision} with an environment"
   )
-  for (config <- TestConfigs.withColours.tail) render(config, s"corner colours at ${config.precision}")
+  for (config <- TestConfigs.withColours.tail) {
+    val withoutTextures = config.copy(geometry = config.geometry.copy(textureBytes = 0))
+    render(withoutTextures, s"corner colours at ${config.precision}")
+  }
 }
 
 /** Packs registers and pixel into one port each; with an environment, adds its maps, with random latency. */

@@ -1,0 +1,120 @@
+"""The base-colour textures of glTF materials: their pictures, samplers, and the positions of a primitive in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from colonnade.common.types import Floats
+from colonnade.mesh import losses as lost
+from colonnade.mesh.gltf_document import GltfDocument
+from colonnade.mesh.losses import Losses
+from colonnade.mesh.resolver import References
+from colonnade.mesh.texture import Texture, Wrap, read_texture
+
+_WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
+#: Extensions of a texture whose pictures have formats that are read, or not.
+_WEBP, _UNREAD = "EXT_texture_webp", ("KHR_texture_basisu", "EXT_texture_avif")
+
+
+@dataclass(frozen=True)
+class TextureUse:
+    """The use of a texture by a material.
+
+    Attributes:
+        texture: Index in `GltfTextures.textures`.
+        coordinates: Name of the positions in a primitive, ``TEXCOORD_0``.
+        matrix: Transform of the positions, float64 [2, 3].
+    """
+
+    texture: int
+    coordinates: str
+    matrix: Floats
+
+    def positions(self, values: Floats) -> Floats:
+        """Positions in the texture of those of a file, float64 [n, 2]."""
+        return values @ self.matrix[:, :2].T + self.matrix[:, 2]
+
+
+class GltfTextures:
+    """The textures of a document, read when they are first used."""
+
+    def __init__(self, document: GltfDocument, references: References, losses: Losses) -> None:
+        self._document, self._references, self._losses = document, references, losses
+        self._uses: dict[int, TextureUse | None] = {}
+        self._read: dict[tuple[int, Wrap, Wrap], int | None] = {}
+        self.textures: list[Texture] = []
+
+    @property
+    def uses(self) -> Mapping[int, TextureUse | None]:
+        """The textures of the materials that `use_of` was asked for."""
+        return self._uses
+
+    def use_of(self, number: int) -> TextureUse | None:
+        """As `of`, for a material's number."""
+        if number not in self._uses:
+            self._uses[number] = self.of(self._document.entry("materials", number))
+        return self._uses[number]
+
+    def of(self, material: Mapping[str, Any]) -> TextureUse | None:
+        """The base-colour texture of a material; None without one, or if its picture is missing or not readable.
+
+        Raises:
+            UserError: The texture does not exist, or its transform is not valid.
+        """
+        surface = material.get("pbrMetallicRoughness")
+        info = surface.get("baseColorTexture") if isinstance(surface, Mapping) else None
+        if not isinstance(info, Mapping):
+            return None
+        entry = self._document.entry("textures", info.get("index"))
+        extensions = entry.get("extensions", {})
+        source = entry.get("source")
+        if _WEBP in extensions:
+            source = extensions[_WEBP].get("source", source)
+        if source is None:
+            self._losses.add(lost.PICTURE_FORMATS, any(name in extensions for name in _UNREAD))
+            return None
+        sampler = self._document.entry("samplers", entry["sampler"]) if "sampler" in entry else {}
+        wrap_u, wrap_v = (_WRAPS.get(sampler.get(key, 10497), "repeat") for key in ("wrapS", "wrapT"))
+        key = (int(source), wrap_u, wrap_v)
+        if key not in self._read:
+            self._read[key] = self._texture(*key)
+        index = self._read[key]
+        transform = info.get("extensions", {}).get("KHR_texture_transform", {})
+        coordinates = f"TEXCOORD_{transform.get('texCoord', info.get('texCoord', 0))}"
+        return None if index is None else TextureUse(index, coordinates, self._matrix(transform))
+
+    def _texture(self, source: int, wrap_u: Wrap, wrap_v: Wrap) -> int | None:
+        image = self._document.entry("images", source)
+        name, uri = f"image {source}", image.get("uri")
+        if "bufferView" in image:
+            data = self._document.view_bytes(image["bufferView"])
+        elif isinstance(uri, str) and uri.startswith("data:"):
+            data = self._document.embedded(uri, name)
+        elif isinstance(uri, str):
+            found = self._references.picture(unquote(uri))
+            if found is None:
+                self._losses.add(lost.NO_PICTURES)
+                return None
+            data = found
+        else:
+            raise self._document.error(f"{name} has no picture: export it again")
+        texture = read_texture(data, name, (wrap_u, wrap_v), self._losses)
+        self.textures += [] if texture is None else [texture]
+        return None if texture is None else len(self.textures) - 1
+
+    def _matrix(self, transform: Mapping[str, Any]) -> Floats:
+        """A KHR_texture_transform: scale, then rotation, then offset."""
+        try:
+            scale = np.array(transform.get("scale", (1.0, 1.0)), dtype=np.float64).reshape(2)
+            offset = np.array(transform.get("offset", (0.0, 0.0)), dtype=np.float64).reshape(2)
+            angle = float(transform.get("rotation", 0.0))
+        except (TypeError, ValueError):
+            raise self._document.error("the transform of a texture is not valid: export it again") from None
+        cosine, sine = math.cos(angle), math.sin(angle)
+        return np.column_stack([np.array([[cosine, sine], [-sine, cosine]]) * scale, offset])

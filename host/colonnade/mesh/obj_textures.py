@@ -1,0 +1,109 @@
+"""The textures of MTL files: ``map_Kd`` with its options ``-s``, ``-o`` and ``-clamp``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from colonnade.common.types import Floats
+from colonnade.mesh import losses as lost
+from colonnade.mesh.losses import Losses
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.resolver import References
+from colonnade.mesh.texture import Texture, Wrap, read_texture
+
+#: Options of a map, and their largest number of values.
+_OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-clamp": 1, "-blendu": 1, "-blendv": 1, "-cc": 1, "-mm": 2, "-bm": 1}
+_OPTIONS |= {"-boost": 1, "-texres": 1, "-imfchan": 1, "-type": 1}
+
+
+@dataclass(frozen=True)
+class TextureMap:
+    """A texture map: its file, and the transform of (u, v) with v upwards."""
+
+    name: str
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    is_clamped: bool = False
+
+
+class MtlTextures:
+    """The textures of MTL files, read when they are first used, and the transform of each material's positions."""
+
+    def __init__(self, references: References, losses: Losses) -> None:
+        self._references, self._losses = references, losses
+        self._read: dict[tuple[str, bool], int | None] = {}
+        self.textures: list[Texture] = []
+
+    def textured(self, material: MeshMaterial, entries: Mapping[str, Any]) -> tuple[MeshMaterial, TextureMap | None]:
+        """The material with the texture of its ``map_Kd``, if that is there; a colour Kd of black counts as white.
+
+        Raises:
+            UserError: The picture is no regular file, or is outside the folder.
+        """
+        words = entries.get("map_kd")
+        if not words:
+            return material, None
+        described = self._parsed(words)
+        key = (described.name, described.is_clamped)
+        if key not in self._read:
+            self._read[key] = self._texture(described)
+        index = self._read[key]
+        if index is None:
+            return material, None
+        albedo = material.albedo if any(material.albedo) else (1.0, 1.0, 1.0)
+        return replace(material, albedo=albedo, texture=index), described
+
+    def _texture(self, described: TextureMap) -> int | None:
+        data = self._references.picture(described.name)
+        if data is None:
+            self._losses.add(lost.NO_PICTURES)
+            return None
+        wrap: tuple[Wrap, Wrap] = ("clamp", "clamp") if described.is_clamped else ("repeat", "repeat")
+        texture = read_texture(data, described.name, wrap, self._losses)
+        self.textures += [] if texture is None else [texture]
+        return None if texture is None else len(self.textures) - 1
+
+    def _parsed(self, words: Sequence[str]) -> TextureMap:
+        found, at = TextureMap(""), 0
+        while at < len(words) - 1 and words[at].lower() in _OPTIONS:
+            option, values = words[at].lower(), []
+            at += 1
+            for word in words[at : at + _OPTIONS[option]]:
+                if at == len(words) - 1 or (_OPTIONS[option] > 1 and not _is_number(word)):
+                    break
+                values.append(word)
+                at += 1
+            if option == "-clamp":
+                found = replace(found, is_clamped=values == ["on"])
+            elif option in ("-s", "-o") and values:
+                default = 1.0 if option == "-s" else 0.0
+                pair = (float(values[0]), float(values[1]) if len(values) > 1 else default)
+                found = replace(found, scale=pair) if option == "-s" else replace(found, offset=pair)
+            else:
+                self._losses.add(lost.TEXTURE_OPTIONS)
+        return replace(found, name=" ".join(words[at:]))
+
+
+def positions_of(values: Floats, maps: Sequence[TextureMap | None], materials: Any) -> Floats:
+    """Positions in the textures, v downwards, of corners with positions of an OBJ file, float64 [k, 2].
+
+    Args:
+        values: Positions (u, v) of the file, v upwards, float64 [k, 2].
+        maps: The texture map of each material.
+        materials: The material of each corner, int64 [k].
+    """
+    scale = np.array([(1.0, 1.0) if one is None else one.scale for one in maps])[materials]
+    offset = np.array([(0.0, 0.0) if one is None else one.offset for one in maps])[materials]
+    at = values * scale + offset
+    return np.column_stack([at[:, 0], 1.0 - at[:, 1]])
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return bool(np.isfinite(float(word)))
+    except ValueError:
+        return False

@@ -1,0 +1,189 @@
+"""The atlas: the base-colour textures of a mesh in one square picture, for the texture memory (docs/textures.md).
+
+Each textured material has a region of the atlas: the part of its texture that faces use, with repeats, resampled and
+multiplied by the material's albedo. Regions begin at tiles and share one scale, of at most 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.texture import Texture
+
+#: Edge of a tile, texels.
+TILE = 16
+#: Samples of the texture along each axis of a texel, at most.
+_MAX_SAMPLES = 8
+#: Steps in the search for the scale.
+_STEPS = 24
+
+
+@dataclass(frozen=True)
+class Region:
+    """A material's part of the atlas.
+
+    Attributes:
+        low, high: The part of the texture, (u, v), float64 [2] each.
+        corner: Its upper left texel.
+        size: Its width and height, texels.
+    """
+
+    low: Floats
+    high: Floats
+    corner: tuple[int, int]
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """The atlas of a mesh.
+
+    Attributes:
+        colours: Linear, float64 [edge, edge, 3].
+        positions: Positions of the corners of the mesh's faces, texels from the upper left corner, 0 on faces without a
+            texture, float64 [m, 3, 2].
+        scale: Texels of the atlas for each pixel of a texture, along an axis.
+        source_bytes: Size of the textures, three bytes a pixel.
+    """
+
+    colours: Floats
+    positions: Floats
+    scale: float
+    source_bytes: int
+
+
+def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, edge: int) -> Atlas | None:
+    """The atlas of the textured materials; None if there are none.
+
+    Args:
+        mesh: The mesh.
+        materials: Its materials, in place of its own.
+        headroom: Factor of the scene's lights, by which the colours of diffuse faces are darker.
+        edge: Edge of the atlas, texels.
+
+    Raises:
+        UserError: There are more textured materials than tiles.
+    """
+    used = np.unique(mesh.face_materials)
+    textured = [int(number) for number in used if materials[number].texture is not None]
+    if mesh.corner_positions is None or not textured:
+        return None
+    parts = [mesh.face_materials == number for number in textured]
+    textures = [mesh.textures[index] for number in textured if (index := materials[number].texture) is not None]
+    unwrapped = [
+        _unwrapped(mesh.corner_positions[part], texture) for part, texture in zip(parts, textures, strict=True)
+    ]
+    lows = [positions.min(axis=(0, 1)) for positions in unwrapped]
+    highs = [
+        np.maximum(positions.max(axis=(0, 1)), low + 1.0 / np.array(texture.size))
+        for positions, low, texture in zip(unwrapped, lows, textures, strict=True)
+    ]
+    pixels = [(high - low) * texture.size for high, low, texture in zip(highs, lows, textures, strict=True)]
+    if len(textured) > (edge // TILE) ** 2:
+        raise UserError(
+            f"mesh {mesh.name} has {len(textured):,} textured materials: use at most {(edge // TILE) ** 2:,}"
+        )
+    scale, corners = _placed(np.array(pixels), edge)
+    colours = np.zeros((edge, edge, 3))
+    positions = np.zeros_like(mesh.corner_positions)
+    covered = np.zeros((edge, edge), dtype=bool)
+    for index, number in enumerate(textured):
+        size = _size(pixels[index] * scale, edge)
+        region = Region(lows[index], highs[index], corners[index], (int(size[0]), int(size[1])))
+        factor = np.array(materials[number].albedo) / (headroom if materials[number].kind == "diffuse" else 1.0)
+        tile = _resampled(textures[index], region, pixels[index]) * factor
+        (x, y), (width, height) = region.corner, region.size
+        right, bottom = x + _tiles(width), y + _tiles(height)
+        padding = ((0, bottom - y - height), (0, right - x - width), (0, 0))
+        colours[y:bottom, x:right] = np.pad(tile, padding, mode="edge")
+        covered[y:bottom, x:right] = True
+        share = (unwrapped[index] - region.low) / (region.high - region.low)
+        positions[parts[index]] = np.array(region.corner) + share * region.size
+    colours[~covered] = colours[covered].mean(axis=0)
+    sources = {id(texture): 3 * texture.size[0] * texture.size[1] for texture in textures}
+    return Atlas(colours, positions, scale, sum(sources.values()))
+
+
+def position_codes(atlas: Atlas, fraction_bits: int) -> npt.NDArray[np.int64]:
+    """The positions of an atlas as the hardware holds them, int64 [m, 3, 2]: texels with fraction bits."""
+    largest = (len(atlas.colours) << fraction_bits) - 1
+    return np.clip(np.rint(atlas.positions * (1 << fraction_bits)), 0, largest).astype(np.int64)
+
+
+def _unwrapped(positions: Floats, texture: Texture) -> Floats:
+    """Positions of the corners of faces, float64 [k, 3, 2], moved by whole periods so that they cover a small part."""
+    moved = positions.copy()
+    for axis, wrap in enumerate(texture.wrap):
+        if wrap == "clamp":
+            continue
+        period = 1.0 if wrap == "repeat" else 2.0
+        along = positions[..., axis]
+        each = along - period * np.floor(along.min(axis=1, keepdims=True) / period)
+        whole = along - period * np.floor(along.min() / period)
+        moved[..., axis] = each if np.ptp(each) < np.ptp(whole) else whole
+    return moved
+
+
+def _tiles(length: int) -> int:
+    """A length rounded up to whole tiles."""
+    return -(-length // TILE) * TILE
+
+
+def _size(pixels: Floats, edge: int) -> npt.NDArray[np.int64]:
+    """Whole texels of a region, at least one and at most the atlas along each axis."""
+    return np.clip(np.ceil(pixels - 1e-6), 1, edge).astype(np.int64)
+
+
+def _placed(pixels: Floats, edge: int) -> tuple[float, list[tuple[int, int]]]:
+    """The largest scale, up to 1, at which regions of so many pixels, float64 [n, 2], fit; and their corners."""
+    whole = _shelves(pixels, edge)
+    if whole is not None:
+        return 1.0, whole
+    low, high = 0.0, 1.0
+    best = _shelves(pixels * low, edge)
+    for _ in range(_STEPS):
+        middle = (low + high) / 2
+        corners = _shelves(pixels * middle, edge)
+        if corners is None:
+            high = middle
+        else:
+            low, best = middle, corners
+    assert best is not None, "a tile for each region"
+    return low, best
+
+
+def _shelves(pixels: Floats, edge: int) -> list[tuple[int, int]] | None:
+    """Corners of regions in rows, the highest first; None if they do not fit."""
+    if (pixels > edge + 1e-6).any():
+        return None
+    sizes = [(_tiles(int(width)), _tiles(int(height))) for width, height in (_size(row, edge) for row in pixels)]
+    corners = [(0, 0)] * len(sizes)
+    x, y, shelf = 0, 0, 0
+    for index in sorted(range(len(sizes)), key=lambda index: (-sizes[index][1], -sizes[index][0])):
+        width, height = sizes[index]
+        if x + width > edge:
+            x, y, shelf = 0, y + shelf, 0
+        if y + height > edge:
+            return None
+        corners[index] = (x, y)
+        x, shelf = x + width, max(shelf, height)
+    return corners
+
+
+def _resampled(texture: Texture, region: Region, pixels: Floats) -> Floats:
+    """The linear colours of a region, float64 [height, width, 3]: means of samples of the texture."""
+    width, height = region.size
+    samples = int(np.clip(np.ceil(max(pixels / region.size)), 1, _MAX_SAMPLES))
+    v, u = np.mgrid[: height * samples, : width * samples]
+    at = (np.stack([u, v], axis=-1) + 0.5) / samples / region.size
+    colours = texture.colours(region.low + at.reshape(-1, 2) * (region.high - region.low))
+    grid: Floats = colours.reshape(height, samples, width, samples, 3).mean(axis=(1, 3))
+    return grid

@@ -1,0 +1,47 @@
+"""The device image: a scene image in the form that the AXI4 shell reads (docs/bus-shell.md), words of 32 bits."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.design.manifest import Manifest
+from colonnade.scene_image.file import SceneImage
+
+MAGIC = b"CLNDLOAD"
+VERSION = 1
+
+#: The header and the whole image are multiples of this; so is its address.
+ALIGNMENT = 128
+
+_HEADER_WORDS = ALIGNMENT // 4
+
+
+def device_image(image: SceneImage, manifest: Manifest) -> bytes:
+    """The image that a shell with this manifest loads.
+
+    With a cache the scene lies in DRAM, and the image has the environment's maps only.
+    """
+    sections = []
+    if not manifest.config["columnBvhMemory"]["cache"]:
+        sections.append(_section(0, image.records))
+    for memory in image.attributes:
+        sections.append(_section(int(manifest.memories[memory.memory]["target"]), memory.words))
+    body = np.concatenate(sections) if sections else np.zeros(0, dtype="<u4")
+    words = _HEADER_WORDS * (1 + -(-len(body) // _HEADER_WORDS))
+    content = np.zeros(words, dtype="<u4")
+    digits = manifest.format_hash
+    content[:2] = np.frombuffer(MAGIC, dtype="<u4")
+    content[2:4] = VERSION, 4 * words
+    content[4:12] = [int(digits[start : start + 8], 16) for start in range(0, 64, 8)]
+    content[12] = len(sections)
+    content[_HEADER_WORDS : _HEADER_WORDS + len(body)] = body
+    return content.tobytes()
+
+
+def _section(target: int, records: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
+    """Target, number of records, and the records, each in whole words. ``records`` is uint8 [records, bytes]."""
+    count, size = records.shape
+    padded = np.zeros((count, -(-size // 4) * 4), dtype=np.uint8)
+    padded[:, :size] = records
+    return np.concatenate([np.array([target, count, 0, 0], dtype="<u4"), padded.reshape(-1).view("<u4")])

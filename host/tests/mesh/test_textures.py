@@ -1,0 +1,152 @@
+"""Base-colour textures of mesh files: pictures, positions, wrapping, and the lines on what is lost."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from colonnade.common import notes
+from colonnade.common.srgb import linear_from_srgb
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.texture import Texture, Wrap
+from colonnade.scene.model import Material, MeshSource, Scene
+from colonnade.scene.object_mesh import with_materials
+from colonnade.scene.view import with_overrides
+
+#: Red, green, blue, white, from the upper left corner on.
+FOUR = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+
+
+def png(pixels: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def obj(folder: Path, faces: str, material: str = "map_Kd a.png") -> Path:
+    (folder / "a.png").write_bytes(png(FOUR))
+    (folder / "a.mtl").write_text(f"newmtl a\nKd 0.5 1 1\n{material}\n")
+    (folder / "a.obj").write_text(f"mtllib a.mtl\nusemtl a\n{SQUARE}{faces}\n")
+    return folder / "a.obj"
+
+
+def test_positions_of_an_obj_file_go_up_and_those_of_a_mesh_down(tmp_path: Path) -> None:
+    mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3 4/4"))
+    assert mesh.materials == (MeshMaterial(albedo=(0.5, 1.0, 1.0), texture=0),) and mesh.notes == ()
+    assert mesh.corner_positions is not None
+    expected = mesh.vertices[mesh.faces][..., :2] * (1, -1) + (0, 1)
+    np.testing.assert_allclose(mesh.corner_positions, expected)
+    np.testing.assert_array_equal(mesh.textures[0].pixels, FOUR)
+
+
+def test_options_of_a_map_move_its_positions(tmp_path: Path) -> None:
+    mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3", "map_Kd -clamp on -s 2 3 1 -o 0.5 -bm 1 a.png"))
+    assert mesh.textures[0].wrap == ("clamp", "clamp") and mesh.corner_positions is not None
+    np.testing.assert_allclose(mesh.corner_positions[0], [(0.5, 1), (2.5, 1), (2.5, -2)])
+    assert mesh.notes[0].endswith("1 option of a texture map is not used: only -s, -o and -clamp are")
+
+
+def test_faces_without_positions_have_the_plain_colour(tmp_path: Path) -> None:
+    mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3\nf 1 3 4"))
+    found = [mesh.materials[index] for index in mesh.face_materials]
+    assert [material.texture for material in found] == [0, None]
+    assert mesh.notes[0].endswith("1 face of a textured material is untextured: it has no texture coordinates")
+
+
+def gltf(folder: Path, **changes: Any) -> Path:
+    """A triangle with a texture that a buffer holds."""
+    picture = png(FOUR)
+    arrays = [np.eye(3, dtype=np.float32), np.array([(0, 0), (1, 0), (0, 1)], np.float32)]
+    data = b"".join(array.tobytes() for array in arrays) + picture
+    document = {
+        "asset": {"version": "2.0"},
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0}}],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"wrapS": 33648, "wrapT": 33071}],
+        "images": [{"bufferView": 2, "mimeType": "image/png"}],
+        "accessors": [{"bufferView": i, "componentType": 5126, "count": 3, "type": f"VEC{3 - i}"} for i in range(2)],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 36, "byteLength": 24},
+            {"buffer": 0, "byteOffset": 60, "byteLength": len(picture)},
+        ],
+        "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
+    }
+    (folder / "a.gltf").write_text(json.dumps(document | changes))
+    return folder / "a.gltf"
+
+
+def test_a_gltf_texture_is_embedded_and_wraps_as_its_sampler_says(tmp_path: Path) -> None:
+    mesh = load_mesh(gltf(tmp_path))
+    assert mesh.notes == () and mesh.materials[0] == MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=0)
+    assert mesh.textures[0].wrap == ("mirror", "clamp")
+    np.testing.assert_array_equal(mesh.textures[0].pixels, FOUR)
+    np.testing.assert_allclose(mesh.corner_positions[0], [(0, 0), (1, 0), (0, 1)])  # type: ignore[index]
+
+
+def test_a_texture_transform_scales_turns_and_moves(tmp_path: Path) -> None:
+    transform = {"offset": [0.25, 1], "rotation": np.pi / 2, "scale": [2, 3]}
+    texture = {"index": 0, "extensions": {"KHR_texture_transform": transform}}
+    mesh = load_mesh(gltf(tmp_path, materials=[{"pbrMetallicRoughness": {"baseColorTexture": texture}}]))
+    np.testing.assert_allclose(mesh.corner_positions[0], [(0.25, 1), (0.25, -1), (3.25, 1)])  # type: ignore[index]
+
+
+def test_hardware_without_textures_shows_their_mean(tmp_path: Path) -> None:
+    mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3 4/4"))
+    told: list[str] = []
+    with notes.opened(told.append):
+        plain = with_materials(Scene(MeshSource(name="square")), mesh, 8, corner_colours=False, textures=False)
+    assert plain.materials == (MeshMaterial(albedo=(0.25, 0.5, 0.5)),) and plain.textures == ()
+    assert "set geometry.cornerColours=true and geometry.textureBytes=16384" in " ".join(told)
+    (replaced,) = with_overrides(mesh.materials, Material(albedo=(0.1, 0.2, 0.3)))
+    assert replaced.texture is None
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.sampled_from(["repeat", "mirror", "clamp"]),
+    st.floats(-4, 4, allow_subnormal=False),
+    st.floats(-4, 4, allow_subnormal=False),
+)
+def test_a_texture_goes_on_beyond_its_picture(wrap: Wrap, u: float, v: float) -> None:
+    """As the same picture in a larger one would."""
+    random = np.random.default_rng(3)
+    pixels = random.integers(0, 256, (5, 7, 3), dtype=np.uint8)
+    large = {
+        "repeat": np.tile(pixels, (10, 10, 1)),
+        "mirror": np.pad(pixels, ((25, 20), (35, 28), (0, 0)), mode="symmetric"),
+        "clamp": np.pad(pixels, ((25, 20), (35, 28), (0, 0)), mode="edge"),
+    }[wrap]
+    found = Texture("a", pixels, (wrap, wrap)).colours(np.array([[u, v]]))
+    count = np.array(large.shape[1::-1]) / (7, 5)
+    whole = Texture("b", large, ("clamp", "clamp")).colours((np.array([[u, v]]) + 5) / count)
+    np.testing.assert_allclose(found, whole, atol=1e-9)
+
+
+def test_colours_are_bilinear_and_linear() -> None:
+    texture = Texture("a", FOUR)
+    np.testing.assert_allclose(texture.colours(np.array([[0.25, 0.25], [0.5, 0.25]])), [(1, 0, 0), (0.5, 0.5, 0)])
+    np.testing.assert_allclose(texture.mean, (0.5, 0.5, 0.5))
+    grey = Texture("b", np.full((1, 1, 3), 128, np.uint8))
+    np.testing.assert_allclose(grey.mean, linear_from_srgb(np.full(3, 128 / 255)))
+
+
+@pytest.mark.parametrize("missing", ["images", "textures"])
+def test_a_texture_that_does_not_exist_is_refused(tmp_path: Path, missing: str) -> None:
+    from colonnade.common.errors import UserError
+
+    with pytest.raises(UserError, match=rf"{missing}\[0\] is used, but does not exist"):
+        load_mesh(gltf(tmp_path, **{missing: []}))

@@ -1,0 +1,85 @@
+"""Textures on the device against the reference, which samples the pictures themselves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from colonnade.common.image_io import encode_srgb
+from colonnade.design.generator import manifest_for
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.texture import Texture
+from colonnade.quality.image_metrics import psnr
+from colonnade.reference.render import render_reference
+from colonnade.render.frames import render_model
+from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Scene
+from colonnade.scene.view import make_view
+
+SIZE = (320, 240)
+SCENE = Scene(
+    MeshSource(name="sphere:4"),
+    camera=Camera(position=(1.5, 1.2, 3.4), target=(0.0, 0.0, 0.0), fov=38.0),
+    light=Light(),
+    background=Background((0.25, 0.45, 0.7)),
+)
+
+
+def settings(size: int) -> tuple[str, ...]:
+    return ("geometry.cornerColours=true", f"geometry.textureBytes={size}")
+
+
+def painted(edge: int) -> Texture:
+    """A painting with soft and hard borders, and lines of a few pixels: uint8 [edge, edge, 3]."""
+    v, u = np.mgrid[:edge, :edge] / edge
+    sky = np.stack([0.2 + 0.3 * v, 0.4 + 0.3 * v, 0.9 - 0.2 * v], axis=-1)
+    hills = v > 0.55 + 0.1 * np.sin(9 * u) + 0.03 * np.sin(31 * u)
+    grass = np.stack([0.25 + 0.2 * u, 0.5 + 0.1 * np.sin(40 * v), 0.15 + 0 * u], axis=-1)
+    colours = np.where(hills[..., None], grass, sky)
+    sun = np.hypot(u - 0.3, v - 0.25)
+    colours = np.where((sun < 0.12)[..., None], (1.0, 0.85, 0.3), colours)
+    fence = hills & ((np.sin(160 * u) > 0.9) | (np.abs(v - 0.8) < 0.01))
+    return Texture("painting", np.rint(255 * np.where(fence[..., None], (0.9, 0.88, 0.8), colours)).astype(np.uint8))
+
+
+def sphere(edge: int) -> Mesh:
+    """A sphere with the painting around it twice, from longitude and latitude; faces at the seam go on beyond it."""
+    mesh = load_mesh("sphere:4")
+    x, y, z = mesh.vertices.T
+    around = np.arctan2(x, z)[mesh.faces] / np.pi
+    around = np.where(around < around.max(axis=1, keepdims=True) - 1.0, around + 2.0, around)
+    positions = np.stack([around, (np.arccos(np.clip(y, -1, 1)) / np.pi)[mesh.faces]], axis=-1)
+    materials = (MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=0),)
+    return replace(mesh, materials=materials, textures=(painted(edge),), corner_positions=positions)
+
+
+def quality(mesh: Mesh, config: str, overrides: tuple[str, ...], material: Material) -> float:
+    """PSNR of the model's frame against the reference's."""
+    scene = replace(SCENE, material=material)
+    manifest = manifest_for(config, overrides).manifest
+    view = make_view(scene, mesh.extent, *SIZE, mesh.materials)
+    device = render_model(scene, mesh, manifest, SIZE)
+    return psnr(encode_srgb(render_reference(mesh, view).image), encode_srgb(device.image))
+
+
+@pytest.mark.parametrize("config", ["16b16s32d", "24b24s64d", "32b32s64d"])
+def test_the_device_shows_the_texture_of_the_reference(config: str) -> None:
+    """Far nearer than with one colour; on mirrors and glass as a tint."""
+    mesh = sphere(256)
+    for kind in ("diffuse", "mirror", "glass"):
+        found = quality(mesh, config, settings(16384), Material(kind=kind))
+        plain = quality(mesh, config, (), Material(kind=kind))
+        print(f"{config}, {kind}: {found:.1f} dB, {plain:.1f} dB with one colour")
+        assert found > 30.0 and found > plain + 8.0
+
+
+def test_more_bytes_keep_more_of_a_texture() -> None:
+    mesh = sphere(1024)
+    found = [
+        quality(mesh, "32b32s64d", settings(size), Material(kind="diffuse")) for size in (5632, 8192, 16384, 21632)
+    ]
+    print("dB in 5,632, 8,192, 16,384 and 21,632 bytes: " + ", ".join(f"{one:.1f}" for one in found))
+    assert found == sorted(found) and found[-1] > found[0] + 1.0

@@ -1,0 +1,43 @@
+"""The device image has the words that docs/bus-shell.md says; the simulated shell loads it in test_shell.py."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colonnade.design.manifest import Manifest
+from colonnade.mesh.load import load_mesh
+from colonnade.scene_image.device_image import ALIGNMENT, device_image
+from colonnade.scene_image.file import LoadSection
+from colonnade.scene_image.packer import pack
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture(scope="module")
+def hardware() -> Manifest:
+    return Manifest.load(ROOT / "configs" / "golden" / "small.json")
+
+
+def test_an_image_has_a_header_and_a_section_for_each_memory(hardware: Manifest) -> None:
+    palette = np.arange(256 * 5, dtype=np.uint8).reshape(256, 5)
+    image = replace(pack(load_mesh("cube"), hardware), attributes=(LoadSection("albedo.palette", palette),))
+    data = device_image(image, hardware)
+    words = np.frombuffer(data, dtype="<u4")
+    assert data[:8] == b"CLNDLOAD" and len(data) % ALIGNMENT == 0
+    assert words[2:4].tolist() == [1, len(data)] and words[12] == 2 and not words[13:32].any()
+    assert "".join(f"{word:08x}" for word in words[4:12]) == hardware.format_hash
+
+    record_words = hardware.record_bits // 32
+    count = len(image.records)
+    assert words[32:36].tolist() == [0, count, 0, 0]
+    records = words[36 : 36 + count * record_words]
+    assert records.tobytes() == image.records.tobytes()
+    rest = words[36 + count * record_words :]
+    assert rest[:4].tolist() == [2, 256, 0, 0]
+    entries = rest[4 : 4 + 2 * 256].view(np.uint8).reshape(256, 8)
+    assert (entries[:, :5] == palette).all() and not entries[:, 5:].any()
+    assert not rest[4 + 2 * 256 :].any() and len(rest[4 + 2 * 256 :]) < 32

@@ -1,0 +1,101 @@
+package colonnade
+
+import chisel3._
+import colonnade.axi.AxiPins
+import colonnade.bus._
+import colonnade.config.{ColonnadeConfig, ShellConfig}
+import colonnade.formats.RegisterMap
+import colonnade.memory.DramPort
+import colonnade.unit.{RenderUnit, RenderUnitModule}
+
+/** The device in its AXI4 shell: registers by AXI4-Lite, images read and frames written by an AXI4 master, an interrupt;
+  * docs/bus-shell.md.
+  *
+  * @param renderUnit makes a render unit; specs pass another one with the same ports
+  */
+final class ColonnadeAxi(
+    config:     ColonnadeConfig,
+    shell:      ShellConfig,
+    renderUnit: ColonnadeConfig => RenderUnitModule = new RenderUnit(_)
+) extends Module {
+  val registerPins = IO(AxiPins.lite(ShellMap.addressBits)).suggestName("s_axil")
+  val masterPins   = IO(AxiPins.readsAndWrites(BurstWriter.idBits, shell.busBytes)).suggestName("m_axi")
+
+  /** With a cache: reads of the scene in DRAM. */
+  val scenePins = config.columnBvhMemory.cache.map { cache =>
+    IO(AxiPins.reads(DramPort.idBits(config), cache.busBytes)).suggestName("m_axi_scene")
+  }
+  val interrupt = IO(Output(Bool())).suggestName("irq")
+
+  private val slave      = Module(new AxiLiteSlave(ShellMap.addressBits))
+  private val registers  = Module(new ShellRegisters(config, shell))
+  private val control    = Module(new ShellControl(config))
+  private val writeGuard = Module(new AxiWriteGuard(BurstWriter.idBits, shell.busBytes))
+  private val readGuard  = Module(new AxiReadGuard(BurstWriter.idBits, shell.busBytes, ImageReader.maxBursts))
+
+  // What a soft reset resets
+  private val clears = reset.asBool || control.io.reset
+  private val device = withReset(clears)(Module(new Colonnade(config, renderUnit)))
+  private val writer = withReset(clears)(Module(new FramebufferWriter(config, shell)))
+  private val loader = withReset(clears)(Module(new ImageLoader(config, shell)))
+
+  // Registers
+  registerPins.attach(slave.axi)
+  registers.io.access :<>= slave.access
+  registers.io.framebufferErrors := control.io.errors
+  registers.io.imageErrors       := loader.io.errors
+  registers.io.status            := control.io.status
+  registers.io.events            := control.io.events
+  registers.io.deviceIsFree      := !control.io.start
+  interrupt                      := registers.io.interrupt
+  control.io.commands            := registers.io.commands
+  control.io.settings            := registers.io.framebuffer
+  control.io.writesAreDone       := registers.io.writesAreDone
+
+  // The device's register port: the host's, or the start of a frame
+  private val start = RegisterMap(config).find(_.name == "control.start").get
+  device.io.register <> registers.io.device
+  when(control.io.start) {
+    device.io.register.write     := true.B
+    device.io.register.address   := start.address.U
+    device.io.register.writeData := 1.U
+  }
+  device.io.memoryHolds.foreach(_ := 0.U)
+
+  // Frames
+  control.io.deviceDone    := device.io.done
+  control.io.writerIsIdle  := writer.io.isIdle && writeGuard.io.isIdle
+  control.io.windowError   := writer.io.windowError
+  control.io.responseError := writer.io.responseError
+  writer.io.start          := control.io.start
+  writer.io.flush          := control.io.flush
+  writer.io.settings       := control.io.framebuffer
+  writer.io.pixels.zip(device.io.pixels).foreach { case (sink, pixels) => sink :<>= pixels }
+  writeGuard.io.inner :<>= writer.io.axi
+
+  // Images
+  control.io.loaderIsIdle := loader.io.isIdle
+  control.io.loadError    := loader.io.errors.asUInt.orR
+  loader.io.start         := control.io.load
+  loader.io.settings      := registers.io.image
+  device.io.load :<>= loader.io.load
+  readGuard.io.inner :<>= loader.io.axi
+
+  // The bus
+  private val master = Seq("aw" -> writeGuard.io.axi.aw, "w" -> writeGuard.io.axi.w, "ar" -> readGuard.io.axi.ar)
+  master.foreach { case (channel, stream) => masterPins.drive(channel, stream) }
+  masterPins.receive("b", writeGuard.io.axi.b)
+  masterPins.receive("r", readGuard.io.axi.r)
+  private val sceneGuard = scenePins.map { pins =>
+    val cache = config.columnBvhMemory.cache.get
+    val guard = Module(new AxiReadGuard(DramPort.idBits(config), cache.busBytes, cache.sharedMisses + 2))
+    guard.io.inner :<>= device.io.memory.get
+    pins.drive("ar", guard.io.axi.ar)
+    pins.receive("r", guard.io.axi.r)
+    guard
+  }
+  private val guards = readGuard +: sceneGuard.toSeq
+  guards.foreach(_.io.abandon := control.io.reset)
+  writeGuard.io.abandon := control.io.reset
+  control.io.busIsIdle  := writeGuard.io.isIdle && guards.map(_.io.isIdle).reduce(_ && _)
+}

@@ -1,0 +1,70 @@
+package colonnade.bus
+
+import chisel3._
+import colonnade.axi.Axi
+
+/** The sources of the interrupt, in the order of their bits. */
+object Interrupts {
+  val names: Seq[String] = Seq("frameDone", "imageDone", "error")
+  def count: Int = names.size
+}
+
+/** Bits of `framebuffer.errors`. */
+object FramebufferError {
+  val names: Seq[String] = Seq("window", "response", "alignment", "format")
+  def count: Int = names.size
+}
+
+/** Errors of a frame's way to memory. Sticky until the next frame starts. */
+final class FramebufferError extends Bundle {
+
+  /** In the order of [[FramebufferError.names]], bit 0 last. */
+  val format    = Bool()
+  val alignment = Bool()
+  val response  = Bool()
+  val window    = Bool()
+}
+
+/** Bits of `image.errors`. */
+object ImageError {
+  val names: Seq[String] =
+    Seq("window", "response", "alignment", "magic", "formatHash", "section", "length")
+  def count: Int = names.size
+}
+
+/** Why an image was refused. Sticky until the next load starts. */
+final class ImageError extends Bundle {
+
+  /** In the order of [[ImageError.names]], bit 0 last. */
+  val length     = Bool()
+  val section    = Bool()
+  val formatHash = Bool()
+  val magic      = Bool()
+  val alignment  = Bool()
+  val response   = Bool()
+  val window     = Bool()
+}
+
+/** Bytes from `base` up to, and without, `end`. */
+final class AddressWindow extends Bundle {
+  val base = UInt(Axi.addressBits.W)
+  val end  = UInt(Axi.addressBits.W)
+
+  /** Whether `bytes` bytes from `address` on lie inside. */
+  def contains(address: UInt, bytes: UInt): Bool = address >= base && (address +& bytes) <= end
+}
+
+/** Where an image lies. */
+final class ImageSettings extends Bundle {
+  val base   = UInt(Axi.addressBits.W)
+  val bytes  = UInt(32.W)
+  val window = new AddressWindow
+}
+
+/** Where pixels go. */
+final class FramebufferSettings extends Bundle {
+  val base   = UInt(Axi.addressBits.W)
+  val stride = UInt(24.W)
+  val format = UInt(PixelFormat.getWidth.W)
+  val window = new AddressWindow
+}

@@ -1,0 +1,30 @@
+package colonnade.bus
+
+import chisel3._
+
+final class InterruptControllerIO extends Bundle {
+  private def bits = UInt(Interrupts.count.W)
+
+  /** Pulses of the sources. */
+  val events = Input(bits)
+
+  /** Writes of the host, 0 without one: status bits to clear, status bits to set. */
+  val clear = Input(bits)
+  val test  = Input(bits)
+
+  val enable = Input(bits)
+  val status = Output(bits)
+
+  /** High while an enabled status bit is set. */
+  val interrupt = Output(Bool())
+}
+
+/** A level interrupt. A status bit stays until the host clears it; an event in the same cycle wins. */
+final class InterruptController extends Module {
+  val io = IO(new InterruptControllerIO)
+
+  private val status = RegInit(0.U(Interrupts.count.W))
+  status       := (status & ~io.clear) | io.events | io.test
+  io.status    := status
+  io.interrupt := RegNext((status & io.enable).orR, false.B)
+}

@@ -1,0 +1,81 @@
+package colonnade.bus
+
+import chisel3._
+import chisel3.util._
+import colonnade.config.{ColonnadeConfig, ShellConfig}
+
+/** A tile's pixels in one line of the frame. */
+final class TileRow(config: ColonnadeConfig) extends Bundle {
+
+  /** Number of the tile in its line, and of the line. */
+  val tile = UInt((config.numbers.coordinateBits - log2Ceil(config.frame.tileSize)).W)
+  val y    = UInt(config.numbers.coordinateBits.W)
+
+  /** Pixels that are there, the leftmost in bit 0. */
+  val mask   = UInt(config.frame.tileSize.W)
+  val pixels = Vec(config.frame.tileSize, UInt((8 * PixelFormat.maxBytes).W))
+}
+
+/** Gathers the pixels of a column, which come in any order, to rows of a tile: a write-combining buffer.
+  *
+  * A row leaves when it is whole, when another one needs its place, or at `flush`. A pixel enters per cycle; a row leaves
+  * in three.
+  */
+final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Module {
+  private val tileBits = log2Ceil(config.frame.tileSize)
+
+  val pixels = IO(Flipped(Decoupled(new EncodedPixel(config))))
+  val out    = IO(Decoupled(new TileRow(config)))
+
+  /** No pixel will come; until idle. */
+  val flush  = IO(Input(Bool()))
+  val isIdle = IO(Output(Bool()))
+
+  private val valid = RegInit(VecInit.fill(shell.rows)(false.B))
+  private val tags  = Reg(Vec(shell.rows, UInt((pixels.bits.x.getWidth - tileBits + pixels.bits.y.getWidth).W)))
+  private val masks = Reg(Vec(shell.rows, UInt(config.frame.tileSize.W)))
+  private val data  = SyncReadMem(shell.rows, chiselTypeOf(out.bits.pixels))
+
+  // A pixel joins its row, or begins one
+  private val tag     = (pixels.bits.x >> tileBits) ## pixels.bits.y
+  private val hits    = VecInit(valid.zip(tags).map { case (isValid, of) => isValid && of === tag })
+  private val isHit   = hits.asUInt.orR
+  private val hasFree = !valid.asUInt.andR
+  private val row     = Mux(isHit, OHToUInt(hits), PriorityEncoder(~valid.asUInt))
+  private val column  = UIntToOH(pixels.bits.x(tileBits - 1, 0), config.frame.tileSize)
+  pixels.ready := isHit || hasFree
+  when(pixels.fire) {
+    valid(row) := true.B
+    tags(row)  := tag
+    masks(row) := Mux(isHit, masks(row), 0.U) | column
+    data.write(row, VecInit.fill(config.frame.tileSize)(pixels.bits.data), column.asBools)
+  }
+
+  // A row leaves
+  private val isReading = RegInit(false.B)
+  private val isOut     = RegInit(false.B)
+  private val leaving   = Reg(new TileRow(config))
+  private val whole     = VecInit(valid.zip(masks).map { case (isValid, mask) => isValid && mask.andR }).asUInt
+  private val victim    = RegInit(0.U(log2Ceil(shell.rows).W))
+  private val isForced  = pixels.valid && !isHit && !hasFree
+  private val isFlushed = flush && !pixels.valid && valid.asUInt.orR
+  private val evicted   = Mux(whole.orR, PriorityEncoder(whole), Mux(isForced, victim, PriorityEncoder(valid.asUInt)))
+  private val evicts    = !isReading && !isOut && (whole.orR || isForced || isFlushed)
+  private val read      = data.read(evicted, evicts)
+  isReading := evicts
+  when(evicts) {
+    valid(evicted) := false.B
+    leaving.tile   := tags(evicted) >> pixels.bits.y.getWidth
+    leaving.y      := tags(evicted)
+    leaving.mask   := masks(evicted)
+    when(!whole.orR) { victim := victim + 1.U }
+  }
+  when(isReading) {
+    leaving.pixels := read
+    isOut          := true.B
+  }
+  when(out.fire) { isOut := false.B }
+  out.valid := isOut
+  out.bits  := leaving
+  isIdle    := !valid.asUInt.orR && !isReading && !isOut
+}

@@ -1,0 +1,131 @@
+package colonnade.bus
+
+import chisel3._
+import chisel3.util._
+import colonnade.config.ColonnadeConfig
+
+final class ShellControlIO extends Bundle {
+  val commands = Input(new ShellCommands)
+  val settings = Input(new FramebufferSettings)
+
+  /** The device has all of its registers. */
+  val writesAreDone = Input(Bool())
+
+  val status = Output(new ShellStatus)
+  val events = Output(UInt(Interrupts.count.W))
+
+  /** Of the frame that runs: constant until its end. */
+  val framebuffer = Output(new FramebufferSettings)
+  val errors      = Output(new FramebufferError)
+
+  /** A pulse: the device starts a frame, and the writer clears its errors. `deviceDone` is low in the next cycle. */
+  val start      = Output(Bool())
+  val deviceDone = Input(Bool())
+
+  val flush = Output(Bool())
+
+  /** All rows are written, and all writes answered. */
+  val writerIsIdle  = Input(Bool())
+  val windowError   = Input(Bool())
+  val responseError = Input(Bool())
+
+  /** A pulse. */
+  val load         = Output(Bool())
+  val loaderIsIdle = Input(Bool())
+  val loadError    = Input(Bool())
+
+  /** Resets the device, the writer and the loader, and abandons their bursts, until the bus is idle. */
+  val reset     = Output(Bool())
+  val busIsIdle = Input(Bool())
+}
+
+/** Runs frames and loads, one at a time, and soft resets.
+  *
+  * A frame ends when the device has ended it, all its rows are written and all writes are answered. A frame that is started
+  * while one runs is queued, and begins in the next cycle but one after its end. A soft reset takes effect in any state.
+  */
+final class ShellControl(config: ColonnadeConfig) extends Module {
+  import ShellControl._
+
+  val io = IO(new ShellControlIO)
+
+  private object State extends ChiselEnum {
+    val idle, begin, running, flushing, loading, resetting = Value
+  }
+  private val state    = RegInit(State.idle)
+  private val isQueued = RegInit(false.B)
+  private val settings = Reg(new FramebufferSettings)
+  private val resets   = RegInit(0.U(log2Ceil(resetCycles + 1).W))
+
+  private val rowBytesLog = log2Ceil(config.frame.tileSize).U +& PixelFormat.bytesLog(settings.format)
+  private val rowMask     = ((1.U << rowBytesLog) - 1.U)(log2Ceil(config.frame.tileSize * PixelFormat.maxBytes) - 1, 0)
+  private val isLegal     = PixelFormat.isLegal(settings.format)
+  private val isAligned   = !((settings.base | settings.stride) & rowMask).orR
+  private val refusals    = RegInit(0.U.asTypeOf(new FramebufferError))
+  private val begins      = state === State.begin
+
+  private val frameDone = (state === State.flushing && io.writerIsIdle) || (begins && !io.start)
+  private val loadDone  = state === State.loading && io.loaderIsIdle
+  private val isLoading = RegNext(state === State.loading, false.B) // from the second cycle on
+
+  when(io.commands.start) { isQueued := true.B }
+  switch(state) {
+    is(State.idle) {
+      when((io.commands.start || isQueued) && io.writesAreDone) {
+        state    := State.begin
+        isQueued := false.B
+        settings := io.settings
+      }.elsewhen(io.commands.load) { state := State.loading }
+    }
+    is(State.begin) {
+      refusals           := 0.U.asTypeOf(refusals)
+      refusals.format    := !isLegal
+      refusals.alignment := !isAligned
+      state              := Mux(io.start, State.running, State.idle)
+    }
+    is(State.running) {
+      when(io.deviceDone) { state := State.flushing }
+    }
+    is(State.flushing) {
+      when(frameDone) { state := State.idle }
+    }
+    is(State.loading) {
+      when(loadDone && isLoading) { state := State.idle }
+    }
+    is(State.resetting) {
+      when(resets =/= 0.U) { resets := resets - 1.U }
+        .elsewhen(io.busIsIdle) { state := State.idle }
+    }
+  }
+  when(io.commands.reset) {
+    state    := State.resetting
+    isQueued := false.B
+    refusals := 0.U.asTypeOf(refusals)
+    resets   := resetCycles.U
+  }
+
+  io.start            := begins && isLegal && isAligned
+  io.load             := state === State.idle && io.commands.load
+  io.flush            := state === State.flushing
+  io.reset            := state === State.resetting
+  io.framebuffer      := settings
+  io.errors           := refusals
+  io.errors.window    := io.windowError
+  io.errors.response  := io.responseError
+  io.status.isRunning := begins || state === State.running || state === State.flushing
+  io.status.isQueued  := isQueued
+  io.status.isLoading := state === State.loading
+
+  // A command counts from the next cycle on, in which no other request is answered
+  io.status.isResetting := state === State.resetting
+
+  private val ended    = loadDone && isLoading
+  private val hasError = Mux(ended, io.loadError, io.errors.asUInt.orR || (begins && !io.start))
+  io.events := ((frameDone || ended) && hasError) ## ended ## frameDone
+}
+
+object ShellControl {
+
+  /** Shortest soft reset. */
+  val resetCycles: Int = 8
+}

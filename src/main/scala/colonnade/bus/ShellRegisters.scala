@@ -1,0 +1,185 @@
+package colonnade.bus
+
+import chisel3._
+import chisel3.util._
+import colonnade.axi.AxiLite
+import colonnade.config.{ColonnadeConfig, ShellConfig}
+import colonnade.formats.{Access, RegisterFile, RegisterMap, RegisterPort}
+
+/** Pulses from the host. */
+final class ShellCommands extends Bundle {
+  val reset = Bool()
+  val load  = Bool()
+  val start = Bool()
+}
+
+/** The state of the shell, in the order of `status`, bit 0 last. */
+final class ShellStatus extends Bundle {
+
+  /** The shell is in a soft reset. */
+  val isResetting = Bool()
+
+  /** An image is being loaded. */
+  val isLoading = Bool()
+
+  /** A frame waits for the end of the running one. */
+  val isQueued = Bool()
+
+  /** A frame runs. */
+  val isRunning = Bool()
+}
+
+/** A write to a register of the device. */
+final class PostedWrite(config: ColonnadeConfig) extends Bundle {
+  val address = UInt(RegisterFile.addressBits(config).W)
+  val data    = UInt(AxiLite.dataBits.W)
+}
+
+final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
+  val access = Flipped(new RegisterAccess(ShellMap.addressBits))
+
+  /** To the device's registers. The port is lent to the shell's control in some cycles. */
+  val device       = Flipped(new RegisterPort(RegisterFile.addressBits(config)))
+  val deviceIsFree = Input(Bool())
+
+  val framebuffer = Output(new FramebufferSettings)
+  val image       = Output(new ImageSettings)
+  val commands    = Output(new ShellCommands)
+
+  /** All writes to the device's registers have arrived there. */
+  val writesAreDone = Output(Bool())
+
+  val status            = Input(new ShellStatus)
+  val framebufferErrors = Input(new FramebufferError)
+  val imageErrors       = Input(new ImageError)
+
+  /** Pulses, see [[Interrupts]]. */
+  val events    = Input(UInt(Interrupts.count.W))
+  val interrupt = Output(Bool())
+}
+
+/** The registers of [[ShellMap]], and the way to those of the device. What is written there while a frame runs waits for
+  * its end; all of the device's registers fit.
+  *
+  * A request is answered in the next cycle. The answer is an error, and a write has no effect, if the address has no
+  * register, the register cannot be written or not now, some bytes of the word are not written, or the value does not fit.
+  */
+final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends Module {
+  val io = IO(new ShellRegistersIO(config))
+
+  private val request     = io.access.request.bits
+  private val isDevice    = request.address >= (ShellMap.deviceBase / 4).U
+  private val deviceWord  = request.address(RegisterFile.addressBits(config) - 1, 0)
+  private val deviceWords = RegisterMap.size(RegisterMap(config))
+  require(ShellMap.deviceBase + 4 * deviceWords <= (1 << ShellMap.addressBits), "the device's registers fit")
+
+  // Writes to the device wait while a frame runs
+  private val posted = withReset(reset.asBool || io.status.isResetting) {
+    Module(new Queue(new PostedWrite(config), 1 << log2Ceil(deviceWords), useSyncReadMem = true))
+  }
+  private val delivers = posted.io.deq.valid && !io.status.isRunning
+  posted.io.deq.ready := !io.status.isRunning
+  io.writesAreDone    := !posted.io.deq.valid
+
+  io.access.request.ready := !isDevice || request.isWrite || (io.deviceIsFree && !delivers)
+  private val accepts = io.access.request.fire
+  private val writes  = accepts && request.isWrite && request.isWhole
+
+  // Registers of the shell
+  private val settings = ShellMap.registers.filter(_.access == Access.ReadWrite).filterNot(_.name == "interrupt.status")
+  private val values   = settings.map { register =>
+    register.name -> Seq.tabulate(register.words) { word =>
+      val bits = (register.width - word * AxiLite.dataBits).min(AxiLite.dataBits)
+      RegInit(0.U(bits.W)).suggestName(s"${register.name.replace('.', '_')}_$word")
+    }
+  }.toMap
+  private def value(name: String): UInt = Cat(values(name).reverse)
+
+  private val isIdle    = !io.status.asUInt.orR
+  private val canChange = !io.status.isQueued && !io.status.isResetting
+
+  /** Whether a register may be written now, by its name. */
+  private def mayWrite(name: String): Bool = name match {
+    case "control" =>
+      val commands = request.data(2, 0)
+      commands === 4.U || (commands === 2.U && isIdle) || (commands === 1.U && canChange && !io.status.isLoading)
+    case image if image.startsWith("image.")             => !io.status.isLoading
+    case framebuffer if framebuffer.startsWith("frameb") => canChange
+    case _                                               => true.B
+  }
+
+  private val writable = for {
+    register <- ShellMap.registers
+    if register.access != Access.ReadOnly
+    word <- 0 until register.words
+    bits   = (register.width - word * AxiLite.dataBits).min(AxiLite.dataBits)
+    isHere = !isDevice && request.address === ((register.address / 4) + word).U
+    fits   = if (bits == AxiLite.dataBits) true.B else !(request.data >> bits).orR
+  } yield (register.name, word) -> (isHere && fits && mayWrite(register.name))
+  private val isWritable                               = writable.toMap
+  private def written(name:     String, word: Int = 0) = writes && isWritable((name, word))
+  private def writtenBits(name: String, bits: Int)     = Mux(written(name), request.data(bits - 1, 0), 0.U)
+  for ((name, words) <- values; (word, index) <- words.zipWithIndex) when(written(name, index)) {
+    word := request.data
+  }
+
+  io.commands := writtenBits("control", 3).asTypeOf(io.commands)
+
+  private val interrupts = Module(new InterruptController)
+  interrupts.io.events := io.events
+  interrupts.io.clear  := writtenBits("interrupt.status", Interrupts.count)
+  interrupts.io.test   := writtenBits("interrupt.test", Interrupts.count)
+  interrupts.io.enable := value("interrupt.enable")
+  io.interrupt         := interrupts.io.interrupt
+
+  io.framebuffer.base        := value("framebuffer.base")
+  io.framebuffer.stride      := value("framebuffer.stride")
+  io.framebuffer.format      := value("framebuffer.format")
+  io.framebuffer.window.base := value("framebuffer.windowBase")
+  io.framebuffer.window.end  := value("framebuffer.windowEnd")
+  io.image.base              := value("image.base")
+  io.image.bytes             := value("image.bytes")
+  io.image.window.base       := value("image.windowBase")
+  io.image.window.end        := value("image.windowEnd")
+
+  // Registers of the device
+  private val deviceWritable =
+    VecInit(ShellMap.writableWords(config).map(_.U === deviceWord)).asUInt.orR && canChange && posted.io.enq.ready
+  private val inDevice = isDevice && request.address < (ShellMap.deviceBase / 4 + deviceWords).U
+  posted.io.enq.valid        := writes && inDevice && deviceWritable
+  posted.io.enq.bits.address := deviceWord
+  posted.io.enq.bits.data    := request.data
+  io.device.address          := Mux(delivers, posted.io.deq.bits.address, deviceWord)
+  io.device.read             := accepts && !request.isWrite && inDevice
+  io.device.write            := delivers
+  io.device.writeData        := posted.io.deq.bits.data
+
+  // Answers
+  private val constants = Map(
+    "identity"     -> ShellMap.identity,
+    "version"      -> ShellMap.version,
+    "capabilities" -> ShellMap.capabilities(config, shell.busBytes),
+    "frameSize"    -> ShellMap.frameSize(config)
+  ) ++ ShellMap.formatHash(config).zipWithIndex.map { case (word, index) => s"formatHash[$index]" -> word }
+  private val observed = Map(
+    "status"             -> io.status.asUInt,
+    "interrupt.status"   -> interrupts.io.status,
+    "framebuffer.errors" -> io.framebufferErrors.asUInt,
+    "image.errors"       -> io.imageErrors.asUInt
+  )
+  private val readable = for {
+    register <- ShellMap.registers
+    if register.access != Access.WriteOnly
+    word <- 0 until register.words
+    data = values.get(register.name).map(_(word)).orElse(observed.get(register.name))
+      .getOrElse(constants(register.name).U(AxiLite.dataBits.W))
+  } yield (!isDevice && request.address === (register.address / 4 + word).U) -> data.pad(AxiLite.dataBits)
+
+  private val wasDevice = RegNext(inDevice)
+  private val data      = RegNext(Mux1H(readable))
+  private val mayRead   = inDevice || VecInit(readable.map(_._1)).asUInt.orR
+  private val isWrite   = VecInit(writable.map(_._2)).asUInt.orR || (inDevice && deviceWritable)
+  io.access.response.valid        := RegNext(accepts, false.B)
+  io.access.response.bits.data    := Mux(wasDevice, io.device.readData, data)
+  io.access.response.bits.isError := RegNext(Mux(request.isWrite, !(isWrite && request.isWhole), !mayRead))
+}

@@ -1,0 +1,48 @@
+package colonnade.bus
+
+import chisel3._
+import chisel3.util.{Cat, RegEnable}
+import colonnade.config.NumberFormats
+
+/** Encodes a linear channel as 8 bits of sRGB (IEC 61966-2-1), rounded to the nearest code.
+  *
+  * A search by halves in the table of the least linear values of all codes, one bit of the code after the other. Two
+  * cycles, in which `enable` lets values move.
+  */
+final class SrgbEncoder extends Module {
+  val linear = IO(Input(UInt(NumberFormats.colourBits.W)))
+  val enable = IO(Input(Bool()))
+  val code   = IO(Output(UInt(SrgbEncoder.codeBits.W)))
+
+  /** The code's next bit, below the bits that are known. */
+  private def next(known: Option[UInt], value: UInt): UInt = {
+    val bit    = SrgbEncoder.codeBits - 1 - known.fold(0)(_.getWidth)
+    val tables = VecInit(SrgbEncoder.leastLinear.grouped(2 << bit).map(_(1 << bit).U(value.getWidth.W)).toSeq)
+    val least  = known.fold(tables.head)(tables(_))
+    known.fold((value >= least).asUInt)(Cat(_, value >= least))
+  }
+  private def half(known: Option[UInt], value: UInt): UInt =
+    (0 until SrgbEncoder.codeBits / 2).foldLeft(known)((bits, _) => Some(next(bits, value))).get
+
+  private val value = RegEnable(linear, enable)
+  private val high  = RegEnable(half(None, linear), enable)
+  code := RegEnable(half(Some(high), value), enable)
+}
+
+object SrgbEncoder {
+  val codeBits: Int = 8
+  val latency:  Int = 2
+
+  /** The code of a linear value. */
+  def apply(linear: Int): Int = {
+    val value   = linear.toDouble / ((1 << NumberFormats.colourBits) - 1)
+    val encoded = if (value <= 0.0031308) 12.92 * value else 1.055 * math.pow(value, 1 / 2.4) - 0.055
+    math.rint(255 * encoded).toInt
+  }
+
+  /** The least linear value of each code, or of a higher one. */
+  val leastLinear: IndexedSeq[Int] = {
+    val codes = (0 until 1 << NumberFormats.colourBits).map(apply)
+    (0 until 1 << codeBits).map(code => codes.indexWhere(_ >= code))
+  }
+}
