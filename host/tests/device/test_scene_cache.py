@@ -25,7 +25,7 @@ EVENTS = ("raysPrimary", "raysShadow", "raysInBox", "nodeReads", "triangleTests"
 
 def design_with(rows: int, columns: int, banks: int, buffers: int, sizes: tuple[int, ...]) -> GeneratedDesign:
     """A design with a cache of these sizes, in the order of its fields."""
-    names = ("lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes")
+    names = ("lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes", "parity")
     cache = json.dumps(dict(zip(names, sizes, strict=True)))
     memory = (f"columnBvhMemory.{field}" for field in (f"banks={banks}", f"recordBuffers={buffers}", f"cache={cache}"))
     return design_for("tiny", (f"array.rows={rows}", f"array.columns={columns}", *memory))
@@ -46,9 +46,9 @@ def assert_same(frame: Frame, expected: Frame) -> None:
 
 #: Rows, columns, banks, record buffers, cache: from one line that is awaited at a time to caches of some lines.
 SHAPES = {
-    "one of everything": (1, 1, 1, 1, (1, 1, 1, 1, 1, 1, 4)),
-    "two columns": (3, 2, 2, 2, (8, 2, 4, 16, 2, 8, 32)),
-    "four banks and two buses": (1, 5, 4, 3, (16, 4, 16, 32, 8, 16, 128)),
+    "one of everything": (1, 1, 1, 1, (1, 1, 1, 1, 1, 1, 4, False)),
+    "two columns": (3, 2, 2, 2, (8, 2, 4, 16, 2, 8, 32, False)),
+    "four banks and two buses": (1, 5, 4, 3, (16, 4, 16, 32, 8, 16, 128, True)),
 }
 
 
@@ -78,7 +78,7 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
 
 def test_a_scene_that_fits_is_read_once() -> None:
     """A line that the shared cache holds is never read again, whatever else happens while it is looked up."""
-    design = design_with(1, 5, 1, 2, (4, 1, 4, 1024, 16, 8, 32))
+    design = design_with(1, 5, 1, 2, (4, 1, 4, 1024, 16, 8, 32, False))
     image, registers = scene_of(design)
     lines = -(-len(image.records) // 4)
     assert lines <= 1024

@@ -70,7 +70,8 @@ final class Colonnade(
   // The scene in DRAM. After a request or a failed read, the caches forget it at the next start
   private val sceneMemory = config.columnBvhMemory.cache.map(_ => Module(new SceneMemory(config)).io)
   for (memory <- sceneMemory) {
-    val hasFailed  = memory.events.error || controller.io.memoryTimeout
+    val isWrong    = columns.flatMap(_.io.memoryError).fold(false.B)(_ || _) // by parity
+    val hasFailed  = memory.events.error || controller.io.memoryTimeout || isWrong
     val isStale    = RegInit(false.B)
     val invalidate = isStale && controller.io.frameStart
     isStale     := (isStale && !invalidate) || registers.io.invalidate.get || hasFailed

@@ -65,6 +65,7 @@ object ArbitraryConfig {
     sharedWays   <- Gen.oneOf(1, 2, 8)
     sharedMisses <- Gen.chooseNum(1, 16)
     busBytes     <- Gen.oneOf(4, 8, 16, 32, 64, 128)
+    parity       <- Gen.oneOf(true, false)
   } yield SceneCacheConfig(
     sets * ways * banks,
     ways,
@@ -72,7 +73,8 @@ object ArbitraryConfig {
     sharedSets * sharedWays * banks,
     sharedWays,
     sharedMisses * banks,
-    busBytes
+    busBytes,
+    parity
   )
 
   /** Maps with a legal size: at least their fixed parts, at most the reach of pointers. */

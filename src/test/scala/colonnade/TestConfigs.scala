@@ -86,7 +86,8 @@ object TestConfigs {
       ways:    Int = 2,
       misses:  Int = 2,
       depth:   Int = 256,
-      bus:     Int = 32
+      bus:     Int = 32,
+      parity:  Boolean = false
   ): ColonnadeConfig = tiny.copy(
     array = tiny.array.copy(rows = rows, columns = columns),
     columnBvhMemory = tiny.columnBvhMemory.copy(
@@ -99,7 +100,8 @@ object TestConfigs {
         sharedLines = 2 * sets * ways * banks,
         sharedWays = ways,
         sharedMisses = 2 * misses * banks,
-        busBytes = bus
+        busBytes = bus,
+        parity = parity
       ))
     )
   )

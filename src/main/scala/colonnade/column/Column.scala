@@ -41,7 +41,10 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
 
   /** With a cache: it forgets its lines; only while idle. */
   val invalidate = config.columnBvhMemory.cache.map(_ => Input(Bool()))
-  val tiles      = Flipped(Decoupled(new Tile(config)))
+
+  /** With parity: a record in the cache is wrong. */
+  val memoryError = Option.when(Lines.hasParity(config))(Output(Bool()))
+  val tiles       = Flipped(Decoupled(new Tile(config)))
 
   /** Tiles without a pixel whose primary ray may hit the object. */
   val backgroundTiles = Flipped(Decoupled(new Tile(config)))
@@ -110,6 +113,7 @@ final class Column(
     cache.lines      := io.lines.get(bank)
     cache.invalidate := io.invalidate.get
   }
+  for (error <- io.memoryError) error := RegNext(caches.flatMap(_.error).reduce(_ || _), false.B)
 
   // Environment: units read the column's own maps, or those that all columns share
   private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(config)).io)

@@ -100,7 +100,17 @@ object ConfigIO {
         readLatency = memory.int("readLatency"),
         holdable = memory.boolean("holdable"),
         cache = memory
-          .optionalSection("cache", "lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes")
+          .optionalSection(
+            "cache",
+            "lines",
+            "ways",
+            "misses",
+            "sharedLines",
+            "sharedWays",
+            "sharedMisses",
+            "busBytes",
+            "parity"
+          )
           .map(sceneCache)
       ),
       physicalAttributeMemory = root
@@ -209,7 +219,8 @@ object ConfigIO {
     sharedLines = cache.int("sharedLines"),
     sharedWays = cache.int("sharedWays"),
     sharedMisses = cache.int("sharedMisses"),
-    busBytes = cache.int("busBytes")
+    busBytes = cache.int("busBytes"),
+    parity = cache.boolean("parity")
   )
 
   private def written(cache: SceneCacheConfig) = ujson.Obj(
@@ -219,7 +230,8 @@ object ConfigIO {
     "sharedLines"  -> cache.sharedLines,
     "sharedWays"   -> cache.sharedWays,
     "sharedMisses" -> cache.sharedMisses,
-    "busBytes"     -> cache.busBytes
+    "busBytes"     -> cache.busBytes,
+    "parity"       -> cache.parity
   )
 
   private def precision(root: ConfigReader): PrecisionConfig = root.value("precision") match {

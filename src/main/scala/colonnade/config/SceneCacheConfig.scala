@@ -10,6 +10,7 @@ package colonnade.config
   * @param sharedWays   its associativity
   * @param sharedMisses lines that it can await from DRAM at a time
   * @param busBytes     width of the DRAM port
+  * @param parity       each record in a cache has a parity bit
   */
 final case class SceneCacheConfig(
     lines:        Int,
@@ -18,7 +19,8 @@ final case class SceneCacheConfig(
     sharedLines:  Int,
     sharedWays:   Int,
     sharedMisses: Int,
-    busBytes:     Int
+    busBytes:     Int,
+    parity:       Boolean
 ) {
   Require.oneOf("columnBvhMemory.cache.ways", ways, Seq(1, 2, 4, 8, 16))
   Require.oneOf("columnBvhMemory.cache.sharedWays", sharedWays, Seq(1, 2, 4, 8, 16))

@@ -3,7 +3,6 @@ package colonnade.memory
 import chisel3._
 import chisel3.util._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordFormats
 
 /** Ports of [[ColumnCache]]. */
 final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
@@ -15,6 +14,9 @@ final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
 
   /** Forgets all lines; only while idle. */
   val invalidate = Input(Bool())
+
+  /** With parity: that of a record which was answered or filled in the cycle before is wrong. */
+  val error = Option.when(Lines.hasParity(config))(Output(Bool()))
 
   /** No request is in flight, and no line is awaited. */
   val isIdle = Output(Bool())
@@ -34,6 +36,8 @@ final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
   * broadcast.
   *
   * A record follows a "later" for certain: the line is awaited before the answer, until it is announced.
+  *
+  * With parity, a record with a wrong one becomes zeros: a node without children, or a leaf without triangles.
   */
 final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val cache    = config.columnBvhMemory.cache.get
@@ -45,7 +49,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnCacheIO(config))
 
   private val tags    = new TagStore(sets, ways, lineBits)
-  private val records = SyncReadMem(sets * ways * Lines.records, new RecordFormats(config).record)
+  private val records = SyncReadMem(sets * ways * Lines.records, Lines.stored(config))
 
   private final class AwaitedLine {
     val isUsed                = RegInit(false.B)
@@ -56,6 +60,10 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val awaited = Seq.fill(cache.misses / banks)(new AwaitedLine)
 
   private def lineOf(address: UInt): UInt = (address >> Lines.wordBits).asUInt
+
+  /** A record without its parity. */
+  private def checked(stored: UInt): UInt =
+    if (Lines.hasParity(config)) Mux(stored.xorR, 0.U, stored.tail(1)) else stored
 
   // Cycle a: an announced line is taken if it is awaited
   private val takes         = io.lines.announced.valid && awaited.map(_.is(io.lines.announced.bits)).reduce(_ || _)
@@ -114,12 +122,15 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   )
   io.port.fill.get.valid        := fills
   io.port.fill.get.bits.address := lineNow ## word
-  io.port.fill.get.bits.record  := io.lines.record
+  io.port.fill.get.bits.record  := checked(io.lines.record)
 
   // Cycle c + 2: answer
   io.port.response.valid            := RegNext(accepted, false.B)
-  io.port.response.bits.record      := data
+  io.port.response.bits.record      := checked(data)
   io.port.response.bits.isLater.get := RegNext(isMiss, false.B)
+
+  for (error <- io.error)
+    error := RegNext((fills && io.lines.record.xorR) || (RegNext(isHit, false.B) && data.xorR), false.B)
 
   // Request awaited lines
   private val nextOH = PriorityEncoderOH(awaited.map(entry => entry.isUsed && !entry.isRequested))

@@ -79,10 +79,9 @@ final class DramReader(config: ColonnadeConfig) extends Module {
     isFull            := (takes && beat === (beats - 1).U) || (isFull && !line.ready)
     line.valid        := isFull
     line.bits.isError := isError
-    line.bits.records := gathered.asUInt(
-      Lines.records * new RecordFormats(config).recordBits - 1,
-      0
-    ).asTypeOf(line.bits.records)
+    line.bits.records := gathered.asUInt(Lines.records * new RecordFormats(config).recordBits - 1, 0)
+      .asTypeOf(Vec(Lines.records, new RecordFormats(config).record))
+      .map(Lines.withParity(config, _))
     port :<>= Queue(line, 1, pipe = true)
     isFor && ready
   }

@@ -13,6 +13,17 @@ object Lines {
   /** Width of the number of a line in its bank. */
   def lineBits(config: ColonnadeConfig): Int =
     RecordFormats.addressBits(config) - wordBits - log2Ceil(config.columnBvhMemory.banks)
+
+  /** Whether records have a parity bit from the DRAM port to the render units. */
+  def hasParity(config: ColonnadeConfig): Boolean = config.columnBvhMemory.cache.exists(_.parity)
+
+  /** A record in a cache or on a bus: its parity is the most significant bit, if it has one. Zeros have the right parity. */
+  def stored(config: ColonnadeConfig): UInt =
+    UInt((new RecordFormats(config).recordBits + (if (hasParity(config)) 1 else 0)).W)
+
+  /** Adds the parity to a record. */
+  def withParity(config: ColonnadeConfig, record: UInt): UInt =
+    if (hasParity(config)) record.xorR ## record else record
 }
 
 /** From a bank of the shared cache to the same bank of every column: a line that was read.
@@ -24,7 +35,7 @@ final class LineBroadcast(config: ColonnadeConfig) extends Bundle {
 
   /** The line's number in its bank. */
   val announced = Valid(UInt(Lines.lineBits(config).W))
-  val record    = new RecordFormats(config).record
+  val record    = Lines.stored(config)
 }
 
 object LineBroadcast {

@@ -4,11 +4,10 @@ import chisel3._
 import chisel3.util._
 import colonnade.common.RoundRobin
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordFormats
 
 /** A line from DRAM. */
 final class ReadLine(config: ColonnadeConfig) extends Bundle {
-  val records = Vec(Lines.records, new RecordFormats(config).record)
+  val records = Vec(Lines.records, Lines.stored(config))
 
   /** The read failed; the records count as 0, and the line is not kept. */
   val isError = Bool()
@@ -61,7 +60,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   val io = IO(new SharedCacheIO(config))
 
   private val tags    = new TagStore(sets, ways, lineBits)
-  private val lines   = SyncReadMem(sets * ways, Vec(Lines.records, new RecordFormats(config).record))
+  private val lines   = SyncReadMem(sets * ways, Vec(Lines.records, Lines.stored(config)))
   private val awaited = Module(new AwaitedLines(config, cache.sharedMisses / banks))
 
   /** By bus: whether a condition holds for any of its columns. */
@@ -166,7 +165,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   private val ready = VecInit(held.zip(arriving).map { case (record, other) => Mux(isTaken, other, record) })
   for ((port, isOn) <- io.lines.zip(isAnnounced)) {
     val begins = ShiftRegister(isOn, 2, false.B, true.B)
-    val rest   = Reg(Vec(Lines.records, new RecordFormats(config).record))
+    val rest   = Reg(Vec(Lines.records, Lines.stored(config)))
     rest        := Mux(begins, ready, VecInit(rest.tail :+ rest.last))
     port.record := rest.head
   }

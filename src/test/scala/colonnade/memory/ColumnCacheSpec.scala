@@ -3,6 +3,7 @@ package colonnade.memory
 import chiseltest._
 import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.RecordFormats
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -15,9 +16,50 @@ class ColumnCacheSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
 
   for ((banks, sets, ways, misses) <- Seq((1, 1, 1, 1), (2, 2, 2, 2), (2, 4, 1, 3), (4, 1, 4, 2)))
     it should s"answer from $sets sets of $ways ways, $misses misses, as one of $banks banks" in {
-      val config = TestConfigs.withCache(banks = banks, sets = sets, ways = ways, misses = misses)
+      val config = TestConfigs.withCache(banks = banks, sets = sets, ways = ways, misses = misses, parity = sets == 4)
       test(new ColumnCache(config)) { dut => new Surroundings(dut, config, new Random(7 * sets + ways)).run(6000) }
     }
+
+  it should "answer zeros for a record whose parity is wrong, and report it" in {
+    val config = TestConfigs.withCache(banks = 1, parity = true)
+    val wrong  = 1
+    test(new ColumnCache(config)) { dut =>
+      def content(word: Int): BigInt = BigInt(3 * word + 7)
+      dut.io.port.request.valid.poke(true)
+      dut.io.port.request.bits.poke(0)
+      dut.clock.step()
+      dut.io.port.request.valid.poke(false)
+      dut.clock.step(3)
+      dut.io.lines.announced.valid.poke(true)
+      dut.io.lines.announced.bits.poke(0)
+      dut.clock.step()
+      dut.io.lines.announced.valid.poke(false)
+      dut.clock.step(LineBroadcast.latency - 1)
+      for (word <- 0 until Lines.records) {
+        val right = stored(config, content(word))
+        dut.io.lines.record.poke(if (word == wrong) right.flipBit(100) else right)
+        dut.io.port.fill.get.bits.record.expect(if (word == wrong) BigInt(0) else content(word))
+        dut.io.error.get.expect(word == wrong + 1)
+        dut.clock.step()
+      }
+      for (word <- 0 until Lines.records) {
+        dut.io.port.request.valid.poke(true)
+        dut.io.port.request.bits.poke(word)
+        dut.clock.step()
+        dut.io.port.request.valid.poke(false)
+        dut.clock.step()
+        dut.io.port.response.valid.expect(true)
+        dut.io.port.response.bits.record.expect(if (word == wrong) BigInt(0) else content(word))
+        dut.clock.step()
+        dut.io.error.get.expect(word == wrong)
+      }
+    }
+  }
+
+  /** A record with its parity, if it has one. */
+  private def stored(config: ColonnadeConfig, record: BigInt): BigInt =
+    if (Lines.hasParity(config) && record.bitCount % 2 == 1) record.setBit(new RecordFormats(config).recordBits)
+    else record
 
   /** The controller in front of the cache, and the shared cache behind it. */
   private class Surroundings(dut: ColumnCache, config: ColonnadeConfig, random: Random) {
@@ -62,7 +104,8 @@ class ColumnCacheSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
         lastLine = now
         (0 until Lines.records).foreach(word => bus(now + 3 + word) = line * Lines.records + word)
       }
-      dut.io.lines.record.poke(bus.get(now).fold(BigInt(random.nextInt(99)))(contentOf))
+      dut.io.lines.record.poke(stored(config, bus.get(now).fold(BigInt(random.nextInt(99)))(contentOf)))
+      dut.io.error.foreach(_.expect(false))
 
       // A read
       val isAsking = asks && random.nextInt(5) > 0

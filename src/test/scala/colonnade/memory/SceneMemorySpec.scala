@@ -18,7 +18,15 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     (columns, banks, sets, ways, bus) <- Seq((1, 1, 1, 1, 64), (3, 2, 2, 2, 32), (3, 4, 1, 4, 16), (6, 2, 4, 1, 128))
   )
     it should s"serve $columns columns from $banks banks of $sets sets of $ways ways over a bus of $bus bytes" in {
-      val config = TestConfigs.withCache(columns = columns, banks = banks, sets = sets, ways = ways, bus = bus)
+      val config =
+        TestConfigs.withCache(
+          columns = columns,
+          banks = banks,
+          sets = sets,
+          ways = ways,
+          bus = bus,
+          parity = columns > 3
+        )
       test(new SceneMemory(config)).withAnnotations(Simulation.verilator) { dut =>
         val dram = new Dram(dut, config, new Random(columns))
         dram.run(requests = 120)
@@ -179,8 +187,10 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
         }
       }
       for ((line, word) <- coming.remove((now, bus, bank))) {
-        val record = port.record.peekInt()
-        if (!(failing(line) && record == 0)) record shouldBe recordOf(bank, line, word)
+        val record   = port.record.peekInt()
+        val expected = recordOf(bank, line, word)
+        val parity   = if (Lines.hasParity(config)) BigInt(expected.bitCount % 2) << bits else BigInt(0)
+        if (!(failing(line) && record == 0)) record shouldBe expected + parity
       }
       wants.values.foreach { case (_, since) => now - since should be < 3000 }
     }
