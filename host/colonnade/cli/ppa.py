@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from colonnade.cli.options import (
+    FILE,
     PositiveNumber,
     configuration_options,
     echo,
@@ -59,6 +60,12 @@ from colonnade.cli.options import (
     metavar="N",
     help="Maximum number of cycles to replay on the gate netlist, at some tens per second.",
 )
+@click.option(
+    "--rates",
+    type=FILE,
+    metavar="FILE",
+    help="JSON of colonnade bench for this configuration: print its rays per cycle at the chip's area.",
+)
 @strict_option
 @json_option
 def ppa(
@@ -72,6 +79,7 @@ def ppa(
     mesh: str,
     size: str | None,
     cycles: int,
+    rates: Path | None,
     json_file: Path | None,
 ) -> None:
     """Synthesise each unit of a configuration separately with Yosys, and sum the units.
@@ -87,24 +95,32 @@ def ppa(
     pixels = parse_size(size) if size is not None else None
     require_outputs(json_file)
     if target == "ecp5":
-        if liberties or delay is not None:
-            raise click.UsageError("--target ecp5 takes neither --liberty nor --delay", click.get_current_context())
+        if liberties or delay is not None or rates is not None:
+            raise click.UsageError(
+                "--target ecp5 takes none of --liberty, --delay and --rates", click.get_current_context()
+            )
         finish(_fpga(config, overrides), json_file)
         return
 
     from colonnade.common import progress
+    from colonnade.design.generator import manifest_for
     from colonnade.ppa.measure import measure
+    from colonnade.ppa.pages.equal_area import at_equal_area, rates_of
     from colonnade.ppa.pages.text import UnitTable, summary
     from colonnade.ppa.power.recording import Stimulus
     from colonnade.ppa.power.report import Operation
 
+    terminal = progress.for_terminal()
+    faster = None
+    if rates is not None:
+        faster = rates_of(rates, manifest_for(config, overrides, terminal).manifest.config_hash)
     table = UnitTable(echo)
     operation = Operation(megahertz, Stimulus.of_benchmark(mesh, pixels, cycles)) if power else None
-    report: Mapping[str, Any] = measure(
-        config, overrides, liberties, delay, operation, progress.for_terminal(), finished=table.print
-    )
+    report: Mapping[str, Any] = measure(config, overrides, liberties, delay, operation, terminal, finished=table.print)
     for line in summary(report):
         echo(line)
+    if faster is not None:
+        echo(at_equal_area(report, faster))
     finish(report, json_file)
 
 

@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 from colonnade.evaluation.bench import geometric_mean
 
-#: The memory that holds the scene. Areas are without it: its depth is a choice, and dwarfs all else.
+#: The scratchpad that holds the scene. Areas are without it: its depth is a choice, and dwarfs all else. The memories
+#: of caches are included.
 SCENE_MEMORY = "records"
 
 Better = Literal["higher", "lower"]
@@ -120,7 +121,9 @@ def described(found: Iterable[Column]) -> list[dict[str, Any]]:
 def area_figures(report: Mapping[str, Any]) -> dict[str, Any]:
     """A library's figures of area, from a report of `colonnade.ppa.measure`."""
     level, config = report["levels"]["array"], report["config"]
-    scene = sum(memory["kge"] for name, memory in report["memories"].items() if name == SCENE_MEMORY)
+    scene = 0.0
+    if config["columnBvhMemory"]["cache"] is None:
+        scene = sum(memory["kge"] for name, memory in report["memories"].items() if name == SCENE_MEMORY)
     kge = level["kge"] - scene * config["array"]["columns"]
     slowest = report["slowest_path"]
     return {

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
-from colonnade.explore.figures import Column, columns, front, point_figures
+from colonnade.explore.figures import Column, area_figures, columns, front, point_figures
 from colonnade.explore.render_index import index_rows, sensitivity
 from colonnade.explore.search import check_search, parse_condition, search_front
 from colonnade.explore.study import FieldValue, StudyFile, load_study
@@ -111,6 +111,23 @@ seed = 2
 [quality]
 [cycles]
 """
+
+
+def test_areas_are_without_scratchpads_and_with_caches() -> None:
+    def array_kge(cache: dict[str, int] | None) -> float:
+        report = {
+            "config": {"array": {"columns": 8}, "columnBvhMemory": {"cache": cache}},
+            "levels": {"array": {"kge": 1000.0, "logic_kge": 500.0}, "render_unit": {"kge": 10.0}},
+            "memories": {"records": {"kge": 50.0}, "stack": {"kge": 5.0}},
+            "units": {},
+            "chip": {"um2_per_gate": 0.5},
+            "slowest_path": {"ns": None, "fo4": None, "unit": None},
+        }
+        return float(area_figures(report)["array_kge"])
+
+    assert array_kge(None) == 600.0
+    assert array_kge({"lines": 256}) == 1000.0
+
 
 HAS = {"quality": True, "baseline": False, "cycles": True, "area": False, "power": False}
 

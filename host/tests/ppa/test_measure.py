@@ -221,7 +221,7 @@ def test_the_chip_has_141_kge_per_unit() -> None:
     [
         (("--liberty", "none.lib"), "no liberty none.lib"),
         (("--delay", "1"), "--delay needs --liberty"),
-        (("--target", "ecp5", "--delay", "1"), "takes neither --liberty nor --delay"),
+        (("--target", "ecp5", "--delay", "1"), "takes none of --liberty, --delay and --rates"),
         (("--delay", "0"), "--delay"),
     ],
 )

@@ -15,7 +15,7 @@ RENDER_UNIT = (
     *("ShadowRays", "ColourUnit", "EnvironmentStage", "RtController", "RecordFetch", "HitTable"),
 )
 COLUMN = ("ColumnBvhController", "ColumnEnvironment", "TileWalker", "BackgroundWalker", "PixelCollector")
-DEVICE = ("FrameController", "RegisterFile", "CounterFile")
+DEVICE = ("FrameController", "RegisterFile", "CounterFile", "SceneMemory")
 
 #: Dividers and square roots: parts of units that are synthesised separately and counted in their unit.
 PARTS = re.compile(r"(Divider|SquareRoot|RootDivider)(_\d+)?")

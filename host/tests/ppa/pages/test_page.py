@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
+from colonnade.common.errors import UserError
 from colonnade.ppa.pages.area import equal_area, gates
+from colonnade.ppa.pages.equal_area import at_equal_area, rates_of
 from colonnade.ppa.pages.page import page
 
 
@@ -52,6 +54,21 @@ def test_rays_at_equal_area_scale_with_the_area(tmp_path: Path) -> None:
     rows = [line.split("|")[3:6] for line in equal_area({"yosys": report()}, tmp_path).splitlines()[2:]]
     figures = [[float(cell) for cell in row] for row in rows]
     assert figures == [pytest.approx(row) for row in ([4.0, 2.0, 6.0], [4.6, 2.3, 5.2], [8.0, 4.0, 3.0])]
+
+
+def test_the_rate_at_the_area_of_everything_is_of_the_same_configuration(tmp_path: Path) -> None:
+    file = tmp_path / "rates.json"
+    file.write_text(json.dumps({"ratio_to_paper": 12.0, "config_hash": "same"}))
+    line = at_equal_area(report(), rates_of(file, "same"))
+    assert "8.00 mm²" in line
+    assert "4.00 times the chip's 2.0" in line
+    assert "3.00 times at equal area" in line
+    with pytest.raises(UserError, match="another configuration"):
+        rates_of(file, "other")
+    for wrong in ("[]", "{}", '{"ratio_to_paper": "much", "config_hash": "same"}'):
+        file.write_text(wrong)
+        with pytest.raises(UserError, match="not a report"):
+            rates_of(file, "same")
 
 
 def test_the_page_keeps_its_text_and_reports_missing_data(tmp_path: Path) -> None:
