@@ -155,7 +155,7 @@ void replyBounce(Query& query, const Numbers& n) {
     const Surface surface = readSurface(query, n);
     const std::int64_t offset = query.number();
     const bool flat = query.number() != 0;
-    Material material{{}, false, false, static_cast<MaterialKind>(query.number()), {}, 0};
+    Material material{{}, false, false, {}, static_cast<MaterialKind>(query.number()), {}, 0};
     for (auto& eta : material.eta) eta = query.number();
     material.reflectance = query.number();
     const Bounce next = bounce(surface, material, flat, offset, n);

@@ -168,6 +168,11 @@ class Manifest:
         """Whether faces have a colour at each corner."""
         return bool(self.config["geometry"]["cornerColours"])
 
+    @property
+    def emission(self) -> bool:
+        """Whether diffuse materials emit light."""
+        return bool(self.config["frame"]["emission"])
+
     @staticmethod
     def load(path: str | Path) -> Manifest:
         """Read ``manifest.json``, given the file or its folder.

@@ -55,7 +55,12 @@ def measure_frame(
     check_size(size, manifest)
     begun = time.perf_counter()
     mesh = with_materials(
-        scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours, manifest.texture is not None
+        scene,
+        mesh,
+        int(manifest.config["frame"]["materials"]),
+        manifest.corner_colours,
+        manifest.texture is not None,
+        manifest.emission,
     )
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     registers = frame_registers(scene, image.header, manifest, *size)

@@ -48,7 +48,9 @@ POINTS = Loss.of("point primitive", "not shown", "only faces are rendered")
 CURVES = Loss.of("free-form curve or surface", "not shown", "only faces are rendered", "free-form curves and surfaces")
 BLENDED = Loss.of("partly transparent material", "opaque", "only transmission above 1/2 is glass")
 MASKED = Loss.of("material with an alpha mask", "not cut out", "its faces are whole", "materials with an alpha mask")
-EMISSION = Loss.of("emissive material", "not emitting", "only the lights of the scene shine")
+EMISSION = Loss.of(
+    "emissive mirror or glass", "not emitting", "only diffuse surfaces do", "emissive mirrors or glasses"
+)
 ROUGH_MIRROR = Loss.of("rough metal", "a perfect mirror", "roughness is not rendered")
 ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "roughness is not rendered", "rough glasses")
 PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror", "1/2 and above is a mirror")

@@ -6,6 +6,7 @@
 | mirror | metallic factor of at least ½, without a texture | `Pm` of at least ½, or `illum` 3 or 5 |
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | index of refraction | `KHR_materials_ior` | `Ni` |
+| emission of a diffuse surface | emissive factor times `KHR_materials_emissive_strength`, at most 1 | `Ke`, at most 1 |
 
 The readers add base-colour textures. What a material holds beyond this is counted as lost.
 """
@@ -32,7 +33,9 @@ GLASS_IOR = 1.5
 #: Roughness up to which a mirror or glass counts as smooth, and below which a diffuse surface counts as glossy.
 _SMOOTH, _GLOSSY = 0.1, 0.5
 #: Extensions of glTF materials that are used.
-_USED_EXTENSIONS = ("KHR_materials_transmission", "KHR_materials_ior")
+_USED_EXTENSIONS = ("KHR_materials_transmission", "KHR_materials_ior", "KHR_materials_emissive_strength")
+#: No emission.
+_DARK = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,7 @@ class MeshMaterial:
         ior: Index of refraction of glass.
         has_corner_colours: The surface has the colours of `colonnade.mesh.mesh.Mesh.corner_colours`, times `albedo`.
         texture: The surface has the colours of this one of `colonnade.mesh.mesh.Mesh.textures`, times `albedo`.
+        emission: Linear, 0 to 1: the light that a diffuse surface emits towards the eye.
     """
 
     kind: str = "diffuse"
@@ -52,6 +56,7 @@ class MeshMaterial:
     ior: float = GLASS_IOR
     has_corner_colours: bool = False
     texture: int | None = None
+    emission: Vector = (0.0, 0.0, 0.0)
 
 
 #: Material of meshes without one.
@@ -69,7 +74,16 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
     metallic = _number(surface.get("metallicFactor"), 1.0) if "metallicRoughnessTexture" not in surface else 0.0
     if _number(transmission, 0.0) > 0.5:
         return MeshMaterial("glass", colour, _ior(ior))
-    return MeshMaterial("mirror" if metallic >= 0.5 else "diffuse", colour)
+    if metallic >= 0.5:
+        return MeshMaterial("mirror", colour)
+    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material))
+
+
+def _gltf_emission(material: Mapping[str, Any]) -> Vector:
+    extension = material.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+    strength = _number(extension.get("emissiveStrength"), 1.0)
+    red, green, blue = (max(0.0, strength) * value for value in _colour(material.get("emissiveFactor"), _DARK))
+    return _colour((red, green, blue), _DARK)
 
 
 def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
@@ -83,7 +97,9 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
     model = first("illum", 2.0)
     if first("d", 1.0) < 0.5 or first("tr", 0.0) > 0.5 or model in (4.0, 6.0, 7.0, 9.0):
         return MeshMaterial("glass", _colour(entries.get("tf"), colour), _ior(first("ni", GLASS_IOR)))
-    return MeshMaterial("mirror" if first("pm", 0.0) >= 0.5 or model in (3.0, 5.0) else "diffuse", colour)
+    if first("pm", 0.0) >= 0.5 or model in (3.0, 5.0):
+        return MeshMaterial("mirror", colour)
+    return MeshMaterial("diffuse", colour, emission=_colour(entries.get("ke"), _DARK))
 
 
 def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
@@ -101,7 +117,7 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         found.append((lost.MASKED, 1))
     elif mode == "BLEND" and shown != "glass" and (len(colour) < 4 or _number(colour[3], 1.0) < 1 or textures):
         found.append((lost.BLENDED, 1))
-    if any(_colour(material.get("emissiveFactor"), (0.0, 0.0, 0.0))):
+    if any(_colour(material.get("emissiveFactor"), _DARK)) and shown != "diffuse":
         found.append((lost.EMISSION, 1))
     transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
     metallic, roughness = _number(surface.get("metallicFactor"), 1.0), _number(surface.get("roughnessFactor"), 1.0)
@@ -126,7 +142,7 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         if (key.startswith("map_") and key != "map_kd") or key in ("bump", "disp", "decal", "refl", "norm")
     ]
     found = [(lost.TEXTURE_OBJ, len(maps))]
-    if any(_colour(entries.get("ke"), (0.0, 0.0, 0.0))):
+    if any(_colour(entries.get("ke"), _DARK)) and shown != "diffuse":
         found.append((lost.EMISSION, 1))
     opacity = min(first("d", 1.0), 1.0 - first("tr", 0.0))
     if 0.0 < opacity < 1.0 and "tf" not in entries:

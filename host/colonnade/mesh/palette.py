@@ -125,6 +125,20 @@ def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:
     return replace(material, albedo=(red, green, blue), texture=None)
 
 
+def without_emission(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
+    """A mesh whose materials do not emit, and a line on this."""
+    count = sum(any(material.emission) for material in mesh.materials)
+    if count == 0:
+        return mesh, ()
+    dark = [replace(material, emission=(0.0, 0.0, 0.0)) for material in mesh.materials]
+    materials, index = _used(dark, mesh.face_materials.astype(np.int64))
+    line = (
+        f"mesh {mesh.name}: {count} emissive {'material is' if count == 1 else 'materials are'} not emitting: the"
+        " hardware has no emission: set frame.emission=true"
+    )
+    return replace(mesh, materials=materials, face_materials=index.astype(np.uint8)), (line,)
+
+
 def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     """Reduce a mesh to so many materials by merging similar colours of the same kind and index of refraction.
 
@@ -137,11 +151,9 @@ def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     materials, index = _used(list(mesh.materials), mesh.face_materials.astype(np.int64))
     if len(materials) <= count:
         return replace(mesh, materials=materials, face_materials=index.astype(np.uint8)), None
-    kinds: dict[tuple[str, float, bool, int | None], list[int]] = {}
+    kinds: dict[MeshMaterial, list[int]] = {}
     for number, material in enumerate(materials):
-        kinds.setdefault((material.kind, material.ior, material.has_corner_colours, material.texture), []).append(
-            number
-        )
+        kinds.setdefault(replace(material, albedo=(0.0, 0.0, 0.0)), []).append(number)
     if len(kinds) > count:
         return mesh, None
     weights = np.bincount(index, minlength=len(materials))

@@ -33,6 +33,7 @@ class ObjectPoints:
         front: The ray hits the triangle's front, bool [n].
         t: Distance in lengths of the ray's direction, float64 [n].
         albedo: Linear, float64 [n, 3].
+        emission: Linear, float64 [n, 3].
     """
 
     position: Floats
@@ -41,6 +42,7 @@ class ObjectPoints:
     front: NDArray[np.bool_]
     t: Floats
     albedo: Floats
+    emission: Floats
 
 
 class PlacedObject:
@@ -52,6 +54,7 @@ class PlacedObject:
         index = np.minimum(mesh.face_materials, len(view.materials) - 1)
         self.kinds = np.array([_KINDS[material.kind] for material in view.materials])[index]
         self._albedo: Floats = np.array([material.albedo for material in view.materials])[index]
+        self._emission: Floats = np.array([material.emission for material in view.materials])[index]
         self._has_colours = np.array([material.has_corner_colours for material in view.materials])[index]
         textures = [-1 if material.texture is None else material.texture for material in view.materials]
         self._textures = np.array(textures)[index]
@@ -91,7 +94,9 @@ class PlacedObject:
             for number, texture in enumerate(self._mesh.textures):
                 shows = np.flatnonzero(self._textures[faces] == number)
                 albedo[shows] = albedo[shows] * texture.colours(positions[shows])
-        return ObjectPoints(hits.position, facing, unit_vectors(normals), ~is_back, hits.t, albedo)
+        return ObjectPoints(
+            hits.position, facing, unit_vectors(normals), ~is_back, hits.t, albedo, self._emission[faces]
+        )
 
     def light_transmittance(self, origins: Floats, to_light: Floats) -> Floats:
         """Transmittance from the light at origin + ``to_light`` to each origin, 0 behind opaque faces, float64 [n]."""

@@ -175,7 +175,7 @@ class PathTracer:
         # The shadow ray starts slightly above the visible side of the surface.
         origins = points.position + self._object.tracer.offset * points.facing
         irradiance, _ = self._irradiance(origins, points.normals, self._view.shadows)
-        return np.asarray((points.albedo * irradiance).clip(max=1.0), dtype=np.float64)
+        return np.asarray((points.albedo * irradiance + points.emission).clip(max=1.0), dtype=np.float64)
 
     def _shade_background(self, points: BackdropPoints, shadows: bool = True) -> tuple[Floats, Floats]:
         """Colours and shadow ratios of background surfaces, float64 [n, 3] each."""

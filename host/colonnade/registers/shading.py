@@ -81,6 +81,9 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
             result[f"materials[{index}].hasCornerColours"] = int(material.has_corner_colours)
         if manifest.texture is not None:
             result[f"materials[{index}].hasTexture"] = int(material.texture is not None)
+        if manifest.emission:
+            emission = np.array(material.emission) * (material.kind == "diffuse")
+            result |= _colour(f"materials[{index}].emission", emission * white, white)
     if int(manifest.config["frame"]["maxBounces"]) > 0:
         result["shading.bounces"] = min(view.bounces, int(manifest.config["frame"]["maxBounces"]))
         result["shading.shadowTransmittance"] = int(np.rint(view.shadow_transmittance * one))

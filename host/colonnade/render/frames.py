@@ -250,7 +250,12 @@ def pack_scene(
 ) -> SceneImage:
     """The scene image of a mesh, with the scene's material and the maps of its room."""
     mesh = with_materials(
-        scene, mesh, int(manifest.config["frame"]["materials"]), manifest.corner_colours, manifest.texture is not None
+        scene,
+        mesh,
+        int(manifest.config["frame"]["materials"]),
+        manifest.corner_colours,
+        manifest.texture is not None,
+        manifest.emission,
     )
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material), scene.headroom)
     if environment is None:

@@ -73,6 +73,7 @@ def reference_frames(
         manifest.corner_colours,
         room,
         manifest.texture is not None,
+        manifest.emission,
     )
     layout = None if manifest.config["physicalAttributeMemory"] is None else layout_of(manifest)
     max_lights = int(manifest.config["frame"]["lights"])

@@ -22,6 +22,8 @@ from colonnade.mesh.texture import Texture
 TILE = 16
 #: Samples of the texture along each axis of a texel, at most.
 _MAX_SAMPLES = 8
+#: Texels around the faces that count as shown: positions are rounded.
+_MARGIN = 2
 #: Steps in the search for the scale.
 _STEPS = 24
 
@@ -94,7 +96,6 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
     scale, corners = _placed(np.array(pixels), edge)
     colours = np.zeros((edge, edge, 3))
     positions = np.zeros_like(mesh.corner_positions)
-    covered = np.zeros((edge, edge), dtype=bool)
     for index, number in enumerate(textured):
         size = _size(pixels[index] * scale, edge)
         region = Region(lows[index], highs[index], corners[index], (int(size[0]), int(size[1])))
@@ -104,10 +105,10 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
         right, bottom = x + _tiles(width), y + _tiles(height)
         padding = ((0, bottom - y - height), (0, right - x - width), (0, 0))
         colours[y:bottom, x:right] = np.pad(tile, padding, mode="edge")
-        covered[y:bottom, x:right] = True
         share = (unwrapped[index] - region.low) / (region.high - region.low)
         positions[parts[index]] = np.array(region.corner) + share * region.size
-    colours[~covered] = colours[covered].mean(axis=0)
+    is_textured = np.isin(mesh.face_materials, textured)
+    colours = _simplified(colours, _covered(positions[is_textured], edge))
     sources = {id(texture): 3 * texture.size[0] * texture.size[1] for texture in textures}
     return Atlas(colours, positions, scale, sum(sources.values()))
 
@@ -130,6 +131,33 @@ def _unwrapped(positions: Floats, texture: Texture) -> Floats:
         whole = along - period * np.floor(along.min() / period)
         moved[..., axis] = each if np.ptp(each) < np.ptp(whole) else whole
     return moved
+
+
+def _covered(positions: Floats, edge: int) -> npt.NDArray[np.bool_]:
+    """The texels that faces with these positions, float64 [k, 3, 2], show, with a margin, bool [edge, edge]."""
+    from PIL import Image, ImageDraw
+    from scipy.ndimage import binary_dilation
+
+    mask = Image.new("1", (edge, edge))
+    draw = ImageDraw.Draw(mask)
+    for corners in positions.reshape(-1, 6).tolist():
+        draw.polygon(corners, fill=1, outline=1)
+    covered: npt.NDArray[np.bool_] = binary_dilation(np.asarray(mask), np.ones((3, 3)), _MARGIN)
+    return covered
+
+
+def _simplified(colours: Floats, covered: npt.NDArray[np.bool_]) -> Floats:
+    """The atlas with simple colours where no face shows them, so that the encoder spends no bytes there.
+
+    A texel takes the colour of the nearest covered one; tiles without any take the mean colour.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    rows, columns = distance_transform_edt(~covered, return_distances=False, return_indices=True)
+    count = len(colours) // TILE
+    is_used = covered.reshape(count, TILE, count, TILE).any(axis=(1, 3)).repeat(TILE, axis=0).repeat(TILE, axis=1)
+    found: Floats = np.where(is_used[..., None], colours[rows, columns], colours[covered].mean(axis=0))
+    return found
 
 
 def _tiles(length: int) -> int:

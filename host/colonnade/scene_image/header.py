@@ -142,7 +142,8 @@ class ImageHeader:
         extent = {name: np.array(value, dtype=np.float64) for name, value in values["extent"].items()}
         values["extent"] = Extent(**extent)
         values["materials"] = tuple(
-            MeshMaterial(**{**material, "albedo": tuple(material["albedo"])}) for material in values["materials"]
+            MeshMaterial(**{**material, **{key: tuple(material[key]) for key in ("albedo", "emission")}})
+            for material in values["materials"]
         )
         values["tree"] = TreeStatistics(**values["tree"]) if values["tree"] else None
         if environment := values["room"]:

@@ -54,6 +54,7 @@ def check_header(header: Any) -> None:
         _numbers(material["albedo"], 3)
         _number(material["ior"])
         _require(isinstance(material["has_corner_colours"], bool))
+        _numbers(material["emission"], 3)
         if material["texture"] is not None:
             _count(material["texture"])
     for part in _list(header["parts"]):

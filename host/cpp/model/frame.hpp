@@ -91,7 +91,7 @@ public:
             const Surface surface = surfaceOf(ray, hit, *face, numbers_);
             const Material& material = frame_.lighting.materialOf(*face);
             const Colour albedo = albedoOf(material, hit, *face);
-            if (material.kind == MaterialKind::diffuse) return finish(pixel, path, light(surface, albedo));
+            if (material.kind == MaterialKind::diffuse) return finish(pixel, path, emitted(material, light(surface, albedo)));
             if (!continuePath(surface, material, albedo, path, request)) return finish(pixel, path, missRadiance(request));
         }
     }
@@ -144,6 +144,12 @@ private:
     Colour reflectedBy(const Colour& albedo, const Colour& light) const {
         Colour colour;
         for (int channel = 0; channel < 3; ++channel) colour[channel] = reflected(albedo[channel], light[channel], numbers_);
+        return colour;
+    }
+
+    /// The reflected light of a diffuse surface and what it emits.
+    Colour emitted(const Material& material, Colour colour) const {
+        for (int channel = 0; channel < 3; ++channel) colour[channel] = std::min(white(), colour[channel] + material.emission[channel]);
         return colour;
     }
 

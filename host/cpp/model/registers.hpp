@@ -74,7 +74,8 @@ struct Frame {
         lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
         for (int i = 0; registers.count(entry("materials", i) + "albedo.r"); ++i) {
             const std::string name = entry("materials", i);
-            lighting.materials.push_back({vector(name + "albedo", "rgb"), takeIfThere(name + "hasCornerColours") != 0, takeIfThere(name + "hasTexture") != 0, static_cast<MaterialKind>(takeIfThere(name + "kind")),
+            lighting.materials.push_back({vector(name + "albedo", "rgb"), takeIfThere(name + "hasCornerColours") != 0, takeIfThere(name + "hasTexture") != 0,
+                                          registers.count(name + "emission.r") ? vector(name + "emission", "rgb") : Vector{}, static_cast<MaterialKind>(takeIfThere(name + "kind")),
                                           {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")}, takeIfThere(name + "reflectance")});
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));

@@ -16,6 +16,8 @@ struct Material {
     bool hasCornerColours;
     /// The albedo is that of the texture, at the position that the corners give.
     bool hasTexture;
+    /// Added to the light that a diffuse surface reflects.
+    Colour emission;
     MaterialKind kind;
     std::array<std::int64_t, 2> eta;
     std::int64_t reflectance;

@@ -71,9 +71,10 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
 
 
 @pytest.mark.parametrize("precision", ["16b16s32d", "32b32s64d"])
-def test_corner_colours_and_textures_equal_the_model(precision: str) -> None:
-    """Diffuse, mirroring and clear faces with textures or colours at their corners, and faces with neither."""
+def test_corner_colours_textures_and_emission_equal_the_model(precision: str) -> None:
+    """Diffuse, mirroring and clear faces with textures or colours at their corners, and emissive faces with neither."""
     options = ("geometry.cornerColours=true", "geometry.textureBytes=16384", "frame.maxBounces=4", "array.rows=2")
+    options += ("frame.emission=true",)
     design = design_for("tiny", (f"precision={precision}", *options))
     mesh = load_mesh("teapot:4")
     kinds = [(kind, shown) for shown in ("texture", "colours") for kind in ("diffuse", "mirror", "glass")]
@@ -81,7 +82,7 @@ def test_corner_colours_and_textures_equal_the_model(precision: str) -> None:
         MeshMaterial(kind, (0.9, 0.8, 0.7), has_corner_colours=True, texture=0 if shown == "texture" else None)
         for kind, shown in kinds
     )
-    materials += (MeshMaterial(albedo=(0.9, 0.8, 0.7)),)
+    materials += (MeshMaterial(albedo=(0.9, 0.8, 0.7), emission=(0.1, 0.6, 0.2)),)
     index = np.arange(len(mesh.faces), dtype=np.uint8) // 8 % 7
     mixed = replace(textured(coloured(mesh)), materials=materials, face_materials=index)
     image = pack(mixed, design.manifest)
@@ -93,9 +94,9 @@ def test_corner_colours_and_textures_equal_the_model(precision: str) -> None:
     simulated = render_rtl(design, image, registers, Stalls(10, 3))
     for frame, settings in zip(simulated.frames, registers, strict=True):
         assert_equal(frame, render_model(design.manifest, image, settings))
-        for register in ("hasTexture", "hasCornerColours"):
+        for register in ("hasTexture", "hasCornerColours", "emission.g"):
             plain = settings | {f"materials[{i}].{register}": 0 for i in range(7)}
-            assert (frame.colour != render_model(design.manifest, image, plain).colour).any(axis=2).mean() > 0.1
+            assert (frame.colour != render_model(design.manifest, image, plain).colour).any(axis=2).mean() > 0.03
 
 
 @pytest.mark.parametrize("mesh", ["teapot:4", "torus"])

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from colonnade.common.image_io import encode_srgb
 from colonnade.design.generator import manifest_for
+from colonnade.mesh import catalog
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
@@ -56,6 +60,28 @@ def sphere(edge: int) -> Mesh:
     return replace(mesh, materials=materials, textures=(painted(edge),), corner_positions=positions)
 
 
+def striped(edge: int) -> np.ndarray:
+    """A coat for the duck's charts: dots on its head, stripes on its ring; uint8 [edge, edge, 3]."""
+    v, u = (np.mgrid[:edge, :edge] + 0.5) / edge
+    colours = np.empty((edge, edge, 3))
+    colours[:] = (0.98, 0.80, 0.15)
+    colours[np.hypot(18 * u % 1 - 0.5, 18 * v % 1 - 0.5) < 0.28] = (0.93, 0.45, 0.1)
+    ring = (v > 0.70) | ((u > 0.64) & (v < 0.32))
+    stripes = np.where(v > 0.5, np.sin(22 * np.arctan2(v - 0.78, u - 0.5)), np.sin(110 * v)) > 0
+    colours[ring] = np.where(stripes[ring][:, None], (0.85, 0.12, 0.12), (0.97, 0.95, 0.9))
+    return np.rint(255 * colours).astype(np.uint8)
+
+
+def duck(folder: Path) -> Path:
+    """Write the duck, whose file has positions but no picture, with its coat: an OBJ file with MTL and PNG."""
+    lines = catalog.find("duck").path.read_text().splitlines()
+    plain = [line for line in lines if line.split(" ")[0] not in ("mtllib", "usemtl")]
+    (folder / "duck.obj").write_text("\n".join(["mtllib duck.mtl", "usemtl coat", *plain]))
+    (folder / "duck.mtl").write_text("newmtl coat\nKd 1 1 1\nmap_Kd coat.png\n")
+    Image.fromarray(striped(1024)).save(folder / "coat.png")
+    return folder / "duck.obj"
+
+
 def quality(mesh: Mesh, config: str, overrides: tuple[str, ...], material: Material) -> float:
     """PSNR of the model's frame against the reference's."""
     scene = replace(SCENE, material=material)
@@ -83,3 +109,12 @@ def test_more_bytes_keep_more_of_a_texture() -> None:
     ]
     print("dB in 5,632, 8,192, 16,384 and 21,632 bytes: " + ", ".join(f"{one:.1f}" for one in found))
     assert found == sorted(found) and found[-1] > found[0] + 1.0
+
+
+@pytest.mark.skipif("COLONNADE_MESHES" not in os.environ, reason="the duck is in the folders of COLONNADE_MESHES")
+def test_a_duck_shows_its_coat(tmp_path: Path) -> None:
+    mesh = load_mesh(duck(tmp_path))
+    assert mesh.textures[0].size == (1024, 1024)
+    found = quality(mesh, "32b32s64d", settings(16384), Material())
+    print(f"duck, a picture of 3,145,728 bytes in 16,384: {found:.1f} dB")
+    assert found > 22.0

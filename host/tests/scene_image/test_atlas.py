@@ -71,8 +71,9 @@ def test_a_point_of_a_face_finds_the_colour_of_its_texture(count: int, seed: int
 
 def test_a_picture_that_fills_the_atlas_is_kept() -> None:
     texture = smooth(EDGE, EDGE, 1)
-    corners = np.array([[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]])
-    mesh = textured((texture,), corners)
+    halves = np.array([[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)], [(0.0, 0.0), (1.0, 1.0), (0.0, 1.0)]])
+    mesh = textured((texture,), halves[:1])
+    mesh = replace(mesh, corner_positions=halves[np.arange(len(mesh.faces)) % 2])
     atlas = make_atlas(mesh, (replace(mesh.materials[0], albedo=(1.0, 1.0, 1.0)),), 1.0, EDGE)
     assert atlas is not None and atlas.scale == 1.0 and atlas.source_bytes == 3 * EDGE * EDGE
     centres = (np.stack(np.meshgrid(np.arange(EDGE), np.arange(EDGE)), axis=-1).reshape(-1, 2) + 0.5) / EDGE
@@ -110,3 +111,15 @@ def test_an_image_keeps_its_textures_in_a_file(tmp_path) -> None:  # type: ignor
     assert plain.header.texture is not None and not any(section.words.any() for section in plain.attributes)
     with pytest.raises(UserError, match=r"the hardware has none: set geometry\.cornerColours=true and geometry\.text"):
         pack(mesh, manifest_for("tiny").manifest)
+
+
+@pytest.mark.parametrize(("wrap", "period"), [("repeat", 1), ("mirror", 2)])
+def test_whole_periods_between_faces_cost_nothing(wrap: Wrap, period: int) -> None:
+    random = np.random.default_rng(2)
+    mesh = textured((smooth(200, 200, 1, (wrap, wrap)),), random.random((1, 3, 2)))
+    assert mesh.corner_positions is not None
+    moved = mesh.corner_positions + period * random.integers(-50, 50, (len(mesh.faces), 1, 2))
+    atlas = make_atlas(replace(mesh, corner_positions=moved), mesh.materials, 1.0, EDGE)
+    near = make_atlas(mesh, mesh.materials, 1.0, EDGE)
+    assert atlas is not None and near is not None and atlas.scale == near.scale == 1.0
+    np.testing.assert_allclose(atlas.positions, near.positions, atol=1e-6)

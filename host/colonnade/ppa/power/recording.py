@@ -184,6 +184,7 @@ def record(
             int(manifest.config["frame"]["materials"]),
             manifest.corner_colours,
             manifest.texture is not None,
+            manifest.emission,
         )
         image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
         registers = frame_registers(scene, image.header, manifest, *size)

@@ -67,7 +67,7 @@ final class ColonnadeAxi(
   control.io.writerIsIdle  := writer.io.isIdle && writeGuard.io.isIdle
   control.io.windowError   := writer.io.windowError
   control.io.responseError := writer.io.responseError
-  writer.io.start          := control.io.start
+  writer.io.clearErrors    := control.io.clearErrors
   writer.io.flush          := control.io.flush
   writer.io.settings       := control.io.framebuffer
   writer.io.pixels.zip(device.io.pixels).foreach { case (sink, pixels) => sink :<>= pixels }

@@ -122,7 +122,8 @@ object ArbitraryConfig {
     lights     <- Gen.chooseNum(1, 8)
     maxBounces <- Gen.chooseNum(0, 15)
     hits       <- flag
-  } yield FrameConfig(maxWidth, maxHeight, tileSize, materials, lights, maxBounces, hits)
+    emission   <- flag
+  } yield FrameConfig(maxWidth, maxHeight, tileSize, materials, lights, maxBounces, hits, emission)
 
   val legal: Gen[ColonnadeConfig] = for {
     array     <- array

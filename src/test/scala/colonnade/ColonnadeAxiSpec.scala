@@ -146,6 +146,9 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     bench.host.set("control", 1)
     assert(bench.until("frameDone") == Set("frameDone", "error") && bench.framebufferErrors == Set("window"))
     assert(bench.memory.written.forall(address => address >= pixels && address < pixels + stride * (h - 1) + 48))
+    bench.framebuffer(pixels + 8, stride, 0, window)
+    bench.host.set("control", 1)
+    assert(bench.until("frameDone") == Set("frameDone", "error") && bench.framebufferErrors == Set("alignment"))
     bench.framebuffer(pixels, stride, 0, window)
     bench.memory.response = _ => 2
     bench.host.set("control", 1)
@@ -158,6 +161,7 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
 
     // The next frame is written while one runs, and starts after it
     bench.memory.maxDelay = 200
+    bench.framebuffer(pixels, stride, 0, (pixels, pixels + stride * h - 1))
     bench.host.set("control", 1)
     bench.size(w - 4, h)
     assert(bench.read("frame.width") == w)
@@ -165,10 +169,11 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     bench.host.set("control", 1)
     assert(bench.host("status") == 3)
     assert(!bench.host.write(0x40, 1) && !bench.host.write(ShellMap.deviceBase + 400, 1) && !bench.host.write(0x80, 0))
-    assert(bench.until("frameDone") == allDone)
+    assert(bench.until("frameDone") == Set("frameDone", "error") && bench.framebufferErrors == Set("window"))
+    assert(bench.host("status") == 1)
     val first = bench.memory.written.filter(_ < other)
-    assert(first.size == 4 * w * h)
-    assert(bench.until("frameDone") == allDone)
+    assert(first.size == 4 * w * (h - 1) + 48)
+    assert(bench.until("frameDone") == allDone && bench.framebufferErrors.isEmpty)
     assert(bench.memory.written.size - first.size == 2 * (w - 4) * h && bench.host("status") == 0)
     bench.memory.maxDelay = 20
     bench.memory.written.clear()

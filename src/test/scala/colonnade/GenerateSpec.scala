@@ -50,6 +50,16 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     names(output.getParent) shouldBe Seq("b")
   }
 
+  it should "write the registers of the AXI4 shell beside the same manifest" in inScratch { scratch =>
+    val output = scratch.resolve("shell")
+    run("--config", "tiny", "--axi", "32", s"--output=$output", "--manifest-only") shouldBe ((0, ""))
+    names(output) shouldBe Seq(DesignMarker.name, "manifest.json", "shell.json")
+    ujson.read(Files.readString(output.resolve("manifest.json"))) shouldBe Manifest(ConfigIO.load("tiny"))
+    val shell = ujson.read(Files.readString(output.resolve("shell.json")))
+    shell("busBytes").num shouldBe 32
+    shell("registers").arr.map(_("name").str) should contain("framebuffer.base")
+  }
+
   it should "replace an earlier output, but no other directory" in inScratch { scratch =>
     val output = scratch.resolve("out")
     for (_ <- 0 until 2) run("--config", "tiny", "--output", output.toString, "--manifest-only")._1 shouldBe 0
@@ -123,6 +133,8 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     refused("--config", "tiny", "--set", "array.rows=0", "--output", output)("array.rows is 0")
     refused("--config", "tiny", "--set", "array.raws=1", "--output", output)("unknown key array.raws")
     refused("--config", "tiny", "--set", "precision.mac=65", "--output", output)("precision.mac is 65")
+    refused("--config", "tiny", "--axi", "12", "--output", output)("--axi is 12; it must be one of 4, 8, 16")
+    refused("--config", "tiny", "--axi=wide", "--output", output)("--axi is 'wide'")
     names(scratch) shouldBe empty
   }
 

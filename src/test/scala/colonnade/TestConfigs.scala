@@ -31,7 +31,16 @@ object TestConfigs {
       cache = None
     ),
     physicalAttributeMemory = None,
-    FrameConfig(maxWidth = 640, maxHeight = 480, tileSize = 8, materials = 2, lights = 2, maxBounces = 3, hits = true)
+    FrameConfig(
+      maxWidth = 640,
+      maxHeight = 480,
+      tileSize = 8,
+      materials = 2,
+      lights = 2,
+      maxBounces = 3,
+      hits = true,
+      emission = false
+    )
   )
 
   /** Maps of a few tiles, the last ones clipped, with a heap for some of them. */

@@ -15,7 +15,7 @@ object FramebufferError {
   def count: Int = names.size
 }
 
-/** Errors of a frame's way to memory. Sticky until the next frame starts. */
+/** Errors of a frame's way to memory. */
 final class FramebufferError extends Bundle {
 
   /** In the order of [[FramebufferError.names]], bit 0 last. */

@@ -14,21 +14,21 @@ final class FramebufferWriterIO(config: ColonnadeConfig, shell: ShellConfig) ext
   val pixels   = Vec(config.array.columns, Flipped(Decoupled(new Pixel(config))))
   val axi      = new AxiWritePort(BurstWriter.idBits, shell.busBytes)
 
-  /** A pulse: a frame starts. */
-  val start = Input(Bool())
+  /** A pulse, while idle. */
+  val clearErrors = Input(Bool())
 
   /** All pixels of the frame have come; until idle. */
   val flush  = Input(Bool())
   val isIdle = Output(Bool())
 
-  /** Sticky until the next start. */
+  /** Sticky until cleared. */
   val windowError   = Output(Bool())
   val responseError = Output(Bool())
 }
 
 /** Writes pixels to the framebuffer: encodes them, gathers them to rows of tiles, and writes each row as a burst.
   *
-  * A row outside the window is dropped. After a write that fails, all rows are dropped until the next start.
+  * A row outside the window is dropped. After a write that fails, all rows are dropped until the errors are cleared.
   */
 final class FramebufferWriter(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   val io = IO(new FramebufferWriterIO(config, shell))
@@ -58,7 +58,7 @@ final class FramebufferWriter(config: ColonnadeConfig, shell: ShellConfig) exten
 
   private def sticky(event: Bool): Bool = {
     val isSet = RegInit(false.B)
-    isSet := event || (isSet && !io.start)
+    isSet := event || (isSet && !io.clearErrors)
     isSet
   }
   io.windowError   := sticky(bursts.io.isOutside)

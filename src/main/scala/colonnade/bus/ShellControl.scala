@@ -16,9 +16,14 @@ final class ShellControlIO extends Bundle {
 
   /** Of the frame that runs: constant until its end. */
   val framebuffer = Output(new FramebufferSettings)
-  val errors      = Output(new FramebufferError)
 
-  /** A pulse: the device starts a frame, and the writer clears its errors. `deviceDone` is low in the next cycle. */
+  /** Of the last frame that has ended. */
+  val errors = Output(new FramebufferError)
+
+  /** A pulse: a frame begins or is refused, and the writer forgets the errors of the last one. */
+  val clearErrors = Output(Bool())
+
+  /** A pulse: the device starts a frame. `deviceDone` is low in the next cycle. */
   val start      = Output(Bool())
   val deviceDone = Input(Bool())
 
@@ -42,7 +47,7 @@ final class ShellControlIO extends Bundle {
 /** Runs frames and loads, one at a time, and soft resets.
   *
   * A frame ends when the device has ended it, all its rows are written and all writes are answered. A frame that is started
-  * while one runs is queued, and begins in the next cycle but one after its end. A soft reset takes effect in any state.
+  * while one runs is queued, and begins when the device has its registers. A soft reset takes effect in any state.
   */
 final class ShellControl(config: ColonnadeConfig) extends Module {
   import ShellControl._
@@ -61,12 +66,11 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
   private val rowMask     = ((1.U << rowBytesLog) - 1.U)(log2Ceil(config.frame.tileSize * PixelFormat.maxBytes) - 1, 0)
   private val isLegal     = PixelFormat.isLegal(settings.format)
   private val isAligned   = !((settings.base | settings.stride) & rowMask).orR
-  private val refusals    = RegInit(0.U.asTypeOf(new FramebufferError))
   private val begins      = state === State.begin
 
   private val frameDone = (state === State.flushing && io.writerIsIdle) || (begins && !io.start)
-  private val loadDone  = state === State.loading && io.loaderIsIdle
-  private val isLoading = RegNext(state === State.loading, false.B) // from the second cycle on
+  private val hasBegun  = RegNext(state === State.loading, false.B) // the loader is idle in the first cycle, too
+  private val loadDone  = state === State.loading && hasBegun && io.loaderIsIdle
 
   when(io.commands.start) { isQueued := true.B }
   switch(state) {
@@ -78,10 +82,7 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
       }.elsewhen(io.commands.load) { state := State.loading }
     }
     is(State.begin) {
-      refusals           := 0.U.asTypeOf(refusals)
-      refusals.format    := !isLegal
-      refusals.alignment := !isAligned
-      state              := Mux(io.start, State.running, State.idle)
+      state := Mux(io.start, State.running, State.idle)
     }
     is(State.running) {
       when(io.deviceDone) { state := State.flushing }
@@ -90,7 +91,7 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
       when(frameDone) { state := State.idle }
     }
     is(State.loading) {
-      when(loadDone && isLoading) { state := State.idle }
+      when(loadDone) { state := State.idle }
     }
     is(State.resetting) {
       when(resets =/= 0.U) { resets := resets - 1.U }
@@ -100,28 +101,34 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
   when(io.commands.reset) {
     state    := State.resetting
     isQueued := false.B
-    refusals := 0.U.asTypeOf(refusals)
     resets   := resetCycles.U
   }
 
-  io.start            := begins && isLegal && isAligned
-  io.load             := state === State.idle && io.commands.load
-  io.flush            := state === State.flushing
-  io.reset            := state === State.resetting
-  io.framebuffer      := settings
-  io.errors           := refusals
-  io.errors.window    := io.windowError
-  io.errors.response  := io.responseError
-  io.status.isRunning := begins || state === State.running || state === State.flushing
-  io.status.isQueued  := isQueued
-  io.status.isLoading := state === State.loading
+  // A frame that is refused ends as it begins
+  private val errors    = Wire(new FramebufferError)
+  private val lastFrame = RegInit(0.U.asTypeOf(errors))
+  errors.format    := begins && !isLegal
+  errors.alignment := begins && !isAligned
+  errors.response  := !begins && io.responseError
+  errors.window    := !begins && io.windowError
+  when(io.commands.reset) {
+    lastFrame := 0.U.asTypeOf(errors)
+  }.elsewhen(frameDone) { lastFrame := errors }
 
-  // A command counts from the next cycle on, in which no other request is answered
+  io.start              := begins && isLegal && isAligned
+  io.clearErrors        := begins
+  io.load               := state === State.idle && io.commands.load
+  io.flush              := state === State.flushing
+  io.reset              := state === State.resetting
+  io.framebuffer        := settings
+  io.errors             := lastFrame
+  io.status.isRunning   := begins || state === State.running || state === State.flushing
+  io.status.isQueued    := isQueued
+  io.status.isLoading   := state === State.loading
   io.status.isResetting := state === State.resetting
 
-  private val ended    = loadDone && isLoading
-  private val hasError = Mux(ended, io.loadError, io.errors.asUInt.orR || (begins && !io.start))
-  io.events := ((frameDone || ended) && hasError) ## ended ## frameDone
+  private val hasError = Mux(loadDone, io.loadError, errors.asUInt.orR)
+  io.events := ((frameDone || loadDone) && hasError) ## loadDone ## frameDone
 }
 
 object ShellControl {

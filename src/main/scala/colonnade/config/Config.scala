@@ -116,6 +116,7 @@ final case class ColumnBvhMemoryConfig(
   * @param lights     point lights
   * @param maxBounces reflections and refractions of a path that are traced; 0: every material is diffuse
   * @param hits       the pixel stream also carries the hit triangle and its distance
+  * @param emission   materials have a colour that diffuse surfaces emit
   */
 final case class FrameConfig(
     maxWidth:   Int,
@@ -124,7 +125,8 @@ final case class FrameConfig(
     materials:  Int,
     lights:     Int,
     maxBounces: Int,
-    hits:       Boolean
+    hits:       Boolean,
+    emission:   Boolean
 ) {
   Require.within("frame.maxWidth", maxWidth, 8, 4096)
   Require.within("frame.maxHeight", maxHeight, 8, 4096)

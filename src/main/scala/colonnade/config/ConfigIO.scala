@@ -61,7 +61,17 @@ object ConfigIO {
       "holdable",
       "cache"
     )
-    val frame = root.section("frame", "maxWidth", "maxHeight", "tileSize", "materials", "lights", "maxBounces", "hits")
+    val frame = root.section(
+      "frame",
+      "maxWidth",
+      "maxHeight",
+      "tileSize",
+      "materials",
+      "lights",
+      "maxBounces",
+      "hits",
+      "emission"
+    )
 
     ColonnadeConfig(
       array = ArrayConfig(
@@ -125,7 +135,8 @@ object ConfigIO {
         materials = frame.int("materials"),
         lights = frame.int("lights"),
         maxBounces = frame.int("maxBounces"),
-        hits = frame.boolean("hits")
+        hits = frame.boolean("hits"),
+        emission = frame.boolean("emission")
       )
     )
   }
@@ -169,7 +180,8 @@ object ConfigIO {
         "materials"  -> frame.materials,
         "lights"     -> frame.lights,
         "maxBounces" -> frame.maxBounces,
-        "hits"       -> frame.hits
+        "hits"       -> frame.hits,
+        "emission"   -> frame.emission
       )
     )
   }

@@ -73,6 +73,9 @@ final class Material(config: ColonnadeConfig) extends Record {
   /** The albedo is that of the texture at a position, interpolated from the red and green channels of the corners. */
   val hasTexture = config.geometry.texture.map(_ => Bool())
 
+  /** What a diffuse surface adds to the light that it reflects; no other surface uses it. */
+  val emission = if (config.frame.emission) Some(Rgb(FrameRegisters.colour)) else None
+
   /** See [[MaterialKind]]. */
   val kind = ifBounces(UInt(MaterialKind.bits.W))
 
@@ -87,7 +90,7 @@ final class Material(config: ColonnadeConfig) extends Record {
 
   val elements: SeqMap[String, Data] = FrameRegisters.fields(
     Seq("albedo" -> albedo) ++ hasCornerColours.map("hasCornerColours" -> _) ++
-      hasTexture.map("hasTexture" -> _) ++ kind.map("kind" -> _) ++
+      hasTexture.map("hasTexture" -> _) ++ emission.map("emission" -> _) ++ kind.map("kind" -> _) ++
       etaFront.map("etaFront" -> _) ++ etaBack.map("etaBack" -> _) ++ reflectance.map("reflectance" -> _): _*
   )
 }

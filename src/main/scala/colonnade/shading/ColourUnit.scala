@@ -30,7 +30,7 @@ final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   * background. A bounce takes 20 cycles, and 6 · (lights + 1) more if its reflection shows a surface. Bounces have
   * priority. A shadow ratio takes 12 cycles per channel that lacks some light.
   *
-  * @note colour = radiance + throughput · albedo · (ambient + the direct light of all lights · transmittance)
+  * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights · transmittance))
   */
 final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val lights     = config.frame.lights
@@ -52,6 +52,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     val surface = Wire(new TerminalSurface(config))
     surface.albedo      := io.surface.bits.albedo
     surface.directLight := io.surface.bits.directLight
+    surface.emission.zip(io.surface.bits.emission).foreach { case (to, from) => to := from }
     surfaces.write(io.surface.bits.context, surface)
   }
 
@@ -81,6 +82,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val radiance    = Reg(Vec(3, UInt(colourBits.W)))
   private val sum         = Reg(UInt(sumBits.W))
   private val surface     = Reg(UInt(colourBits.W))
+  private val emission    = if (config.frame.emission) Some(Reg(Vec(3, UInt(colourBits.W)))) else None
 
   /** The surface's albedo, in registers of its own if a bounce may have a surface. */
   private val surfaceAlbedo = if (hasBounces && config.hasEnvironment) Reg(Vec(3, UInt(colourBits.W))) else albedo
@@ -136,6 +138,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     when(hasSurface) {
       surfaceAlbedo := VecInit(surfaceRead.albedo.channels)
       directLight   := VecInit(surfaceRead.directLight.map(light => VecInit(light.channels.map(_.natural))))
+      emission.zip(surfaceRead.emission).foreach { case (to, from) => to := VecInit(from.channels) }
     }
   }
 
@@ -169,6 +172,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   product := left * right
   private val part   = Rounding.floor(product, fraction)
   private val colour = Rounding.saturate(part, colourBits)
+  private val shown  = emission.map(value => Rounding.saturate(colour +& of(value), colourBits)).getOrElse(colour)
   private val total  = Rounding.saturate(of(radiance) +& part, colourBits)
 
   // Use the product
@@ -187,7 +191,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
         when(!ofSurface) { channel := channel + 1.U }
       }
       when(ofSurface) {
-        when(reflects) { surface := colour }.otherwise { sum := Mux(step === 0.U, first, sum) + part }
+        when(reflects) { surface := shown }.otherwise { sum := Mux(step === 0.U, first, sum) + part }
         when(!reflects) { unshadowed := Mux(step === 0.U, first, unshadowed) + of(at(directLight)) }
       }.elsewhen(isEnd) {
         set(colours, total)
@@ -234,6 +238,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
 final private class TerminalSurface(config: ColonnadeConfig) extends Bundle {
   val albedo      = Rgb(FrameRegisters.colour)
   val directLight = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
+  val emission    = if (config.frame.emission) Some(Rgb(FrameRegisters.colour)) else None
 }
 
 /** A path after its bounces so far. */

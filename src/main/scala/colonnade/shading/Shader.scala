@@ -133,6 +133,8 @@ final class Shader(config: ColonnadeConfig) extends Module {
     lit.context := surface.context
     lit.albedo  := albedo
     lit.origin  := Vec3.of(x, y, z)
+    for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
+      channel := Mux(surface.isEnvironment, 0.U, value)
     when(point.bits.light === 0.U) {
       lit.directLight     := 0.U.asTypeOf(lit.directLight)
       lit.needsShadowRays := 0.U.asTypeOf(lit.needsShadowRays)

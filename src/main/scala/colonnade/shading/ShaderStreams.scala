@@ -36,6 +36,9 @@ final class LitSurface(config: ColonnadeConfig) extends Bundle {
   /** By light; 0 from a light that is off. */
   val directLight     = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
   val needsShadowRays = Vec(config.frame.lights, Bool())
+
+  /** The light that the surface adds. */
+  val emission = if (config.frame.emission) Some(Rgb(FrameRegisters.colour)) else None
 }
 
 /** A ray that leaves a mirror or glass. */

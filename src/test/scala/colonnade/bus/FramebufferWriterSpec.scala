@@ -23,9 +23,9 @@ private class GuardedWriter(config: ColonnadeConfig, shell: ShellConfig) extends
 
   private val writer = Module(new FramebufferWriter(config, shell))
   private val guard  = Module(new AxiWriteGuard(BurstWriter.idBits, shell.busBytes))
-  writer.io.settings := settings
-  writer.io.start    := start
-  writer.io.flush    := flush
+  writer.io.settings    := settings
+  writer.io.clearErrors := start
+  writer.io.flush       := flush
   writer.io.pixels.zip(pixels).foreach { case (sink, source) => sink :<>= source }
   isIdle        := writer.io.isIdle && guard.io.isIdle
   windowError   := writer.io.windowError

@@ -20,8 +20,9 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       Seq(TestConfigs.tiny -> "", TestConfigs.withEnvironment(TestConfigs.environment) -> " in an environment")
     (lights, maxBounces) <- Seq((1, 0), (2, 0), (1, 2), (3, 15))
   } {
-    val config = base.copy(frame = base.frame.copy(lights = lights, maxBounces = maxBounces))
-    it should s"colour paths with $lights lights and $maxBounces bounces$where" in
+    val config = base.copy(frame = base.frame.copy(lights = lights, maxBounces = maxBounces, emission = lights > 1))
+    val what   = if (config.frame.emission) "emissive paths" else "paths"
+    it should s"colour $what with $lights lights and $maxBounces bounces$where" in
       test(new ColourUnit(config)).withAnnotations(Simulation.verilator) { dut =>
         new ColouredPaths(dut, config, seed = lights).run(paths = 60)
       }
@@ -75,7 +76,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   private def pass(port: chisel3.util.DecoupledIO[BounceUpdate], context: Int): Unit = {
     val (albedo, isTinted, fresnel) = (colour(), random.nextBoolean(), random.nextInt(3) * random.nextInt(one / 2))
     val surface                     = Option.when(config.hasEnvironment && random.nextBoolean())(remember(context))
-    val behind                      = surface.fold(background)(surface => reflected(surface.albedo, surface.all))
+    val behind                      = surface.fold(background)(surface => shown(surface, surface.all))
     port.bits.context.poke(context)
     pokeUInt(port.bits.albedo, albedo)
     port.bits.isTinted.poke(isTinted)
@@ -131,7 +132,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
         case _                                => 0
       }.sum
     }
-    val last  = if (isBackground) background else reflected(surface.albedo, visible)
+    val last  = if (isBackground) background else shown(surface, visible)
     val whole = radiance(context).zip(throughput(context).zip(last)).map { case (sure, (weight, seen)) =>
       white.min(sure + (weight * seen >> 12))
     }
@@ -158,8 +159,10 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   private def remember(context: Int): TestSurface = {
     val surface = TestSurface(
       colour(),
-      Seq.fill(config.frame.lights)(if (random.nextInt(3) == 0) ambient else intensity())
+      Seq.fill(config.frame.lights)(if (random.nextInt(3) == 0) ambient else intensity()),
+      if (config.frame.emission && random.nextBoolean()) colour() else xyz(0)
     )
+    dut.io.surface.bits.emission.foreach(pokeUInt(_, surface.emission))
     dut.io.surface.valid.poke(true)
     dut.io.surface.bits.context.poke(context)
     pokeUInt(dut.io.surface.bits.albedo, surface.albedo)
@@ -176,10 +179,13 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     port.valid.poke(false)
   }
 
-  private def reflected(albedo: Seq[Int], light: Seq[Int]): Seq[Int] =
-    albedo.zip(light).map { case (a, light) => (a.toLong * light >> 12).min(white).toInt }
+  /** What a surface reflects of the light, and emits. */
+  private def shown(surface: TestSurface, light: Seq[Int]): Seq[Int] =
+    surface.albedo.zip(light).zip(surface.emission).map { case ((albedo, light), emission) =>
+      ((albedo.toLong * light >> 12).min(white) + emission).min(white).toInt
+    }
 
-  private case class TestSurface(albedo: Seq[Int], directLight: Seq[Seq[Int]]) {
+  private case class TestSurface(albedo: Seq[Int], directLight: Seq[Seq[Int]], emission: Seq[Int]) {
 
     /** The incoming light without shadows. */
     def all: Seq[Int] = ambient.indices.map(channel => ambient(channel) + directLight.map(_(channel)).sum)

@@ -116,8 +116,11 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     "with an environment, one context, no bounces"
   )
   render(
-    TestConfigs.withColours.head.copy(physicalAttributeMemory = Some(TestConfigs.environment)),
-    s"corner colours at ${TestConfigs.withColours.head.precision} with an environment"
+    TestConfigs.withColours.head.copy(
+      physicalAttributeMemory = Some(TestConfigs.environment),
+      frame = TestConfigs.withColours.head.frame.copy(emission = true)
+    ),
+    s"corner colours and emission at ${TestConfigs.withColours.head.precision} with an environment"
   )
   for (config <- TestConfigs.withColours.tail) {
     val withoutTextures = config.copy(geometry = config.geometry.copy(textureBytes = 0))

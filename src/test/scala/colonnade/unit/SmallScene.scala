@@ -69,6 +69,8 @@ final class SmallScene(
       vector(s"materials[$i].albedo", "rgb", Seq.fill(3)(BigInt(1000 + random.nextInt(3000)))) ++
         (if (config.frame.hasBounces) glossy(i) else Map.empty[String, BigInt]) ++
         (if (config.geometry.cornerColours) Map(s"materials[$i].hasCornerColours" -> BigInt(seed >> i & 1))
+         else Map.empty[String, BigInt]) ++
+        (if (config.frame.emission) vector(s"materials[$i].emission", "rgb", Seq.fill(3)(BigInt(random.nextInt(2000))))
          else Map.empty[String, BigInt])
     }
     val lights = Seq.tabulate(config.frame.lights) { i =>

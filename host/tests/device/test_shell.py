@@ -1,0 +1,46 @@
+"""Frames through the AXI4 shell are the model's, byte by byte, in all formats and at any timing of the bus."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
+from colonnade.design import toolchain
+from colonnade.design.generator import GeneratedDesign, shell_design_for
+from colonnade.device.bit_exact import render_model
+from colonnade.device.shell import Bus, ShellFrame, render_shell
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.parser import load_scene
+from colonnade.scene_image.packer import pack
+
+WIDTH, HEIGHT = 45, 30
+UNWRITTEN = 0xA5
+
+
+@pytest.fixture(scope="module")
+def design() -> GeneratedDesign:
+    return shell_design_for("tiny", ("array.columns=2",), bus_bytes=16)
+
+
+def assert_bytes(frame: ShellFrame, expected: np.ndarray, pixel_bytes: int) -> None:
+    assert frame.errors == 0
+    used = WIDTH * pixel_bytes
+    np.testing.assert_array_equal(frame.lines[:, :used], expected)
+    assert (frame.lines[:, used:] == UNWRITTEN).all()
+
+
+@pytest.mark.parametrize("bus", [Bus(), Bus(latency=60, stall=30, seed=2)], ids=["fast", "slow"])
+def test_frames_in_memory_are_those_of_the_model(design: GeneratedDesign, bus: Bus) -> None:
+    manifest = design.manifest
+    image = pack(load_mesh("torus"), manifest)
+    scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")
+    registers = frame_registers(scene, image.header, manifest, WIDTH, HEIGHT)
+    expected = render_model(manifest, image, registers)
+    assert expected.is_object.any() and not expected.is_object.all()
+    frames = render_shell(design, image, [registers] * 3, [0, 1, 2], bus)
+    for code, frame in enumerate(frames):
+        assert_bytes(frame, framebuffer_bytes(expected, code), PIXEL_BYTES[code])
+        assert frame.values["counters.hits"] == expected.counters["hits"]
+        assert not any(value for name, value in frame.values.items() if name.startswith("errors."))

@@ -1,0 +1,69 @@
+"""Emission: from the file to the registers, and the device's frame against the reference's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from colonnade.common import notes
+from colonnade.common.image_io import encode_srgb
+from colonnade.design.generator import manifest_for
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import MeshMaterial, from_gltf, from_mtl
+from colonnade.mesh.mesh import Mesh
+from colonnade.quality.image_metrics import psnr
+from colonnade.reference.render import render_reference
+from colonnade.render.frames import render_model
+from colonnade.scene.model import Background, Camera, Light, MeshSource, Scene
+from colonnade.scene.object_mesh import with_materials
+from colonnade.scene.view import make_view
+
+SIZE = (160, 120)
+ON = ("frame.emission=true",)
+SCENE = Scene(
+    MeshSource(name="sphere:4"),
+    camera=Camera(position=(1.5, 1.2, 3.4), target=(0.0, 0.0, 0.0), fov=38.0),
+    light=Light(colour=(0.5, 0.5, 0.5)),
+    background=Background((0.1, 0.1, 0.1)),
+)
+
+
+def test_gltf_and_mtl_materials_emit() -> None:
+    strength = {"extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}}}
+    surface = {"pbrMetallicRoughness": {"metallicFactor": 0.0}, "emissiveFactor": [0.1, 0.2, 0.5]}
+    assert from_gltf(surface).emission == (0.1, 0.2, 0.5)
+    assert from_gltf(surface | strength).emission == pytest.approx((0.4, 0.8, 1.0))
+    assert from_gltf({**surface, "pbrMetallicRoughness": {}}) == MeshMaterial("mirror", (1.0, 1.0, 1.0))
+    assert from_mtl({"ke": ["0.25", "0", "3"]}).emission == (0.25, 0.0, 1.0)
+    assert from_mtl({"ke": ["1", "1", "1"], "d": "0.2"}).emission == (0.0, 0.0, 0.0)
+
+
+def lamp() -> Mesh:
+    """A sphere: an emissive upper half, and below it a dark one that does not emit."""
+    mesh = load_mesh("sphere:4")
+    materials = (MeshMaterial(albedo=(0.2, 0.2, 0.2)), MeshMaterial(albedo=(0.2, 0.3, 0.1), emission=(0.6, 0.4, 0.9)))
+    upper = mesh.vertices[mesh.faces].mean(axis=1)[:, 1] > 0
+    return replace(mesh, materials=materials, face_materials=upper.astype(np.uint8))
+
+
+@pytest.mark.parametrize("config", ["16b16s32d", "32b32s64d"])
+def test_the_device_shows_the_emission_of_the_reference(config: str) -> None:
+    mesh = lamp()
+    view = make_view(SCENE, mesh.extent, *SIZE, mesh.materials)
+    truth = encode_srgb(render_reference(mesh, view).image)
+    found, dark = (
+        psnr(truth, encode_srgb(render_model(SCENE, mesh, manifest_for(config, options).manifest, SIZE).image))
+        for options in (ON, ())
+    )
+    print(f"{config}: {found:.1f} dB, {dark:.1f} dB without emission")
+    assert found > 45.0 > 25.0 > dark
+
+
+def test_hardware_without_emission_says_so() -> None:
+    told: list[str] = []
+    with notes.opened(told.append):
+        mesh = with_materials(SCENE, lamp(), 8, corner_colours=False, textures=False)
+    assert not any(any(material.emission) for material in mesh.materials)
+    assert "1 emissive material is not emitting: the hardware has no emission: set frame.emission=true" in told[0]
