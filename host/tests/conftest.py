@@ -159,6 +159,15 @@ _SHINY = (("kind", 2), ("etaFront", 16), ("etaBack", 16), ("reflectance", 13))
 _SCENE = ("recordCount", "triangleBase", "triangleRecords", "attributeBase")
 
 
+#: A file with one test of minutes.
+LONGEST = "test_tutorial.py"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest file, so that no worker is left alone with it at the end."""
+    items.sort(key=lambda item: item.path.name != LONGEST)
+
+
 @pytest.fixture(autouse=True)
 def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
     """Disable progress lines, which a slow machine would print between the expected lines."""

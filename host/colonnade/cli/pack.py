@@ -66,10 +66,8 @@ def pack(
         described = described.with_environment(background)
     manifest = manifest_for(config, overrides, terminal).manifest
     with terminal.step("packing"):
-        maps = device_room(described, manifest) if described.objects else None
-        surface = object_mesh(described, corner_colours=manifest.corner_colours, environment=maps)
-        if maps is None:
-            maps = device_room(described, manifest)
+        maps = device_room(described, manifest)
+        surface = object_mesh(described, maps, manifest.corner_colours)
         room = lit_room(described, maps, surface.extent, max_lights(manifest), False, terminal)
         image = pack_scene(room.scene, surface, manifest, encoded(room, manifest))
     image.save(output)

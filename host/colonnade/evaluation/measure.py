@@ -20,7 +20,7 @@ from colonnade.registers.frame import frame_registers
 from colonnade.render.frames import require_no_errors
 from colonnade.render.report import frame_report, mesh_report
 from colonnade.scene.model import Scene
-from colonnade.scene.object_mesh import with_materials
+from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 from colonnade.scene.view import with_overrides
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
@@ -54,14 +54,7 @@ def measure_frame(
     manifest = design.manifest
     check_size(size, manifest)
     begun = time.perf_counter()
-    mesh = with_materials(
-        scene,
-        mesh,
-        int(manifest.config["frame"]["materials"]),
-        manifest.corner_colours,
-        manifest.texture is not None,
-        manifest.emission,
-    )
+    mesh = with_materials(scene, mesh, SurfaceFeatures.of(manifest))
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     registers = frame_registers(scene, image.header, manifest, *size)
     pack_seconds = time.perf_counter() - begun

@@ -27,7 +27,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
-from colonnade.scene.object_mesh import object_mesh, with_materials
+from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import View, make_view, with_overrides
 from colonnade.scene_image.file import SceneImage
@@ -83,10 +83,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
 
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        maps = device_room(scene, manifest) if scene.objects else None
-        mesh = object_mesh(scene, corner_colours=manifest.corner_colours, environment=maps)
-        if maps is None:
-            maps = device_room(scene, manifest)
+        maps = device_room(scene, manifest)
+        mesh = object_mesh(scene, maps, manifest.corner_colours)
         if maps is not None:
             check_layout(maps, manifest)
             environment_camera(maps, width, height)
@@ -249,14 +247,7 @@ def pack_scene(
     scene: Scene, mesh: Mesh, manifest: Manifest, environment: EncodedEnvironment | None = None
 ) -> SceneImage:
     """The scene image of a mesh, with the scene's material and the maps of its room."""
-    mesh = with_materials(
-        scene,
-        mesh,
-        int(manifest.config["frame"]["materials"]),
-        manifest.corner_colours,
-        manifest.texture is not None,
-        manifest.emission,
-    )
+    mesh = with_materials(scene, mesh, SurfaceFeatures.of(manifest))
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material), scene.headroom)
     if environment is None:
         return image

@@ -26,10 +26,11 @@ from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
 from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
-from colonnade.scene.object_mesh import object_mesh
+from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.view import make_view
 
 if TYPE_CHECKING:
+    from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Mesh
     from colonnade.reference.environment.surface import Backdrop
 
@@ -66,19 +67,13 @@ def reference_frames(
         options: Further options.
     """
     begun = time.perf_counter()
-    room = scene_room(poses[0]) if poses[0].objects else None
-    mesh = object_mesh(
-        poses[0],
-        int(manifest.config["frame"]["materials"]),
-        manifest.corner_colours,
-        room,
-        manifest.texture is not None,
-        manifest.emission,
-    )
+    maps = scene_room(poses[0])
+    mesh = object_mesh(poses[0], maps, manifest.corner_colours)
+    mesh = with_materials(poses[0], mesh, SurfaceFeatures.of(manifest))
     layout = None if manifest.config["physicalAttributeMemory"] is None else layout_of(manifest)
     max_lights = int(manifest.config["frame"]["lights"])
     for pose, traced in zip(
-        poses, traced_frames(poses, mesh, size, max_lights, layout, options, progress), strict=True
+        poses, traced_frames(poses, mesh, maps, size, max_lights, layout, options, progress), strict=True
     ):
         report = FrameReport(
             backend="reference",
@@ -119,14 +114,14 @@ class TracedFrame:
 def traced_frames(
     poses: Sequence[Scene],
     mesh: Mesh,
+    maps: Environment | None,
     size: tuple[int, int],
     max_lights: int,
     layout: AttributeLayout | None = None,
     options: ReferenceOptions = ReferenceOptions(),
     progress: Progress = QUIET,
 ) -> Iterator[TracedFrame]:
-    """Trace poses of a scene; without a ``layout`` the room's bounding planes are those of the default one."""
-    maps = scene_room(poses[0])
+    """Trace poses of a scene in the room ``maps``, with bounding planes of ``layout`` or else of the default one."""
     if maps is not None:
         environment_camera(maps, *size)
     room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)

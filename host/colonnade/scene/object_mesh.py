@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from colonnade.common import notes
@@ -13,54 +13,67 @@ from colonnade.scene.model import Scene
 from colonnade.scene.view import with_overrides
 
 if TYPE_CHECKING:
+    from colonnade.design.manifest import Manifest
     from colonnade.environment.model import Environment
     from colonnade.mesh.mesh import Mesh
 
 
-def object_mesh(
-    scene: Scene,
-    materials: int | None = None,
-    corner_colours: bool = False,
-    environment: Environment | None = None,
-    textures: bool = False,
-    emission: bool = False,
-) -> Mesh:
-    """Load the mesh of a scene, of several objects joined, and report its notes.
+@dataclass(frozen=True)
+class SurfaceFeatures:
+    """What the surfaces of a design have.
+
+    Attributes:
+        materials: Entries of the material table.
+        corner_colours: Colours at the corners of faces.
+        textures: A texture memory.
+        emission: Emission of materials.
+    """
+
+    materials: int
+    corner_colours: bool = False
+    textures: bool = False
+    emission: bool = False
+
+    @classmethod
+    def of(cls, manifest: Manifest) -> SurfaceFeatures:
+        """Those of a manifest."""
+        materials = int(manifest.config["frame"]["materials"])
+        return cls(materials, manifest.corner_colours, manifest.texture is not None, manifest.emission)
+
+
+def object_mesh(scene: Scene, environment: Environment | None = None, corner_colours: bool = False) -> Mesh:
+    """Load the mesh of a scene, of several objects joined, and report its notes. Textures and emission are kept.
 
     Args:
         scene: The scene.
-        materials: Entries of the device's material table: of more diffuse colours, similar ones are merged. None: all
-            are kept.
-        corner_colours: Keep the colours of the corners, for a device that has them.
         environment: The room of `scene.background`, in which several objects stand.
-        textures: Keep the textures, for a device that has them; they are always kept without ``materials``.
-        emission: Likewise the emission of materials.
+        corner_colours: Keep the colours of the corners, for a device that has them.
 
     Raises:
         UserError: The mesh does not exist or cannot be rendered, or one of several objects has no place.
     """
     if scene.objects:
-        mesh = joined_mesh(scene, environment, corner_colours)
-    else:
-        mesh = load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours)
-    return mesh if materials is None else with_materials(scene, mesh, materials, corner_colours, textures, emission)
+        return joined_mesh(scene, environment, corner_colours)
+    return load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours)
 
 
-def with_materials(
-    scene: Scene, mesh: Mesh, materials: int, corner_colours: bool, textures: bool, emission: bool = False
-) -> Mesh:
-    """The mesh with what a device has, as `object_mesh`; the scene's values override its materials first."""
-    if not textures:
+def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
+    """The mesh with what a device has, and notes of what it lacks.
+
+    Of more diffuse colours than the material table holds, similar ones are merged, after the scene's values have
+    overridden those of the mesh.
+    """
+    if not features.textures:
         mesh, lines = without_textures(mesh)
         notes.report(lines)
-    if not emission:
+    if not features.emission:
         mesh, lines = without_emission(mesh)
         notes.report(lines)
-    if not corner_colours:
+    if not features.corner_colours:
         mesh, lines = with_face_colours(mesh)
         notes.report(lines)
-    if len(mesh.materials) <= materials:
+    if len(mesh.materials) <= features.materials:
         return mesh
-    mesh, line = reduced(replace(mesh, materials=with_overrides(mesh.materials, scene.material)), materials)
+    mesh, line = reduced(replace(mesh, materials=with_overrides(mesh.materials, scene.material)), features.materials)
     notes.report([] if line is None else [line])
     return mesh

@@ -20,7 +20,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.texture import Texture, Wrap
 from colonnade.scene.model import Material, MeshSource, Scene
-from colonnade.scene.object_mesh import with_materials
+from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 from colonnade.scene.view import with_overrides
 
 #: Red, green, blue, white, from the upper left corner on.
@@ -108,7 +108,7 @@ def test_hardware_without_textures_shows_their_mean(tmp_path: Path) -> None:
     mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3 4/4"))
     told: list[str] = []
     with notes.opened(told.append):
-        plain = with_materials(Scene(MeshSource(name="square")), mesh, 8, corner_colours=False, textures=False)
+        plain = with_materials(Scene(MeshSource(name="square")), mesh, SurfaceFeatures(8))
     assert plain.materials == (MeshMaterial(albedo=(0.25, 0.5, 0.5)),) and plain.textures == ()
     assert "set geometry.cornerColours=true and geometry.textureBytes=16384" in " ".join(told)
     (replaced,) = with_overrides(mesh.materials, Material(albedo=(0.1, 0.2, 0.3)))

@@ -28,7 +28,7 @@ from colonnade.reference.render import render_reference
 from colonnade.registers.frame import frame_registers
 from colonnade.render.frames import render_model
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Scene
-from colonnade.scene.object_mesh import with_materials
+from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 from colonnade.scene.view import make_view, with_overrides
 from colonnade.scene_image.packer import pack
 
@@ -124,7 +124,7 @@ def test_hardware_without_corner_colours_has_a_colour_a_face(tmp_path: Path) -> 
     line = "colours of vertices or faces are the albedo of their faces: a face has one colour, the mean of its corners"
     told: list[str] = []
     with notes.opened(told.append):
-        reduced = with_materials(Scene(MeshSource(name="sphere:2")), late, 256, corner_colours=False, textures=False)
+        reduced = with_materials(Scene(MeshSource(name="sphere:2")), late, SurfaceFeatures(256))
     assert line in early.notes[0] and line in " ".join(told)
     assert reduced.materials == early.materials and reduced.corner_colours is None
     np.testing.assert_array_equal(reduced.face_materials, early.face_materials)
@@ -135,7 +135,7 @@ def test_hardware_without_corner_colours_has_a_colour_a_face(tmp_path: Path) -> 
 
 def test_any_number_of_colours_needs_one_material(tmp_path: Path) -> None:
     mesh = load_mesh(ply(tmp_path / "a.ply", "sphere:4"), corner_colours=True)
-    assert with_materials(Scene(MeshSource(name="sphere:4")), mesh, 1, corner_colours=True, textures=False) is mesh
+    assert with_materials(Scene(MeshSource(name="sphere:4")), mesh, SurfaceFeatures(1, corner_colours=True)) is mesh
     header = pack(mesh, coloured()).header
     registers = frame_registers(Scene(MeshSource(name="sphere:4")), header, coloured(), *SIZE)
     assert registers["materials[0].hasCornerColours"] == 1 and "materials[0].hasCornerColours" in coloured().registers

@@ -17,7 +17,7 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
 from colonnade.render.frames import render_model
 from colonnade.scene.model import Background, Camera, Light, MeshSource, Scene
-from colonnade.scene.object_mesh import with_materials
+from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 from colonnade.scene.view import make_view
 
 SIZE = (160, 120)
@@ -64,6 +64,6 @@ def test_the_device_shows_the_emission_of_the_reference(config: str) -> None:
 def test_hardware_without_emission_says_so() -> None:
     told: list[str] = []
     with notes.opened(told.append):
-        mesh = with_materials(SCENE, lamp(), 8, corner_colours=False, textures=False)
+        mesh = with_materials(SCENE, lamp(), SurfaceFeatures(8))
     assert not any(any(material.emission) for material in mesh.materials)
     assert "1 emissive material is not emitting: the hardware has no emission: set frame.emission=true" in told[0]

@@ -70,7 +70,7 @@ def of(file: Path, backend: Backend, samples: int | None = None, config: str = "
 
 
 @NEEDS_SIMULATOR
-@pytest.mark.parametrize("config", ["tiny", "16b16s32d", "24b20s40d"])
+@pytest.mark.parametrize("config", ["tiny", "16b16s32d", pytest.param("24b20s40d", marks=pytest.mark.matrix)])
 def test_the_hardware_renders_the_passes_of_the_model(folder: Path, config: str) -> None:
     file = scene_file(folder, EVERYTHING)
     overrides = () if config == "tiny" else ("array.rows=1", "array.columns=1")

@@ -26,7 +26,7 @@ from colonnade.device.verilator import write_job
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Scene
-from colonnade.scene.object_mesh import object_mesh, with_materials
+from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import with_overrides
 from colonnade.scene_image.packer import pack
@@ -178,14 +178,7 @@ def record(
     size = require_recordable(stimulus, design.manifest)
     with progress.step("packing the scene"):
         scene, manifest = stimulus.scene, design.manifest
-        mesh = with_materials(
-            scene,
-            stimulus.mesh,
-            int(manifest.config["frame"]["materials"]),
-            manifest.corner_colours,
-            manifest.texture is not None,
-            manifest.emission,
-        )
+        mesh = with_materials(scene, stimulus.mesh, SurfaceFeatures.of(manifest))
         image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
         registers = frame_registers(scene, image.header, manifest, *size)
     joined = {
