@@ -12,10 +12,13 @@ from colonnade.device.bit_exact import render_model
 from colonnade.device.shell import Bus, ShellFrame, render_shell
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
+from colonnade.render.frames import encoded, max_lights, pack_scene
+from colonnade.render.lit_room import device_room, lit_room
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
 
-WIDTH, HEIGHT = 45, 30
+WIDTH, HEIGHT = 44, 33
 UNWRITTEN = 0xA5
 
 
@@ -44,3 +47,21 @@ def test_frames_in_memory_are_those_of_the_model(design: GeneratedDesign, bus: B
         assert_bytes(frame, framebuffer_bytes(expected, code), PIXEL_BYTES[code])
         assert frame.values["counters.hits"] == expected.counters["hits"]
         assert not any(value for name, value in frame.values.items() if name.startswith("errors."))
+
+
+@pytest.mark.matrix
+def test_a_room_in_memory_is_that_of_the_model() -> None:
+    """Its maps are loaded by the shell, too."""
+    design = shell_design_for("small", ("array.columns=2", "array.rows=1"), bus_bytes=16)
+    manifest = design.manifest
+    scene = load_scene(toolchain.project_root() / "scenes" / "room.toml")
+    maps = device_room(scene, manifest)
+    mesh = object_mesh(scene, maps)
+    room = lit_room(scene, maps, mesh.extent, max_lights(manifest), relit=False)
+    environment = encoded(room, manifest)
+    image = pack_scene(room.scene, mesh, manifest, environment)
+    registers = frame_registers(room.scene, image.header, manifest, WIDTH, HEIGHT, environment)
+    expected = render_model(manifest, image, registers)
+    assert expected.is_object.any()
+    (frame,) = render_shell(design, image, [registers], [0], Bus(latency=40, stall=10, seed=3))
+    assert_bytes(frame, framebuffer_bytes(expected, 0), PIXEL_BYTES[0])
