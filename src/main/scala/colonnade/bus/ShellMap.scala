@@ -26,7 +26,7 @@ object ShellMap {
   val identity: BigInt = 0x434c4e44
 
   /** Major and minor version of these registers. A driver refuses another major version. */
-  val version: BigInt = 0x00010000
+  val version: BigInt = 0x00010001
 
   private val byteAddress = 40 // bits
 
@@ -51,7 +51,12 @@ object ShellMap {
     ShellRegister("image.base", 0xc0, byteAddress, ReadWrite),
     ShellRegister("image.windowBase", 0xc8, byteAddress, ReadWrite),
     ShellRegister("image.windowEnd", 0xd0, byteAddress, ReadWrite),
-    ShellRegister("image.bytes", 0xd8, 32, ReadWrite)
+    ShellRegister("image.bytes", 0xd8, 32, ReadWrite),
+    ShellRegister("photo.base", 0xe0, byteAddress, ReadWrite),
+    ShellRegister("photo.windowBase", 0xe8, byteAddress, ReadWrite),
+    ShellRegister("photo.windowEnd", 0xf0, byteAddress, ReadWrite),
+    ShellRegister("photo.stride", 0xf8, 24, ReadWrite),
+    ShellRegister("photo.enabled", 0xfc, 1, ReadWrite)
   )
 
   /** What the design can do: bits 0 to 7 for a driver, and the base-2 logarithm of the bus bytes in bits 11 to 8. */
