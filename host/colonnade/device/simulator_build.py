@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shlex
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -112,11 +113,17 @@ def _build(
         commands[-1] += ["-CFLAGS", "-I..", "-LDFLAGS", " ".join(f"../obj_{top}/V{top}__ALL.a" for top in inner)]
         with log.open("w") as stream:
             for command in commands:
-                done = processes.run(command, cwd=work, env=clean_environment(), stdout=stream, stderr=stream)
+                done = processes.run(command, cwd=work, env=build_environment(), stdout=stream, stderr=stream)
                 if done.returncode != 0:
                     raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
         shutil.move(work / f"obj_{DEVICE}" / PROGRAM, output / PROGRAM)
     log.unlink()
+
+
+def build_environment() -> dict[str, str]:
+    """The environment of Verilator: its own runtime is compiled once for all simulators."""
+    compiles = shlex.quote(str(project_root() / "tools" / "verilated-object"))
+    return {**clean_environment(), "OBJCACHE": compiles}
 
 
 def _verilate(tools: Tools, top: str, sources: Sequence[Path]) -> list[str]:
