@@ -22,7 +22,7 @@ from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
 Integers = npt.NDArray[np.int64]
-PRECISIONS = ("16b16s32d", "24b24s32d", "24b24s64d", "32b32s64d")
+PRECISIONS = ("16b16s32d", "24b24s32d", "24b24s64d", "32b32s64d", "small")
 RAYS = 48
 
 
@@ -141,7 +141,7 @@ def hits_of_their_own_plane(precision: str, divisions: int, seed: int, share: fl
 @settings(max_examples=60, deadline=None)
 @given(st.sampled_from(PRECISIONS), st.sampled_from([1, 1, 2, 7, 30]), st.integers(0, 2**32 - 1))
 def test_no_ray_meets_the_plane_that_it_leaves(precision: str, divisions: int, seed: int) -> None:
-    """Neither its own triangle nor one beside it, from anywhere, at four precisions."""
+    """Neither its own triangle nor one beside it, from anywhere, at five precisions."""
     assert hits_of_their_own_plane(precision, divisions, seed)[0] == 0
 
 
