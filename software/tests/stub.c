@@ -183,6 +183,20 @@ static void test_frames(struct stub *stub, struct colonnade *device) {
     stub->shell[AT(status)] = 1;
     CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK && stub->device[8] == 99 && stub->device[11] == 77);
 
+    struct colonnade_photo photo = {0x200000040, 64, {0x200000000, 0x2000000C0}};
+    device->capabilities = 0;
+    CHECK(colonnade_show_photo(device, &photo) == COLONNADE_NO_ENVIRONMENT);
+    CHECK(colonnade_show_photo(device, NULL) == COLONNADE_OK);
+    device->capabilities = COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm;
+    CHECK(colonnade_show_photo(device, &photo) == COLONNADE_OK);
+    CHECK(stub->shell[AT(photo_enabled)] == 1 && stub->shell[AT(photo_base_low)] == 0x40);
+    CHECK(stub->shell[AT(photo_base_high)] == 2 && stub->shell[AT(photo_stride)] == 64);
+    photo.window.end -= 1;
+    CHECK(colonnade_show_photo(device, &photo) == COLONNADE_TOO_LARGE);
+    photo.base -= 4;
+    CHECK(colonnade_show_photo(device, &photo) == COLONNADE_MISALIGNED);
+    CHECK(colonnade_show_photo(device, NULL) == COLONNADE_OK && stub->shell[AT(photo_enabled)] == 0);
+
     stub->outcome = COLONNADE_FRAME_DONE;
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_OK);
     CHECK(stub->shell[AT(framebuffer_base_high)] == 1 && stub->shell[AT(framebuffer_stride)] == 64);
