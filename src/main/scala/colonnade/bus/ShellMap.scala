@@ -36,7 +36,7 @@ object ShellMap {
   val identity: BigInt = 0x434c4e44
 
   /** Major and minor version of these registers. A driver refuses another major version. */
-  val version: BigInt = 0x00010000
+  val version: BigInt = 0x00010001
 
   private val byteAddress = 40 // bits
 
@@ -67,7 +67,12 @@ object ShellMap {
     setting("image.base", 0xc0, byteAddress, "Address of the image."),
     setting("image.windowBase", 0xc8, byteAddress, "No image is read below this address."),
     setting("image.windowEnd", 0xd0, byteAddress, "No image is read from this address on."),
-    setting("image.bytes", 0xd8, 32, "Size of the image, bytes.")
+    setting("image.bytes", 0xd8, 32, "Size of the image, bytes."),
+    setting("photo.base", 0xe0, byteAddress, "Address of the photo's pixel (0, 0)."),
+    setting("photo.windowBase", 0xe8, byteAddress, "No photo is read below this address."),
+    setting("photo.windowEnd", 0xf0, byteAddress, "No photo is read from this address on."),
+    setting("photo.stride", 0xf8, 24, "Bytes from a line of the photo to the next."),
+    setting("photo.enabled", 0xfc, 1, "1: the photo shows where the object does not.")
   )
 
   private def interrupt(name: String, address: Int, access: Access, description: String): ShellRegister =
