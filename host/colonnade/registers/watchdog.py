@@ -57,11 +57,15 @@ def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest:
 
 
 def _march(manifest: Manifest) -> int:
-    """Cycles of one ray along the longest way through the maps."""
+    """Cycles of one ray along the longest way through the maps, behind one of every unit that shares its march."""
     maps = manifest.config["physicalAttributeMemory"]
     if maps is None:
         return 0
-    array = manifest.config["array"]
-    units = int(array["rows"]) * (int(array["columns"]) if maps["shared"] else 1)
+    array, units = manifest.config["array"], manifest.config["units"]
+    rows, marches = int(array["rows"]), int(units["marches"])
+    sharers = -(-rows // marches) if marches else 1
+    requesters = marches + bool(units["directView"]) if marches else rows
+    if maps["shared"]:
+        requesters *= int(array["columns"])
     tiles = (int(maps["width"]) + int(maps["height"])) // int(maps["tileSize"])
-    return tiles * TILE_STEPS * (MARCH_CYCLES + units)
+    return sharers * tiles * TILE_STEPS * (MARCH_CYCLES + requesters)

@@ -12,9 +12,16 @@ from pathlib import Path
 #: Units of each level in the order of the data flow. The remaining logic of the level's module is one more unit.
 RENDER_UNIT = (
     *("RayGenerator", "RaySetup", "BoxUnit", "TraversalStack", "TriangleUnit", "Shader", "BounceUnit"),
-    *("ShadowRays", "ColourUnit", "EnvironmentStage", "RtController", "RecordFetch", "HitTable"),
+    *("ShadowRays", "ColourUnit", "EnvironmentStage", "EnvironmentRays", "RtController", "RecordFetch", "HitTable"),
 )
-COLUMN = ("ColumnBvhController", "ColumnEnvironment", "TileWalker", "BackgroundWalker", "PixelCollector")
+COLUMN = (
+    "ColumnBvhController",
+    "ColumnEnvironment",
+    "EnvironmentMarches",
+    "TileWalker",
+    "BackgroundWalker",
+    "PixelCollector",
+)
 DEVICE = ("FrameController", "RegisterFile", "CounterFile", "SceneMemory")
 
 #: Dividers and square roots: parts of units that are synthesised separately and counted in their unit.

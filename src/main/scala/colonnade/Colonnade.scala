@@ -61,7 +61,7 @@ final class Colonnade(
 
   // The environment's maps, if all columns share them
   for (ports <- Some(columns.flatMap(_.io.environment)) if ports.nonEmpty) {
-    val tagBits = AttributeArbiter.tagBits(config.array.rows, AttributePort.tagBits(config))
+    val tagBits = AttributeArbiter.tagBits(config.mapRequesters, AttributePort.tagBits(config))
     val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, config.array.columns, tagBits)))
     maps.io.load := load
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }

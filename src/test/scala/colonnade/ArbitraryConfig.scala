@@ -32,7 +32,9 @@ object ArbitraryConfig {
   private def units(arity: Int) = for {
     boxLanes      <- Gen.oneOf(Seq(1, 2, 4).filter(_ <= arity))
     triangleLanes <- Gen.chooseNum(1, 4)
-  } yield UnitsConfig(boxLanes, triangleLanes)
+    marches       <- Gen.chooseNum(0, 16)
+    directView    <- if (marches == 0) Gen.const(false) else flag
+  } yield UnitsConfig(boxLanes, triangleLanes, marches, directView)
 
   private val memory = for {
     depth         <- Gen.chooseNum(16, 1 << 22, 17, 1024, 1 << 17)

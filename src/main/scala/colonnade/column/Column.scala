@@ -5,7 +5,7 @@ import chisel3.experimental.hierarchy.{instantiable, public, Definition, Instanc
 import chisel3.experimental.noPrefix
 import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.{AttributePort, ColumnEnvironment, TextureMemory}
+import colonnade.environment.{AttributePort, ColumnEnvironment, EnvironmentMarches, TextureMemory}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{
   BackgroundWalker,
@@ -115,12 +115,18 @@ final class Column(
   }
   for (error <- io.memoryError) error := RegNext(caches.flatMap(_.error).reduce(_ || _), false.B)
 
-  // Environment: units read the column's own maps, or those that all columns share
+  // Environment: units, or the marches that they share, read the column's own maps, or those that all columns share
   private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(config)).io)
   for (maps <- environment) {
     maps.load := io.load
     maps.shared.zip(io.environment).foreach { case (shared, port) => port <> shared }
     maps.ports.zip(units.flatMap(_.maps)).foreach { case (port, unit) => port <> unit }
+  }
+  private val marches = Option.when(config.sharesMarches)(Module(new EnvironmentMarches(config)).io)
+  for (shared <- marches; maps <- environment) {
+    shared.view := io.registers.environment.get
+    shared.units.zip(units.flatMap(_.marches)).foreach { case (port, unit) => port :<>= unit }
+    maps.ports.zip(shared.maps).foreach { case (port, march) => port <> march }
   }
 
   // Textures: units read the column's own copy
@@ -159,6 +165,7 @@ final class Column(
     enters,
     units.map(_.events),
     controller.io.events,
-    environment.map(_.events)
+    environment.map(_.events),
+    marches.map(_.events)
   ))
 }

@@ -68,14 +68,22 @@ final case class GeometryConfig(
   val texture: Option[TextureLayout] = Option.when(textureBytes != 0)(TextureLayout(textureBytes))
 }
 
-/** Parallel lanes in a render unit.
+/** Parallel lanes in a render unit, and what the units of a column share.
   *
   * @param boxLanes      children that the box unit tests per cycle
   * @param triangleLanes parallel triangle units of four cycles per test
+  * @param marches       environment marches that the render units of a column share; 0: one in every render unit
+  * @param directView    with shared marches: a pipeline of the column for directly seen pixels of an environment
   */
-final case class UnitsConfig(boxLanes: Int, triangleLanes: Int) {
+final case class UnitsConfig(boxLanes: Int, triangleLanes: Int, marches: Int, directView: Boolean) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
   Require.within("units.triangleLanes", triangleLanes, 1, 4)
+  Require.within("units.marches", marches, 0, UnitsConfig.mostMarches)
+  Require("units.directView", !directView || marches > 0, "needs shared marches, units.marches from 1 on")
+}
+
+object UnitsConfig {
+  val mostMarches: Int = 16
 }
 
 /** The memory that the render units of a column share.
@@ -158,4 +166,10 @@ final case class ColonnadeConfig(
 
   /** The device supports an environment. */
   val hasEnvironment: Boolean = physicalAttributeMemory.nonEmpty
+
+  /** The render units of a column share their environment marches. */
+  val sharesMarches: Boolean = hasEnvironment && units.marches > 0
+
+  /** Ports to a column's maps of an environment: of its render units, or of what they share. */
+  val mapRequesters: Int = if (sharesMarches) units.marches + (if (units.directView) 1 else 0) else array.rows
 }

@@ -49,7 +49,7 @@ object ConfigIO {
       "cornerColours",
       "textureBytes"
     )
-    val units  = root.section("units", "boxLanes", "triangleLanes")
+    val units  = root.section("units", "boxLanes", "triangleLanes", "marches", "directView")
     val memory = root.section(
       "columnBvhMemory",
       "depth",
@@ -90,7 +90,12 @@ object ConfigIO {
         cornerColours = shape.boolean("cornerColours"),
         textureBytes = shape.int("textureBytes")
       ),
-      units = UnitsConfig(boxLanes = units.int("boxLanes"), triangleLanes = units.int("triangleLanes")),
+      units = UnitsConfig(
+        boxLanes = units.int("boxLanes"),
+        triangleLanes = units.int("triangleLanes"),
+        marches = units.int("marches"),
+        directView = units.boolean("directView")
+      ),
       columnBvhMemory = ColumnBvhMemoryConfig(
         depth = memory.int("depth"),
         banks = memory.int("banks"),
@@ -161,7 +166,12 @@ object ConfigIO {
         "cornerColours"      -> geometry.cornerColours,
         "textureBytes"       -> geometry.textureBytes
       ),
-      "units"           -> ujson.Obj("boxLanes" -> units.boxLanes, "triangleLanes" -> units.triangleLanes),
+      "units" -> ujson.Obj(
+        "boxLanes"      -> units.boxLanes,
+        "triangleLanes" -> units.triangleLanes,
+        "marches"       -> units.marches,
+        "directView"    -> units.directView
+      ),
       "columnBvhMemory" -> ujson.Obj(
         "depth"         -> columnBvhMemory.depth,
         "banks"         -> columnBvhMemory.banks,

@@ -101,7 +101,7 @@ object AttributePort {
   /** Bits of a render unit's tag, which is a context. */
   def tagBits(config: ColonnadeConfig): Int = log2Ceil(config.array.contexts.max(2))
 
-  /** The port of a column, for all of its render units. */
+  /** The port of a column, for all of its marches. */
   def ofColumn(config: ColonnadeConfig): AttributePort =
-    new AttributePort(AttributeLayout.of(config), AttributeArbiter.tagBits(config.array.rows, tagBits(config)))
+    new AttributePort(AttributeLayout.of(config), AttributeArbiter.tagBits(config.mapRequesters, tagBits(config)))
 }

@@ -12,8 +12,8 @@ final class ColumnEnvironmentIO(config: ColonnadeConfig) extends Bundle {
   /** Only while no request is in flight. */
   val load = Flipped(Valid(new Load(config)))
 
-  /** One for each render unit. */
-  val ports = Vec(config.array.rows, Flipped(port))
+  /** One for each march: of a render unit, or shared. */
+  val ports = Vec(config.mapRequesters, Flipped(port))
 
   /** To the maps that all columns share, if the configuration says so. */
   val shared = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
@@ -28,12 +28,12 @@ final class ColumnEnvironment(config: ColonnadeConfig) extends Module {
 
   io.shared match {
     case Some(shared) =>
-      val units = Module(new AttributeConcentrator(config, config.array.rows, tagBits))
+      val units = Module(new AttributeConcentrator(config, config.mapRequesters, tagBits))
       units.io.ports <> io.ports
       shared <> units.io.joined
       io.events := shared.events
     case None =>
-      val maps = Module(new PhysicalAttributeMemory(config, config.array.rows, tagBits))
+      val maps = Module(new PhysicalAttributeMemory(config, config.mapRequesters, tagBits))
       maps.io.ports <> io.ports
       maps.io.load := io.load
       io.events    := maps.io.events

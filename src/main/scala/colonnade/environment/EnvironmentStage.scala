@@ -7,13 +7,13 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.EnvironmentView
 import colonnade.shading.EnvironmentSurface
 
-/** The ray of a context, for the table of [[EnvironmentStage]]. */
+/** The ray of a context, for the table of a stage. */
 final class StoredRay(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val ray     = new EnvironmentRay(config)
 }
 
-/** Ports of [[EnvironmentStage]]. */
+/** Ports of [[EnvironmentStage]] and [[EnvironmentRays]]. */
 final class EnvironmentStageIO(config: ColonnadeConfig) extends Bundle {
 
   /** Constant while a frame runs. */
@@ -31,8 +31,14 @@ final class EnvironmentStageIO(config: ColonnadeConfig) extends Bundle {
   val surface = Decoupled(new EnvironmentSurface(config))
   val miss    = Valid(Context(config))
   val visible = Valid(Context(config))
-  val maps    = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
-  val events  = Output(new MarchEvents)
+
+  /** To the column: maps, or marches. */
+  val maps =
+    Option.when(!config.sharesMarches)(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config)))
+  val marches = Option.when(config.sharesMarches)(new MarchPort(config))
+
+  /** Of a march of its own. */
+  val events = Output(new MarchEvents)
 }
 
 /** Stores each context's ray, and finds the points of the environment that the rays hit, one at a time; see
@@ -41,42 +47,29 @@ final class EnvironmentStageIO(config: ColonnadeConfig) extends Bundle {
 final class EnvironmentStage(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentStageIO(config))
 
-  private val march = Module(new EnvironmentMarch(config))
-  private val rays  = ContextTable(config, new EnvironmentRay(config))
+  private val slot = Module(new MarchSlot(config))
+  private val rays = ContextTable(config, new EnvironmentRay(config))
   when(io.ray.valid) { rays.write(io.ray.bits.context, io.ray.bits.ray) }
 
-  // A ray is read in the cycle after its request, and held until the march takes it with its result
-  private val isTaken = RegInit(false.B)
-  private val isHeld  = RegInit(false.B)
-  private val req     = RegEnable(io.req.bits, io.req.fire)
-  private val read    = rays.read(io.req.bits.context, io.req.fire)
-  private val held    = RegEnable(read, isTaken)
-  io.req.ready := !isTaken && (!isHeld || march.io.request.ready)
-  isTaken      := io.req.fire
-  when(isTaken) { isHeld := true.B }.elsewhen(march.io.request.ready) { isHeld := false.B }
+  // A ray is read in the cycle after its request
+  private val isTaken = RegNext(io.req.fire, false.B)
+  io.req.ready                   := !isTaken && slot.io.isReady
+  slot.io.view                   := io.view
+  slot.io.order.valid            := isTaken
+  slot.io.order.bits.request     := RegEnable(io.req.bits, io.req.fire)
+  slot.io.order.bits.ray         := rays.read(io.req.bits.context, io.req.fire)
+  slot.io.order.bits.hitDistance := io.hitDistance
+  io.maps.get <> slot.io.maps
+  io.events := slot.io.events
 
-  march.io.view                      := io.view
-  march.io.request.valid             := isHeld
-  march.io.request.bits.context      := req.context
-  march.io.request.bits.isDirectView := req.isDirectView
-  march.io.request.bits.ray          := held
-  march.io.request.bits.hitDistance  := RegEnable(io.hitDistance, isTaken)
-  io.maps <> march.io.maps
-  io.events := march.io.events
-
-  private val result = march.io.result
-  private val isHit  = Mux(req.isOcclusionTest, result.bits.hidesObject, result.bits.kind =/= HitKind.miss.U)
-  io.surface.valid        := result.valid && isHit
-  io.surface.bits.context := result.bits.context
-  io.surface.bits.point   := result.bits.point
-  io.surface.bits.normal  := result.bits.normal
-  io.surface.bits.shadows := !req.isFresnelReflection
-  io.surface.bits.albedo.channels.zip(Seq(result.bits.albedo.r, result.bits.albedo.g, result.bits.albedo.b)).foreach {
-    case (to, from) => to := from
-  }
-  io.miss.valid    := result.valid && !isHit && !req.isOcclusionTest
-  io.miss.bits     := result.bits.context
-  io.visible.valid := result.valid && !isHit && req.isOcclusionTest
-  io.visible.bits  := result.bits.context
-  result.ready     := !isHit || io.surface.ready
+  private val answer = slot.io.answer
+  private val isTest = answer.bits.isOcclusionTest
+  private val isHit  = answer.bits.isHit
+  io.surface.valid := answer.valid && isHit
+  io.surface.bits  := answer.bits.surface
+  io.miss.valid    := answer.valid && !isHit && !isTest
+  io.miss.bits     := answer.bits.surface.context
+  io.visible.valid := answer.valid && !isHit && isTest
+  io.visible.bits  := answer.bits.surface.context
+  answer.ready     := !isHit || io.surface.ready
 }

@@ -32,22 +32,12 @@ final class SurfacePoint(
   private val distance  = m.quotient.zext
   private val mapNormal = Seq(texel.normal.x, texel.normal.y, texel.normal.z).map(_.integer)
 
-  /** The point is clamped to half the scene's size. */
-  private val clamped = {
-    val bits  = sceneBits - 1
-    val sign  = position(sceneBits)
-    val isFar = position(sceneBits - 1, bits - 1) =/= Fill(2, sign)
-    val max   = ((BigInt(1) << (bits - 1)) - 1).S(sceneBits.W)
-    Mux(isFar, Mux(sign, ~max, max), Rounding.narrow(position, sceneBits))
-  }
+  private val clamped = SurfacePoint.clamped(position)
 
   /** The length of the offset along its axis. */
   private val travelled = Mux(offset < 0.S, ~offset, offset).asUInt
 
-  private val rotated = {
-    val exact = Rounding.narrow(m.sum, EnvironmentView.rotationBits + NumberFormats.normalBits + 2)
-    Rounding.saturate(Rounding.nearestEven(exact, EnvironmentView.rotationFraction), NumberFormats.normalBits)
-  }
+  private val rotated = SurfacePoint.rotated(Rounding.narrow(m.sum, SurfacePoint.rotationBits))
 
   /** Connects the result, which is valid in `Finish`. */
   def result(to: MarchResult): Unit = {
@@ -101,5 +91,24 @@ final class SurfacePoint(
     at(begin + 2)(m.accumulate())
     at(begin + 3)(m.accumulate())
     at(begin + 4)(set(normal(axis), rotated))
+  }
+}
+
+object SurfacePoint {
+
+  /** Bits of a sum of three products of a normal and a row of the rotation. */
+  val rotationBits: Int = EnvironmentView.rotationBits + NumberFormats.normalBits + 2
+
+  /** A component of the normal, from its sum. */
+  def rotated(sum: SInt): SInt =
+    Rounding.saturate(Rounding.nearestEven(sum, EnvironmentView.rotationFraction), NumberFormats.normalBits)
+
+  /** A coordinate of `sceneBits` and one bit, clamped to half the scene's size. */
+  def clamped(position: SInt): SInt = {
+    val sceneBits = position.getWidth - 1
+    val sign      = position(sceneBits)
+    val isFar     = position(sceneBits - 1, sceneBits - 2) =/= Fill(2, sign)
+    val max       = ((BigInt(1) << (sceneBits - 2)) - 1).S(sceneBits.W)
+    Mux(isFar, Mux(sign, ~max, max), Rounding.narrow(position, sceneBits))
   }
 }

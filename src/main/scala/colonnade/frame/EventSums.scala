@@ -3,6 +3,7 @@ package colonnade.frame
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
+import colonnade.environment.MarchSums
 import colonnade.formats.{AttributeEvents, UnitEvents}
 
 /** Events of a column BVH controller in one cycle; names as in `Counters`. */
@@ -23,6 +24,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   private def sum(max: Int): UInt = UInt(log2Ceil(max + 1).W)
   private def perUnit             = sum(units)
   private def perContext          = sum(units * config.array.contexts)
+  private def perMarch            = sum(columns * config.mapRequesters)
   private def perEnvironment      = ifEnvironment(sum(columns))
 
   private def ifEnvironment[T <: Data](event: T): Option[T] = if (config.hasEnvironment) Some(event) else None
@@ -56,8 +58,8 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
 
   /** With an environment. */
   val raysEnvironment     = ifEnvironment(perUnit)
-  val marchSteps          = ifEnvironment(perUnit)
-  val busyEnvironment     = ifEnvironment(perUnit)
+  val marchSteps          = ifEnvironment(perMarch)
+  val busyEnvironment     = ifEnvironment(perMarch)
   val contextsEnvironment = ifEnvironment(perContext)
 
   val albedoReads = perEnvironment
@@ -75,13 +77,14 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
 
 object EventSums {
 
-  /** The events of a column: its started pixels, its units, its controller and the environment's maps. */
+  /** The events of a column: its started pixels, its units, its controller, the environment's maps and shared marches. */
   def ofColumn(
       config:      ColonnadeConfig,
       raysPrimary: UInt,
       units:       Seq[UnitEvents],
       controller:  ColumnBvhEvents,
-      environment: Option[AttributeEvents]
+      environment: Option[AttributeEvents],
+      marches:     Option[MarchSums]
   ): EventSums = {
     val sums = joined(new EventSums(config, 1), units.map(_.elements.toMap))
     sums.raysPrimary   := raysPrimary
@@ -89,6 +92,11 @@ object EventSums {
     sums.bankConflicts := controller.bankConflicts
     sums.cacheMisses.zip(controller.cacheMisses).foreach { case (sum, misses) => sum := misses }
     for (events <- environment; (name, event) <- events.elements) sums.elements(name) := event
+    for (events <- marches) {
+      sums.marchSteps.get      := events.marchSteps
+      sums.busyEnvironment.get := events.busyEnvironment
+      sums.illegalRecord       := units.map(_.illegalRecord).reduce(_ || _) || events.illegalRecord
+    }
     sums
   }
 

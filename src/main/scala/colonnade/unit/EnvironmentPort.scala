@@ -2,8 +2,8 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.Decoupled
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.environment.{AttributePort, EnvironmentStage, HitDistance, MarchEvents}
+import colonnade.config.ColonnadeConfig
+import colonnade.environment.{EnvironmentRays, EnvironmentStage, EnvironmentStageIO, HitDistance, MarchEvents}
 import colonnade.formats.{EnvironmentView, PixelPosition}
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
@@ -25,32 +25,37 @@ final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
 
   /** Points of the environment to shade. */
   val surfaces = Decoupled(new EnvironmentSurface(config))
-  val maps     = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
-  val events   = Output(new MarchEvents)
+
+  /** To the maps, for a march of its own; or to the marches of the column. */
+  val maps    = new EnvironmentStageIO(config).maps
+  val marches = new EnvironmentStageIO(config).marches
+  val events  = Output(new MarchEvents)
 }
 
-/** Routes rays to the environment march: every ray that may miss the object is stored there. A primary ray that cannot
+/** Routes rays to the environment march, its own or one of the column: every ray that may miss the object is stored there. A primary ray that cannot
   * hit the object bypasses ray set-up. The ray of a hit that the environment may hide is marched too.
   */
 final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentPortIO(config))
 
-  private val stage   = Module(new EnvironmentStage(config))
+  private val stage =
+    if (config.sharesMarches) Module(new EnvironmentRays(config)).io else Module(new EnvironmentStage(config)).io
   private val control = io.control
   control.enabled   := io.view.enabled
   control.occlusion := io.view.occlusion
-  stage.io.view     := io.view
-  io.maps <> stage.io.maps
-  io.events := stage.io.events
+  stage.view        := io.view
+  io.maps.zip(stage.maps).foreach { case (port, maps) => port <> maps }
+  io.marches.zip(stage.marches).foreach { case (port, marches) => port :<>= marches }
+  io.events := stage.events
 
   // March
-  stage.io.req :<>= control.req
-  control.miss         := stage.io.miss
-  control.visible      := stage.io.visible
-  stage.io.hitDistance := io.hitDistance
-  io.surfaces :<>= stage.io.surface
-  control.hit.valid := stage.io.surface.fire
-  control.hit.bits  := stage.io.surface.bits.context
+  stage.req :<>= control.req
+  control.miss      := stage.miss
+  control.visible   := stage.visible
+  stage.hitDistance := io.hitDistance
+  io.surfaces :<>= stage.surface
+  control.hit.valid := stage.surface.fire
+  control.hit.bits  := stage.surface.bits.context
 
   // Deferred bounces
   control.fresnelReflection := 0.U.asTypeOf(control.fresnelReflection)
@@ -65,12 +70,12 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   private val primary   = io.primary.bits
   private val bounceRay = io.bounces.map(_.ray)
   private val isBounce  = bounceRay.map(_.valid).getOrElse(false.B)
-  stage.io.ray.valid           := isBounce || io.primary.fire
-  stage.io.ray.bits.context    := primary.context
-  stage.io.ray.bits.ray.origin := primary.origin
-  stage.io.ray.bits.ray.dir    := primary.dir
-  for (ray <- bounceRay) when(ray.valid) { stage.io.ray.bits := ray.bits }
-  stage.io.ray.bits.ray.pixel := io.pixel
+  stage.ray.valid           := isBounce || io.primary.fire
+  stage.ray.bits.context    := primary.context
+  stage.ray.bits.ray.origin := primary.origin
+  stage.ray.bits.ray.dir    := primary.dir
+  for (ray <- bounceRay) when(ray.valid) { stage.ray.bits := ray.bits }
+  stage.ray.bits.ray.pixel := io.pixel
 
   // Trace primary rays that may hit the object
   io.objectRays.valid  := io.primary.valid && !isBounce && io.meetsObject

@@ -74,7 +74,8 @@ final class RenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config)
     environment.hitDistance := intersector.surfaceHit.bits.distance.get
     for (bounces <- bounces) environment.bounces.get :<>= bounces.environment.get
     shader.environment.get :<>= environment.surfaces
-    io.maps.get <> environment.maps
+    io.maps.zip(environment.maps).foreach { case (port, maps) => port <> maps }
+    io.marches.zip(environment.marches).foreach { case (port, marches) => port :<>= marches }
   }
 
   // From a path to a pixel

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.environment.AttributePort
+import colonnade.environment.{AttributePort, MarchPort}
 import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitEvents, UnitPosition}
 import colonnade.shading.TexturePort
 
@@ -18,10 +18,11 @@ final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
   val pixels     = Decoupled(new Pixel(config))
 
-  /** To the maps of the environment. */
-  val maps =
-    if (config.hasEnvironment) Some(new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config)))
-    else None
+  /** To the maps of the environment, for a march of its own; or to the marches of the column. */
+  val maps = Option.when(config.hasEnvironment && !config.sharesMarches)(
+    new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
+  )
+  val marches = Option.when(config.sharesMarches)(new MarchPort(config))
 
   /** To the textures. */
   val texture = config.geometry.texture.map(_ => new TexturePort(config))

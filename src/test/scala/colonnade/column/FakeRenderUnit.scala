@@ -38,6 +38,7 @@ class FakeRenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config) {
   io.requests.bits.address := address
   io.pixels.valid          := state === leaving
   io.maps.foreach(_.tieOff())
+  io.marches.foreach(_.tieOff())
   io.pixels.bits          := 0.U.asTypeOf(new Pixel(config))
   io.pixels.bits.x        := position.x
   io.pixels.bits.y        := position.y

@@ -26,7 +26,7 @@ private class EnvironmentStageHarness(config: ColonnadeConfig) extends Module {
   stage.io.ray.bits := ray.asTypeOf(stage.io.ray.bits)
   surface           := stage.io.surface.bits.asUInt
   maps.io.load      := load
-  SlowMaps.connect(stage.io.maps, maps.io.ports.head, isSlow = true.B)
+  SlowMaps.connect(stage.io.maps.get, maps.io.ports.head, isSlow = true.B)
 }
 
 class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {

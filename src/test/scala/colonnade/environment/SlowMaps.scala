@@ -2,11 +2,12 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.random.LFSR
+import chisel3.util.{Decoupled, Queue}
 
 /** Delays requests to an environment's maps, and their responses, at random. */
 object SlowMaps {
 
-  /** @param requester has at most one request in flight in each channel */
+  /** @param requester has at most eight requests in flight in each channel */
   def connect(requester: AttributePort, maps: AttributePort, isSlow: Bool): Unit = {
     val noise = LFSR(16)
     join(requester.cells, maps.cells, isSlow && noise(0))
@@ -24,12 +25,12 @@ object SlowMaps {
     map.req.bits        := requester.req.bits
     requester.req.ready := map.req.ready && !holds
 
-    // At most one response waits
-    val waiting = RegInit(false.B)
-    val kept    = Reg(chiselTypeOf(map.resp.bits))
-    when(map.resp.valid)(kept := map.resp.bits)
-    requester.resp.valid := (map.resp.valid || waiting) && !holds
-    requester.resp.bits := Mux(map.resp.valid, map.resp.bits, kept)
-    waiting := (map.resp.valid || waiting) && holds
+    val responses = Wire(Decoupled(chiselTypeOf(map.resp.bits)))
+    responses.valid := map.resp.valid
+    responses.bits  := map.resp.bits
+    val waiting = Queue(responses, 8, flow = true)
+    waiting.ready        := !holds
+    requester.resp.valid := waiting.fire
+    requester.resp.bits  := waiting.bits
   }
 }

@@ -3,8 +3,8 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.config.{ColonnadeConfig, MapEncoding, UnitsConfig}
-import colonnade.environment.{AttributePort, EnvironmentImage, PhysicalAttributeMemory, SlowMaps}
+import colonnade.config.{ColonnadeConfig, MapEncoding}
+import colonnade.environment.{AttributePort, EnvironmentImage, EnvironmentMarches, PhysicalAttributeMemory, SlowMaps}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.{Always, Matrix, Model, Packed, Simulation, TestConfigs}
 import org.scalatest.Tag
@@ -89,7 +89,7 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   render(TestConfigs.tiny, "a tree, snooping")
   render(
     TestConfigs.tiny.copy(
-      units = UnitsConfig(boxLanes = 4, triangleLanes = 2),
+      units = TestConfigs.tiny.units.copy(boxLanes = 4, triangleLanes = 2),
       columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(recordBuffers = 3)
     ),
     "wide units"
@@ -113,16 +113,18 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     TestConfigs.withPrecision(16, 16, 32).copy(
       array = TestConfigs.tiny.array.copy(contexts = 1),
       frame = TestConfigs.tiny.frame.copy(lights = 1, maxBounces = 0, hits = false),
+      units = TestConfigs.tiny.units.copy(marches = 1),
       physicalAttributeMemory = Some(TestConfigs.environment.copy(encoding = MapEncoding.Sliding))
     ),
-    "with an environment, one context, no bounces"
+    "with an environment, a march of the column, one context, no bounces"
   )
   render(
     TestConfigs.withColours.head.copy(
+      units = TestConfigs.tiny.units.copy(marches = 2, directView = true),
       physicalAttributeMemory = Some(TestConfigs.environment),
       frame = TestConfigs.withColours.head.frame.copy(emission = true)
     ),
-    s"corner colours and emission at ${TestConfigs.withColours.head.precision} with an environment"
+    s"corner colours and emission at ${TestConfigs.withColours.head.precision} with an environment in the column"
   )
   for (config <- TestConfigs.withColours.tail) {
     val withoutTextures = config.copy(geometry = config.geometry.copy(textureBytes = 0))
@@ -142,10 +144,16 @@ private class RenderUnitHarness(config: ColonnadeConfig) extends Module {
   pixel             := unit.io.pixels.bits.asUInt
 
   /** Loads of the maps. */
-  val load = Option.when(config.hasEnvironment)(IO(Flipped(Valid(new Load(config)))))
-  for (asks <- unit.io.maps) {
-    val maps = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
-    SlowMaps.connect(asks, maps.io.ports.head, isSlow = true.B)
+  val load            = Option.when(config.hasEnvironment)(IO(Flipped(Valid(new Load(config)))))
+  private val marches = unit.io.marches.map { port =>
+    val marches = Module(new EnvironmentMarches(config)).io
+    marches.view := unit.io.registers.environment.get
+    marches.units.head :<>= port
+    marches.maps
+  }
+  for (asks <- marches.orElse(unit.io.maps.map(Seq(_)))) {
+    val maps = Module(new PhysicalAttributeMemory(config, config.mapRequesters, AttributePort.tagBits(config)))
+    asks.zip(maps.io.ports).foreach { case (asks, port) => SlowMaps.connect(asks, port, isSlow = true.B) }
     maps.io.load := load.get
   }
 }

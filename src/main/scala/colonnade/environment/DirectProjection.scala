@@ -1,0 +1,122 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.Valid
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.EnvironmentView
+import colonnade.numbers.{Normalise, Rounding}
+
+/** Where a directly seen pixel lies in the map. */
+final class DirectPlace(config: ColonnadeConfig) extends Bundle {
+  private val formats = new MarchFormats(config)
+
+  /** From the map's centre, in map units. */
+  val u, v = SInt(formats.originBits.W)
+
+  /** The map's pixel. */
+  val pixel = new MapPixel(AttributeLayout.of(config))
+}
+
+/** How fast a pixel's ray goes away from the camera: mantissa · 2^(exponent - f). */
+final class DirectRate(config: ColonnadeConfig) extends Bundle {
+  private val formats = new MarchFormats(config)
+
+  val mantissa   = UInt(formats.f.W)
+  val exponent   = UInt(formats.exponentBits.W)
+  val isReceding = Bool()
+}
+
+/** Ports of [[DirectProjection]]. */
+final class DirectProjectionIO(config: ColonnadeConfig) extends Bundle {
+  private val formats = new MarchFormats(config)
+
+  val view = Input(new EnvironmentView(config.numbers))
+
+  /** A ray, only in a cycle after one with `isReady`. */
+  val ray     = Flipped(Valid(new EnvironmentRay(config)))
+  val isReady = Output(Bool())
+
+  /** The cycle after this one takes a place. */
+  val hasSpace = Input(Bool())
+
+  /** In the fourth cycle after the ray, or later; the direction is scaled to f bits. */
+  val place = Valid(new DirectPlace(config))
+  val dir   = Output(Vec(3, SInt((formats.f + 1).W)))
+
+  /** Six cycles after the place. */
+  val rate = Valid(new DirectRate(config))
+}
+
+/** Finds the map's pixel of a ray from the camera, and the growth of the ray's depth: a ray every four cycles.
+  *
+  * One multiplier for the two coordinates of the pixel, one for the three products of the depth.
+  */
+final class DirectProjection(config: ColonnadeConfig) extends Module {
+  private val formats = new MarchFormats(config)
+  import DirectView.latch
+  import formats._
+
+  val io = IO(new DirectProjectionIO(config))
+
+  // Four cycles of a ray
+  private val isHeld = RegInit(false.B)
+  private val at     = Reg(UInt(2.W))
+  private val ray    = latch(io.ray.bits, io.ray.valid)
+  private val leaves = isHeld && at === 3.U && io.hasSpace
+  when(io.ray.valid) {
+    isHeld := true.B
+    at     := 0.U
+  }.elsewhen(leaves) { isHeld := false.B }.elsewhen(at =/= 3.U) { at := at + 1.U }
+  // One cycle before the ray leaves, its space is certain: only this unit takes it
+  io.isReady := !isHeld || (at(1) && io.hasSpace)
+
+  // The direction, shifted to the length of its largest component
+  private val dirBits    = config.numbers.directionBits.max(f + 1)
+  private val components = VecInit(ray.dir.axes.map(_.pad(dirBits)))
+  private val lengths    = components.map(c => Mux(c < 0.S, ~c, c).asUInt(dirBits - 2, 0)).reduce(_ | _)
+  private val shift      = latch((dirBits - 1).U - Normalise.bitLength(lengths), at === 0.U)
+  private val component  = VecInit(components.head +: components)(at)
+  private val scaled     = (component.asUInt << shift)(dirBits - 1, dirBits - 1 - f).asSInt
+  private val dir        = Seq.tabulate(2)(axis => latch(scaled, at === (axis + 1).U))
+  io.dir := VecInit(dir :+ scaled)
+
+  // The pixel: (2 · pixel + 1) · step
+  private val halfPixels  = Mux(at(0), ray.pixel.y, ray.pixel.x) ## 1.U(1.W)
+  private val position    = latch(halfPixels * Mux(at(0), io.view.stepY, io.view.stepX))
+  private val coordinates = for (axis <- 0 until 2) yield {
+    val coordinate = Rounding.floor(position, EnvironmentView.stepGuard)
+    val inMap      = Rounding.floor(coordinate, pixelFraction)
+    val pixel = Mux(inMap >= sizes(axis).U, (sizes(axis) - 1).U, inMap)(Seq(layout.xBits, layout.yBits)(axis) - 1, 0)
+    val fromCentre = (coordinate.zext - centre(axis).S).asUInt.pad(originBits)(originBits - 1, 0).asSInt
+    val isNow      = at === (axis + 1).U
+    (latch(fromCentre, isNow), latch(pixel, isNow))
+  }
+  io.place.valid        := leaves
+  io.place.bits.u       := coordinates.head._1
+  io.place.bits.v       := coordinates.last._1
+  io.place.bits.pixel.x := coordinates.head._2
+  io.place.bits.pixel.y := coordinates.last._2
+
+  // The growth of the depth: the matrix's last row times the direction
+  private val atRate  = RegInit(4.U(3.W))
+  private val rateDir = latch(io.dir, leaves)
+  private val product = latch(VecInit(rateDir :+ rateDir.head)(atRate(1, 0)) * VecInit(
+    io.view.matrix(2).axes :+ io.view.matrix(2).axes.head
+  )(atRate(1, 0)))
+  private val sum = Reg(SInt((product.getWidth + 2).W))
+  when(leaves) { atRate := 0.U }.elsewhen(atRate < 4.U) { atRate := atRate + 1.U }
+  when(atRate === 1.U) { sum := product }.elsewhen(atRate === 2.U || atRate === 3.U) { sum := sum + product }
+
+  // The sum stays for two cycles, whatever comes next
+  private val sumBits       = sum.getWidth - 1
+  private val isSummed      = RegNext(atRate === 3.U, false.B)
+  private val magnitude     = sum.asUInt(sumBits - 1, 0)
+  private val (zero, zeros) = Normalise.countLeadingZeros(magnitude)
+  private val normaliseBy   = latch(zeros, isSummed)
+  private val isReceding    = latch(!zero && sum > 0.S, isSummed)
+  private val normalised    = (magnitude << normaliseBy)(sumBits - 1, 0)
+  io.rate.valid           := RegNext(isSummed, false.B)
+  io.rate.bits.mantissa   := normalised(sumBits - 1, sumBits - f)
+  io.rate.bits.exponent   := sumBits.U - normaliseBy
+  io.rate.bits.isReceding := isReceding
+}

@@ -1,0 +1,59 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.{Decoupled, RegEnable, Valid}
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.formats.EnvironmentView
+
+/** Ports of [[MarchSlot]]. */
+final class MarchSlotIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Constant while a frame runs. */
+  val view = Input(new EnvironmentView(config.numbers))
+
+  /** Only in a cycle after one with `isReady` or `isEmpty`. */
+  val order = Flipped(Valid(new MarchOrder(config)))
+
+  /** No order is held, or it ends in this cycle; no order is held. */
+  val isReady = Output(Bool())
+  val isEmpty = Output(Bool())
+  val answer  = Decoupled(new MarchAnswer(config))
+  val maps    = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
+  val events  = Output(new MarchEvents)
+}
+
+/** An [[EnvironmentMarch]] with the order that it works on. */
+final class MarchSlot(config: ColonnadeConfig) extends Module {
+  val io = IO(new MarchSlotIO(config))
+
+  private val march  = Module(new EnvironmentMarch(config))
+  private val isHeld = RegInit(false.B)
+  private val order  = RegEnable(io.order.bits, io.order.valid)
+  when(io.order.valid) { isHeld := true.B }.elsewhen(march.io.request.ready) { isHeld := false.B }
+  io.isReady := !isHeld || march.io.request.ready
+  io.isEmpty := !isHeld
+
+  march.io.view                      := io.view
+  march.io.request.valid             := isHeld
+  march.io.request.bits.context      := order.request.context
+  march.io.request.bits.isDirectView := order.request.isDirectView
+  march.io.request.bits.ray          := order.ray
+  march.io.request.bits.hitDistance  := order.hitDistance
+  io.maps <> march.io.maps
+  io.events := march.io.events
+
+  private val result  = march.io.result
+  private val surface = io.answer.bits.surface
+  io.answer.valid                := result.valid
+  io.answer.bits.isOcclusionTest := order.request.isOcclusionTest
+  io.answer.bits.isHit           :=
+    Mux(order.request.isOcclusionTest, result.bits.hidesObject, result.bits.kind =/= HitKind.miss.U)
+  surface.context := result.bits.context
+  surface.point   := result.bits.point
+  surface.normal  := result.bits.normal
+  surface.shadows := !order.request.isFresnelReflection
+  surface.albedo.channels.zip(Seq(result.bits.albedo.r, result.bits.albedo.g, result.bits.albedo.b)).foreach {
+    case (to, from) => to := from
+  }
+  result.ready := io.answer.ready
+}

@@ -1,0 +1,172 @@
+package colonnade.environment
+
+import chisel3._
+import chisel3.util.{Decoupled, Valid}
+import chiseltest._
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{EnvironmentView, Load}
+import colonnade.shading.EnvironmentSurface
+import colonnade.{Model, Packed, Simulation, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+/** The ports of a render unit's [[EnvironmentRays]]; each wide one is a number. */
+private class RowPorts(config: ColonnadeConfig) extends Bundle {
+  val ray         = Flipped(Valid(UInt(new StoredRay(config).getWidth.W)))
+  val req         = Flipped(Decoupled(new EnvironmentRequest(config)))
+  val hitDistance = Input(HitDistance(config))
+  val surface     = Decoupled(UInt(new EnvironmentSurface(config).getWidth.W))
+  val miss        = Valid(Context(config))
+  val visible     = Valid(Context(config))
+}
+
+/** The rays of some render units, the marches that they share, and slow maps. */
+private class EnvironmentMarchesHarness(config: ColonnadeConfig) extends Module {
+  private val marches = Module(new EnvironmentMarches(config))
+  private val maps    = Module(new PhysicalAttributeMemory(config, config.mapRequesters, AttributePort.tagBits(config)))
+
+  val rows   = IO(Vec(config.array.rows, new RowPorts(config)))
+  val view   = IO(Input(UInt(marches.io.view.getWidth.W)))
+  val load   = IO(Flipped(Valid(new Load(config))))
+  val events = IO(chiselTypeOf(marches.io.events))
+  marches.io.view := view.asTypeOf(marches.io.view)
+  maps.io.load    := load
+  events          := marches.io.events
+  marches.io.maps.zip(maps.io.ports).foreach { case (march, port) => SlowMaps.connect(march, port, isSlow = true.B) }
+  for ((port, row) <- marches.io.units.zip(rows)) {
+    val unit = Module(new EnvironmentRays(config)).io
+    port :<>= unit.marches.get
+    unit.view         := view.asTypeOf(unit.view)
+    unit.ray.valid    := row.ray.valid
+    unit.ray.bits     := row.ray.bits.asTypeOf(unit.ray.bits)
+    unit.hitDistance  := row.hitDistance
+    row.surface.valid := unit.surface.valid
+    row.surface.bits  := unit.surface.bits.asUInt
+    row.miss          := unit.miss
+    row.visible       := unit.visible
+    unit.req :<>= row.req
+    unit.surface.ready := row.surface.ready
+  }
+}
+
+class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "EnvironmentMarches"
+
+  private case class Request(ray: MarchCase, isFresnelReflection: Boolean, isOcclusionTest: Boolean)
+
+  /** What came back: a surface or none, and whether the object's hit is visible. */
+  private case class Answer(request: Request, surface: Option[BigInt], isVisible: Boolean)
+
+  /** The driver of a render unit. */
+  private class Row(port: RowPorts, config: ColonnadeConfig, nextRay: () => MarchCase, random: Random) {
+    private val stored   = new Packed(new StoredRay(config))
+    private var rays     = Map.empty[Int, MarchCase]
+    private var offered  = Option.empty[Request]
+    private var distance = Option.empty[BigInt]
+
+    /** By context; the largest number of them. */
+    private var inFlight = Map.empty[Int, Request]
+    var mostInFlight     = 0
+
+    /** Contexts whose answer has come, in order of the requests. */
+    var answers = Vector.empty[Answer]
+
+    def step(willing: Double): Unit = {
+      val free =
+        (0 until config.array.contexts).filterNot(c => inFlight.contains(c) || offered.exists(_.ray.context == c))
+      val next = Option.when(free.nonEmpty && random.nextInt(6) == 0) {
+        nextRay().copy(context = free(random.nextInt(free.size)))
+      }
+      port.ray.valid.poke(next.nonEmpty)
+      for (ray <- next) port.ray.bits.poke(stored.pack(ray.fields - "isDirectView" - "hitDistance"))
+      val ready = free.filter(context => rays.contains(context) && !next.exists(_.context == context))
+      if (offered.isEmpty && ready.nonEmpty && random.nextInt(4) == 0)
+        offered = Some(Request(rays(ready(random.nextInt(ready.size))), random.nextBoolean(), random.nextBoolean()))
+      port.hitDistance.poke(distance.getOrElse(BigInt(config.numbers.sceneBits, random)))
+      distance = None
+      port.req.valid.poke(offered.nonEmpty)
+      for (request <- offered) {
+        port.req.bits.context.poke(request.ray.context)
+        port.req.bits.isDirectView.poke(request.ray.isDirectView)
+        port.req.bits.isFresnelReflection.poke(request.isFresnelReflection)
+        port.req.bits.isOcclusionTest.poke(request.isOcclusionTest)
+      }
+      val takes = random.nextDouble() < willing
+      port.surface.ready.poke(takes)
+      if (takes && port.surface.valid.peekBoolean()) {
+        val bits    = port.surface.bits.peekInt()
+        val context = new Packed(new EnvironmentSurface(config)).unpack(bits)("context").toInt
+        rays -= context // the point has taken its place
+        end(context, Some(bits), isVisible = false)
+      }
+      if (port.miss.valid.peekBoolean()) end(port.miss.bits.peekInt().toInt, None, isVisible = false)
+      if (port.visible.valid.peekBoolean()) end(port.visible.bits.peekInt().toInt, None, isVisible = true)
+      if (port.req.ready.peekBoolean()) for (request <- offered) {
+        inFlight += request.ray.context -> request
+        mostInFlight = mostInFlight.max(inFlight.size)
+        distance = Some(request.ray.hitDistance)
+        offered = None
+      }
+      for (ray <- next) rays += ray.context -> ray
+    }
+
+    private def end(context: Int, surface: Option[BigInt], isVisible: Boolean): Unit = {
+      answers :+= Answer(inFlight(context), surface, isVisible)
+      inFlight -= context
+    }
+  }
+
+  for ((rows, marches, directView, willing) <- Seq((3, 2, true, 0.02), (1, 1, false, 0.5)))
+    it should s"answer each request as the model does: $rows units, $marches marches, ${if (directView) "with"
+      else "without"} a pipeline" in {
+      val base   = TestConfigs.withEnvironment(TestConfigs.environment)
+      val config = base.copy(
+        array = base.array.copy(rows = rows),
+        units = base.units.copy(marches = marches, directView = directView)
+      )
+      test(new EnvironmentMarchesHarness(config)).withAnnotations(Simulation.verilator) { dut =>
+        val random   = new Random(rows)
+        val stimulus = new MarchStimulus(config, random)
+        val scene    = new EnvironmentScene(config, random)
+        val camera   = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
+        def nextRay  = if (random.nextInt(3) == 0) stimulus.fromCamera(camera) else stimulus.inRoom(camera)
+        dut.clock.setTimeout(0)
+        EnvironmentImage.load(dut.load, dut.clock, config, scene.words)
+        dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(camera.view.fields))
+
+        val units  = dut.rows.map(new Row(_, config, () => nextRay, random))
+        var cycles = 0
+        var steps  = BigInt(0)
+        while (units.map(_.answers.size).sum < 45) {
+          units.foreach(_.step(willing))
+          steps += dut.events.marchSteps.peekInt()
+          cycles += 1
+          assert(cycles < 60000, s"only ${units.map(_.answers.size)} answers")
+          dut.clock.step()
+        }
+        assert(units.forall(_.answers.size > 45 / rows / 2), "no unit starves")
+        assert(units.forall(_.mostInFlight > 2), "several contexts are under way at a time")
+
+        val answers = units.flatMap(_.answers)
+        val words   = answers.map(answer => camera.view.words ++ answer.request.ray.words)
+        val models  = Model.attributes(config, scene.words, words, "march").map(MarchCase.answer.zip(_).toMap)
+        for ((Answer(request, surface, isVisible), expected) <- answers.zip(models)) {
+          val isHit = if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss
+          assert(surface.nonEmpty == isHit && isVisible == (request.isOcclusionTest && !isHit), s"of $request")
+          for (bits <- surface) {
+            val values = new Packed(new EnvironmentSurface(config)).unpack(bits)
+            val added  = Map(
+              "context" -> BigInt(request.ray.context),
+              "shadows" -> BigInt(if (request.isFresnelReflection) 0 else 1)
+            )
+            assert(values == (expected.filter(value => values.contains(value._1)) ++ added), s"of $request")
+          }
+        }
+        assert(steps >= models.map(_("steps")).sum, "steps are counted")
+        assert(answers.exists(_.isVisible) && answers.exists(a => a.request.isOcclusionTest && a.surface.nonEmpty))
+        assert(answers.exists(_.request.ray.isDirectView) && answers.exists(!_.request.ray.isDirectView))
+      }
+    }
+}
