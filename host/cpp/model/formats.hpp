@@ -22,15 +22,16 @@ inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, co
 
 /// The manifest's `numbers` (docs/numbers.md), and the configuration values that traversal depends on.
 struct Numbers {
-    int vertexBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
+    int vertexBits, boxBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
         entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits,
-        boxPadLog, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
+        boxPadLog, stepFraction, stepReach, nodeBits, nearFraction, nearBits, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
     int arity, trianglesPerRecord, stackDepth;
     bool bvh;
 
     explicit Numbers(const std::map<std::string, std::int64_t>& values) {
         const auto take = [&](const char* key) { return static_cast<int>(lookUp(values, key)); };
         vertexBits = take("vertexBits");
+        boxBits = take("boxBits");
         gridBits = take("gridBits");
         gridFraction = take("gridFraction");
         sceneBits = take("sceneBits");
@@ -49,6 +50,11 @@ struct Numbers {
         cosineFraction = take("cosineFraction");
         boxDistanceBits = take("boxDistanceBits");
         boxPadLog = take("boxPadLog");
+        stepFraction = take("stepFraction");
+        stepReach = take("stepReach");
+        nodeBits = take("nodeBits");
+        nearFraction = take("nearFraction");
+        nearBits = take("nearBits");
         normalFraction = take("normalFraction");
         colourBits = take("colourBits");
         lightBits = take("lightBits");

@@ -25,33 +25,81 @@ struct Entered {
     std::int64_t tNear;
 };
 
+/// A node as a ray sees it: everything that the box tests of its children share (docs/numbers.md, section 3).
+struct RelativeNode {
+    /// The distance along z' at which the ray reaches the node's first z plane, vertex units, and the exponent of the node there.
+    std::int64_t z;
+    int exponent;
+    /// By axis x', y': a floored and a raised plane's step, the first planes' near and far t, and the left shift of a sum of these to the children's t.
+    std::array<std::int64_t, 2> step, near, far;
+    std::array<int, 2> scale;
+    /// The pad along z', the ray's origin and its tMax, in the children's t.
+    std::int64_t pad, origin, tMax;
+
+    RelativeNode(const Ray& ray, const Node& node, std::int64_t tMaxInUnits, const Numbers& n) {
+        const std::int64_t mostPlane = (std::int64_t(1) << n.boxBits) - 1;
+        std::array<std::int64_t, 3> corner, span;
+        for (int a = 0; a < 3; ++a) {
+            const int axis = ray.objectAxis(a);
+            corner[a] = node.origin[axis] - ray.boxOrigin[a];
+            span[a] = mostPlane << node.exponent[axis];
+        }
+        exponent = node.exponent[ray.objectAxis(2)];
+        z = ray.negative[2] ? -(corner[2] + span[2]) : corner[2];
+        for (int a = 0; a < 2; ++a) {
+            const int axisExponent = node.exponent[ray.objectAxis(a)], drop = n.reciprocalFraction - ray.exponent[a];
+            const int finest = axisExponent + ray.exponent[a] - n.stepFraction, lowest = std::max(finest, exponent - n.stepReach);
+            step[a] = ray.reciprocal[a] >> (n.reciprocalFraction - n.stepFraction + lowest - finest);
+            const std::int64_t product = corner[a] * ray.reciprocal[a];
+            const Wide exact = (ray.negative[a] ? -product : product) - shiftLeft<Wide>(z, drop);
+            const auto base = static_cast<std::int64_t>(clamp<Wide>(floorShift<Wide>(exact, lowest + drop), -largest(n.nodeBits) - 1, largest(n.nodeBits)));
+            const std::int64_t pad = (((step[a] + 1) << n.boxPadLog) >> axisExponent) + 1;
+            scale[a] = lowest - (exponent - n.nearFraction);
+            const std::int64_t roundUp = scale[a] < 0 ? (std::int64_t(1) << -scale[a]) - 1 : 0;
+            near[a] = base - pad - (ray.negative[a] ? mostPlane * (step[a] + 1) : 0);
+            far[a] = base + pad + 1 + roundUp - (ray.negative[a] ? mostPlane * step[a] : 0);
+        }
+        pad = std::int64_t(1) << std::max(0, n.boxPadLog + n.nearFraction - exponent);
+        origin = saturate(floorShift<Wide>(-z, exponent - n.nearFraction), n);
+        tMax = saturate(floorShift<Wide>(tMaxInUnits - z, exponent - n.nearFraction), n);
+    }
+
+    static std::int64_t saturate(Wide t, const Numbers& n) {
+        return static_cast<std::int64_t>(clamp<Wide>(t, -largest(n.nearBits) - 1, largest(n.nearBits)));
+    }
+
+    /// A child's t in vertex units, rounded down.
+    std::int64_t units(std::int64_t t, const Numbers& n) const { return std::max<std::int64_t>(0, z + floorShift(t, n.nearFraction - exponent)); }
+};
+
 /// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
 inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, 4>& entered, std::uint64_t& tests) {
-    const std::int64_t maximum = static_cast<std::int64_t>(largest(n.boxDistanceBits)), tMaxInUnits = tMaxUnits(tMax, n);
+    const RelativeNode relative(ray, node, tMaxUnits(tMax, n), n);
+    const std::int64_t mostPlane = (std::int64_t(1) << n.boxBits) - 1;
     int count = 0;
     for (int slot = 0; slot < n.arity; ++slot) {
         if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
         ++tests;
-        std::int64_t tNear = 0, tFar = maximum;
+        std::int64_t tNear = relative.origin, tFar = relative.tMax;
         for (int a = 0; a < 3; ++a) {
             const int axis = ray.objectAxis(a);
-            const std::int64_t origin = node.origin[axis] - ray.boxOrigin[a];
-            const std::int64_t low = origin + (std::int64_t(node.low[slot][axis]) << node.exponent[axis]);
-            const std::int64_t high = origin + (std::int64_t(node.high[slot][axis]) << node.exponent[axis]);
-            std::int64_t first = (ray.negative[a] ? -high : low) - n.boxPad(), last = (ray.negative[a] ? -low : high) + n.boxPad();
+            const std::int64_t low = node.low[slot][axis], high = node.high[slot][axis];
+            const std::int64_t first = ray.negative[a] ? mostPlane - high : low, last = ray.negative[a] ? mostPlane - low : high;
             if (a < 2) {
-                const int drop = n.reciprocalFraction - ray.exponent[a];
-                first = (first * ray.reciprocal[a]) >> drop;
-                last = ((last * ray.reciprocal[a]) >> drop) + 1;
+                const std::int64_t near = relative.near[a] + first * relative.step[a], far = relative.far[a] + last * (relative.step[a] + 1);
+                tNear = std::max(tNear, RelativeNode::saturate(floorShift<Wide>(near, -relative.scale[a]), n));
+                tFar = std::min(tFar, RelativeNode::saturate(floorShift<Wide>(far, -relative.scale[a]), n));
+            } else {
+                tNear = std::max(tNear, (first << n.nearFraction) - relative.pad);
+                tFar = std::min(tFar, (last << n.nearFraction) + relative.pad);
             }
-            tNear = std::max(tNear, clamp(first, -maximum - 1, maximum));
-            tFar = std::min(tFar, clamp(last, -maximum - 1, maximum));
         }
-        if (tNear > tFar || tNear > tMaxInUnits) continue;
+        if (tNear > tFar) continue;
         int position = count++;
         for (; position > 0 && entered[position - 1].tNear > tNear; --position) entered[position] = entered[position - 1];
         entered[position] = {slot, tNear};
     }
+    for (int i = 0; i < count; ++i) entered[i].tNear = relative.units(entered[i].tNear, n);
     return count;
 }
 

@@ -43,6 +43,15 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   /** Largest exponent of a node: a child's planes are less than two cubes from its node's corner. */
   val mostExponent: Int = (vertexBits - boxBits + 1).max(1)
 
+  /** The box test's reciprocal: fraction bits of its mantissa, enough for a quarter of a child's plane. */
+  val stepFraction: Int = (boxBits + 2).min(reciprocalFraction)
+
+  /** Its steps are no finer than 2^-stepReach planes of the node along the dominant axis. */
+  val stepReach: Int = boxBits + 2
+
+  /** Distances relative to a node, in its planes along the dominant axis: signed, with this fraction. */
+  val nearFraction: Int = 3
+
   /** Signed distances of the box test, in units. */
   val boxDistanceBits: Int = vertexBits + 3
 
@@ -59,6 +68,18 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
         (if (gridFraction > 0) 0.5 else 0.0) +
         step + power(vertexBits + 1) * (power(1 - distanceDigits) + power(2 - mantissaBits))
     math.ceil(math.log(sum) / math.log(2)).toInt.max(1)
+  }
+
+  /** The last plane of a node, padded. */
+  private val farthestPlane = (((1L << boxBits) - 1) << nearFraction) + (1L << (boxPadLog + nearFraction))
+
+  /** Width of a distance relative to a node: beyond its last plane there is at least one value to saturate to. */
+  val nearBits: Int = bitLength(farthestPlane) + 1
+
+  /** Width of a node's distance in steps: where it saturates, all children are before the node or beyond it. */
+  val nodeBits: Int = {
+    val steps = 1L << (stepFraction + 1)
+    bitLength((farthestPlane << (stepReach - nearFraction)) + (steps << boxBits) + (steps << boxPadLog) + 4) + 1
   }
 
   /** All values by their manifest key. */
@@ -87,6 +108,11 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
     "mostExponent"       -> mostExponent,
     "boxDistanceBits"    -> boxDistanceBits,
     "boxPadLog"          -> boxPadLog,
+    "stepFraction"       -> stepFraction,
+    "stepReach"          -> stepReach,
+    "nearFraction"       -> nearFraction,
+    "nearBits"           -> nearBits,
+    "nodeBits"           -> nodeBits,
     "normalBits"         -> normalBits,
     "normalFraction"     -> normalFraction,
     "colourBits"         -> colourBits,
@@ -117,7 +143,9 @@ object NumberFormats {
   val etaBits:     Int = 16
   val etaFraction: Int = 13
 
-  def bitLength(value: Int): Int = 32 - Integer.numberOfLeadingZeros(value)
+  def bitLength(value: Int): Int = bitLength(value.toLong)
+
+  def bitLength(value: Long): Int = 64 - java.lang.Long.numberOfLeadingZeros(value)
 
   private def power(exponent: Int): Double = math.pow(2, exponent)
 }

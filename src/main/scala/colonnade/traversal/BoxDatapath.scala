@@ -3,15 +3,30 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.RegEnable
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.RecordFormats
 import colonnade.numbers.Rounding
 
-/** The interval of t in which a ray is inside a child's box, in units; empty if `tNear` exceeds `tFar`. */
+/** The interval of t in which a ray is inside a child's box, relative to its node; empty if `tNear` exceeds `tFar`. */
 final class BoxInterval(config: ColonnadeConfig) extends Bundle {
   val isOccupied = Bool()
-  val tNear      = UInt((config.numbers.boxDistanceBits - 1).W)
-  val tFar       = SInt(config.numbers.boxDistanceBits.W)
+  val tNear      = SInt(config.numbers.nearBits.W)
+  val tFar       = SInt(config.numbers.nearBits.W)
 
-  def isEntered: Bool = isOccupied && tNear.zext <= tFar
+  def isEntered: Bool = isOccupied && tNear <= tFar
+}
+
+/** Converts t of a node's children to units: t · 2^(`exponent` - `nearFraction`) - `toOrigin`, at least 0. */
+final class NodeDistance(config: ColonnadeConfig) extends Bundle {
+  private val numbers = config.numbers
+
+  val toOrigin = SInt(numbers.boxDistanceBits.W)
+  val exponent = UInt(RecordFormats.exponentBits(config).W)
+
+  /** Combinational; rounds down. `t` is at most that of the node's last z' plane. */
+  def units(t: SInt): UInt = {
+    val distance = ((t << exponent).asSInt >> numbers.nearFraction) - toOrigin
+    Mux(distance < 0.S, 0.U, distance.asUInt(numbers.boxDistanceBits - 2, 0))
+  }
 }
 
 /** Ports of [[BoxDatapath]]. */
@@ -22,18 +37,19 @@ final class BoxDatapathIO(config: ColonnadeConfig, lanes: Int) extends Bundle {
   val isValid   = Input(Bool())
   val children  = Input(Vec(lanes, new ChildPlanes(config)))
   val intervals = Output(Vec(lanes, new BoxInterval(config)))
+
+  /** With `intervals`. */
+  val distance = Output(new NodeDistance(config))
 }
 
 /** Slab test of one ray against `lanes` boxes in padded integers (docs/numbers.md, section 3), without control logic.
   *
-  * Latency [[BoxDatapath.latency]] cycles, throughput one set of boxes per cycle, no stalls. Each lane has four
-  * multipliers, because the dominant axis needs none. A box beyond `tMax` has an empty interval. The registers of a lane
-  * hold while it has no child to test.
+  * Latency [[BoxDatapath.latency]] cycles, throughput one set of boxes per cycle, no stalls. [[NodeStage]] multiplies
+  * the corner of the node; each lane has four short multipliers, because the dominant axis needs none. A box beyond
+  * `tMax` has an empty interval. The registers of a lane hold while it has no child to test.
   */
 class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
-  private val numbers      = config.numbers
-  private val distanceBits = numbers.boxDistanceBits
-  private val pad          = BigInt(1) << numbers.boxPadLog
+  private val numbers = config.numbers
   require(
     numbers.boxPadLog <= numbers.vertexBits - 2,
     s"boxes are widened by 2^${numbers.boxPadLog} units; a quarter of the cube, 2^${numbers.vertexBits - 2}, is the most"
@@ -45,63 +61,59 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
   private val isValid  = stages(io.isValid)
   private val isTested = io.children.map(child => stages(io.isValid && child.isOccupied))
 
-  // Signed distances from the ray's origin to the planes of the padded box, along the ray's signs.
-  // For a negative direction, -(corner + plane) ∓ pad is the complement of corner + plane ± pad - 1.
-  private def widenedCorner(axis: Int, by: BigInt): SInt = {
-    val constant = Mux(io.node.negative(axis), (-by - 1).S, by.S)
-    Rounding.narrow(io.node.corner(axis) +& constant, numbers.vertexBits + 2) // at most 1.75 cubes
-  }
-  private val nearCorners = Seq.tabulate(3)(widenedCorner(_, -pad))
-  private val farCorners  = Seq.tabulate(3)(widenedCorner(_, pad))
+  private val nodeStage      = Module(new NodeStage(config))
+  private val (steps, terms) = (nodeStage.io.steps, nodeStage.io.terms)
+  nodeStage.io.node    := io.node
+  nodeStage.io.isValid := VecInit(isValid.take(2))
 
-  private def distance(corners: Seq[SInt], planes: Vec[UInt], isTested: Bool)(axis: Int): SInt = {
-    val plane  = Rounding.narrow(planes(axis) << io.node.exponent(axis), numbers.vertexBits + 1) // less than two cubes
-    val upward = Rounding.narrow(corners(axis) +& plane.zext, distanceBits)                      // less than four
-    RegEnable(Mux(io.node.negative(axis), ~upward, upward), isTested)
-  }
-  private def distances(corners: Seq[SInt], planes: ChildPlanes => Vec[UInt]) =
-    io.children.zip(isTested).map { case (child, isTested) =>
-      Seq.tabulate(3)(distance(corners, planes(child), isTested(0)))
-    }
-  private val tNears      = distances(nearCorners, _.nearPlanes)
-  private val tFars       = distances(farCorners, _.farPlanes)
-  private val reciprocals = RegEnable(io.node.reciprocal, isValid(0))
-  private val tMax        = RegEnable(io.node.tMax, isValid(0))
+  // While the node stage multiplies its corner, the planes wait
+  private val children = byLane(io.children, stage = 0)(RegEnable(_, _))
 
-  // Multiply by the reciprocals; along the dominant axis the distance is t already
-  private def products(distances: Seq[Seq[SInt]]) = byLane(distances, stage = 1) { (lane, isTested) =>
+  // Multiply the planes by the steps; along z' a plane is t already
+  private def products(planes: ChildPlanes => Vec[UInt], steps: Vec[UInt]) = byLane(children, stage = 1) {
+    (child, isTested) => Seq.tabulate(2)(axis => RegEnable(planes(child)(axis) * steps(axis), isTested))
+  }
+  private val nearProducts = products(_.nearPlanes, steps.down)
+  private val farProducts  = products(_.farPlanes, steps.up)
+
+  private def z(plane: UInt): SInt = (plane << numbers.nearFraction).zext
+  private val nearZ                = byLane(children, stage = 1)((child, isTested) =>
+    RegEnable(Rounding.narrow(z(child.nearPlanes(2)) -& steps.pad.zext, numbers.nearBits), isTested)
+  )
+  private val farZ = byLane(children, stage = 1)((child, isTested) =>
+    RegEnable(Rounding.narrow(z(child.farPlanes(2)) +& steps.pad.zext, numbers.nearBits), isTested)
+  )
+
+  // Add the node's terms, and shift to the node's t
+  private val shifts = terms.shiftRight.map(
+    new SaturatingShift(_, numbers.nearBits - 1 + numbers.stepReach - numbers.nearFraction, numbers.nearBits)
+  )
+  private def sides(products: Seq[Seq[UInt]], nodes: Vec[SInt]) = byLane(products, stage = 2) { (lane, isTested) =>
     Seq.tabulate(2) { axis =>
-      val exact = lane(axis) * reciprocals(axis).zext
-      RegEnable(Rounding.narrow(exact, distanceBits + reciprocals(axis).getWidth), isTested)
+      val sum = Rounding.narrow(nodes(axis) +& lane(axis).zext, numbers.nodeBits + 1)
+      RegEnable(shifts(axis)((sum << (numbers.nearBits - 1)).asSInt), isTested)
     }
   }
-  private val nearProducts  = products(tNears)
-  private val farProducts   = products(tFars)
-  private val dominantTNear = byLane(tNears, stage = 1)((tNear, isTested) => RegEnable(atLeastZero(tNear(2)), isTested))
-  private val dominantTFar  = byLane(tFars, stage = 1)((tFar, isTested) => RegEnable(least(tFar(2), tMax), isTested))
-
-  // Round to whole units
-  private val shiftRight                      = RegEnable(RegEnable(io.node.shiftRight, isValid(0)), isValid(1))
-  private val unitShift                       = Seq.tabulate(2)(axis => new UnitShift(shiftRight(axis), numbers))
-  private def units(products: Seq[Seq[SInt]]) = byLane(products, stage = 2) { (lane, isTested) =>
-    lane.zip(unitShift).map { case (product, shift) => RegEnable(shift(product), isTested) }
-  }
-  private val sideTNears = units(nearProducts)
-  private val sideTFars  = units(farProducts)
-  private val zTNears    = byLane(dominantTNear, stage = 2)(RegEnable(_, _))
-  private val zTFars     = byLane(dominantTFar, stage = 2)(RegEnable(_, _))
+  private val sideTNears = sides(nearProducts, terms.near)
+  private val sideTFars  = sides(farProducts, terms.far)
+  private val zTNears    = byLane(nearZ, stage = 2)((z, isTested) => RegEnable(greatest(z, terms.origin), isTested))
+  private val zTFars     = byLane(farZ, stage = 2)((z, isTested) => RegEnable(least(z, terms.tMax), isTested))
 
   // Intersect the intervals of the three slabs
   for (lane <- 0 until lanes) {
-    val interval  = Wire(new BoxInterval(config))
-    val sideTNear = greatest(sideTNears(lane)(0), sideTNears(lane)(1))
-    val sideTFar  = least(sideTFars(lane)(0), sideTFars(lane)(1))
+    val interval = Wire(new BoxInterval(config))
     interval.isOccupied := isTested(lane)(3)
-    interval.tNear      := greatest(sideTNear, zTNears(lane).zext).asUInt(distanceBits - 2, 0)
-    // Floor rounds the side's tFar down, so add one unit; this cannot overflow because sideTFar < tFar
-    interval.tFar      := Mux(sideTFar < zTFars(lane), Rounding.narrow(sideTFar +& 1.S, distanceBits), zTFars(lane))
-    io.intervals(lane) := RegEnable(interval, isValid(3))
+    interval.tNear      := greatest(greatest(sideTNears(lane)(0), sideTNears(lane)(1)), zTNears(lane))
+    interval.tFar       := least(least(sideTFars(lane)(0), sideTFars(lane)(1)), zTFars(lane))
+    io.intervals(lane)  := RegEnable(interval, isValid(3))
   }
+
+  // The node's own distance goes with its children
+  private val exponent = isValid.take(2).foldLeft(io.node.exponent(2))(RegEnable(_, _))
+  private val distance = Wire(new NodeDistance(config))
+  distance.toOrigin := nodeStage.io.toOrigin
+  distance.exponent := exponent
+  io.distance       := isValid.drop(2).foldLeft(distance)(RegEnable(_, _))
 
   /** A flag in each stage: at the input, and after each register of the datapath but the last. */
   private def stages(flag: Bool): IndexedSeq[Bool] =
@@ -114,8 +126,6 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
   private def least(a: SInt, b: SInt): SInt = Mux(a < b, a, b)
 
   private def greatest(a: SInt, b: SInt): SInt = Mux(a < b, b, a)
-
-  private def atLeastZero(x: SInt): UInt = Mux(x < 0.S, 0.U, x.asUInt(distanceBits - 2, 0))
 }
 
 object BoxDatapath {

@@ -30,7 +30,7 @@ final class NodeOperands(config: ColonnadeConfig) extends Bundle {
   val tMax = SInt(numbers.boxDistanceBits.W)
 }
 
-/** A child's planes relative to the node's corner, in the ray's own frame: the ray crosses `nearPlanes` first. */
+/** A child's planes, counted along the ray from the first plane of the node's range: the ray crosses `nearPlanes` first. */
 final class ChildPlanes(config: ColonnadeConfig) extends Bundle {
   val isOccupied = Bool()
   val nearPlanes = Vec(3, UInt(config.geometry.boxBits.W))
@@ -86,8 +86,8 @@ object BoxOperands {
     val high   = PermutedFrame(child.high, axis)
     result.isOccupied := BoxOperands.isOccupied(child.kind)
     for (a <- 0 until 3) {
-      result.nearPlanes(a) := Mux(negative(a), high(a), low(a))
-      result.farPlanes(a)  := Mux(negative(a), low(a), high(a))
+      result.nearPlanes(a) := Mux(negative(a), ~high(a), low(a))
+      result.farPlanes(a)  := Mux(negative(a), ~low(a), high(a))
     }
     result
   }

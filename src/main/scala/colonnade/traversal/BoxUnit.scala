@@ -79,7 +79,7 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   private def allBeats[T <: Data](values: Seq[T]): Seq[T] =
     (0 until beats).reverse.flatMap(before => values.map(ShiftRegister(_, before)))
   sorted.io.enq.valid := ends
-  sorted.io.enq.bits  := ChildOrder(config, allBeats(isEntered), allBeats(tNear))
+  sorted.io.enq.bits  := ChildOrder(config, allBeats(isEntered), allBeats(tNear), datapath.io.distance)
   assert(!ends || sorted.io.enq.ready, "a node was accepted without queue space for its result")
 
   io.out.valid          := sorted.io.deq.valid
@@ -109,7 +109,7 @@ private[traversal] final class NodeTag(config: ColonnadeConfig) extends Bundle {
       val isLeaf = kinds(entered.slot) === ChildKind.leaf
       child.target.isLeaf  := isLeaf
       child.target.address := Mux(isLeaf, firstTriangles, firstChild) + before(entered.slot)
-      child.tNear          := Fixed(new RayFormats(config.numbers).units, entered.tNear.zext)
+      child.tNear          := Fixed(new RayFormats(config.numbers).units, order.distance.units(entered.tNear).zext)
     }
     result
   }

@@ -6,20 +6,28 @@ import colonnade.config.ColonnadeConfig
 
 /** A child by its slot, and its entry distance. */
 final class OrderedChild(config: ColonnadeConfig) extends Bundle {
-  val slot  = UInt(log2Ceil(config.geometry.arity).W)
-  val tNear = UInt((config.numbers.boxDistanceBits - 1).W)
+  val slot = UInt(log2Ceil(config.geometry.arity).W)
+
+  /** Relative to the node, see [[NodeDistance]]. */
+  val tNear = SInt(config.numbers.nearBits.W)
 }
 
 /** The children that the ray enters: the first `count` of `children`, sorted by entry distance, then by slot. */
 final class ChildOrder(config: ColonnadeConfig) extends Bundle {
   val count    = UInt(log2Ceil(config.geometry.arity + 1).W)
   val children = Vec(config.geometry.arity, new OrderedChild(config))
+  val distance = new NodeDistance(config)
 }
 
 object ChildOrder {
 
   /** Sorts by rank, combinationally: all pairs are compared at once, and a child's rank is its number of predecessors. */
-  def apply(config: ColonnadeConfig, isEntered: Seq[Bool], tNear: Seq[UInt]): ChildOrder = {
+  def apply(
+      config:    ColonnadeConfig,
+      isEntered: Seq[Bool],
+      tNear:     Seq[SInt],
+      distance:  NodeDistance
+  ): ChildOrder = {
     val slots      = tNear.indices
     val isNotAfter = Map.from(for (i <- slots; j <- slots if i < j) yield (i, j) -> (tNear(i) <= tNear(j)))
 
@@ -27,11 +35,12 @@ object ChildOrder {
     val ranks                          = slots.map(slot => PopCount(slots.filter(_ != slot).map(precedes(_, slot))))
 
     val order = Wire(new ChildOrder(config))
-    order.count := PopCount(isEntered)
+    order.count    := PopCount(isEntered)
+    order.distance := distance
     for (rank <- slots) {
       val isHere = slots.map(slot => isEntered(slot) && ranks(slot) === rank.U)
       order.children(rank).slot  := Mux1H(isHere, slots.map(_.U))
-      order.children(rank).tNear := Mux1H(isHere, tNear)
+      order.children(rank).tNear := Mux1H(isHere, tNear.map(_.asUInt)).asSInt
     }
     order
   }
