@@ -44,7 +44,7 @@ class Bus:
     Attributes:
         latency: Cycles from a read or the end of a write to its answer.
         stall: Percentage of cycles in which a channel does not move, 0 to 99.
-        seed: Random seed of the stalls.
+        seed: Random seed of the stalls, and of the registers' values at power-up.
     """
 
     latency: int = 1
@@ -221,7 +221,9 @@ def build_shell_simulator(design: GeneratedDesign, progress: Progress = QUIET) -
             require_right_compiler(tools.compiler, (*OPTIMISATION, *SAFE))
             for source in [*design.sources, harness]:
                 shutil.copy(source, work / source.name)
-            command = [str(tools.verilator), *VERILATOR_OPTIONS, "--top-module", _TOP, "--Mdir", "obj"]
+            # Registers begin with random values, as at power-up
+            command = [str(tools.verilator), *VERILATOR_OPTIONS, "--x-initial", "unique", "--top-module", _TOP]
+            command += ["--Mdir", "obj"]
             command += ["-CFLAGS", " ".join(SAFE), "-MAKEFLAGS", f"CXX={tools.compiler}"]
             command += ["-MAKEFLAGS", f"OPT_FAST={flags}", "-MAKEFLAGS", f"OPT_GLOBAL={flags}"]
             command += ["--exe", "-o", PROGRAM, harness.name, *(source.name for source in design.sources)]

@@ -9,7 +9,7 @@
 //   dump FILE ADDRESS BYTES    writes a range of the memory to a file; bytes that were never written are 0xA5
 //
 // Options: --bus BYTES of the data bus; --memory BYTES of memory, from address 0; --latency CYCLES of an answer; --stall
-// PERCENT of cycles in which a channel does not move; --seed N. An access beyond the memory, an answer with an error, or a
+// PERCENT of cycles in which a channel does not move; --seed N of stalls and of the state at power-up. An access beyond the memory, an answer with an error, or a
 // broken rule of AXI ends the run. Exit status 0, or 3 on an error.
 #include <cstdint>
 #include <cstring>
@@ -122,7 +122,17 @@ private:
 class Harness {
 public:
     explicit Harness(std::map<std::string, unsigned>& options) : memory_(top_, options) {
+        top_.s_axil_awvalid = top_.s_axil_wvalid = top_.s_axil_bready = top_.s_axil_arvalid = top_.s_axil_rready = 0;
+        top_.s_axil_awprot = top_.s_axil_arprot = 0;
+        top_.m_axi_bvalid = top_.m_axi_rvalid = top_.m_axi_bresp = top_.m_axi_rresp = top_.m_axi_bid = top_.m_axi_rid = 0;
         top_.reset = 1;
+        // Outputs mean nothing before the first edges: the registers begin with random values
+        for (int i = 0; i < 2; ++i) {
+            top_.clock = 1;
+            top_.eval();
+            top_.clock = 0;
+            top_.eval();
+        }
         for (int i = 0; i < 8; ++i) cycle();
         top_.reset = 0;
         cycle();
@@ -242,6 +252,8 @@ int main(int argc, char** argv) try {
         else if (++i < argc) options[argument] = static_cast<unsigned>(std::stoul(argv[i]));
         else throw std::runtime_error(argument + " needs a number");
     }
+    Verilated::randReset(2);
+    Verilated::randSeed(static_cast<int>(options["--seed"]));
     run(job, options);
     return 0;
 } catch (const std::exception& problem) {
