@@ -50,7 +50,12 @@ lazy val colonnade = (project in file("."))
       "CPPFLAGS",
       "LDFLAGS"
     ).map(_ -> "").toMap + ("OBJCACHE" -> s"'${baseDirectory.value / "tools" / "verilated-object"}'"),
-    Test / testOptions += Tests.Argument(TestFrameworks.ScalaTest, "-oD")
+    Test / testOptions += Tests.Argument(TestFrameworks.ScalaTest, "-oD"),
+    // `make verify` sets the variable.
+    Test / testOptions ++= (
+      if (sys.env.get("COLONNADE_MATRIX").contains("1")) Nil
+      else Seq(Tests.Argument(TestFrameworks.ScalaTest, "-l", "colonnade.Matrix"))
+    )
   )
 
 // Two suites at a time: a simulator in each wants a core of its own.

@@ -2,7 +2,8 @@
 
 - README, CHANGELOG, CONTRIBUTING and SECURITY become pages, so that each text exists once.
 - Each Python package of host/colonnade gets a page of its docstrings.
-- Scaladoc is copied into the site, from the folder that the environment variable COLONNADE_SCALADOC names.
+- Scaladoc and PeakRDL's register pages are copied into the site, from the folders that the environment variables
+  COLONNADE_SCALADOC and COLONNADE_REGISTERS name.
 - Links are written for the repository (``../SECURITY.md``); here they are pointed at the site's pages. Of a link to a
   source file only the text stays. A link to a file that the repository lacks is a warning, and the build is strict.
 - GitHub's Markdown needs no blank line before a list or a table; Python-Markdown does.
@@ -31,7 +32,11 @@ _ROOT_PAGES = {
     "CONTRIBUTING.md": "contributing.md",
     "SECURITY.md": "security.md",
 }
-_SCALADOC = "scala"
+#: Folders of finished pages: environment variable, place, section, title.
+_COPIED = (
+    ("COLONNADE_SCALADOC", "scala", "Hardware by stage", "Scaladoc"),
+    ("COLONNADE_REGISTERS", "registers", "Integration", "Register pages"),
+)
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _ITEM = re.compile(r"^([-*+]|\d+\.) ")
@@ -44,8 +49,9 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     assert nav is not None
     sections = {name: entries for section in nav for name, entries in section.items()}
     sections["Host"].append({"Python packages": [f"api/{name}.md" for name in _packages()]})
-    if _scaladoc():
-        sections["Hardware by stage"].append({"Scaladoc": f"{_SCALADOC}/index.html"})
+    for variable, place, section, title in _COPIED:
+        if _folder(variable):
+            sections[section].append({title: f"{place}/index.html"})
     return config
 
 
@@ -55,11 +61,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, page, abs_src_path=str(ROOT / source)))
     for name in _packages():
         files.append(File.generated(config, f"api/{name}.md", content=f"# {name}\n\n::: {name}\n"))
-    scaladoc = _scaladoc()
-    if scaladoc:
-        for path in sorted(file for file in scaladoc.rglob("*") if file.is_file()):
-            place = f"{_SCALADOC}/{path.relative_to(scaladoc).as_posix()}"
-            files.append(File.generated(config, place, abs_src_path=str(path)))
+    for variable, place, _, _ in _COPIED:
+        folder = _folder(variable)
+        for path in sorted(file for file in folder.rglob("*") if file.is_file()) if folder else ():
+            relative = path.relative_to(folder).as_posix()
+            if not relative.startswith((".", "launcher")):
+                files.append(File.generated(config, f"{place}/{relative}", abs_src_path=str(path)))
     # Pictures that pages show from outside docs/
     sources = [*_ROOT_PAGES, *(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))]
     for target in sorted({target for source in sources for target in _targets(source)}):
@@ -123,6 +130,6 @@ def _packages() -> list[str]:
     return [f"colonnade.{name}" for name in found if not name.startswith("_")]
 
 
-def _scaladoc() -> Path | None:
-    folder = os.environ.get("COLONNADE_SCALADOC")
+def _folder(variable: str) -> Path | None:
+    folder = os.environ.get(variable)
     return Path(folder) if folder else None

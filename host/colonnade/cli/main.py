@@ -21,6 +21,7 @@ from colonnade.cli.light import light
 from colonnade.cli.options import echo
 from colonnade.cli.pack import pack
 from colonnade.cli.ppa import ppa
+from colonnade.cli.registers import registers
 from colonnade.cli.render import render
 from colonnade.cli.study import study
 from colonnade.cli.verify import verify
@@ -114,7 +115,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, pack, inspect, light, render, compare, study, verify, fuzz, bench, explore, ppa):
+for command in (generate, registers, pack, inspect, light, render, compare, study, verify, fuzz, bench, explore, ppa):
     cli.add_command(command)
 
 

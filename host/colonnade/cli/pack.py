@@ -15,6 +15,7 @@ from colonnade.cli.options import (
     json_option,
     mesh_option,
     require_outputs,
+    size_option,
     strict_option,
 )
 
@@ -28,6 +29,8 @@ from colonnade.cli.options import (
     "--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; created if missing."
 )
 @click.option("--device-image", type=FILE, metavar="FILE", help="Also write the image that the AXI4 shell loads.")
+@click.option("--frame-file", type=FILE, metavar="FILE", help="Also write the registers of a frame, for a driver.")
+@size_option("Frame size of --frame-file, e.g. 640x480.  [default: that of the scene]")
 @strict_option
 @json_option
 def pack(
@@ -38,13 +41,21 @@ def pack(
     background: Path | None,
     output: Path,
     device_image: Path | None,
+    frame_file: Path | None,
+    size: str | None,
     json_file: Path | None,
 ) -> None:
     """Pack SCENE, a TOML file, for one configuration, and print its use of each memory."""
+    if size is not None and frame_file is None:
+        raise click.UsageError("--size is that of --frame-file", click.get_current_context())
+
     from colonnade.common import progress
     from colonnade.common.atomic_files import replacing
+    from colonnade.common.frame_size import parse_size
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
+    from colonnade.registers.frame import frame_registers
+    from colonnade.registers.frame_file import frame_file as encode_frame_file
     from colonnade.render.frames import encoded, max_lights, pack_scene
     from colonnade.render.lit_room import device_room, lit_room
     from colonnade.scene.object_mesh import object_mesh
@@ -56,9 +67,10 @@ def pack(
 
     file = image_file(output)
     check_image_file(file)
-    require_outputs(json_file, device_image, folders=[file.parent])
+    require_outputs(json_file, device_image, frame_file, folders=[file.parent])
     declare_output(file)
     terminal = progress.for_terminal()
+    pixels = parse_size(size) if size is not None else None
     described = load_scene(scene)
     if mesh is not None:
         described = described.with_mesh(mesh)
@@ -69,12 +81,19 @@ def pack(
         maps = device_room(described, manifest)
         surface = object_mesh(described, maps, manifest.corner_colours)
         room = lit_room(described, maps, surface.extent, max_lights(manifest), False, terminal)
-        image = pack_scene(room.scene, surface, manifest, encoded(room, manifest))
+        environment = encoded(room, manifest)
+        image = pack_scene(room.scene, surface, manifest, environment)
     image.save(output)
     echo(f"packed      {file}")
     if device_image is not None:
         with replacing(device_image) as stream:
             stream.write(encode_device_image(image, manifest))
         echo(f"for a bus   {device_image}")
+    if frame_file is not None:
+        width, height = pixels or (described.frame.width, described.frame.height)
+        registers = frame_registers(room.scene, image.header, manifest, width, height, environment)
+        with replacing(frame_file) as stream:
+            stream.write(encode_frame_file(registers, manifest))
+        echo(f"a frame     {frame_file}, {width}x{height}")
     print_report(image.header, manifest, echo)
     finish({"file": str(file), **describe(image), "use": memory_use(image.header, manifest)}, json_file)

@@ -81,6 +81,13 @@ def black_boxed_design_for(config: str, overrides: Sequence[str] = (), progress:
     return _cached(config, overrides, ("--black-box-memories",), progress)
 
 
+def shell_manifest_for(
+    config: str, overrides: Sequence[str] = (), bus_bytes: int = 16, progress: Progress = QUIET
+) -> GeneratedDesign:
+    """Generate only ``manifest.json`` and ``shell.json``, enough for register descriptions."""
+    return _cached(config, overrides, ("--manifest-only", *_shell_options(bus_bytes)), progress)
+
+
 def shell_design_for(
     config: str, overrides: Sequence[str] = (), bus_bytes: int = 16, progress: Progress = QUIET
 ) -> GeneratedDesign:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shlex
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -110,9 +111,14 @@ def _build(
         inner = [top for top in models if top != DEVICE]
         commands[-1] += ["--exe", "-o", PROGRAM, "harness.cpp", "-CFLAGS", " ".join(f"-I../obj_{top}" for top in inner)]
         commands[-1] += ["-CFLAGS", "-I..", "-LDFLAGS", " ".join(f"../obj_{top}/V{top}__ALL.a" for top in inner)]
+        # Compiles Verilator's runtime once for all simulators
+        environment = {
+            **clean_environment(),
+            "OBJCACHE": shlex.quote(str(project_root() / "tools" / "verilated-object")),
+        }
         with log.open("w") as stream:
             for command in commands:
-                done = processes.run(command, cwd=work, env=clean_environment(), stdout=stream, stderr=stream)
+                done = processes.run(command, cwd=work, env=environment, stdout=stream, stderr=stream)
                 if done.returncode != 0:
                     raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
         shutil.move(work / f"obj_{DEVICE}" / PROGRAM, output / PROGRAM)

@@ -1,9 +1,11 @@
-// Testbench of the AXI4 shell: executes the commands of a job file on the Verilated ColonnadeAxi, one command per line.
+// Testbench of the AXI4 shell: executes the commands of a job on the Verilated ColonnadeAxi, one command per line. The job
+// is a file, or "-" for the standard input: then a driver in another process can send commands and read what they print.
 //
 //   store FILE ADDRESS         writes a file into the memory
 //   write ADDRESS VALUE        writes a register word by AXI4-Lite
 //   read NAME ADDRESS WORDS    prints "value NAME VALUE"
 //   wait CYCLES                waits for the interrupt, so many cycles at most; prints "waited CYCLES"
+//   run CYCLES                 goes on for so many cycles, or until the interrupt; prints "ran CYCLES"
 //   dump FILE ADDRESS BYTES    writes a range of the memory to a file; bytes that were never written are 0xA5
 //
 // Options: --bus BYTES of the data bus; --memory BYTES of memory, from address 0; --latency CYCLES of an answer; --stall
@@ -179,6 +181,12 @@ public:
         return cycles;
     }
 
+    std::uint64_t run(std::uint64_t most) {
+        std::uint64_t cycles = 0;
+        for (; cycles < most && !top_.irq; ++cycles) cycle();
+        return cycles;
+    }
+
 private:
     void cycle() {
         memory_.offer();
@@ -196,21 +204,25 @@ private:
 
 void run(const std::string& job, std::map<std::string, unsigned>& options) {
     Harness harness(options);
-    std::ifstream stream(job);
+    std::ifstream file(job);
+    std::istream& stream = job == "-" ? std::cin : file;
+    if (job == "-") std::cout << std::unitbuf;
     if (!stream) throw std::runtime_error("no job " + job);
     for (std::string line; std::getline(stream, line);) {
         std::istringstream words(line);
         std::string command, name;
         std::uint64_t first = 0, second = 0;
         words >> command;
-        if (command != "write" && command != "wait") words >> name;
+        const bool isWait = command == "wait" || command == "run";
+        if (command != "write" && !isWait) words >> name;
         words >> first;
-        if (command != "store" && command != "wait") words >> second;
+        if (command != "store" && !isWait) words >> second;
         if (!words) throw std::runtime_error("cannot parse: " + line);
         if (command == "store") harness.store(name, first);
         else if (command == "dump") harness.dump(name, first, second);
         else if (command == "write") harness.write(static_cast<unsigned>(first), static_cast<std::uint32_t>(second));
         else if (command == "wait") std::cout << "waited " << harness.wait(first) << '\n';
+        else if (command == "run") std::cout << "ran " << harness.run(first) << '\n';
         else if (command == "read") {
             std::uint64_t value = 0;
             for (unsigned word = 0; word < second; ++word) value |= static_cast<std::uint64_t>(harness.read(static_cast<unsigned>(first) + 4 * word)) << (32 * word);

@@ -1,6 +1,7 @@
 package colonnade
 
 import chisel3._
+import chisel3.util.Mux1H
 import colonnade.axi.AxiPins
 import colonnade.bus._
 import colonnade.config.{ColonnadeConfig, ShellConfig}
@@ -31,7 +32,7 @@ final class ColonnadeAxi(
   private val registers  = Module(new ShellRegisters(config, shell))
   private val control    = Module(new ShellControl(config))
   private val writeGuard = Module(new AxiWriteGuard(BurstWriter.idBits, shell.busBytes))
-  private val readGuard  = Module(new AxiReadGuard(BurstWriter.idBits, shell.busBytes, ImageReader.maxBursts))
+  private val readGuard  = Module(new AxiReadGuard(BurstWriter.idBits, shell.busBytes, PhotoCompositor.maxRows))
 
   // What a soft reset resets
   private val clears = reset.asBool || control.io.reset
@@ -63,13 +64,12 @@ final class ColonnadeAxi(
   device.io.memoryHolds.foreach(_ := 0.U)
 
   // Frames
-  control.io.deviceDone    := device.io.done
-  control.io.writerIsIdle  := writer.io.isIdle && writeGuard.io.isIdle
-  control.io.windowError   := writer.io.windowError
-  control.io.responseError := writer.io.responseError
-  writer.io.clearErrors    := control.io.clearErrors
-  writer.io.flush          := control.io.flush
-  writer.io.settings       := control.io.framebuffer
+  control.io.deviceDone   := device.io.done
+  control.io.writerIsIdle := writer.io.isIdle && writeGuard.io.isIdle
+  control.io.writerErrors := writer.io.errors
+  writer.io.clearErrors   := control.io.clearErrors
+  writer.io.flush         := control.io.flush
+  writer.io.settings      := control.io.framebuffer
   writer.io.pixels.zip(device.io.pixels).foreach { case (sink, pixels) => sink :<>= pixels }
   writeGuard.io.inner :<>= writer.io.axi
 
@@ -79,7 +79,18 @@ final class ColonnadeAxi(
   loader.io.start         := control.io.load
   loader.io.settings      := registers.io.image
   device.io.load :<>= loader.io.load
-  readGuard.io.inner :<>= loader.io.axi
+
+  // Reads: of an image, or of the photo while a frame runs
+  private val isLoading = control.io.status.isLoading
+  private val readers   = Seq(isLoading -> loader.io.axi) ++ writer.io.photo.map(!isLoading -> _)
+  readGuard.io.inner.ar.valid := VecInit(readers.map { case (isOn, reader) => isOn && reader.ar.valid }).asUInt.orR
+  readGuard.io.inner.ar.bits  := Mux1H(readers.map { case (isOn, reader) => isOn -> reader.ar.bits })
+  readGuard.io.inner.r.ready  := VecInit(readers.map { case (isOn, reader) => isOn && reader.r.ready }).asUInt.orR
+  for ((isOn, reader) <- readers) {
+    reader.ar.ready := isOn && readGuard.io.inner.ar.ready
+    reader.r.valid  := isOn && readGuard.io.inner.r.valid
+    reader.r.bits   := readGuard.io.inner.r.bits
+  }
 
   // The bus
   private val master = Seq("aw" -> writeGuard.io.axi.aw, "w" -> writeGuard.io.axi.w, "ar" -> readGuard.io.axi.ar)

@@ -64,7 +64,10 @@ object Generate {
     options.formatsPage.foreach(file => OutputFiles.writeFile(path(file), FormatsPage(config)))
     options.output.foreach { directory =>
       OutputFiles.replaceDirectory(path(directory)) { fresh =>
-        if (!options.manifestOnly) Emit(top(config, options.axi), fresh, options.blackBoxMemories)
+        if (!options.manifestOnly) {
+          Emit(top(config, options.axi), fresh, options.blackBoxMemories)
+          CoreFile.write(if (options.axi.isEmpty) "Colonnade" else "ColonnadeAxi", fresh)
+        }
         OutputFiles.writeFile(fresh.resolve("manifest.json"), formats.Json.pretty(Manifest(config)))
         for (shell <- options.axi)
           OutputFiles.writeFile(fresh.resolve("shell.json"), ShellMap.json(config, shell.busBytes))

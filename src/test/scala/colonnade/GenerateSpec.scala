@@ -57,7 +57,10 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     ujson.read(Files.readString(output.resolve("manifest.json"))) shouldBe Manifest(ConfigIO.load("tiny"))
     val shell = ujson.read(Files.readString(output.resolve("shell.json")))
     shell("busBytes").num shouldBe 32
-    shell("registers").arr.map(_("name").str) should contain("framebuffer.base")
+    val registers = shell("registers").arr.map(register => register("name").str -> register).toMap
+    registers should contain key "framebuffer.base"
+    registers("status")("fields").arr.map(field => (field("name").str, field("offset").num.toInt)) shouldBe
+      Seq("isRunning" -> 0, "isQueued" -> 1, "isLoading" -> 2, "isResetting" -> 3)
   }
 
   it should "replace an earlier output, but no other directory" in inScratch { scratch =>

@@ -11,7 +11,8 @@ object Interrupts {
 
 /** Bits of `framebuffer.errors`. */
 object FramebufferError {
-  val names: Seq[String] = Seq("window", "response", "alignment", "format")
+  val names: Seq[String] =
+    Seq("window", "response", "alignment", "format", "photoWindow", "photoResponse")
   def count: Int = names.size
 }
 
@@ -19,10 +20,12 @@ object FramebufferError {
 final class FramebufferError extends Bundle {
 
   /** In the order of [[FramebufferError.names]], bit 0 last. */
-  val format    = Bool()
-  val alignment = Bool()
-  val response  = Bool()
-  val window    = Bool()
+  val photoResponse = Bool()
+  val photoWindow   = Bool()
+  val format        = Bool()
+  val alignment     = Bool()
+  val response      = Bool()
+  val window        = Bool()
 }
 
 /** Bits of `image.errors`. */
@@ -67,4 +70,13 @@ final class FramebufferSettings extends Bundle {
   val stride = UInt(24.W)
   val format = UInt(PixelFormat.getWidth.W)
   val window = new AddressWindow
+  val photo  = new PhotoSettings
+}
+
+/** The camera's photo, XRGB8888 in sRGB, for the pixels that do not show the object. */
+final class PhotoSettings extends Bundle {
+  val isEnabled = Bool()
+  val base      = UInt(Axi.addressBits.W)
+  val stride    = UInt(24.W)
+  val window    = new AddressWindow
 }

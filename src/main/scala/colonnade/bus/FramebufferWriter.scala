@@ -2,10 +2,18 @@ package colonnade.bus
 
 import chisel3._
 import chisel3.util._
-import colonnade.axi.AxiWritePort
+import colonnade.axi.{AxiReadPort, AxiWritePort}
 import colonnade.common.RoundRobin
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.Pixel
+
+/** Errors of a frame that is being written; sticky. */
+final class WriterErrors extends Bundle {
+  val photoResponse = Bool()
+  val photoWindow   = Bool()
+  val response      = Bool()
+  val window        = Bool()
+}
 
 final class FramebufferWriterIO(config: ColonnadeConfig, shell: ShellConfig) extends Bundle {
 
@@ -14,6 +22,9 @@ final class FramebufferWriterIO(config: ColonnadeConfig, shell: ShellConfig) ext
   val pixels   = Vec(config.array.columns, Flipped(Decoupled(new Pixel(config))))
   val axi      = new AxiWritePort(BurstWriter.idBits, shell.busBytes)
 
+  /** With an environment: reads of the photo. */
+  val photo = Option.when(config.hasEnvironment)(new AxiReadPort(BurstWriter.idBits, shell.busBytes))
+
   /** A pulse, while idle. */
   val clearErrors = Input(Bool())
 
@@ -21,12 +32,12 @@ final class FramebufferWriterIO(config: ColonnadeConfig, shell: ShellConfig) ext
   val flush  = Input(Bool())
   val isIdle = Output(Bool())
 
-  /** Sticky until cleared. */
-  val windowError   = Output(Bool())
-  val responseError = Output(Bool())
+  /** Until cleared. */
+  val errors = Output(new WriterErrors)
 }
 
-/** Writes pixels to the framebuffer: encodes them, gathers them to rows of tiles, and writes each row as a burst.
+/** Writes pixels to the framebuffer: encodes them, gathers them to rows of tiles, puts the photo into the pixels that do
+  * not show the object, and writes each row as a burst.
   *
   * A row outside the window is dropped. After a write that fails, all rows are dropped until the errors are cleared.
   */
@@ -44,16 +55,28 @@ final class FramebufferWriter(config: ColonnadeConfig, shell: ShellConfig) exten
     buffer.flush := io.flush && encoder.isIdle
   }
 
+  for (encoder <- encoders; composites <- encoder.composites) composites := io.settings.photo.isEnabled
+
   private val arbiter = Module(new RoundRobin(config.array.columns))
-  arbiter.io.requests  := VecInit(buffers.map(_.out.valid)).asUInt
-  arbiter.io.isTaken   := bursts.io.rows.fire
-  bursts.io.rows.valid := arbiter.io.requests.orR
-  bursts.io.rows.bits  := Mux1H(arbiter.io.grant, buffers.map(_.out.bits))
+  private val rows    = Wire(Decoupled(new TileRow(config, PixelWord.bits(config))))
+  arbiter.io.requests := VecInit(buffers.map(_.out.valid)).asUInt
+  arbiter.io.isTaken  := rows.fire
+  rows.valid          := arbiter.io.requests.orR
+  rows.bits           := Mux1H(arbiter.io.grant, buffers.map(_.out.bits))
   buffers.zip(arbiter.io.grant.asBools).foreach { case (buffer, isGranted) =>
-    buffer.out.ready := isGranted && bursts.io.rows.ready
+    buffer.out.ready := isGranted && rows.ready
   }
+
+  private val compositor = io.photo.map { photo =>
+    val compositor = Module(new PhotoCompositor(config, shell))
+    compositor.io.settings := io.settings
+    compositor.io.rows :<>= rows
+    photo :<>= compositor.io.axi
+    compositor
+  }
+  bursts.io.rows :<>= compositor.fold(rows)(_.io.out)
   bursts.io.settings := io.settings
-  bursts.io.drop     := io.responseError
+  bursts.io.drop     := io.errors.response
   io.axi :<>= bursts.io.axi
 
   private def sticky(event: Bool): Bool = {
@@ -61,7 +84,10 @@ final class FramebufferWriter(config: ColonnadeConfig, shell: ShellConfig) exten
     isSet := event || (isSet && !io.clearErrors)
     isSet
   }
-  io.windowError   := sticky(bursts.io.isOutside)
-  io.responseError := sticky(io.axi.b.fire && io.axi.b.bits.resp =/= 0.U)
-  io.isIdle        := encoders.map(_.isIdle).reduce(_ && _) && buffers.map(_.isIdle).reduce(_ && _) && bursts.io.isIdle
+  io.errors.window        := sticky(bursts.io.isOutside)
+  io.errors.response      := sticky(io.axi.b.fire && io.axi.b.bits.resp =/= 0.U)
+  io.errors.photoWindow   := compositor.fold(false.B)(unit => sticky(unit.io.isOutside))
+  io.errors.photoResponse := compositor.fold(false.B)(unit => sticky(unit.io.isError))
+  io.isIdle               := encoders.map(_.isIdle).reduce(_ && _) && buffers.map(_.isIdle).reduce(_ && _) &&
+    compositor.fold(true.B)(_.io.isIdle) && bursts.io.isIdle
 }

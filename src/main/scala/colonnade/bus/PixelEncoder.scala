@@ -5,13 +5,27 @@ import chisel3.util._
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.Pixel
 
-/** A pixel as it lies in memory. */
+/** A pixel as it lies in memory, or the shadow ratio of a pixel that will show the photo. */
 final class EncodedPixel(config: ColonnadeConfig) extends Bundle {
   val x = UInt(config.numbers.coordinateBits.W)
   val y = UInt(config.numbers.coordinateBits.W)
 
-  /** The low bytes are those of the format. */
-  val data = UInt((8 * PixelFormat.maxBytes).W)
+  /** See [[PixelWord]]. */
+  val data = UInt(PixelWord.bits(config).W)
+}
+
+/** A pixel's word: the low bytes are those of the format. With an environment the highest bit says that the word is a
+  * shadow ratio, red in the low bits.
+  */
+object PixelWord {
+  def bits(config: ColonnadeConfig): Int = 8 * PixelFormat.maxBytes + (if (config.hasEnvironment) 1 else 0)
+
+  def ofRatio(ratio: Seq[UInt]): UInt = {
+    val packed = ratio(2) ## ratio(1) ## ratio(0)
+    1.U(1.W) ## packed.pad(8 * PixelFormat.maxBytes)
+  }
+
+  def showsPhoto(word: UInt): Bool = if (word.getWidth > 8 * PixelFormat.maxBytes) word.head(1).asBool else false.B
 }
 
 /** Encodes pixels for the framebuffer, one per cycle, in two cycles. */
@@ -20,6 +34,9 @@ final class PixelEncoder(config: ColonnadeConfig) extends Module {
   val pixels = IO(Flipped(Decoupled(new Pixel(config))))
   val out    = IO(Decoupled(new EncodedPixel(config)))
   val isIdle = IO(Output(Bool()))
+
+  /** With an environment: pixels that do not show the object become shadow ratios. */
+  val composites = Option.when(config.hasEnvironment)(IO(Input(Bool())))
 
   private val moves  = !out.valid || out.ready
   private val valids = Seq.iterate(pixels.valid, SrgbEncoder.latency + 1)(valid => RegEnable(valid, false.B, moves))
@@ -33,20 +50,18 @@ final class PixelEncoder(config: ColonnadeConfig) extends Module {
     encoder.enable := moves
     encoder.code
   }
-  private val Seq(r, g, b) = codes
-  private val linear       = Seq(pixel.colour.r, pixel.colour.g, pixel.colour.b).map { channel =>
+  private val linear = Seq(pixel.colour.r, pixel.colour.g, pixel.colour.b).map { channel =>
     val bits: UInt = channel
     bits ## bits(NumberFormats.colourBits - 1, 2 * NumberFormats.colourBits - 16) // all ones is 1.0
   }
-  private val xrgb     = 255.U(8.W) ## r ## g ## b
-  private val rgb565   = r(7, 3) ## g(7, 2) ## b(7, 3)
-  private val linear16 = Fill(16, pixel.isObject) ## linear(2) ## linear(1) ## linear(0)
+  private val word = PixelFormat.packed(format, codes, linear, pixel.isObject).pad(PixelWord.bits(config))
 
   out.valid     := valids.last
   out.bits.x    := pixel.x
   out.bits.y    := pixel.y
-  out.bits.data := MuxLookup(format, xrgb)(
-    Seq(PixelFormat.rgb565.litValue.U -> rgb565, PixelFormat.linear16.litValue.U -> linear16)
-  )
+  out.bits.data := word
+  for (ratio <- pixel.ratio) when(composites.get && !pixel.isObject) {
+    out.bits.data := PixelWord.ofRatio(Seq(ratio.r, ratio.g, ratio.b).map(_.natural))
+  }
   isIdle := !valids.drop(1).reduce(_ || _)
 }

@@ -4,8 +4,11 @@ import chisel3._
 import chisel3.util._
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
-/** A tile's pixels in one line of the frame. */
-final class TileRow(config: ColonnadeConfig) extends Bundle {
+/** A tile's pixels in one line of the frame.
+  *
+  * @param wordBits of a pixel: those of its format, or of a [[PixelWord]]
+  */
+final class TileRow(config: ColonnadeConfig, wordBits: Int = 8 * PixelFormat.maxBytes) extends Bundle {
 
   /** Number of the tile in its line, and of the line. */
   val tile = UInt((config.numbers.coordinateBits - log2Ceil(config.frame.tileSize)).W)
@@ -13,7 +16,7 @@ final class TileRow(config: ColonnadeConfig) extends Bundle {
 
   /** Pixels that are there, the leftmost in bit 0. */
   val mask   = UInt(config.frame.tileSize.W)
-  val pixels = Vec(config.frame.tileSize, UInt((8 * PixelFormat.maxBytes).W))
+  val pixels = Vec(config.frame.tileSize, UInt(wordBits.W))
 }
 
 /** Gathers the pixels of a column, which come in any order, to rows of a tile: a write-combining buffer.
@@ -25,7 +28,7 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
   private val tileBits = log2Ceil(config.frame.tileSize)
 
   val pixels = IO(Flipped(Decoupled(new EncodedPixel(config))))
-  val out    = IO(Decoupled(new TileRow(config)))
+  val out    = IO(Decoupled(new TileRow(config, PixelWord.bits(config))))
 
   /** No pixel will come; until idle. */
   val flush  = IO(Input(Bool()))
@@ -54,7 +57,7 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
   // A row leaves
   private val isReading = RegInit(false.B)
   private val isOut     = RegInit(false.B)
-  private val leaving   = Reg(new TileRow(config))
+  private val leaving   = Reg(chiselTypeOf(out.bits))
   private val whole     = VecInit(valid.zip(masks).map { case (isValid, mask) => isValid && mask.andR }).asUInt
   private val victim    = RegInit(0.U(log2Ceil(shell.rows).W))
   private val isForced  = pixels.valid && !isHit && !hasFree

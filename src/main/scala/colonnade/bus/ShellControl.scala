@@ -30,9 +30,8 @@ final class ShellControlIO extends Bundle {
   val flush = Output(Bool())
 
   /** All rows are written, and all writes answered. */
-  val writerIsIdle  = Input(Bool())
-  val windowError   = Input(Bool())
-  val responseError = Input(Bool())
+  val writerIsIdle = Input(Bool())
+  val writerErrors = Input(new WriterErrors)
 
   /** A pulse. */
   val load         = Output(Bool())
@@ -65,8 +64,11 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
   private val rowBytesLog = log2Ceil(config.frame.tileSize).U +& PixelFormat.bytesLog(settings.format)
   private val rowMask     = ((1.U << rowBytesLog) - 1.U)(log2Ceil(config.frame.tileSize * PixelFormat.maxBytes) - 1, 0)
   private val isLegal     = PixelFormat.isLegal(settings.format)
-  private val isAligned   = !((settings.base | settings.stride) & rowMask).orR
-  private val begins      = state === State.begin
+  private val photoMask   = (config.frame.tileSize * PhotoCompositor.photoBytes - 1).U
+  private val photo       = settings.photo
+  private val isAligned   = !((settings.base | settings.stride) & rowMask).orR &&
+    !(photo.isEnabled && ((photo.base | photo.stride) & photoMask).orR)
+  private val begins = state === State.begin
 
   private val frameDone = (state === State.flushing && io.writerIsIdle) || (begins && !io.start)
   private val hasBegun  = RegNext(state === State.loading, false.B) // the loader is idle in the first cycle, too
@@ -107,10 +109,12 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
   // A frame that is refused ends as it begins
   private val errors    = Wire(new FramebufferError)
   private val lastFrame = RegInit(0.U.asTypeOf(errors))
-  errors.format    := begins && !isLegal
-  errors.alignment := begins && !isAligned
-  errors.response  := !begins && io.responseError
-  errors.window    := !begins && io.windowError
+  errors.format        := begins && !isLegal
+  errors.alignment     := begins && !isAligned
+  errors.response      := !begins && io.writerErrors.response
+  errors.window        := !begins && io.writerErrors.window
+  errors.photoResponse := !begins && io.writerErrors.photoResponse
+  errors.photoWindow   := !begins && io.writerErrors.photoWindow
   when(io.commands.reset) {
     lastFrame := 0.U.asTypeOf(errors)
   }.elsewhen(frameDone) { lastFrame := errors }

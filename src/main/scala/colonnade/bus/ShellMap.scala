@@ -1,15 +1,25 @@
 package colonnade.bus
 
+import chisel3.Bundle
 import colonnade.axi.AxiLite
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Access, Json, Manifest, RegisterMap}
+import colonnade.formats.{Access, Field, Json, Layout, Manifest, RegisterMap}
 
 /** A register of the shell.
   *
-  * @param address byte address of its low word
-  * @param width   bits; beyond 32 in two words
+  * @param address     byte address of its low word
+  * @param width       bits; beyond 32 in two words
+  * @param description one sentence, for register pages and headers
+  * @param fields      its parts by name, offset and width; none if it is one number
   */
-final case class ShellRegister(name: String, address: Int, width: Int, access: Access) {
+final case class ShellRegister(
+    name:        String,
+    address:     Int,
+    width:       Int,
+    access:      Access,
+    description: String,
+    fields:      Seq[Field] = Nil
+) {
   def words: Int = (width + AxiLite.dataBits - 1) / AxiLite.dataBits
 }
 
@@ -26,33 +36,63 @@ object ShellMap {
   val identity: BigInt = 0x434c4e44
 
   /** Major and minor version of these registers. A driver refuses another major version. */
-  val version: BigInt = 0x00010000
+  val version: BigInt = 0x00010001
 
   private val byteAddress = 40 // bits
 
+  private val features         = Seq("environment", "sceneInDram", "mirrorsAndGlass", "cornerColours", "textures")
+  private val capabilityFields = bits(features) :+ Field("busBytesLog2", 8, 4, signed = false, fraction = 0)
+
   val registers: Seq[ShellRegister] = Seq(
-    ShellRegister("identity", 0x00, 32, ReadOnly),
-    ShellRegister("version", 0x04, 32, ReadOnly),
-    ShellRegister("capabilities", 0x08, 32, ReadOnly),
-    ShellRegister("frameSize", 0x0c, 32, ReadOnly)
-  ) ++ (0 until 8).map(i => ShellRegister(s"formatHash[$i]", 0x10 + 4 * i, 32, ReadOnly)) ++ Seq(
-    ShellRegister("control", 0x40, 3, WriteOnly),
-    ShellRegister("status", 0x44, 4, ReadOnly),
-    ShellRegister("interrupt.status", 0x48, Interrupts.count, ReadWrite),
-    ShellRegister("interrupt.enable", 0x4c, Interrupts.count, ReadWrite),
-    ShellRegister("interrupt.test", 0x50, Interrupts.count, WriteOnly),
-    ShellRegister("framebuffer.errors", 0x54, FramebufferError.count, ReadOnly),
-    ShellRegister("image.errors", 0x58, ImageError.count, ReadOnly),
-    ShellRegister("framebuffer.base", 0x80, byteAddress, ReadWrite),
-    ShellRegister("framebuffer.windowBase", 0x88, byteAddress, ReadWrite),
-    ShellRegister("framebuffer.windowEnd", 0x90, byteAddress, ReadWrite),
-    ShellRegister("framebuffer.stride", 0x98, 24, ReadWrite),
-    ShellRegister("framebuffer.format", 0x9c, PixelFormat.getWidth, ReadWrite),
-    ShellRegister("image.base", 0xc0, byteAddress, ReadWrite),
-    ShellRegister("image.windowBase", 0xc8, byteAddress, ReadWrite),
-    ShellRegister("image.windowEnd", 0xd0, byteAddress, ReadWrite),
-    ShellRegister("image.bytes", 0xd8, 32, ReadWrite)
+    ShellRegister("identity", 0x00, 32, ReadOnly, "0x434C4E44, \"CLND\"."),
+    ShellRegister("version", 0x04, 32, ReadOnly, "Version of these registers.", halves("minor", "major")),
+    ShellRegister("capabilities", 0x08, 32, ReadOnly, "What the design can do.", capabilityFields),
+    ShellRegister("frameSize", 0x0c, 32, ReadOnly, "The largest frame, pixels.", halves("width", "height"))
+  ) ++ (0 until 8).map { i =>
+    val digits = s"Digits ${8 * i} to ${8 * i + 7} of the manifest's formatHash."
+    ShellRegister(s"formatHash[$i]", 0x10 + 4 * i, 32, ReadOnly, digits)
+  } ++ Seq(
+    ShellRegister("control", 0x40, 3, WriteOnly, "One command.", fieldsOf(new ShellCommands)),
+    ShellRegister("status", 0x44, 4, ReadOnly, "State of the shell.", fieldsOf(new ShellStatus)),
+    interrupt("status", 0x48, ReadWrite, "Events; a written 1 clears its bit."),
+    interrupt("enable", 0x4c, ReadWrite, "Events that raise irq."),
+    interrupt("test", 0x50, WriteOnly, "A written 1 sets the bit of interrupt.status."),
+    errors("framebuffer", 0x54, FramebufferError.names, "Errors of the last frame that has ended."),
+    errors("image", 0x58, ImageError.names, "Errors of the last load."),
+    setting("framebuffer.base", 0x80, byteAddress, "Address of the pixel (0, 0)."),
+    setting("framebuffer.windowBase", 0x88, byteAddress, "No frame is written below this address."),
+    setting("framebuffer.windowEnd", 0x90, byteAddress, "No frame is written from this address on."),
+    setting("framebuffer.stride", 0x98, 24, "Bytes from a line to the next."),
+    setting("framebuffer.format", 0x9c, PixelFormat.getWidth, "0: XRGB8888, 1: RGB565, 2: linear, 16 bits."),
+    setting("image.base", 0xc0, byteAddress, "Address of the image."),
+    setting("image.windowBase", 0xc8, byteAddress, "No image is read below this address."),
+    setting("image.windowEnd", 0xd0, byteAddress, "No image is read from this address on."),
+    setting("image.bytes", 0xd8, 32, "Size of the image, bytes."),
+    setting("photo.base", 0xe0, byteAddress, "Address of the photo's pixel (0, 0)."),
+    setting("photo.windowBase", 0xe8, byteAddress, "No photo is read below this address."),
+    setting("photo.windowEnd", 0xf0, byteAddress, "No photo is read from this address on."),
+    setting("photo.stride", 0xf8, 24, "Bytes from a line of the photo to the next."),
+    setting("photo.enabled", 0xfc, 1, "1: the photo shows where the object does not.")
   )
+
+  private def interrupt(name: String, address: Int, access: Access, description: String): ShellRegister =
+    ShellRegister(s"interrupt.$name", address, Interrupts.count, access, description, bits(Interrupts.names))
+
+  private def errors(of: String, address: Int, names: Seq[String], description: String): ShellRegister =
+    ShellRegister(s"$of.errors", address, names.size, ReadOnly, description, bits(names))
+
+  private def setting(name: String, address: Int, width: Int, description: String): ShellRegister =
+    ShellRegister(name, address, width, ReadWrite, description)
+
+  private def fieldsOf(bundle: Bundle): Seq[Field] = Layout.of(bundle).sortBy(_.offset)
+
+  /** A bit for each name, from bit 0 on. */
+  private def bits(names: Seq[String]): Seq[Field] =
+    names.zipWithIndex.map { case (name, offset) => Field(name, offset, 1, signed = false, fraction = 0) }
+
+  /** The low and the high half of a word. */
+  private def halves(low: String, high: String): Seq[Field] =
+    Seq(Field(low, 0, 16, signed = false, fraction = 0), Field(high, 16, 16, signed = false, fraction = 0))
 
   /** What the design can do: bits 0 to 7 for a driver, and the base-2 logarithm of the bus bytes in bits 11 to 8. */
   def capabilities(config: ColonnadeConfig, busBytes: Int): BigInt = {
@@ -63,8 +103,9 @@ object ShellMap {
       config.geometry.cornerColours,
       config.geometry.texture.nonEmpty
     )
-    val bits = flags.zipWithIndex.collect { case (true, bit) => 1 << bit }.sum
-    BigInt(bits | (Integer.numberOfTrailingZeros(busBytes) << 8))
+    require(flags.size == features.size)
+    val mask = flags.zipWithIndex.collect { case (true, bit) => 1 << bit }.sum
+    BigInt(mask | (Integer.numberOfTrailingZeros(busBytes) << 8))
   }
 
   def frameSize(config: ColonnadeConfig): BigInt = BigInt(config.frame.maxWidth) | BigInt(config.frame.maxHeight) << 16
@@ -81,10 +122,14 @@ object ShellMap {
       "deviceBase" -> deviceBase,
       "registers"  -> ujson.Arr.from(registers.map { register =>
         ujson.Obj(
-          "name"    -> register.name,
-          "address" -> register.address,
-          "width"   -> register.width,
-          "access"  -> register.access.label
+          "name"        -> register.name,
+          "address"     -> register.address,
+          "width"       -> register.width,
+          "access"      -> register.access.label,
+          "description" -> register.description,
+          "fields"      -> ujson.Arr.from(register.fields.map { field =>
+            ujson.Obj("name" -> field.name, "offset" -> field.offset, "width" -> field.width)
+          })
         )
       }),
       "interrupts"        -> ujson.Arr.from(Interrupts.names),

@@ -105,6 +105,8 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
       commands === 4.U || (commands === 2.U && isIdle) || (commands === 1.U && canChange && !io.status.isLoading)
     case image if image.startsWith("image.")             => !io.status.isLoading
     case framebuffer if framebuffer.startsWith("frameb") => canChange
+    case "photo.enabled"                                 => canChange && config.hasEnvironment.B
+    case photo if photo.startsWith("photo.")             => canChange
     case _                                               => true.B
   }
 
@@ -132,15 +134,20 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   interrupts.io.enable := value("interrupt.enable")
   io.interrupt         := interrupts.io.interrupt
 
-  io.framebuffer.base        := value("framebuffer.base")
-  io.framebuffer.stride      := value("framebuffer.stride")
-  io.framebuffer.format      := value("framebuffer.format")
-  io.framebuffer.window.base := value("framebuffer.windowBase")
-  io.framebuffer.window.end  := value("framebuffer.windowEnd")
-  io.image.base              := value("image.base")
-  io.image.bytes             := value("image.bytes")
-  io.image.window.base       := value("image.windowBase")
-  io.image.window.end        := value("image.windowEnd")
+  io.framebuffer.base              := value("framebuffer.base")
+  io.framebuffer.stride            := value("framebuffer.stride")
+  io.framebuffer.format            := value("framebuffer.format")
+  io.framebuffer.window.base       := value("framebuffer.windowBase")
+  io.framebuffer.window.end        := value("framebuffer.windowEnd")
+  io.framebuffer.photo.base        := value("photo.base")
+  io.framebuffer.photo.stride      := value("photo.stride")
+  io.framebuffer.photo.isEnabled   := value("photo.enabled")
+  io.framebuffer.photo.window.base := value("photo.windowBase")
+  io.framebuffer.photo.window.end  := value("photo.windowEnd")
+  io.image.base                    := value("image.base")
+  io.image.bytes                   := value("image.bytes")
+  io.image.window.base             := value("image.windowBase")
+  io.image.window.end              := value("image.windowEnd")
 
   // Registers of the device
   private val deviceWritable =

@@ -63,7 +63,8 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   private val axis          = Mux(follows, RegEnable(orientation.axis, io.in.fire), orientation.axis)
   private val node          = RegEnable(BoxOperands.node(config, io.in.bits), io.in.fire)
   private val datapath      = Module(new BoxDatapath(config, lanes))
-  datapath.io.node := node
+  datapath.io.node    := node
+  datapath.io.isValid := RegNext(starts, false.B)
   for (lane <- 0 until lanes) {
     val byBeat   = (stored.take(lanes) ++ laterChildren.drop(lanes)).grouped(lanes).map(_(lane)).toSeq
     val child    = Mux1H(byBeat.zipWithIndex.map { case (child, index) => (beat === index.U) -> child })

@@ -13,7 +13,7 @@ final class TriangleSequencerIO(config: ColonnadeConfig) extends Bundle {
   /** `candidate` will be ready in the next cycle. */
   val readyNext = Output(Bool())
 
-  /** The vertex of this phase (phases 0 to 2). */
+  /** The vertex of this phase (phases 0 to 2) if `tag` is valid; otherwise it does not change. */
   val vertex = Output(Vec3(UInt(config.geometry.vertexBits.W)))
 
   /** Constant from phase 0 to 3. */
@@ -60,7 +60,8 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
       Mux(index === k.U, triangle(vertex), other)
     }
   }
-  io.vertex := Mux(io.schedule.is(0), vertices(0), Mux(io.schedule.is(1), vertices(1), vertices(2)))
+  private def issues(vertex: Int): Bool = isOccupied && io.schedule.is(vertex)
+  io.vertex := Mux(issues(0), vertices(0), Mux(issues(1), vertices(1), vertices(2)))
   io.ray    := candidate.ray
 
   io.tag.valid               := isOccupied

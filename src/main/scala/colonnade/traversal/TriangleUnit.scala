@@ -70,16 +70,19 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, queueD
 
   // The path of every triangle
   sequencer.io.candidate <> io.candidate
-  io.readyNext     := sequencer.io.readyNext
-  shear.io.vertex  := sequencer.io.vertex
-  shear.io.ray     := sequencer.io.ray
-  edges.io.sheared := shear.io.sheared
+  io.readyNext        := sequencer.io.readyNext
+  shear.io.vertex     := sequencer.io.vertex
+  shear.io.ray        := sequencer.io.ray
+  shear.io.isOccupied := sequencer.io.tag.valid
+  edges.io.sheared    := shear.io.sheared
 
   // Tags move with their triangles: one in the shear, one in the edge stage
   private val none       = 0.U.asTypeOf(Valid(new TriangleTag(config)))
   private val shiftsTags = schedule.is(1) && schedule.advances
   private val sheared    = RegEnable(sequencer.io.tag, none, shiftsTags)
   private val tested     = RegEnable(sheared, none, shiftsTags)
+  edges.io.isOccupied  := sheared.valid
+  edges.io.wasOccupied := tested.valid
 
   // Phase 1: the edge functions decide
   private val crossesTriangle = edges.io.crossesTriangle && !tested.bits.isAbsent

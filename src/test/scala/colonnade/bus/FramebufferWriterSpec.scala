@@ -28,8 +28,8 @@ private class GuardedWriter(config: ColonnadeConfig, shell: ShellConfig) extends
   writer.io.flush       := flush
   writer.io.pixels.zip(pixels).foreach { case (sink, source) => sink :<>= source }
   isIdle        := writer.io.isIdle && guard.io.isIdle
-  windowError   := writer.io.windowError
-  responseError := writer.io.responseError
+  windowError   := writer.io.errors.window
+  responseError := writer.io.errors.response
   guard.io.inner :<>= writer.io.axi
   guard.io.abandon := false.B
   Seq("aw" -> guard.io.axi.aw, "w" -> guard.io.axi.w).foreach { case (channel, stream) => pins.drive(channel, stream) }

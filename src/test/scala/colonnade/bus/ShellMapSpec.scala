@@ -16,6 +16,13 @@ class ShellMapSpec extends AnyFlatSpec {
     assert(words.distinct == words && words.forall(word => word % 4 == 0 && word < ShellMap.deviceBase))
   }
 
+  it should "place the fields of a register in its bits, apart from each other" in {
+    for (register <- ShellMap.registers) {
+      val taken = register.fields.flatMap(field => field.offset until field.end)
+      assert(taken.distinct == taken && taken.forall(_ < register.width), register.name)
+    }
+  }
+
   it should "hold all digits of the format hash" in {
     val config = ConfigIO.load("small")
     assert(ShellMap.formatHash(config).map(word => f"$word%08x").mkString == Manifest(config)("formatHash").str)

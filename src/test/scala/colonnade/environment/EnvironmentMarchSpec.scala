@@ -6,7 +6,7 @@ import chiseltest._
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{EnvironmentView, Load}
 import colonnade.numbers.StreamTester
-import colonnade.{Model, Packed, PackedUnit, Simulation, TestConfigs}
+import colonnade.{Always, Matrix, Model, Packed, PackedUnit, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -69,7 +69,8 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     val name =
       s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a map of ${size.width}x${size.height}"
 
-    it should s"hit what the model hits, with $name" in {
+    val isCommon = size.width == 640
+    it should s"hit what the model hits, with $name" taggedAs (if (isCommon) Matrix else Always.ifExtreme(config)) in {
       val random   = new Random(seed)
       val stimulus = new MarchStimulus(config, random)
       test(new EnvironmentMarchHarness(config)).withAnnotations(Simulation.verilator) { unit =>

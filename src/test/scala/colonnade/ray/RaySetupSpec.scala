@@ -2,7 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
 import org.scalatest.flatspec.AnyFlatSpec
@@ -27,7 +27,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
   TestConfigs.formats.foreach { config =>
     it should s"equal the model under random stalls, ${config.precision} with ${config.geometry.vertexBits}-bit vertices" in {
-      test(new RaySetupHarness(config)) { setup =>
+      test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
         val random = new Random(2)
         val cases  = new SetupStimulus(config, random).all(raysPerBox = 14)
         val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
@@ -38,7 +38,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
   it should "accept a ray every 16 cycles at 32b32s64d, and lose none" in {
     val config = TestConfigs.tiny
-    test(new RaySetupHarness(config)) { setup =>
+    test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
       val random   = new Random(3)
       val box      = new SetupStimulus(config, random).all(raysPerBox = 40).head
       val answers  = box.answers(config)

@@ -6,7 +6,8 @@ import chiseltest._
 import colonnade.config.{ColonnadeConfig, MapEncoding}
 import colonnade.environment.{AttributePort, EnvironmentImage, EnvironmentMarches, PhysicalAttributeMemory, SlowMaps}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
-import colonnade.{Model, Packed, Simulation, TestConfigs}
+import colonnade.{Always, Matrix, Model, Packed, Simulation, TestConfigs}
+import org.scalatest.Tag
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.collection.mutable
@@ -31,8 +32,8 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       (0.8, 7, true, false, true)
     )
 
-  private def render(config: ColonnadeConfig, name: String): Unit =
-    it should s"give each pixel once, equal to the model's: $name" in
+  private def render(config: ColonnadeConfig, name: String, tag: Tag = Always): Unit =
+    it should s"give each pixel once, equal to the model's: $name" taggedAs tag in
       test(new RenderUnitHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         for (
           (willing, seed, shadows, hasEnvironment, occlusion) <-
@@ -104,7 +105,8 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   )
   render(
     TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(lights = 1, maxBounces = 0)),
-    "one light, no bounces"
+    "one light, no bounces",
+    Matrix
   )
   render(TestConfigs.withEnvironment(TestConfigs.environment), "with an environment")
   render(
@@ -126,7 +128,7 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   )
   for (config <- TestConfigs.withColours.tail) {
     val withoutTextures = config.copy(geometry = config.geometry.copy(textureBytes = 0))
-    render(withoutTextures, s"corner colours at ${config.precision}")
+    render(withoutTextures, s"corner colours at ${config.precision}", Matrix)
   }
 }
 

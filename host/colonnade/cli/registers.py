@@ -1,0 +1,65 @@
+"""``colonnade registers``: the registers of a design for drivers, debuggers and integration tools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from colonnade.cli.options import FILE, configuration_options, echo, require_outputs
+
+
+def _address(context: click.Context, parameter: click.Parameter, value: str) -> int:
+    try:
+        address = int(value, 0)
+    except ValueError:
+        address = -1
+    if not 0 <= address < 1 << 40 or address % (1 << 16):
+        raise click.BadParameter(f"{value!r} is not a multiple of 0x10000 below 2^40", context, parameter)
+    return address
+
+
+@click.command(short_help="Describe the registers: SystemRDL, C, HTML, IP-XACT, SVD, device tree.")
+@configuration_options
+@click.option(
+    "--axi", "bus_bytes", type=int, default=16, show_default=True, metavar="BYTES", help="The bus of the AXI4 shell."
+)
+@click.option("--output", type=FILE, metavar="DIR", help="Output folder. An unmodified earlier output is replaced.")
+@click.option(
+    "--base", callback=_address, default="0", metavar="ADDRESS", help="Where the device is, for SVD and device tree."
+)
+@click.option("--interrupt", type=click.IntRange(0), default=0, metavar="N", help="Its interrupt, for the device tree.")
+@click.option("--shell-header", type=FILE, metavar="FILE", help="Write only the C header of the shell's registers.")
+def registers(
+    config: str,
+    overrides: tuple[str, ...],
+    bus_bytes: int,
+    output: Path | None,
+    base: int,
+    interrupt: int,
+    shell_header: Path | None,
+) -> None:
+    """Write the registers of a design in its AXI4 shell, from the generator's table.
+
+    DIR receives colonnade.rdl, C headers, HTML pages, IP-XACT, SVD, and a node for a device tree.
+    """
+    if (output is None) == (shell_header is None):
+        raise click.UsageError("give either --output DIR or --shell-header FILE", click.get_current_context())
+    require_outputs(shell_header)
+
+    from colonnade.common import progress
+    from colonnade.common.atomic_files import replacing
+    from colonnade.design import generator
+    from colonnade.design.design_folder import check_replaceable, listed
+    from colonnade.integration import files
+
+    if output is not None:
+        check_replaceable(output)
+    design = generator.shell_manifest_for(config, overrides, bus_bytes, progress.for_terminal())
+    if shell_header is not None:
+        with replacing(shell_header) as stream:
+            stream.write(files.shell_header(design).encode())
+        return
+    assert output is not None
+    files.write_registers(design, output, base, interrupt)
+    echo(f"{output}: {len(listed(output))} files, format {design.manifest.format_hash[:12]}")

@@ -1,0 +1,102 @@
+"""Register descriptions have the addresses, widths and accesses of the generator's table."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from systemrdl import RDLCompiler
+
+from colonnade.common.errors import UserError
+from colonnade.design import toolchain
+from colonnade.design.generator import GeneratedDesign, shell_manifest_for
+from colonnade.integration.files import shell_header, write_registers
+from colonnade.integration.register_table import RegisterTable, register_table
+
+BASE = 0x90000000
+
+
+@pytest.fixture(scope="module")
+def design() -> GeneratedDesign:
+    return shell_manifest_for("tiny")
+
+
+@pytest.fixture(scope="module")
+def table(design: GeneratedDesign) -> RegisterTable:
+    return register_table(design)
+
+
+@pytest.fixture(scope="module")
+def folder(design: GeneratedDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    output = tmp_path_factory.mktemp("registers") / "out"
+    write_registers(design, output, BASE, 5)
+    return output
+
+
+def expected(table: RegisterTable) -> dict[str, tuple[int, int]]:
+    """Address and bits of each word."""
+    return {
+        f"{block.name}.{word.name}": (block.base + word.address, sum(field.width for field in word.fields))
+        for block in (table.shell, table.device)
+        for word in block.words
+    }
+
+
+def test_the_table_has_all_words_of_the_manifest(design: GeneratedDesign, table: RegisterTable) -> None:
+    addresses = [word.address for word in table.device.words]
+    registers = [register for register in design.manifest.registers.values() if register.name != "control.start"]
+    words = [4 * (register.address + word) for register in registers for word in range(register.words)]
+    assert addresses == words
+    assert sum(field.width for word in table.device.words for field in word.fields) == sum(r.width for r in registers)
+
+
+def test_system_rdl_has_the_words_of_the_table(folder: Path, table: RegisterTable) -> None:
+    compiler = RDLCompiler()
+    compiler.compile_file(str(folder / "colonnade.rdl"))
+    top = compiler.elaborate().top
+    found = {
+        register.get_path().removeprefix("colonnade."): (
+            register.absolute_address,
+            sum(field.width for field in register.fields()),
+        )
+        for block in top.children()
+        for register in block.registers()
+    }
+    assert found == expected(table)
+
+
+def test_svd_has_the_words_of_the_table(folder: Path, table: RegisterTable) -> None:
+    (peripheral,) = ET.parse(folder / "colonnade.svd").getroot().iter("peripheral")
+    assert int(peripheral.findtext("baseAddress", ""), 0) == BASE
+    found = {}
+    for cluster in peripheral.iter("cluster"):
+        for register in cluster.iter("register"):
+            address = int(cluster.findtext("addressOffset", ""), 0) + int(register.findtext("addressOffset", ""), 0)
+            bits = sum(int(field.findtext("bitWidth", "")) for field in register.iter("field"))
+            found[f"{cluster.findtext('name')}.{register.findtext('name')}"] = (address, bits)
+    assert found == expected(table)
+
+
+def test_all_files_are_there(folder: Path) -> None:
+    names = {path.name for path in folder.iterdir()}
+    headers = {"colonnade_registers.h", "colonnade_design.h"}
+    assert names >= headers | {"colonnade.xml", "colonnade.dtsi", "html"}
+    assert (folder / "html" / "index.html").is_file()
+    assert ET.parse(folder / "colonnade.xml").getroot().tag.endswith("component")
+    assert f"colonnade@{BASE:x}" in (folder / "colonnade.dtsi").read_text()
+
+
+def test_the_shell_is_the_same_in_every_design(design: GeneratedDesign) -> None:
+    """Also in the repository's header."""
+    header = (toolchain.project_root() / "software" / "include" / "colonnade_shell.h").read_text()
+    assert shell_header(design) == header
+    assert shell_header(shell_manifest_for("small", bus_bytes=64)) == header
+    assert re.search(r"STATUS__ISLOADING_bm 0x4$", header, re.MULTILINE)
+
+
+def test_a_foreign_folder_is_not_replaced(design: GeneratedDesign, tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("irreplaceable")
+    with pytest.raises(UserError, match="holds files"):
+        write_registers(design, tmp_path)

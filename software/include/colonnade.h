@@ -1,0 +1,152 @@
+/* Driver of the Colonnade device in its AXI4 shell: docs/driver.md.
+ *
+ * It allocates nothing, uses no floating point, and keeps no state but what it is given. Pointers are those of the caller,
+ * and are not kept beyond the call, but for `bus` and `design` of `colonnade_probe`. It makes no access that the shell
+ * would refuse. */
+#ifndef COLONNADE_H
+#define COLONNADE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum colonnade_error {
+    COLONNADE_OK,
+    COLONNADE_NO_DEVICE,       /* no Colonnade answers at this address */
+    COLONNADE_UNKNOWN_VERSION, /* the shell has another major version */
+    COLONNADE_OTHER_FORMAT,    /* device, image or frame file has another formatHash */
+    COLONNADE_NOT_AN_IMAGE,    /* no device image, or one of another version */
+    COLONNADE_NOT_A_FRAME,     /* no frame file, or one of another version */
+    COLONNADE_TRUNCATED,       /* a file is shorter or longer than it says */
+    COLONNADE_TOO_LARGE,       /* an image or a framebuffer leaves its window, or a frame is larger than the device's */
+    COLONNADE_MISALIGNED,      /* an address, a size or a stride is no multiple of what it has to be */
+    COLONNADE_BAD_REGISTER,    /* a frame file sets a word that is no frame register */
+    COLONNADE_BAD_FORMAT,      /* a framebuffer's format is none of enum colonnade_format */
+    COLONNADE_NO_FRAME,        /* a start without colonnade_set_frame before it */
+    COLONNADE_BUSY,            /* not now: a frame is queued, an image is loading, or a reset is under way */
+    COLONNADE_TIMEOUT,         /* the event has not come */
+    COLONNADE_BUS_RESPONSE,    /* the memory answered with an error */
+    COLONNADE_BAD_SECTION,     /* an image has a section for a memory that the device lacks, or one that is too long */
+    COLONNADE_BAD_LENGTH,      /* an image's sections do not fill it */
+    COLONNADE_FRAME_INVALID    /* the device has an error bit: colonnade_device_errors */
+};
+
+/* Bits of `interrupt.status` and `interrupt.enable`. */
+enum { COLONNADE_FRAME_DONE = 1, COLONNADE_IMAGE_DONE = 2, COLONNADE_ERROR = 4 };
+
+enum colonnade_format { COLONNADE_XRGB8888, COLONNADE_RGB565, COLONNADE_LINEAR16 };
+
+/* Access to the registers, at byte addresses from 0 to 0xFFFF. Accesses take effect in the order of the calls. */
+struct colonnade_bus {
+    uint32_t (*read)(void *context, uint32_t address);
+    void (*write)(void *context, uint32_t address, uint32_t value);
+    /* Sleeps until an interrupt or for a while; NULL: the driver polls without a pause. */
+    void (*wait)(void *context);
+    void *context;
+};
+
+/* One design, as the generated colonnade_design.h describes it. */
+struct colonnade_design {
+    uint32_t format_hash[8];
+    uint32_t device_end;      /* byte address behind the device's registers */
+    uint32_t frame_registers; /* byte address of the first frame register; all up to device_end are such */
+    uint32_t errors;          /* byte address of the first error bit, each in a word of its own */
+    uint32_t error_count;
+    uint32_t counters;        /* byte address of the first counter, each in two words */
+    uint32_t counter_count;
+    uint32_t tile_size;       /* pixels */
+};
+
+struct colonnade {
+    const struct colonnade_bus *bus;
+    const struct colonnade_design *design;
+    uint32_t capabilities;
+    uint32_t max_width, max_height;
+    uint32_t width, height; /* of the frame that is set; 0: none */
+};
+
+/* Bus addresses from `base` up to, and without, `end`. */
+struct colonnade_window {
+    uint64_t base, end;
+};
+
+/* A device image, which `colonnade pack --device-image` writes.
+ * `data` is where the processor sees it; NULL if it does not: the device alone checks the image then. */
+struct colonnade_image {
+    const void *data;
+    uint32_t bytes;
+    uint64_t address;
+    struct colonnade_window window;
+};
+
+/* The registers of a frame, in a file that `colonnade pack --frame-file` writes. */
+struct colonnade_frame {
+    const uint8_t *writes; /* pairs of words: word address behind the device's base, value */
+    uint32_t count;
+    uint32_t width, height;
+};
+
+struct colonnade_framebuffer {
+    uint64_t base;
+    uint32_t stride; /* bytes */
+    enum colonnade_format format;
+    struct colonnade_window window;
+};
+
+/* Finds out whether the device is the one of the design, and fills `device`. Touches nothing but read-only registers. */
+enum colonnade_error colonnade_probe(struct colonnade *device, const struct colonnade_bus *bus,
+                                     const struct colonnade_design *design);
+
+/* Checks an image without a device: `bytes` bytes at `data`. */
+enum colonnade_error colonnade_check_image(const struct colonnade_design *design, const void *data, size_t bytes);
+
+/* Loads an image and waits for its end, `attempts` polls or waits at most. Acknowledges imageDone and error. */
+enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
+
+/* Reads a frame file of `bytes` bytes; `frame` points into it. */
+enum colonnade_error colonnade_open_frame(const struct colonnade_design *design, const void *data, size_t bytes,
+                                          struct colonnade_frame *frame);
+
+/* Writes the registers of a frame, also while another one runs. */
+enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct colonnade_frame *frame);
+
+/* Starts the frame that is set; while one runs, it is queued. What the processor has written to memory before is there. */
+enum colonnade_error colonnade_start(struct colonnade *device, const struct colonnade_framebuffer *framebuffer);
+
+/* Waits until one of `events` has come, `attempts` polls or waits at most. It is not acknowledged. */
+enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, uint32_t attempts);
+
+/* Whether the last frame that ended is valid, and if not, why: its framebuffer's errors first, then the device's. */
+enum colonnade_error colonnade_result(struct colonnade *device);
+
+/* Clears events in `interrupt.status`. */
+void colonnade_acknowledge(struct colonnade *device, uint32_t events);
+
+/* Chooses the events that raise the interrupt. */
+void colonnade_enable_interrupts(struct colonnade *device, uint32_t events);
+
+/* Resets the device in any state; the frame registers are 0 then. */
+enum colonnade_error colonnade_reset(struct colonnade *device, uint32_t attempts);
+
+/* A bit for each error of the last frame, bit n for number n of colonnade_design.h. */
+uint32_t colonnade_device_errors(struct colonnade *device);
+
+/* Counter number `index` of colonnade_design.h; 0 if there is none. Read it while no frame runs. */
+uint64_t colonnade_counter(struct colonnade *device, uint32_t index);
+
+/* The name of an error, such as "otherFormat". */
+const char *colonnade_error_name(enum colonnade_error error);
+
+/* Accesses of a processor that sees the registers at `context`, for `struct colonnade_bus`. */
+uint32_t colonnade_mmio_read(void *context, uint32_t address);
+void colonnade_mmio_write(void *context, uint32_t address, uint32_t value);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,177 @@
+#include "colonnade.h"
+
+#include "colonnade_shell.h"
+
+#define REGISTER(name) ((uint32_t)offsetof(colonnade_shell_t, name))
+
+enum { IDENTITY = 0x434C4E44, DEVICE_BASE = 0x8000, IMAGE_ALIGNMENT = 128 };
+
+static uint32_t get(const struct colonnade *device, uint32_t address) {
+    return device->bus->read(device->bus->context, address);
+}
+
+static void set(const struct colonnade *device, uint32_t address, uint32_t value) {
+    device->bus->write(device->bus->context, address, value);
+}
+
+/* Writes a number of two words; the registers have 40 bits. */
+static void set_wide(const struct colonnade *device, uint32_t address, uint64_t value) {
+    set(device, address, (uint32_t)value);
+    set(device, address + 4, (uint32_t)(value >> 32));
+}
+
+/* Whether `bytes` bytes at `address` lie in a window of bus addresses. No sum overflows. */
+static bool contains(const struct colonnade_window *window, uint64_t address, uint64_t bytes) {
+    return window->end >> 40 == 0 && address >= window->base && address <= window->end && bytes <= window->end - address;
+}
+
+enum colonnade_error colonnade_probe(struct colonnade *device, const struct colonnade_bus *bus,
+                                     const struct colonnade_design *design) {
+    *device = (struct colonnade){.bus = bus, .design = design};
+    if (get(device, REGISTER(identity)) != IDENTITY) return COLONNADE_NO_DEVICE;
+    if (get(device, REGISTER(version)) >> COLONNADE_SHELL__VERSION__MAJOR_bp != 1) return COLONNADE_UNKNOWN_VERSION;
+    for (uint32_t i = 0; i < 8; ++i)
+        if (get(device, REGISTER(formatHash_0) + 4 * i) != design->format_hash[i]) return COLONNADE_OTHER_FORMAT;
+    device->capabilities = get(device, REGISTER(capabilities));
+    uint32_t size = get(device, REGISTER(frameSize));
+    device->max_width = size & COLONNADE_SHELL__FRAMESIZE__WIDTH_bm;
+    device->max_height = size >> COLONNADE_SHELL__FRAMESIZE__HEIGHT_bp;
+    return COLONNADE_OK;
+}
+
+static enum colonnade_error image_error(uint32_t bits) {
+    if (bits & COLONNADE_SHELL__IMAGE_ERRORS__WINDOW_bm) return COLONNADE_TOO_LARGE;
+    if (bits & COLONNADE_SHELL__IMAGE_ERRORS__RESPONSE_bm) return COLONNADE_BUS_RESPONSE;
+    if (bits & COLONNADE_SHELL__IMAGE_ERRORS__ALIGNMENT_bm) return COLONNADE_MISALIGNED;
+    if (bits & COLONNADE_SHELL__IMAGE_ERRORS__MAGIC_bm) return COLONNADE_NOT_AN_IMAGE;
+    if (bits & COLONNADE_SHELL__IMAGE_ERRORS__FORMATHASH_bm) return COLONNADE_OTHER_FORMAT;
+    if (bits & COLONNADE_SHELL__IMAGE_ERRORS__SECTION_bm) return COLONNADE_BAD_SECTION;
+    if (bits & COLONNADE_SHELL__IMAGE_ERRORS__LENGTH_bm) return COLONNADE_BAD_LENGTH;
+    return COLONNADE_OK;
+}
+
+enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts) {
+    if (image->address % IMAGE_ALIGNMENT != 0 || image->bytes % IMAGE_ALIGNMENT != 0) return COLONNADE_MISALIGNED;
+    if (!contains(&image->window, image->address, image->bytes)) return COLONNADE_TOO_LARGE;
+    if (image->data != NULL) {
+        enum colonnade_error error = colonnade_check_image(device->design, image->data, image->bytes);
+        if (error != COLONNADE_OK) return error;
+    }
+    if (get(device, REGISTER(status)) != 0) return COLONNADE_BUSY;
+    set_wide(device, REGISTER(image_base_low), image->address);
+    set_wide(device, REGISTER(image_windowBase_low), image->window.base);
+    set_wide(device, REGISTER(image_windowEnd_low), image->window.end);
+    set(device, REGISTER(image_bytes), image->bytes);
+    colonnade_acknowledge(device, COLONNADE_IMAGE_DONE | COLONNADE_ERROR);
+    __sync_synchronize();
+    set(device, REGISTER(control), COLONNADE_SHELL__CONTROL__LOAD_bm);
+    enum colonnade_error error = colonnade_wait(device, COLONNADE_IMAGE_DONE, attempts);
+    if (error != COLONNADE_OK) return error;
+    colonnade_acknowledge(device, COLONNADE_IMAGE_DONE | COLONNADE_ERROR);
+    return image_error(get(device, REGISTER(image_errors)));
+}
+
+static uint32_t word(const uint8_t *at) {
+    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+}
+
+/* Registers and framebuffer may change now, and the next frame may be started. */
+static bool takes_a_frame(const struct colonnade *device) {
+    return (get(device, REGISTER(status)) & ~(uint32_t)COLONNADE_SHELL__STATUS__ISRUNNING_bm) == 0;
+}
+
+enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct colonnade_frame *frame) {
+    if (frame->width > device->max_width || frame->height > device->max_height) return COLONNADE_TOO_LARGE;
+    if (!takes_a_frame(device)) return COLONNADE_BUSY;
+    for (size_t i = 0; i < frame->count; ++i)
+        set(device, DEVICE_BASE + 4 * word(frame->writes + 8 * i), word(frame->writes + 8 * i + 4));
+    device->width = frame->width;
+    device->height = frame->height;
+    return COLONNADE_OK;
+}
+
+enum colonnade_error colonnade_start(struct colonnade *device, const struct colonnade_framebuffer *framebuffer) {
+    static const uint32_t pixel_bytes[] = {4, 2, 8};
+    if (device->width == 0 || device->height == 0) return COLONNADE_NO_FRAME;
+    if ((uint32_t)framebuffer->format > COLONNADE_LINEAR16) return COLONNADE_BAD_FORMAT;
+    uint32_t tile = device->design->tile_size, row = tile * pixel_bytes[framebuffer->format];
+    uint32_t line = (device->width + tile - 1) / tile * row;
+    if (framebuffer->base % row != 0 || framebuffer->stride % row != 0) return COLONNADE_MISALIGNED;
+    uint64_t bytes = (uint64_t)framebuffer->stride * (device->height - 1) + line;
+    if (framebuffer->stride < line || framebuffer->stride >> 24 != 0 ||
+        !contains(&framebuffer->window, framebuffer->base, bytes))
+        return COLONNADE_TOO_LARGE;
+    if (!takes_a_frame(device)) return COLONNADE_BUSY;
+    set_wide(device, REGISTER(framebuffer_base_low), framebuffer->base);
+    set_wide(device, REGISTER(framebuffer_windowBase_low), framebuffer->window.base);
+    set_wide(device, REGISTER(framebuffer_windowEnd_low), framebuffer->window.end);
+    set(device, REGISTER(framebuffer_stride), framebuffer->stride);
+    set(device, REGISTER(framebuffer_format), (uint32_t)framebuffer->format);
+    __sync_synchronize();
+    set(device, REGISTER(control), COLONNADE_SHELL__CONTROL__START_bm);
+    return COLONNADE_OK;
+}
+
+enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, uint32_t attempts) {
+    while ((get(device, REGISTER(interrupt_status)) & events) == 0) {
+        if (attempts-- == 0) return COLONNADE_TIMEOUT;
+        if (device->bus->wait != NULL) device->bus->wait(device->bus->context);
+    }
+    __sync_synchronize();
+    return COLONNADE_OK;
+}
+
+enum colonnade_error colonnade_result(struct colonnade *device) {
+    uint32_t bits = get(device, REGISTER(framebuffer_errors));
+    if (bits & COLONNADE_SHELL__FRAMEBUFFER_ERRORS__WINDOW_bm) return COLONNADE_TOO_LARGE;
+    if (bits & COLONNADE_SHELL__FRAMEBUFFER_ERRORS__RESPONSE_bm) return COLONNADE_BUS_RESPONSE;
+    if (bits & COLONNADE_SHELL__FRAMEBUFFER_ERRORS__ALIGNMENT_bm) return COLONNADE_MISALIGNED;
+    if (bits & COLONNADE_SHELL__FRAMEBUFFER_ERRORS__FORMAT_bm) return COLONNADE_BAD_FORMAT;
+    return colonnade_device_errors(device) == 0 ? COLONNADE_OK : COLONNADE_FRAME_INVALID;
+}
+
+void colonnade_acknowledge(struct colonnade *device, uint32_t events) {
+    set(device, REGISTER(interrupt_status), events);
+}
+
+void colonnade_enable_interrupts(struct colonnade *device, uint32_t events) {
+    set(device, REGISTER(interrupt_enable), events);
+}
+
+enum colonnade_error colonnade_reset(struct colonnade *device, uint32_t attempts) {
+    set(device, REGISTER(control), COLONNADE_SHELL__CONTROL__RESET_bm);
+    device->width = device->height = 0;
+    while (get(device, REGISTER(status)) != 0)
+        if (attempts-- == 0) return COLONNADE_TIMEOUT;
+    return COLONNADE_OK;
+}
+
+uint32_t colonnade_device_errors(struct colonnade *device) {
+    uint32_t bits = 0;
+    for (uint32_t i = 0; i < device->design->error_count; ++i)
+        bits |= (get(device, device->design->errors + 4 * i) & 1u) << i;
+    return bits;
+}
+
+uint64_t colonnade_counter(struct colonnade *device, uint32_t index) {
+    if (index >= device->design->counter_count) return 0;
+    uint32_t address = device->design->counters + 8 * index;
+    return get(device, address) | (uint64_t)get(device, address + 4) << 32;
+}
+
+const char *colonnade_error_name(enum colonnade_error error) {
+    static const char *const names[] = {
+        "ok",          "noDevice",    "unknownVersion", "otherFormat", "notAnImage", "notAFrame",
+        "truncated",   "tooLarge",    "misaligned",     "badRegister", "badFormat",  "noFrame",
+        "busy",        "timeout",     "busResponse",    "badSection",  "badLength",  "frameInvalid",
+    };
+    return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
+}
+
+uint32_t colonnade_mmio_read(void *context, uint32_t address) {
+    return ((volatile uint32_t *)context)[address / 4];
+}
+
+void colonnade_mmio_write(void *context, uint32_t address, uint32_t value) {
+    ((volatile uint32_t *)context)[address / 4] = value;
+}

@@ -1,0 +1,129 @@
+/* The driver against a simulated device: commands of the shell's test bench go to the standard output, its answers come
+ * from the standard input. Renders a frame in each format, two of them queued, and then tries what the device has to refuse.
+ *
+ * usage: simulated IMAGE FRAME interrupt|poll
+ *
+ * Memory: the image at PAGE, framebuffers behind it, each in a window of its size with a page of untouched memory around. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "colonnade.h"
+#include "colonnade_design.h"
+
+enum { PAGE = 4096, ATTEMPTS = 1000000 };
+
+static bool waits_for_interrupt;
+
+static void fail(const char *what) {
+    fprintf(stderr, "failed: %s\n", what);
+    exit(1);
+}
+
+static uint32_t bus_read(void *context, uint32_t address) {
+    (void)context;
+    uint32_t value;
+    printf("read x %" PRIu32 " 1\n", address);
+    fflush(stdout);
+    if (scanf(" value x %" SCNu32, &value) != 1) fail("the simulator does not answer a read");
+    return value;
+}
+
+static void bus_write(void *context, uint32_t address, uint32_t value) {
+    (void)context;
+    printf("write %" PRIu32 " %" PRIu32 "\n", address, value);
+}
+
+static void bus_wait(void *context) {
+    (void)context;
+    uint64_t cycles;
+    puts(waits_for_interrupt ? "wait 50000000" : "run 1000");
+    fflush(stdout);
+    if (scanf(" %*s %" SCNu64, &cycles) != 1) fail("the simulator does not answer a wait");
+}
+
+static void *read_file(const char *name, size_t *bytes) {
+    FILE *file = fopen(name, "rb");
+    if (file == NULL || fseek(file, 0, SEEK_END) != 0) fail(name);
+    *bytes = (size_t)ftell(file);
+    rewind(file);
+    void *data = malloc(*bytes);
+    if (data == NULL || fread(data, 1, *bytes, file) != *bytes) fail(name);
+    fclose(file);
+    return data;
+}
+
+static void expect(enum colonnade_error error, enum colonnade_error expected, const char *what) {
+    if (error != expected) {
+        fprintf(stderr, "%s: %s, expected %s\n", what, colonnade_error_name(error), colonnade_error_name(expected));
+        exit(1);
+    }
+}
+
+static uint64_t pages(uint64_t bytes) { return (bytes + PAGE - 1) / PAGE * PAGE; }
+
+int main(int argc, char **argv) {
+    static const struct colonnade_bus bus = {bus_read, bus_write, bus_wait, NULL};
+    static const uint32_t pixel_bytes[] = {4, 2, 8};
+    if (argc != 4) fail("usage");
+    waits_for_interrupt = strcmp(argv[3], "interrupt") == 0;
+    size_t image_bytes, frame_bytes;
+    uint8_t *image_data = read_file(argv[1], &image_bytes);
+    void *frame_data = read_file(argv[2], &frame_bytes);
+    struct colonnade device;
+    struct colonnade_frame frame;
+    expect(colonnade_probe(&device, &bus, &colonnade_design), COLONNADE_OK, "probe");
+    if (waits_for_interrupt) colonnade_enable_interrupts(&device, COLONNADE_IMAGE_DONE);
+
+    /* An image that the device refuses, since the driver does not see it: one word of the format hash differs */
+    struct colonnade_image image = {NULL, (uint32_t)image_bytes, PAGE, {PAGE, PAGE + image_bytes}};
+    puts("store other 4096");
+    expect(colonnade_load(&device, &image, ATTEMPTS), COLONNADE_OTHER_FORMAT, "an image of another format");
+    puts("store image 4096");
+    image.bytes -= 128;
+    expect(colonnade_load(&device, &image, ATTEMPTS), COLONNADE_BAD_LENGTH, "a truncated image");
+    image.bytes += 128;
+    image.data = image_data;
+    image.window.end -= 1;
+    expect(colonnade_load(&device, &image, ATTEMPTS), COLONNADE_TOO_LARGE, "an image larger than its window");
+    image.window.end += 1;
+    expect(colonnade_load(&device, &image, ATTEMPTS), COLONNADE_OK, "load");
+
+    expect(colonnade_open_frame(&colonnade_design, frame_data, frame_bytes, &frame), COLONNADE_OK, "frame file");
+    expect(colonnade_set_frame(&device, &frame), COLONNADE_OK, "set frame");
+    if (waits_for_interrupt) colonnade_enable_interrupts(&device, COLONNADE_FRAME_DONE);
+    uint32_t tile = colonnade_design.tile_size, columns = (frame.width + tile - 1) / tile * tile;
+    uint64_t place = PAGE + pages(image_bytes) + PAGE;
+    for (uint32_t format = COLONNADE_XRGB8888; format <= COLONNADE_LINEAR16; ++format) {
+        uint32_t stride = columns * pixel_bytes[format];
+        uint64_t bytes = (uint64_t)stride * frame.height;
+        struct colonnade_framebuffer framebuffer = {place, stride, format, {place, place + bytes}};
+        expect(colonnade_start(&device, &framebuffer), COLONNADE_OK, "start");
+        expect(colonnade_wait(&device, COLONNADE_FRAME_DONE, ATTEMPTS), COLONNADE_OK, "wait");
+        colonnade_acknowledge(&device, COLONNADE_FRAME_DONE | COLONNADE_ERROR);
+        expect(colonnade_result(&device), COLONNADE_OK, "result");
+        fprintf(stderr, "frame %" PRIu64 " %" PRIu32 " hits %" PRIu64 "\n", place, stride,
+                colonnade_counter(&device, COLONNADE_COUNTER_HITS));
+        place += pages(bytes) + PAGE;
+    }
+
+    /* A soft reset in the middle of a frame; then the device lacks a frame, and takes one again */
+    struct colonnade_framebuffer last = {place, columns * 4, COLONNADE_XRGB8888, {place, place + 4 * columns * frame.height}};
+    expect(colonnade_start(&device, &last), COLONNADE_OK, "start before a reset");
+    expect(colonnade_start(&device, &last), COLONNADE_OK, "start of a queued frame");
+    expect(colonnade_set_frame(&device, &frame), COLONNADE_BUSY, "a third frame");
+    expect(colonnade_reset(&device, ATTEMPTS), COLONNADE_OK, "reset");
+    expect(colonnade_start(&device, &last), COLONNADE_NO_FRAME, "start after a reset");
+    expect(colonnade_set_frame(&device, &frame), COLONNADE_OK, "set frame after a reset");
+    colonnade_acknowledge(&device, COLONNADE_FRAME_DONE | COLONNADE_ERROR);
+    expect(colonnade_start(&device, &last), COLONNADE_OK, "start after a reset");
+    expect(colonnade_wait(&device, COLONNADE_FRAME_DONE, ATTEMPTS), COLONNADE_OK, "wait after a reset");
+    expect(colonnade_result(&device), COLONNADE_OK, "result after a reset");
+    fprintf(stderr, "frame %" PRIu64 " %" PRIu32 " hits %" PRIu64 "\n", place, last.stride,
+            colonnade_counter(&device, COLONNADE_COUNTER_HITS));
+    printf("dump memory 0 %" PRIu64 "\n", place + pages(4 * columns * frame.height) + PAGE);
+    free(image_data);
+    free(frame_data);
+    return 0;
+}

@@ -1,0 +1,135 @@
+package colonnade.bus
+
+import chisel3._
+import chisel3.util._
+import colonnade.axi.{Axi, AxiReadPort}
+import colonnade.config.{ColonnadeConfig, ShellConfig}
+
+final class PhotoCompositorIO(config: ColonnadeConfig, shell: ShellConfig) extends Bundle {
+
+  /** Constant while rows are under way. */
+  val settings = Input(new FramebufferSettings)
+  val rows     = Flipped(Decoupled(new TileRow(config, PixelWord.bits(config))))
+  val out      = Decoupled(new TileRow(config))
+  val axi      = new AxiReadPort(BurstWriter.idBits, shell.busBytes)
+
+  /** A pulse: a row of the photo lies outside its window; its pixels are dropped. */
+  val isOutside = Output(Bool())
+
+  /** A pulse: a read has failed. */
+  val isError = Output(Bool())
+  val isIdle  = Output(Bool())
+}
+
+/** Puts the camera's photo, darkened by the shadow ratios, into the pixels of a row that do not show the object.
+  *
+  * A row with such pixels reads its part of the photo, one burst; up to [[PhotoCompositor.maxRows]] rows wait for theirs.
+  * Rows leave in order, at the pace of the bus: as many pixels per cycle as a beat has, [[PhotoPixel.latency]] cycles after
+  * their beat.
+  */
+final class PhotoCompositor(config: ColonnadeConfig, shell: ShellConfig) extends Module {
+  import PhotoCompositor._
+
+  val io = IO(new PhotoCompositorIO(config, shell))
+
+  private val tileSize = config.frame.tileSize
+  private val rowBytes = tileSize * photoBytes
+  private val lanes    = tileSize.min(shell.busBytes / photoBytes)
+  private val beats    = tileSize / lanes
+  private val photo    = io.settings.photo
+
+  // Where the photo of a row lies
+  private val waits   = RegInit(false.B)
+  private val row     = RegEnable(io.rows.bits, io.rows.fire)
+  private val address = RegEnable(addressOf(io.rows.bits), io.rows.fire)
+  private val shows   = VecInit(row.pixels.map(PixelWord.showsPhoto)).asUInt & row.mask
+  private val isIn    = photo.window.contains(address, rowBytes.U)
+  private val reads   = shows.orR && isIn
+
+  private def addressOf(row: TileRow): UInt =
+    (photo.base + row.y * photo.stride + (row.tile ## 0.U(log2Ceil(rowBytes).W)))(Axi.addressBits - 1, 0)
+
+  // A row that reads waits for its data in a queue, in the order of the bursts
+  private val pending = Module(new Queue(new PendingRow(config, shell), maxRows, useSyncReadMem = true))
+  io.axi.ar.valid              := waits && reads && pending.io.enq.ready
+  io.axi.ar.bits.id            := 0.U
+  io.axi.ar.bits.addr          := address
+  io.axi.ar.bits.len           := (beats - 1).U
+  io.axi.ar.bits.size          := Axi.size(shell.busBytes)
+  io.axi.ar.bits.burst         := Axi.incr
+  pending.io.enq.valid         := waits && (!reads || io.axi.ar.ready)
+  pending.io.enq.bits.row      := row
+  pending.io.enq.bits.lane     := address(log2Ceil(shell.busBytes) - 1, 0) >> log2Ceil(lanes * photoBytes)
+  pending.io.enq.bits.reads    := reads
+  pending.io.enq.bits.row.mask := Mux(isIn, row.mask, row.mask & ~shows)
+  io.isOutside                 := pending.io.enq.fire && shows.orR && !isIn
+  io.rows.ready                := !waits || pending.io.enq.fire
+  when(io.rows.ready) { waits := io.rows.valid }
+
+  // A beat of the row and of the photo per cycle
+  private val data    = Module(new Queue(UInt((8 * shell.busBytes).W), 2))
+  private val head    = pending.io.deq.bits
+  private val beat    = RegInit(0.U(log2Ceil(beats).max(1).W))
+  private val isLast  = beat === (beats - 1).U
+  private val moves   = Wire(Bool())
+  private val isGiven = pending.io.deq.valid && (!head.reads || data.io.deq.valid)
+  private val texels  = data.io.deq.bits.asTypeOf(Vec(shell.busBytes / photoBytes / lanes, Vec(lanes, UInt(32.W))))
+  data.io.enq.valid    := io.axi.r.valid
+  data.io.enq.bits     := io.axi.r.bits.data
+  io.axi.r.ready       := data.io.enq.ready
+  io.isError           := io.axi.r.fire && io.axi.r.bits.resp =/= 0.U
+  data.io.deq.ready    := pending.io.deq.valid && head.reads && moves
+  pending.io.deq.ready := isGiven && moves && isLast
+  when(isGiven && moves) { beat := Mux(isLast, 0.U, beat + 1.U) }
+
+  private val valids = Seq.iterate(isGiven, PhotoPixel.latency + 1)(valid => RegEnable(valid, false.B, moves))
+  private val lasts  = ShiftRegister(isLast, PhotoPixel.latency, moves)
+  private val places = ShiftRegister(Cat(head.row.tile, head.row.y, head.row.mask), PhotoPixel.latency, moves)
+  private val words  = VecInit.tabulate(lanes) { lane =>
+    val pixel = Module(new PhotoPixel(config))
+    pixel.enable := moves
+    pixel.format := io.settings.format
+    pixel.word   := pick(Seq.tabulate(beats)(index => head.row.pixels(index * lanes + lane)), beat)
+    pixel.photo  := pick(texels.map(_(lane)), head.lane)
+    pixel.out
+  }
+
+  private def pick(values: Seq[UInt], index: UInt): UInt =
+    if (values.size == 1) values.head else VecInit(values)(index(log2Ceil(values.size) - 1, 0))
+
+  // Beats become a row
+  private val gathered = Reg(UInt((tileSize * words.head.getWidth).W))
+  private val isOut    = RegInit(false.B)
+  private val place    = Reg(chiselTypeOf(places))
+  moves := !valids.last || !isOut || io.out.ready // a beat waits until the row before it has left
+  when(io.out.fire) { isOut := false.B }
+  when(valids.last && moves) {
+    gathered := (words.asUInt ## gathered) >> words.getWidth
+    isOut    := lasts
+    place    := places
+  }
+  io.out.valid       := isOut
+  io.out.bits.pixels := gathered.asTypeOf(io.out.bits.pixels)
+  io.out.bits.mask   := place
+  io.out.bits.y      := place >> tileSize
+  io.out.bits.tile   := place >> (tileSize + io.out.bits.y.getWidth)
+  io.isIdle          := !waits && !pending.io.deq.valid && !valids.drop(1).reduce(_ || _) && !isOut
+}
+
+/** A row that waits for its part of the photo. */
+final class PendingRow(config: ColonnadeConfig, shell: ShellConfig) extends Bundle {
+  val row   = new TileRow(config, PixelWord.bits(config))
+  val reads = Bool()
+
+  /** Of a beat wider than the row: the part with the row. */
+  val lane = UInt(log2Ceil(shell.busBytes).W)
+}
+
+object PhotoCompositor {
+
+  /** A pixel of the photo, XRGB8888. */
+  val photoBytes: Int = 4
+
+  /** Rows that wait for their part of the photo. */
+  val maxRows: Int = 16
+}

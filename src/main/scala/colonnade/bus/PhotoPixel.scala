@@ -1,0 +1,55 @@
+package colonnade.bus
+
+import chisel3._
+import chisel3.util.{RegEnable, ShiftRegister}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.FrameRegisters
+
+/** A pixel of the photo times its shadow ratio, in the framebuffer's format; docs/bus-shell.md. One per cycle.
+  *
+  * The photo's sRGB code becomes 16 linear bits, by a table; these times the ratio are rounded to 16 bits.
+  */
+final class PhotoPixel(config: ColonnadeConfig) extends Module {
+  import PhotoPixel._
+
+  val enable = IO(Input(Bool()))
+  val format = IO(Input(UInt(PixelFormat.getWidth.W)))
+
+  /** See [[PixelWord]]: a shadow ratio, or a pixel that passes as it is. */
+  val word = IO(Input(UInt(PixelWord.bits(config).W)))
+
+  /** XRGB8888 */
+  val photo = IO(Input(UInt(32.W)))
+  val out   = IO(Output(UInt((8 * PixelFormat.maxBytes).W)))
+
+  private val ratioBits = FrameRegisters.weight.format.width
+  private val fraction  = FrameRegisters.weight.format.fraction
+  private val table     = VecInit(
+    (0 until 1 << SrgbEncoder.codeBits).map(code => SrgbEncoder.decoded(code, linearBits).U(linearBits.W))
+  )
+  private val channels = Seq.tabulate(3) { channel =>
+    val code    = photo(8 * (2 - channel) + 7, 8 * (2 - channel))
+    val linear  = RegEnable(table(code), enable)
+    val ratio   = RegEnable(word(ratioBits * (channel + 1) - 1, ratioBits * channel), enable)
+    val product = RegEnable(linear * ratio, enable)
+    val rounded = (product +& (1 << (fraction - 1)).U) >> fraction
+    val result  =
+      RegEnable(Mux((rounded >> linearBits).orR, ((1 << linearBits) - 1).U, rounded(linearBits - 1, 0)), enable)
+    val encoder = Module(new SrgbEncoder(linearBits))
+    encoder.linear := result
+    encoder.enable := enable
+    (encoder.code, ShiftRegister(result, SrgbEncoder.latency, enable))
+  }
+  private val passed = ShiftRegister(word, latency, enable)
+  private val mixed  = PixelFormat.packed(format, channels.map(_._1), channels.map(_._2), isObject = false.B)
+  out := Mux(PixelWord.showsPhoto(passed), mixed, passed)
+}
+
+object PhotoPixel {
+
+  /** Of a linear channel of the photo; all ones is 1.0. */
+  val linearBits: Int = 16
+
+  /** Cycles from a pixel to its word. */
+  val latency: Int = 3 + SrgbEncoder.latency
+}
