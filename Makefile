@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup render test test-hardware test-host verify bench check docs lock format clean
+.PHONY: help setup render test test-hardware test-host verify bench soc check docs lock format clean
 
 venv := .venv/bin
 SCENE ?= scenes/room.toml
@@ -36,6 +36,9 @@ verify: setup ## the full matrix: array shapes, precisions, meshes; long
 bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where the cycles go
 	@mkdir -p out
 	@$(venv)/colonnade bench --config $(BENCH_CONFIG) --json out/bench.json --plot out/bench.png
+
+soc: setup ## a LiteX SoC in the simulator: boots, renders by the driver, compares the framebuffer with the model's
+	@tools/soc
 
 check: setup ## formatters, linters, types, locks, golden manifests
 	@tools/check

@@ -32,6 +32,7 @@ enum colonnade_error {
     COLONNADE_BUS_RESPONSE,    /* the memory answered with an error */
     COLONNADE_BAD_SECTION,     /* an image has a section for a memory that the device lacks, or one that is too long */
     COLONNADE_BAD_LENGTH,      /* an image's sections do not fill it */
+    COLONNADE_NO_PHOTO,        /* the device cannot composite a photo */
     COLONNADE_FRAME_INVALID    /* the device has an error bit: colonnade_device_errors */
 };
 
@@ -97,6 +98,13 @@ struct colonnade_framebuffer {
     struct colonnade_window window;
 };
 
+/* The camera's photo, XRGB8888 in sRGB, as large as the frame. Base and stride are multiples of 4 * tile_size bytes. */
+struct colonnade_photo {
+    uint64_t base;
+    uint32_t stride; /* bytes */
+    struct colonnade_window window;
+};
+
 /* Finds out whether the device is the one of the design, and fills `device`. Touches nothing but read-only registers. */
 enum colonnade_error colonnade_probe(struct colonnade *device, const struct colonnade_bus *bus,
                                      const struct colonnade_design *design);
@@ -113,6 +121,10 @@ enum colonnade_error colonnade_open_frame(const struct colonnade_design *design,
 
 /* Writes the registers of a frame, also while another one runs. */
 enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct colonnade_frame *frame);
+
+/* Chooses the photo that frames show where the object is not, from the next start on; NULL: none. Call it after
+ * colonnade_set_frame. */
+enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct colonnade_photo *photo);
 
 /* Starts the frame that is set; while one runs, it is queued. What the processor has written to memory before is there. */
 enum colonnade_error colonnade_start(struct colonnade *device, const struct colonnade_framebuffer *framebuffer);

@@ -162,6 +162,12 @@ extern "C" {
 #define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__FORMAT_bm 0x8
 #define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__FORMAT_bp 3
 #define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__FORMAT_bw 1
+#define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__PHOTOWINDOW_bm 0x10
+#define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__PHOTOWINDOW_bp 4
+#define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__PHOTOWINDOW_bw 1
+#define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__PHOTORESPONSE_bm 0x20
+#define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__PHOTORESPONSE_bp 5
+#define COLONNADE_SHELL__FRAMEBUFFER_ERRORS__PHOTORESPONSE_bw 1
 
 // reg - colonnade_shell::image_errors
 #define COLONNADE_SHELL__IMAGE_ERRORS__WINDOW_bm 0x1
@@ -261,6 +267,46 @@ extern "C" {
 #define COLONNADE_SHELL__IMAGE_BYTES__VALUE_bp 0
 #define COLONNADE_SHELL__IMAGE_BYTES__VALUE_bw 32
 
+// reg - colonnade_shell::photo_base_low
+#define COLONNADE_SHELL__PHOTO_BASE_LOW__VALUE_bm 0xffffffff
+#define COLONNADE_SHELL__PHOTO_BASE_LOW__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_BASE_LOW__VALUE_bw 32
+
+// reg - colonnade_shell::photo_base_high
+#define COLONNADE_SHELL__PHOTO_BASE_HIGH__VALUE_bm 0xff
+#define COLONNADE_SHELL__PHOTO_BASE_HIGH__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_BASE_HIGH__VALUE_bw 8
+
+// reg - colonnade_shell::photo_windowBase_low
+#define COLONNADE_SHELL__PHOTO_WINDOWBASE_LOW__VALUE_bm 0xffffffff
+#define COLONNADE_SHELL__PHOTO_WINDOWBASE_LOW__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_WINDOWBASE_LOW__VALUE_bw 32
+
+// reg - colonnade_shell::photo_windowBase_high
+#define COLONNADE_SHELL__PHOTO_WINDOWBASE_HIGH__VALUE_bm 0xff
+#define COLONNADE_SHELL__PHOTO_WINDOWBASE_HIGH__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_WINDOWBASE_HIGH__VALUE_bw 8
+
+// reg - colonnade_shell::photo_windowEnd_low
+#define COLONNADE_SHELL__PHOTO_WINDOWEND_LOW__VALUE_bm 0xffffffff
+#define COLONNADE_SHELL__PHOTO_WINDOWEND_LOW__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_WINDOWEND_LOW__VALUE_bw 32
+
+// reg - colonnade_shell::photo_windowEnd_high
+#define COLONNADE_SHELL__PHOTO_WINDOWEND_HIGH__VALUE_bm 0xff
+#define COLONNADE_SHELL__PHOTO_WINDOWEND_HIGH__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_WINDOWEND_HIGH__VALUE_bw 8
+
+// reg - colonnade_shell::photo_stride
+#define COLONNADE_SHELL__PHOTO_STRIDE__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__PHOTO_STRIDE__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_STRIDE__VALUE_bw 24
+
+// reg - colonnade_shell::photo_enabled
+#define COLONNADE_SHELL__PHOTO_ENABLED__VALUE_bm 0x1
+#define COLONNADE_SHELL__PHOTO_ENABLED__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_ENABLED__VALUE_bw 1
+
 // addrmap - colonnade_shell
 typedef struct __attribute__ ((__packed__)) {
     uint32_t identity;
@@ -300,11 +346,20 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t image_windowEnd_low;
     uint32_t image_windowEnd_high;
     uint32_t image_bytes;
+    uint8_t RESERVED_dc_df[0x4];
+    uint32_t photo_base_low;
+    uint32_t photo_base_high;
+    uint32_t photo_windowBase_low;
+    uint32_t photo_windowBase_high;
+    uint32_t photo_windowEnd_low;
+    uint32_t photo_windowEnd_high;
+    uint32_t photo_stride;
+    uint32_t photo_enabled;
 } colonnade_shell_t;
 
 
 #ifndef __cplusplus
-_Static_assert(sizeof(colonnade_shell_t) == 0xdc, "Packing error");
+_Static_assert(sizeof(colonnade_shell_t) == 0x100, "Packing error");
 #endif
 
 #ifdef __cplusplus

@@ -90,15 +90,46 @@ enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct 
     return COLONNADE_OK;
 }
 
+/* Bytes from the first pixel of a frame to the end of its last tile row. Lines that overlap are not valid. */
+static bool frame_bytes(const struct colonnade *device, uint32_t stride, uint32_t pixel_bytes, uint64_t *bytes) {
+    uint32_t tile = device->design->tile_size, line = (device->width + tile - 1) / tile * tile * pixel_bytes;
+    *bytes = (uint64_t)stride * (device->height - 1) + line;
+    return stride >= line && stride >> 24 == 0;
+}
+
+enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct colonnade_photo *photo) {
+    /* Shells of version 1.0 lack these registers */
+    bool composites = (get(device, REGISTER(version)) & COLONNADE_SHELL__VERSION__MINOR_bm) != 0 &&
+                      (device->capabilities & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0;
+    if (!composites) return photo == NULL ? COLONNADE_OK : COLONNADE_NO_PHOTO;
+    if (photo == NULL) {
+        if (!takes_a_frame(device)) return COLONNADE_BUSY;
+        set(device, REGISTER(photo_enabled), 0);
+        return COLONNADE_OK;
+    }
+    if (device->width == 0 || device->height == 0) return COLONNADE_NO_FRAME;
+    uint32_t row = device->design->tile_size * 4;
+    if (photo->base % row != 0 || photo->stride % row != 0) return COLONNADE_MISALIGNED;
+    uint64_t bytes;
+    if (!frame_bytes(device, photo->stride, 4, &bytes) || !contains(&photo->window, photo->base, bytes))
+        return COLONNADE_TOO_LARGE;
+    if (!takes_a_frame(device)) return COLONNADE_BUSY;
+    set_wide(device, REGISTER(photo_base_low), photo->base);
+    set_wide(device, REGISTER(photo_windowBase_low), photo->window.base);
+    set_wide(device, REGISTER(photo_windowEnd_low), photo->window.end);
+    set(device, REGISTER(photo_stride), photo->stride);
+    set(device, REGISTER(photo_enabled), 1);
+    return COLONNADE_OK;
+}
+
 enum colonnade_error colonnade_start(struct colonnade *device, const struct colonnade_framebuffer *framebuffer) {
     static const uint32_t pixel_bytes[] = {4, 2, 8};
     if (device->width == 0 || device->height == 0) return COLONNADE_NO_FRAME;
     if ((uint32_t)framebuffer->format > COLONNADE_LINEAR16) return COLONNADE_BAD_FORMAT;
-    uint32_t tile = device->design->tile_size, row = tile * pixel_bytes[framebuffer->format];
-    uint32_t line = (device->width + tile - 1) / tile * row;
+    uint32_t row = device->design->tile_size * pixel_bytes[framebuffer->format];
     if (framebuffer->base % row != 0 || framebuffer->stride % row != 0) return COLONNADE_MISALIGNED;
-    uint64_t bytes = (uint64_t)framebuffer->stride * (device->height - 1) + line;
-    if (framebuffer->stride < line || framebuffer->stride >> 24 != 0 ||
+    uint64_t bytes;
+    if (!frame_bytes(device, framebuffer->stride, pixel_bytes[framebuffer->format], &bytes) ||
         !contains(&framebuffer->window, framebuffer->base, bytes))
         return COLONNADE_TOO_LARGE;
     if (!takes_a_frame(device)) return COLONNADE_BUSY;
@@ -123,8 +154,12 @@ enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, u
 
 enum colonnade_error colonnade_result(struct colonnade *device) {
     uint32_t bits = get(device, REGISTER(framebuffer_errors));
-    if (bits & COLONNADE_SHELL__FRAMEBUFFER_ERRORS__WINDOW_bm) return COLONNADE_TOO_LARGE;
-    if (bits & COLONNADE_SHELL__FRAMEBUFFER_ERRORS__RESPONSE_bm) return COLONNADE_BUS_RESPONSE;
+    const uint32_t windows =
+        COLONNADE_SHELL__FRAMEBUFFER_ERRORS__WINDOW_bm | COLONNADE_SHELL__FRAMEBUFFER_ERRORS__PHOTOWINDOW_bm;
+    const uint32_t responses =
+        COLONNADE_SHELL__FRAMEBUFFER_ERRORS__RESPONSE_bm | COLONNADE_SHELL__FRAMEBUFFER_ERRORS__PHOTORESPONSE_bm;
+    if (bits & windows) return COLONNADE_TOO_LARGE;
+    if (bits & responses) return COLONNADE_BUS_RESPONSE;
     if (bits & COLONNADE_SHELL__FRAMEBUFFER_ERRORS__ALIGNMENT_bm) return COLONNADE_MISALIGNED;
     if (bits & COLONNADE_SHELL__FRAMEBUFFER_ERRORS__FORMAT_bm) return COLONNADE_BAD_FORMAT;
     return colonnade_device_errors(device) == 0 ? COLONNADE_OK : COLONNADE_FRAME_INVALID;
@@ -163,7 +198,8 @@ const char *colonnade_error_name(enum colonnade_error error) {
     static const char *const names[] = {
         "ok",          "noDevice",    "unknownVersion", "otherFormat", "notAnImage", "notAFrame",
         "truncated",   "tooLarge",    "misaligned",     "badRegister", "badFormat",  "noFrame",
-        "busy",        "timeout",     "busResponse",    "badSection",  "badLength",  "frameInvalid",
+        "busy",        "timeout",     "busResponse",    "badSection",  "badLength",  "noPhoto",
+        "frameInvalid",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }

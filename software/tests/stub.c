@@ -206,9 +206,9 @@ static void test_frames(struct stub *stub, struct colonnade *device) {
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_BUSY);
     stub->shell[AT(status)] = 0;
 
-    static const enum colonnade_error errors[] = {COLONNADE_TOO_LARGE, COLONNADE_BUS_RESPONSE, COLONNADE_MISALIGNED,
-                                                  COLONNADE_BAD_FORMAT};
-    for (size_t bit = 0; bit < 4; ++bit) {
+    static const enum colonnade_error errors[] = {COLONNADE_TOO_LARGE,  COLONNADE_BUS_RESPONSE, COLONNADE_MISALIGNED,
+                                                  COLONNADE_BAD_FORMAT, COLONNADE_TOO_LARGE,    COLONNADE_BUS_RESPONSE};
+    for (size_t bit = 0; bit < 6; ++bit) {
         stub->shell[AT(framebuffer_errors)] = 1u << bit;
         CHECK(colonnade_result(device) == errors[bit]);
     }
@@ -227,6 +227,31 @@ static void test_frames(struct stub *stub, struct colonnade *device) {
     free(file);
 }
 
+static void test_photos(struct stub *stub, struct colonnade *device) {
+    struct colonnade_photo photo = {4096, 64, {4096, 4096 + 2 * 64}};
+    device->width = device->height = 0;
+    stub->shell[AT(version)] = 0x00010000;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO && colonnade_set_photo(device, NULL) == COLONNADE_OK);
+    stub->shell[AT(version)] = 0x00010001;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO && colonnade_set_photo(device, NULL) == COLONNADE_OK);
+    device->capabilities = COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_FRAME);
+    device->width = 10;
+    device->height = 2;
+    photo.window.end -= 1;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_TOO_LARGE);
+    photo.window.end += 1;
+    photo.base += 4;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_MISALIGNED);
+    photo.base -= 4;
+    stub->shell[AT(status)] = 2;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_BUSY && colonnade_set_photo(device, NULL) == COLONNADE_BUSY);
+    stub->shell[AT(status)] = 1;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_OK && stub->shell[AT(photo_enabled)] == 1);
+    CHECK(stub->shell[AT(photo_base_low)] == 4096 && stub->shell[AT(photo_stride)] == 64);
+    CHECK(colonnade_set_photo(device, NULL) == COLONNADE_OK && stub->shell[AT(photo_enabled)] == 0);
+}
+
 int main(void) {
     struct stub *stub = calloc(1, sizeof *stub);
     CHECK(stub != NULL);
@@ -236,6 +261,7 @@ int main(void) {
     CHECK(colonnade_probe(&device, &bus, &design) == COLONNADE_OK);
     test_images(stub, &device);
     test_frames(stub, &device);
+    test_photos(stub, &device);
     for (int error = COLONNADE_OK; error <= COLONNADE_FRAME_INVALID; ++error)
         CHECK(strcmp(colonnade_error_name((enum colonnade_error)error), "unknown") != 0);
     CHECK(strcmp(colonnade_error_name((enum colonnade_error)(COLONNADE_FRAME_INVALID + 1)), "unknown") == 0);

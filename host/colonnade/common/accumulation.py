@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from colonnade.common.framebuffer import Frame
 
-#: The device's numbers for the colour 1.0 and the shadow ratio 1.0.
-WHITE, UNSHADOWED = 4095, 4096
+#: The device's numbers for the colour 1.0, the shadow ratio 1.0, and the photo's colour 1.0.
+WHITE, UNSHADOWED, PHOTO_WHITE = 4095, 4096, 65535
 
 #: A counter that is a level: the passes' maximum and not their sum.
 _LEVEL = "deepestStack"
@@ -100,10 +100,28 @@ class Accumulation:
 
         Returns:
             Linear colours, float64 [height, width, 3]. Each sample that does not show the object shows the photo, times
-            its shadow ratio.
+            its shadow ratio; on the device, rounded to 16 bits (`shadowed_photo`).
         """
         assert self.ratio is not None
-        return (self.objects / self.white + photo * (self.ratio / self.unshadowed)) / self.samples
+        if self.unshadowed == UNSHADOWED:
+            background = shadowed_photo(photo, self.ratio) / PHOTO_WHITE
+        else:
+            background = photo * (self.ratio / self.unshadowed)
+        return (self.objects / self.white + background) / self.samples
+
+
+def shadowed_photo(photo: npt.NDArray[np.float64], ratio: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """A photo times the device's shadow ratios, as the AXI4 shell computes it (docs/bus-shell.md).
+
+    Args:
+        photo: Linear, float64 [height, width, 3].
+        ratio: Shadow ratios, or sums of them, [height, width, 3]; `UNSHADOWED` is 1.0.
+
+    Returns:
+        Linear colours, int64 [height, width, 3]; `PHOTO_WHITE` is 1.0.
+    """
+    linear = np.rint(photo * PHOTO_WHITE).astype(np.int64)
+    return (linear * ratio.astype(np.int64) + UNSHADOWED // 2) // UNSHADOWED
 
 
 @dataclass

@@ -5,26 +5,42 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common.accumulation import PHOTO_WHITE, WHITE, shadowed_photo
 from colonnade.common.framebuffer import Frame
-from colonnade.common.srgb import srgb_from_linear
+from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 
 #: Names by the code of ``framebuffer.format``, and bytes of a pixel.
 FORMATS = ("xrgb8888", "rgb565", "linear16")
 PIXEL_BYTES = (4, 2, 8)
 
-_MAX = 4095
 
+def framebuffer_bytes(
+    frame: Frame, pixel_format: int, photo: npt.NDArray[np.uint8] | None = None
+) -> npt.NDArray[np.uint8]:
+    """The lines of a frame in memory.
 
-def framebuffer_bytes(frame: Frame, pixel_format: int) -> npt.NDArray[np.uint8]:
-    """The lines of a frame: uint8 [height, width * bytes of a pixel]; ``pixel_format`` is a code of `FORMATS`."""
+    Args:
+        frame: The frame; with a photo, it has shadow ratios.
+        pixel_format: A code of `FORMATS`.
+        photo: The camera's photo, sRGB, uint8 [height, width, 3], or None without compositing.
+
+    Returns:
+        uint8 [height, width * bytes of a pixel].
+    """
     height, width = frame.is_object.shape
+    wide = (frame.colour.astype(np.int64) << 4) | (frame.colour.astype(np.int64) >> 8)
+    linear = frame.colour / WHITE
+    if photo is not None:
+        assert frame.ratio is not None
+        shows = ~frame.is_object[..., None]
+        shadowed = np.minimum(shadowed_photo(linear_from_srgb(photo / 255.0), frame.ratio), PHOTO_WHITE)
+        wide = np.where(shows, shadowed, wide)
+        linear = np.where(shows, shadowed / PHOTO_WHITE, linear)
     if pixel_format == FORMATS.index("linear16"):
-        colour = frame.colour.astype(np.uint16)
-        wide = (colour << 4) | (colour >> 8)
         alpha = np.where(frame.is_object, 0xFFFF, 0).astype(np.uint16)
-        words = np.concatenate([wide, alpha[..., None]], axis=2).astype("<u2")
+        words = np.concatenate([wide.astype(np.uint16), alpha[..., None]], axis=2).astype("<u2")
         return words.view(np.uint8).reshape(height, width * 8)
-    codes = np.rint(srgb_from_linear(frame.colour / _MAX) * 255.0).astype(np.uint16)
+    codes = np.rint(srgb_from_linear(linear) * 255.0).astype(np.uint16)
     if pixel_format == FORMATS.index("rgb565"):
         packed = (codes[..., 0] >> 3 << 11) | (codes[..., 1] >> 2 << 5) | (codes[..., 2] >> 3)
         return np.ascontiguousarray(packed.astype("<u2")).view(np.uint8).reshape(height, width * 2)

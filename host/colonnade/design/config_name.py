@@ -36,7 +36,8 @@ def find_configuration(name: str, overrides: Sequence[str], root: Path) -> Confi
     """Resolve the name of a configuration.
 
     Args:
-        name: a preset (``small``), a JSON file, or a precision (``32b32s64d``: preset `small` with this precision).
+        name: a preset (``small``), a JSON file, or a precision (``32b32s64d``: preset `small` with this precision and
+            with triangle tests as wide as its MAC operands).
         overrides: ``key.path=value`` strings of ``--set``.
         root: the checkout, whose ``configs`` folder contains the presets.
 
@@ -52,7 +53,8 @@ def find_configuration(name: str, overrides: Sequence[str], root: Path) -> Confi
     if _PRECISION.fullmatch(name):
         if max(map(len, re.findall(r"\d+", name))) > _PRECISION_DIGITS:
             raise UserError(f"the precision {name} has a number of more than {_PRECISION_DIGITS} digits")
-        return ConfigurationSource(presets / f"{PRECISION_PRESET}.json", (f"precision={name}", *overrides))
+        precision = (f"precision={name}", "geometry.triangleBits=null")
+        return ConfigurationSource(presets / f"{PRECISION_PRESET}.json", (*precision, *overrides))
     if re.fullmatch(r"[\w-]+", name) and is_file(presets / f"{name}.json"):
         return ConfigurationSource(presets / f"{name}.json", tuple(overrides))
     path = Path(name)

@@ -173,6 +173,11 @@ class Manifest:
         """Whether diffuse materials emit light."""
         return bool(self.config["frame"]["emission"])
 
+    @property
+    def format_words(self) -> list[int]:
+        """The format hash as eight words of 32 bits; the first has its first eight digits."""
+        return [int(self.format_hash[start : start + 8], 16) for start in range(0, 64, 8)]
+
     @staticmethod
     def load(path: str | Path) -> Manifest:
         """Read ``manifest.json``, given the file or its folder.

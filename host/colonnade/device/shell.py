@@ -20,8 +20,14 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import GeneratedDesign
 from colonnade.design.toolchain import cache_directory, project_root
-from colonnade.device.compiler import SAFE, clean_environment, require_right_compiler
-from colonnade.device.simulator_build import OPTIMISATION, PROGRAM, VERILATOR_OPTIONS, simulator_tools
+from colonnade.device.compiler import SAFE, require_right_compiler
+from colonnade.device.simulator_build import (
+    OPTIMISATION,
+    PROGRAM,
+    VERILATOR_OPTIONS,
+    build_environment,
+    simulator_tools,
+)
 from colonnade.device.verilator import run_program
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.file import SceneImage
@@ -91,6 +97,7 @@ def render_shell(
     formats: Sequence[int],
     bus: Bus | None = None,
     progress: Progress = QUIET,
+    photo: npt.NDArray[np.uint8] | None = None,
 ) -> list[ShellFrame]:
     """Render a frame for each set of registers, in the format of the same index, through the bus.
 
@@ -101,6 +108,7 @@ def render_shell(
         formats: Codes of `FORMATS`.
         bus: The memory's timing.
         progress: Shows the steps.
+        photo: Composited into the frames, which then have one size: sRGB, uint8 [height, width, 3].
 
     Raises:
         RuntimeError: The shell breaks a rule of AXI, refuses an access, leaves its windows, or hangs.
@@ -119,6 +127,11 @@ def render_shell(
     with temporary_folder() as folder:
         (folder / "image").write_bytes(data)
         lines = ["store image 0", *_load(shell, len(data))]
+        if photo is not None:
+            stored = _photo_lines(photo, tile)
+            (folder / "photo").write_bytes(stored.tobytes())
+            lines += [f"store photo {end}", *_photo(shell, end, stored)]
+            end += stored.size
         for index, (values, code, place) in enumerate(zip(registers, formats, places, strict=True)):
             lines += _frame(shell, design, values, code, place)
             lines.append(f"dump frame{index} {place[0]} {place[1] * place[2]}")
@@ -128,6 +141,20 @@ def render_shell(
         with progress.step("rendering through the bus") as report:
             output = run_program([str(program), *arguments, "job"], folder, report)
         return _frames(folder, output, places)
+
+
+def _photo_lines(photo: npt.NDArray[np.uint8], tile: int) -> npt.NDArray[np.uint8]:
+    """A photo as XRGB8888, in lines of whole tile rows: uint8 [height, stride]."""
+    height, width, _ = photo.shape
+    lines = np.zeros((height, -(-width // tile) * tile, 4), np.uint8)
+    lines[:, :width, :3] = photo[..., ::-1]
+    return lines.reshape(height, -1)
+
+
+def _photo(shell: ShellMap, base: int, lines: npt.NDArray[np.uint8]) -> list[str]:
+    """Show the photo where the object is not, from a window of its size."""
+    places = {"base": base, "windowBase": base, "windowEnd": base + lines.size, "stride": lines.shape[1], "enabled": 1}
+    return [command for name, value in places.items() for command in shell.write(f"photo.{name}", value)]
 
 
 def _load(shell: ShellMap, size: int) -> list[str]:
@@ -200,7 +227,7 @@ def build_shell_simulator(design: GeneratedDesign, progress: Progress = QUIET) -
             command += ["--exe", "-o", PROGRAM, harness.name, *(source.name for source in design.sources)]
             with log.open("w") as stream:
                 done = processes.run(
-                    command, cwd=work, env=clean_environment(), stdout=stream, stderr=subprocess.STDOUT
+                    command, cwd=work, env=build_environment(), stdout=stream, stderr=subprocess.STDOUT
                 )
             if done.returncode != 0:
                 raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")

@@ -111,18 +111,19 @@ def _build(
         inner = [top for top in models if top != DEVICE]
         commands[-1] += ["--exe", "-o", PROGRAM, "harness.cpp", "-CFLAGS", " ".join(f"-I../obj_{top}" for top in inner)]
         commands[-1] += ["-CFLAGS", "-I..", "-LDFLAGS", " ".join(f"../obj_{top}/V{top}__ALL.a" for top in inner)]
-        # Compiles Verilator's runtime once for all simulators
-        environment = {
-            **clean_environment(),
-            "OBJCACHE": shlex.quote(str(project_root() / "tools" / "verilated-object")),
-        }
         with log.open("w") as stream:
             for command in commands:
-                done = processes.run(command, cwd=work, env=environment, stdout=stream, stderr=stream)
+                done = processes.run(command, cwd=work, env=build_environment(), stdout=stream, stderr=stream)
                 if done.returncode != 0:
                     raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
         shutil.move(work / f"obj_{DEVICE}" / PROGRAM, output / PROGRAM)
     log.unlink()
+
+
+def build_environment() -> dict[str, str]:
+    """The environment of Verilator: its own runtime is compiled once for all simulators."""
+    compiles = shlex.quote(str(project_root() / "tools" / "verilated-object"))
+    return {**clean_environment(), "OBJCACHE": compiles}
 
 
 def _verilate(tools: Tools, top: str, sources: Sequence[Path]) -> list[str]:

@@ -10,8 +10,7 @@ from colonnade.integration.register_table import RegisterTable, identifier
 
 def design_header(table: RegisterTable, manifest: Manifest) -> str:
     """Format hash, places of registers, and names of errors and counters. Needs ``colonnade.h`` of the driver."""
-    digits = manifest.format_hash
-    words = [f"0x{digits[start : start + 8]}u" for start in range(0, 64, 8)]
+    words = [f"{word:#010x}u" for word in manifest.format_words]
     errors = _of(manifest, "errors.")
     counters = _of(manifest, "counters.")
     lines = [

@@ -27,9 +27,14 @@ def composited(sums: Accumulation, environment: Environment) -> npt.NDArray[np.f
     if environment.photo is None or sums.ratio is None:
         return sums.image()
     height, width = sums.coverage.shape
-    photo = environment.photo
-    if photo.shape[:2] != (height, width):
-        from PIL import Image
+    return sums.over(decode_srgb(resized_photo(environment, width, height)))
 
-        photo = np.asarray(Image.fromarray(photo).resize((width, height), Image.Resampling.BOX))
-    return sums.over(decode_srgb(photo))
+
+def resized_photo(environment: Environment, width: int, height: int) -> npt.NDArray[np.uint8]:
+    """The room's photo in the size of a frame: sRGB, uint8 [height, width, 3]."""
+    assert environment.photo is not None
+    if environment.photo.shape[:2] == (height, width):
+        return environment.photo
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(environment.photo).resize((width, height), Image.Resampling.BOX))

@@ -30,10 +30,9 @@ def device_image(image: SceneImage, manifest: Manifest) -> bytes:
     body = np.concatenate(sections) if sections else np.zeros(0, dtype="<u4")
     words = _HEADER_WORDS * (1 + -(-len(body) // _HEADER_WORDS))
     content = np.zeros(words, dtype="<u4")
-    digits = manifest.format_hash
     content[:2] = np.frombuffer(MAGIC, dtype="<u4")
     content[2:4] = VERSION, 4 * words
-    content[4:12] = [int(digits[start : start + 8], 16) for start in range(0, 64, 8)]
+    content[4:12] = manifest.format_words
     content[12] = len(sections)
     content[_HEADER_WORDS : _HEADER_WORDS + len(body)] = body
     return content.tobytes()

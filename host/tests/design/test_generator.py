@@ -231,7 +231,7 @@ def test_configurations_by_name_path_and_precision(checkout: Path, tmp_path: Pat
     assert find_configuration(str(own), [], checkout).path == own
     precise = find_configuration("16b16s32d", ["array.rows=1"], checkout)
     assert precise.path.name == "small.json"
-    assert precise.overrides == ("precision=16b16s32d", "array.rows=1")
+    assert precise.overrides == ("precision=16b16s32d", "geometry.triangleBits=null", "array.rows=1")
 
 
 @pytest.mark.parametrize("name", ["huge", "none.json", "../configs/none.json", "32b32s"])

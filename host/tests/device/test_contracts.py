@@ -17,7 +17,7 @@ from colonnade.scene.model import MeshSource, Scene
 from colonnade.scene_image.packer import pack
 
 Integers = npt.NDArray[np.int64]
-PRECISIONS = ("32b32s64d", "24b24s48d", "16b16s32d")
+PRECISIONS = ("small", "32b32s64d", "24b24s48d", "16b16s32d")
 
 
 def loaded_model(mesh: str, precision: str, *overrides: str) -> tuple[Any, Any, Manifest]:

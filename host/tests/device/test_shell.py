@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from colonnade.common.accumulation import Accumulation
 from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
+from colonnade.common.image_io import encode_srgb
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.shell import Bus, ShellFrame, render_shell
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
+from colonnade.render.composite import composited, resized_photo
 from colonnade.render.frames import encoded, max_lights, pack_scene
 from colonnade.render.lit_room import device_room, lit_room
 from colonnade.scene.object_mesh import object_mesh
@@ -51,7 +54,7 @@ def test_frames_in_memory_are_those_of_the_model(design: GeneratedDesign, bus: B
 
 @pytest.mark.matrix
 def test_a_room_in_memory_is_that_of_the_model() -> None:
-    """Its maps are loaded by the shell, too."""
+    """Its maps are loaded by the shell, too, and its photo is composited as the host does it."""
     design = shell_design_for("small", ("array.columns=2", "array.rows=1"), bus_bytes=16)
     manifest = design.manifest
     scene = load_scene(toolchain.project_root() / "scenes" / "room.toml")
@@ -65,3 +68,10 @@ def test_a_room_in_memory_is_that_of_the_model() -> None:
     assert expected.is_object.any()
     (frame,) = render_shell(design, image, [registers], [0], Bus(latency=40, stall=10, seed=3))
     assert_bytes(frame, framebuffer_bytes(expected, 0), PIXEL_BYTES[0])
+
+    photo = resized_photo(room.environment, WIDTH, HEIGHT)
+    frames = render_shell(design, image, [registers] * 3, [0, 1, 2], Bus(latency=40, stall=10, seed=4), photo=photo)
+    for code, frame in enumerate(frames):
+        assert_bytes(frame, framebuffer_bytes(expected, code, photo), PIXEL_BYTES[code])
+    host = encode_srgb(composited(Accumulation.of_frame(expected), room.environment))
+    np.testing.assert_array_equal(frames[0].lines[:, : 4 * WIDTH].reshape(HEIGHT, WIDTH, 4)[..., 2::-1], host)

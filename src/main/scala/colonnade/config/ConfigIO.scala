@@ -17,7 +17,8 @@ object ConfigIO {
 
   private val notation = """(\d{1,6})b(\d{1,6})s(\d{1,6})d""".r
 
-  /** The configuration of a preset's name, of a file, or of a precision such as `16b16s32d` (then otherwise `small`).
+  /** The configuration of a preset's name, of a file, or of a precision such as `16b16s32d`: `small` with that precision
+    * and with triangle tests as wide as `precision.mac`.
     *
     * @param overrides `path.to.key=value`, applied in order; a value is JSON, or else a string without quotes
     */
@@ -25,7 +26,10 @@ object ConfigIO {
     val json = name match {
       case preset if presets.contains(preset) => parse(presetText(preset), preset)
       case notation(_, _, _)                  =>
-        withOverride(parse(presetText("small"), "small"), s"precision=$name")
+        Seq(
+          s"precision=$name",
+          "geometry.triangleBits=null"
+        ).foldLeft(parse(presetText("small"), "small"))(withOverride)
       case file => parse(fileText(file), file)
     }
     read(overrides.foldLeft(json)(withOverride))

@@ -80,6 +80,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     val expected = PrecisionConfig(mac = 16, sqrt = 24, div = 48)
     ConfigIO.load("16b24s48d").precision shouldBe expected
     ConfigIO.load("16b24s48d").array shouldBe ConfigIO.load("small").array
+    ConfigIO.load("16b24s48d").numbers.gridBits shouldBe 16
     ConfigIO.load("tiny", Seq("precision=16b24s48d")).precision shouldBe expected
     ConfigIO.load("tiny", Seq("precision={\"mac\": 16, \"sqrt\": 24, \"div\": 48}")).precision shouldBe expected
     ConfigIO.load("tiny", Seq("precision.mac=20")).precision shouldBe PrecisionConfig(20, 32, 64)

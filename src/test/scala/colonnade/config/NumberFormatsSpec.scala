@@ -7,7 +7,7 @@ class NumberFormatsSpec extends AnyFlatSpec with Matchers {
   behavior of "NumberFormats"
 
   private def numbers(mac: Int, sqrt: Int, div: Int, vertexBits: Int): NumberFormats =
-    ConfigIO.load("tiny", Seq(s"precision=${mac}b${sqrt}s${div}d", s"geometry.vertexBits=$vertexBits")).numbers
+    ConfigIO.load(s"${mac}b${sqrt}s${div}d", Seq(s"geometry.vertexBits=$vertexBits")).numbers
 
   it should "give the reference widths for 32b32s64d" in {
     val reference = numbers(32, 32, 64, 16)

@@ -32,8 +32,14 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
     Seq("geometry.cornerColours=true"),
     Seq("geometry.cornerColours=true", "geometry.textureBytes=16384"),
     Seq("geometry.vertexBits=24", "geometry.boxBits=4", "columnBvhMemory.depth=16"),
-    Seq("geometry.vertexBits=10", "geometry.boxBits=12", "precision=16b16s16d"),
-    Seq("precision=64b64s64d", "frame.materials=1", "frame.hits=false", "columnBvhMemory.depth=4194304")
+    Seq("geometry.vertexBits=10", "geometry.boxBits=12", "precision=16b16s16d", "geometry.triangleBits=null"),
+    Seq(
+      "precision=64b64s64d",
+      "geometry.triangleBits=null",
+      "frame.materials=1",
+      "frame.hits=false",
+      "columnBvhMemory.depth=4194304"
+    )
   ).map(ConfigIO.load("tiny", _))
 
   private def kinds(config: ColonnadeConfig): Seq[Data] = {

@@ -129,7 +129,7 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
 
   it should "assign every word of the register map to one register" in {
     for (precision <- Seq("16b16s16d", "33b32s64d", "64b64s64d")) {
-      val registers = manifest(s"precision=$precision")("registers")("fields").arr.toSeq
+      val registers = manifest(s"precision=$precision", "geometry.triangleBits=null")("registers")("fields").arr.toSeq
       val words     = registers.flatMap(r => Seq.tabulate(r("words").num.toInt)(r("address").num.toInt + _))
       words shouldBe words.indices
       registers.foreach(r => r("words").num shouldBe math.ceil(r("width").num / 32))
