@@ -39,10 +39,14 @@ SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
 
 
 @NEEDS_SIMULATOR
-@pytest.mark.parametrize("kind", ["diffuse", "mirror", "glass"])
-def test_hardware_renders_the_rooms_of_the_model(kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [("diffuse", ()), ("mirror", ()), ("glass", ("units.marches=1", "units.directView=true"))],
+    ids=["diffuse", "mirror", "glass, environment in the column"],
+)
+def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, ...]) -> None:
     """The relit room and the shadow window; two lights, one light, no bounces; a sample; a stalled sink."""
-    design = design_for("small", ())
+    design = design_for("small", options)
     held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
     mesh = load_mesh("teapot:4")
     material = Material(kind=kind, albedo=(0.9, 0.95, 0.9))

@@ -29,8 +29,8 @@ final class EnvironmentMarchesIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The marches that the render units of a column share, and with `units.directView` the pipeline for directly seen pixels.
-  * One request a cycle, by round-robin, goes to an empty march or into the pipeline; one answer every other cycle, by
-  * round-robin, goes back to its unit.
+  * One request a cycle goes into the pipeline, or else to an empty march, by round-robin for each; one answer every other
+  * cycle, by round-robin, goes back to its unit.
   *
   * A march is empty once its answer has left it. An answer leaves as soon as its unit stores no ray in the same cycle, and
   * a unit stores at most one ray for each of its contexts without an answer. So every request ends.
@@ -44,22 +44,20 @@ final class EnvironmentMarches(config: ColonnadeConfig) extends Module {
   // Requests: a unit that is granted sends its order in the next cycle
   private val isAwaited = RegInit(VecInit.fill(config.units.marches)(false.B))
   private val isFree    = VecInit(marches.zip(isAwaited).map { case (march, awaited) => march.isEmpty && !awaited })
-  private val isDirect  = VecInit(io.units.map(_.req.bits.isDirectView && config.units.directView.B)).asUInt
   private val mayDirect = RegInit(true.B) // no pixel came into the pipeline in the cycle before
-  private val goes      = Mux(direct.fold(false.B)(_.isReady && mayDirect), isDirect, 0.U) |
-    Mux(isFree.asUInt.orR, ~isDirect, 0.U)
-  private val arbiter = Module(new RoundRobin(config.array.rows)).io
-  arbiter.requests := VecInit(io.units.map(_.req.valid)).asUInt & goes
-  arbiter.isTaken  := true.B
-  io.units.zip(arbiter.grant.asBools).foreach { case (unit, isGranted) => unit.req.ready := isGranted }
-  private val toMarch  = (arbiter.grant & ~isDirect).orR
-  private val toDirect = (arbiter.grant & isDirect).orR
-  private val granted  = RegEnable(arbiter.grant, arbiter.grant.orR)
-  private val order    = Wire(new RowOrder(config))
+  private val asks      = VecInit(io.units.map(_.req.valid)).asUInt
+  private val isDirect  = VecInit(io.units.map(_.req.bits.isDirectView && config.units.directView.B)).asUInt
+  private val seenGrant = grant(asks & isDirect, direct.fold(false.B)(_.isReady && mayDirect))
+  private val toDirect  = seenGrant.orR
+  private val rayGrant  = grant(asks & ~isDirect, isFree.asUInt.orR && !toDirect)
+  private val grants    = seenGrant | rayGrant
+  private val granted   = RegEnable(grants, grants.orR)
+  private val order     = Wire(new RowOrder(config))
+  io.units.zip(grants.asBools).foreach { case (unit, isGranted) => unit.req.ready := isGranted }
   order.row                                                                 := OHToUInt(granted)
   order.order                                                               := Mux1H(granted, io.units.map(_.order))
   mayDirect                                                                 := !toDirect
-  for ((awaited, free) <- isAwaited.zip(PriorityEncoderOH(isFree))) awaited := toMarch && free
+  for ((awaited, free) <- isAwaited.zip(PriorityEncoderOH(isFree))) awaited := rayGrant.orR && free
 
   // Marches
   private val marched = marches.zip(isAwaited).zip(io.maps).map { case ((march, awaited), maps) =>
@@ -103,4 +101,12 @@ final class EnvironmentMarches(config: ColonnadeConfig) extends Module {
   io.events.marchSteps      := PopCount(marches.map(_.events.step))
   io.events.busyEnvironment := PopCount(marches.map(_.events.busy))
   io.events.illegalRecord   := marches.map(_.events.illegal).reduce(_ || _) || direct.fold(false.B)(_.isIllegal)
+
+  /** One of the requests, one-hot, by round-robin, if one may go. */
+  private def grant(requests: UInt, mayGo: Bool): UInt = {
+    val arbiter = Module(new RoundRobin(config.array.rows)).io
+    arbiter.requests := requests
+    arbiter.isTaken  := mayGo
+    Mux(mayGo, arbiter.grant, 0.U)
+  }
 }

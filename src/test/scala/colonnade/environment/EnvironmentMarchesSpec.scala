@@ -118,55 +118,54 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  for ((rows, marches, directView, willing) <- Seq((3, 2, true, 0.02), (1, 1, false, 0.5)))
-    it should s"answer each request as the model does: $rows units, $marches marches, ${if (directView) "with"
-      else "without"} a pipeline" in {
-      val base   = TestConfigs.withEnvironment(TestConfigs.environment)
-      val config = base.copy(
-        array = base.array.copy(rows = rows),
-        units = base.units.copy(marches = marches, directView = directView)
-      )
-      test(new EnvironmentMarchesHarness(config)).withAnnotations(Simulation.verilator) { dut =>
-        val random   = new Random(rows)
-        val stimulus = new MarchStimulus(config, random)
-        val scene    = new EnvironmentScene(config, random)
-        val camera   = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
-        def nextRay  = if (random.nextInt(3) == 0) stimulus.fromCamera(camera) else stimulus.inRoom(camera)
-        dut.clock.setTimeout(0)
-        EnvironmentImage.load(dut.load, dut.clock, config, scene.words)
-        dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(camera.view.fields))
+  private val rows   = 3
+  private val base   = TestConfigs.withEnvironment(TestConfigs.environment)
+  private val config = base.copy(
+    array = base.array.copy(rows = rows),
+    units = base.units.copy(marches = 2, directView = true)
+  )
 
-        val units  = dut.rows.map(new Row(_, config, () => nextRay, random))
-        var cycles = 0
-        var steps  = BigInt(0)
-        while (units.map(_.answers.size).sum < 45) {
-          units.foreach(_.step(willing))
-          steps += dut.events.marchSteps.peekInt()
-          cycles += 1
-          assert(cycles < 60000, s"only ${units.map(_.answers.size)} answers")
-          dut.clock.step()
-        }
-        assert(units.forall(_.answers.size > 45 / rows / 2), "no unit starves")
-        assert(units.forall(_.mostInFlight > 2), "several contexts are under way at a time")
+  it should "answer each request of three units as the model does, in two marches and the pipeline" in
+    test(new EnvironmentMarchesHarness(config)).withAnnotations(Simulation.verilator) { dut =>
+      val random   = new Random(rows)
+      val stimulus = new MarchStimulus(config, random)
+      val scene    = new EnvironmentScene(config, random)
+      val camera   = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
+      def nextRay  = if (random.nextInt(3) == 0) stimulus.fromCamera(camera) else stimulus.inRoom(camera)
+      dut.clock.setTimeout(0)
+      EnvironmentImage.load(dut.load, dut.clock, config, scene.words)
+      dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(camera.view.fields))
 
-        val answers = units.flatMap(_.answers)
-        val words   = answers.map(answer => camera.view.words ++ answer.request.ray.words)
-        val models  = Model.attributes(config, scene.words, words, "march").map(MarchCase.answer.zip(_).toMap)
-        for ((Answer(request, surface, isVisible), expected) <- answers.zip(models)) {
-          val isHit = if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss
-          assert(surface.nonEmpty == isHit && isVisible == (request.isOcclusionTest && !isHit), s"of $request")
-          for (bits <- surface) {
-            val values = new Packed(new EnvironmentSurface(config)).unpack(bits)
-            val added  = Map(
-              "context" -> BigInt(request.ray.context),
-              "shadows" -> BigInt(if (request.isFresnelReflection) 0 else 1)
-            )
-            assert(values == (expected.filter(value => values.contains(value._1)) ++ added), s"of $request")
-          }
-        }
-        assert(steps >= models.map(_("steps")).sum, "steps are counted")
-        assert(answers.exists(_.isVisible) && answers.exists(a => a.request.isOcclusionTest && a.surface.nonEmpty))
-        assert(answers.exists(_.request.ray.isDirectView) && answers.exists(!_.request.ray.isDirectView))
+      val units  = dut.rows.map(new Row(_, config, () => nextRay, random))
+      var cycles = 0
+      var steps  = BigInt(0)
+      while (units.map(_.answers.size).sum < 45) {
+        units.foreach(_.step(willing = 0.02))
+        steps += dut.events.marchSteps.peekInt()
+        cycles += 1
+        assert(cycles < 60000, s"only ${units.map(_.answers.size)} answers")
+        dut.clock.step()
       }
+      assert(units.forall(_.answers.size > 45 / rows / 2), "no unit starves")
+      assert(units.forall(_.mostInFlight > 2), "several contexts are under way at a time")
+
+      val answers = units.flatMap(_.answers)
+      val words   = answers.map(answer => camera.view.words ++ answer.request.ray.words)
+      val models  = Model.attributes(config, scene.words, words, "march").map(MarchCase.answer.zip(_).toMap)
+      for ((Answer(request, surface, isVisible), expected) <- answers.zip(models)) {
+        val isHit = if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss
+        assert(surface.nonEmpty == isHit && isVisible == (request.isOcclusionTest && !isHit), s"of $request")
+        for (bits <- surface) {
+          val values = new Packed(new EnvironmentSurface(config)).unpack(bits)
+          val added  = Map(
+            "context" -> BigInt(request.ray.context),
+            "shadows" -> BigInt(if (request.isFresnelReflection) 0 else 1)
+          )
+          assert(values == (expected.filter(value => values.contains(value._1)) ++ added), s"of $request")
+        }
+      }
+      assert(steps >= models.map(_("steps")).sum, "steps are counted")
+      assert(answers.exists(_.isVisible) && answers.exists(a => a.request.isOcclusionTest && a.surface.nonEmpty))
+      assert(answers.exists(_.request.ray.isDirectView) && answers.exists(!_.request.ray.isDirectView))
     }
 }
