@@ -70,7 +70,7 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     assert simulated.frames[0].is_object.any()
 
 
-@pytest.mark.parametrize("precision", ["16b16s32d", "32b32s64d"])
+@pytest.mark.parametrize("precision", ["16b16s32d", pytest.param("24b24s64d", marks=pytest.mark.matrix), "32b32s64d"])
 def test_corner_colours_textures_and_emission_equal_the_model(precision: str) -> None:
     """Diffuse, mirroring and clear faces with textures or colours at their corners, and emissive faces with neither."""
     options = ("geometry.cornerColours=true", "geometry.textureBytes=16384", "frame.maxBounces=4", "array.rows=2")

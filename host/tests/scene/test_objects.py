@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,15 @@ def test_model_and_reference_show_the_same_objects(tmp_path: Path) -> None:
     assert np.mean(hits.numbers() != reference.hits().numbers()) < 0.01
     write_hits(tmp_path / "h.npz", hits)
     np.testing.assert_array_equal(read_hits(tmp_path / "h.npz").numbers(), hits.numbers())
+
+
+@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+def test_hardware_shows_the_objects_of_the_model(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(TWO)
+    request = RenderRequest(tmp_path / "a.toml", "small", backend="rtl", size=(96, 72))
+    rtl, model = render(request), render(dataclasses.replace(request, backend="model"))
+    np.testing.assert_array_equal(rtl.image, model.image)
+    np.testing.assert_array_equal(rtl.hits().numbers(), model.hits().numbers())
 
 
 def test_objects_without_a_place_stand_apart_on_level_surfaces(room: Environment) -> None:
