@@ -2,7 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chiseltest._
-import colonnade.{Simulation, TestConfigs}
+import colonnade.{Always, Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
 import org.scalatest.flatspec.AnyFlatSpec
@@ -26,7 +26,9 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
   behavior of "RaySetup"
 
   TestConfigs.formats.foreach { config =>
-    it should s"equal the model under random stalls, ${config.precision} with ${config.geometry.vertexBits}-bit vertices" in {
+    it should s"equal the model under random stalls, ${config.precision} with ${config.geometry.vertexBits}-bit vertices" taggedAs Always.ifExtreme(
+      config
+    ) in {
       test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
         val random = new Random(2)
         val cases  = new SetupStimulus(config, random).all(raysPerBox = 14)

@@ -2,7 +2,7 @@ package colonnade.traversal
 
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.{Packed, PackedStreams, PackedUnit, TestConfigs}
+import colonnade.{Always, Packed, PackedStreams, PackedUnit, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -20,7 +20,8 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     s"${config.precision}, arity ${config.geometry.arity}, ${config.units.boxLanes} lanes"
 
   for ((config, i) <- (TestConfigs.formats ++ (binary +: laneVariants)).zipWithIndex)
-    it should s"follow the model under random stalls, format $i (${shape(config)})" in
+    it should s"follow the model under random stalls, format $i (${shape(config)})" taggedAs
+      (if (i < TestConfigs.formats.size) Always.ifExtreme(config) else Always) in
       test(new PackedBoxUnit(config)) { dut =>
         val cases = new BoxStimulus(config, seed = 100 + i)
         compare(dut, config, cases.atBoundaries(20), offered = 1, accepted = 1)
