@@ -194,7 +194,14 @@ def manifest_json() -> dict[str, Any]:
 
 SMALL_ARRAY = {
     "array": {"rows": 2, "columns": 3, "contexts": 4},
-    "units": {"boxLanes": 2, "triangleLanes": 1, "marches": 0, "directView": False},
+    "units": {
+        "boxLanes": 2,
+        "triangleLanes": 1,
+        "marches": 0,
+        "directView": False,
+        "pathContexts": 0,
+        "pipelined": False,
+    },
     "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1, "cache": None},
 }
 

@@ -34,7 +34,9 @@ object ArbitraryConfig {
     triangleLanes <- Gen.chooseNum(1, 4)
     marches       <- Gen.chooseNum(0, 16)
     directView    <- if (marches == 0) Gen.const(false) else flag
-  } yield UnitsConfig(boxLanes, triangleLanes, marches, directView)
+    pathContexts  <- Gen.chooseNum(0, UnitsConfig.mostPathContexts)
+    pipelined     <- flag
+  } yield UnitsConfig(boxLanes, triangleLanes, marches, directView, pathContexts, pipelined)
 
   private val memory = for {
     depth         <- Gen.chooseNum(16, 1 << 22, 17, 1024, 1 << 17)

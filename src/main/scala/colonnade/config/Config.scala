@@ -74,16 +74,27 @@ final case class GeometryConfig(
   * @param triangleLanes parallel triangle units of four cycles per test
   * @param marches       environment marches that the render units of a column share; 0: one in every render unit
   * @param directView    with shared marches: a pipeline of the column for directly seen pixels of an environment
+  * @param pathContexts  pixels in flight in the path unit that a column has; 0: every render unit follows its own paths
+  * @param pipelined     ray set-up, shading, bounces and colours are pipelines, for a path unit that serves a column
   */
-final case class UnitsConfig(boxLanes: Int, triangleLanes: Int, marches: Int, directView: Boolean) {
+final case class UnitsConfig(
+    boxLanes:      Int,
+    triangleLanes: Int,
+    marches:       Int,
+    directView:    Boolean,
+    pathContexts:  Int,
+    pipelined:     Boolean
+) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
   Require.within("units.triangleLanes", triangleLanes, 1, 4)
   Require.within("units.marches", marches, 0, UnitsConfig.mostMarches)
   Require("units.directView", !directView || marches > 0, "needs shared marches, units.marches from 1 on")
+  Require.within("units.pathContexts", pathContexts, 0, UnitsConfig.mostPathContexts)
 }
 
 object UnitsConfig {
-  val mostMarches: Int = 16
+  val mostMarches:      Int = 16
+  val mostPathContexts: Int = 256
 }
 
 /** The memory that the render units of a column share.

@@ -53,7 +53,7 @@ object ConfigIO {
       "cornerColours",
       "textureBytes"
     )
-    val units  = root.section("units", "boxLanes", "triangleLanes", "marches", "directView")
+    val units = root.section("units", "boxLanes", "triangleLanes", "marches", "directView", "pathContexts", "pipelined")
     val memory = root.section(
       "columnBvhMemory",
       "depth",
@@ -98,7 +98,9 @@ object ConfigIO {
         boxLanes = units.int("boxLanes"),
         triangleLanes = units.int("triangleLanes"),
         marches = units.int("marches"),
-        directView = units.boolean("directView")
+        directView = units.boolean("directView"),
+        pathContexts = units.int("pathContexts"),
+        pipelined = units.boolean("pipelined")
       ),
       columnBvhMemory = ColumnBvhMemoryConfig(
         depth = memory.int("depth"),
@@ -174,7 +176,9 @@ object ConfigIO {
         "boxLanes"      -> units.boxLanes,
         "triangleLanes" -> units.triangleLanes,
         "marches"       -> units.marches,
-        "directView"    -> units.directView
+        "directView"    -> units.directView,
+        "pathContexts"  -> units.pathContexts,
+        "pipelined"     -> units.pipelined
       ),
       "columnBvhMemory" -> ujson.Obj(
         "depth"         -> columnBvhMemory.depth,
