@@ -1,0 +1,78 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{Decoupled, Valid}
+import colonnade.common.{Context, ReservedQueue}
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.formats.{Material, MaterialKind, RecordFormats, Vec3}
+
+/** A hit on a mirror or glass. */
+final class BounceHit(config: ColonnadeConfig) extends Bundle {
+  val context  = Context(config)
+  val material = UInt(RecordFormats.materialBits.W)
+  val backSide = Bool()
+}
+
+/** Components of vectors that are known early: the geometric normal, turned against the ray, and the ray's direction. */
+final class BounceDirections(config: ColonnadeConfig) extends Bundle {
+  val faceForwardNormal = SInt((NumberFormats.normalBits + 1).W)
+  val dir               = SInt((new ShaderFormats(config.numbers).shadeBits + 1).W)
+}
+
+/** Components of vectors that are known late: the reflection's origin and the shading normal; and what kind of normal it is. */
+final class BouncePoint(config: ColonnadeConfig) extends Bundle {
+  private val formats = new ShaderFormats(config.numbers)
+
+  val origin   = SInt(formats.pointBits.W)
+  val normal   = SInt(formats.narrowBits.W)
+  val isSmooth = Bool()
+}
+
+/** Ports of [[BounceQueue]]. */
+final class BounceQueueIO(config: ColonnadeConfig) extends Bundle {
+  val materials = Input(Vec(config.frame.materials, new Material(config)))
+
+  // Each only while there is space
+  val hit        = Flipped(Valid(new BounceHit(config)))
+  val directions = Vec(3, Flipped(Valid(new BounceDirections(config))))
+  val points     = Vec(3, Flipped(Valid(new BouncePoint(config))))
+
+  val job = Decoupled(new BounceJob(config))
+}
+
+/** Hits on mirrors and glass on their way from the [[ShadingPipeline]] to the bounce units, in order. */
+final class BounceQueue(config: ColonnadeConfig, places: Int) extends Module {
+  val io = IO(new BounceQueueIO(config))
+
+  private def queue[T <: Data](in: Valid[T]) = {
+    val queue = Module(new ReservedQueue(in.bits.cloneType, places)).io
+    queue.in := in
+    queue.out
+  }
+
+  private val hits       = queue(io.hit)
+  private val directions = io.directions.map(queue(_))
+  private val points     = io.points.map(queue(_))
+  private val all        = (hits +: directions) ++ points
+  io.job.valid := all.map(_.valid).reduce(_ && _)
+  all.foreach(_.ready := io.job.fire)
+
+  private val request  = io.job.bits.request
+  private val hit      = hits.bits
+  private val material = ShadingPipeline.material(config, io.materials, hit.material)
+  private val kind     = material.kind.get
+  request.context           := hit.context
+  request.origin            := vector(points.map(_.bits.origin))
+  request.normal            := vector(points.map(_.bits.normal))
+  request.isSmooth          := points.last.bits.isSmooth
+  request.faceForwardNormal := vector(directions.map(_.bits.faceForwardNormal))
+  request.dir               := vector(directions.map(_.bits.dir))
+  request.backSide          := hit.backSide
+  request.isGlass           := kind === MaterialKind.glass
+  request.eta               := Mux(hit.backSide, material.etaBack.get, material.etaFront.get)
+  request.reflectance       := material.reflectance.get
+  io.job.bits.albedo        := material.albedo
+  io.job.bits.isTinted      := !hit.backSide || kind === MaterialKind.mirror
+
+  private def vector(components: Seq[SInt]): Vec3[SInt] = Vec3.of[SInt](components(0), components(1), components(2))
+}
