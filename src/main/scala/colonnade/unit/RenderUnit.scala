@@ -26,8 +26,8 @@ final class RenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config)
   private val fetch       = Module(new FetchStage(config)).io
   private val intersector = Module(new Intersector(config)).io
   private val shader      = Module(new Shader(config)).io
-  private val shadowRays  = Module(new ShadowRays(config)).io
-  private val colourUnit  = Module(new ColourUnit(config)).io
+  private val shadowRays  = ShadowRays(config)
+  private val colourUnit  = ColourUnit(config)
   private val assembler   = Module(new PixelAssembler(config)).io
   private val bounces     = Option.when(config.frame.hasBounces)(Module(new BounceScheduler(config)).io)
   private val environment = Option.when(config.hasEnvironment)(Module(new EnvironmentPort(config)).io)
