@@ -52,8 +52,8 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
   private val primaryRays = Module(new PrimaryRays(config)).io
   private val raySetup    = Module(new RaySetup(config)).io
   private val shader      = Module(new Shader(config)).io
-  private val shadowRays  = Module(new ShadowRays(config)).io
-  private val colourUnit  = Module(new ColourUnit(config)).io
+  private val shadowRays  = ShadowRays(config)
+  private val colourUnit  = ColourUnit(config)
   private val assembler   = Module(new PixelAssembler(config)).io
   private val bounces     = Option.when(config.frame.hasBounces)(Module(new BounceScheduler(config)).io)
   private val environment = Option.when(config.hasEnvironment)(Module(new EnvironmentPort(config)).io)
