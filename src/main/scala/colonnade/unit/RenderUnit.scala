@@ -22,7 +22,7 @@ import colonnade.shading.{ColourUnit, LitSurface, Shader, ShadowRays}
 final class RenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config) {
   private val controller  = Module(new RtController(config)).io
   private val primaryRays = Module(new PrimaryRays(config)).io
-  private val raySetup    = Module(new RaySetup(config)).io
+  private val raySetup    = Module(RaySetup(config)).io
   private val fetch       = Module(new FetchStage(config)).io
   private val intersector = Module(new Intersector(config)).io
   private val shader      = Module(new Shader(config)).io
