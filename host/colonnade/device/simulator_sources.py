@@ -1,8 +1,8 @@
-"""Sources of a simulator: Verilator models of render unit, column and device, and their coupling.
+"""Sources of a simulator: Verilator models of unit, column and device, and their coupling.
 
-Verilator generates C++ for each instance of a module, about 170 MB for 80 render units. So render unit and column are
-separate models, and each instance is an object. An outer model is *opened*: its inner instances are removed, and
-variables replace their ports.
+The unit is the render unit, or the traversal unit if the columns have path units. Verilator generates C++ for each
+instance of a module, about 170 MB for 80 render units. So unit and column are separate models, and each instance is
+an object. An outer model is *opened*: its inner instances are removed, and variables replace their ports.
 
 One evaluation of each unit and a few of columns and device simulate a cycle exactly, by three properties of the RTL:
 
@@ -24,10 +24,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-UNIT, COLUMN, DEVICE = "RenderUnit", "Column", "Colonnade"
+#: Modules of which a column has one in each row; a design has one of them.
+UNITS = ("RenderUnit", "TraversalUnit")
+COLUMN, DEVICE = "Column", "Colonnade"
 
 #: The wrapper with registers at the unit's inputs.
-UNIT_MODEL = "RenderUnitModel"
+UNIT_MODEL = "UnitModel"
 
 #: Inputs of a unit that depend combinationally on its outputs or on the device's inputs.
 DIRECT = re.compile(r"reset|io_start|io_\w*_ready")
@@ -104,8 +106,8 @@ def module_ports(verilog: str, module: str) -> list[Port]:
     return [port for port in ports if port.name != "clock"]
 
 
-def unit_model(ports: Iterable[Port]) -> str:
-    """Verilog of `UNIT_MODEL`: the unit with a register at each input that is not direct."""
+def unit_model(unit: str, ports: Iterable[Port]) -> str:
+    """Verilog of `UNIT_MODEL`: the module `unit` with a register at each input that is not direct."""
     declarations, registers, connections = ["  input clock"], [], ["    .clock(clock)"]
     for port in ports:
         declarations.append(f"  {'input' if port.is_input else 'output'} {port.range}{port.name}")
@@ -115,7 +117,7 @@ def unit_model(ports: Iterable[Port]) -> str:
             registers.append(f"  reg {port.range}{source};\n  always @(edge clock) {source} <= {port.name};\n")
         connections.append(f"    .{port.name}({source})")
     header = f"module {UNIT_MODEL}(\n" + ",\n".join(declarations) + "\n);\n"
-    return header + "".join(registers) + f"  {UNIT} unit (\n" + ",\n".join(connections) + "\n  );\nendmodule\n"
+    return header + "".join(registers) + f"  {unit} unit (\n" + ",\n".join(connections) + "\n  );\nendmodule\n"
 
 
 @dataclass(frozen=True)
@@ -209,15 +211,16 @@ def write_sources(sources: Iterable[Path], folder: Path) -> dict[str, list[Path]
         The files of each model by top module: `UNIT_MODEL`, `COLUMN`, `DEVICE`.
     """
     verilog = {path.stem: both_edges(path.read_text()) for path in sources}
-    ports = {module: module_ports(verilog[module], module) for module in (UNIT, COLUMN)}
-    column = open_module(verilog[COLUMN], COLUMN, UNIT, ports[UNIT])
+    (unit,) = (module for module in UNITS if module in verilog)
+    ports = {module: module_ports(verilog[module], module) for module in (unit, COLUMN)}
+    column = open_module(verilog[COLUMN], COLUMN, unit, ports[unit])
     device = open_module(verilog[DEVICE], DEVICE, COLUMN, ports[COLUMN])
     header = "#pragma once\n" + record_banks(verilog.get("ColumnBvhMemory"))
-    (folder / "coupling.hpp").write_text(header + coupling(column, UNIT) + coupling(device, COLUMN))
+    (folder / "coupling.hpp").write_text(header + coupling(column, "Unit") + coupling(device, COLUMN))
     for module in verilog:
         if module.startswith("records_"):
             verilog[module] = _RECORDS_ARRAY.sub(r"\1 /*verilator public_flat_rw*/;", verilog[module])
-    verilog |= {UNIT_MODEL: unit_model(ports[UNIT]), COLUMN: column.verilog, DEVICE: device.verilog}
+    verilog |= {UNIT_MODEL: unit_model(unit, ports[unit]), COLUMN: column.verilog, DEVICE: device.verilog}
     return {top: list(_written(verilog, top, folder / top)) for top in (UNIT_MODEL, COLUMN, DEVICE)}
 
 

@@ -92,7 +92,7 @@ def test_registers_use_both_edges_of_any_clock() -> None:
 
 
 def test_the_units_model_registers_all_but_the_direct_inputs() -> None:
-    text = unit_model(module_ports(UNIT, "RenderUnit"))
+    text = unit_model("RenderUnit", module_ports(UNIT, "RenderUnit"))
     held = {line.split()[-1].rstrip(";") for line in text.splitlines() if line.startswith("  reg ")}
     assert held == {"held_io_registers_frame_unitShift", "held_io_positions_valid", "held_io_broadcasts_0_bits_record"}
     assert "    .io_positions_valid(held_io_positions_valid)" in text
@@ -116,9 +116,9 @@ def test_variables_replace_the_ports_of_removed_instances() -> None:
 
 def test_the_harness_gets_every_connected_port() -> None:
     opened = open_module(COLUMN, "Column", "RenderUnit", module_ports(UNIT, "RenderUnit"))
-    header = coupling(opened, "RenderUnit")
-    assert "#define RenderUnit_DIRECT(DO) DO(reset) DO(io_requests_ready)\n" in header
-    assert "#define RenderUnit_REGISTERS(DO) DO(io_registers_frame_unitShift)\n" in header
+    header = coupling(opened, "Unit")
+    assert "#define Unit_DIRECT(DO) DO(reset) DO(io_requests_ready)\n" in header
+    assert "#define Unit_REGISTERS(DO) DO(io_registers_frame_unitShift)\n" in header
     assert header.count("&root.Column__DOT__shared_io_broadcasts_0_bits_record") == 2
     assert "io_unused" not in header
 
@@ -143,7 +143,7 @@ def test_each_model_gets_its_modules(tmp_path: Path) -> None:
         (folder / f"{name}.sv").write_text(text)
     models = write_sources(sorted(folder.iterdir()), out)
     assert {top: [path.stem for path in paths] for top, paths in models.items()} == {
-        "RenderUnitModel": ["Recorder", "Queue1_Pixel", "RenderUnit", "RenderUnitModel"],
+        "UnitModel": ["Recorder", "Queue1_Pixel", "RenderUnit", "UnitModel"],
         "Column": ["Column", "ColumnBvhMemory", "records_64x320"],
         "Colonnade": ["Colonnade"],
     }

@@ -1,4 +1,4 @@
-// The device as coupled Verilator models of render unit, column and device.
+// The device as coupled Verilator models of unit, column and device.
 // simulator_sources.py, which writes coupling.hpp, explains the coupling and the properties of the RTL that it needs.
 #pragma once
 #include <cstdint>
@@ -12,7 +12,7 @@
 #include "VColonnade___024root.h"
 #include "VColumn.h"
 #include "VColumn___024root.h"
-#include "VRenderUnitModel.h"
+#include "VUnitModel.h"
 #include "coupling.hpp"
 #ifdef WAVEFORM
 #include "verilated_vcd_c.h"
@@ -31,9 +31,9 @@ public:
     Array() : columnVariables_(bindColumn(*device.rootp)) {
         for (std::size_t i = 0; i < columnVariables_.size(); ++i) {
             columns_.push_back(std::make_unique<VColumn>());
-            for (const RenderUnitVariables& variables : bindRenderUnit(*columns_.back()->rootp)) {
+            for (const UnitVariables& variables : bindUnit(*columns_.back()->rootp)) {
                 unitVariables_.push_back(variables);
-                units_.push_back(std::make_unique<VRenderUnitModel>());
+                units_.push_back(std::make_unique<VUnitModel>());
                 units_.back()->eval();
             }
             columns_.back()->eval();
@@ -49,9 +49,9 @@ public:
     void settle() {
         device.eval();
         for (std::size_t i = 0; i < units_.size(); ++i) {
-            const RenderUnitVariables& variables = unitVariables_[i];
-            const VRenderUnitModel& inner = *units_[i];
-            RenderUnit_OUTPUTS(OUTWARD)
+            const UnitVariables& variables = unitVariables_[i];
+            const VUnitModel& inner = *units_[i];
+            Unit_OUTPUTS(OUTWARD)
         }
         for (std::size_t i = 0; i < columns_.size(); ++i) {
             const ColumnVariables& variables = columnVariables_[i];
@@ -64,9 +64,9 @@ public:
         device.eval();
         intoColumns();
         for (std::size_t i = 0; i < units_.size(); ++i) {
-            const RenderUnitVariables& variables = unitVariables_[i];
-            VRenderUnitModel& inner = *units_[i];
-            RenderUnit_DIRECT(INWARD)
+            const UnitVariables& variables = unitVariables_[i];
+            VUnitModel& inner = *units_[i];
+            Unit_DIRECT(INWARD)
         }
     }
 
@@ -86,10 +86,10 @@ public:
     /// A clock edge of the units alone, to catch up with cycles of `outerCycle`.
     void unitsEdge(bool mayChangeRegisters) {
         for (std::size_t i = 0; i < units_.size(); ++i) {
-            const RenderUnitVariables& variables = unitVariables_[i];
-            VRenderUnitModel& inner = *units_[i];
-            RenderUnit_INPUTS(INWARD)
-            if (mayChangeRegisters) { RenderUnit_REGISTERS(INWARD) }
+            const UnitVariables& variables = unitVariables_[i];
+            VUnitModel& inner = *units_[i];
+            Unit_INPUTS(INWARD)
+            if (mayChangeRegisters) { Unit_REGISTERS(INWARD) }
             flip(inner);
         }
     }
@@ -107,10 +107,10 @@ public:
     /// Throws if another evaluation after `settle` changes a coupled port.
     void check() {
         for (std::size_t i = 0; i < units_.size(); ++i) {
-            const RenderUnitVariables& variables = unitVariables_[i];
-            VRenderUnitModel& inner = *units_[i];
+            const UnitVariables& variables = unitVariables_[i];
+            VUnitModel& inner = *units_[i];
             inner.eval();
-            RenderUnit_OUTPUTS(REQUIRE_EQUAL)
+            Unit_OUTPUTS(REQUIRE_EQUAL)
         }
         for (std::size_t i = 0; i < columns_.size(); ++i) {
             const ColumnVariables& variables = columnVariables_[i];
@@ -120,11 +120,11 @@ public:
             Column_REGISTERS(REQUIRE_EQUAL)
         }
         for (std::size_t i = 0; i < units_.size(); ++i) {
-            const RenderUnitVariables& variables = unitVariables_[i];
-            const VRenderUnitModel& inner = *units_[i];
-            RenderUnit_DIRECT(REQUIRE_EQUAL)
-            RenderUnit_INPUTS(REQUIRE_EQUAL)
-            RenderUnit_REGISTERS(REQUIRE_EQUAL)
+            const UnitVariables& variables = unitVariables_[i];
+            const VUnitModel& inner = *units_[i];
+            Unit_DIRECT(REQUIRE_EQUAL)
+            Unit_INPUTS(REQUIRE_EQUAL)
+            Unit_REGISTERS(REQUIRE_EQUAL)
         }
     }
 
@@ -182,9 +182,9 @@ private:
     }
 
     std::vector<std::unique_ptr<VColumn>> columns_;
-    std::vector<std::unique_ptr<VRenderUnitModel>> units_;
+    std::vector<std::unique_ptr<VUnitModel>> units_;
     std::vector<ColumnVariables> columnVariables_;
-    std::vector<RenderUnitVariables> unitVariables_;
+    std::vector<UnitVariables> unitVariables_;
 };
 
 #undef INWARD

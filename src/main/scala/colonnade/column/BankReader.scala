@@ -12,7 +12,7 @@ import colonnade.memory.{BankPort, Banks}
 final class BankReaderIO(config: ColonnadeConfig) extends Bundle {
 
   /** By row; ready only where valid is set. */
-  val requests = Vec(config.array.rows, Flipped(Decoupled(new RecordRequest(config))))
+  val requests = Vec(config.recordRequesters, Flipped(Decoupled(new RecordRequest(config))))
 
   /** The number of the bank; constant. */
   val bank      = Input(UInt(log2Ceil(config.columnBvhMemory.banks.max(2)).W))
@@ -30,7 +30,7 @@ final class BankReaderIO(config: ColonnadeConfig) extends Bundle {
 final class BankReader(config: ColonnadeConfig) extends Module {
   val io = IO(new BankReaderIO(config))
 
-  private val rows     = config.array.rows
+  private val rows     = config.recordRequesters
   private val arbiter  = Module(new RoundRobin(rows))
   private val inFlight = Module(new ReadList(config))
   private val asking   = arbiter.io.requests

@@ -1,8 +1,7 @@
 package colonnade.column
 
 import chisel3._
-import chisel3.experimental.hierarchy.{instantiable, public, Definition, Instance}
-import chisel3.experimental.noPrefix
+import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{Decoupled, PopCount, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributePort, ColumnEnvironment, EnvironmentMarches, TextureMemory}
@@ -71,20 +70,19 @@ final class Column(
 ) extends Module {
   @public val io = IO(new ColumnIO(config))
 
+  private val paths      = config.ofPaths
   private val hasCache   = config.columnBvhMemory.cache.nonEmpty
-  private val walker     = Module(new TileWalker(config))
+  private val walker     = Module(new TileWalker(paths))
   private val background = Module(new BackgroundWalker(config))
-  // A definition: the unit is elaborated once, not once per row. Without prefix the instances are RenderUnit, RenderUnit_1…
-  private val definition = Definition(renderUnit(config))
-  private val units      = Seq.fill(config.array.rows)(noPrefix(Instance(definition)).io)
+  private val units = if (config.hasPathUnit) ColumnUnits.sharing(config) else ColumnUnits.separate(config, renderUnit)
   private val controller = Module(new ColumnBvhController(config))
-  private val collector  = Module(new PixelCollector(config, config.array.rows + 1))
+  private val collector  = Module(new PixelCollector(config, paths.array.rows + 1))
 
   // Walk tiles: pixel positions for the units
   walker.io.frame  := io.registers.frame
   walker.io.window := EnvironmentWindow(config, io.registers)
   walker.io.tiles <> io.tiles
-  units.zip(walker.io.positions).foreach { case (unit, positions) => unit.positions <> positions }
+  units.positions.zip(walker.io.positions).foreach { case (unit, positions) => unit <> positions }
 
   // Tiles of the background, and pixels outside the object's outline, become finished pixels at once
   background.io.frame  := io.registers.frame
@@ -93,8 +91,8 @@ final class Column(
   background.io.others <> walker.io.others
 
   // Records: units send requests and receive all broadcasts
-  controller.io.requests.zip(units).foreach { case (requests, unit) => requests <> unit.requests }
-  units.foreach(_.broadcasts := controller.io.broadcasts)
+  controller.io.requests.zip(units.requests).foreach { case (requests, unit) => requests <> unit }
+  units.broadcasts.foreach(_ := controller.io.broadcasts)
 
   // The whole scene, or a cache of it
   private val memory = if (hasCache) None else Some(Module(new ColumnBvhMemory(config)))
@@ -116,38 +114,35 @@ final class Column(
   for (error <- io.memoryError) error := RegNext(caches.flatMap(_.error).reduce(_ || _), false.B)
 
   // Environment: units, or the marches that they share, read the column's own maps, or those that all columns share
-  private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(config)).io)
+  private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(paths)).io)
   for (maps <- environment) {
     maps.load := io.load
     maps.shared.zip(io.environment).foreach { case (shared, port) => port <> shared }
-    maps.ports.zip(units.flatMap(_.maps)).foreach { case (port, unit) => port <> unit }
+    maps.ports.zip(units.maps).foreach { case (port, unit) => port <> unit }
   }
-  private val marches = Option.when(config.sharesMarches)(Module(new EnvironmentMarches(config)).io)
+  private val marches = Option.when(config.sharesMarches)(Module(new EnvironmentMarches(paths)).io)
   for (shared <- marches; maps <- environment) {
     shared.view := io.registers.environment.get
-    shared.units.zip(units.flatMap(_.marches)).foreach { case (port, unit) => port :<>= unit }
+    shared.units.zip(units.marches).foreach { case (port, unit) => port :<>= unit }
     maps.ports.zip(shared.maps).foreach { case (port, march) => port <> march }
   }
 
   // Textures: units read the column's own copy
   for (layout <- config.geometry.texture) {
-    val memory = Module(new TextureMemory(config)).io
+    val memory = Module(new TextureMemory(paths)).io
     memory.load := io.load
-    memory.ports.zip(units.flatMap(_.texture)).foreach { case (port, unit) => port <> unit }
+    memory.ports.zip(units.texture).foreach { case (port, unit) => port <> unit }
   }
 
   // Collect finished pixels
-  collector.io.sources.zip(units.map(_.pixels) :+ background.io.pixels).foreach { case (source, pixels) =>
+  collector.io.sources.zip(units.pixels :+ background.io.pixels).foreach { case (source, pixels) =>
     source <> pixels
   }
   io.pixels <> collector.io.pixels
 
   // Registers
-  for ((unit, row) <- units.zipWithIndex) {
-    unit.row       := row.U
-    unit.registers := io.registers
-    unit.start     := io.start
-  }
+  units.registers.foreach(_ := io.registers)
+  units.starts.foreach(_ := io.start)
 
   // Progress: pixels that have started and not yet retired
   private val inFlight = RegInit(0.U((2 * config.numbers.coordinateBits).W))
@@ -157,13 +152,13 @@ final class Column(
 
   io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === retired.asUInt
   io.progress.isIdle    := RegNext(
-    units.map(_.isIdle).reduce(_ && _) && controller.io.isIdle && caches.map(_.isIdle).fold(true.B)(_ && _),
+    units.isIdle && controller.io.isIdle && caches.map(_.isIdle).fold(true.B)(_ && _),
     true.B
   )
   io.events := RegNext(EventSums.ofColumn(
     config,
     enters,
-    units.map(_.events),
+    units.events,
     controller.io.events,
     environment.map(_.events),
     marches.map(_.events)

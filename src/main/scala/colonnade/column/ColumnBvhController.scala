@@ -12,7 +12,7 @@ final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 
   /** By row; a request may be withdrawn until it is accepted. */
-  val requests = Vec(config.array.rows, Flipped(Decoupled(new RecordRequest(config))))
+  val requests = Vec(config.recordRequesters, Flipped(Decoupled(new RecordRequest(config))))
 
   /** By bank. */
   val broadcasts = Output(Vec(banks, Valid(new RecordBroadcast(config))))

@@ -9,7 +9,7 @@ import colonnade.memory.Banks
 /** A read in flight. */
 final class Read(config: ColonnadeConfig) extends Bundle {
   val address = new RecordRequest(config).address.cloneType
-  val row     = UInt(log2Ceil(config.array.rows.max(2)).W)
+  val row     = UInt(log2Ceil(config.recordRequesters.max(2)).W)
 }
 
 /** Ports of [[ReadList]]. */

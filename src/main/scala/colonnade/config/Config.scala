@@ -10,10 +10,14 @@ final case class ArrayConfig(rows: Int, columns: Int, contexts: Int) {
   Require.within("array.rows", rows, 1, ArrayConfig.mostRows)
   Require.within("array.columns", columns, 1, ArrayConfig.mostColumns)
   Require.product("array.rows", rows, "array.columns", columns, ArrayConfig.mostUnits)
-  Require.within("array.contexts", contexts, 1, 16)
+  Require.within("array.contexts", contexts, 1, UnitsConfig.mostPathContexts)
 }
 
 object ArrayConfig {
+
+  /** Maximum number of contexts of a render unit; a path unit may have more. */
+  val mostContexts: Int = 16
+
   val mostRows:    Int = 256
   val mostColumns: Int = 256
 
@@ -175,8 +179,25 @@ final case class ColonnadeConfig(
 
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
+  /** A path unit follows the paths of a column, and its render units are traversal units. */
+  val hasPathUnit: Boolean = units.pathContexts > 0
+
+  /** What the parts that follow a path see: the contexts of a column's path unit, or of a render unit. */
+  lazy val ofPaths: ColonnadeConfig =
+    if (hasPathUnit)
+      copy(array = array.copy(rows = 1, contexts = units.pathContexts), units = units.copy(pathContexts = 0))
+    else this
+
+  /** Requesters of a column's records: its rows, and the path unit for attributes. */
+  val recordRequesters: Int = array.rows + (if (hasPathUnit) 1 else 0)
+
   /** The device supports an environment. */
   val hasEnvironment: Boolean = physicalAttributeMemory.nonEmpty
+  Require(
+    "units.pathContexts",
+    !(hasPathUnit && hasEnvironment) || units.marches > 0,
+    "with an environment needs shared marches, units.marches from 1 on"
+  )
 
   /** The render units of a column share their environment marches. */
   val sharesMarches: Boolean = hasEnvironment && units.marches > 0

@@ -77,6 +77,7 @@ object ConfigIO {
       "emission"
     )
 
+    Require.within("array.contexts", array.int("contexts"), 1, ArrayConfig.mostContexts)
     ColonnadeConfig(
       array = ArrayConfig(
         rows = array.int("rows"),

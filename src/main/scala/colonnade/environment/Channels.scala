@@ -99,7 +99,7 @@ final class AttributePort(layout: AttributeLayout, tagBits: Int) extends Bundle 
 object AttributePort {
 
   /** Bits of a render unit's tag, which is a context. */
-  def tagBits(config: ColonnadeConfig): Int = log2Ceil(config.array.contexts.max(2))
+  def tagBits(config: ColonnadeConfig): Int = log2Ceil(config.ofPaths.array.contexts.max(2))
 
   /** The port of a column, for all of its marches. */
   def ofColumn(config: ColonnadeConfig): AttributePort =

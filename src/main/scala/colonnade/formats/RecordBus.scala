@@ -15,7 +15,7 @@ final class RecordBroadcast(config: ColonnadeConfig) extends Bundle {
   val record  = new RecordFormats(config).record
 
   /** The row that requested it. */
-  val row = UInt(log2Ceil(config.array.rows.max(2)).W)
+  val row = UInt(log2Ceil(config.recordRequesters.max(2)).W)
 
   /** With a cache: this is no record. The cache awaits it, and another broadcast will bring it. */
   val isLater = if (config.columnBvhMemory.cache.nonEmpty) Some(Bool()) else None

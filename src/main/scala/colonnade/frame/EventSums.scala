@@ -4,14 +4,14 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.MarchSums
-import colonnade.formats.{AttributeEvents, UnitEvents}
+import colonnade.formats.AttributeEvents
 
 /** Events of a column BVH controller in one cycle; names as in `Counters`. */
 final class ColumnBvhEvents(config: ColonnadeConfig) extends Bundle {
   val recordReads = UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)
 
   /** Requests that wait because the bank reads for another row. */
-  val bankConflicts = UInt(log2Ceil(config.array.rows + 1).W)
+  val bankConflicts = UInt(log2Ceil(config.recordRequesters + 1).W)
 
   /** Reads that a cache answers later. */
   val cacheMisses = config.columnBvhMemory.cache.map(_ => UInt(log2Ceil(config.columnBvhMemory.banks + 1).W))
@@ -23,7 +23,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
 
   private def sum(max: Int): UInt = UInt(log2Ceil(max + 1).W)
   private def perUnit             = sum(units)
-  private def perContext          = sum(units * config.array.contexts)
+  private def perContext          = sum(units * config.array.contexts + columns * config.units.pathContexts)
   private def perMarch            = sum(columns * config.mapRequesters)
   private def perEnvironment      = ifEnvironment(sum(columns))
 
@@ -41,7 +41,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val hits             = perUnit
   val recordReads      = sum(columns * config.columnBvhMemory.banks)
   val snoopHits        = perContext
-  val bankConflicts    = perUnit
+  val bankConflicts    = sum(columns * config.recordRequesters)
   val cacheMisses      = config.columnBvhMemory.cache.map(_ => sum(columns * config.columnBvhMemory.banks))
   val busyRaySetup     = perUnit
   val busyBoxUnit      = perUnit
@@ -81,7 +81,7 @@ object EventSums {
   def ofColumn(
       config:      ColonnadeConfig,
       raysPrimary: UInt,
-      units:       Seq[UnitEvents],
+      units:       Seq[Record],
       controller:  ColumnBvhEvents,
       environment: Option[AttributeEvents],
       marches:     Option[MarchSums]
@@ -95,7 +95,7 @@ object EventSums {
     for (events <- marches) {
       sums.marchSteps.get      := events.marchSteps
       sums.busyEnvironment.get := events.busyEnvironment
-      sums.illegalRecord       := units.map(_.illegalRecord).reduce(_ || _) || events.illegalRecord
+      sums.illegalRecord := tree(units.map(_.elements("illegalRecord").asUInt))(_ | _).asBool || events.illegalRecord
     }
     sums
   }
@@ -107,8 +107,8 @@ object EventSums {
   /** Sums the fields of all parts by name. */
   private def joined(result: EventSums, parts: Seq[Map[String, Data]]): EventSums = {
     val sums = Wire(result)
-    for ((name, sum) <- sums.elements if parts.head.contains(name)) {
-      val values = parts.map(_(name).asUInt)
+    for ((name, sum) <- sums.elements if parts.exists(_.contains(name))) {
+      val values = parts.flatMap(_.get(name)).map(_.asUInt)
       sum := (name match {
         case "deepestStack"                    => tree(values)((a, b) => Mux(a > b, a, b))
         case "stackOverflow" | "illegalRecord" => tree(values)(_ | _)

@@ -1,67 +1,33 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{Decoupled, Mux1H, RegEnable}
-import colonnade.common.{Dispatcher, RoundRobin}
+import chisel3.util.{PriorityEncoderOH, RRArbiter}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameRegisters, Rgb}
-import colonnade.numbers.Fixed
-import colonnade.ray.RayFormats
 
-/** A hit on a mirror or glass, and what the path has to know of its surface. */
-final class BounceJob(config: ColonnadeConfig) extends Bundle {
-  val request = new BounceRequest(config)
-  val albedo  = Rgb(FrameRegisters.colour)
+/** Several [[BounceUnit]]s behind the ports of one: docs/bounce.md. Results come in any order. */
+final class BouncePool(config: ColonnadeConfig) extends Module {
+  val io = IO(new BounceUnitIO(config))
 
-  /** See [[BouncedRay]]. */
-  val isTinted = Bool()
-}
+  private val units = Seq.fill(BouncePool.units)(Module(new BounceUnit(config)).io)
 
-/** Ports of [[BouncePool]]. */
-final class BouncePoolIO(config: ColonnadeConfig) extends Bundle {
-
-  /** The register `shading.offset`; constant while the pool is busy. */
-  val offset  = Input(UInt((config.numbers.gridBits - 2).W))
-  val job     = Flipped(Decoupled(new BounceJob(config)))
-  val bounced = Decoupled(new BouncedRay(config))
-}
-
-/** Bounce units side by side. A job goes to a unit that is free; the rays leave in any order, and one that is offered stays
-  * until it is taken.
-  */
-final class BouncePool(config: ColonnadeConfig, count: Int) extends Module {
-  private val scene = new RayFormats(config.numbers).scene
-
-  val io = IO(new BouncePoolIO(config))
-
-  private val dispatcher = Module(new Dispatcher(new BounceJob(config), count)).io
-  dispatcher.items :<>= io.job
-
-  private val results = dispatcher.takers.map { job =>
-    val unit = Module(new BounceUnit(config)).io
+  // The first idle unit takes a request
+  private val takes = PriorityEncoderOH(units.map(_.request.ready))
+  io.request.ready := units.map(_.request.ready).reduce(_ || _)
+  for ((unit, takes) <- units.zip(takes)) {
     unit.offset        := io.offset
-    unit.request.valid := job.valid
-    unit.request.bits  := job.bits.request
-    job.ready          := unit.request.ready
-    val ray = Wire(Decoupled(new BouncedRay(config)))
-    ray.valid         := unit.result.valid
-    ray.bits.bounce   := unit.result.bits
-    ray.bits.albedo   := RegEnable(job.bits.albedo, job.fire)
-    ray.bits.isTinted := RegEnable(job.bits.isTinted, job.fire)
-    for (origin <- ray.bits.fresnelOrigin; (to, from) <- origin.axes.zip(job.bits.request.origin.axes))
-      to := Fixed(scene, RegEnable(from, job.fire))
-    unit.result.ready := ray.ready
-    ray
+    unit.request.valid := io.request.valid && takes
+    unit.request.bits  := io.request.bits
   }
 
-  // The ray that was offered in the cycle before and not taken
-  private val waiting = RegInit(0.U(count.W))
-  private val turns   = Module(new RoundRobin(count)).io
-  private val grant   = Mux(waiting.orR, waiting, turns.grant)
-  turns.requests := VecInit(results.map(_.valid)).asUInt
-  turns.isTaken  := io.bounced.fire
-  waiting        := Mux(io.bounced.ready, 0.U, grant)
-  io.bounced.valid := turns.requests.orR
-  io.bounced.bits  := Mux1H(grant, results.map(_.bits))
-  results.zip(grant.asBools).foreach { case (ray, isGranted) => ray.ready := isGranted && io.bounced.ready }
+  // Results in turn
+  private val arbiter = Module(new RRArbiter(new BounceResult(config), units.size)).io
+  arbiter.in.zip(units).foreach { case (in, unit) => in :<>= unit.result }
+  io.result :<>= arbiter.out
+  io.busy := units.map(_.busy).reduce(_ || _)
+}
+
+object BouncePool {
+
+  /** A mirror every 8 cycles. */
+  val units: Int = 6
 }

@@ -234,6 +234,13 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     for (index <- 0 until 3) when(channel === index.U) { channels(index) := value }
 }
 
+object ColourUnit {
+
+  /** The ports of a new unit: with `units.pipelined` a [[ColourPipeline]]. */
+  def apply(config: ColonnadeConfig): ColourUnitIO =
+    if (config.units.pipelined) Module(new ColourPipeline(config)).io else Module(new ColourUnit(config)).io
+}
+
 /** The surface at which a path ends. */
 final private class TerminalSurface(config: ColonnadeConfig) extends Bundle {
   val albedo      = Rgb(FrameRegisters.colour)

@@ -20,7 +20,6 @@ import colonnade.numbers.Rounding
   * computed again for each light.
   */
 final class ShadingPipeline(config: ColonnadeConfig) extends Module {
-  require(!config.geometry.cornerColours, "units.pipelined needs geometry.cornerColours=false")
   import ShadingPipeline._
 
   private val numbers = config.numbers
@@ -129,7 +128,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   // Mirrors and glass
   private val bounces = io.bounced.map { bounced =>
     val queue    = Module(new BounceQueue(config, bouncePlaces)).io
-    val pool     = Module(new BouncePool(config, bounceUnits)).io
+    val pool     = Module(new BouncePool(config)).io
     val count    = RegInit(0.U(log2Ceil(bouncePlaces + 1).W))
     val isBounce = latch(1)(isActive && hit.isBounce)
     val atPoint  = latch(5)(isBounce.at(5))
@@ -150,9 +149,10 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
       component.bits.isSmooth := surface.isSmooth
     }
     pool.offset := io.shading.offset
-    pool.job :<>= queue.job
-    bounced :<>= pool.bounced
-    count     := count + (takes && entering.isBounce) - queue.job.fire
+    pool.request :<>= queue.request
+    queue.result :<>= pool.result
+    bounced :<>= queue.bounced
+    count     := count + (takes && entering.isBounce) - queue.request.fire
     mayBounce := !count(log2Ceil(bouncePlaces))
     count =/= 0.U
   }
@@ -200,8 +200,6 @@ object ShadingPipeline {
 
   /** Mirrors and glass between the entry and their unit. */
   val bouncePlaces: Int = 4
-
-  val bounceUnits: Int = 2
 
   /** Lights between the entry and the lit surface: what the stages hold and some, a power of two. */
   private def places(config: ColonnadeConfig): Int =

@@ -73,3 +73,10 @@ final class ShadowRays(config: ColonnadeConfig) extends Module {
   io.ray.bits.origin   := origin
   io.ray.bits.dir.axes.zip(dir).foreach { case (to, from) => to := from }
 }
+
+object ShadowRays {
+
+  /** The ports of a new unit: with `units.pipelined` a [[ShadowRaysPipeline]]. */
+  def apply(config: ColonnadeConfig): ShadowRaysIO =
+    if (config.units.pipelined) Module(new ShadowRaysPipeline(config)).io else Module(new ShadowRays(config)).io
+}

@@ -67,7 +67,7 @@ final class RecordFetchIO(config: ColonnadeConfig) extends Bundle {
 
   /** Invalidates all buffers: the memory may have changed. */
   val start = Input(Bool())
-  val row   = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
+  val row   = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
   val scene = Input(new SceneMap(RecordFormats.idBits(config)))
 
   /** A context has at most one request outstanding. */

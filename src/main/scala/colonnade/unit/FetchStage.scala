@@ -14,7 +14,7 @@ final class FetchStageIO(config: ColonnadeConfig) extends Bundle {
 
   /** Invalidates all record buffers. */
   val start      = Input(Bool())
-  val row        = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
+  val row        = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
   val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
   val requests   = Decoupled(new RecordRequest(config))
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))

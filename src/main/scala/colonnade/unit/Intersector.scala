@@ -25,6 +25,18 @@ final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
 
 object SurfaceHit {
   def hasDistance(config: ColonnadeConfig): Boolean = config.frame.hits || config.hasEnvironment
+
+  /** The distance of a hit at `t` of a ray that enters the object's box at `tEntry`, in whole units. */
+  def distance(config: ColonnadeConfig, tEntry: UInt, t: Fixed): UInt =
+    Rounding.floor(tEntry, -config.numbers.gridFraction) +& t.integer.asUInt
+
+  /** The record with the attributes of a triangle. */
+  def attributeAddress(config: ColonnadeConfig, scene: SceneMap, id: UInt): UInt = {
+    val slotBits = RecordFormats.faceSlotBits(config)
+    // With one face per record the sum may be too large: all ones is no legal address
+    if (slotBits == 0) Rounding.saturate(scene.attributeBase +& id, id.getWidth)
+    else scene.attributeBase + (id >> slotBits)
+  }
 }
 
 /** Events of [[Intersector]]; names as in `UnitEvents`. */
@@ -35,7 +47,6 @@ final class IntersectorEvents(config: ColonnadeConfig) extends Bundle {
   val nodeReads         = Bool()
   val boxTests          = UInt(log2Ceil(config.geometry.arity + 1).W)
   val triangleTests     = Bool()
-  val hits              = Bool()
   val busyBoxUnit       = Bool()
   val busyTriangleUnit  = UInt(log2Ceil(config.units.triangleLanes + 1).W)
   val contextsBox       = contextCount
@@ -147,19 +158,13 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   for (distance <- io.surfaceHit.bits.distance) {
     val entries = ContextTable(config, UInt(config.numbers.entryBits.W))
     when(io.entered.valid) { entries.write(ray.context, ray.tEntry.natural) }
-    val tEntry = entries.read(readHit, reads)
-    distance := Rounding.floor(tEntry, -config.numbers.gridFraction) +& closest.t.integer.asUInt
+    distance := SurfaceHit.distance(config, entries.read(readHit, reads), closest.t)
   }
   assert(!(hasSurface && control.measured.valid), "one hit is read in a cycle")
   io.fetches(2).valid        := io.surfaceHit.valid
   io.fetches(2).bits.context := closest.context
   io.fetches(2).bits.kind    := RecordKind.attributes
-  io.fetches(2).bits.address := {
-    val slotBits = RecordFormats.faceSlotBits(config)
-    // With one face per record the sum may be too large: all ones is no legal address
-    if (slotBits == 0) Rounding.saturate(io.scene.attributeBase +& closest.id, closest.id.getWidth)
-    else io.scene.attributeBase + (closest.id >> slotBits)
-  }
+  io.fetches(2).bits.address := SurfaceHit.attributeAddress(config, io.scene, closest.id)
 
   io.nodesReadyNext     := traversal.io.readyNext
   io.trianglesReadyNext := triangles.io.readyNext
@@ -171,7 +176,6 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   io.events.nodeReads         := io.nodes.fire
   io.events.boxTests          := traversal.io.boxTests
   io.events.triangleTests     := result.fire
-  io.events.hits              := io.surfaceHit.valid && io.surfaceHit.bits.isPrimary
   io.events.busyBoxUnit       := traversal.io.busy
   io.events.busyTriangleUnit  := triangles.io.busy
   io.events.contextsBox       := Occupancy(config, Seq(io.nodes.fire, traversal.io.resume.fire), Seq(step.fire))

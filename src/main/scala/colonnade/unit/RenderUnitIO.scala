@@ -10,7 +10,7 @@ import colonnade.shading.TexturePort
 
 /** Ports of a render unit. `registers` is constant while a frame runs; `start` precedes the first position. */
 final class RenderUnitIO(config: ColonnadeConfig) extends Bundle {
-  val row        = Input(UInt(log2Ceil(config.array.rows.max(2)).W))
+  val row        = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
   val registers  = Input(new FrameRegisters(config))
   val start      = Input(Bool())
   val positions  = Flipped(Decoupled(new UnitPosition(config)))

@@ -1,0 +1,79 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{log2Ceil, Cat, Decoupled, Valid}
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.numbers.Fixed
+
+/** Ports of [[ShadowRatios]].
+  *
+  * @param bits of the light that arrives at a surface, in one channel
+  */
+final class ShadowRatiosIO(config: ColonnadeConfig, bits: Int) extends Bundle {
+
+  /** A pixel claims the unit, only while it is not busy. Its channels follow, then its colour. */
+  val claim = Input(Bool())
+  val busy  = Output(Bool())
+
+  /** A channel, in the order 0, 1, 2; and its light without shadows, at least `part`. */
+  val load  = Flipped(Valid(new ShadowRatioRequest(bits)))
+  val whole = Input(UInt(bits.W))
+
+  /** Within 12 cycles after the last channel; its ratio is ignored. */
+  val colour = Flipped(Valid(new PathColour(config)))
+
+  /** The pixel with its ratio; the unit is busy until it is taken. */
+  val result = Decoupled(new PathColour(config))
+}
+
+/** Shadow ratios of one pixel at a time, beside the stream of [[ColourPipeline]]: three dividers, one quotient bit a cycle
+  * each. The result is offered 13 cycles after the last channel.
+  */
+final class ShadowRatios(config: ColonnadeConfig, bits: Int) extends Module {
+  private val fraction = NumberFormats.lightFraction
+
+  val io = IO(new ShadowRatiosIO(config, bits))
+
+  private val isBusy   = RegInit(false.B)
+  private val isLoaded = RegInit(false.B)
+  private val bitsLeft = Reg(UInt(log2Ceil(fraction + 1).W))
+  private val pixel    = Reg(new PathColour(config))
+  when(io.claim) { isBusy := true.B }.elsewhen(io.result.fire) { isBusy := false.B }
+  when(io.colour.valid) { pixel := io.colour.bits }
+
+  private val isLast = io.load.valid && io.load.bits.channel === 2.U
+  when(isLast) {
+    isLoaded := true.B
+    bitsLeft := fraction.U
+  }.elsewhen(io.result.fire) { isLoaded := false.B }
+  private val divides = isLoaded && bitsLeft =/= 0.U
+  when(divides) { bitsLeft := bitsLeft - 1.U }
+
+  private val ratios = Seq.tabulate(3) { channel =>
+    val whole     = Reg(UInt(bits.W))
+    val remainder = Reg(UInt(bits.W))
+    val ratio     = Reg(UInt((fraction + 1).W))
+
+    /** The ratio is one, and needs no division. */
+    val isOne = Reg(Bool())
+    val twice = remainder << 1
+    val fits  = twice >= whole
+    when(divides && !isOne) {
+      remainder := Mux(fits, twice - whole, twice)
+      ratio     := Cat(ratio(fraction - 1, 0), fits)
+    }
+    when(io.load.valid && io.load.bits.channel === channel.U) {
+      whole     := io.whole
+      remainder := io.load.bits.part
+      ratio     := Mux(io.load.bits.part === io.whole, (1 << fraction).U, 0.U)
+      isOne     := io.load.bits.part === io.whole
+    }
+    ratio
+  }
+
+  io.busy         := isBusy
+  io.result.valid := isLoaded && bitsLeft === 0.U
+  io.result.bits  := pixel
+  for (to <- io.result.bits.ratio)
+    to.channels.zip(ratios).foreach { case (to, ratio) => to := Fixed(to.format, ratio) }
+}

@@ -1,0 +1,112 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Decoupled, PriorityEncoder, Queue, Valid}
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+
+/** A hit whose attributes are wanted. */
+final class AttributeRequest(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config.ofPaths)
+  val address = UInt(RecordFormats.idBits(config).W)
+}
+
+/** The attributes of a hit. */
+final class AttributeResponse(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config.ofPaths)
+  val record  = new RecordFormats(config).record
+}
+
+/** Ports of [[AttributeFetch]]. */
+final class AttributeFetchIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Invalidates all record buffers. */
+  val start      = Input(Bool())
+  val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
+  val requests   = Decoupled(new RecordRequest(config))
+  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+
+  /** Never refused; at most one of a context at a time. */
+  val hits = Flipped(Valid(new AttributeRequest(config)))
+
+  /** A response is accepted in the next cycle. */
+  val readyNext = Input(Bool())
+
+  /** The context that gets its attributes in the next cycle. */
+  val grantNext = Output(Valid(Context(config.ofPaths)))
+  val response  = Output(Valid(new AttributeResponse(config)))
+
+  /** A context whose address is illegal. */
+  val error  = Output(Valid(Context(config.ofPaths)))
+  val events = Output(new FetchEvents(AttributeFetch.slotConfig(config)))
+}
+
+/** Fetches the attributes of hits for a path unit. Hits wait in a queue for one of the slots, which are the contexts of a
+  * [[RecordFetch]]; so as many records as there are slots may be awaited. Responses come in any order.
+  *
+  * @param config of the column
+  */
+final class AttributeFetch(config: ColonnadeConfig) extends Module {
+  val io = IO(new AttributeFetchIO(config))
+
+  private val slotConfig = AttributeFetch.slotConfig(config)
+  private val slots      = slotConfig.array.contexts
+  private val fetch      = Module(new RecordFetch(slotConfig)).io
+  private val isUsed     = RegInit(VecInit.fill(slots)(false.B))
+  private val owners     = Reg(Vec(slots, Context(config.ofPaths)))
+
+  fetch.start      := io.start
+  fetch.row        := config.array.rows.U
+  fetch.scene      := io.scene
+  fetch.broadcasts := io.broadcasts
+  fetch.readyNext  := VecInit(false.B, false.B, io.readyNext)
+  io.requests :<>= fetch.requests
+
+  // Queue hits for a slot; there are never more than contexts
+  private val waiting =
+    Module(new Queue(new AttributeRequest(config), config.ofPaths.array.contexts, useSyncReadMem = true))
+  waiting.io.enq.valid := io.hits.valid
+  waiting.io.enq.bits  := io.hits.bits
+  assert(!io.hits.valid || waiting.io.enq.ready, "more hits than contexts")
+
+  private val hit  = waiting.io.deq
+  private val free = PriorityEncoder(isUsed.map(!_))
+  hit.ready := !isUsed.asUInt.andR
+  fetch.fetches.foreach(_ := 0.U.asTypeOf(fetch.fetches.head))
+  fetch.fetches.head.valid        := hit.fire
+  fetch.fetches.head.bits.context := free
+  fetch.fetches.head.bits.kind    := RecordKind.attributes
+  fetch.fetches.head.bits.address := hit.bits.address
+  when(hit.fire) {
+    isUsed(free) := true.B
+    owners(free) := hit.bits.context
+  }
+
+  // Responses free their slots
+  private val response = fetch.response
+  io.grantNext.valid       := fetch.grantNext.valid
+  io.grantNext.bits        := owners(fetch.grantNext.bits)
+  io.response.valid        := response.valid
+  io.response.bits.context := owners(response.bits.context)
+  io.response.bits.record  := response.bits.record
+  io.error.valid           := fetch.error.valid
+  io.error.bits            := owners(fetch.error.bits.context)
+  when(response.valid) { isUsed(response.bits.context) := false.B }
+  when(fetch.error.valid) { isUsed(fetch.error.bits.context) := false.B }
+
+  io.events.waitRecord    := fetch.stalledContexts
+  io.events.waitUnit      := fetch.readyContexts
+  io.events.snoopHits     := fetch.snoopHits
+  io.events.illegalRecord := fetch.error.valid
+}
+
+object AttributeFetch {
+
+  /** Hits whose attributes are awaited at a time. */
+  val slots: Int = 16
+
+  /** A configuration whose contexts are the slots. */
+  def slotConfig(config: ColonnadeConfig): ColonnadeConfig =
+    config.copy(array = config.array.copy(contexts = slots.min(config.units.pathContexts)))
+}

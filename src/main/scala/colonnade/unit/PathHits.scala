@@ -1,0 +1,136 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Decoupled, RegEnable, Valid}
+import colonnade.common.ContextTable
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.numbers.Fixed
+import colonnade.ray.{PreparedRay, RayFormats, TriangleRay}
+import colonnade.shading.Occlusion
+import colonnade.traversal.TriangleHit
+
+/** Ports of [[PathHits]]. */
+final class PathHitsIO(config: ColonnadeConfig) extends Bundle {
+  val start = Input(Bool())
+  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
+
+  /** To the path unit. */
+  val trace = Flipped(new TracePort(config.ofPaths))
+
+  /** Rays that enter the object's box, to the traversal units; what they have met. */
+  val rays    = Decoupled(new PreparedRay(config.ofPaths))
+  val results = Flipped(Valid(new TraceResult(config.ofPaths)))
+
+  /** To the column's records, for attributes. */
+  val requests   = Decoupled(new RecordRequest(config))
+  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+  val events     = Output(new FetchEvents(AttributeFetch.slotConfig(config)))
+}
+
+/** Stands between a path unit and the traversal units that trace its rays: forwards rays, keeps the hit of each context,
+  * and joins a hit that is to be shaded with its ray and its attributes.
+  *
+  * @param config of the column
+  */
+final class PathHits(config: ColonnadeConfig) extends Module {
+  private val paths = config.ofPaths
+
+  val io = IO(new PathHitsIO(config))
+
+  private val trace      = io.trace
+  private val control    = trace.control
+  private val attributes = Module(new AttributeFetch(config)).io
+
+  // Forward a ray, or end its trace at once if it misses the object's box
+  private val ray = trace.rays.bits
+  io.rays.valid         := trace.rays.valid && ray.enters
+  io.rays.bits          := ray
+  trace.rays.ready      := !ray.enters || io.rays.ready
+  control.entered.valid := io.rays.fire
+  control.entered.bits  := ray.context
+  private val misses = trace.rays.valid && !ray.enters
+
+  // Results
+  private val result     = io.results.bits
+  private val hasHit     = Reg(Vec(paths.array.contexts, Bool()))
+  private val occlusions = Reg(Vec(paths.array.contexts, Occlusion()))
+  when(misses) {
+    hasHit(ray.context)     := false.B
+    occlusions(ray.context) := Occlusion.none
+  }
+  when(io.results.valid) {
+    hasHit(result.context)     := result.hasHit
+    occlusions(result.context) := result.occlusion
+  }
+  control.hasHit     := hasHit
+  control.occlusions := occlusions
+  control.ended.foreach(_ := 0.U.asTypeOf(control.ended.head))
+  control.ended(0).valid := misses
+  control.ended(0).bits  := ray.context
+  control.ended(1).valid := io.results.valid
+  control.ended(1).bits  := result.context
+
+  // Tables: what the resolution of a hit reads, and what its shading reads
+  private val closest = ContextTable(paths, new ClosestHit(config))
+  private val hits    = ContextTable(paths, new TriangleHit(config))
+  private val rays    = ContextTable(paths, new TriangleRay(config.numbers))
+  when(io.rays.fire) { rays.write(ray.context, ray.ray.forTriangles) }
+  when(io.results.valid && result.hasHit) {
+    val entry = Wire(new ClosestHit(config))
+    entry.id := result.hit.id
+    entry.t  := result.hit.t
+    closest.write(result.context, entry)
+    hits.write(result.context, result.hit)
+  }
+
+  // A hit with a surface to shade, or whose distance is measured
+  private val resolved = control.resolved.bits
+  private val reads    = control.shades || control.measured.valid
+  private val readHit  = Mux(control.measured.valid, control.measured.bits, resolved)
+  private val hit      = closest.read(readHit, reads)
+  private val context  = RegEnable(readHit, reads)
+  trace.hasSurface.valid          := control.shades
+  trace.hasSurface.bits           := resolved
+  trace.surfaceHit.valid          := RegNext(control.shades, false.B)
+  trace.surfaceHit.bits.context   := context
+  trace.surfaceHit.bits.isPrimary := RegNext(control.isPrimary(resolved))
+  trace.surfaceHit.bits.id        := hit.id
+  trace.surfaceHit.bits.t         := hit.t
+  for (distance <- trace.surfaceHit.bits.distance) {
+    val entries = ContextTable(paths, UInt(config.numbers.entryBits.W))
+    when(io.rays.fire) { entries.write(ray.context, ray.tEntry.natural) }
+    distance := SurfaceHit.distance(config, entries.read(readHit, reads), hit.t)
+  }
+  assert(!(control.shades && control.measured.valid), "one hit is read in a cycle")
+
+  // Its attributes
+  attributes.start      := io.start
+  attributes.scene      := io.scene
+  attributes.broadcasts := io.broadcasts
+  io.requests :<>= attributes.requests
+  attributes.hits.valid        := trace.surfaceHit.valid
+  attributes.hits.bits.context := context
+  attributes.hits.bits.address := SurfaceHit.attributeAddress(config, io.scene, hit.id)
+  attributes.readyNext         := trace.hitsReadyNext
+  trace.attributeError         := attributes.error
+  private val granted  = attributes.grantNext
+  private val shaded   = hits.read(granted.bits, granted.valid)
+  private val response = attributes.response
+  private val faces    = new RecordFormats(config).asAttributes(response.bits.record).faces
+  private val slotBits = RecordFormats.faceSlotBits(config)
+  trace.hits.valid        := response.valid
+  trace.hits.bits.context := response.bits.context
+  trace.hits.bits.ray     := rays.read(granted.bits, granted.valid)
+  trace.hits.bits.hit     := shaded
+  trace.hits.bits.face    := (if (slotBits == 0) faces.head else faces(shaded.id(slotBits - 1, 0)))
+  assert(!trace.hits.valid || trace.hits.ready, "the shader does not accept its hit")
+
+  io.events := attributes.events
+}
+
+/** What the resolution of a hit needs. */
+private final class ClosestHit(config: ColonnadeConfig) extends Bundle {
+  val id = UInt(RecordFormats.idBits(config).W)
+  val t  = new Fixed(new RayFormats(config.numbers).grid)
+}

@@ -1,0 +1,142 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Arbiter, Decoupled, Valid}
+import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.environment.{AttributePort, MarchPort}
+import colonnade.formats.{FrameRegisters, Pixel, UnitPosition}
+import colonnade.ray.{RayRequest, RaySetup}
+import colonnade.shading.{ColourUnit, LitSurface, Shader, ShadowRays, TexturePort}
+
+/** Ports of [[PathUnit]]. `registers` is constant while a frame runs. */
+final class PathUnitIO(config: ColonnadeConfig) extends Bundle {
+  val registers = Input(new FrameRegisters(config))
+  val positions = Flipped(Decoupled(new UnitPosition(config)))
+  val pixels    = Decoupled(new Pixel(config))
+  val trace     = new TracePort(config)
+
+  /** To the maps of the environment, for a march of its own; or to the marches of the column. */
+  val maps = Option.when(config.hasEnvironment && !config.sharesMarches)(
+    new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
+  )
+  val marches = Option.when(config.sharesMarches)(new MarchPort(config))
+
+  /** To the textures. */
+  val texture = config.geometry.texture.map(_ => new TexturePort(config))
+
+  /** No pixel is in flight. */
+  val isIdle = Output(Bool())
+  val events = Output(new PathEvents(config))
+}
+
+/** Follows the path of each pixel in flight, one per context: {{{
+  *
+  * positions ─▶ PrimaryRays ─▶ RaySetup ─▶ trace: rays
+  *                               ▲   ▲
+  *                 bounced rays  │   │ shadow rays
+  *              BounceScheduler ─┘   └─ ShadowRays ◀──────── Shader ◀─ trace: hits with attributes
+  *                     └──────────────┬──────────────────────┘  ▲
+  *                                    ▼                         └─ EnvironmentPort ◀─▶ column (maps)
+  *                                ColourUnit ─▶ PixelAssembler ─▶ pixels
+  * }}}
+  * RtController holds the state of every context and issues it to its next stage. Pixels leave in any order; their order
+  * depends on timing, their values do not.
+  *
+  * @param config of the paths, see [[ColonnadeConfig.ofPaths]]
+  */
+final class PathUnit(config: ColonnadeConfig) extends Module {
+  val io = IO(new PathUnitIO(config))
+
+  private val trace       = io.trace
+  private val controller  = Module(new RtController(config)).io
+  private val primaryRays = Module(new PrimaryRays(config)).io
+  private val raySetup    = Module(RaySetup(config)).io
+  private val shader      = Shader(config)
+  private val shadowRays  = ShadowRays(config)
+  private val colourUnit  = ColourUnit(config)
+  private val assembler   = Module(new PixelAssembler(config)).io
+  private val bounces     = Option.when(config.frame.hasBounces)(Module(new BounceScheduler(config)).io)
+  private val environment = Option.when(config.hasEnvironment)(Module(new EnvironmentPort(config)).io)
+
+  // From a position to a prepared ray; rays whose pixels are closer to their end have priority
+  primaryRays.positions :<>= io.positions
+  private val tracedPrimary = environment.map(_.objectRays).getOrElse(primaryRays.ray)
+  private val raySources    = Seq(shadowRays.ray) ++ bounces.map(_.ray) :+ tracedPrimary
+  private val rayArbiter    = Module(new Arbiter(new RayRequest(config), raySources.size)).io
+  rayArbiter.in.zip(raySources).foreach { case (in, rays) => in :<>= rays }
+  raySetup.request :<>= rayArbiter.out
+  trace.rays :<>= raySetup.ray
+
+  // Shading: a lit surface ends its path, after a shadow ray to each light; a mirror or glass continues it
+  private val lit = Wire(Valid(new LitSurface(config)))
+  shader.request :<>= trace.hits
+  trace.hitsReadyNext := shader.readyNext
+  shader.lit.ready    := true.B
+  lit.valid           := shader.lit.valid
+  lit.bits            := shader.lit.bits
+  io.texture.zip(shader.texture).foreach { case (port, requests) => port <> requests }
+  shadowRays.req :<>= controller.shadow
+  shadowRays.surface := lit
+  for (bounces <- bounces) {
+    bounces.in :<>= shader.bounced.get
+    colourUnit.bounce.get :<>= bounces.update
+  }
+
+  // Rays that miss the object, or whose hit may be hidden, march through the environment
+  for (environment <- environment) {
+    environment.primary :<>= primaryRays.ray
+    environment.pixel       := primaryRays.pixel
+    environment.meetsObject := primaryRays.meetsObject
+    environment.hitDistance := trace.surfaceHit.bits.distance.get
+    for (bounces <- bounces) environment.bounces.get :<>= bounces.environment.get
+    shader.environment.get :<>= environment.surfaces
+    io.maps.zip(environment.maps).foreach { case (port, maps) => port <> maps }
+    io.marches.zip(environment.marches).foreach { case (port, marches) => port :<>= marches }
+  }
+
+  // From a path to a pixel
+  colourUnit.end :<>= controller.end
+  colourUnit.surface   := lit
+  assembler.allocated  := primaryRays.allocated
+  assembler.hasSurface := trace.hasSurface
+  assembler.surfaceHit := trace.surfaceHit
+  assembler.colour     := colourUnit.colour
+  io.pixels :<>= assembler.pixels
+
+  // Control: the state of every context
+  controller.allocation :<>= primaryRays.control
+  controller.trace :<>= trace.control
+  controller.pixel :<>= assembler.control
+  controller.shaded.valid                := lit.valid
+  controller.shaded.bits.context         := lit.bits.context
+  controller.shaded.bits.needsShadowRays := lit.bits.needsShadowRays
+  controller.bounced                     := bounces.map(_.bounced).getOrElse(0.U.asTypeOf(controller.bounced))
+  controller.fetchFailed                 := trace.attributeError
+  controller.accumulated.valid           := colourUnit.colour.valid
+  controller.accumulated.bits            := colourUnit.colour.bits.context
+  colourUnit.start                       := primaryRays.start
+  bounces.foreach(_.start := primaryRays.start)
+  environment.foreach(_.control :<>= controller.environment.get)
+  io.isIdle := controller.idleCount === config.array.contexts.U && assembler.isIdle
+  io.events :=
+    PathCounters(config, controller, raySetup, trace, shader, shadowRays, bounces, environment)
+
+  // Registers
+  private val registers = io.registers
+  private val unitShift = registers.frame.unitShift
+  primaryRays.camera.camera    := registers.camera
+  primaryRays.camera.unitShift := unitShift
+  raySetup.bounds              := registers.bounds
+  shader.lights                := registers.lights
+  shader.unitShift             := unitShift
+  shader.shading               := registers.shading
+  shader.materials             := registers.materials
+  shadowRays.lights            := registers.lights
+  shadowRays.unitShift         := unitShift
+  colourUnit.ambient           := registers.ambient
+  colourUnit.background        := registers.background
+  colourUnit.shading           := registers.shading
+  assembler.background         := registers.background
+  bounces.foreach(_.shading := registers.shading)
+  environment.foreach(_.view := registers.environment.get)
+}

@@ -1,0 +1,43 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Decoupled, Valid}
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+import colonnade.ray.PreparedRay
+import colonnade.shading.{Occlusion, ShadeRequest}
+import colonnade.traversal.TriangleHit
+
+/** From rays to hits with their attributes, seen from the unit that follows the paths. */
+final class TracePort(config: ColonnadeConfig) extends Bundle {
+  val rays    = Decoupled(new PreparedRay(config))
+  val control = Flipped(new TraceControl(config))
+
+  /** A resolved context whose ray has a surface to shade; one cycle later its hit. After `control.measured`, the hit's
+    * distance comes in the same way.
+    */
+  val hasSurface = Flipped(Valid(Context(config)))
+  val surfaceHit = Flipped(Valid(new SurfaceHit(config)))
+
+  /** Hits to shade; they come only after a cycle with `hitsReadyNext`. */
+  val hits          = Flipped(Decoupled(new ShadeRequest(config)))
+  val hitsReadyNext = Output(Bool())
+
+  /** A hit whose attributes have an illegal address. */
+  val attributeError = Flipped(Valid(Context(config)))
+}
+
+/** What a ray has met, from a traversal unit.
+  *
+  * @param config of the paths, see [[ColonnadeConfig.ofPaths]]
+  */
+final class TraceResult(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val hasHit  = Bool()
+
+  /** Of a shadow ray. */
+  val occlusion = Occlusion()
+
+  /** If `hasHit`, and the ray is no shadow ray. */
+  val hit = new TriangleHit(config)
+}

@@ -1,0 +1,109 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.experimental.hierarchy.{instantiable, public}
+import chisel3.util.{log2Ceil, Decoupled, PriorityEncoder, Queue, RegEnable, Valid}
+import colonnade.common.Context
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap, UnitEvents}
+import colonnade.ray.PreparedRay
+
+/** Ports of [[TraversalUnit]]. `scene` is constant while a frame runs; `start` precedes the first ray. */
+final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
+  val row        = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
+  val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
+  val start      = Input(Bool())
+  val requests   = Decoupled(new RecordRequest(config))
+  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+
+  /** A ray that enters the object's box, with the context of its path; only in a cycle with `isFree`. */
+  val rays   = Flipped(Valid(new PreparedRay(config.ofPaths)))
+  val isFree = Output(Bool())
+
+  /** In any order. */
+  val results = Decoupled(new TraceResult(config.ofPaths))
+  val events  = Output(new UnitEvents(config))
+}
+
+/** Traces rays for a path unit: {{{
+  * rays ─▶ Intersector ◀─▶ FetchStage ◀─▶ column (requests, broadcasts)
+  *              └─▶ results
+  * }}}
+  * A ray takes an idle context, and leaves it when its result enters the queue of one result. The context that ended and
+  * has the lowest number goes first; a result every other cycle. There are only as many rays as contexts, and each one
+  * ends, so a unit becomes free as long as `results` are taken.
+  */
+@instantiable
+final class TraversalUnit(config: ColonnadeConfig) extends Module {
+  @public val io: TraversalUnitIO = IO(new TraversalUnitIO(config))
+
+  private val contexts    = config.array.contexts
+  private val fetch       = Module(new FetchStage(config)).io
+  private val intersector = Module(new Intersector(config)).io
+  private val control     = intersector.control
+
+  private val isUsed   = RegInit(VecInit.fill(contexts)(false.B))
+  private val hasEnded = RegInit(VecInit.fill(contexts)(false.B))
+  private val isShadow = Reg(Vec(contexts, Bool()))
+
+  /** The context of the path whose ray a context traces. */
+  private val owners = Reg(Vec(contexts, Context(config.ofPaths)))
+
+  // Allocate a context
+  private val free = PriorityEncoder(isUsed.map(!_))
+  io.isFree                     := !isUsed.asUInt.andR
+  intersector.rays.valid        := io.rays.valid
+  intersector.rays.bits         := io.rays.bits
+  intersector.rays.bits.context := free
+  intersector.rays.bits.enters  := true.B
+  when(io.rays.valid) {
+    isUsed(free)   := true.B
+    owners(free)   := io.rays.bits.context
+    isShadow(free) := io.rays.bits.isShadow
+  }
+  assert(!io.rays.valid || io.isFree, "a ray comes to a traversal unit without an idle context")
+
+  // Trace
+  io.requests :<>= fetch.requests
+  fetch.broadcasts := io.broadcasts
+  fetch.ray        := intersector.entered
+  fetch.fetches    := intersector.fetches
+  fetch.readyNext  := VecInit(intersector.nodesReadyNext, intersector.trianglesReadyNext, false.B)
+  intersector.nodes :<>= fetch.nodes
+  intersector.triangles :<>= fetch.triangles
+  intersector.fetchError := fetch.traversalError
+  fetch.hits.ready       := false.B
+  fetch.closestHit.hit   := DontCare
+  fetch.start            := io.start
+  fetch.row              := io.row
+  fetch.scene            := io.scene
+  intersector.start      := io.start
+  intersector.scene      := io.scene
+  control.isShadow       := isShadow
+  control.isPrimary      := VecInit.fill(contexts)(false.B)
+  control.resolved       := 0.U.asTypeOf(control.resolved)
+  control.measured       := 0.U.asTypeOf(control.measured)
+  control.shades         := false.B
+  control.ended.foreach(ended => when(ended.valid) { hasEnded(ended.bits) := true.B })
+
+  // Results: the hit's details are read in one cycle, and the result leaves in the next
+  private val result = Wire(Decoupled(new TraceResult(config.ofPaths)))
+  private val queue  = Module(new Queue(new TraceResult(config.ofPaths), 1))
+  private val ended  = PriorityEncoder(hasEnded)
+  private val reads  = hasEnded.asUInt.orR && queue.io.enq.ready && !result.valid
+  private val reader = RegEnable(ended, reads)
+  when(reads) { hasEnded(ended) := false.B }
+  when(result.valid) { isUsed(reader) := false.B }
+  intersector.closestHit.grantNext.valid := reads
+  intersector.closestHit.grantNext.bits  := ended
+  intersector.closestHit.context         := reader
+  result.valid                           := RegNext(reads, false.B)
+  result.bits.context                    := owners(reader)
+  result.bits.hasHit                     := control.hasHit(reader)
+  result.bits.occlusion                  := control.occlusions(reader)
+  result.bits.hit                        := intersector.closestHit.hit
+  queue.io.enq :<>= result
+  io.results :<>= queue.io.deq
+
+  io.events := UnitCounters(config, None, intersector, fetch)
+}

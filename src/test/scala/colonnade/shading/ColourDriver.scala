@@ -1,0 +1,151 @@
+package colonnade.shading
+
+import chisel3._
+import chiseltest._
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.Rgb
+import colonnade.numbers.Fixed
+import colonnade.numbers.FixedPorts._
+
+import scala.collection.mutable
+import scala.util.Random
+
+/** What happens to a context, in this order: a path starts, bounces and ends. */
+sealed trait ColourEvent
+
+object ColourEvent {
+  case object Start                                                                               extends ColourEvent
+  final case class Remember(what: LitColours)                                                     extends ColourEvent
+  final case class Bounce(albedo: Seq[Int], isTinted: Boolean, fresnel: Int, hasSurface: Boolean) extends ColourEvent
+
+  /** @param occlusions by light, 0: none, 1: transmissive, 2: opaque */
+  final case class End(isBackground: Boolean, occlusions: Seq[Int], isDirectView: Boolean) extends ColourEvent
+}
+
+/** A surface: albedo, direct light of each light, emission. */
+final case class LitColours(albedo: Seq[Int], direct: Seq[Seq[Int]], emission: Seq[Int])
+
+/** Random paths. */
+final class ColourScript(config: ColonnadeConfig, random: Random) {
+  import ColourEvent._
+
+  private val one = 4096
+
+  private def xyz(value: => Int): Seq[Int] = Seq.fill(3)(value)
+
+  private def colour(): Seq[Int] =
+    xyz(if (random.nextInt(4) == 0) random.nextInt(2) * 4095 else random.nextInt(4096))
+
+  private def intensity(): Seq[Int] =
+    xyz(if (random.nextInt(6) == 0) 65535 else random.nextInt(6) * random.nextInt(1800))
+
+  /** Ambient light, background, transmittance for shadow rays. */
+  def registers(): (Seq[Int], Seq[Int], Int) =
+    (if (random.nextBoolean()) intensity() else xyz(0), colour(), random.nextInt(one + 1))
+
+  def surface(): LitColours =
+    LitColours(colour(), Seq.fill(config.frame.lights)(intensity()), if (random.nextBoolean()) colour() else xyz(0))
+
+  def path(): Seq[ColourEvent] = {
+    val bounces = if (config.frame.hasBounces) random.nextInt(4) else 0
+    Start +: Seq.fill(bounces)(bounce()).flatten ++: end()
+  }
+
+  private def bounce(): Seq[ColourEvent] = {
+    val hasSurface = config.hasEnvironment && random.nextBoolean()
+    val fresnel    = if (random.nextBoolean()) 0 else random.nextInt(one + 1)
+    Seq(Remember(surface())).filter(_ => hasSurface) :+ Bounce(colour(), random.nextBoolean(), fresnel, hasSurface)
+  }
+
+  private def end(): Seq[ColourEvent] = {
+    val kinds      = if (config.frame.hasBounces) 3 else 2
+    val occlusions = Seq.fill(config.frame.lights)(if (random.nextBoolean()) 0 else 2 - random.nextInt(kinds - 1))
+    if (random.nextInt(4) == 0) Seq(End(isBackground = true, occlusions, random.nextBoolean()))
+    else Seq(Remember(surface()), End(isBackground = false, occlusions, random.nextBoolean()))
+  }
+}
+
+/** Plays the events of every context on the ports of a colour unit. Each port takes the next event of any context. */
+final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
+  import ColourEvent._
+
+  private val contexts = config.array.contexts
+  private val todo     = Seq.fill(contexts)(mutable.Queue.empty[ColourEvent])
+  private val waits    = Array.fill(contexts)(Option.empty[End])
+
+  /** By context, the colours and shadow ratios of its paths. */
+  val colours = Seq.fill(contexts)(mutable.ArrayBuffer.empty[(Seq[BigInt], Option[Seq[BigInt]])])
+
+  def enqueue(events: Seq[Seq[ColourEvent]]): Unit = todo.zip(events).foreach { case (queue, more) => queue ++= more }
+
+  def isDone: Boolean = todo.forall(_.isEmpty) && waits.forall(_.isEmpty)
+
+  def registers(values: (Seq[Int], Seq[Int], Int)): Unit = {
+    poke(io.ambient, values._1)
+    pokeUInt(io.background, values._2)
+    io.shading.shadowTransmittance.foreach(_.pokeRaw(values._3))
+  }
+
+  /** One cycle. */
+  def act(random: Random, stalls: Double): Unit = {
+    def next[E <: ColourEvent](of: PartialFunction[ColourEvent, E]): Option[(Int, E)] = {
+      val able = (0 until contexts).filter(c => waits(c).isEmpty && todo(c).headOption.exists(of.isDefinedAt))
+      Option.when(able.nonEmpty && random.nextDouble() >= stalls) {
+        val context = able(random.nextInt(able.size))
+        (context, of(todo(context).head))
+      }
+    }
+    val start    = next { case Start => Start }
+    val remember = next { case it: Remember => it }
+    val bounce   = next { case it: Bounce => it }
+    val end      = next { case it: End => it }
+
+    io.start.valid.poke(start.nonEmpty)
+    start.foreach { case (context, _) => io.start.bits.poke(context) }
+    io.surface.valid.poke(remember.nonEmpty)
+    for ((context, Remember(what)) <- remember) {
+      io.surface.bits.context.poke(context)
+      pokeUInt(io.surface.bits.albedo, what.albedo)
+      io.surface.bits.directLight.zip(what.direct).foreach { case (port, value) => poke(port, value) }
+      io.surface.bits.emission.foreach(pokeUInt(_, what.emission))
+    }
+    for (port <- io.bounce) {
+      port.valid.poke(bounce.nonEmpty)
+      for ((context, Bounce(albedo, isTinted, fresnel, hasSurface)) <- bounce) {
+        port.bits.context.poke(context)
+        pokeUInt(port.bits.albedo, albedo)
+        port.bits.isTinted.poke(isTinted)
+        port.bits.fresnel.pokeRaw(fresnel)
+        port.bits.hasSurface.foreach(_.poke(hasSurface))
+      }
+    }
+    io.end.valid.poke(end.nonEmpty)
+    for ((context, End(isBackground, occlusions, isDirectView)) <- end) {
+      io.end.bits.context.poke(context)
+      io.end.bits.isBackground.poke(isBackground)
+      io.end.bits.isDirectView.foreach(_.poke(isDirectView))
+      io.end.bits.occlusions.zip(occlusions).foreach { case (port, what) => port.poke(Occlusion.all(what)) }
+    }
+
+    // What was taken
+    if (io.colour.valid.peekBoolean()) {
+      val context = io.colour.bits.context.peekInt().toInt
+      val ended   = waits(context).getOrElse(throw new AssertionError(s"context $context has not ended"))
+      val ratio   = io.colour.bits.ratio.filter(_ => ended.isDirectView && !ended.isBackground)
+      colours(context) += (io.colour.bits.colour.channels.map(_.peekInt()) -> ratio.map(_.channels.map(_.peekRaw())))
+      waits(context) = None
+    }
+    (start ++ remember).foreach { case (context, _) => todo(context).dequeue() }
+    for ((context, _) <- bounce if io.bounce.get.ready.peekBoolean()) todo(context).dequeue()
+    for ((context, ended) <- end if io.end.ready.peekBoolean()) {
+      todo(context).dequeue()
+      waits(context) = Some(ended)
+    }
+  }
+
+  private def poke(port: Rgb[Fixed], values: Seq[Int]): Unit =
+    port.channels.zip(values).foreach { case (channel, value) => channel.pokeRaw(value) }
+
+  private def pokeUInt(port: Rgb[UInt], values: Seq[Int]): Unit =
+    port.channels.zip(values).foreach { case (channel, value) => channel.poke(value) }
+}
