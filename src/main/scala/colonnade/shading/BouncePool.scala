@@ -1,7 +1,8 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{PriorityEncoderOH, RRArbiter}
+import chisel3.util.{Mux1H, PriorityEncoderOH}
+import colonnade.common.RoundRobin
 import colonnade.config.ColonnadeConfig
 
 /** Several [[BounceUnit]]s behind the ports of one: docs/bounce.md. Results come in any order. */
@@ -19,10 +20,16 @@ final class BouncePool(config: ColonnadeConfig) extends Module {
     unit.request.bits  := io.request.bits
   }
 
-  // Results in turn
-  private val arbiter = Module(new RRArbiter(new BounceResult(config), units.size)).io
-  arbiter.in.zip(units).foreach { case (in, unit) => in :<>= unit.result }
-  io.result :<>= arbiter.out
+  // Results in turn. One that was offered and not taken is offered until it is
+  private val turns   = Module(new RoundRobin(units.size)).io
+  private val waiting = RegInit(0.U(units.size.W))
+  private val grant   = Mux(waiting.orR, waiting, turns.grant)
+  turns.requests  := VecInit(units.map(_.result.valid)).asUInt
+  turns.isTaken   := io.result.fire
+  waiting         := Mux(io.result.ready, 0.U, grant)
+  io.result.valid := turns.requests.orR
+  io.result.bits  := Mux1H(grant, units.map(_.result.bits))
+  for ((unit, isGranted) <- units.zip(grant.asBools)) unit.result.ready := isGranted && io.result.ready
   io.busy := units.map(_.busy).reduce(_ || _)
 }
 
