@@ -1,8 +1,8 @@
 """Sources of a simulator: Verilator models of unit, column and device, and their coupling.
 
 The unit is the render unit, or the traversal unit if the columns have path units. Verilator generates C++ for each
-instance of a module, about 170 MB for 80 render units. So unit and column are separate models, and each instance is an object. An outer model is *opened*: its inner instances are removed, and
-variables replace their ports.
+instance of a module, about 170 MB for 80 render units. So unit and column are separate models, and each instance is
+an object. An outer model is *opened*: its inner instances are removed, and variables replace their ports.
 
 One evaluation of each unit and a few of columns and device simulate a cycle exactly, by three properties of the RTL:
 

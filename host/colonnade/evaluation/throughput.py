@@ -41,13 +41,15 @@ class Shape:
 
     Attributes:
         units: Render units.
+        path_units: Units that follow paths: one a column, or the render units.
         triangle_units: Triangle units.
-        contexts: Contexts.
+        contexts: Contexts of the units that follow paths.
         columns: Columns, each with a pixel stream.
         banks: Memory banks.
     """
 
     units: int
+    path_units: int
     triangle_units: int
     contexts: int
     columns: int
@@ -59,8 +61,9 @@ class Shape:
         columns = int(config["array"]["columns"])
         units = columns * int(config["array"]["rows"])
         banks = columns * int(config["columnBvhMemory"]["banks"])
-        lanes, contexts = int(config["units"]["triangleLanes"]), int(config["array"]["contexts"])
-        return Shape(units, units * lanes, units * contexts, columns, banks)
+        lanes, shared = int(config["units"]["triangleLanes"]), int(config["units"]["pathContexts"])
+        contexts = columns * shared or units * int(config["array"]["contexts"])
+        return Shape(units, columns if shared else units, units * lanes, contexts, columns, banks)
 
 
 def figures(report: Mapping[str, Any]) -> dict[str, Any]:
@@ -96,7 +99,12 @@ def figures(report: Mapping[str, Any]) -> dict[str, Any]:
 
 def utilisation(counters: Mapping[str, int], cycles: int, shape: Shape) -> dict[str, float]:
     """Busy share of the frame's cycles for each kind of unit or port, averaged over its instances, 0 to 1."""
-    instances = {unit: shape.triangle_units if unit == "triangle unit" else shape.units for unit in UNITS}
+    instances = {
+        "ray set-up": shape.path_units,
+        "box unit": shape.units,
+        "triangle unit": shape.triangle_units,
+        "shader": shape.path_units,
+    }
     return {
         RENDER_UNIT: 1.0 - _ratio(counters["idleContexts"], cycles * shape.contexts),
         **{unit: _ratio(counters[counter], cycles * instances[unit]) for unit, counter in UNITS.items()},

@@ -9,7 +9,7 @@ from typing import Any
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import black_boxed_design_for
 from colonnade.ppa.netlist import memories
-from colonnade.ppa.netlist.hierarchy import LEVELS, Hierarchy, Level, Memory
+from colonnade.ppa.netlist.hierarchy import LEVEL_NAMES, Hierarchy, Level, Memory
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.netlist.synthesis import Technology, count_gates, require_yosys, synthesise, technology
 from colonnade.ppa.power.recording import require_recordable
@@ -52,7 +52,7 @@ def measure(
         require_recordable(operation.stimulus, design.manifest)
     netlists: dict[str, Any] = {}
     units: dict[str, dict[str, Any]] = {}
-    for level in LEVELS:
+    for level in hierarchy.levels:
         for module in (*hierarchy.units(level), level.top):
             name = level.rest if module == level.top else module
             with progress.step(f"synthesising {name}"):
@@ -61,7 +61,7 @@ def measure(
                 units[name] = _unit(level, module, netlists, hierarchy.parts(module), tech)
             finished(level.name, name, units[name])
     with progress.step("timing the whole render unit"):
-        whole = _timing(Netlist(netlists, "RenderUnit", tech.library), tech) if tech.library else None
+        whole = _timing(Netlist(netlists, hierarchy.levels[0].top, tech.library), tech) if tech.library else None
     power = None
     if tech.library and operation:
         power = measure_power(design, config, overrides, hierarchy, netlists, tech, operation, progress)
@@ -176,14 +176,14 @@ def _levels(units: Mapping[str, Mapping[str, Any]], rows: int, columns: int, box
     """Gates and memory bits of a render unit, a column and the array; each includes the level below."""
     levels: dict[str, Any] = {}
     below, bits_below, area_below, memory_below = 0.0, 0, 0.0, 0.0
-    for level, copies in zip(LEVELS, (0, rows, columns), strict=True):
-        own = [unit for unit in units.values() if unit["level"] == level.name]
+    for level, copies in zip(LEVEL_NAMES, (0, rows, columns), strict=True):
+        own = [unit for unit in units.values() if unit["level"] == level]
         logic = sum(unit["kge"] for unit in own) + copies * below
-        own_memories = [memory for memory in boxes if memory.level == level.name]
+        own_memories = [memory for memory in boxes if memory.level == level]
         bits = sum(memory.bits * memory.count for memory in own_memories) + copies * bits_below
         memory_um2 = sum(memories.area_um2(memory) for memory in own_memories) + copies * memory_below
         um2 = sum(unit["um2"] or 0.0 for unit in own) + copies * area_below
-        levels[level.name] = {
+        levels[level] = {
             "of_the_level_below": copies,
             "logic_kge": logic,
             "memory_bits": bits,

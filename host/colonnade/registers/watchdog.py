@@ -35,10 +35,12 @@ TILE_STEPS = 17
 def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest: Manifest) -> int:
     """The register ``frame.watchdogCycles`` of a frame with these registers.
 
-    A pixel leaves at the latest when all contexts of its render unit have traced all their rays.
+    A pixel leaves at the latest when all contexts of its render unit, or of its column's path unit, have traced all
+    their rays. A path unit hands out rays in any order, so one may wait for all others.
     """
     array: Mapping[str, Any] = manifest.config["array"]
     rows, contexts = int(array["rows"]), int(array["contexts"])
+    shared = int(manifest.config["units"]["pathContexts"])
     geometry = manifest.config["geometry"]
     nodes, leaves = header.triangle_base, header.triangle_records
     if geometry["bvh"]:
@@ -52,7 +54,7 @@ def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest:
     rays = 1 + bounces + lights
     # Glass looks up the environment once more at each bounce
     march = _march(manifest) if registers.get("environment.enabled", 0) else 0
-    cycles = contexts * (rays * (RAY_CYCLES + walk) + (rays + bounces) * march)
+    cycles = (shared or contexts) * (rays * (RAY_CYCLES + walk) + (rays + bounces) * march)
     return min(BASE_CYCLES + cycles, (1 << 32) - 1)
 
 
@@ -62,7 +64,7 @@ def _march(manifest: Manifest) -> int:
     if maps is None:
         return 0
     array, units = manifest.config["array"], manifest.config["units"]
-    rows, marches = int(array["rows"]), int(units["marches"])
+    rows, marches = 1 if units["pathContexts"] else int(array["rows"]), int(units["marches"])
     sharers = -(-rows // marches) if marches else 1
     requesters = marches + bool(units["directView"]) if marches else rows
     if maps["shared"]:

@@ -10,11 +10,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 #: Units of each level in the order of the data flow. The remaining logic of the level's module is one more unit.
-RENDER_UNIT = (
-    *("RayGenerator", "RaySetup", "BoxUnit", "TraversalStack", "TriangleUnit", "Shader", "BounceUnit"),
-    *("ShadowRays", "ColourUnit", "EnvironmentStage", "EnvironmentRays", "RtController", "RecordFetch", "HitTable"),
+PATHS = (
+    *("RayGenerator", "RayGeneratorPipeline", "RaySetup", "RaySetupPipeline", "Shader", "ShaderPipeline"),
+    *("BounceUnit", "BouncePipeline", "BouncePool", "ShadowRays", "ShadowRaysPipeline", "ColourUnit", "ColourPipeline"),
+    *("BounceScheduler", "EnvironmentStage", "EnvironmentRays", "RtController"),
 )
+TRACE = ("BoxUnit", "TraversalStack", "TriangleUnit", "RecordFetch", "HitTable")
 COLUMN = (
+    "PathUnit",
+    "PathHits",
+    "RayBus",
+    "ResultBus",
     "ColumnBvhController",
     "ColumnEnvironment",
     "EnvironmentMarches",
@@ -49,14 +55,27 @@ class Level:
     rest: str
 
 
-LEVELS = (
-    Level("render_unit", "RenderUnit", RENDER_UNIT, "contexts"),
+ARRAY = Level("array", "Colonnade", DEVICE, "rest of Colonnade")
+
+#: Every render unit follows its own paths.
+SEPARATE = (
+    Level("render_unit", "RenderUnit", (*PATHS, *TRACE), "contexts"),
     Level("column", "Column", COLUMN, "rest of Column"),
-    Level("array", "Colonnade", DEVICE, "rest of Colonnade"),
+    ARRAY,
 )
 
+#: A column has a path unit, and its render units are traversal units.
+SHARED = (
+    Level("render_unit", "TraversalUnit", TRACE, "contexts"),
+    Level("column", "Column", (*PATHS, *COLUMN), "rest of Column"),
+    ARRAY,
+)
+
+#: Names of the levels, the lowest first.
+LEVEL_NAMES = tuple(level.name for level in SEPARATE)
+
 #: Modules that the synthesis of another module treats as black boxes.
-BOUNDARIES = frozenset({*RENDER_UNIT, *COLUMN, *DEVICE, "RenderUnit", "Column"})
+BOUNDARIES = frozenset({*PATHS, *TRACE, *COLUMN, *DEVICE, "RenderUnit", "TraversalUnit", "Column"})
 
 
 @dataclass(frozen=True)
@@ -113,6 +132,11 @@ class Hierarchy:
         for counts in self._instances.values():
             for kind in set(counts) - known:
                 del counts[kind]
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """The levels of this design, the lowest first."""
+        return SHARED if "TraversalUnit" in self.files else SEPARATE
 
     def units(self, level: Level) -> list[str]:
         """The units of a level that this design has."""
@@ -179,7 +203,7 @@ class Hierarchy:
 
     def _inside_units(self, modules: Iterable[str]) -> Iterator[tuple[str, str, str, int]]:
         """Module, level, unit and number of instances for each unit that contains a module of `modules`."""
-        for level in LEVELS:
+        for level in self.levels:
             for unit in (*self.units(level), level.top):
                 for module in modules:
                     number = self.count(module, unit, BOUNDARIES - {unit})

@@ -15,7 +15,7 @@ from typing import Any
 
 from colonnade.common.atomic_files import replacing
 from colonnade.common.markdown import markdown
-from colonnade.ppa.netlist.hierarchy import LEVELS
+from colonnade.ppa.netlist.hierarchy import LEVEL_NAMES
 from colonnade.ppa.pages.area import equal_area, gates
 from colonnade.ppa.pages.power import power_table, unit_power_table
 from colonnade.ppa.pages.text import LIBRARIES, MAX_FO4, TITLES, format_opensta
@@ -55,10 +55,10 @@ def units(reports: Mapping[str, Data]) -> str:
     titles = ["unit", *(f"kGE, {LIBRARIES[name]}" for name in reports), "share", "flip-flops"]
     titles += [f"µm², {LIBRARIES[name]}" for name in timed] + [f"FO4, {LIBRARIES[name]}" for name in timed]
     rows: list[list[str]] = []
-    for level in LEVELS:
-        rows.append([f"**{TITLES[level.name]}**", *[""] * (len(titles) - 1)])
+    for level in LEVEL_NAMES:
+        rows.append([f"**{TITLES[level]}**", *[""] * (len(titles) - 1)])
         for name, unit in first["units"].items():
-            if unit["level"] == level.name:
+            if unit["level"] == level:
                 same = [report["units"][name] for report in reports.values()]
                 of_timed = [reports[library]["units"][name] for library in timed]
                 row = [name, *(f"{each['kge']:.1f}" for each in same), f"{100 * unit['share']:.1f} %"]
@@ -88,11 +88,11 @@ def _of_part(unit: Data, part: str, key: str, form: str) -> str:
 def totals(reports: Mapping[str, Data]) -> str:
     """Area of render unit, column and array."""
     rows = []
-    for level in LEVELS:
+    for level in LEVEL_NAMES:
         for library, report in reports.items():
-            total = report["levels"][level.name]
+            total = report["levels"][level]
             um2 = "–" if total["logic_um2"] is None else f"{total['logic_um2'] / 1e6:.4f}"
-            row = [TITLES[level.name], LIBRARIES[library], f"{total['logic_kge']:,.1f}", um2]
+            row = [TITLES[level], LIBRARIES[library], f"{total['logic_kge']:,.1f}", um2]
             row += [f"{total['memory_bits'] / 1000:,.0f}", f"{total['kge']:,.1f}"]
             rows.append([*row, f"{total['logic_mm2_28nm']:.3f}", f"{total['mm2_28nm']:.3f}"])
     chip = next(iter(reports.values()))["chip"]

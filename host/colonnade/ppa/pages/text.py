@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from colonnade.common.text_table import Column, Table
-from colonnade.ppa.netlist.hierarchy import LEVELS
+from colonnade.ppa.netlist.hierarchy import LEVEL_NAMES
 from colonnade.ppa.netlist.memories import CHIP_NODE, MIN_SRAM_WORDS, REGISTER_FILE, SRAM, Rate
 from colonnade.ppa.pages.power_text import power_lines
 
@@ -69,11 +69,11 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
     """Totals, memories, slowest paths, power, and the method."""
     chip, used = report["chip"], report["technology"]
     yield ""
-    for level in LEVELS:
-        total = report["levels"][level.name]
+    for level in LEVEL_NAMES:
+        total = report["levels"][level]
         copies = total["of_the_level_below"]
         yield (
-            f"{TITLES[level.name]}{f' (its units and {copies} × the level above)' if copies else ''}: "
+            f"{TITLES[level]}{f' (its units and {copies} × the level above)' if copies else ''}: "
             f"{total['logic_kge']:,.1f} kGE of logic, {total['memory_bits']:,} bits of memory"
             f"{_um2(total['logic_um2'])}; at {CHIP_NODE} {total['logic_mm2_28nm']:,.3f} mm² of logic, "
             f"{total['mm2_28nm']:,.3f} mm² with memories"

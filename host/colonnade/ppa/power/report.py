@@ -13,7 +13,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import GeneratedDesign
 from colonnade.ppa.library import energies
 from colonnade.ppa.netlist import memories
-from colonnade.ppa.netlist.hierarchy import LEVELS, Hierarchy
+from colonnade.ppa.netlist.hierarchy import SEPARATE, Hierarchy
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.netlist.synthesis import Technology
 from colonnade.ppa.power.activity import Power, power_of
@@ -25,7 +25,7 @@ from colonnade.ppa.timing.static import Analysis
 
 #: The replayed module and its level.
 TOP = "RenderUnit"
-LEVEL = LEVELS[0]
+LEVEL = SEPARATE[0]
 
 #: Supply voltage at the chip's node, V.
 VOLTAGE_28NM = 0.9

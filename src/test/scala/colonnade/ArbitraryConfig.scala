@@ -34,7 +34,7 @@ object ArbitraryConfig {
     triangleLanes <- Gen.chooseNum(1, 4)
     marches       <- Gen.chooseNum(0, 16)
     directView    <- if (marches == 0) Gen.const(false) else flag
-    pathContexts  <- Gen.chooseNum(0, UnitsConfig.mostPathContexts)
+    pathContexts  <- if (marches == 0) Gen.const(0) else Gen.chooseNum(0, UnitsConfig.mostPathContexts)
     pipelined     <- flag
   } yield UnitsConfig(boxLanes, triangleLanes, marches, directView, pathContexts, pipelined)
 

@@ -27,6 +27,11 @@ final class DirectionInfo(config: ColonnadeConfig) extends Bundle {
 
   /** Components of the direction that are 0. */
   val isZero = Vec(3, Bool())
+
+  /** Whether x' and y' are so short that the largest reciprocal stands for theirs. */
+  def isTiny: Seq[Bool] = isZero.take(2).zip(exponent).map { case (zero, by) =>
+    zero || by > config.numbers.reciprocalFraction.U
+  }
 }
 
 /** A ray in its own frame while its quotients are being computed. */

@@ -47,9 +47,7 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   private val tNear      = Reg(UInt(numbers.entryBits.W))
   private val tFar       = Reg(SInt(distanceBits.W))
   private val tEntry     = if (fraction < 0) Cat(tNear >> -fraction, 0.U((-fraction).W)) else tNear
-  private val isTiny     = ray.isZero.take(2).zip(ray.exponent).map { case (zero, by) =>
-    zero || by > numbers.reciprocalFraction.U
-  }
+  private val isTiny     = ray.isTiny
 
   // Distances from the origin to padded planes, in units; the sum of plane, origin and pad stays below 2^entryBits
   private val unitOrigin =

@@ -31,17 +31,20 @@ final class RayGeneratorIO(config: ColonnadeConfig) extends Bundle {
   val pixel = Output(new RayPosition(config))
 }
 
+/** Ray generation: [[RayGenerator]], or with `units.pipelined` a [[RayGeneratorPipeline]]. */
+abstract class RayGeneratorModule(config: ColonnadeConfig) extends Module {
+  final val io = IO(new RayGeneratorIO(config))
+}
+
 /** Generates primary rays: `dir = (camera.dir << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
   *
   * One multiplier computes the six products in sequence. Latency: a ray is offered 8 cycles after its pixel was accepted,
   * and the next pixel is accepted in the cycle that takes the ray. The registers are constant while a pixel is in the
   * unit. A position outside the scene wraps around; the host rejects it. Source: docs/numbers.md, section 1.
   */
-final class RayGenerator(config: ColonnadeConfig) extends Module {
+final class RayGenerator(config: ColonnadeConfig) extends RayGeneratorModule(config) {
   private val numbers = config.numbers
   private val scene   = new RayFormats(numbers).scene
-
-  val io = IO(new RayGeneratorIO(config))
 
   // Control: six products; each sum follows one cycle later
   private val products   = 2 * 3
@@ -80,7 +83,7 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
   private val shifted    = Reg(SInt(numbers.directionBits.W))
 
   term    := step * coordinate.zext
-  shifted := shiftLeft(base, amount)
+  shifted := RayGenerator.shiftLeft(base, amount, numbers.directionBits)
 
   private val origin = Reg(Vec(3, SInt(scene.width.W)))
   private val dir    = Reg(Vec(3, SInt(numbers.directionBits.W)))
@@ -102,10 +105,17 @@ final class RayGenerator(config: ColonnadeConfig) extends Module {
   io.ray.bits.origin.axes.zip(origin).foreach { case (to, from) => to := Fixed(scene, from) }
   io.ray.bits.dir.axes.zip(dir).foreach { case (to, from) => to := from }
 
-  private def shiftLeft(value: SInt, by: UInt): SInt = {
-    val wide = value.pad(numbers.directionBits)
+}
+
+object RayGenerator {
+  def apply(config: ColonnadeConfig): RayGeneratorModule =
+    if (config.units.pipelined) new RayGeneratorPipeline(config) else new RayGenerator(config)
+
+  /** A value shifted left, in `width` bits; the bits above are lost. */
+  private[ray] def shiftLeft(value: SInt, by: UInt, width: Int): SInt = {
+    val wide = Rounding.narrow(value.pad(width), width)
     (0 until by.getWidth).foldLeft(wide) { (shifted, bit) =>
-      Mux(by(bit), Rounding.narrow((shifted << (1 << bit)).asSInt, numbers.directionBits), shifted)
+      Mux(by(bit), Rounding.narrow((shifted << (1 << bit)).asSInt, width), shifted)
     }
   }
 }

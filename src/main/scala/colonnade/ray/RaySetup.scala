@@ -13,8 +13,18 @@ final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
   val bounds = Input(new Bounds(config.numbers))
   val ray    = Decoupled(new PreparedRay(config))
 
-  /** The longest stage, [[RayEntry]], holds a ray. */
+  /** The slowest stage holds a ray: [[RayEntry]], or the last stage of a [[RaySetupPipeline]]. */
   val busy = Output(Bool())
+}
+
+/** Ray set-up: [[RaySetup]], or with `units.pipelined` a [[RaySetupPipeline]]. */
+abstract class RaySetupModule(config: ColonnadeConfig) extends Module {
+  final val io = IO(new RaySetupIO(config))
+}
+
+object RaySetup {
+  def apply(config: ColonnadeConfig): RaySetupModule =
+    if (config.units.pipelined) new RaySetupPipeline(config) else new RaySetup(config)
 }
 
 /** Prepares a ray for traversal: {{{
@@ -25,10 +35,8 @@ final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
   * throughput at least one ray every 16 cycles. The quotients of a component that is 0 are computed, then replaced. A
   * direction of 0 gives a ray that does not enter the box. Source: docs/numbers.md, section 2.
   */
-final class RaySetup(config: ColonnadeConfig) extends Module {
+final class RaySetup(config: ColonnadeConfig) extends RaySetupModule(config) {
   private val numbers = config.numbers
-
-  val io = IO(new RaySetupIO(config))
 
   private val normaliser = Module(new DirectionNormaliser(config))
   private val shears = Seq.fill(2)(Module(new Divider(numbers.mantissaBits, numbers.shearDigits, digitsPerCycle = 2)))

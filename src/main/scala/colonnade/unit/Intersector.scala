@@ -24,7 +24,10 @@ final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
 }
 
 object SurfaceHit {
-  def hasDistance(config: ColonnadeConfig): Boolean = config.frame.hits || config.hasEnvironment
+
+  /** A traversal unit leaves distances to its path unit. */
+  def hasDistance(config: ColonnadeConfig): Boolean =
+    !config.hasPathUnit && (config.frame.hits || config.hasEnvironment)
 
   /** The distance of a hit at `t` of a ray that enters the object's box at `tEntry`, in whole units. */
   def distance(config: ColonnadeConfig, tEntry: UInt, t: Fixed): UInt =

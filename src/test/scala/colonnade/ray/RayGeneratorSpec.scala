@@ -13,38 +13,43 @@ import scala.util.Random
 /** Expected values straight from docs/numbers.md, section 1. */
 class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   import RayGeneratorSpec._
-  behavior of "RayGenerator"
 
-  TestConfigs.formats.foreach { config =>
-    val name = s"${config.precision} with ${config.geometry.vertexBits}-bit vertices"
+  for (pipelined <- Seq(false, true)) {
+    behavior of (if (pipelined) "RayGeneratorPipeline" else "RayGenerator")
+    val kind = if (pipelined) "pipelined" else "sequential"
 
-    it should s"send every pixel's exact ray under random stalls, $name" in {
-      test(new RayGenerator(config)) { generator =>
-        val random = new Random(1)
-        for (frame <- frames(config, random)) {
-          setRegisters(generator, frame)
-          run(generator, pixels(config, random, 12), random)(frame)
+    TestConfigs.formats.foreach { formats =>
+      val name = s"$kind, ${formats.precision} with ${formats.geometry.vertexBits}-bit vertices"
+
+      it should s"send every pixel's exact ray under random stalls, $name" in {
+        val config = withPipeline(formats, pipelined)
+        test(RayGenerator(config)) { generator =>
+          val random = new Random(1)
+          for (frame <- frames(config, random)) {
+            setRegisters(generator, frame)
+            run(generator, pixels(config, random, 12), random)(frame)
+          }
         }
       }
     }
-  }
 
-  it should "accept a pixel every 8 cycles" in {
-    val config = TestConfigs.tiny
-    test(new RayGenerator(config)) { generator =>
-      generator.io.position.valid.poke(true)
-      generator.io.ray.ready.poke(true)
-      var taken = Seq.empty[Int]
-      for (cycle <- 0 until 100) {
-        if (generator.io.position.ready.peekBoolean()) taken :+= cycle
-        generator.clock.step()
+    val interval = if (pipelined) 2 else 8
+    it should s"accept a pixel every $interval cycles, $kind" in {
+      test(RayGenerator(withPipeline(TestConfigs.tiny, pipelined))) { generator =>
+        generator.io.position.valid.poke(true)
+        generator.io.ray.ready.poke(true)
+        var taken = Seq.empty[Int]
+        for (cycle <- 0 until 100) {
+          if (generator.io.position.ready.peekBoolean()) taken :+= cycle
+          generator.clock.step()
+        }
+        taken.zip(taken.tail).foreach { case (one, next) => next - one should be <= interval }
+        taken.size should be > 10
       }
-      taken.zip(taken.tail).foreach { case (one, next) => next - one should be <= 8 }
-      taken.size should be > 10
     }
   }
 
-  private def run(generator: RayGenerator, pixels: Seq[Pixel], random: Random)(frame: Frame): Unit = {
+  private def run(generator: RayGeneratorModule, pixels: Seq[Pixel], random: Random)(frame: Frame): Unit = {
     var (sent, received, cycle) = (0, 0, 0)
     while (received < pixels.size) {
       cycle should be < 100 * pixels.size
@@ -59,6 +64,8 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       generator.io.position.bits.y.poke(offered.y)
       if (accepts && generator.io.ray.valid.peekBoolean()) {
         expect(generator.io.ray.bits, pixels(received), frame)
+        generator.io.pixel.x.expect(pixels(received).x)
+        generator.io.pixel.y.expect(pixels(received).y)
         received += 1
       }
       if (offers && generator.io.position.ready.peekBoolean()) sent += 1
@@ -79,6 +86,9 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
 }
 
 object RayGeneratorSpec {
+  private def withPipeline(config: ColonnadeConfig, pipelined: Boolean): ColonnadeConfig =
+    config.copy(units = config.units.copy(pipelined = pipelined))
+
   private type Vector = Seq[BigInt]
   private case class Pixel(context: Int, x: BigInt, y: BigInt)
   private case class Frame(
@@ -116,7 +126,7 @@ object RayGeneratorSpec {
     extreme ++ Seq.fill(count)(Pixel(random.nextInt(config.array.contexts), BigInt(bits, random), BigInt(bits, random)))
   }
 
-  private def setRegisters(generator: RayGenerator, frame: Frame): Unit = {
+  private def setRegisters(generator: RayGeneratorModule, frame: Frame): Unit = {
     val camera                                  = generator.io.registers.camera
     def set(port: Vec3[SInt], to: Vector): Unit = port.axes.zip(to).foreach { case (p, v) => p.poke(v) }
     set(camera.position, frame.position)

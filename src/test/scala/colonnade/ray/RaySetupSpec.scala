@@ -5,6 +5,7 @@ import chiseltest._
 import colonnade.{Always, Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
+import org.scalatest.Tag
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -12,7 +13,7 @@ import scala.util.Random
 
 /** Adds the ray in the format of the box test. */
 private class RaySetupHarness(config: ColonnadeConfig) extends Module {
-  private val setup = Module(new RaySetup(config))
+  private val setup = Module(RaySetup(config))
 
   val io       = IO(chiselTypeOf(setup.io))
   val forBoxes = IO(Output(new BoxRay(config.numbers)))
@@ -23,32 +24,38 @@ private class RaySetupHarness(config: ColonnadeConfig) extends Module {
 /** Prepared rays equal the model's, bit for bit. */
 class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   import RaySetupSpec._
-  behavior of "RaySetup"
 
-  TestConfigs.formats.foreach { config =>
-    it should s"equal the model under random stalls, ${config.precision} with ${config.geometry.vertexBits}-bit vertices" taggedAs Always.ifExtreme(
-      config
-    ) in {
-      test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
-        val random = new Random(2)
-        val cases  = new SetupStimulus(config, random).all(raysPerBox = 14)
-        val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
-        cases.zip(rates).foreach { case (box, rate) => run(setup, box, box.answers(config), random, rate) }
+  for (pipelined <- Seq(false, true)) {
+    behavior of (if (pipelined) "RaySetupPipeline" else "RaySetup")
+    val kind = if (pipelined) "pipelined" else "sequential"
+
+    (TestConfigs.formats :+ narrowTests).foreach { formats =>
+      val name = s"$kind, ${formats.precision} with ${formats.geometry.vertexBits}-bit vertices and " +
+        s"${formats.numbers.gridBits}-bit triangle tests"
+      it should s"equal the model under random stalls, $name" taggedAs tag(formats) in {
+        val config = withPipeline(formats, pipelined)
+        test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
+          val random = new Random(2)
+          val cases  = new SetupStimulus(config, random).all(raysPerBox = if (pipelined) 40 else 14)
+          val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
+          cases.zip(rates).foreach { case (box, rate) => run(setup, box, box.answers(config), random, rate) }
+        }
       }
     }
-  }
 
-  it should "accept a ray every 16 cycles at 32b32s64d, and lose none" in {
-    val config = TestConfigs.tiny
-    test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
-      val random   = new Random(3)
-      val box      = new SetupStimulus(config, random).all(raysPerBox = 40).head
-      val answers  = box.answers(config)
-      val inBox    = answers.map(_.head == 1)
-      val left     = run(setup, box, answers, random, Rates(1, 1))
-      val starting = 4
-      inBox.count(identity) should be > 20
-      left.zip(left.tail).drop(starting).map { case (one, next) => next - one }.max should be <= 16
+    val interval = if (pipelined) 1 else 16
+    it should s"accept a ray every $interval cycles at 32b32s64d, $kind, and lose none" in {
+      val config = withPipeline(TestConfigs.tiny, pipelined)
+      test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
+        val random   = new Random(3)
+        val box      = new SetupStimulus(config, random).all(raysPerBox = 40).head
+        val answers  = box.answers(config)
+        val inBox    = answers.map(_.head == 1)
+        val left     = run(setup, box, answers, random, Rates(1, 1))
+        val starting = 4
+        inBox.count(identity) should be > 20
+        left.zip(left.tail).drop(starting).map { case (one, next) => next - one }.max should be <= interval
+      }
     }
   }
 
@@ -106,6 +113,15 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 }
 
 object RaySetupSpec {
+
+  /** The triangle tests of the presets. */
+  private val narrowTests: ColonnadeConfig =
+    TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(triangleBits = Some(24)))
+
+  private def tag(config: ColonnadeConfig): Tag = if (config == narrowTests) Always else Always.ifExtreme(config)
+
+  private def withPipeline(config: ColonnadeConfig, pipelined: Boolean): ColonnadeConfig =
+    config.copy(units = config.units.copy(pipelined = pipelined))
 
   /** A request is offered in one of `offer` cycles, a ray is accepted in one of `accept` cycles. */
   private case class Rates(offer: Int, accept: Int)

@@ -1,0 +1,92 @@
+"""Frames of columns with a path unit: the RTL under Verilator against the model, bit for bit."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from colonnade.common.framebuffer import Frame
+from colonnade.design.generator import design_for
+from colonnade.device.bit_exact import render_model
+from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.evaluation.throughput import figures, records_taken
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.render.report import frame_report
+from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
+from colonnade.scene.view import with_overrides
+from colonnade.scene_image.packer import pack
+
+pytestmark = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+
+TEAPOT = Scene(MeshSource(name="teapot:4"), background=Background(colour=(0.2, 0.3, 0.5)), paths=Paths(bounces=3))
+LIGHTS = (Light(offset=(-1.0, 0.5, 2.0), colour=(0.2, 0.4, 0.9)),)
+
+#: Limits of the frames, and banks that can be stalled.
+FRAME = ("columnBvhMemory.holdable=true", "frame.maxBounces=4", "frame.lights=2")
+
+#: Name, precision, overrides.
+SHAPES = [
+    ("three traversal units", "tiny", ("array.rows=3", "units.pathContexts=24", "units.pipelined=true")),
+    pytest.param(
+        ("sequential parts", "tiny", ("array.rows=2", "units.pathContexts=7", "columnBvhMemory.snooping=false")),
+        marks=pytest.mark.matrix,
+    ),
+    pytest.param(
+        (
+            "one context, no tree, narrow",
+            "16b16s32d",
+            (
+                *("array.rows=1", "array.columns=1", "array.contexts=1", "units.pathContexts=1", "units.marches=1"),
+                *("units.pipelined=true", "geometry.bvh=false"),
+            ),
+        ),
+        marks=pytest.mark.matrix,
+    ),
+]
+
+
+def _assert_equal(rtl: Frame, model: Frame) -> None:
+    assert rtl.errors == model.errors == []
+    np.testing.assert_array_equal(rtl.colour, model.colour)
+    np.testing.assert_array_equal(rtl.triangle, model.triangle)
+    np.testing.assert_array_equal(rtl.distance, model.distance)
+    assert {name: rtl.counters[name] for name in model.counters} == model.counters
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape[0])
+def test_a_path_unit_renders_what_the_model_renders(shape: tuple[str, str, tuple[str, ...]]) -> None:
+    """Diffuse under two lights, mirror, and glass seen from inside, while memory and sink stall at random."""
+    _, config, overrides = shape
+    design = design_for(config, (*overrides, *FRAME))
+    mesh = load_mesh("teapot:4" if design.manifest.config["geometry"]["bvh"] else "cube")
+    for material, camera in [
+        (Material(), Camera()),
+        (Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Camera(direction=(-1.0, -0.2, 0.1))),
+        (Material(kind="glass", ior=1.45), Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0))),
+    ]:
+        image = pack(mesh, design.manifest, with_overrides(mesh.materials, material))
+        scene = replace(TEAPOT, material=material, camera=camera, more_lights=LIGHTS)
+        registers = [frame_registers(scene, image.header, design.manifest, *size) for size in ((40, 30), (17, 9))]
+        stalls = Stalls(percent=20, memory_percent=40, seed=3, check_interval=16)
+        simulated = render_rtl(design, image, registers, stalls)
+        for frame, settings in zip(simulated.frames, registers, strict=True):
+            _assert_equal(frame, render_model(design.manifest, image, settings))
+        assert simulated.frames[0].is_object.any()
+
+
+def test_counters_account_for_every_context_and_record() -> None:
+    """The contexts are those of the path unit: each one is in one state, and each record taken has a reason."""
+    design = design_for("tiny", ("array.rows=3", "units.pathContexts=24", "units.pipelined=true", *FRAME))
+    image = pack(load_mesh("teapot:3"), design.manifest)
+    settings = frame_registers(TEAPOT, image.header, design.manifest, 40, 30)
+    frame = render_rtl(design, image, [settings]).frames[0]
+    report = frame_report("rtl", design.manifest, image.header, frame).as_json()
+    found, counters = figures(report), report["counters"]
+    assert all(0 < share < 1 for share in found["stalls"].values()), found["stalls"]
+    assert all(0 < share < 1 for share in found["utilisation"].values()), found["utilisation"]
+    triangle_records = records_taken(counters) - counters["nodeReads"] - counters["hits"]
+    assert triangle_records <= counters["triangleTests"] <= 2 * triangle_records

@@ -1,0 +1,40 @@
+package colonnade.common
+
+import chisel3._
+import chisel3.util.log2Ceil
+
+/** Ports of [[DelayLine]]. */
+final class DelayLineIO[T <: Data](value: T) extends Bundle {
+
+  /** The pipeline moves on by one stage. */
+  val moves = Input(Bool())
+
+  /** `in` is valid and must come out later. */
+  val writes = Input(Bool())
+  val in     = Input(value)
+
+  /** `out` is needed in the next cycle, after this cycle's move if there is one. */
+  val reads = Input(Bool())
+  val out   = Output(value)
+}
+
+/** Carries values along a pipeline that may stall, in a memory of `delay` words in place of shift registers.
+  *
+  * A value written with a move comes out `delay` moves later; it is `in` before the first of them. Between moves `out`
+  * stays, as long as it is read. It is undefined in a cycle after one without `reads`. A word is never read in the cycle in
+  * which it is written.
+  */
+final class DelayLine[T <: Data](value: T, delay: Int) extends Module {
+  require(delay >= 2, s"a delay line of $delay moves; it must have at least 2")
+
+  val io = IO(new DelayLineIO(value))
+
+  // The word that is written now was written before by the value that is out now
+  private val memory  = SyncReadMem(delay, value)
+  private val current = RegInit(0.U(log2Ceil(delay).W))
+  private val next    = Mux(current === (delay - 1).U, 0.U, current + 1.U)
+
+  when(io.moves) { current := next }
+  when(io.moves && io.writes) { memory.write(current, io.in) }
+  io.out := memory.read(Mux(io.moves, next, current), io.reads)
+}

@@ -1,0 +1,66 @@
+package colonnade.numbers
+
+import chisel3._
+import chisel3.util.{Cat, RegEnable}
+
+/** Ports of [[PipelinedDivider]]. */
+final class PipelinedDividerIO(mantissaBits: Int, digits: Int, lanes: Int) extends Bundle {
+
+  /** Stage i loads the divisions of the stage before it. */
+  val loads = Input(Vec(PipelinedDivider.stages(digits), Bool()))
+
+  /** The numerator's top bit is set, or it is zero; the denominator's top bit is set. */
+  val numerators  = Input(Vec(lanes, UInt(mantissaBits.W)))
+  val denominator = Input(UInt(mantissaBits.W))
+
+  /** ⌊numerator · 2^digits / denominator⌋ */
+  val quotients = Output(Vec(lanes, UInt((digits + 1).W)))
+}
+
+/** Divides mantissas as [[Divider]] does, a division a cycle in each lane. The lanes share the denominator.
+  *
+  * Restoring recurrence in radix 2, two quotient bits a stage: two subtractors in series are a third smaller than the
+  * three parallel ones of radix 4, and fit the cycle. Latency: ⌈(digits + 1) / 2⌉ loads. A stage that does not load holds
+  * its values.
+  *
+  * @param digits fraction bits of the quotient
+  * @param lanes  numerators that are divided by the same denominator
+  */
+final class PipelinedDivider(mantissaBits: Int, digits: Int, lanes: Int) extends Module {
+  import PipelinedDivider._
+  require(mantissaBits >= 2, s"a divider of $mantissaBits-bit mantissas; they must have at least 2 bits")
+  require(digits >= 0, s"a divider for $digits digits; it must be for at least 0")
+
+  val io = IO(new PipelinedDividerIO(mantissaBits, digits, lanes))
+
+  /** A partial division: the remainder is less than twice the denominator. */
+  private case class Partial(remainder: UInt, quotient: Option[UInt])
+
+  private def step(from: Partial, denominator: UInt): Partial = {
+    val tried = from.remainder -& denominator
+    val fits  = !tried(mantissaBits + 1)
+    val rest  = Mux(fits, tried, from.remainder)(mantissaBits - 1, 0)
+    Partial(Cat(rest, false.B), Some(from.quotient.fold(fits.asUInt)(Cat(_, fits))))
+  }
+
+  private val begin    = (io.numerators.map(n => Partial(Cat(false.B, n), None)).toSeq, io.denominator)
+  private val (end, _) = (0 until stages(digits)).foldLeft(begin) { case ((partials, denominator), stage) =>
+    val bits = bitsPerStage.min(digits + 1 - bitsPerStage * stage)
+    val next = partials.map { partial =>
+      val stepped = (0 until bits).foldLeft(partial)((each, _) => step(each, denominator))
+      Partial(
+        RegEnable(stepped.remainder, io.loads(stage)),
+        stepped.quotient.map(RegEnable(_, io.loads(stage)))
+      )
+    }
+    (next, RegEnable(denominator, io.loads(stage)))
+  }
+  io.quotients.zip(end).foreach { case (to, partial) => to := partial.quotient.get }
+}
+
+object PipelinedDivider {
+  private val bitsPerStage = 2
+
+  /** Latency of a division. */
+  def stages(digits: Int): Int = (digits + bitsPerStage) / bitsPerStage
+}

@@ -1,0 +1,57 @@
+package colonnade.numbers
+
+import chiseltest._
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.util.Random
+
+class PipelinedDividerSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  behavior of "PipelinedDivider"
+
+  private type Operands = (BigInt, BigInt)
+
+  /** A division a cycle: two lanes, the second one divides the numerators in reverse. */
+  private def check(mantissaBits: Int, digits: Int, operands: Seq[Operands]): Unit =
+    test(new PipelinedDivider(mantissaBits, digits, lanes = 2)) { divider =>
+      divider.io.loads.foreach(_.poke(true))
+      val latency = PipelinedDivider.stages(digits)
+      val lanes   = operands.map(_._1).zip(operands.map(_._1).reverse)
+      for (cycle <- 0 until operands.size + latency) {
+        for (((one, other), (_, denominator)) <- lanes.lift(cycle).zip(operands.lift(cycle))) {
+          divider.io.numerators(0).poke(one)
+          divider.io.numerators(1).poke(other)
+          divider.io.denominator.poke(denominator)
+        }
+        if (cycle >= latency) {
+          val ((one, other), (_, denominator)) = (lanes(cycle - latency), operands(cycle - latency))
+          divider.io.quotients(0).expect((one << digits) / denominator)
+          divider.io.quotients(1).expect((other << digits) / denominator)
+        }
+        divider.clock.step()
+      }
+    }
+
+  private def mantissas(bits: Int) = BigInt(1) << (bits - 1) until BigInt(1) << bits
+
+  for ((mantissaBits, digits) <- Seq((2, 0), (2, 5), (3, 1), (4, 2), (5, 4), (5, 9)))
+    it should s"divide all $mantissaBits-bit mantissas to $digits digits" in
+      check(
+        mantissaBits,
+        digits,
+        for (n <- BigInt(0) +: mantissas(mantissaBits); d <- mantissas(mantissaBits)) yield (n, d)
+      )
+
+  for ((mantissaBits, digits) <- Seq((32, 30), (32, 22), (32, 18), (8, 8)))
+    it should s"divide random and extreme $mantissaBits-bit mantissas to $digits digits" in {
+      val random   = new Random(1)
+      val top      = BigInt(1) << (mantissaBits - 1)
+      val extremes = Seq(top, top + 1, 2 * top - 2, 2 * top - 1)
+      def any      = top | BigInt(mantissaBits - 1, random)
+      check(
+        mantissaBits,
+        digits,
+        (for (n <- BigInt(0) +: extremes; d <- extremes) yield (n, d)) ++ Seq.fill(300)((any, any))
+      )
+    }
+}
