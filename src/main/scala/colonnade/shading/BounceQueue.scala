@@ -5,6 +5,8 @@ import chisel3.util.{Decoupled, Valid}
 import colonnade.common.{Context, ContextTable, ReservedQueue}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{Material, MaterialKind, RecordFormats, Vec3}
+import colonnade.numbers.Fixed
+import colonnade.ray.RayFormats
 
 /** A hit on a mirror or glass. */
 final class BounceHit(config: ColonnadeConfig) extends Bundle {
