@@ -24,13 +24,13 @@ final class BouncePool(config: ColonnadeConfig) extends Module {
   private val turns   = Module(new RoundRobin(units.size)).io
   private val waiting = RegInit(0.U(units.size.W))
   private val grant   = Mux(waiting.orR, waiting, turns.grant)
-  turns.requests  := VecInit(units.map(_.result.valid)).asUInt
-  turns.isTaken   := io.result.fire
-  waiting         := Mux(io.result.ready, 0.U, grant)
-  io.result.valid := turns.requests.orR
-  io.result.bits  := Mux1H(grant, units.map(_.result.bits))
+  turns.requests                                                        := VecInit(units.map(_.result.valid)).asUInt
+  turns.isTaken                                                         := io.result.fire
+  waiting                                                               := Mux(io.result.ready, 0.U, grant)
+  io.result.valid                                                       := turns.requests.orR
+  io.result.bits                                                        := Mux1H(grant, units.map(_.result.bits))
   for ((unit, isGranted) <- units.zip(grant.asBools)) unit.result.ready := isGranted && io.result.ready
-  io.busy := units.map(_.busy).reduce(_ || _)
+  io.busy                                                               := units.map(_.busy).reduce(_ || _)
 }
 
 object BouncePool {
