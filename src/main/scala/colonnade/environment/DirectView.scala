@@ -2,6 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, DecoupledIO, Queue, RegEnable, Valid}
+import colonnade.common.ReservedQueue
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{AlbedoEntry, EnvironmentView, NormalEntry, Plane}
 
@@ -48,7 +49,7 @@ final class DirectView(config: ColonnadeConfig) extends Module {
 
   /** A queue of pixels, with its input. */
   private def queue[T <: Data](item: T, places: Int)(valid: Bool, bits: T): DecoupledIO[T] = {
-    val queue = Module(new PixelQueue(item, places)).io
+    val queue = Module(new ReservedQueue(item, places)).io
     queue.in.valid := valid
     queue.in.bits  := bits
     queue.out

@@ -207,3 +207,11 @@ final class Shader(config: ColonnadeConfig) extends Module {
   private def at[T <: Data](entries: Vec[T], index: UInt): T =
     if (config.frame.lights == 1) entries.head else entries(index)
 }
+
+object Shader {
+
+  /** The ports of a new unit: with `units.pipelined` a [[ShadingPipeline]]. */
+  def apply(config: ColonnadeConfig): ShaderIO =
+    if (config.units.pipelined && !config.geometry.cornerColours) Module(new ShadingPipeline(config)).io
+    else Module(new Shader(config)).io
+}

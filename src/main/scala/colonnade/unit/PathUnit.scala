@@ -51,7 +51,7 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
   private val controller  = Module(new RtController(config)).io
   private val primaryRays = Module(new PrimaryRays(config)).io
   private val raySetup    = Module(RaySetup(config)).io
-  private val shader      = Module(new Shader(config)).io
+  private val shader      = Shader(config)
   private val shadowRays  = ShadowRays(config)
   private val colourUnit  = ColourUnit(config)
   private val assembler   = Module(new PixelAssembler(config)).io

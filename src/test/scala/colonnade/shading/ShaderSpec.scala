@@ -59,7 +59,9 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  for (config <- TestConfigs.formats ++ TestConfigs.withColours) {
+  private def pipelined(config: ColonnadeConfig) = config.copy(units = config.units.copy(pipelined = true))
+
+  for (config <- TestConfigs.formats ++ TestConfigs.withColours ++ TestConfigs.formats.map(pipelined)) {
     val name = nameOf(config)
 
     it should s"equal the model with $name" in test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
@@ -78,7 +80,8 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def nameOf(config: ColonnadeConfig): String =
     s"${config.precision} and ${config.geometry.vertexBits}-bit vertices" +
       (if (config.geometry.cornerColours) " with corner colours" else "") +
-      (if (config.geometry.texture.nonEmpty) " and textures" else "")
+      (if (config.geometry.texture.nonEmpty) " and textures" else "") +
+      (if (config.units.pipelined) " in a pipeline" else "")
 
   /** Every number at a limit of its range. */
   private def extremes(config: ColonnadeConfig, stimulus: ShaderStimulus): Seq[(LightCase, Seq[HitCase])] = {

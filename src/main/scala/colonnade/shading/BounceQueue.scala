@@ -1,0 +1,111 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{Decoupled, Valid}
+import colonnade.common.{Context, ContextTable, ReservedQueue}
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.formats.{Material, MaterialKind, RecordFormats, Vec3}
+import colonnade.numbers.Fixed
+import colonnade.ray.RayFormats
+
+/** A hit on a mirror or glass. */
+final class BounceHit(config: ColonnadeConfig) extends Bundle {
+  val context  = Context(config)
+  val material = UInt(RecordFormats.materialBits.W)
+  val backSide = Bool()
+}
+
+/** Components of vectors that are known early: the geometric normal, turned against the ray, and the ray's direction. */
+final class BounceDirections(config: ColonnadeConfig) extends Bundle {
+  val faceForwardNormal = SInt((NumberFormats.normalBits + 1).W)
+  val dir               = SInt((new ShaderFormats(config.numbers).shadeBits + 1).W)
+}
+
+/** Components of vectors that are known late: the reflection's origin and the shading normal; and what kind of normal it is. */
+final class BouncePoint(config: ColonnadeConfig) extends Bundle {
+  private val formats = new ShaderFormats(config.numbers)
+
+  val origin   = SInt(formats.pointBits.W)
+  val normal   = SInt(formats.narrowBits.W)
+  val isSmooth = Bool()
+}
+
+/** Ports of [[BounceQueue]]. */
+final class BounceQueueIO(config: ColonnadeConfig) extends Bundle {
+  val materials = Input(Vec(config.frame.materials, new Material(config)))
+
+  // Each only while there is space
+  val hit        = Flipped(Valid(new BounceHit(config)))
+  val directions = Vec(3, Flipped(Valid(new BounceDirections(config))))
+  val points     = Vec(3, Flipped(Valid(new BouncePoint(config))))
+
+  // To and from bounce units, which may answer in any order
+  val request = Decoupled(new BounceRequest(config))
+  val result  = Flipped(Decoupled(new BounceResult(config)))
+  val bounced = Decoupled(new BouncedRay(config))
+}
+
+/** What a path needs besides the bounce. */
+final private class BounceSurface(config: ColonnadeConfig) extends Bundle {
+  val material = UInt(RecordFormats.materialBits.W)
+  val backSide = Bool()
+  val origin   = Option.when(config.hasEnvironment)(Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W)))
+}
+
+/** Hits on mirrors and glass on their way from the [[ShadingPipeline]] to the bounce units, in order, and their bounces on
+  * the way back, which meet what is stored of their surface. A result is offered in the cycle after it came.
+  *
+  * @param places of the queues
+  */
+final class BounceQueue(config: ColonnadeConfig, places: Int) extends Module {
+  val io = IO(new BounceQueueIO(config))
+
+  private def queue[T <: Data](in: Valid[T]) = {
+    val queue = Module(new ReservedQueue(in.bits.cloneType, places)).io
+    queue.in := in
+    queue.out
+  }
+
+  private val hits       = queue(io.hit)
+  private val directions = io.directions.map(queue(_))
+  private val points     = io.points.map(queue(_))
+  private val all        = (hits +: directions) ++ points
+  io.request.valid := all.map(_.valid).reduce(_ && _)
+  all.foreach(_.ready := io.request.fire)
+
+  private val request  = io.request.bits
+  private val hit      = hits.bits
+  private val material = ShadingPipeline.material(config, io.materials, hit.material)
+  request.context           := hit.context
+  request.origin            := vector(points.map(_.bits.origin))
+  request.normal            := vector(points.map(_.bits.normal))
+  request.isSmooth          := points.last.bits.isSmooth
+  request.faceForwardNormal := vector(directions.map(_.bits.faceForwardNormal))
+  request.dir               := vector(directions.map(_.bits.dir))
+  request.backSide          := hit.backSide
+  request.isGlass           := material.kind.get === MaterialKind.glass
+  request.eta               := Mux(hit.backSide, material.etaBack.get, material.etaFront.get)
+  request.reflectance       := material.reflectance.get
+
+  // Surfaces of bounces under way. The entry of an offered result is read again and again until the result is taken
+  private val table = ContextTable(config, new BounceSurface(config))
+  private val entry = Wire(new BounceSurface(config))
+  entry.material := hit.material
+  entry.backSide := hit.backSide
+  entry.origin.foreach(_ := VecInit(points.map(_.bits.origin)))
+  when(io.request.fire)(table.write(hit.context, entry))
+  private val context = io.result.bits.context
+  private val surface = table.read(context, io.result.valid)
+  private val isRead  = RegNext(io.result.valid && !io.result.fire, false.B) && RegNext(context) === context
+  private val bounced = io.bounced.bits
+  private val ofRay   = ShadingPipeline.material(config, io.materials, surface.material)
+  io.bounced.valid := io.result.valid && isRead
+  io.result.ready  := io.bounced.ready && isRead
+  bounced.bounce   := io.result.bits
+  bounced.albedo   := ofRay.albedo
+  bounced.isTinted := !surface.backSide || ofRay.kind.get === MaterialKind.mirror
+  for (to <- bounced.fresnelOrigin; (axis, from) <- to.axes.zip(surface.origin.get))
+    axis := Fixed(new RayFormats(config.numbers).scene, from)
+
+  private def vector(components: Seq[SInt]): Vec3[SInt] = Vec3.of[SInt](components(0), components(1), components(2))
+}

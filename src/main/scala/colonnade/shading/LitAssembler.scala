@@ -1,0 +1,97 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.common.{Context, ReservedQueue}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{FrameRegisters, Material, RecordFormats, Rgb}
+import colonnade.numbers.Fixed
+import colonnade.ray.RayFormats
+
+/** A surface to light, before its point is known. */
+final class SurfaceLabel(config: ColonnadeConfig) extends Bundle {
+  val context  = Context(config)
+  val material = UInt(RecordFormats.materialBits.W)
+
+  /** Of a point of the environment, which has no material. */
+  val environment = if (config.hasEnvironment) Some(Valid(Rgb(FrameRegisters.colour))) else None
+}
+
+/** A light on a surface, without shadows. */
+final class LightOnSurface(config: ColonnadeConfig) extends Bundle {
+  val light          = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val isLast         = Bool()
+  val direct         = Rgb(FrameRegisters.intensity)
+  val needsShadowRay = Bool()
+}
+
+/** Ports of [[LitAssembler]]. */
+final class LitAssemblerIO(config: ColonnadeConfig) extends Bundle {
+  val materials = Input(Vec(config.frame.materials, new Material(config)))
+
+  // For each surface a label and its origin's components; for each light its share. All only while there is space
+  val label  = Flipped(Valid(new SurfaceLabel(config)))
+  val origin = Vec(3, Flipped(Valid(SInt(ShaderFormats.originBits(config).W))))
+  val light  = Flipped(Valid(new LightOnSurface(config)))
+
+  /** A light has left. */
+  val isTaken = Output(Bool())
+  val lit     = Decoupled(new LitSurface(config))
+}
+
+/** Puts surfaces together with their lights, in the order in which they come. A light a cycle; a surface leaves with the
+  * last of its lights.
+  *
+  * @param places of the queues
+  */
+final class LitAssembler(config: ColonnadeConfig, places: Int) extends Module {
+  val io = IO(new LitAssemblerIO(config))
+
+  private val labels  = Module(new ReservedQueue(new SurfaceLabel(config), places)).io
+  private val lights  = Module(new ReservedQueue(new LightOnSurface(config), places)).io
+  private val origins = io.origin.map { component =>
+    val queue = Module(new ReservedQueue(component.bits.cloneType, places)).io
+    queue.in := component
+    queue.out
+  }
+  labels.in := io.label
+  lights.in := io.light
+
+  private val label = labels.out.bits
+  private val light = lights.out.bits
+  private val lit   = io.lit.bits
+  io.lit.valid                                     := lights.out.valid && light.isLast
+  lights.out.ready                                 := io.lit.ready || !light.isLast
+  io.isTaken                                       := lights.out.fire
+  for (queue <- labels.out +: origins) queue.ready := io.lit.fire
+  assert(!io.lit.valid || (labels.out.valid && origins.map(_.valid).reduce(_ && _)), "a light without a surface")
+
+  // The lights before the last one
+  private val direct = Reg(chiselTypeOf(lit.directLight))
+  private val needs  = Reg(chiselTypeOf(lit.needsShadowRays))
+  lit.directLight     := direct
+  lit.needsShadowRays := needs
+  when(light.light === 0.U) {
+    lit.directLight     := 0.U.asTypeOf(direct)
+    lit.needsShadowRays := 0.U.asTypeOf(needs)
+  }
+  for (index <- 0 until config.frame.lights) when(light.light === index.U) {
+    lit.directLight(index)     := light.direct
+    lit.needsShadowRays(index) := light.needsShadowRay
+  }
+  if (config.frame.lights > 1) when(lights.out.fire) {
+    direct := lit.directLight
+    needs  := lit.needsShadowRays
+  }
+
+  private val material      = ShadingPipeline.material(config, io.materials, label.material)
+  private val isEnvironment = label.environment.map(_.valid).getOrElse(false.B)
+  lit.context := label.context
+  lit.albedo  := material.albedo
+  for (albedo <- label.environment) when(albedo.valid)(lit.albedo := albedo.bits)
+  for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
+    channel := Mux(isEnvironment, 0.U, value)
+  lit.origin.axes.zip(origins).foreach { case (to, from) =>
+    to := Fixed(new RayFormats(config.numbers).scene, from.bits)
+  }
+}

@@ -1,0 +1,52 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.log2Ceil
+import colonnade.common.Context
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.formats.{RecordFormats, Vec3}
+
+/** A hit, or a point of the environment, in the [[ShadingPipeline]]. */
+final class ShadingHit(config: ColonnadeConfig) extends Bundle {
+  private val numbers = config.numbers
+
+  val context       = Context(config)
+  val material      = UInt(RecordFormats.materialBits.W)
+  val isEnvironment = Bool()
+
+  /** Its material is a mirror or glass. */
+  val isBounce = Bool()
+
+  /** Shade with the geometric normal. */
+  val isFlat   = Bool()
+  val backSide = Bool()
+
+  /** The ray's dominant axis, and whether it goes down there. */
+  val axis       = UInt(2.W)
+  val isNegative = Bool()
+
+  // In the ray's frame
+  val origin   = Vec(3, SInt(ShaderFormats.originBits(config).W))
+  val shear    = Vec(2, SInt(numbers.gridBits.W))
+  val distance = SInt(numbers.gridBits.W)
+
+  // In the object's frame
+  val weights         = Vec(3, UInt(numbers.barycentricBits.W))
+  val normals         = Vec(3, Vec3(SInt(NumberFormats.normalBits.W)))
+  val geometricNormal = Vec3(SInt(NumberFormats.normalBits.W))
+}
+
+/** What the end of the [[ShadingPipeline]] has to know of a light on a hit. */
+final class LightSlot(config: ColonnadeConfig) extends Bundle {
+
+  /** The pipeline holds a hit to light; otherwise a mirror or glass, or nothing. */
+  val isSurface = Bool()
+  val light     = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val isLast    = Bool()
+
+  /** A shadow ray is needed if the surface faces the light. */
+  val shadows = Bool()
+
+  /** The light is on. */
+  val isOn = Bool()
+}

@@ -1,0 +1,214 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{log2Ceil, RegEnable}
+import colonnade.common.ModuloSchedule.xyz
+import colonnade.common.ModuloSchedule
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{Material, MaterialKind}
+import colonnade.numbers.Rounding
+
+/** Shades hits as [[Shader]] does, bit for bit: a hit with one light every four cycles, and four cycles more for each
+  * further light. {{{
+  *
+  * hit ─▶ SurfaceStage ─ normal, origin ─▶ AngleStage ─ angle, falloff ─▶ BrightnessStage ─ light ─┬▶ lit surface
+  *           │   │                 └──────────────────────── queue of surfaces ────────────────────┘
+  *           └───┴─ queue of bounces ─▶ BouncePipeline ─▶ bounced ray
+  * }}}
+  * The stages follow a [[ModuloSchedule]] and never stall: a light on a hit enters only if it has a place in the queues at
+  * the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The hit's point and normal are
+  * computed again for each light.
+  */
+final class ShadingPipeline(config: ColonnadeConfig) extends Module {
+  import ShadingPipeline._
+
+  private val numbers = config.numbers
+  private val cycles  = new BrightnessCycles(numbers)
+
+  val io = IO(new ShaderIO(config))
+
+  private val phase    = RegInit(0.U(2.W))
+  private val schedule = new ModuloSchedule(phase)
+  import schedule._
+  phase := phase + 1.U
+
+  // The entry: a hit stays for all of its lights, one every four cycles
+  private val hit      = Reg(new ShadingHit(config))
+  private val shadows  = Reg(Bool())
+  private val isHeld   = RegInit(false.B)
+  private val isActive = RegInit(false.B) // a light on the hit has just entered
+  private val light    = Reg(UInt(log2Ceil(config.frame.lights.max(2)).W))
+  private val isLast   = hit.isBounce || light +& 1.U >= io.shading.lights
+  private val isFree   = !isHeld || (isActive && isLast)
+
+  // Places at the end
+  private val queued     = places(config)
+  private val lightCount = RegInit(0.U(log2Ceil(queued + 1).W))
+  private val hasPlace   = !lightCount(log2Ceil(queued))
+  private val mayBounce  = WireInit(true.B)
+  private val isReady    = isFree && hasPlace && mayBounce
+  private val isEnd      = isAt(3)
+  private val takesPoint = io.environment.map(_.fire).getOrElse(false.B)
+  private val takes      = io.request.fire || takesPoint
+  private val entering   = entered(takesPoint)
+  io.request.ready := isEnd && isReady
+  io.environment.foreach(_.ready := isEnd && isReady && !io.request.valid)
+  io.readyNext := isAt(2) && isReady
+  when(isEnd) {
+    isHeld   := takes || !isFree
+    isActive := takes || (!isFree && hasPlace)
+    light    := Mux(takes, 0.U, light + isActive)
+  }
+  when(takes) {
+    hit     := entering
+    shadows := io.shading.shadows && io.environment.map(port => !takesPoint || port.bits.shadows).getOrElse(true.B)
+  }
+  private val isCounted = isEnd && Mux(takes, !entering.isBounce, !isFree && hasPlace)
+
+  // Stages
+  private val slot = Wire(new LightSlot(config))
+  slot.isSurface := isActive && !hit.isBounce
+  slot.light     := light
+  slot.isLast    := isLast
+  slot.shadows   := shadows
+  slot.isOn      := light < io.shading.lights
+  private val slots   = arriving(slot, 0, 3)
+  private val at6     = latch(5)(latch(3)(slots.at(3)).at(5))
+  private val at18    = carry(at6, 18)
+  private val surface = Module(new SurfaceStage(config)).io
+  private val angle   = Module(new AngleStage(config)).io
+  private val bright  = Module(new BrightnessStage(config)).io
+  surface.phase      := phase
+  surface.offset     := io.shading.offset
+  surface.hit        := hit
+  angle.phase        := phase
+  angle.lights       := io.lights
+  angle.unitShift    := io.unitShift
+  angle.light        := at6.at(xyz(6)).light
+  angle.lightFalloff := at18.at(18).light
+  angle.origin       := surface.origin
+  angle.normal       := surface.normal
+  bright.phase       := phase
+  bright.angle       := angle.angle
+  private val faces = angle.angle.isAcute && at18.at(18 to 21).isOn
+  bright.angle.isAcute := faces
+  bright.falloff       := angle.falloff
+
+  // Lit surfaces
+  private val assembler = Module(new LitAssembler(config, queued)).io
+  private val label     = assembler.label.bits
+  assembler.materials   := io.materials
+  assembler.label.valid := isAt(1) && slot.isSurface && light === 0.U
+  label.context         := hit.context
+  label.material        := hit.material
+  for (environment <- label.environment; port <- io.environment) {
+    environment.valid := hit.isEnvironment
+    environment.bits  := RegEnable(port.bits.albedo, takes)
+  }
+  for ((component, cycle) <- assembler.origin.zip(xyz(7))) {
+    component.valid := isAt(cycle) && at6.at(cycle).isSurface && at6.at(cycle).light === 0.U
+    component.bits  := surface.origin
+  }
+  private val facing = latch(18) {
+    val now = WireInit(at18.at(18))
+    now.shadows := at18.at(18).shadows && faces
+    now
+  }
+  private val atEnd = latch(cycles.brightness)(carry(facing, cycles.brightness).at(cycles.brightness))
+  private val ended = atEnd.at(cycles.direct)
+  bright.colour                       := entry(io.lights, atEnd.at(xyz(cycles.colour)).light).colour
+  assembler.light.valid               := isAt(cycles.direct) && ended.isSurface
+  assembler.light.bits.light          := ended.light
+  assembler.light.bits.isLast         := ended.isLast
+  assembler.light.bits.direct         := bright.direct
+  assembler.light.bits.needsShadowRay := ended.shadows
+  io.lit :<>= assembler.lit
+  lightCount := lightCount + isCounted - assembler.isTaken
+
+  // Mirrors and glass
+  private val bounces = io.bounced.map { bounced =>
+    val queue    = Module(new BounceQueue(config, bouncePlaces)).io
+    val pool     = Module(new BouncePipeline(config)).io
+    val count    = RegInit(0.U(log2Ceil(bouncePlaces + 1).W))
+    val isBounce = latch(1)(isActive && hit.isBounce)
+    val atPoint  = latch(5)(isBounce.at(5))
+    queue.materials         := io.materials
+    queue.hit.valid         := isAt(1) && isActive && hit.isBounce
+    queue.hit.bits.context  := hit.context
+    queue.hit.bits.material := hit.material
+    queue.hit.bits.backSide := hit.backSide
+    for ((component, cycle) <- queue.directions.zip(xyz(2))) {
+      component.valid                  := isAt(cycle) && isBounce.at(cycle)
+      component.bits.faceForwardNormal := surface.faceForwardNormal
+      component.bits.dir               := surface.dir
+    }
+    for ((component, cycle) <- queue.points.zip(xyz(7))) {
+      component.valid         := isAt(cycle) && atPoint.at(cycle)
+      component.bits.origin   := Rounding.narrow(surface.origin, component.bits.origin.getWidth)
+      component.bits.normal   := surface.normal
+      component.bits.isSmooth := surface.isSmooth
+    }
+    pool.offset := io.shading.offset
+    pool.request :<>= queue.request
+    queue.result :<>= pool.result
+    bounced :<>= queue.bounced
+    count     := count + (takes && entering.isBounce) - queue.request.fire
+    mayBounce := !count(log2Ceil(bouncePlaces))
+    count =/= 0.U
+  }
+  io.busy := isHeld || lightCount =/= 0.U || bounces.getOrElse(false.B)
+
+  /** The hit that enters. A point of the environment enters as a hit at distance 0 with a geometric normal of its own. */
+  private def entered(isPoint: Bool): ShadingHit = {
+    val request = io.request.bits
+    val to      = Wire(new ShadingHit(config))
+    to.context       := request.context
+    to.material      := request.face.material
+    to.isEnvironment := isPoint
+    to.isBounce      := !isPoint && material(config, io.materials, request.face.material).kind
+      .map(_ =/= MaterialKind.diffuse).getOrElse(false.B)
+    to.isFlat     := io.shading.flat || isPoint
+    to.backSide   := request.hit.backSide
+    to.axis       := request.ray.orientation.axis
+    to.isNegative := request.ray.orientation.negative(2)
+    to.origin     := VecInit(request.ray.origin.map(_.integer.pad(to.origin.head.getWidth)))
+    to.shear      := VecInit(request.ray.shear.map(_.integer))
+    to.distance   := request.hit.t.integer
+    to.weights    := VecInit(request.hit.weights.map(_.natural))
+    for ((normal, from) <- (to.normals :+ to.geometricNormal).zip(request.face.normals :+ request.face.geometricNormal))
+      normal.axes.zip(from.axes).foreach { case (component, value) => component := value.integer }
+    for (port <- io.environment) when(isPoint) {
+      val point = port.bits
+      to.context         := point.context
+      to.backSide        := false.B
+      to.axis            := 2.U
+      to.isNegative      := false.B
+      to.origin          := VecInit(point.point.axes.map(_.integer.pad(to.origin.head.getWidth)))
+      to.shear           := 0.U.asTypeOf(to.shear)
+      to.distance        := 0.S
+      to.geometricNormal := point.normal
+    }
+    to
+  }
+
+  /** A light's entry; a single light needs no index. */
+  private def entry[T <: Data](entries: Vec[T], index: UInt): T =
+    if (config.frame.lights == 1) entries.head else entries(index)
+}
+
+object ShadingPipeline {
+
+  /** Mirrors and glass between the entry and their unit. */
+  val bouncePlaces: Int = 4
+
+  /** Lights between the entry and the lit surface: what the stages hold and some, a power of two. */
+  private def places(config: ColonnadeConfig): Int =
+    1 << log2Ceil(new BrightnessCycles(config.numbers).direct / ModuloSchedule.interval + 4)
+
+  /** The entry of a material's number, truncated to the bits that the table needs; beyond the table it means entry 0. */
+  private[shading] def material(config: ColonnadeConfig, table: Vec[Material], number: UInt): Material = {
+    val indexBits = log2Ceil(config.frame.materials)
+    val entries   = table.padTo(1 << indexBits, table.head)
+    if (indexBits == 0) entries.head else VecInit(entries)(number(indexBits - 1, 0))
+  }
+}
