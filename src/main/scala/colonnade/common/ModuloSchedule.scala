@@ -25,7 +25,7 @@ final class Timed[T <: Data](bits: T, windows: Seq[(Int, Int)]) {
 
   /** The first cycle of the first value, and the last cycle of the last one. */
   def first: Int = windows.head._1
-  def last:  Int = windows.last._2
+  def last: Int  = windows.last._2
 }
 
 /** A modulo schedule: an operation starts every `interval` cycles, and each takes the same steps in the same cycles. So one
@@ -82,7 +82,10 @@ final class ModuloSchedule(phase: UInt, interval: Int = ModuloSchedule.interval)
   /** Successive values of a register, so many cycles after its own. For a whole interval it takes a register for each value.
     */
   def delay[T <: Data](values: Timed[T], cycles: Seq[Int], by: Int): Timed[T] = {
-    require(cycles.zip(cycles.tail).forall { case (one, next) => next == one + 1 }, s"$cycles do not succeed each other")
+    require(
+      cycles.zip(cycles.tail).forall { case (one, next) => next == one + 1 },
+      s"$cycles do not succeed each other"
+    )
     val steps    = if (by >= interval) cycles.size else 1
     val now      = values.at(cycles)
     val isMoving = if (by >= interval) cycles.map(isAt).reduce(_ || _) else true.B

@@ -35,9 +35,9 @@ final class FoldedSquareRoot(radicandBits: Int, interval: Int) extends Module {
 
   private def digit(state: State): State = {
     val (remainder, root, pending) = state
-    val extended   = Cat(remainder, pending(pending.getWidth - 1, pending.getWidth - 2))
-    val difference = extended -& Cat(root, 1.U(2.W))
-    val fits       = !difference(difference.getWidth - 1)
+    val extended                   = Cat(remainder, pending(pending.getWidth - 1, pending.getWidth - 2))
+    val difference                 = extended -& Cat(root, 1.U(2.W))
+    val fits                       = !difference(difference.getWidth - 1)
     (Mux(fits, difference, extended), Cat(root, fits), Cat(pending(pending.getWidth - 3, 0), 0.U(2.W)))
   }
 
@@ -45,10 +45,10 @@ final class FoldedSquareRoot(radicandBits: Int, interval: Int) extends Module {
 
   /** The end of the last stage. */
   private val (_, root, _) = (1 to stages).foldLeft((0.U(1.W), 0.U(1.W), radicand): State) { (before, stage) =>
-    val count     = stage * perStage
-    val pending   = Reg(UInt((2 * (found - count + perStage)).W))
-    val root      = Reg(UInt(count.W))
-    val remainder = Reg(UInt((count + 1).W))
+    val count                   = stage * perStage
+    val pending                 = Reg(UInt((2 * (found - count + perStage)).W))
+    val root                    = Reg(UInt(count.W))
+    val remainder               = Reg(UInt((count + 1).W))
     val (extended, roots, left) =
       (0 until FoldedSquareRoot.perCycle).foldLeft((remainder, root, pending): State)((state, _) => digit(state))
     val after: State = (extended(count, 0), roots(count - 1, 0), left)

@@ -66,14 +66,14 @@ final class AngleStage(config: ColonnadeConfig) extends Module {
   }
 
   // Dot products
-  private val normal         = delay(arriving(io.normal, xyz(7)), xyz(7), 6)
-  private val (n, l)         = (normal.at(xyz(13)), light.at(xyz(13)))
-  private val lengths        = Wire(Vec(2, SInt(formats.narrowBits.W)))
-  private val square         = latch(xyz(13) :+ 20) {
+  private val normal  = delay(arriving(io.normal, xyz(7)), xyz(7), 6)
+  private val (n, l)  = (normal.at(xyz(13)), light.at(xyz(13)))
+  private val lengths = Wire(Vec(2, SInt(formats.narrowBits.W)))
+  private val square  = latch(xyz(13) :+ 20) {
     val Seq(left, right) = lengths.map(length => Mux(isAt(20), length, n))
     left * right
   }
-  private val Seq(nl, ll)    = Seq(n, l).map(factor => latch(xyz(13))(factor * l))
+  private val Seq(nl, ll)           = Seq(n, l).map(factor => latch(xyz(13))(factor * l))
   private val Seq(nn, dot, squared) = Seq(square.items(0, 1, 2), nl, ll).map { product =>
     accumulate(xyz(14), product.at(xyz(14)).pad(formats.dotBits + 1))(_ + _)
   }

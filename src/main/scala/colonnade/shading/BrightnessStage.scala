@@ -101,7 +101,7 @@ final class BrightnessStage(config: ColonnadeConfig) extends Module {
     divide(18, io.falloff.reference, io.falloff.mantissa.head(shadeBits.min(numbers.mantissaBits)))
   private val falloff = latch(cycles.falloffQuotient) {
     def now[T <: Data](value: Timed[T]): T = carry(value, cycles.falloffQuotient).at(cycles.falloffQuotient)
-    val moved   = (ratio << guardBits).asUInt.pad(falloffBits) >> now(amount)
+    val moved                              = (ratio << guardBits).asUInt.pad(falloffBits) >> now(amount)
     val limited = Mux(now(isNear) || moved > Falloff.max, Falloff.max, moved(Falloff.bits - 1, 0))
     Mux(now(isConstant), Falloff.one, limited)
   }
@@ -120,7 +120,7 @@ final class BrightnessStage(config: ColonnadeConfig) extends Module {
     formats.brightnessBits
   )
   brightness := Mux(isAt(cycles.colour), scaled, latch(cycles.colour)(scaled).at(colours.tail))
-  private val channel  =
+  private val channel =
     Rounding.saturate(Rounding.floor(product.items(1, 2, 3).at(colours.map(_ + 1)), fraction), NumberFormats.lightBits)
   private val channels = Seq.tabulate(2)(index => latch(colours(index) + 1)(channel).at(cycles.direct)) :+ channel
   io.direct.channels.zip(channels).foreach { case (to, from) => to := Fixed(to.format, from) }

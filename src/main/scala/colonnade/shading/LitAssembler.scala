@@ -60,9 +60,9 @@ final class LitAssembler(config: ColonnadeConfig, places: Int) extends Module {
   private val label = labels.out.bits
   private val light = lights.out.bits
   private val lit   = io.lit.bits
-  io.lit.valid     := lights.out.valid && light.isLast
-  lights.out.ready := io.lit.ready || !light.isLast
-  io.isTaken       := lights.out.fire
+  io.lit.valid                                     := lights.out.valid && light.isLast
+  lights.out.ready                                 := io.lit.ready || !light.isLast
+  io.isTaken                                       := lights.out.fire
   for (queue <- labels.out +: origins) queue.ready := io.lit.fire
   assert(!io.lit.valid || (labels.out.valid && origins.map(_.valid).reduce(_ && _)), "a light without a surface")
 

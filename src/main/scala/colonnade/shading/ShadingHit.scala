@@ -41,8 +41,8 @@ final class LightSlot(config: ColonnadeConfig) extends Bundle {
 
   /** The pipeline holds a hit to light; otherwise a mirror or glass, or nothing. */
   val isSurface = Bool()
-  val light  = UInt(log2Ceil(config.frame.lights.max(2)).W)
-  val isLast = Bool()
+  val light     = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val isLast    = Bool()
 
   /** A shadow ray is needed if the surface faces the light. */
   val shadows = Bool()
@@ -50,4 +50,3 @@ final class LightSlot(config: ColonnadeConfig) extends Bundle {
   /** The light is on. */
   val isOn = Bool()
 }
-

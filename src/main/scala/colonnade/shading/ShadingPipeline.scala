@@ -67,11 +67,11 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
 
   // Stages
   private val slot = Wire(new LightSlot(config))
-  slot.isSurface   := isActive && !hit.isBounce
-  slot.light   := light
-  slot.isLast  := isLast
-  slot.shadows := shadows
-  slot.isOn    := light < io.shading.lights
+  slot.isSurface := isActive && !hit.isBounce
+  slot.light     := light
+  slot.isLast    := isLast
+  slot.shadows   := shadows
+  slot.isOn      := light < io.shading.lights
   private val slots   = arriving(slot, 0, 3)
   private val at6     = latch(5)(latch(3)(slots.at(3)).at(5))
   private val at18    = carry(at6, 18)
@@ -92,15 +92,15 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   bright.angle       := angle.angle
   private val faces = angle.angle.isAcute && at18.at(18 to 21).isOn
   bright.angle.isAcute := faces
-  bright.falloff     := angle.falloff
+  bright.falloff       := angle.falloff
 
   // Lit surfaces
   private val assembler = Module(new LitAssembler(config, queued)).io
   private val label     = assembler.label.bits
-  assembler.materials := io.materials
+  assembler.materials   := io.materials
   assembler.label.valid := isAt(1) && slot.isSurface && light === 0.U
-  label.context  := hit.context
-  label.material := hit.material
+  label.context         := hit.context
+  label.material        := hit.material
   for (environment <- label.environment; port <- io.environment) {
     environment.valid := hit.isEnvironment
     environment.bits  := RegEnable(port.bits.albedo, takes)
@@ -116,7 +116,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   }
   private val atEnd = latch(cycles.brightness)(carry(facing, cycles.brightness).at(cycles.brightness))
   private val ended = atEnd.at(cycles.direct)
-  bright.colour := entry(io.lights, atEnd.at(xyz(cycles.colour)).light).colour
+  bright.colour                       := entry(io.lights, atEnd.at(xyz(cycles.colour)).light).colour
   assembler.light.valid               := isAt(cycles.direct) && ended.isSurface
   assembler.light.bits.light          := ended.light
   assembler.light.bits.isLast         := ended.isLast

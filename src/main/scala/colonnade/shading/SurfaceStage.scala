@@ -61,7 +61,7 @@ final class SurfaceStage(config: ColonnadeConfig) extends Module {
     val now = hit.at(xyz(0))
     VecInit(now.weights.zip(now.normals).map { case (weight, normal) => weight.zext * select(xyz(0))(normal.axes(_)) })
   }
-  private val sum = latch(xyz(1))(Rounding.narrow(weighted.at(xyz(1)).reduce(_ +& _), formats.normalSumBits))
+  private val sum          = latch(xyz(1))(Rounding.narrow(weighted.at(xyz(1)).reduce(_ +& _), formats.normalSumBits))
   private val turned       = -sum.at(xyz(2))
   private val smooth       = latch(xyz(2))(Mux(backSide.at(xyz(2)), turned, sum.at(xyz(2))))
   private val smoothLength = longest(xyz(2), sum.at(xyz(2)), turned)

@@ -13,7 +13,7 @@ private class ShadersHarness(config: ColonnadeConfig) extends Module {
   val registers = IO(new ShaderIO(config))
 
   private val units = Seq(Module(new Shader(config)).io, Module(new ShadingPipeline(config)).io)
-  val shaders = units.map(unit => IO(chiselTypeOf(unit)))
+  val shaders       = units.map(unit => IO(chiselTypeOf(unit)))
   for ((port, unit) <- shaders.zip(units)) {
     port <> unit
     unit.lights    := registers.lights
@@ -40,7 +40,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
     TestConfigs.withPrecision(16, 16, 16),
     withRoom(TestConfigs.withPrecision(24, 20, 40).copy(frame = TestConfigs.tiny.frame.copy(lights = 5))),
     TestConfigs.withPrecision(64, 64, 64).copy(frame = TestConfigs.tiny.frame.copy(maxBounces = 0))
-  )
+  ).map(config => config.copy(array = config.array.copy(contexts = 16)))
 
   for ((config, seed) <- configs.zipWithIndex)
     it should s"equal the shader with ${config.precision}, ${config.frame.lights} lights and ${config.frame.maxBounces} bounces" in
@@ -52,14 +52,17 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
           val light = stimulus.light()
           pokeLight(dut.registers, light)
           pokeBounces(dut.registers, config, random)
-          val inputs = Seq.fill(20)(random.nextInt(if (config.hasEnvironment) 8 else 6) match {
-            case 0     => Left(stimulus.anyHit())
-            case 1     => Left(stimulus.withoutSmoothNormal())
-            case 2     => Left(stimulus.withoutNormal())
-            case 6 | 7 => Right(stimulus.environmentPoint())
-            case _     => Left(stimulus.surfaceHit(light))
-          })
-          val stalls = if (round % 2 == 0) 0.0 else 0.6
+          // A context has one hit at a time
+          val inputs = Seq.tabulate(config.array.contexts) { context =>
+            random.nextInt(if (config.hasEnvironment) 8 else 6) match {
+              case 0     => Left(stimulus.anyHit().copy(context = context))
+              case 1     => Left(stimulus.withoutSmoothNormal().copy(context = context))
+              case 2     => Left(stimulus.withoutNormal().copy(context = context))
+              case 6 | 7 => Right(stimulus.environmentPoint().copy(context = context))
+              case _     => Left(stimulus.surfaceHit(light).copy(context = context))
+            }
+          }
+          val stalls               = if (round % 2 == 0) 0.0 else 0.6
           val Seq(expected, found) = dut.shaders.map(run(dut, _, inputs, random, stalls))
           assert(found._1 == expected._1, s"lit surfaces of round $round under $light")
           assert(found._2.sortBy(_.toString) == expected._2.sortBy(_.toString), s"bounced rays of round $round")
@@ -123,11 +126,11 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   /** The numbers of a port. */
   private def leaves(data: Data): Seq[BigInt] = data match {
-    case vec:     Vec[_]  => vec.flatMap(element => leaves(element.asInstanceOf[Data]))
-    case record:  Record  => record.elements.values.flatMap(leaves).toSeq
-    case number:  SInt    => Seq(number.peekInt())
-    case number:  UInt    => Seq(number.peekInt())
-    case other            => throw new IllegalArgumentException(s"a port of $other")
+    case vec: Vec[_]    => vec.flatMap(element => leaves(element.asInstanceOf[Data]))
+    case record: Record => record.elements.values.flatMap(leaves).toSeq
+    case number: SInt   => Seq(number.peekInt())
+    case number: UInt   => Seq(number.peekInt())
+    case other          => throw new IllegalArgumentException(s"a port of $other")
   }
 
   for (shining <- Seq(1, 2))
