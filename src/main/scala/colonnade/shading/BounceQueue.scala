@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.common.{Context, ContextTable, ReservedQueue}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.formats.{Material, MaterialKind, RecordFormats, Vec3}
+import colonnade.formats.{FrameRegisters, Material, MaterialKind, RecordFormats, Rgb, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
@@ -38,6 +38,7 @@ final class BounceQueueIO(config: ColonnadeConfig) extends Bundle {
   val hit        = Flipped(Valid(new BounceHit(config)))
   val directions = Vec(3, Flipped(Valid(new BounceDirections(config))))
   val points     = Vec(3, Flipped(Valid(new BouncePoint(config))))
+  val albedo     = Flipped(new AlbedoSources(config))
 
   // To and from bounce units, which may answer in any order
   val request = Decoupled(new BounceRequest(config))
@@ -49,6 +50,7 @@ final class BounceQueueIO(config: ColonnadeConfig) extends Bundle {
 final private class BounceSurface(config: ColonnadeConfig) extends Bundle {
   val material = UInt(RecordFormats.materialBits.W)
   val backSide = Bool()
+  val albedo   = Option.when(config.geometry.cornerColours)(Rgb(FrameRegisters.colour))
   val origin   = Option.when(config.hasEnvironment)(Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W)))
 }
 
@@ -70,12 +72,13 @@ final class BounceQueue(config: ColonnadeConfig, places: Int) extends Module {
   private val directions = io.directions.map(queue(_))
   private val points     = io.points.map(queue(_))
   private val all        = (hits +: directions) ++ points
-  io.request.valid := all.map(_.valid).reduce(_ && _)
+  private val request    = io.request.bits
+  private val hit        = hits.bits
+  private val material   = ShadingPipeline.material(config, io.materials, hit.material)
+  private val albedo     = new ObjectAlbedo(config, io.albedo, material, true.B, io.request.fire, places)
+  io.request.valid := all.map(_.valid).reduce(_ && _) && albedo.isKnown
   all.foreach(_.ready := io.request.fire)
 
-  private val request  = io.request.bits
-  private val hit      = hits.bits
-  private val material = ShadingPipeline.material(config, io.materials, hit.material)
   request.context           := hit.context
   request.origin            := vector(points.map(_.bits.origin))
   request.normal            := vector(points.map(_.bits.normal))
@@ -92,6 +95,7 @@ final class BounceQueue(config: ColonnadeConfig, places: Int) extends Module {
   private val entry = Wire(new BounceSurface(config))
   entry.material := hit.material
   entry.backSide := hit.backSide
+  entry.albedo.foreach(_ := albedo.albedo)
   entry.origin.foreach(_ := VecInit(points.map(_.bits.origin)))
   when(io.request.fire)(table.write(hit.context, entry))
   private val context = io.result.bits.context
@@ -102,7 +106,7 @@ final class BounceQueue(config: ColonnadeConfig, places: Int) extends Module {
   io.bounced.valid := io.result.valid && isRead
   io.result.ready  := io.bounced.ready && isRead
   bounced.bounce   := io.result.bits
-  bounced.albedo   := ofRay.albedo
+  bounced.albedo   := surface.albedo.getOrElse(ofRay.albedo)
   bounced.isTinted := !surface.backSide || ofRay.kind.get === MaterialKind.mirror
   for (to <- bounced.fresnelOrigin; (axis, from) <- to.axes.zip(surface.origin.get))
     axis := Fixed(new RayFormats(config.numbers).scene, from)

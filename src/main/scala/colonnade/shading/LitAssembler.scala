@@ -33,6 +33,7 @@ final class LitAssemblerIO(config: ColonnadeConfig) extends Bundle {
   val label  = Flipped(Valid(new SurfaceLabel(config)))
   val origin = Vec(3, Flipped(Valid(SInt(ShaderFormats.originBits(config).W))))
   val light  = Flipped(Valid(new LightOnSurface(config)))
+  val albedo = Flipped(new AlbedoSources(config))
 
   /** A light has left. */
   val isTaken = Output(Bool())
@@ -57,11 +58,14 @@ final class LitAssembler(config: ColonnadeConfig, places: Int) extends Module {
   labels.in := io.label
   lights.in := io.light
 
-  private val label = labels.out.bits
-  private val light = lights.out.bits
-  private val lit   = io.lit.bits
-  io.lit.valid                                     := lights.out.valid && light.isLast
-  lights.out.ready                                 := io.lit.ready || !light.isLast
+  private val label         = labels.out.bits
+  private val light         = lights.out.bits
+  private val lit           = io.lit.bits
+  private val isEnvironment = label.environment.map(_.valid).getOrElse(false.B)
+  private val material      = ShadingPipeline.material(config, io.materials, label.material)
+  private val albedo        = new ObjectAlbedo(config, io.albedo, material, !isEnvironment, io.lit.fire, places)
+  io.lit.valid                                     := lights.out.valid && light.isLast && albedo.isKnown
+  lights.out.ready                                 := (io.lit.ready && albedo.isKnown) || !light.isLast
   io.isTaken                                       := lights.out.fire
   for (queue <- labels.out +: origins) queue.ready := io.lit.fire
   assert(!io.lit.valid || (labels.out.valid && origins.map(_.valid).reduce(_ && _)), "a light without a surface")
@@ -84,10 +88,8 @@ final class LitAssembler(config: ColonnadeConfig, places: Int) extends Module {
     needs  := lit.needsShadowRays
   }
 
-  private val material      = ShadingPipeline.material(config, io.materials, label.material)
-  private val isEnvironment = label.environment.map(_.valid).getOrElse(false.B)
   lit.context := label.context
-  lit.albedo  := material.albedo
+  lit.albedo  := albedo.albedo
   for (albedo <- label.environment) when(albedo.valid)(lit.albedo := albedo.bits)
   for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
     channel := Mux(isEnvironment, 0.U, value)

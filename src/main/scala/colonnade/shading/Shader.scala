@@ -212,6 +212,6 @@ object Shader {
 
   /** The ports of a new unit: with `units.pipelined` a [[ShadingPipeline]]. */
   def apply(config: ColonnadeConfig): ShaderIO =
-    if (config.units.pipelined && !config.geometry.cornerColours) Module(new ShadingPipeline(config)).io
+    if (config.units.pipelined) Module(new ShadingPipeline(config)).io
     else Module(new Shader(config)).io
 }

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.formats.{RecordFormats, Vec3}
+import colonnade.formats.{FrameRegisters, RecordFormats, Rgb, Vec3}
 
 /** A hit, or a point of the environment, in the [[ShadingPipeline]]. */
 final class ShadingHit(config: ColonnadeConfig) extends Bundle {
@@ -34,6 +34,9 @@ final class ShadingHit(config: ColonnadeConfig) extends Bundle {
   val weights         = Vec(3, UInt(numbers.barycentricBits.W))
   val normals         = Vec(3, Vec3(SInt(NumberFormats.normalBits.W)))
   val geometricNormal = Vec3(SInt(NumberFormats.normalBits.W))
+
+  /** By corner. */
+  val colours = Option.when(config.geometry.cornerColours)(Vec(3, Rgb(FrameRegisters.colour)))
 }
 
 /** What the end of the [[ShadingPipeline]] has to know of a light on a hit. */

@@ -46,6 +46,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   private val lightCount = RegInit(0.U(log2Ceil(queued + 1).W))
   private val hasPlace   = !lightCount(log2Ceil(queued))
   private val mayBounce  = WireInit(true.B)
+  private val isBouncing = WireInit(false.B)
   private val isReady    = isFree && hasPlace && mayBounce
   private val isEnd      = isAt(3)
   private val takesPoint = io.environment.map(_.fire).getOrElse(false.B)
@@ -126,12 +127,12 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   lightCount := lightCount + isCounted - assembler.isTaken
 
   // Mirrors and glass
-  private val bounces = io.bounced.map { bounced =>
-    val queue    = Module(new BounceQueue(config, bouncePlaces)).io
-    val pool     = Module(new BouncePipeline(config)).io
-    val count    = RegInit(0.U(log2Ceil(bouncePlaces + 1).W))
-    val isBounce = latch(1)(isActive && hit.isBounce)
-    val atPoint  = latch(5)(isBounce.at(5))
+  private val isBounce    = latch(1)(isActive && hit.isBounce)
+  private val bouncesAt6  = latch(5)(isBounce.at(5))
+  private val bounceQueue = io.bounced.map { bounced =>
+    val queue = Module(new BounceQueue(config, bouncePlaces)).io
+    val pool  = Module(new BouncePipeline(config)).io
+    val count = RegInit(0.U(log2Ceil(bouncePlaces + 1).W))
     queue.materials         := io.materials
     queue.hit.valid         := isAt(1) && isActive && hit.isBounce
     queue.hit.bits.context  := hit.context
@@ -143,7 +144,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
       component.bits.dir               := surface.dir
     }
     for ((component, cycle) <- queue.points.zip(xyz(7))) {
-      component.valid         := isAt(cycle) && atPoint.at(cycle)
+      component.valid         := isAt(cycle) && bouncesAt6.at(cycle)
       component.bits.origin   := Rounding.narrow(surface.origin, component.bits.origin.getWidth)
       component.bits.normal   := surface.normal
       component.bits.isSmooth := surface.isSmooth
@@ -152,11 +153,39 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
     pool.request :<>= queue.request
     queue.result :<>= pool.result
     bounced :<>= queue.bounced
-    count     := count + (takes && entering.isBounce) - queue.request.fire
-    mayBounce := !count(log2Ceil(bouncePlaces))
-    count =/= 0.U
+    count      := count + (takes && entering.isBounce) - queue.request.fire
+    mayBounce  := !count(log2Ceil(bouncePlaces))
+    isBouncing := count =/= 0.U
+    queue
   }
-  io.busy := isHeld || lightCount =/= 0.U || bounces.getOrElse(false.B)
+  io.busy := isHeld || lightCount =/= 0.U || isBouncing
+
+  // Colours of the corners, or texels at the positions that they hold
+  private val albedos   = assembler.albedo +: bounceQueue.map(_.albedo).toSeq
+  private val isOfKind  = Seq(at6.at(9).isSurface && at6.at(9).light === 0.U, bouncesAt6.at(9))
+  private val atCorners = hit.colours.map { colours =>
+    val corners = Module(new CornerStage(config)).io
+    corners.phase   := phase
+    corners.weights := hit.weights
+    corners.colours := colours
+    for ((albedo, isOfKind) <- albedos.zip(isOfKind); colour <- albedo.colour) {
+      colour.valid := isAt(9) && isOfKind
+      colour.bits  := corners.colour
+    }
+    corners.colour
+  }
+  for ((port, layout) <- io.texture.zip(config.geometry.texture)) {
+    val texels     = Module(new TexelReader(config, 2 * queued)).io
+    val isTextured =
+      carry(latch(3)(material(config, io.materials, hit.material).hasTexture.get && !hit.isEnvironment), 9).at(9)
+    texels.hit.valid           := isAt(9) && isTextured && isOfKind.reduce(_ || _)
+    texels.hit.bits.position.x := atCorners.get.r >> layout.fractionBits
+    texels.hit.bits.position.y := atCorners.get.g >> layout.fractionBits
+    texels.hit.bits.isBounce   := isOfKind.last
+    for ((albedo, texel) <- albedos.zip(Seq(texels.lit, texels.bounced)); port <- albedo.texel) port := texel
+    port :<>= texels.port
+    io.isIllegalTexel.get := texels.isIllegal
+  }
 
   /** The hit that enters. A point of the environment enters as a hit at distance 0 with a geometric normal of its own. */
   private def entered(isPoint: Bool): ShadingHit = {
@@ -175,6 +204,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
     to.shear      := VecInit(request.ray.shear.map(_.integer))
     to.distance   := request.hit.t.integer
     to.weights    := VecInit(request.hit.weights.map(_.natural))
+    for ((colours, from) <- to.colours.zip(request.face.colours)) colours := from
     for ((normal, from) <- (to.normals :+ to.geometricNormal).zip(request.face.normals :+ request.face.geometricNormal))
       normal.axes.zip(from.axes).foreach { case (component, value) => component := value.integer }
     for (port <- io.environment) when(isPoint) {

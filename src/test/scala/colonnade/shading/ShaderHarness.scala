@@ -1,11 +1,11 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.RegEnable
+import chisel3.util.Queue
 import chisel3.util.random.LFSR
 import colonnade.config.ColonnadeConfig
 
-/** A shader, with a texture whose texels are made of their position and come after one to eight cycles. */
+/** A shader, with a texture whose texels are made of their position and come in order, after a random time. */
 final class ShaderHarness(config: ColonnadeConfig) extends Module {
   val io = IO(new ShaderIO(config))
 
@@ -13,20 +13,21 @@ final class ShaderHarness(config: ColonnadeConfig) extends Module {
   io <> shader
 
   for ((port, unused) <- shader.texture.zip(io.texture)) {
-    val random    = LFSR(8)
-    val isWaiting = RegInit(false.B)
-    val pixel     = RegEnable(port.req.bits, port.req.fire)
-    val texel     = port.resp.bits.colour
+    val random = LFSR(8)
+    val asked  = Module(new Queue(chiselTypeOf(port.req.bits), 4)).io
+    val pixel  = asked.deq.bits
+    val texel  = port.resp.bits.colour
     unused.req.valid         := false.B
     unused.req.bits          := DontCare
-    port.req.ready           := random(1)
-    port.resp.valid          := isWaiting && random(2, 0) === 0.U
+    asked.enq.valid          := port.req.valid && random(1)
+    asked.enq.bits           := port.req.bits
+    port.req.ready           := asked.enq.ready && random(1)
+    asked.deq.ready          := random(2, 0) === 0.U
+    port.resp.valid          := asked.deq.fire
     port.resp.bits.isIllegal := false.B
     texel.r                  := pixel.x
     texel.g                  := pixel.y
     texel.b                  := pixel.x ^ pixel.y
-    when(port.req.fire) { isWaiting := true.B }.elsewhen(port.resp.valid) { isWaiting := false.B }
-    assert(!(port.req.valid && isWaiting), "one request at a time")
   }
 }
 

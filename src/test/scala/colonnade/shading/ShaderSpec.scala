@@ -61,7 +61,10 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private def pipelined(config: ColonnadeConfig) = config.copy(units = config.units.copy(pipelined = true))
 
-  for (config <- TestConfigs.formats ++ TestConfigs.withColours ++ TestConfigs.formats.map(pipelined)) {
+  for (
+    config <-
+      TestConfigs.formats ++ TestConfigs.withColours ++ (TestConfigs.formats ++ TestConfigs.withColours).map(pipelined)
+  ) {
     val name = nameOf(config)
 
     it should s"equal the model with $name" in test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
@@ -221,9 +224,11 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   for (
-    config <- (TestConfigs.formats :+ TestConfigs.withColours.head).map(_.copy(physicalAttributeMemory =
-      Some(TestConfigs.environment)
-    ))
+    config <- (TestConfigs.formats ++ Seq(
+      TestConfigs.withColours.head,
+      pipelined(TestConfigs.tiny),
+      pipelined(TestConfigs.withTextures)
+    )).map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment)))
   )
     it should s"light points of an environment between hits, with ${nameOf(config)}" in
       test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>

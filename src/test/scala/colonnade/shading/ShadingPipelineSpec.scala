@@ -38,7 +38,10 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       frame = TestConfigs.tiny.frame.copy(lights = 1, materials = 5, emission = true)
     )),
     TestConfigs.withPrecision(16, 16, 16),
-    withRoom(TestConfigs.withPrecision(24, 20, 40).copy(frame = TestConfigs.tiny.frame.copy(lights = 5))),
+    withRoom(TestConfigs.withPrecision(24, 20, 40).copy(
+      geometry = TestConfigs.tiny.geometry.copy(cornerColours = true),
+      frame = TestConfigs.tiny.frame.copy(lights = 5)
+    )),
     TestConfigs.withPrecision(64, 64, 64).copy(frame = TestConfigs.tiny.frame.copy(maxBounces = 0))
   ).map(config => config.copy(array = config.array.copy(contexts = 16)))
 

@@ -1,0 +1,63 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.Cat
+import colonnade.common.ModuloSchedule
+import colonnade.common.ModuloSchedule.xyz
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.formats.{FrameRegisters, Rgb}
+
+/** Ports of [[CornerStage]]. */
+final class CornerStageIO(config: ColonnadeConfig) extends Bundle {
+  val phase = Input(UInt(2.W))
+
+  /** In cycles 0 to 3: the weights of a hit, and the colours of its corners. */
+  val weights = Input(Vec(3, UInt(config.numbers.barycentricBits.W)))
+  val colours = Input(Vec(3, Rgb(FrameRegisters.colour)))
+
+  /** In cycles 9 and 10. */
+  val colour = Output(Rgb(FrameRegisters.colour))
+}
+
+/** Interpolates the colours at the corners of a face, as [[CornerColours]] does: a hit every four cycles, by three
+  * multipliers, and for each channel a restoring divider that finds three bits a cycle.
+  */
+final class CornerStage(config: ColonnadeConfig) extends Module {
+  private val colourBits = NumberFormats.colourBits
+  private val totalBits  = config.numbers.barycentricBits + 2
+  private val perCycle   = colourBits / ModuloSchedule.interval
+
+  val io = IO(new CornerStageIO(config))
+
+  private val schedule = new ModuloSchedule(io.phase)
+  import schedule._
+
+  private val weights  = arriving(io.weights, 0, 3)
+  private val colours  = arriving(io.colours, 0, 3)
+  private val total    = latch(0)(weights.at(0).reduce(_ +& _).pad(totalBits))
+  private val products = latch(xyz(0)) {
+    val corners = weights.at(xyz(0)).zip(colours.at(xyz(0)))
+    VecInit(corners.map { case (weight, colour) => weight * select(xyz(0))(colour.channels(_)) })
+  }
+
+  // Half of the divisor rounds the quotient
+  private val sum = latch(xyz(1)) {
+    (products.at(xyz(1)).reduce(_ +& _) +& (total.at(xyz(1)) >> 1))(totalBits + colourBits - 1, 0)
+  }
+
+  /** What is left of the division, above the bits found so far; and the divisor. */
+  private def step(left: UInt, divisor: UInt): UInt = {
+    val high = left.head(totalBits + 1)
+    val fits = high >= divisor
+    Cat(Mux(fits, high - divisor, high)(totalBits - 1, 0), left(colourBits - 2, 0), fits)
+  }
+  for ((channel, index) <- io.colour.channels.zipWithIndex) {
+    val isStart = isAt(2 + index)
+    val left    = Reg(UInt((totalBits + colourBits).W))
+    val divisor = Reg(UInt(totalBits.W))
+    val after   = (0 until perCycle).foldLeft(left)((left, _) => step(left, divisor))
+    left    := Mux(isStart, sum.items(index).at(2 + index), after)
+    when(isStart)(divisor := total.at(2 + index))
+    channel := latch(6 + index)(after(colourBits - 1, 0)).at(Seq(9, 10))
+  }
+}

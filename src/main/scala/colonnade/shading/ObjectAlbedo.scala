@@ -1,0 +1,91 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{Queue, Valid}
+import colonnade.common.ReservedQueue
+import colonnade.config.{ColonnadeConfig, TextureLayout}
+import colonnade.formats.{FrameRegisters, Material, Rgb}
+
+/** Albedos that do not come from the material: by hit the interpolated colour, by textured hit the texel. */
+final class AlbedoSources(config: ColonnadeConfig) extends Bundle {
+  val colour = Option.when(config.geometry.cornerColours)(Valid(Rgb(FrameRegisters.colour)))
+  val texel  = config.geometry.texture.map(_ => Valid(Rgb(FrameRegisters.colour)))
+}
+
+/** The albedo of the first of the hits whose sources are queued; a part of the module that has the queue of hits.
+  *
+  * @param material     of the first hit
+  * @param hasMaterial  it is no point of the environment
+  * @param takes        the first hit leaves
+  * @param places       of the queues
+  */
+final private[shading] class ObjectAlbedo(
+    config:      ColonnadeConfig,
+    sources:     AlbedoSources,
+    material:    Material,
+    hasMaterial: Bool,
+    takes:       Bool,
+    places:      Int
+) {
+  private def queue(in: Valid[Rgb[UInt]], isTaken: Bool) = {
+    val queue = Module(new ReservedQueue(Rgb(FrameRegisters.colour), places)).io
+    queue.in        := in
+    queue.out.ready := isTaken
+    queue.out
+  }
+  private val isTextured = material.hasTexture.map(_ && hasMaterial).getOrElse(false.B)
+  private val colours    = sources.colour.map(queue(_, takes))
+  private val texels     = sources.texel.map(queue(_, takes && isTextured))
+
+  /** A textured hit waits for its texel. */
+  val isKnown: Bool = texels.map(_.valid || !isTextured).getOrElse(true.B) && colours.map(_.valid).getOrElse(true.B)
+
+  val albedo: Rgb[UInt] = WireInit(material.albedo)
+  for (colour <- colours) when(material.hasCornerColours.get)(albedo := colour.bits)
+  for (texel <- texels) when(isTextured)(albedo := texel.bits)
+}
+
+/** A hit with a texture. */
+final class TexturedHit(config: ColonnadeConfig) extends Bundle {
+  val position = new TexelPosition(TextureLayout.of(config))
+
+  /** Its material is a mirror or glass. */
+  val isBounce = Bool()
+}
+
+/** Ports of [[TexelReader]]. */
+final class TexelReaderIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Only while there is space. */
+  val hit  = Flipped(Valid(new TexturedHit(config)))
+  val port = new TexturePort(config)
+
+  // In the order of the hits of each kind
+  val lit     = Valid(Rgb(FrameRegisters.colour))
+  val bounced = Valid(Rgb(FrameRegisters.colour))
+
+  /** A word beyond the heap was read, for one cycle. */
+  val isIllegal = Output(Bool())
+}
+
+/** Reads the texels of hits. As many may be under way as have places. */
+final class TexelReader(config: ColonnadeConfig, places: Int) extends Module {
+  val io = IO(new TexelReaderIO(config))
+
+  private val waiting = Module(new ReservedQueue(new TexturedHit(config), places)).io
+  private val kinds   = Module(new Queue(Bool(), places)).io // of texels that are under way
+  private val texel   = io.port.resp
+  waiting.in        := io.hit
+  io.port.req.valid := waiting.out.valid
+  io.port.req.bits  := waiting.out.bits.position
+  waiting.out.ready := io.port.req.ready
+  kinds.enq.valid   := io.port.req.fire
+  kinds.enq.bits    := waiting.out.bits.isBounce
+  kinds.deq.ready   := texel.valid
+  for ((to, isOfKind) <- Seq(io.lit -> !kinds.deq.bits, io.bounced -> kinds.deq.bits)) {
+    to.valid := texel.valid && isOfKind
+    val colour = texel.bits.colour
+    to.bits.channels.zip(Seq(colour.r, colour.g, colour.b)).foreach { case (channel, from) => channel := from }
+  }
+  io.isIllegal := texel.valid && texel.bits.isIllegal
+}
