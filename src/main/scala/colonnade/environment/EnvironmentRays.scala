@@ -1,8 +1,8 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{PriorityEncoder, Queue, RegEnable}
-import colonnade.common.{Context, ContextTable}
+import chisel3.util.{Queue, RegEnable}
+import colonnade.common.{Context, ContextTable, First}
 import colonnade.config.ColonnadeConfig
 import colonnade.shading.EnvironmentSurface
 
@@ -46,7 +46,7 @@ final class EnvironmentRays(config: ColonnadeConfig) extends Module {
   when(answer.fire && answer.bits.isHit) { hasPoint(answer.bits.surface.context) := true.B }
   when(!isChosen) {
     isChosen := hasPoint.asUInt.orR
-    chosen   := PriorityEncoder(hasPoint)
+    chosen   := First(hasPoint).bits
   }
   when(io.surface.fire) {
     isChosen         := false.B

@@ -13,7 +13,7 @@ import colonnade.numbers.Rounding
   *
   * hit ─▶ SurfaceStage ─ normal, origin ─▶ AngleStage ─ angle, falloff ─▶ BrightnessStage ─ light ─┬▶ lit surface
   *           │   │                 └──────────────────────── queue of surfaces ────────────────────┘
-  *           └───┴─ queue of bounces ─▶ BouncePool ─▶ bounced ray
+  *           └───┴─ queue of bounces ─▶ BouncePipeline ─▶ bounced ray
   * }}}
   * The stages follow a [[ModuloSchedule]] and never stall: a light on a hit enters only if it has a place in the queues at
   * the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The hit's point and normal are
@@ -131,7 +131,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   private val bouncesAt6  = latch(5)(isBounce.at(5))
   private val bounceQueue = io.bounced.map { bounced =>
     val queue = Module(new BounceQueue(config, bouncePlaces)).io
-    val pool  = Module(new BouncePool(config)).io
+    val pool  = Module(new BouncePipeline(config)).io
     val count = RegInit(0.U(log2Ceil(bouncePlaces + 1).W))
     queue.materials         := io.materials
     queue.hit.valid         := isAt(1) && isActive && hit.isBounce

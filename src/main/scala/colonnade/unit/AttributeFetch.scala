@@ -1,8 +1,8 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Decoupled, PriorityEncoder, Queue, Valid}
-import colonnade.common.Context
+import chisel3.util.{Decoupled, Queue, Valid}
+import colonnade.common.{Context, First}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 
@@ -71,7 +71,7 @@ final class AttributeFetch(config: ColonnadeConfig) extends Module {
   assert(!io.hits.valid || waiting.io.enq.ready, "more hits than contexts")
 
   private val hit  = waiting.io.deq
-  private val free = PriorityEncoder(isUsed.map(!_))
+  private val free = First(isUsed.map(!_)).bits
   hit.ready := !isUsed.asUInt.andR
   fetch.fetches.foreach(_ := 0.U.asTypeOf(fetch.fetches.head))
   fetch.fetches.head.valid        := hit.fire

@@ -2,8 +2,8 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{PopCount, PriorityEncoder, Valid}
-import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.common.First
+import colonnade.config.{ArrayConfig, ColonnadeConfig}
 import colonnade.shading.Occlusion
 
 /** Holds the state of every context and issues each one to its next stage; contains no arithmetic.
@@ -25,6 +25,9 @@ import colonnade.shading.Occlusion
 final class RtController(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
   private val lights   = config.frame.lights
+
+  /** So many contexts that a choice of one of them, or their number, takes a cycle. */
+  private val isLarge = contexts > ArrayConfig.mostContexts
 
   val io = IO(new RtControllerIO(config))
 
@@ -54,11 +57,11 @@ final class RtController(config: ColonnadeConfig) extends Module {
 
   /** The light of a context's current shadow ray. */
   private val shadowLight = Reg(Vec(contexts, chiselTypeOf(io.shadow.bits.light)))
-  io.idleCount     := PopCount(isAt(ContextState.idle))
-  io.raySetupCount := PopCount(isAt(ContextState.raySetup))
+  io.idleCount     := count(isAt(ContextState.idle), atReset = contexts)
+  io.raySetupCount := count(isAt(ContextState.raySetup))
 
   // Allocate an idle context
-  private val free = firstOf(isAt(ContextState.idle))
+  private val free = choose(isAt(ContextState.idle), io.allocation.allocate)
   io.allocation.free := free
   when(io.allocation.allocate) {
     state(free.bits)     := ContextState.raySetup
@@ -76,7 +79,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
   // Trace its ray
   io.trace.isShadow  := isShadow
   io.trace.isPrimary := isPrimary
-  io.trace.resolved  := firstOf(isAt(ContextState.resolve))
+  io.trace.resolved  := choose(isAt(ContextState.resolve), true.B)
   when(io.trace.entered.valid) { state(io.trace.entered.bits) := ContextState.traversing }
   io.trace.ended.foreach(ended => when(ended.valid) { state(ended.bits) := ContextState.resolve })
 
@@ -127,7 +130,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
   private val needsShadow = state.zip(shadowPending).map { case (at, lights) =>
     at === ContextState.shadowTest && lights.reduce(_ || _)
   }
-  private val shadow     = firstOf(needsShadow)
+  private val shadow     = choose(needsShadow, io.shadow.ready)
   private val lightsLeft = shadowPending(shadow.bits)
   io.shadow.valid        := shadow.valid
   io.shadow.bits.context := shadow.bits
@@ -147,7 +150,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
   private val isEnding = state.zip(shadowDone.zip(isFresnelReflection)).map { case (at, (shadowDone, reflection)) =>
     at === ContextState.accumulatePending || (shadowDone && !reflection)
   }
-  private val ending = firstOf(isEnding)
+  private val ending = choose(isEnding, io.end.ready)
   io.end.valid             := ending.valid
   io.end.bits.context      := ending.bits
   io.end.bits.isBackground := isBackground(ending.bits)
@@ -160,7 +163,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
   }
 
   // Retire pixels
-  private val done = firstOf(isAt(ContextState.done))
+  private val done = choose(isAt(ContextState.done), io.pixel.retire)
   io.pixel.done      := done
   io.pixel.hasColour := hasColour(done.bits)
   when(io.pixel.retire) { state(done.bits) := ContextState.idle }
@@ -174,9 +177,9 @@ final class RtController(config: ColonnadeConfig) extends Module {
       isFresnelReflection(reflection.bits) := true.B
       isPrimary(reflection.bits)           := false.B
     }
-    val pending = firstOf(isAt(ContextState.environmentPending))
+    val pending = choose(isAt(ContextState.environmentPending), environment.req.fire)
     io.environmentCount.get :=
-      PopCount(state.map(at => at === ContextState.environmentPending || at === ContextState.environmentMarch))
+      count(state.map(at => at === ContextState.environmentPending || at === ContextState.environmentMarch))
     // The distance of a hit is read through the port that serves the surfaces to shade
     val isTest = isOcclusionTest(pending.bits)
     environment.req.valid                    := pending.valid && !(isTest && io.trace.shades)
@@ -205,9 +208,10 @@ final class RtController(config: ColonnadeConfig) extends Module {
       state(missed)        := Mux(isFresnelReflection(missed), ContextState.resumeBounce, afterMiss(missed))
       isBackground(missed) := true.B
     }
-    val resumable = firstOf(isAt(ContextState.resumeBounce).zip(shadowDone.zip(isFresnelReflection)).map {
+    val isResumable = isAt(ContextState.resumeBounce).zip(shadowDone.zip(isFresnelReflection)).map {
       case (waits, (shadowDone, reflection)) => waits || (shadowDone && reflection)
-    })
+    }
+    val resumable = choose(isResumable, environment.resume.ready)
     environment.resume.valid             := resumable.valid
     environment.resume.bits.context      := resumable.bits
     environment.resume.bits.isBackground := isBackground(resumable.bits)
@@ -223,10 +227,12 @@ final class RtController(config: ColonnadeConfig) extends Module {
 
   private def isAt(wanted: ContextState.Type): Seq[Bool] = state.map(_ === wanted)
 
-  private def firstOf(claims: Seq[Bool]): Valid[UInt] = {
-    val first = Wire(Valid(Context(config)))
-    first.valid := claims.reduce(_ || _)
-    first.bits  := PriorityEncoder(claims)
-    first
+  /** The context that is served next, of those that wait for it. Of many contexts it is chosen one cycle early. */
+  private def choose(claims: Seq[Bool], isServed: => Bool): Valid[UInt] =
+    if (isLarge) First.registered(claims, isServed) else First(claims)
+
+  private def count(claims: Seq[Bool], atReset: Int = 0): UInt = {
+    val number = PopCount(claims)
+    if (isLarge) RegNext(number, atReset.U) else number
   }
 }

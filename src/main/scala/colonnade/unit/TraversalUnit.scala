@@ -2,8 +2,8 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.experimental.hierarchy.{instantiable, public}
-import chisel3.util.{log2Ceil, Decoupled, PriorityEncoder, Queue, RegEnable, Valid}
-import colonnade.common.Context
+import chisel3.util.{log2Ceil, Decoupled, Queue, RegEnable, Valid}
+import colonnade.common.{Context, First}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap, UnitEvents}
 import colonnade.ray.PreparedRay
@@ -50,7 +50,7 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   private val owners = Reg(Vec(contexts, Context(config.ofPaths)))
 
   // Allocate a context
-  private val free = PriorityEncoder(isUsed.map(!_))
+  private val free = First(isUsed.map(!_)).bits
   io.isFree                     := !isUsed.asUInt.andR
   intersector.rays.valid        := io.rays.valid
   intersector.rays.bits         := io.rays.bits
@@ -89,7 +89,7 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   // Results: the hit's details are read in one cycle, and the result leaves in the next
   private val result = Wire(Decoupled(new TraceResult(config.ofPaths)))
   private val queue  = Module(new Queue(new TraceResult(config.ofPaths), 1))
-  private val ended  = PriorityEncoder(hasEnded)
+  private val ended  = First(hasEnded).bits
   private val reads  = hasEnded.asUInt.orR && queue.io.enq.ready && !result.valid
   private val reader = RegEnable(ended, reads)
   when(reads) { hasEnded(ended) := false.B }

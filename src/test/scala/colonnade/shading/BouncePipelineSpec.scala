@@ -1,0 +1,120 @@
+package colonnade.shading
+
+import chisel3._
+import chiseltest._
+import colonnade.config.ColonnadeConfig
+import colonnade.numbers.Fixed
+import colonnade.{Model, Simulation, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.collection.mutable
+import scala.util.Random
+
+/** The pipeline finds what [[BounceUnit]] finds, which [[BounceUnitSpec]] compares with the same answers of the model. */
+class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "BouncePipeline"
+
+  private val configs = Seq(0, 2, 4).map(TestConfigs.formats).map(config =>
+    config.copy(array = config.array.copy(contexts = 40))
+  )
+
+  for (config <- configs)
+    it should s"equal the model at ${config.precision}" in
+      test(new BouncePipeline(config)).withAnnotations(Simulation.verilator) { unit =>
+        val random   = new Random(41)
+        val stimulus = new BounceStimulus(config, random)
+        unit.clock.setTimeout(0)
+        for (stalls <- Seq(0.0, 0.5, 0.9)) {
+          val hits =
+            Seq.fill(20)(stimulus.surface()) ++ Seq.fill(15)(stimulus.any()) ++ Seq.fill(20)(stimulus.grazing()) ++
+              Seq.fill(8)(stimulus.critical()) ++ Seq.fill(8)(stimulus.extreme()) ++
+              Seq.fill(4)(stimulus.straight()) ++ Seq.fill(4)(stimulus.withoutNormal())
+          // Twice as mirrors, so that these meet restarts and each other
+          exchange(
+            config,
+            unit,
+            random.shuffle(hits ++ hits.map(_.copy(isGlass = false))),
+            stimulus.offset(),
+            random,
+            stalls
+          )
+        }
+
+        // Throughput, of mirrors that restart too
+        val mirrors = Seq.fill(100)(stimulus.surface().copy(isGlass = false, isFlat = true))
+        val cycles  = exchange(config, unit, mirrors, 100, random, 0).toDouble / mirrors.size
+        info(f"$cycles%.2f cycles a mirror")
+        assert(cycles <= 5.3)
+      }
+
+  /** Compares with the model; returns the cycles. */
+  private def exchange(
+      config: ColonnadeConfig,
+      unit:   BouncePipeline,
+      hits:   Seq[BounceCase],
+      offset: BigInt,
+      random: Random,
+      stalls: Double
+  ): Int = {
+    val answers = Model.answers(config, hits.map(_.words(offset)), "bounce")
+    val free    = mutable.Queue.from(0 until config.array.contexts)
+    val flying  = mutable.Map.empty[Int, Int]
+    var sent    = 0
+    var poked   = -1
+    var ended   = 0
+    var cycles  = 0
+    var idle    = 0
+    unit.io.offset.poke(offset)
+    while (ended < hits.size) {
+      val offers = sent < hits.size && free.nonEmpty && (poked == sent || random.nextDouble() >= stalls)
+      unit.io.request.valid.poke(offers)
+      if (offers && poked < sent) {
+        poke(config, offset)(unit.io.request.bits, hits(sent).copy(context = free.head))
+        poked = sent
+      }
+      val takes  = random.nextDouble() >= stalls
+      val result = unit.io.result.bits
+      unit.io.result.ready.poke(takes)
+      idle += 1
+      if (takes && unit.io.result.valid.peekBoolean()) {
+        val context = result.context.peekInt().toInt
+        val index   = flying.remove(context).getOrElse(fail(s"no bounce of context $context"))
+        assert(peek(result) == answers(index), s"of ${hits(index)} with the offset $offset in ${config.precision}")
+        free.enqueue(context)
+        ended += 1
+        idle = 0
+      }
+      if (offers && unit.io.request.ready.peekBoolean()) {
+        flying(free.dequeue()) = sent
+        sent += 1
+        idle = 0
+      }
+      assert(idle < 2000, s"nothing moves after $ended bounces")
+      cycles += 1
+      unit.clock.step()
+    }
+    unit.io.request.valid.poke(false)
+    unit.io.busy.expect(false)
+    cycles
+  }
+
+  private def poke(config: ColonnadeConfig, offset: BigInt)(port: BounceRequest, hit: BounceCase): Unit = {
+    val numbers                                         = config.numbers
+    def set(to:   Seq[SInt], values: Seq[BigInt]): Unit = to.zip(values).foreach { case (to, value) => to.poke(value) }
+    def fixed(to: Fixed, value:      BigInt): Unit      = to.raw.asInstanceOf[UInt].poke(value)
+    port.context.poke(hit.context)
+    set(port.origin.axes, hit.origin(offset))
+    set(port.normal.axes, hit.normal(numbers))
+    port.isSmooth.poke(hit.isSmooth)
+    set(port.faceForwardNormal.axes, hit.faceForwardNormal)
+    set(port.dir.axes, hit.dir(numbers))
+    port.backSide.poke(hit.backSide)
+    port.isGlass.poke(hit.isGlass)
+    fixed(port.eta, hit.eta)
+    fixed(port.reflectance, hit.reflectance)
+  }
+
+  private def peek(result: BounceResult): Seq[BigInt] =
+    (result.isRefraction.peekInt() +: result.origin.axes.map(_.integer.peekInt())) ++
+      (result.dir.axes ++ result.reflection.axes).map(_.peekInt()) :+ result.fresnel.natural.peekInt()
+}
