@@ -22,18 +22,19 @@ final class ReservedQueue[T <: Data](item: T, places: Int) extends Module {
 
   val io = IO(new ReservedQueueIO(item))
 
-  private val memory = SyncReadMem(places, item)
+  // Plain words: firtool replaces no memory of signed integers by a black box
+  private val memory = SyncReadMem(places, UInt(item.getWidth.W))
   private val tail   = RegInit(0.U(log2Ceil(places).W))
   private val head   = RegInit(0.U(log2Ceil(places).W))
   private val count  = RegInit(0.U(log2Ceil(places + 1).W))
   when(io.in.valid) {
-    memory.write(tail, io.in.bits)
+    memory.write(tail, io.in.bits.asUInt)
     tail := tail + 1.U
   }
   private val next = head + io.out.fire
   head         := next
   count        := count + io.in.valid - io.out.fire
   io.out.valid := RegNext(count =/= io.out.fire.asUInt, false.B)
-  io.out.bits  := memory.read(next, count =/= 0.U)
+  io.out.bits  := memory.read(next, count =/= 0.U).asTypeOf(item)
   assert(!io.in.valid || count < places.U, "an item without a place")
 }

@@ -1,9 +1,7 @@
 package colonnade.shading
 
-import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.numbers.Fixed
 import colonnade.{Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -12,6 +10,8 @@ import scala.util.Random
 
 /** The pipeline finds what [[BounceUnit]] finds, which [[BounceUnitSpec]] compares with the same answers of the model. */
 class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
+  import BounceStimulus.poke
+
   behavior of "BouncePipeline"
 
   private val configs = Seq(0, 2, 4).map(TestConfigs.formats).map(config =>
@@ -40,7 +40,7 @@ class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
           )
         }
 
-        // Throughput, of mirrors that restart too
+        // Throughput of mirrors that do not restart
         val mirrors = Seq.fill(100)(stimulus.surface().copy(isGlass = false, isFlat = true))
         val cycles  = exchange(config, unit, mirrors, 100, random, 0).toDouble / mirrors.size
         info(f"$cycles%.2f cycles a mirror")
@@ -96,22 +96,6 @@ class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
     unit.io.request.valid.poke(false)
     unit.io.busy.expect(false)
     cycles
-  }
-
-  private def poke(config: ColonnadeConfig, offset: BigInt)(port: BounceRequest, hit: BounceCase): Unit = {
-    val numbers                                         = config.numbers
-    def set(to:   Seq[SInt], values: Seq[BigInt]): Unit = to.zip(values).foreach { case (to, value) => to.poke(value) }
-    def fixed(to: Fixed, value:      BigInt): Unit      = to.raw.asInstanceOf[UInt].poke(value)
-    port.context.poke(hit.context)
-    set(port.origin.axes, hit.origin(offset))
-    set(port.normal.axes, hit.normal(numbers))
-    port.isSmooth.poke(hit.isSmooth)
-    set(port.faceForwardNormal.axes, hit.faceForwardNormal)
-    set(port.dir.axes, hit.dir(numbers))
-    port.backSide.poke(hit.backSide)
-    port.isGlass.poke(hit.isGlass)
-    fixed(port.eta, hit.eta)
-    fixed(port.reflectance, hit.reflectance)
   }
 
   private def peek(result: BounceResult): Seq[BigInt] =

@@ -1,6 +1,9 @@
 package colonnade.shading
 
+import chisel3._
+import chiseltest._
 import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.numbers.Fixed
 
 import scala.util.Random
 
@@ -72,6 +75,23 @@ object BounceStimulus {
     val (quotient, half) = (x >> bits, BigInt(1) << (bits - 1))
     val rest             = x - (quotient << bits)
     if (rest > half || (rest == half && quotient.testBit(0))) quotient + 1 else quotient
+  }
+
+  /** Offers a hit, for a register `shading.offset`. */
+  def poke(config: ColonnadeConfig, offset: BigInt)(port: BounceRequest, hit: BounceCase): Unit = {
+    val numbers                                         = config.numbers
+    def set(to:   Seq[SInt], values: Seq[BigInt]): Unit = to.zip(values).foreach { case (to, value) => to.poke(value) }
+    def fixed(to: Fixed, value:      BigInt): Unit      = to.raw.asInstanceOf[UInt].poke(value)
+    port.context.poke(hit.context)
+    set(port.origin.axes, hit.origin(offset))
+    set(port.normal.axes, hit.normal(numbers))
+    port.isSmooth.poke(hit.isSmooth)
+    set(port.faceForwardNormal.axes, hit.faceForwardNormal)
+    set(port.dir.axes, hit.dir(numbers))
+    port.backSide.poke(hit.backSide)
+    port.isGlass.poke(hit.isGlass)
+    fixed(port.eta, hit.eta)
+    fixed(port.reflectance, hit.reflectance)
   }
 }
 

@@ -1,36 +1,20 @@
 package colonnade.shading
 
-import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.numbers.{Fixed, StreamTester}
+import colonnade.numbers.StreamTester
 import colonnade.{Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
 class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
+  import BounceStimulus.poke
   import ResultPacking._
 
   behavior of "BounceUnit"
 
   private val simulation = Simulation.verilator
-
-  private def poke(config: ColonnadeConfig, offset: BigInt)(port: BounceRequest, hit: BounceCase): Unit = {
-    val numbers                                         = config.numbers
-    def set(to:   Seq[SInt], values: Seq[BigInt]): Unit = to.zip(values).foreach { case (to, value) => to.poke(value) }
-    def fixed(to: Fixed, value:      BigInt): Unit      = to.raw.asInstanceOf[UInt].poke(value)
-    port.context.poke(hit.context)
-    set(port.origin.axes, hit.origin(offset))
-    set(port.normal.axes, hit.normal(numbers))
-    port.isSmooth.poke(hit.isSmooth)
-    set(port.faceForwardNormal.axes, hit.faceForwardNormal)
-    set(port.dir.axes, hit.dir(numbers))
-    port.backSide.poke(hit.backSide)
-    port.isGlass.poke(hit.isGlass)
-    fixed(port.eta, hit.eta)
-    fixed(port.reflectance, hit.reflectance)
-  }
 
   private def peek(result: BounceResult): BigInt = pack(
     (result.isRefraction.peekInt() +: result.origin.axes.map(_.integer.peekInt())) ++
