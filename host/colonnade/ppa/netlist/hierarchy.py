@@ -31,7 +31,7 @@ COLUMN = (
 DEVICE = ("FrameController", "RegisterFile", "CounterFile", "SceneMemory")
 
 #: Dividers and square roots: parts of units that are synthesised separately and counted in their unit.
-PARTS = re.compile(r"(Divider|SquareRoot|RootDivider)(_\d+)?")
+PARTS = re.compile(r"(Divider|PipelinedDivider|SquareRoot|RootDivider)(_\d+)?")
 
 _INSTANCE = re.compile(r"^  (\w+)\s+(\w+) \(", re.MULTILINE)
 _TABLE = re.compile(r"^  reg\s+(?:\[(\d+):0\]\s+)?Memory\[0:(\d+)\];", re.MULTILINE)

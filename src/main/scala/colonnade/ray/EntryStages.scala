@@ -2,7 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.Fill
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.Bounds
 import colonnade.numbers.Rounding
 
@@ -55,69 +55,72 @@ final class EntryStages(config: ColonnadeConfig) extends Module {
     val units = Rounding.nearestEven(position.integer, numbers.gridFraction)
     load(Rounding.narrow(units, distanceBits), stages.unitOrigins)
   }
-  private val pad       = (BigInt(1) << numbers.boxPadLog).U
-  private val lows      = PermutedFrame(io.bounds.low, axis).map(_.zext -& pad.zext)
-  private val highs     = PermutedFrame(io.bounds.high, axis).map(_.zext +& pad.zext)
-  private val distances = Seq.tabulate(3) { index =>
-    def to(plane: SInt): SInt = {
-      val forward = Mux(negative(index), origin(index), plane) -& Mux(negative(index), plane, origin(index))
-      Rounding.narrow(forward, distanceBits)
-    }
+  private val pad        = (BigInt(1) << numbers.boxPadLog).U
+  private val lows       = PermutedFrame(io.bounds.low, axis).map(_.zext -& pad.zext)
+  private val highs      = PermutedFrame(io.bounds.high, axis).map(_.zext +& pad.zext)
+  private val widthBits  = NumberFormats.bitLength((1L << numbers.vertexBits) + (2L << numbers.boxPadLog))
+  private val widths     = highs.zip(lows).map { case (high, low) => (high -& low).asUInt(widthBits - 1, 0) }
+  private val nears      = planeDistances(lows, highs)
+  private val fars       = planeDistances(highs, lows)
+  private val tNearAlong = load(positive(nears.last), stages.planes)
+  private val tFarAlong  = Exit(
+    load(fars.last < 0.S || isNoRay, stages.planes),
+    load(fars.last.asUInt(entryBits - 1, 0), stages.planes)
+  )
+
+  // The sides have a second pad, for the error of their slopes. Far planes follow from near ones and the box's width
+  private val slopePad = tNearAlong >> numbers.vertexBits
+  private val products = Seq.tabulate(2) { side =>
+    val near   = load(nears(side), stages.planes) -& slopePad.zext
+    val width  = load(widths(side), stages.planes) +& (slopePad << 1)
+    val factor = io.reciprocals(side)
     (
-      to(Mux(negative(index), highs(index), lows(index))),
-      to(Mux(negative(index), lows(index), highs(index)))
+      load(load(Rounding.narrow(near, distanceBits), stages.distances) * factor.zext, stages.products),
+      load(load(width, stages.distances) * factor, stages.products)
     )
   }
-  private val sides = distances.take(2).map { case (near, far) =>
-    (load(near, stages.planes), load(far, stages.planes))
-  }
-  private val tNearAlong = load(positive(distances.last._1), stages.planes)
-  private val tFarAlong  = {
-    val far = distances.last._2
-    Exit(load(far < 0.S || isNoRay, stages.planes), load(far.asUInt(entryBits - 1, 0), stages.planes))
-  }
 
-  // The sides have a second pad, for the error of their slopes; then the products
-  private val slopePad = (tNearAlong >> numbers.vertexBits).zext
-  private val products = sides.zip(io.reciprocals).map { case ((near, far), reciprocal) =>
-    val nearest  = load(positive(Rounding.narrow(near -& slopePad, distanceBits)), stages.distances)
-    val farthest = load(Rounding.narrow(far +& slopePad, distanceBits), stages.distances)
-    (load(nearest * reciprocal, stages.products), load(farthest * reciprocal.zext, stages.products))
+  // In units along the ray; then widened by their relative error
+  private val slack  = numbers.entrySlackShift
+  private val tNears = products.zip(drops).map { case ((near, _), drop) =>
+    val floored = near >> drop
+    val t       = load(Rounding.saturate(Mux(floored < 0.S, 0.U, floored.asUInt), entryBits), stages.crossings)
+    load(t - (t >> slack), stages.limits)
   }
-
-  // In units along the ray, the exit rounded up; then widened by their relative error
-  private val crossings = products.zip(drops).map { case ((near, far), drop) =>
-    (load(Rounding.saturate(near >> drop, entryBits), stages.crossings), exitAfter(far >> drop, stages.crossings))
-  }
-  private val slack = numbers.entrySlackShift
-  private val nears = crossings.map { case (near, _) => load(near - (near >> slack), stages.limits) }
-  private val exits = crossings.map { case (_, exit) =>
-    Exit(load(exit.isBelow0, stages.limits), load(exit.t +& (exit.t >> slack), stages.limits))
+  private val tFars = products.zip(drops).map { case ((near, width), drop) =>
+    widenedExit(Rounding.narrow(near +& width.zext, near.getWidth) >> drop)
   }
 
   // The latest entry, before the earliest exit
-  private val along       = hold(tNearAlong, stages.planes, stages.limits)
-  private val Seq(x, y)   = nears
-  private val latest      = Mux(x > y, Mux(x > along, x, along), Mux(y > along, y, along))
-  private val tNear       = load(latest, stages.entry)
-  private val exitsAtNear =
-    exits.map(_.hold(stages.limits, stages.entry)) :+ tFarAlong.hold(stages.planes, stages.entry)
+  private val Seq(x, y) = tNears
+  private val z         = hold(tNearAlong, stages.planes, stages.limits)
+  private val tNear     = load(Mux(x > y, Mux(x > z, x, z), Mux(y > z, y, z)), stages.entry)
+  private val exits     = tFars.map(_.hold(stages.limits, stages.entry)) :+ tFarAlong.hold(stages.planes, stages.entry)
   io.tNear  := tNear
-  io.enters := load(exitsAtNear.map(exit => !exit.isBelow0 && tNear <= exit.t).reduce(_ && _), stages.enters)
+  io.enters := load(exits.map(exit => !exit.isBelow0 && tNear <= exit.t).reduce(_ && _), stages.enters)
 
   /** An exit below 0, or at t; t is exact as far as an entry reaches. */
   private case class Exit(isBelow0: Bool, t: UInt) {
     def hold(from: Int, to: Int): Exit = Exit(registers.hold(isBelow0, from, to), registers.hold(t, from, to))
   }
 
-  /** The exit one unit after t. */
-  private def exitAfter(t: SInt, stage: Int): Exit = {
-    val next   = t(entryBits - 1, 0) +& 1.U
-    val beyond = t(t.getWidth - 1, entryBits)
-    val isHuge = beyond.orR || next(entryBits)
-    val below0 = t < 0.S && !(beyond.andR && next(entryBits))
-    Exit(load(below0, stage), load(next(entryBits - 1, 0) | Fill(entryBits, isHuge), stage))
+  /** The exit one unit after a floored distance, with its slack: one addition for both. */
+  private def widenedExit(floored: SInt): Exit = {
+    val isBefore0 = floored < 0.S
+    val isAt0     = floored.asUInt.andR
+    val isHuge    = !isBefore0 && floored(floored.getWidth - 1, entryBits).orR
+    val t         = load(floored(entryBits - 1, 0) | Fill(entryBits, isHuge), stages.crossings)
+    val slackOf   = (t >> slack) +& t(slack - 1, 0).andR
+    val widened   = Mux(load(isAt0, stages.crossings), 0.U, t +& slackOf + 1.U)
+    Exit(load(load(isBefore0 && !isAt0, stages.crossings), stages.limits), load(widened, stages.limits))
   }
+
+  /** From the origin forward to one of two planes, the second where the ray runs down the axis. */
+  private def planeDistances(up: Seq[SInt], down: Seq[SInt]): Seq[SInt] =
+    origin.zip(negative).zip(up.zip(down)).map { case ((from, isNegative), (upward, downward)) =>
+      val distance = Mux(isNegative, from, upward) -& Mux(isNegative, downward, from)
+      Rounding.narrow(distance, distanceBits)
+    }
 
   private def positive(t: SInt): UInt = Mux(t < 0.S, 0.U, t.asUInt)(entryBits - 1, 0)
 }

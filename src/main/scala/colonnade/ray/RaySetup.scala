@@ -13,7 +13,7 @@ final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
   val bounds = Input(new Bounds(config.numbers))
   val ray    = Decoupled(new PreparedRay(config))
 
-  /** The slowest stage holds a ray: [[RayEntry]], or the last stage of a [[RaySetupPipeline]]. */
+  /** The longest stage, [[RayEntry]], holds a ray; of a [[RaySetupPipeline]]: a ray enters. */
   val busy = Output(Bool())
 }
 

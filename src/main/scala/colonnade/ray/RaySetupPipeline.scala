@@ -11,8 +11,8 @@ import colonnade.numbers.PipelinedDivider
   *                    └──────── DelayLine ── the ray in its own frame ─────────────▲ └─── DelayLine ───────▲
   * }}}
   * In order and bit for bit as [[RaySetup]]. Latency: [[SetupStages.count]] cycles, 18 with 24-bit triangle tests. All
-  * stages stall together while the offered ray is not taken; a stage without a ray keeps its values. `busy`: the last stage
-  * holds a ray. Source: docs/numbers.md, section 2.
+  * stages stall together while the offered ray is not taken; a stage without a ray keeps its values. `busy`: a ray enters.
+  * Source: docs/numbers.md, section 2.
   */
 final class RaySetupPipeline(config: ColonnadeConfig) extends RaySetupModule(config) {
   private val numbers = config.numbers
@@ -27,7 +27,7 @@ final class RaySetupPipeline(config: ColonnadeConfig) extends RaySetupModule(con
   when(moves) { holdsRay.zip(arrives).foreach { case (to, from) => to := from } }
   io.request.ready := moves
   io.ray.valid     := holdsRay.last
-  io.busy          := holdsRay.last
+  io.busy          := loads.head
 
   /** A value of a stage as it is in a later one. */
   private def delayed[T <: Data](value: T, from: Int, to: Int): T = {

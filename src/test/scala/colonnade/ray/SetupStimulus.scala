@@ -57,8 +57,20 @@ final class SetupStimulus(config: ColonnadeConfig, random: Random) {
       request(centre.updated(0, least), Seq(1, 0, 0)),
       request(centre.updated(2, -least - 1), Seq(0, 0, -1)),
       request(centre.updated(1, least), Seq(0, -lowest - 1, 1))
-    )
+    ) ++ leaving(low, high)
   }
+
+  /** Diagonal rays that reach one plane of the padded box about where they leave another one. */
+  private def leaving(low: Seq[BigInt], high: Seq[BigInt]): Seq[SetupRequest] =
+    for (before <- 0 to 1; behind <- 0 to 2; up <- Seq(true, false)) yield {
+      val pad          = BigInt(1) << numbers.boxPadLog
+      val (begin, end) = if (up) (low.map(_ - pad - before), high) else (high.map(_ + pad + before), low)
+      val sign         = if (up) 1 else -1
+      val axis         = 1 + random.nextInt(2)
+      val inside       = low.zip(high).map { case (l, h) => (l + h) / 2 }
+      val origin       = inside.updated(0, begin.head).updated(axis, end(axis) + sign * (pad + behind))
+      request(origin.map(steps), Seq.fill(3)(BigInt(7 * sign)))
+    }
 
   /** A ray at a point in the box, close to it, or anywhere. */
   private def ray(low: Seq[BigInt], high: Seq[BigInt]): SetupRequest = {
