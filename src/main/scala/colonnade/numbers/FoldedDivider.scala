@@ -35,8 +35,8 @@ final class FoldedDivider(numeratorBits: Int, denominatorBits: Int, digits: Int,
   }
 
   private def subtracted(minuend: UInt, divisor: UInt): (Bool, UInt) = {
-    val difference = minuend.pad(denominatorBits + 1) -& divisor
-    val fits       = !difference(denominatorBits + 1)
+    val difference = minuend -& divisor
+    val fits       = !difference(minuend.getWidth)
     (fits, Mux(fits, difference, minuend)(denominatorBits - 1, 0))
   }
 

@@ -115,6 +115,26 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
     )
   }
 
+  /** Lights near the object, with a falloff of about one there, in a place where all directions are alike. */
+  def typicalLight(): LightCase = {
+    val plain = light()
+    plain.copy(
+      unitShift = 0,
+      sources = plain.sources.map(_.copy(
+        position = xyz(anywhere()),
+        colour = xyz(BigInt(random.nextInt(1 << 14))),
+        reachMantissa = (BigInt(1) << (numbers.mantissaBits - 1)) + BigInt(numbers.mantissaBits - 1, random),
+        reachExponent = 2 * (numbers.gridBits - 2) - numbers.mantissaBits
+      ))
+    )
+  }
+
+  /** A point near the object that faces any direction. */
+  def typicalPoint(): EnvironmentPointCase = environmentPoint().copy(point = xyz(anywhere()), normal = anyUnit)
+
+  private def anywhere(): BigInt =
+    BigInt(numbers.gridBits.min(numbers.macBits) - 2, random) * (if (random.nextBoolean()) 1 else -1)
+
   private def colour(): Seq[BigInt] = xyz(natural(NumberFormats.colourBits))
 
   /** A light without falloff, or with a reference distance near the scene, or with any. */

@@ -52,7 +52,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
         val random   = new Random(seed)
         val stimulus = new ShaderStimulus(config, random)
         for (round <- 0 until 12) {
-          val light = stimulus.light()
+          val light = if (round < 4) stimulus.typicalLight() else stimulus.light()
           pokeLight(dut.registers, light)
           pokeBounces(dut.registers, config, random)
           // A context has one hit at a time
@@ -61,7 +61,8 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
               case 0     => Left(stimulus.anyHit().copy(context = context))
               case 1     => Left(stimulus.withoutSmoothNormal().copy(context = context))
               case 2     => Left(stimulus.withoutNormal().copy(context = context))
-              case 6 | 7 => Right(stimulus.environmentPoint().copy(context = context))
+              case 6     => Right(stimulus.environmentPoint().copy(context = context))
+              case 7     => Right(stimulus.typicalPoint().copy(context = context))
               case _     => Left(stimulus.surfaceHit(light).copy(context = context))
             }
           }
