@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ArrayConfig, ColonnadeConfig}
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, PixelPosition, Rgb}
 import colonnade.shading.PathColour
 
@@ -26,7 +26,8 @@ final class PixelAssemblerIO(config: ColonnadeConfig) extends Bundle {
 
 /** Keeps what each context knows of its pixel, and assembles the pixel when it is done.
   *
-  * A context retires when its tables are read; the pixel follows one cycle later, into a queue that has space for it.
+  * A context retires when its tables are read; the pixel follows one cycle later, into a queue that has space
+  * for it.
   */
 final class PixelAssembler(config: ColonnadeConfig) extends Module {
   val io = IO(new PixelAssemblerIO(config))
@@ -41,11 +42,14 @@ final class PixelAssembler(config: ColonnadeConfig) extends Module {
   when(io.hasSurface.valid) { isObject(io.hasSurface.bits) := true.B }
   when(io.colour.valid) { colours.write(io.colour.bits.context, io.colour.bits) }
 
+  /** Finished pixels that wait. Many contexts give a pixel a cycle: two wait while one is on its way. */
+  private val places = if (config.array.contexts > ArrayConfig.mostContexts) 3 else 1
+
   // Retire a context
   private val done     = io.control.done
   private val finished = Wire(Decoupled(new Pixel(config)))
-  private val queue    = Module(new Queue(new Pixel(config), 1))
-  private val retires  = done.valid && queue.io.enq.ready && !finished.valid
+  private val queue    = Module(new Queue(new Pixel(config), places))
+  private val retires  = done.valid && queue.io.count +& finished.valid < places.U
   io.control.retire := retires
   queue.io.enq :<>= finished
   io.pixels :<>= queue.io.deq
