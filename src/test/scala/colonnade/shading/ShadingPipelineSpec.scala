@@ -160,5 +160,15 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
           }
           assert(taken == 100 && lit > 80, s"$taken hits taken, $lit lit")
           info(s"${(taken - lit) * 4 * shining} cycles from hit to lit surface")
+
+          // Nobody takes a surface for a while, and then all leave
+          for (cycle <- 0 until 800) {
+            dut.io.lit.ready.poke(cycle >= 200)
+            dut.io.request.valid.poke(cycle < 200)
+            if (cycle < 200 && dut.io.request.ready.peekBoolean()) taken += 1
+            if (cycle >= 200 && dut.io.lit.valid.peekBoolean()) lit += 1
+            dut.clock.step()
+          }
+          assert(lit == taken && taken < 120, s"$taken hits taken, $lit lit")
         }
 }
