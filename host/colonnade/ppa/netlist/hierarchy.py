@@ -11,7 +11,7 @@ from pathlib import Path
 
 #: Units of each level in the order of the data flow. The remaining logic of the level's module is one more unit.
 PATHS = (
-    *("RayGenerator", "RayGeneratorPipeline", "RaySetup", "RaySetupPipeline", "Shader", "ShaderPipeline"),
+    *("RayGenerator", "RayGeneratorPipeline", "RaySetup", "RaySetupPipeline", "Shader", "ShadingPipeline"),
     *("BounceUnit", "BouncePipeline", "BouncePool", "ShadowRays", "ShadowRaysPipeline", "ColourUnit", "ColourPipeline"),
     *("BounceScheduler", "EnvironmentStage", "EnvironmentRays", "RtController"),
 )

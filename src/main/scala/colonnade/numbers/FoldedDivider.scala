@@ -34,6 +34,9 @@ final class FoldedDivider(numeratorBits: Int, denominatorBits: Int, digits: Int,
     val pending   = UInt(found.W)
   }
 
+  /** Whether the divisor fits, and what is left. Operands that are padded more than the difference needs would make firtool
+    * take the borrow for a constant.
+    */
   private def subtracted(minuend: UInt, divisor: UInt): (Bool, UInt) = {
     val difference = minuend -& divisor
     val fits       = !difference(minuend.getWidth)

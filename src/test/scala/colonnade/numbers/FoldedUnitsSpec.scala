@@ -28,18 +28,21 @@ class FoldedUnitsSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   behavior of "FoldedDivider"
 
-  for ((numeratorBits, denominatorBits, digits) <- Seq((32, 18, 16), (32, 16, 16), (20, 18, 16), (8, 16, 8), (10, 10, 10), (38, 5, 3)))
+  for (
+    (numeratorBits, denominatorBits, digits) <-
+      Seq((32, 18, 16), (32, 16, 16), (20, 18, 16), (8, 16, 8), (10, 10, 10), (38, 5, 3))
+  )
     it should s"divide $numeratorBits by $denominatorBits bits to $digits digits" in
       test(new FoldedDivider(numeratorBits, denominatorBits, digits, interval)) { dut =>
-        val random                 = new Random(1)
-        def mantissa(bits: Int)    = (BigInt(1) << (bits - 1)) + (random.nextInt(4) match {
+        val random              = new Random(1)
+        def mantissa(bits: Int) = (BigInt(1) << (bits - 1)) + (random.nextInt(4) match {
           case 0 => BigInt(0)
           case 1 => (BigInt(1) << (bits - 1)) - 1
           case _ => BigInt(bits - 1, random)
         })
-        val divisions  = Seq.fill(200)((mantissa(numeratorBits), mantissa(denominatorBits)))
-        val intervals  = FoldedDivider.intervals(digits, interval)
-        val quotients  = feed(dut.clock, dut.io.isStep, divisions, intervals)(
+        val divisions = Seq.fill(200)((mantissa(numeratorBits), mantissa(denominatorBits)))
+        val intervals = FoldedDivider.intervals(digits, interval)
+        val quotients = feed(dut.clock, dut.io.isStep, divisions, intervals)(
           division => {
             dut.io.numerator.poke(division.map(_._1).getOrElse(mantissa(numeratorBits)))
             dut.io.denominator.poke(division.map(_._2).getOrElse(mantissa(denominatorBits)))

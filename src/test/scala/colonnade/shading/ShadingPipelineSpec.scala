@@ -58,12 +58,12 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
           // A context has one hit at a time
           val inputs = Seq.tabulate(config.array.contexts) { context =>
             random.nextInt(if (config.hasEnvironment) 8 else 6) match {
-              case 0     => Left(stimulus.anyHit().copy(context = context))
-              case 1     => Left(stimulus.withoutSmoothNormal().copy(context = context))
-              case 2     => Left(stimulus.withoutNormal().copy(context = context))
-              case 6     => Right(stimulus.environmentPoint().copy(context = context))
-              case 7     => Right(stimulus.typicalPoint().copy(context = context))
-              case _     => Left(stimulus.surfaceHit(light).copy(context = context))
+              case 0 => Left(stimulus.anyHit().copy(context = context))
+              case 1 => Left(stimulus.withoutSmoothNormal().copy(context = context))
+              case 2 => Left(stimulus.withoutNormal().copy(context = context))
+              case 6 => Right(stimulus.environmentPoint().copy(context = context))
+              case 7 => Right(stimulus.typicalPoint().copy(context = context))
+              case _ => Left(stimulus.surfaceHit(light).copy(context = context))
             }
           }
           val stalls               = if (round % 2 == 0) 0.0 else 0.6
