@@ -1,9 +1,8 @@
 package colonnade.ray
 
 import chisel3._
-import chisel3.util.{Cat, Mux1H, RegEnable}
+import chisel3.util.{log2Ceil, Cat, Mux1H, RegEnable}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.frame.Tile
 import colonnade.numbers.{CarrySave, Fixed}
 
 /** What [[RayGenerator]] does, a ray per cycle while each pixel follows the one before it in the Morton order of a tile.
@@ -16,7 +15,7 @@ import colonnade.numbers.{CarrySave, Fixed}
 final class RayGeneratorPipeline(config: ColonnadeConfig) extends RayGeneratorModule(config) {
   private val numbers = config.numbers
   private val scene   = new RayFormats(numbers).scene
-  private val levels  = Tile.pixelLevels(config)
+  private val levels  = log2Ceil(config.frame.tileSize)
 
   // Control: a pixel waits in front for its direction; the back offers its ray
   private val inFront  = RegInit(false.B)
@@ -37,6 +36,19 @@ final class RayGeneratorPipeline(config: ColonnadeConfig) extends RayGeneratorMo
   when(sums && !follows) { bit := Mux(bit === 0.U, topBit.U, bit - 1.U) }
   when(inFront || inBack) { empty := 0.U }.elsewhen(!isNew) { empty := empty + 1.U }
 
+  // What is added. A pixel that follows sets the lowest clear bit of the Morton code before, and clears those below it. If
+  // it sets bit n of x, it adds stepX + stepY - (stepY << n); if bit n of y, stepX + stepY - (stepX << n + 1).
+  //
+  // For another pixel, the sum starts with 0 and goes through the bits of x and y from the top: it is doubled, and the
+  // steps whose bit is set are added. The camera's direction joins in at bit stepShift, so it needs no shifter.
+  private val code     = tileCode(position).asBools
+  private val sets     = code.indices.map(n => follows && code(n) && !code.take(n).fold(false.B)(_ || _))
+  private val clears   = sets.tail.reduce(_ || _)
+  private val addsX    = follows || bitOf(position.x)
+  private val addsY    = Mux(follows, clears, bitOf(position.y))
+  private val addsDir  = !follows && bit === io.registers.camera.stepShift
+  private val isDouble = !follows && bit =/= topBit.U
+
   // Datapath: the camera registers are constant, so their terms have no registers of their own
   private val pixel = RegEnable(position, moves)
   io.pixel             := pixel
@@ -54,31 +66,19 @@ final class RayGeneratorPipeline(config: ColonnadeConfig) extends RayGeneratorMo
     RayGenerator.shiftLeft(io.registers.camera.position.axes(axis), shift, scene.width)
   }
 
-  /** The next pixel sets the lowest clear bit of the Morton code, and clears the bits below it. If it sets bit n of x, it
-    * adds stepX + stepY - (stepY << n); if bit n of y, stepX + stepY - (stepX << n + 1).
-    *
-    * Another pixel starts with 0 and goes through the bits of x and y from the top: doubles the sum, and adds the steps
-    * whose bit is set. The camera's direction joins in at bit `stepShift`, so it needs no shifter.
-    */
   private def direction(axis: Int): SInt = {
     val bits   = numbers.directionBits
     val camera = io.registers.camera
-    val stepX  = camera.stepX.axes(axis).pad(bits).asUInt
-    val stepY  = camera.stepY.axes(axis).pad(bits).asUInt
-    val dir    = camera.dir.axes(axis).pad(bits).asUInt
+    val terms  = Seq(camera.stepX, camera.stepY, camera.dir).map(_.axes(axis).pad(bits).asUInt)
     val sum    = Reg(UInt(bits.W))
 
-    val code   = tileCode(position)
-    val sets   = (0 until 2 * levels).map(n => follows && code(n) && !code.asBools.take(n).fold(false.B)(_ || _))
-    val before = Mux1H(Seq(follows -> sum, (!follows && bit =/= topBit.U) -> (sum << 1)(bits - 1, 0)))
-    val addsX  = follows || bitOf(position.x)
-    val addsY  = Mux(follows, !sets.head, bitOf(position.y))
-    val less  = sets.indices.tail.map(n => sets(n) -> ~((if (n % 2 == 0) stepY else stepX) << (n + 1) / 2)(bits - 1, 0))
-    val third = Mux1H(((!follows && bit === camera.stepShift) -> dir) +: less)
+    def shifted(term: UInt, by: Int): UInt = (term << by)(bits - 1, 0)
+    val subtracted = sets.indices.tail.map(n => sets(n) -> ~shifted(terms((n + 1) % 2), (n + 1) / 2))
+    val third      = Mux1H((addsDir -> terms(2)) +: subtracted)
+    val before     = Mux1H(Seq(follows -> sum, isDouble -> shifted(sum, 1)))
 
-    val (steps, stepCarries) =
-      CarrySave(Mux(addsX, stepX, 0.U), Mux(addsY, stepY, 0.U), third, sets.tail.reduce(_ || _))
-    val (whole, carries) = CarrySave(before, steps, stepCarries)
+    val (steps, stepCarries) = CarrySave(Mux(addsX, terms(0), 0.U), Mux(addsY, terms(1), 0.U), third, clears)
+    val (whole, carries)     = CarrySave(before, steps, stepCarries)
     when(sums) { sum := whole + carries }
     sum.asSInt
   }

@@ -30,7 +30,10 @@ final class PrimaryRaysIO(config: ColonnadeConfig) extends Bundle {
   val meetsObject = Output(Bool())
 }
 
-/** Allocates an idle context to each pixel position, and generates its primary ray. */
+/** Allocates an idle context to each pixel position, and generates its primary ray.
+  *
+  * Throughput: that of [[RayGenerator]], while contexts are idle.
+  */
 final class PrimaryRays(config: ColonnadeConfig) extends Module {
   val io = IO(new PrimaryRaysIO(config))
 

@@ -161,8 +161,8 @@ object RayGeneratorSpec {
 
   /** The pixels of a tile in Morton order. */
   private def tile(config: ColonnadeConfig, random: Random): Seq[Pixel] = {
-    val levels = Tile.pixelLevels(config)
-    val corner = Seq.fill(2)(BigInt(config.numbers.coordinateBits - levels, random) << levels)
+    val levels                          = Tile.pixelLevels(config)
+    val corner                          = Seq.fill(2)(BigInt(config.numbers.coordinateBits - levels, random) << levels)
     def bits(code: Int, from: Int): Int = (0 until levels).map(level => (code >> (2 * level + from) & 1) << level).sum
     (0 until 1 << 2 * levels).map { code =>
       Pixel(random.nextInt(config.array.contexts), corner(0) + bits(code, 0), corner(1) + bits(code, 1))
