@@ -21,6 +21,9 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   val directionBits:  Int = (macBits + coordinateBits + 2).max(sceneBits + 1)
   val mantissaBits:   Int = precision.div / 2
 
+  /** The largest left shift of a position that is not out of the scene at once. */
+  val mostUnitShift: Int = (sceneBits - macBits).max(0)
+
   val shearFraction:      Int = gridBits - 2
   val shearDigits:        Int = shearFraction.min(mantissaBits)
   val reciprocalFraction: Int = vertexBits + 2

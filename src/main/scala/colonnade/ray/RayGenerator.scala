@@ -12,6 +12,9 @@ final class RayPosition(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
   val x       = UInt(config.numbers.coordinateBits.W)
   val y       = UInt(config.numbers.coordinateBits.W)
+
+  /** [[colonnade.formats.UnitPosition]]'s. */
+  val meetsObject = if (config.hasEnvironment) Some(Bool()) else None
 }
 
 /** The frame registers that define a primary ray. */

@@ -1,67 +1,106 @@
 package colonnade.ray
 
 import chisel3._
-import chisel3.util.RegEnable
-import colonnade.config.ColonnadeConfig
-import colonnade.numbers.{Fixed, Rounding}
+import chisel3.util.{log2Ceil, Cat, Mux1H, RegEnable}
+import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.numbers.{CarrySave, Fixed}
 
-/** What [[RayGenerator]] does, a ray every 2 cycles, with a multiplier and an adder for each component.
+/** What [[RayGenerator]] does, a ray per cycle while each pixel follows the one before it in the Morton order of a tile.
   *
-  * The front half multiplies by the step in x, then by that in y; the back half adds them up. The shifted camera registers
-  * are constant, so they have no registers of their own. Latency: a ray is offered 4 cycles after its pixel was accepted,
-  * if none waits before it. Source: docs/numbers.md, section 1.
+  * Such a pixel needs one addition to the direction before. The direction of another pixel is summed up bit by bit, in
+  * `coordinateBits` + 1 cycles. Any order gives the same rays. Latency: a ray is offered 2 cycles after its pixel was
+  * accepted, later by the cycles of a sum bit by bit, and if another ray waits before it. The registers may change when
+  * the unit has been empty for [[RayGeneratorPipeline.emptyCycles]] cycles. Source: docs/ray-setup.md, pipelines.
   */
 final class RayGeneratorPipeline(config: ColonnadeConfig) extends RayGeneratorModule(config) {
   private val numbers = config.numbers
   private val scene   = new RayFormats(numbers).scene
+  private val levels  = log2Ceil(config.frame.tileSize)
 
-  // Control: the front half multiplies by x, then by y; the back half adds the second product, then offers the ray
+  // Control: a pixel waits in front for its direction; the back offers its ray
   private val inFront  = RegInit(false.B)
-  private val ofY      = Reg(Bool())
   private val inBack   = RegInit(false.B)
-  private val isSummed = Reg(Bool())
-  private val leaves   = io.ray.ready && io.ray.valid
-  private val moves    = inFront && ofY && (!inBack || leaves)
-  private val adds     = inBack && !isSummed
+  private val empty    = RegInit(RayGeneratorPipeline.emptyCycles.U)
+  private val isNew    = empty === RayGeneratorPipeline.emptyCycles.U
+  private val position = RegEnable(io.position.bits, io.position.fire)
+  private val follows  = RegEnable(!isNew && isNext(position, io.position.bits), io.position.fire)
+  private val topBit   = numbers.coordinateBits
+  private val bit      = RegInit(topBit.U)
+  private val sums     = inFront && (!inBack || io.ray.ready)
+  private val moves    = sums && (follows || bit === 0.U)
 
-  io.ray.valid      := inBack && isSummed
+  io.ray.valid      := inBack
   io.position.ready := !inFront || moves
-  when(inFront && !ofY) { ofY := true.B }
-  when(moves) { inFront := false.B }
-  when(io.position.fire) {
-    inFront := true.B
-    ofY     := false.B
-  }
-  when(adds) { isSummed := true.B }
-  when(leaves) { inBack := false.B }
-  when(moves) {
-    inBack   := true.B
-    isSummed := false.B
-  }
+  inFront           := io.position.valid || (inFront && !moves)
+  inBack            := moves || (inBack && !io.ray.ready)
+  when(sums && !follows) { bit := Mux(bit === 0.U, topBit.U, bit - 1.U) }
+  when(inFront || inBack) { empty := 0.U }.elsewhen(!isNew) { empty := empty + 1.U }
 
-  // Datapath: the front half is never at its second product while the back half adds
-  private val position   = RegEnable(io.position.bits, io.position.fire)
-  private val pixel      = RegEnable(position, moves)
-  private val coordinate = Mux(ofY, position.y, position.x).zext
-  private val multiplies = moves || (inFront && !ofY)
-  private val camera     = io.registers.camera
+  // What is added. A pixel that follows sets the lowest clear bit of the Morton code before, and clears those below it. If
+  // it sets bit n of x, it adds stepX + stepY - (stepY << n); if bit n of y, stepX + stepY - (stepX << n + 1).
+  //
+  // For another pixel, the sum starts with 0 and goes through the bits of x and y from the top: it is doubled, and the
+  // steps whose bit is set are added. The camera's direction joins in at bit stepShift, so it needs no shifter.
+  private val code     = tileCode(position).asBools
+  private val sets     = code.indices.map(n => follows && code(n) && !code.take(n).fold(false.B)(_ || _))
+  private val clears   = sets.tail.reduce(_ || _)
+  private val addsX    = follows || bitOf(position.x)
+  private val addsY    = Mux(follows, clears, bitOf(position.y))
+  private val addsDir  = !follows && bit === io.registers.camera.stepShift
+  private val isDouble = !follows && bit =/= topBit.U
 
-  private def component(axis: Int): SInt = {
-    val step = Mux(ofY, camera.stepY.axes(axis), camera.stepX.axes(axis))
-    val term = RegEnable(step * coordinate, multiplies)
-    val base = RayGenerator.shiftLeft(camera.dir.axes(axis), camera.stepShift, numbers.directionBits)
-    // The sums cannot overflow: directionBits holds all three terms.
-    val sum = Reg(SInt(numbers.directionBits.W))
-    when(moves || adds) { sum := Rounding.narrow(Mux(adds, sum, base) +& term, numbers.directionBits) }
-    sum
-  }
-
+  // Datapath: the camera registers are constant, so their terms have no registers of their own
+  private val pixel = RegEnable(position, moves)
   io.pixel             := pixel
   io.ray.bits.context  := pixel.context
   io.ray.bits.isShadow := false.B
   (0 until 3).foreach { axis =>
-    val origin = RayGenerator.shiftLeft(camera.position.axes(axis), io.registers.unitShift, scene.width)
-    io.ray.bits.origin.axes(axis) := Fixed(scene, origin)
-    io.ray.bits.dir.axes(axis)    := component(axis)
+    io.ray.bits.origin.axes(axis) := Fixed(scene, origin(axis))
+    io.ray.bits.dir.axes(axis)    := direction(axis)
   }
+
+  /** The shift has as many bits as its legal values: `RegisterLimits`. */
+  private def origin(axis: Int): SInt = {
+    val shiftBits = NumberFormats.bitLength(numbers.mostUnitShift)
+    val shift     = if (shiftBits == 0) 0.U(0.W) else io.registers.unitShift(shiftBits - 1, 0)
+    RayGenerator.shiftLeft(io.registers.camera.position.axes(axis), shift, scene.width)
+  }
+
+  private def direction(axis: Int): SInt = {
+    val bits   = numbers.directionBits
+    val camera = io.registers.camera
+    val terms  = Seq(camera.stepX, camera.stepY, camera.dir).map(_.axes(axis).pad(bits).asUInt)
+    val sum    = Reg(UInt(bits.W))
+
+    def shifted(term: UInt, by: Int): UInt = (term << by)(bits - 1, 0)
+    val subtracted = sets.indices.tail.map(n => sets(n) -> ~shifted(terms((n + 1) % 2), (n + 1) / 2))
+    val third      = Mux1H((addsDir -> terms(2)) +: subtracted)
+    val before     = Mux1H(Seq(follows -> sum, isDouble -> shifted(sum, 1)))
+
+    val (steps, stepCarries) = CarrySave(Mux(addsX, terms(0), 0.U), Mux(addsY, terms(1), 0.U), third, clears)
+    val (whole, carries)     = CarrySave(before, steps, stepCarries)
+    when(sums) { sum := whole + carries }
+    sum.asSInt
+  }
+
+  /** The bit of a coordinate that is added; the highest step has none. */
+  private def bitOf(coordinate: UInt): Bool = (0.U(1.W) ## coordinate)(bit)
+
+  /** Whether a pixel follows another one in a tile. */
+  private def isNext(before: RayPosition, pixel: RayPosition): Bool = {
+    def tile(pixel: RayPosition): UInt = (pixel.y >> levels) ## (pixel.x >> levels)
+    tileCode(pixel) === tileCode(before) +& 1.U && tile(pixel) === tile(before)
+  }
+
+  /** The Morton code of a pixel in its tile. */
+  private def tileCode(pixel: RayPosition): UInt =
+    Cat((0 until levels).reverse.flatMap(level => Seq(pixel.y, pixel.x).map(_.pad(levels)(level))))
+}
+
+object RayGeneratorPipeline {
+
+  /** Cycles that a [[RayGeneratorPipeline]] must have been empty before the registers may change. A primary ray takes
+    * longer to become a pixel.
+    */
+  val emptyCycles = 8
 }

@@ -30,7 +30,10 @@ final class PrimaryRaysIO(config: ColonnadeConfig) extends Bundle {
   val meetsObject = Output(Bool())
 }
 
-/** Allocates an idle context to each pixel position, and generates its primary ray. */
+/** Allocates an idle context to each pixel position, and generates its primary ray.
+  *
+  * Throughput: that of [[RayGenerator]], while contexts are idle.
+  */
 final class PrimaryRays(config: ColonnadeConfig) extends Module {
   val io = IO(new PrimaryRaysIO(config))
 
@@ -42,7 +45,8 @@ final class PrimaryRays(config: ColonnadeConfig) extends Module {
   generator.io.position.bits.context := free.bits
   generator.io.position.bits.x       := position.x
   generator.io.position.bits.y       := position.y
-  io.positions.ready                 := generator.io.position.ready && free.valid
+  generator.io.position.bits.meetsObject.zip(position.meetsObject).foreach { case (to, from) => to := from }
+  io.positions.ready := generator.io.position.ready && free.valid
 
   io.control.allocate       := generator.io.position.fire
   io.start.valid            := generator.io.position.fire
@@ -55,10 +59,5 @@ final class PrimaryRays(config: ColonnadeConfig) extends Module {
   io.ray :<>= generator.io.ray
   io.pixel.x     := generator.io.pixel.x
   io.pixel.y     := generator.io.pixel.y
-  io.meetsObject := true.B
-  for (meetsObject <- position.meetsObject) {
-    val table = Reg(Vec(config.array.contexts, Bool()))
-    when(io.allocated.valid) { table(free.bits) := meetsObject }
-    io.meetsObject := table(io.ray.bits.context)
-  }
+  io.meetsObject := generator.io.pixel.meetsObject.getOrElse(true.B)
 }

@@ -5,6 +5,7 @@ import chiseltest._
 import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Vec3
+import colonnade.frame.Tile
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -28,23 +29,45 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
           for (frame <- frames(config, random)) {
             setRegisters(generator, frame)
             run(generator, pixels(config, random, 12), random)(frame)
+            run(generator, tileWithGaps(config, random), random)(frame)
+            // Then the registers change, even if the next pixel would follow the last one
+            stop(generator, RayGeneratorPipeline.emptyCycles)
           }
         }
       }
     }
 
-    val interval = if (pipelined) 2 else 8
-    it should s"accept a pixel every $interval cycles, $kind" in {
-      test(RayGenerator(withPipeline(TestConfigs.tiny, pipelined))) { generator =>
+    it should s"forget the registers when it is empty, $kind" in {
+      val config = withPipeline(TestConfigs.tiny, pipelined)
+      test(RayGenerator(config)) { generator =>
+        val random = new Random(2)
+        val pixels = tile(config, random)
+        for ((frame, pixel) <- frames(config, random).zip(pixels)) {
+          setRegisters(generator, frame)
+          run(generator, Seq(pixel), random)(frame)
+          stop(generator, RayGeneratorPipeline.emptyCycles)
+        }
+      }
+    }
+
+    val interval = if (pipelined) 1 else 8
+    it should s"accept a pixel of a tile every $interval cycles, $kind" in {
+      val config = withPipeline(TestConfigs.tiny, pipelined)
+      test(RayGenerator(config)) { generator =>
+        val pixels = tile(config, new Random(3))
         generator.io.position.valid.poke(true)
         generator.io.ray.ready.poke(true)
         var taken = Seq.empty[Int]
-        for (cycle <- 0 until 100) {
+        for (cycle <- 0 until 200 if taken.size < pixels.size) {
+          poke(generator, pixels(taken.size))
           if (generator.io.position.ready.peekBoolean()) taken :+= cycle
           generator.clock.step()
         }
-        taken.zip(taken.tail).foreach { case (one, next) => next - one should be <= interval }
-        taken.size should be > 10
+        val intervals = taken.zip(taken.tail).map { case (one, next) => next - one }
+        // The second pixel waits for the direction of the first one
+        intervals.head should be <= interval.max(config.numbers.coordinateBits + 1)
+        all(intervals.tail) should be <= interval
+        taken.size should be > 20
       }
     }
   }
@@ -59,9 +82,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       generator.io.ray.ready.poke(accepts)
       // Bits without valid must have no effect
       val offered = if (offers) pixels(sent) else pixels(random.nextInt(pixels.size))
-      generator.io.position.bits.context.poke(offered.context)
-      generator.io.position.bits.x.poke(offered.x)
-      generator.io.position.bits.y.poke(offered.y)
+      poke(generator, offered)
       if (accepts && generator.io.ray.valid.peekBoolean()) {
         expect(generator.io.ray.bits, pixels(received), frame)
         generator.io.pixel.x.expect(pixels(received).x)
@@ -72,6 +93,18 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       generator.clock.step()
       cycle += 1
     }
+  }
+
+  private def poke(generator: RayGeneratorModule, pixel: Pixel): Unit = {
+    generator.io.position.bits.context.poke(pixel.context)
+    generator.io.position.bits.x.poke(pixel.x)
+    generator.io.position.bits.y.poke(pixel.y)
+  }
+
+  /** Leaves the empty generator without a pixel. */
+  private def stop(generator: RayGeneratorModule, cycles: Int): Unit = {
+    generator.io.position.valid.poke(false)
+    generator.clock.step(cycles)
   }
 
   private def expect(ray: RayRequest, pixel: Pixel, frame: Frame): Unit = {
@@ -109,10 +142,10 @@ object RayGeneratorSpec {
     def any(bits:     Int): BigInt       = BigInt(bits, random) - (BigInt(1) << (bits - 1))
     val maxShift                         = numbers.coordinateBits
     Seq(least, most).map(v =>
-      Frame(vector(v), vector(v), vector(v), vector(v), maxShift, numbers.sceneBits - numbers.macBits)
+      Frame(vector(v), vector(v), vector(v), vector(v), maxShift, numbers.mostUnitShift)
     ) ++
       Seq.fill(4) {
-        val unitShift = random.nextInt(numbers.sceneBits - 1)
+        val unitShift = random.nextInt(numbers.mostUnitShift + 1)
         val position  = vector(any(numbers.macBits.min(numbers.sceneBits - unitShift)))
         def steps     = vector(any(numbers.macBits))
         Frame(position, steps, steps, steps, random.nextInt(maxShift + 1), unitShift)
@@ -124,6 +157,29 @@ object RayGeneratorSpec {
     val corners: Seq[BigInt] = Seq(0, (BigInt(1) << bits) - 1)
     val extreme = for (x <- corners; y <- corners) yield Pixel(1, x, y)
     extreme ++ Seq.fill(count)(Pixel(random.nextInt(config.array.contexts), BigInt(bits, random), BigInt(bits, random)))
+  }
+
+  /** The pixels of a tile in Morton order. */
+  private def tile(config: ColonnadeConfig, random: Random): Seq[Pixel] = {
+    val levels                          = Tile.pixelLevels(config)
+    val corner                          = Seq.fill(2)(BigInt(config.numbers.coordinateBits - levels, random) << levels)
+    def bits(code: Int, from: Int): Int = (0 until levels).map(level => (code >> (2 * level + from) & 1) << level).sum
+    (0 until 1 << 2 * levels).map { code =>
+      Pixel(random.nextInt(config.array.contexts), corner(0) + bits(code, 0), corner(1) + bits(code, 1))
+    }
+  }
+
+  /** The same, but some pixels are left out, and some moved to a tile beside it. */
+  private def tileWithGaps(config: ColonnadeConfig, random: Random): Seq[Pixel] = {
+    val size = BigInt(config.frame.tileSize)
+    tile(config, random).flatMap { pixel =>
+      random.nextInt(16) match {
+        case 0 => None
+        case 1 => Some(pixel.copy(x = pixel.x ^ size))
+        case 2 => Some(pixel.copy(y = pixel.y ^ size))
+        case _ => Some(pixel)
+      }
+    }
   }
 
   private def setRegisters(generator: RayGeneratorModule, frame: Frame): Unit = {
