@@ -12,7 +12,7 @@ from pathlib import Path
 #: Units of each level in the order of the data flow. The remaining logic of the level's module is one more unit.
 PATHS = (
     *("RayGenerator", "RayGeneratorPipeline", "RaySetup", "RaySetupPipeline", "Shader", "ShadingPipeline"),
-    *("BounceUnit", "BouncePipeline", "BouncePool", "ShadowRays", "ShadowRaysPipeline", "ColourUnit", "ColourPipeline"),
+    *("BounceUnit", "BouncePipeline", "ShadowRays", "ShadowRaysPipeline", "ColourUnit", "ColourPipeline"),
     *("BounceScheduler", "EnvironmentStage", "EnvironmentRays", "RtController"),
 )
 TRACE = ("BoxUnit", "TraversalStack", "TriangleUnit", "RecordFetch", "HitTable")

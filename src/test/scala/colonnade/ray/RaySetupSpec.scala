@@ -2,7 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chiseltest._
-import colonnade.{Always, Simulation, TestConfigs}
+import colonnade.{Always, Matrix, Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
 import org.scalatest.Tag
@@ -32,7 +32,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     (TestConfigs.formats :+ narrowTests).foreach { formats =>
       val name = s"$kind, ${formats.precision} with ${formats.geometry.vertexBits}-bit vertices and " +
         s"${formats.numbers.gridBits}-bit triangle tests"
-      it should s"equal the model under random stalls, $name" taggedAs tag(formats) in {
+      it should s"equal the model under random stalls, $name" taggedAs tag(formats, pipelined) in {
         val config = withPipeline(formats, pipelined)
         test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
           val random = new Random(2)
@@ -118,7 +118,8 @@ object RaySetupSpec {
   private val narrowTests: ColonnadeConfig =
     TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(triangleBits = Some(24)))
 
-  private def tag(config: ColonnadeConfig): Tag = if (config == narrowTests) Always else Always.ifExtreme(config)
+  private def tag(config: ColonnadeConfig, pipelined: Boolean): Tag =
+    if (config == narrowTests) Always else if (pipelined) Matrix else Always.ifExtreme(config)
 
   private def withPipeline(config: ColonnadeConfig, pipelined: Boolean): ColonnadeConfig =
     config.copy(units = config.units.copy(pipelined = pipelined))

@@ -3,7 +3,7 @@ package colonnade.shading
 import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.{Simulation, TestConfigs}
+import colonnade.{Always, Matrix, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -29,7 +29,11 @@ class ColourPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       frame = base.frame.copy(lights = lights, maxBounces = maxBounces, emission = lights == 3)
     )
     val where = if (hasEnvironment) " in an environment" else ""
-    it should s"give the colours of ColourUnit with $lights lights and $maxBounces bounces$where" in
+    it should s"give the colours of ColourUnit with $lights lights and $maxBounces bounces$where" taggedAs (if (
+                                                                                                              maxBounces == 0 || !hasEnvironment
+                                                                                                            ) Matrix
+                                                                                                            else
+                                                                                                              Always) in
       test(new ColourHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         val random = new Random(lights)
         val script = new ColourScript(config, random)

@@ -92,7 +92,8 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       units = TestConfigs.tiny.units.copy(boxLanes = 4, triangleLanes = 2),
       columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(recordBuffers = 3)
     ),
-    "wide units"
+    "wide units",
+    Matrix
   )
   render(
     TestConfigs.withPrecision(16, 16, 32).copy(
