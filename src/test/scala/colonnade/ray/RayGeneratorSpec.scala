@@ -1,11 +1,11 @@
 package colonnade.ray
 
 import chisel3._
+import chisel3.util.log2Ceil
 import chiseltest._
 import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Vec3
-import colonnade.frame.Tile
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -161,7 +161,7 @@ object RayGeneratorSpec {
 
   /** The pixels of a tile in Morton order. */
   private def tile(config: ColonnadeConfig, random: Random): Seq[Pixel] = {
-    val levels                          = Tile.pixelLevels(config)
+    val levels                          = log2Ceil(config.frame.tileSize)
     val corner                          = Seq.fill(2)(BigInt(config.numbers.coordinateBits - levels, random) << levels)
     def bits(code: Int, from: Int): Int = (0 until levels).map(level => (code >> (2 * level + from) & 1) << level).sum
     (0 until 1 << 2 * levels).map { code =>
