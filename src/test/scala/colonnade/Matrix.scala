@@ -9,6 +9,8 @@ object Matrix extends Tag("colonnade.Matrix")
 /** Marks a spec that `sbt test` always runs. */
 object Always extends Tag("colonnade.Always") {
 
+  def unless(isMiddle: Boolean): Tag = if (isMiddle) Matrix else this
+
   /** For a spec that runs in many formats: the narrowest, the widest and that of the presets always run. */
   def ifExtreme(config: ColonnadeConfig): Tag = {
     val extremes = Seq(TestConfigs.tiny, TestConfigs.withPrecision(16, 16, 16), TestConfigs.withPrecision(64, 64, 64))

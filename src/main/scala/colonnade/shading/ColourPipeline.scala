@@ -11,7 +11,7 @@ import colonnade.numbers.{Fixed, Rounding}
   * end ────┬▶ read ─▶ light · transmittance ─▶ light · albedo  ─▶ throughput · colour ─▶ colour, path
   * bounce ─┘          throughput · tint        tinted · Fresnel   part · behind
   * }}}
-  * An end takes 1 + 3 · lights cycles, in the background 4. A bounce takes 6, and 3 · lights more if its reflection shows
+  * An end takes 1 + 3 · lights cycles, with the lights that are on, at least one; in the background 4. A bounce takes 6, and 3 · lights more if its reflection shows
   * a surface. Colours come in any order; the throughput and radiance of every path are in a table.
   */
 final class ColourPipeline(config: ColonnadeConfig) extends Module {
@@ -52,7 +52,7 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
   private val isFirst   = channel === 0.U && light === 0.U
   private val waits     = isUpdating || (isFirst && needsRatio && ratios.map(_.busy).getOrElse(false.B))
   private val issues    = isIssuing && !waits
-  private val lastLight = !ofSurface || light === (lights - 1).U
+  private val lastLight = !ofSurface || light +& 1.U >= io.shading.lights // a light that is off adds nothing
   private val lastPass  = !(isBounce && ofSurface)
   private val isLast    = issues && lastLight && lastPass && channel === 2.U
   when(issues) {

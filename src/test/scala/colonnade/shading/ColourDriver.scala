@@ -31,6 +31,9 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
 
   private val one = 4096
 
+  /** Lights that are on. */
+  var lights: Int = config.frame.lights
+
   private def xyz(value: => Int): Seq[Int] = Seq.fill(3)(value)
 
   private def colour(): Seq[Int] =
@@ -44,7 +47,11 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
     (if (random.nextBoolean()) intensity() else xyz(0), colour(), random.nextInt(one + 1))
 
   def surface(): LitColours =
-    LitColours(colour(), Seq.fill(config.frame.lights)(intensity()), if (random.nextBoolean()) colour() else xyz(0))
+    LitColours(
+      colour(),
+      Seq.tabulate(config.frame.lights)(light => if (light < lights) intensity() else xyz(0)),
+      if (random.nextBoolean()) colour() else xyz(0)
+    )
 
   def path(): Seq[ColourEvent] = {
     val bounces = if (config.frame.hasBounces) random.nextInt(4) else 0
@@ -80,7 +87,8 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
 
   def isDone: Boolean = todo.forall(_.isEmpty) && waits.forall(_.isEmpty)
 
-  def registers(values: (Seq[Int], Seq[Int], Int)): Unit = {
+  def registers(values: (Seq[Int], Seq[Int], Int), lights: Int = config.frame.lights): Unit = {
+    io.shading.lights.poke(lights)
     poke(io.ambient, values._1)
     pokeUInt(io.background, values._2)
     io.shading.shadowTransmittance.foreach(_.pokeRaw(values._3))
