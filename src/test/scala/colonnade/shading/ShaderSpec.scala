@@ -3,7 +3,8 @@ package colonnade.shading
 import chiseltest._
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.StreamTester
-import colonnade.{Model, Simulation, TestConfigs}
+import colonnade.{Always, Matrix, Model, Simulation, TestConfigs}
+import org.scalatest.Tag
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -67,17 +68,26 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   ) {
     val name = nameOf(config)
 
-    it should s"equal the model with $name" in test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
-      val random   = new Random(20)
-      val stimulus = new ShaderStimulus(config, random)
-      val rounds   = Seq.fill(8) {
-        val light = stimulus.light()
-        val hits  = Seq.fill(3)(stimulus.surfaceHit(light)) :+ stimulus.anyHit() :+ stimulus.withoutSmoothNormal()
-        light -> random.shuffle(hits)
+    it should s"equal the model with $name" taggedAs tag(config) in
+      test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
+        val random   = new Random(20)
+        val stimulus = new ShaderStimulus(config, random)
+        val rounds   = Seq.fill(8) {
+          val light = stimulus.light()
+          val hits  = Seq.fill(3)(stimulus.surfaceHit(light)) :+ stimulus.anyHit() :+ stimulus.withoutSmoothNormal()
+          light -> random.shuffle(hits)
+        }
+        val ties = Seq.fill(2)(stimulus.light().copy(offset = random.nextInt(64)) -> Seq.fill(5)(stimulus.halfway()))
+        check(shader, config, rounds ++ ties ++ extremes(config, stimulus) ++ atTheLight(stimulus), random, _ % 2 * 0.7)
       }
-      val ties = Seq.fill(2)(stimulus.light().copy(offset = random.nextInt(64)) -> Seq.fill(5)(stimulus.halfway()))
-      check(shader, config, rounds ++ ties ++ extremes(config, stimulus) ++ atTheLight(stimulus), random, _ % 2 * 0.7)
-    }
+  }
+
+  /** [[ShadingPipelineSpec]] covers other formats of the pipeline. */
+  private def tag(config: ColonnadeConfig): Tag = {
+    val common = Seq(pipelined(TestConfigs.tiny), TestConfigs.withColours.head)
+    if (common.contains(config.copy(physicalAttributeMemory = None))) Always
+    else if (config.units.pipelined || config.geometry.cornerColours) Matrix
+    else Always.ifExtreme(config)
   }
 
   private def nameOf(config: ColonnadeConfig): String =
@@ -230,7 +240,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       pipelined(TestConfigs.withTextures)
     )).map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment)))
   )
-    it should s"light points of an environment between hits, with ${nameOf(config)}" in
+    it should s"light points of an environment between hits, with ${nameOf(config)}" taggedAs tag(config) in
       test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
         val random   = new Random(25)
         val stimulus = new ShaderStimulus(config, random)
