@@ -117,7 +117,8 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       units = TestConfigs.tiny.units.copy(marches = 1),
       physicalAttributeMemory = Some(TestConfigs.environment.copy(encoding = MapEncoding.Sliding))
     ),
-    "with an environment, a march of the column, one context, no bounces"
+    "with an environment, a march of the column, one context, no bounces",
+    Matrix
   )
   render(
     TestConfigs.withColours.head.copy(
