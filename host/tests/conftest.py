@@ -56,6 +56,7 @@ def manifest_data(
         "version": 1,
         "config": {
             "array": {"rows": 1, "columns": 1, "contexts": 8},
+            "units": {"pathContexts": 0},
             "geometry": {
                 "vertexBits": vertex_bits,
                 "boxBits": box_bits,
