@@ -21,6 +21,7 @@ COLUMN = (
     "PathHits",
     "RayBus",
     "ResultBus",
+    "SharedTriangles",
     "ColumnBvhController",
     "ColumnEnvironment",
     "EnvironmentMarches",
