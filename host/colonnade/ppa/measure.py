@@ -58,7 +58,8 @@ def measure(
             with progress.step(f"synthesising {name}"):
                 for each in (*hierarchy.parts(module), module):
                     netlists[each] = synthesise(hierarchy, each, tech, progress)
-                units[name] = _unit(level, module, netlists, hierarchy.parts(module), tech)
+                count = hierarchy.instances(module, level)
+                units[name] = _unit(level, module, count, netlists, hierarchy.parts(module), tech)
             finished(level.name, name, units[name])
     with progress.step("timing the whole render unit"):
         whole = _timing(Netlist(netlists, hierarchy.levels[0].top, tech.library), tech) if tech.library else None
@@ -102,11 +103,13 @@ def measure(
 
 
 def _unit(
-    level: Level, module: str, netlists: Mapping[str, Any], parts: Mapping[str, int], tech: Technology
+    level: Level, module: str, count: int, netlists: Mapping[str, Any], parts: Mapping[str, int], tech: Technology
 ) -> dict[str, Any]:
+    """The area of all `count` instances of a unit in its level, and its paths."""
     own = count_gates(netlists[module], tech)
     of_parts = {part: count_gates(netlists[part], tech) for part in parts}
-    counts = [(own, 1), *((of_parts[part], number) for part, number in parts.items())]
+    all_parts = {part: number * count for part, number in parts.items()}
+    counts = [(own, count), *((of_parts[part], number) for part, number in all_parts.items())]
     registers = sum(gates.registers * number for gates, number in counts)
     combinational = sum(gates.combinational * number for gates, number in counts)
     area = tech.gate_area
@@ -121,6 +124,7 @@ def _unit(
     return {
         "level": level.name,
         "module": module,
+        "count": count,
         "kge": (registers + combinational) / 1e3,
         "flops": sum(gates.flops * number for gates, number in counts),
         "flops_kge": registers / 1e3,
@@ -134,7 +138,7 @@ def _unit(
                 "flops": of_parts[part].flops * number,
                 "um2": None if area is None else of_parts[part].total * number * area,
             }
-            for part, number in parts.items()
+            for part, number in all_parts.items()
         },
     }
 

@@ -68,12 +68,15 @@ SEPARATE = (
 #: A column has a path unit, and its render units are traversal units.
 SHARED = (
     Level("render_unit", "TraversalUnit", TRACE, "contexts"),
-    Level("column", "Column", (*PATHS, *COLUMN), "rest of Column"),
+    Level("column", "Column", (*PATHS, *COLUMN, "TriangleUnit"), "rest of Column"),
     ARRAY,
 )
 
 #: Modules of a column that follow the paths of its traversal units.
 PATH_MODULES = ("PathUnit", "PathHits", "RayBus", "ResultBus")
+
+#: Triangle units of some rows of a column.
+TRIANGLE_ROWS = "SharedTriangles"
 
 #: Names of the levels, the lowest first.
 LEVEL_NAMES = tuple(level.name for level in SEPARATE)
@@ -154,7 +157,12 @@ class Hierarchy:
 
     def units(self, level: Level) -> list[str]:
         """The units of a level that this design has."""
-        return [unit for unit in level.units if unit in self.files]
+        return [unit for unit in level.units if unit in self.files and self.instances(unit, level)]
+
+    def instances(self, unit: str, level: Level) -> int:
+        """Number of instances of a unit in a level, without those in the levels below."""
+        below = {other.top for other in self.levels} - {level.top}
+        return 1 if unit == level.top else self.count(unit, level.top, below)
 
     def closure(self, top: str) -> tuple[list[str], list[str]]:
         """The modules that belong to `top`, and its black boxes: other units, parts and memories."""
@@ -220,7 +228,7 @@ class Hierarchy:
         for level in self.levels:
             for unit in (*self.units(level), level.top):
                 for module in modules:
-                    number = self.count(module, unit, BOUNDARIES - {unit})
+                    number = self.count(module, unit, BOUNDARIES - {unit}) * self.instances(unit, level)
                     if number:
                         yield module, level.name, level.rest if unit == level.top else unit, number
 

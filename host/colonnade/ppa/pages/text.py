@@ -48,7 +48,7 @@ class UnitTable:
         fo4 = [(paths.get(kind) or {}).get("fo4") for kind in PATHS]
         self._table.print(
             TITLES[level],
-            name,
+            name if unit["count"] == 1 else f"{unit['count']} × {name}",
             unit["kge"],
             unit["flops_kge"],
             unit["combinational_kge"],
