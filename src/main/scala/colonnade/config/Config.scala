@@ -75,7 +75,7 @@ final case class GeometryConfig(
 /** Parallel lanes in a render unit, and what the units of a column share.
   *
   * @param boxLanes      children that the box unit tests per cycle
-  * @param triangleLanes parallel triangle units of four cycles per test
+  * @param triangleLanes parallel triangle units
   * @param marches       environment marches that the render units of a column share; 0: one in every render unit
   * @param directView    with shared marches: a pipeline of the column for directly seen pixels of an environment
   * @param pathContexts  pixels in flight in the path unit that a column has; 0: every render unit follows its own paths
