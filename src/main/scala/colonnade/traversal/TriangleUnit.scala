@@ -30,7 +30,7 @@ final private class PendingTriangle(config: ColonnadeConfig) extends Bundle {
   * Throughput: a record whose two triangles share an edge every 5 cycles, any other triangle every 4 cycles; one result
   * for each triangle, in order. Latency of a miss: 10 cycles. A triangle that the ray's line crosses continues to
   * weights, numerator and division. Its latency is about 30 cycles plus a quarter of the quotient's digits; its
-  * throughput is one every 8 cycles or one per rotation of the dividers, whichever is longer.
+  * throughput is one every 7 cycles or one per rotation of the dividers, whichever is longer.
   *
   * {{{
   * candidate ▸ sequencer ▸ shear ▸ edges ▸ (crossed: weights ▸ numerator ▸ distance) ▸ result
