@@ -198,6 +198,7 @@ SMALL_ARRAY = {
     "units": {
         "boxLanes": 2,
         "triangleLanes": 1,
+        "triangleRows": 1,
         "marches": 0,
         "directView": False,
         "pathContexts": 0,

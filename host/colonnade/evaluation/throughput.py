@@ -62,8 +62,9 @@ class Shape:
         units = columns * int(config["array"]["rows"])
         banks = columns * int(config["columnBvhMemory"]["banks"])
         lanes, shared = int(config["units"]["triangleLanes"]), int(config["units"]["pathContexts"])
+        groups = columns * -(-int(config["array"]["rows"]) // int(config["units"]["triangleRows"]))
         contexts = columns * shared or units * int(config["array"]["contexts"])
-        return Shape(units, columns if shared else units, units * lanes, contexts, columns, banks)
+        return Shape(units, columns if shared else units, groups * lanes, contexts, columns, banks)
 
 
 def figures(report: Mapping[str, Any]) -> dict[str, Any]:

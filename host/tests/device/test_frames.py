@@ -70,11 +70,18 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     assert simulated.frames[0].is_object.any()
 
 
-@pytest.mark.parametrize("precision", ["16b16s32d", pytest.param("24b24s64d", marks=pytest.mark.matrix), "32b32s64d"])
-def test_corner_colours_textures_and_emission_equal_the_model(precision: str) -> None:
+@pytest.mark.parametrize(
+    ("precision", "units"),
+    [
+        ("16b16s32d", ()),
+        pytest.param("24b24s64d", ("units.pathContexts=24", "units.pipelined=true"), marks=pytest.mark.matrix),
+        ("32b32s64d", ()),
+    ],
+)
+def test_corner_colours_textures_and_emission_equal_the_model(precision: str, units: tuple[str, ...]) -> None:
     """Diffuse, mirroring and clear faces with textures or colours at their corners, and emissive faces with neither."""
     options = ("geometry.cornerColours=true", "geometry.textureBytes=16384", "frame.maxBounces=4", "array.rows=2")
-    options += ("frame.emission=true",)
+    options += ("frame.emission=true", *units)
     design = design_for("tiny", (f"precision={precision}", "geometry.triangleBits=null", *options))
     mesh = load_mesh("teapot:4")
     kinds = [(kind, shown) for shown in ("texture", "colours") for kind in ("diffuse", "mirror", "glass")]

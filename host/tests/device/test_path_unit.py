@@ -30,7 +30,14 @@ FRAME = ("columnBvhMemory.holdable=true", "frame.maxBounces=4", "frame.lights=2"
 
 #: Name, precision, overrides.
 SHAPES = [
-    ("three traversal units", "tiny", ("array.rows=3", "units.pathContexts=24", "units.pipelined=true")),
+    (
+        "three traversal units, two of them share two triangle units",
+        "tiny",
+        (
+            *("array.rows=3", "units.pathContexts=24", "units.pipelined=true"),
+            *("units.triangleRows=2", "units.triangleLanes=2"),
+        ),
+    ),
     pytest.param(
         ("sequential parts", "tiny", ("array.rows=2", "units.pathContexts=7", "columnBvhMemory.snooping=false")),
         marks=pytest.mark.matrix,

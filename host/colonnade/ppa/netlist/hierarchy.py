@@ -21,6 +21,7 @@ COLUMN = (
     "PathHits",
     "RayBus",
     "ResultBus",
+    "SharedTriangles",
     "ColumnBvhController",
     "ColumnEnvironment",
     "EnvironmentMarches",
@@ -70,6 +71,9 @@ SHARED = (
     Level("column", "Column", (*PATHS, *COLUMN), "rest of Column"),
     ARRAY,
 )
+
+#: Modules of a column that follow the paths of its traversal units.
+PATH_MODULES = ("PathUnit", "PathHits", "RayBus", "ResultBus")
 
 #: Names of the levels, the lowest first.
 LEVEL_NAMES = tuple(level.name for level in SEPARATE)
@@ -137,6 +141,16 @@ class Hierarchy:
     def levels(self) -> tuple[Level, ...]:
         """The levels of this design, the lowest first."""
         return SHARED if "TraversalUnit" in self.files else SEPARATE
+
+    @property
+    def has_path_unit(self) -> bool:
+        """A column has a path unit."""
+        return self.levels == SHARED
+
+    @property
+    def replayed(self) -> tuple[str, ...]:
+        """The modules whose power is measured: the render unit, then the modules that follow its paths."""
+        return (self.levels[0].top, *(PATH_MODULES if self.has_path_unit else ()))
 
     def units(self, level: Level) -> list[str]:
         """The units of a level that this design has."""

@@ -11,6 +11,12 @@ from colonnade.ppa.power.report import VOLTAGE_28NM
 #: Titles of the two power figures, by key.
 KINDS = {"zero_delay": "without glitches", "glitch_aware": "with glitches"}
 
+#: What the figures leave out, without and with a path unit.
+OUTSIDE = (
+    "Units of column and array are not included.",
+    "A path unit counts with this unit's share of the in-box rays; other units of column and array are not included.",
+)
+
 
 def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
     """Power of a render unit and of its units, energy per ray, and the method."""
@@ -18,10 +24,12 @@ def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
     window, scene = power["window"], power["scene"]
     yield ""
     width, height = scene["size"]
+    has_path_unit = report["config"]["units"]["pathContexts"] > 0
+    of_column = f" in the column, whose row 0 traces {window['rays_traced']:,} of them" if has_path_unit else ""
     yield (
         f"power of a render unit at {power['clock_mhz']:g} MHz and {power['volts']:g} V: {scene['mesh']}, "
         f"{width}×{height}, {window['cycles']:,} cycles, {window['pixels']:,} pixels, {window['rays']:,} rays, "
-        f"{window['rays_in_box']:,} in-box rays, {window['hits']:,} hits"
+        f"{window['rays_in_box']:,} in-box rays, {window['hits']:,} hits{of_column}"
     )
     for kind, title in KINDS.items():
         figures = power[kind]
@@ -41,12 +49,15 @@ def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
         f"  memories, at {power['memory_pj_per_bit']} pJ per bit: {memories['own']:.4f} mW in the render unit, "
         f"{memories['records']:.4f} mW for its share of the column memory"
     )
-    units = {name: unit for name, unit in report["units"].items() if "power_mw" in unit}
-    parts = ", ".join(f"{name} {unit['power_mw']:.3f}" for name, unit in units.items())
-    yield f"  by unit, with glitches, mW: {parts}"
+    yield f"  by unit, with glitches, and energy per in-box ray at {CHIP_NODE} without and with glitches:"
+    for name, unit in report["units"].items():
+        if "power_mw" in unit:
+            energies = (unit["energy_per_ray_nj_at_28nm"][kind] for kind in KINDS)
+            without, glitches = (f"{1e3 * energy:.1f}" for energy in energies)
+            yield f"    {name:22}{unit['power_mw']:8.3f} mW {without:>8} {glitches:>8} pJ"
     yield (
         "  Method: replay on the gate netlist, checked against the RTL in every cycle; no wires, no clock tree; mean "
-        "leakage over the states of a cell. Units of column and array are not included."
+        f"leakage over the states of a cell. {OUTSIDE[has_path_unit]}"
     )
     if power["opensta_mw"] is not None:
         gates = power["glitch_aware"]["dynamic_mw"] + power["glitch_aware"]["leakage_mw"]

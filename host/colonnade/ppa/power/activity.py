@@ -29,6 +29,16 @@ class Power:
     dynamic: float
     leakage: float
 
+    def __add__(self, other: Power) -> Power:
+        return Power(self.clock + other.clock, self.dynamic + other.dynamic, self.leakage + other.leakage)
+
+    def __mul__(self, factor: float) -> Power:
+        return Power(self.clock * factor, self.dynamic * factor, self.leakage * factor)
+
+
+#: No power.
+NO_POWER = Power(0.0, 0.0, 0.0)
+
 
 def power_of(
     netlist: Netlist,

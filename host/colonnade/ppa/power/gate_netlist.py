@@ -122,7 +122,9 @@ def _ports(box: Box) -> Iterator[str]:
     if any("mask" in port for port in box.ports) or not all(re.fullmatch(r"(RW|R|W)\d+", kind) for kind in kinds):
         raise RuntimeError(f"memory {box.kind} has ports that the replay does not support: {', '.join(box.ports)}")
     for kind in kinds:
-        address, enable = (_joined(box.ports[f"{kind}_{role}"]) for role in ("addr", "en"))
+        address = _joined(box.ports[f"{kind}_addr"])
+        # A port that is always enabled has none
+        enable = _joined(box.ports.get(f"{kind}_en", [True]))
         if kind.startswith("RW"):
             writes, into, out = (_joined(box.ports[f"{kind}_{role}"]) for role in ("wmode", "wdata", "rdata"))
         elif kind.startswith("R"):

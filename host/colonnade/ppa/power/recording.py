@@ -1,8 +1,9 @@
-"""Records the ports of one module while the RTL renders a frame, for a replay on the gate netlist.
+"""Records the ports of modules while the RTL renders a frame, for a replay on their gate netlists.
 
-A recorder is bound to the module in the simulation. It writes inputs and outputs just before each clock edge, from the
-cycle in which ``io_start`` starts the frame. Of several instances, the one that finds no recording yet makes it: the
-simulator evaluates them in the order of their rows.
+A recorder for each module is bound into the simulation: to the render unit itself, and to the column for modules that
+follow paths. It writes inputs and outputs just before each clock edge, from the cycle in which ``io_start`` starts the
+frame. Of several render units, the one that finds no recording yet makes it: the simulator evaluates them in the order
+of their rows.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from colonnade.common import processes
-from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.frame_limits import check_size
@@ -23,6 +23,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root, require_program
 from colonnade.device.harness_job import parse_output
 from colonnade.device.simulator_build import build_simulator
+from colonnade.device.simulator_sources import COLUMN, UNITS
 from colonnade.device.verilator import write_job
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
@@ -36,8 +37,8 @@ from colonnade.scene_image.packer import pack
 CLOCK, RESET, START = "clock", "reset", "io_start"
 
 _RECORDER = """
-module ColonnadeRecorder(
-  input clock, input reset, input start, input [{inputs}:0] inputs, input [{outputs}:0] outputs
+module ColonnadeRecorder_{module}(
+  input clock, input reset, input start, input [{input_bits}-1:0] inputs, input [{output_bits}-1:0] outputs
 );
   integer file, limit, unused, other, left, idle_cycles;
   initial begin
@@ -50,9 +51,9 @@ module ColonnadeRecorder(
   always @(posedge clock) begin
     idle_cycles <= reset ? 0 : idle_cycles + 1;
     if (start && file == 0) begin
-      other = $fopen("recording", "r");
+      other = $fopen("{module}.recording", "r");
       if (other == 0) begin
-        file = $fopen("recording", "w");
+        file = $fopen("{module}.recording", "w");
         $fwrite(file, "%0d\\n", idle_cycles);
         $fwrite(file, "%h %h\\n", inputs, outputs);
         left <= limit - 1;
@@ -63,8 +64,8 @@ module ColonnadeRecorder(
     end
   end
 endmodule
-bind {module} ColonnadeRecorder recorder(
-  .clock({clock}), .reset({reset}), .start({start}), .inputs({{{input_names}}}), .outputs({{{output_names}}})
+bind {scope} ColonnadeRecorder_{module} recorder_{module}(
+  .clock({clock}), .reset({reset}), .start({start}), .inputs({{{inputs}}}), .outputs({{{outputs}}})
 );
 """
 
@@ -147,10 +148,8 @@ def require_recordable(stimulus: Stimulus, manifest: Manifest) -> tuple[int, int
     """The size of the frame, checked before the work starts.
 
     Raises:
-        UserError: A program is missing, the size is wrong, or columns have path units.
+        UserError: A program is missing, or the size is wrong.
     """
-    if manifest.config["units"]["pathContexts"]:
-        raise UserError("power is measured on a render unit; with units.pathContexts use --no-power")
     for program, package in (("verilator", "verilator"), ("g++", "g++"), ("make", "make")):
         require_program(program, "power (--no-power leaves it out)", package)
     size = stimulus.size or whole_frame(int(manifest.config["array"]["rows"]))
@@ -161,18 +160,16 @@ def require_recordable(stimulus: Stimulus, manifest: Manifest) -> tuple[int, int
 def record(
     config: str,
     overrides: Sequence[str],
-    module: str,
-    ports: Mapping[str, Any],
+    modules: Mapping[str, Mapping[str, Any]],
     stimulus: Stimulus,
     progress: Progress = QUIET,
-) -> Recording:
-    """Render a frame on one column of a configuration and record one instance of a module.
+) -> dict[str, Recording]:
+    """Render a frame on one column of a configuration and record one instance of each module.
 
     Args:
         config: Configuration, before `overrides`.
         overrides: Changes to the configuration, ``key.path=value``.
-        module: Name of the module.
-        ports: Ports of the module in Yosys's JSON.
+        modules: Ports in Yosys's JSON of the modules: a render unit, and others that the column has once.
         stimulus: The workload.
         progress: Shows the steps.
     """
@@ -184,15 +181,8 @@ def record(
         mesh = with_materials(scene, stimulus.mesh, SurfaceFeatures.of(manifest))
         image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
         registers = frame_registers(scene, image.header, manifest, *size)
-    joined = {
-        direction: tuple(
-            Port(name, len(port["bits"]))
-            for name, port in ports.items()
-            if port["direction"] == direction and name != CLOCK
-        )
-        for direction in ("input", "output")
-    }
-    with _with_recorder(design, module, joined["input"], joined["output"]) as recorded:
+    ports = {module: _Ports.of(yosys) for module, yosys in modules.items()}
+    with _with_recorders(design, ports) as recorded:
         program = build_simulator(recorded, progress)
     with temporary_folder() as folder:
         (folder / "limit").write_text(f"{stimulus.cycles}\n")
@@ -201,32 +191,68 @@ def record(
             done = processes.run([program, job], cwd=folder)
         if done.returncode != 0:
             raise RuntimeError(f"the simulated hardware failed (status {done.returncode}): {done.stderr[-300:]}")
-        lines = (folder / "recording").read_text().split("\n")
+        lines = {module: (folder / f"{module}.recording").read_text().splitlines() for module in ports}
     (output,) = parse_output(done.stdout.splitlines())
     counters = {name.removeprefix("counters."): n for name, n in output.values.items() if name.startswith("counters.")}
-    cycles = tuple((int(line.split()[0], 16), int(line.split()[1], 16)) for line in lines[1:] if line)
     facts = {"mesh": stimulus.mesh.name, "triangles": len(stimulus.mesh.faces), "size": list(size)}
-    return Recording(joined["input"], joined["output"], cycles, int(lines[0]), facts, counters)
+    return {
+        module: Recording(of.inputs, of.outputs, _cycles(lines[module]), int(lines[module][0]), facts, counters)
+        for module, of in ports.items()
+    }
+
+
+@dataclass(frozen=True)
+class _Ports:
+    """The ports of a recorded module, without the clock."""
+
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+
+    @staticmethod
+    def of(ports: Mapping[str, Any]) -> _Ports:
+        def towards(direction: str) -> tuple[Port, ...]:
+            found = ((name, port) for name, port in ports.items() if port["direction"] == direction)
+            return tuple(Port(name, len(port["bits"])) for name, port in found if name != CLOCK)
+
+        return _Ports(towards("input"), towards("output"))
+
+
+def _cycles(lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
+    """Inputs and outputs of each cycle, from the lines of a recording."""
+    words = (line.split() for line in lines[1:])
+    return tuple((int(inputs, 16), int(outputs, 16)) for inputs, outputs in words)
 
 
 @contextlib.contextmanager
-def _with_recorder(
-    design: GeneratedDesign, module: str, inputs: Sequence[Port], outputs: Sequence[Port]
-) -> Iterator[GeneratedDesign]:
-    """A temporary folder with the design and the recorder."""
-    text = _RECORDER.format(
-        module=module,
-        clock=CLOCK,
-        reset=RESET,
-        start=START,
-        inputs=sum(port.bits for port in inputs) - 1,
-        outputs=sum(port.bits for port in outputs) - 1,
-        input_names=", ".join(port.name for port in inputs),
-        output_names=", ".join(port.name for port in outputs),
-    )
+def _with_recorders(design: GeneratedDesign, modules: Mapping[str, _Ports]) -> Iterator[GeneratedDesign]:
+    """A temporary folder with the design and a recorder for each module."""
     with temporary_folder() as folder:
         for file in design.sources:
             (folder / file.name).symlink_to(file.resolve())
-        # Verilator reads files in the order of their names, and the bound recorder must come first
-        (folder / "ColonnadeRecorder.sv").write_text(re.sub(r"^\n", "", text))
+        for module, ports in modules.items():
+            (folder / f"ColonnadeRecorder_{module}.sv").write_text(_recorder(module, ports, design))
         yield GeneratedDesign(folder, design.manifest)
+
+
+def _recorder(module: str, ports: _Ports, design: GeneratedDesign) -> str:
+    """The recorder of a module, and what binds it."""
+    scope, instance = module, ""
+    if module not in UNITS:
+        scope = COLUMN
+        (name,) = re.findall(rf"^  {module}\s+(\w+) \(", (design.dir / f"{COLUMN}.sv").read_text(), re.MULTILINE)
+        instance = f"{name}."
+
+    def joined(names: Sequence[Port]) -> str:
+        return ", ".join(f"{instance}{port.name}" for port in names)
+
+    return _RECORDER.lstrip().format(
+        module=module,
+        scope=scope,
+        clock=CLOCK,
+        reset=RESET,
+        start=START,
+        input_bits=sum(port.bits for port in ports.inputs),
+        output_bits=sum(port.bits for port in ports.outputs),
+        inputs=joined(ports.inputs),
+        outputs=joined(ports.outputs),
+    )

@@ -17,9 +17,11 @@ from colonnade.ppa.library.cells import Library
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.pages.power import power_table, unit_power_table
 from colonnade.ppa.power.activity import Power, power_of
+from colonnade.ppa.power.frame import Frame
 from colonnade.ppa.power.recording import Stimulus, require_recordable
 from colonnade.ppa.power.replay import Activity
-from colonnade.ppa.power.report import by_unit, node_scale
+from colonnade.ppa.power.report import node_scale
+from colonnade.ppa.power.sums import Sum, by_unit
 from colonnade.ppa.timing import opensta
 from colonnade.ppa.timing.delays import NetTiming
 
@@ -80,8 +82,37 @@ def test_clock_gates_count_as_clock_power(library: Library, tmp_path: Path) -> N
 def test_power_belongs_to_the_innermost_unit() -> None:
     flat = Power(1.0, 2.0, 3.0)
     owners = ("", "Queue", "Shader", "Shader/CosineUnit", "Shader/BounceUnit", "Shader/BounceUnit/Divider")
-    found = by_unit(dict.fromkeys(owners, flat))
-    assert {unit: power.clock for unit, power in found.items()} == {"contexts": 2, "Shader": 2, "BounceUnit": 2}
+    for module, rest in (("RenderUnit", "contexts"), ("TraversalUnit", "contexts"), ("PathUnit", "PathUnit")):
+        found = by_unit(dict.fromkeys(owners, flat), module)
+        assert {unit: power.clock for unit, power in found.items()} == {rest: 2, "Shader": 2, "BounceUnit": 2}
+
+
+def test_a_path_unit_counts_with_the_rays_of_the_render_unit() -> None:
+    """The energies of all units add up to that of a ray, with each part of a column counted once."""
+    frame = Frame(
+        10, 110, {"pixels": 40, "rays": 60, "rays_in_box": 50, "hits": 20}, traced=10, share=0.2, records_share=0.2
+    )
+    found = Sum(frame, megahertz=200, scale=3)
+    for module, owners in (("TraversalUnit", ("BoxUnit", "")), ("PathUnit", ("RtController", "")), ("PathHits", ("",))):
+        powers = dict.fromkeys(owners, Power(0.5, 2.0, 0.25))
+        still = dict.fromkeys(owners, Power(0.5, 1.0, 0.25))
+        found.add(module, {"zero_delay": still, "glitch_aware": powers}, {"": 1.0})
+    found.records = 0.5
+    assert found.kinds() == {"own": pytest.approx(1.4), "records": 0.5}
+    total = found.totals()["glitch_aware"]
+    # Two owners of the traversal unit, and a fifth of three in the column
+    assert total["dynamic_mw"] == pytest.approx(2 * 2.6)
+    assert total["total_mw"] == pytest.approx(2.25 * 2.6 + 1.9)
+    # 0.5 µs, 10 of the column's in-box rays and 12 of its rays
+    assert total["energy_per_ray_nj"] == pytest.approx(total["total_mw"] * 0.5 / 10)
+    assert total["energy_per_any_ray_nj"] == pytest.approx(total["total_mw"] * 0.5 / 12)
+    units = found.units()
+    assert set(units) == {"BoxUnit", "contexts", "RtController", "PathUnit", "PathHits"}
+    assert units["PathHits"]["power_mw"] == pytest.approx((2.25 + 1.0) / 5)
+    for kind, of_kind in found.totals().items():
+        energies = [unit["energy_per_ray_nj_at_28nm"][kind] for unit in units.values()]
+        records = 0.5 * 0.5 / 10
+        assert of_kind["at_28nm"]["energy_per_ray_nj"] == pytest.approx(sum(energies) + records)
 
 
 def test_the_workload_is_checked_before_synthesis(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -35,8 +35,9 @@ object ArbitraryConfig {
     marches       <- Gen.chooseNum(0, 16)
     directView    <- if (marches == 0) Gen.const(false) else flag
     pathContexts  <- if (marches == 0) Gen.const(0) else Gen.chooseNum(0, UnitsConfig.mostPathContexts)
+    triangleRows  <- if (pathContexts == 0) Gen.const(1) else Gen.chooseNum(1, UnitsConfig.mostTriangleRows)
     pipelined     <- flag
-  } yield UnitsConfig(boxLanes, triangleLanes, marches, directView, pathContexts, pipelined)
+  } yield UnitsConfig(boxLanes, triangleLanes, triangleRows, marches, directView, pathContexts, pipelined)
 
   private val memory = for {
     depth         <- Gen.chooseNum(16, 1 << 22, 17, 1024, 1 << 17)

@@ -19,7 +19,15 @@ object TestConfigs {
       cornerColours = false,
       textureBytes = 0
     ),
-    UnitsConfig(boxLanes = 2, triangleLanes = 1, marches = 0, directView = false, pathContexts = 0, pipelined = false),
+    UnitsConfig(
+      boxLanes = 2,
+      triangleLanes = 1,
+      triangleRows = 1,
+      marches = 0,
+      directView = false,
+      pathContexts = 0,
+      pipelined = false
+    ),
     ColumnBvhMemoryConfig(
       depth = 1024,
       banks = 2,

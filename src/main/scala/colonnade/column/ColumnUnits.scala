@@ -72,6 +72,13 @@ private[column] object ColumnUnits {
       rays.isFree(row) := unit.isFree
       results.units(row) :<>= unit.results
     }
+    if (config.sharesTriangleUnits) for (rows <- traversals.grouped(config.units.triangleRows)) {
+      val shared = Module(new SharedTriangles(config, rows.size)).io
+      for ((unit, row) <- rows.zipWithIndex) {
+        unit.triangleLanes.get :<>= shared.rows(row)
+        shared.waits(row) := unit.waitsForTriangles.get
+      }
+    }
     hits.scene := paths.registers.scene
     ColumnUnits(
       registers = Seq(paths.registers),

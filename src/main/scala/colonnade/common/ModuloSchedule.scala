@@ -1,7 +1,7 @@
 package colonnade.common
 
 import chisel3._
-import chisel3.util.Mux1H
+import chisel3.util.{log2Ceil, Mux1H}
 
 /** Values of one register of a [[ModuloSchedule]], and for each of them the cycles in which the register holds it.
   *
@@ -79,24 +79,29 @@ final class ModuloSchedule(phase: UInt, interval: Int = ModuloSchedule.interval)
   def carry[T <: Data](value: Timed[T], to: Int): Timed[T] =
     if (to <= value.last) value else carry(latch(value.last)(value.at(value.last)), to)
 
-  /** Successive values of a register, so many cycles after its own. For a whole interval it takes a register for each value.
-    */
+  /** Successive values of a register, so many cycles after its own. */
   def delay[T <: Data](values: Timed[T], cycles: Seq[Int], by: Int): Timed[T] = {
-    require(
-      cycles.zip(cycles.tail).forall { case (one, next) => next == one + 1 },
-      s"$cycles do not succeed each other"
-    )
-    val steps    = if (by >= interval) cycles.size else 1
-    val now      = values.at(cycles)
-    val isMoving = if (by >= interval) cycles.map(isAt).reduce(_ || _) else true.B
-    val moved    = (0 until steps.min(by)).foldLeft(now) { (from, _) =>
-      val register = Reg(chiselTypeOf(now))
-      when(isMoving)(register := from)
+    val delayed = (0 until by).foldLeft(values.at(cycles)) { (from, _) =>
+      val register = Reg(chiselTypeOf(from))
+      register := from
       register
     }
-    val passed = if (by >= interval) interval else by.min(1)
-    val later  = new Timed(moved, cycles.map(cycle => (cycle + passed) -> (cycle + passed)))
-    if (by == 0) values else if (by == passed) later else delay(later, cycles.map(_ + passed), by - passed)
+    arriving(delayed, cycles.map(_ + by))
+  }
+
+  /** The exact product of two factors that are there for an interval from a cycle on. A digit of the right one is multiplied
+    * in each cycle, the lowest first; the product comes in the second cycle after.
+    */
+  def multiply(left: Timed[SInt], right: Timed[SInt], first: Int): Timed[SInt] = {
+    val cycles    = first until first + interval
+    val digitBits = (right.at(cycles).getWidth + interval - 2) / interval
+    val factor    = right.at(cycles).pad(interval * digitBits + 1)
+    val top       = (interval - 1) * digitBits
+    val digits    = (0 until top by digitBits).map(low => factor(low + digitBits - 1, low).zext) :+ (factor >> top)
+    val product   = latch(cycles)(left.at(cycles) * select(cycles)(digits(_)))
+    accumulate(cycles.map(_ + 1), (product.at(cycles.map(_ + 1)) << top).asSInt) {
+      (sum, next) => (sum >> digitBits) + next
+    }
   }
 
   private def check(cycles: Seq[Int]): Unit =
@@ -110,7 +115,10 @@ final class ModuloSchedule(phase: UInt, interval: Int = ModuloSchedule.interval)
 object ModuloSchedule {
 
   /** Cycles from an operation to the next. */
-  val interval: Int = 4
+  val interval: Int = 3
+
+  /** A counter of the cycles of an interval. */
+  def phase(): UInt = UInt(log2Ceil(interval).W)
 
   /** Three cycles, one for each axis or channel. */
   def xyz(first: Int): Seq[Int] = first until first + 3

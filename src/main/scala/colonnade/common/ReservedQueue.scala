@@ -14,11 +14,9 @@ final class ReservedQueueIO[T <: Data](item: T) extends Bundle {
 /** A queue in a memory with one read port and one write port, for items that have their place reserved: it has no
   * back-pressure. An item is offered from the second cycle after it
   * came until it is taken.
-  *
-  * @param places a power of two
   */
 final class ReservedQueue[T <: Data](item: T, places: Int) extends Module {
-  require(isPow2(places) && places > 1, s"a queue of $places places; it must be a power of two from 2 on")
+  require(places > 1, s"a queue of $places places; it must have two at least")
 
   val io = IO(new ReservedQueueIO(item))
 
@@ -29,12 +27,15 @@ final class ReservedQueue[T <: Data](item: T, places: Int) extends Module {
   private val count  = RegInit(0.U(log2Ceil(places + 1).W))
   when(io.in.valid) {
     memory.write(tail, io.in.bits.asUInt)
-    tail := tail + 1.U
+    tail := after(tail)
   }
-  private val next = head + io.out.fire
+  private val next = Mux(io.out.fire, after(head), head)
   head         := next
   count        := count + io.in.valid - io.out.fire
   io.out.valid := RegNext(count =/= io.out.fire.asUInt, false.B)
   io.out.bits  := memory.read(next, count =/= 0.U).asTypeOf(item)
   assert(!io.in.valid || count < places.U, "an item without a place")
+
+  private def after(place: UInt): UInt =
+    if (isPow2(places)) place + 1.U else Mux(place === (places - 1).U, 0.U, place + 1.U)
 }

@@ -1,5 +1,7 @@
 package colonnade.config
 
+import chisel3.util.log2Ceil
+
 /** Shape of the array.
   *
   * @param rows     render units that share one column memory (N)
@@ -75,7 +77,8 @@ final case class GeometryConfig(
 /** Parallel lanes in a render unit, and what the units of a column share.
   *
   * @param boxLanes      children that the box unit tests per cycle
-  * @param triangleLanes parallel triangle units
+  * @param triangleLanes parallel triangle units of a render unit, or of the rows that share them
+  * @param triangleRows  rows of a column that share triangle units; 1: each render unit has its own
   * @param marches       environment marches that the render units of a column share; 0: one in every render unit
   * @param directView    with shared marches: a pipeline of the column for directly seen pixels of an environment
   * @param pathContexts  pixels in flight in the path unit that a column has; 0: every render unit follows its own paths
@@ -84,6 +87,7 @@ final case class GeometryConfig(
 final case class UnitsConfig(
     boxLanes:      Int,
     triangleLanes: Int,
+    triangleRows:  Int,
     marches:       Int,
     directView:    Boolean,
     pathContexts:  Int,
@@ -91,6 +95,12 @@ final case class UnitsConfig(
 ) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
   Require.within("units.triangleLanes", triangleLanes, 1, 4)
+  Require.within("units.triangleRows", triangleRows, 1, UnitsConfig.mostTriangleRows)
+  Require(
+    "units.triangleRows",
+    triangleRows == 1 || pathContexts > 0,
+    "needs a path unit, units.pathContexts from 1 on"
+  )
   Require.within("units.marches", marches, 0, UnitsConfig.mostMarches)
   Require("units.directView", !directView || marches > 0, "needs shared marches, units.marches from 1 on")
   Require.within("units.pathContexts", pathContexts, 0, UnitsConfig.mostPathContexts)
@@ -99,6 +109,7 @@ final case class UnitsConfig(
 object UnitsConfig {
   val mostMarches:      Int = 16
   val mostPathContexts: Int = 256
+  val mostTriangleRows: Int = 16
 }
 
 /** The memory that the render units of a column share.
@@ -185,8 +196,18 @@ final case class ColonnadeConfig(
   /** What the parts that follow a path see: the contexts of a column's path unit, or of a render unit. */
   lazy val ofPaths: ColonnadeConfig =
     if (hasPathUnit)
-      copy(array = array.copy(rows = 1, contexts = units.pathContexts), units = units.copy(pathContexts = 0))
+      copy(
+        array = array.copy(rows = 1, contexts = units.pathContexts),
+        units = units.copy(pathContexts = 0, triangleRows = 1)
+      )
     else this
+
+  /** Rows of a column share triangle units. */
+  val sharesTriangleUnits: Boolean = units.triangleRows > 1
+
+  /** What shared triangle units see: the contexts of all their rows. */
+  lazy val ofTriangleRows: ColonnadeConfig =
+    copy(array = array.copy(contexts = array.contexts.max(2) << log2Ceil(units.triangleRows)))
 
   /** Requesters of a column's records: its rows, and the path unit for attributes. */
   val recordRequesters: Int = array.rows + (if (hasPathUnit) 1 else 0)

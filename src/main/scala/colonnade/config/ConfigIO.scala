@@ -53,7 +53,16 @@ object ConfigIO {
       "cornerColours",
       "textureBytes"
     )
-    val units = root.section("units", "boxLanes", "triangleLanes", "marches", "directView", "pathContexts", "pipelined")
+    val units = root.section(
+      "units",
+      "boxLanes",
+      "triangleLanes",
+      "triangleRows",
+      "marches",
+      "directView",
+      "pathContexts",
+      "pipelined"
+    )
     val memory = root.section(
       "columnBvhMemory",
       "depth",
@@ -98,6 +107,7 @@ object ConfigIO {
       units = UnitsConfig(
         boxLanes = units.int("boxLanes"),
         triangleLanes = units.int("triangleLanes"),
+        triangleRows = units.int("triangleRows"),
         marches = units.int("marches"),
         directView = units.boolean("directView"),
         pathContexts = units.int("pathContexts"),
@@ -176,6 +186,7 @@ object ConfigIO {
       "units" -> ujson.Obj(
         "boxLanes"      -> units.boxLanes,
         "triangleLanes" -> units.triangleLanes,
+        "triangleRows"  -> units.triangleRows,
         "marches"       -> units.marches,
         "directView"    -> units.directView,
         "pathContexts"  -> units.pathContexts,

@@ -17,7 +17,7 @@ final class FoldedDividerIO(numeratorBits: Int, denominatorBits: Int, digits: In
   * n = numerator / 2^numeratorBits and d = denominator / 2^denominatorBits. The denominator's top bit is set; the
   * numerator is less than twice the denominator in this sense.
   *
-  * Restoring, two bits a cycle. A chain of stages, each of which works on a division for one interval. The quotient comes
+  * Restoring, three bits a cycle. A chain of stages, each of which works on a division for one interval. The quotient comes
   * `FoldedDivider.intervals` intervals after its operands and one cycle.
   */
 final class FoldedDivider(numeratorBits: Int, denominatorBits: Int, digits: Int, interval: Int) extends Module {
@@ -78,7 +78,7 @@ final class FoldedDivider(numeratorBits: Int, denominatorBits: Int, digits: Int,
 }
 
 object FoldedDivider {
-  val perCycle: Int = 2
+  val perCycle: Int = 3
 
   /** Intervals of a division. */
   def intervals(digits: Int, interval: Int): Int = (digits.max(1) - 1) / (perCycle * interval) + 1

@@ -16,7 +16,7 @@ final class FoldedSquareRootIO(radicandBits: Int) extends Bundle {
 
 /** Square roots, one every `interval` cycles, of radicands with an even number of bits.
   *
-  * Restoring, two bits of the root a cycle. A chain of stages, each of which works on a root for one interval; the first
+  * Restoring, three bits of the root a cycle. A chain of stages, each of which works on a root for one interval; the first
   * ones have short remainders and roots. The root comes `FoldedSquareRoot.intervals` intervals after its radicand and one
   * cycle.
   */
@@ -65,7 +65,7 @@ final class FoldedSquareRoot(radicandBits: Int, interval: Int) extends Module {
 }
 
 object FoldedSquareRoot {
-  val perCycle: Int = 2
+  val perCycle: Int = 3
 
   /** Intervals of a root. */
   def intervals(radicandBits: Int, interval: Int): Int =

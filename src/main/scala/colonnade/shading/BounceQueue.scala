@@ -82,7 +82,7 @@ final class BounceQueue(config: ColonnadeConfig, places: Int) extends Module {
   request.context           := hit.context
   request.origin            := vector(points.map(_.bits.origin))
   request.normal            := vector(points.map(_.bits.normal))
-  request.isSmooth          := points.last.bits.isSmooth
+  request.isSmooth          := points.head.bits.isSmooth
   request.faceForwardNormal := vector(directions.map(_.bits.faceForwardNormal))
   request.dir               := vector(directions.map(_.bits.dir))
   request.backSide          := hit.backSide

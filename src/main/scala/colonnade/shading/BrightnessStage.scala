@@ -2,6 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.log2Ceil
+import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.{ModuloSchedule, Timed}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb}
@@ -12,7 +13,7 @@ final class BrightnessStageIO(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
-  val phase = Input(UInt(2.W))
+  val phase = Input(ModuloSchedule.phase())
 
   /** As [[AngleStage]] offers them. */
   val angle   = Input(new Angle(formats))
@@ -27,21 +28,20 @@ final class BrightnessStageIO(config: ColonnadeConfig) extends Bundle {
 
 /** Cycles of [[BrightnessStage]]. */
 final class BrightnessCycles(numbers: NumberFormats) {
-  private val interval = ModuloSchedule.interval
-
+  val falloff:  Int = 17
   val radicand: Int = 21
   val root:     Int = radicand + 1 + interval * FoldedSquareRoot.intervals(numbers.radicandBits, interval)
 
   private val division = 1 + interval * FoldedDivider.intervals(numbers.cosineFraction, interval)
   val quotient:        Int = root + division
-  val falloffQuotient: Int = 18 + division
+  val falloffQuotient: Int = falloff + division
   val brightness:      Int = quotient + 1
-  val colour:          Int = brightness + 1
+  val colour:          Int = brightness + interval + 1
   val direct:          Int = colour + 3
 }
 
-/** The cosine of an angle, the light's falloff and the light that arrives: docs/numbers.md, 5.7 and 5.8. An angle every four
-  * cycles, by a square root, two dividers, and one multiplier for the brightness and the three channels.
+/** The cosine of an angle, the light's falloff and the light that arrives: docs/numbers.md, 5.7 and 5.8. An angle every three
+  * cycles, by a square root, two dividers, a multiplier for the brightness, digit by digit, and one for the three channels.
   */
 final class BrightnessStage(config: ColonnadeConfig) extends Module {
   private val numbers   = config.numbers
@@ -56,12 +56,12 @@ final class BrightnessStage(config: ColonnadeConfig) extends Module {
   import schedule._
 
   // The dot product with its top bit set
-  private val dot        = arriving(io.angle.dot, 18, 21)
-  private val dotZeros   = latch(18)(Normalise.countLeadingZeros(dot.at(18))._2)
+  private val dot        = arriving(io.angle.dot, 17, 19)
+  private val dotZeros   = latch(17)(Normalise.countLeadingZeros(dot.at(17))._2)
   private val dotBits    = numbers.mantissaBits.min(formats.dotBits)
-  private val isAcute    = arriving(io.angle.isAcute, 18, 21)
-  private val normalised = latch(19) {
-    (dot.at(19) << dotZeros.at(19))(formats.dotBits - 1, formats.dotBits - dotBits)
+  private val isAcute    = arriving(io.angle.isAcute, 17, 19)
+  private val normalised = latch(18) {
+    (dot.at(18) << dotZeros.at(18))(formats.dotBits - 1, formats.dotBits - dotBits)
   }
 
   // The root. One of the product's two top bits is set, and the exponent is made even
@@ -69,13 +69,13 @@ final class BrightnessStage(config: ColonnadeConfig) extends Module {
   private val aligned  = Mux(isLong, io.angle.normProduct, (io.angle.normProduct << 1)(formats.normProductBits - 1, 0))
   private val mantissa = Rounding.floor(aligned, formats.normProductBits - numbers.radicandBits)
   private val exponent = io.angle.exponent +& isLong
-  private val root     = Module(new FoldedSquareRoot(numbers.radicandBits, ModuloSchedule.interval)).io
+  private val root     = Module(new FoldedSquareRoot(numbers.radicandBits, interval)).io
   root.isStep   := isAt(cycles.radicand)
   root.radicand := Mux(exponent(0), mantissa, mantissa >> 1)
 
   // The cosine: twice the quotient, moved down by two bits less than the exponents say
   private val rootBits = SquareRoot.rootBits(numbers.radicandBits)
-  private val down     = latch(cycles.radicand)(exponent(3, 1) +& dotZeros.at(cycles.radicand))
+  private val down     = latch(cycles.radicand)(exponent(3, 1) +& carry(dotZeros, cycles.radicand).at(cycles.radicand))
   private val quotient = divide(
     cycles.root,
     carry(normalised, cycles.root).at(cycles.root),
@@ -85,20 +85,20 @@ final class BrightnessStage(config: ColonnadeConfig) extends Module {
     val exponent = carry(down, cycles.quotient).at(cycles.quotient)
     val cosine   = (quotient << 1).asUInt >> Mux(exponent > 2.U, exponent - 2.U, 0.U)
     val limited  = Mux(cosine(fraction + 1, fraction).orR, (BigInt(1) << fraction).U, cosine(fraction, 0))
-    Mux(carry(isAcute, cycles.quotient).at(cycles.quotient), limited, 0.U)
+    Mux(carry(isAcute, cycles.quotient).at(cycles.quotient), limited, 0.U).zext
   }
 
   // The falloff: its quotient has guard bits below, so that it only has to move down
   private val guardBits   = (NumberFormats.lightFraction + 3 - fraction).max(0)
   private val falloffBits = (fraction + 1 + guardBits).max(Falloff.bits)
-  private val shift       = latch(18)((fraction - NumberFormats.lightFraction + guardBits).S -& io.falloff.exponent)
+  private val shift       = latch(17)((fraction - NumberFormats.lightFraction + guardBits).S -& io.falloff.exponent)
   private val amountBits  = log2Ceil(falloffBits + 1)
   private val most        = (1 << amountBits) - 1
-  private val amount      = latch(19)(Mux(shift.at(19) > most.S, most.U, shift.at(19).asUInt(amountBits - 1, 0)))
-  private val isNear      = latch(19)(shift.at(19) < 0.S)
-  private val isConstant  = latch(18)(io.falloff.reference === 0.U)
+  private val amount      = latch(18)(Mux(shift.at(18) > most.S, most.U, shift.at(18).asUInt(amountBits - 1, 0)))
+  private val isNear      = latch(18)(shift.at(18) < 0.S)
+  private val isConstant  = latch(17)(io.falloff.reference === 0.U)
   private val ratio       =
-    divide(18, io.falloff.reference, io.falloff.mantissa.head(shadeBits.min(numbers.mantissaBits)))
+    divide(cycles.falloff, io.falloff.reference, io.falloff.mantissa.head(shadeBits.min(numbers.mantissaBits)))
   private val falloff = latch(cycles.falloffQuotient) {
     def now[T <: Data](value: Timed[T]): T = carry(value, cycles.falloffQuotient).at(cycles.falloffQuotient)
     val moved                              = (ratio << guardBits).asUInt.pad(falloffBits) >> now(amount)
@@ -107,28 +107,24 @@ final class BrightnessStage(config: ColonnadeConfig) extends Module {
   }
 
   // The products
-  private val colours    = cycles.colour until cycles.colour + 3
-  private val brightness = Wire(UInt(formats.brightnessBits.W))
-  private val product    = latch(cycles.brightness +: colours) {
-    val isFalloff = isAt(cycles.brightness)
-    val channel   = select(colours)(io.colour.channels(_).natural)
-    val narrow    = Mux(isFalloff, carry(falloff, cycles.brightness).at(cycles.brightness), channel)
-    Mux(isFalloff, cosine.at(cycles.brightness).pad(formats.brightnessBits), brightness) * narrow
-  }
-  private val scaled = Rounding.narrow(
-    Rounding.floor(product.items(0).at(cycles.colour), NumberFormats.lightFraction),
+  private val falloffThen = latch(cycles.quotient)(carry(falloff, cycles.quotient).at(cycles.quotient).zext)
+  private val product     = multiply(cosine, falloffThen, cycles.brightness)
+  private val scaled      = Rounding.narrow(
+    Rounding.floor(product.at(cycles.colour).asUInt, NumberFormats.lightFraction),
     formats.brightnessBits
   )
-  brightness := Mux(isAt(cycles.colour), scaled, latch(cycles.colour)(scaled).at(colours.tail))
-  private val channel =
-    Rounding.saturate(Rounding.floor(product.items(1, 2, 3).at(colours.map(_ + 1)), fraction), NumberFormats.lightBits)
+  private val colours    = xyz(cycles.colour)
+  private val brightness = Mux(isAt(cycles.colour), scaled, latch(cycles.colour)(scaled).at(colours.tail))
+  private val lit        = latch(colours)(brightness * select(colours)(io.colour.channels(_).natural))
+  private val channel    =
+    Rounding.saturate(Rounding.floor(lit.at(xyz(cycles.colour + 1)), fraction), NumberFormats.lightBits)
   private val channels = Seq.tabulate(2)(index => latch(colours(index) + 1)(channel).at(cycles.direct)) :+ channel
   io.direct.channels.zip(channels).foreach { case (to, from) => to := Fixed(to.format, from) }
 
   /** The quotient of two mantissas that are there in a cycle. */
   private def divide(cycle: Int, numerator: UInt, denominator: UInt): UInt = {
     val divider =
-      Module(new FoldedDivider(numerator.getWidth, denominator.getWidth, fraction, ModuloSchedule.interval)).io
+      Module(new FoldedDivider(numerator.getWidth, denominator.getWidth, fraction, interval)).io
     divider.isStep      := isAt(cycle)
     divider.numerator   := numerator
     divider.denominator := denominator

@@ -11,8 +11,9 @@ import colonnade.numbers.{Fixed, Rounding}
   * end ────┬▶ read ─▶ light · transmittance ─▶ light · albedo  ─▶ throughput · colour ─▶ colour, path
   * bounce ─┘          throughput · tint        tinted · Fresnel   part · behind
   * }}}
-  * An end takes 1 + 3 · lights cycles, with the lights that are on, at least one; in the background 4. A bounce takes 6, and 3 · lights more if its reflection shows
-  * a surface. Colours come in any order; the throughput and radiance of every path are in a table.
+  * An end takes 3 · lights cycles, with the lights that are on, at least one; in the background 3. A bounce takes 6, and
+  * 3 · lights more if its reflection shows a surface. Colours come in any order; the throughput and radiance of every path
+  * are in a table.
   */
 final class ColourPipeline(config: ColonnadeConfig) extends Module {
   private val lights         = config.frame.lights
@@ -26,17 +27,15 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
 
   val io = IO(new ColourUnitIO(config))
 
-  // The operation: a bounce or an end
-  private val isReading  = RegInit(false.B)
-  private val isIssuing  = RegInit(false.B)
-  private val context    = Reg(Context(config))
-  private val isBounce   = Reg(Bool())
-  private val hasSurface = Reg(Bool())
-  private val occlusions = Reg(Vec(lights, Occlusion()))
-  private val needsRatio = Reg(Bool())
-  private val albedo     = Reg(Vec(3, UInt(colourBits.W)))
-  private val isTinted   = Reg(Bool())
-  private val fresnel    = Reg(UInt(weightBits.W))
+  // The operation: a bounce or an end; and the next one, while it is read
+  private val isReading = RegInit(false.B)
+  private val isIssuing = RegInit(false.B)
+  private val next      = Reg(new ColourOperation(config))
+  private val operation = Reg(new ColourOperation(config))
+  import operation.{context, hasSurface, isBounce, needsRatio, occlusions}
+  private val albedo   = Reg(Vec(3, UInt(colourBits.W)))
+  private val isTinted = Reg(Bool())
+  private val fresnel  = Reg(UInt(weightBits.W))
 
   /** A slot of the operation is a channel and a light of its surface, or a channel of its path. */
   private val ofSurface = Reg(Bool())
@@ -49,40 +48,41 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
   private val resultContext = Reg(Context(config))
   private val ratios        = Option.when(config.hasEnvironment)(Module(new ShadowRatios(config, sumBits)).io)
 
-  private val isFirst   = channel === 0.U && light === 0.U
-  private val waits     = isUpdating || (isFirst && needsRatio && ratios.map(_.busy).getOrElse(false.B))
-  private val issues    = isIssuing && !waits
-  private val lastLight = !ofSurface || light +& 1.U >= io.shading.lights // a light that is off adds nothing
-  private val lastPass  = !(isBounce && ofSurface)
-  private val isLast    = issues && lastLight && lastPass && channel === 2.U
+  private val isFirst     = channel === 0.U && light === 0.U
+  private val waits       = isUpdating || (isFirst && needsRatio && ratios.map(_.busy).getOrElse(false.B))
+  private val issues      = isIssuing && !waits
+  private val lastLight   = !ofSurface || light +& 1.U >= io.shading.lights // a light that is off adds nothing
+  private val lastPass    = !(isBounce && ofSurface)
+  private val isLast      = issues && lastLight && lastPass && channel === 2.U
+  private val lightThen   = Mux(lastLight, 0.U, light + 1.U)
+  private val channelThen = Mux(!lastLight, channel, Mux(channel === 2.U, 0.U, channel + 1.U))
   when(issues) {
-    light := Mux(lastLight, 0.U, light + 1.U)
-    when(lastLight) { channel := Mux(channel === 2.U, 0.U, channel + 1.U) }
+    light   := lightThen
+    channel := channelThen
     when(lastLight && channel === 2.U && isBounce) { ofSurface := false.B }
   }
   ratios.foreach(_.claim := issues && isFirst && needsRatio)
 
-  // Take one while the last slot is issued
-  private val isFree  = !isReading && (!isIssuing || isLast)
+  // Take one while the last slot is issued; an end after an end one cycle before
+  private val isFree   = !isReading && (!isIssuing || isLast)
+  private val endsNext =
+    issues && !isBounce && channelThen === 2.U && (!ofSurface || lightThen +& 1.U >= io.shading.lights)
   private val bounces = io.bounce.map(_.fire).getOrElse(false.B)
   private val takes   = bounces || io.end.fire
   private val taken   =
     io.bounce.map(bounce => Mux(bounce.valid, bounce.bits.context, io.end.bits.context)).getOrElse(io.end.bits.context)
   io.bounce.foreach(_.ready := isFree)
-  io.end.ready := isFree && !io.bounce.map(_.valid).getOrElse(false.B)
+  io.end.ready := (isFree || (endsNext && !isReading)) && !io.bounce.map(_.valid).getOrElse(false.B)
   when(takes) {
-    context    := taken
-    isBounce   := bounces
-    channel    := 0.U
-    light      := 0.U
-    occlusions := io.end.bits.occlusions
-    when(bounces) { occlusions.foreach(_ := Occlusion.none) }
+    next.context    := taken
+    next.isBounce   := bounces
+    next.occlusions := io.end.bits.occlusions
+    when(bounces) { next.occlusions.foreach(_ := Occlusion.none) }
     val showsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
-    hasSurface := showsSurface
-    ofSurface  := showsSurface
-    needsRatio := !bounces && showsSurface && io.end.bits.isDirectView.getOrElse(false.B) &&
+    next.hasSurface := showsSurface
+    next.needsRatio := !bounces && showsSurface && io.end.bits.isDirectView.getOrElse(false.B) &&
       io.end.bits.occlusions.map(_ =/= Occlusion.none).reduce(_ || _)
-    for (bounce <- io.bounce) {
+    for (bounce <- io.bounce) when(bounces) {
       albedo   := VecInit(bounce.bits.albedo.channels)
       isTinted := bounce.bits.isTinted
       fresnel  := bounce.bits.fresnel.natural
@@ -90,10 +90,18 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
   }
 
   // Read its surface once; and its path again and again while a bounce of the same path is under way
-  private val repeats = isReading && !(isSettled && !isUpdating) && resultContext === context
+  private val repeats = isReading && !(isSettled && !isUpdating) && resultContext === next.context
   private val reads   = takes || repeats
+  private val starts  = isReading && !repeats
+  assert(!starts || !isIssuing || isLast, "an operation before the end of another one")
   isReading := reads
-  when(isReading && !repeats) { isIssuing := true.B }.elsewhen(isLast) { isIssuing := false.B }
+  when(starts) {
+    isIssuing := true.B
+    operation := next
+    ofSurface := next.hasSurface
+    channel   := 0.U
+    light     := 0.U
+  }.elsewhen(isLast) { isIssuing := false.B }
 
   private val surfaces      = ContextTable(config, new TerminalSurface(config))
   private val surface       = surfaces.read(taken, takes)
@@ -108,7 +116,7 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
     surfaces.write(io.surface.bits.context, surface)
   }
   when(RegNext(takes, false.B)) {
-    when(hasReflections.B || !isBounce) { surfaceAlbedo := VecInit(surface.albedo.channels) }
+    when(hasReflections.B || !next.isBounce) { surfaceAlbedo := VecInit(surface.albedo.channels) }
     directLight := VecInit(surface.directLight.map(light => VecInit(light.channels.map(_.natural))))
     emission.zip(surface.emission).foreach { case (to, from) => to := VecInit(from.channels) }
   }
@@ -116,7 +124,7 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
   private val paths      = Option.when(hasBounces)(ContextTable(config, new PathState))
   private val throughput = if (hasBounces) Reg(Vec(3, UInt(weightBits.W))) else VecInit.fill(3)(one)
   private val radiance   = if (hasBounces) Reg(Vec(3, UInt(colourBits.W))) else VecInit.fill(3)(0.U(colourBits.W))
-  for (path <- paths.map(_.read(Mux(repeats, context, taken), reads)))
+  for (path <- paths.map(_.read(Mux(repeats, next.context, taken), reads)))
     when(isReading) {
       throughput := VecInit(path.throughput.map(_.natural))
       radiance   := VecInit(path.radiance.channels)

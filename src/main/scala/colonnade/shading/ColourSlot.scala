@@ -1,7 +1,17 @@
 package colonnade.shading
 
 import chisel3._
+import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
+
+/** A bounce or an end in [[ColourPipeline]]. */
+final private[shading] class ColourOperation(config: ColonnadeConfig) extends Bundle {
+  val context    = Context(config)
+  val isBounce   = Bool()
+  val hasSurface = Bool()
+  val occlusions = Vec(config.frame.lights, Occlusion())
+  val needsRatio = Bool()
+}
 
 /** A channel in the later stages of [[ColourPipeline]]. */
 final private[shading] class ColourSlot(config: ColonnadeConfig) extends Bundle {

@@ -3,37 +3,37 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.Cat
 import colonnade.common.ModuloSchedule
-import colonnade.common.ModuloSchedule.xyz
+import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb}
 
 /** Ports of [[CornerStage]]. */
 final class CornerStageIO(config: ColonnadeConfig) extends Bundle {
-  val phase = Input(UInt(2.W))
+  val phase = Input(ModuloSchedule.phase())
 
-  /** In cycles 0 to 3: the weights of a hit, and the colours of its corners. */
+  /** In cycles 0 to 2: the weights of a hit, and the colours of its corners. */
   val weights = Input(Vec(3, UInt(config.numbers.barycentricBits.W)))
   val colours = Input(Vec(3, Rgb(FrameRegisters.colour)))
 
-  /** In cycles 9 and 10. */
+  /** In cycle 8. */
   val colour = Output(Rgb(FrameRegisters.colour))
 }
 
-/** Interpolates the colours at the corners of a face, as [[CornerColours]] does: a hit every four cycles, by three
-  * multipliers, and for each channel a restoring divider that finds three bits a cycle.
+/** Interpolates the colours at the corners of a face, as [[CornerColours]] does: a hit every three cycles, by three
+  * multipliers, and for each channel a restoring divider that finds four bits a cycle.
   */
 final class CornerStage(config: ColonnadeConfig) extends Module {
   private val colourBits = NumberFormats.colourBits
   private val totalBits  = config.numbers.barycentricBits + 2
-  private val perCycle   = colourBits / ModuloSchedule.interval
+  private val perCycle   = colourBits / interval
 
   val io = IO(new CornerStageIO(config))
 
   private val schedule = new ModuloSchedule(io.phase)
   import schedule._
 
-  private val weights  = arriving(io.weights, 0, 3)
-  private val colours  = arriving(io.colours, 0, 3)
+  private val weights  = arriving(io.weights, 0, interval - 1)
+  private val colours  = arriving(io.colours, 0, interval - 1)
   private val total    = latch(0)(weights.at(0).reduce(_ +& _).pad(totalBits))
   private val products = latch(xyz(0)) {
     val corners = weights.at(xyz(0)).zip(colours.at(xyz(0)))
@@ -57,7 +57,7 @@ final class CornerStage(config: ColonnadeConfig) extends Module {
     val divisor = Reg(UInt(totalBits.W))
     val after   = (0 until perCycle).foldLeft(left)((left, _) => step(left, divisor))
     left    := Mux(isStart, sum.items(index).at(2 + index), after)
-    when(isStart)(divisor := total.at(2 + index))
-    channel := latch(6 + index)(after(colourBits - 1, 0)).at(Seq(9, 10))
+    when(isStart)(divisor := carry(total, 2 + index).at(2 + index))
+    channel := latch(2 + index + interval)(after(colourBits - 1, 0)).at(8)
   }
 }

@@ -33,7 +33,7 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
   /** Hits on mirrors and glass. */
   val bounced = if (config.frame.hasBounces) Some(Decoupled(new BouncedRay(config))) else None
 
-  /** Holds a hit. */
+  /** The entry holds a hit: a cycle of the narrowest stage. */
   val busy = Output(Bool())
 }
 

@@ -2,14 +2,14 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, RegEnable}
-import colonnade.common.ModuloSchedule.xyz
+import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.ModuloSchedule
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Material, MaterialKind}
 import colonnade.numbers.Rounding
 
-/** Shades hits as [[Shader]] does, bit for bit: a hit with one light every four cycles, and four cycles more for each
-  * further light. {{{
+/** Shades hits as [[Shader]] does, bit for bit: a hit with one light every three cycles, and three cycles more for
+  * each further light. {{{
   *
   * hit ─▶ SurfaceStage ─ normal, origin ─▶ AngleStage ─ angle, falloff ─▶ BrightnessStage ─ light ─┬▶ lit surface
   *           │   │                 └──────────────────────── queue of surfaces ────────────────────┘
@@ -27,12 +27,12 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
 
   val io = IO(new ShaderIO(config))
 
-  private val phase    = RegInit(0.U(2.W))
+  private val phase    = RegInit(0.U.asTypeOf(ModuloSchedule.phase()))
   private val schedule = new ModuloSchedule(phase)
   import schedule._
-  phase := phase + 1.U
+  phase := Mux(isAt(interval - 1), 0.U, phase + 1.U)
 
-  // The entry: a hit stays for all of its lights, one every four cycles
+  // The entry: a hit stays for all of its lights, one in each interval
   private val hit      = Reg(new ShadingHit(config))
   private val shadows  = Reg(Bool())
   private val isHeld   = RegInit(false.B)
@@ -44,17 +44,16 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   // Places at the end
   private val queued     = places(config)
   private val lightCount = RegInit(0.U(log2Ceil(queued + 1).W))
-  private val hasPlace   = !lightCount(log2Ceil(queued))
+  private val hasPlace   = lightCount =/= queued.U
   private val mayBounce  = WireInit(true.B)
-  private val isBouncing = WireInit(false.B)
   private val isReady    = isFree && hasPlace && mayBounce
-  private val isEnd      = isAt(3)
+  private val isEnd      = isAt(interval - 1)
   private val takesPoint = io.environment.map(_.fire).getOrElse(false.B)
   private val takes      = io.request.fire || takesPoint
   private val entering   = entered(takesPoint)
   io.request.ready := isEnd && isReady
   io.environment.foreach(_.ready := isEnd && isReady && !io.request.valid)
-  io.readyNext := isAt(2) && isReady
+  io.readyNext := isAt(interval - 2) && isReady
   when(isEnd) {
     isHeld   := takes || !isFree
     isActive := takes || (!isFree && hasPlace)
@@ -73,9 +72,10 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   slot.isLast    := isLast
   slot.shadows   := shadows
   slot.isOn      := light < io.shading.lights
-  private val slots   = arriving(slot, 0, 3)
-  private val at6     = latch(5)(latch(3)(slots.at(3)).at(5))
-  private val at18    = carry(at6, 18)
+  private val slots   = carry(arriving(slot, 0, interval - 1), 4)
+  private val at5     = latch(4)(slots.at(4))
+  private val at6     = carry(slots, 6)
+  private val at17    = carry(at5, 17)
   private val surface = Module(new SurfaceStage(config)).io
   private val angle   = Module(new AngleStage(config)).io
   private val bright  = Module(new BrightnessStage(config)).io
@@ -85,13 +85,13 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   angle.phase        := phase
   angle.lights       := io.lights
   angle.unitShift    := io.unitShift
-  angle.light        := at6.at(xyz(6)).light
-  angle.lightFalloff := at18.at(18).light
+  angle.light        := at5.at(xyz(5)).light
+  angle.lightFalloff := at17.at(17).light
   angle.origin       := surface.origin
   angle.normal       := surface.normal
   bright.phase       := phase
   bright.angle       := angle.angle
-  private val faces = angle.angle.isAcute && at18.at(18 to 21).isOn
+  private val faces = angle.angle.isAcute && at17.at(17 to 19).isOn
   bright.angle.isAcute := faces
   bright.falloff       := angle.falloff
 
@@ -106,18 +106,18 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
     environment.valid := hit.isEnvironment
     environment.bits  := RegEnable(port.bits.albedo, takes)
   }
-  for ((component, cycle) <- assembler.origin.zip(xyz(7))) {
+  for ((component, cycle) <- assembler.origin.zip(xyz(6))) {
     component.valid := isAt(cycle) && at6.at(cycle).isSurface && at6.at(cycle).light === 0.U
     component.bits  := surface.origin
   }
-  private val facing = latch(18) {
-    val now = WireInit(at18.at(18))
-    now.shadows := at18.at(18).shadows && faces
+  private val facing = latch(17) {
+    val now = WireInit(at17.at(17))
+    now.shadows := at17.at(17).shadows && faces
     now
   }
-  private val atEnd = latch(cycles.brightness)(carry(facing, cycles.brightness).at(cycles.brightness))
-  private val ended = atEnd.at(cycles.direct)
-  bright.colour                       := entry(io.lights, atEnd.at(xyz(cycles.colour)).light).colour
+  private val atColour = latch(cycles.colour - 1)(carry(facing, cycles.colour - 1).at(cycles.colour - 1))
+  private val ended    = carry(atColour, cycles.direct).at(cycles.direct)
+  bright.colour                       := entry(io.lights, atColour.at(xyz(cycles.colour)).light).colour
   assembler.light.valid               := isAt(cycles.direct) && ended.isSurface
   assembler.light.bits.light          := ended.light
   assembler.light.bits.isLast         := ended.isLast
@@ -127,8 +127,8 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   lightCount := lightCount + isCounted - assembler.isTaken
 
   // Mirrors and glass
-  private val isBounce    = latch(1)(isActive && hit.isBounce)
-  private val bouncesAt6  = latch(5)(isBounce.at(5))
+  private val isBounce    = latch(0)(isActive && hit.isBounce)
+  private val bounceAt7   = latch(6)(carry(isBounce, 6).at(6))
   private val bounceQueue = io.bounced.map { bounced =>
     val queue = Module(new BounceQueue(config, bouncePlaces)).io
     val pool  = Module(new BouncePipeline(config)).io
@@ -138,14 +138,16 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
     queue.hit.bits.context  := hit.context
     queue.hit.bits.material := hit.material
     queue.hit.bits.backSide := hit.backSide
-    for ((component, cycle) <- queue.directions.zip(xyz(2))) {
+    for ((component, cycle) <- queue.directions.zip(xyz(1))) {
       component.valid                  := isAt(cycle) && isBounce.at(cycle)
       component.bits.faceForwardNormal := surface.faceForwardNormal
       component.bits.dir               := surface.dir
     }
+    val point  = Rounding.narrow(surface.origin, queue.points.head.bits.origin.getWidth)
+    val origin = delay(arriving(point, xyz(6)), xyz(6), 1).at(xyz(7))
     for ((component, cycle) <- queue.points.zip(xyz(7))) {
-      component.valid         := isAt(cycle) && bouncesAt6.at(cycle)
-      component.bits.origin   := Rounding.narrow(surface.origin, component.bits.origin.getWidth)
+      component.valid         := isAt(cycle) && bounceAt7.at(cycle)
+      component.bits.origin   := origin
       component.bits.normal   := surface.normal
       component.bits.isSmooth := surface.isSmooth
     }
@@ -154,22 +156,21 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
     queue.result :<>= pool.result
     bounced :<>= queue.bounced
     count      := count + (takes && entering.isBounce) - queue.request.fire
-    mayBounce  := !count(log2Ceil(bouncePlaces))
-    isBouncing := count =/= 0.U
+    mayBounce  := count =/= bouncePlaces.U
     queue
   }
-  io.busy := isHeld || lightCount =/= 0.U || isBouncing
+  io.busy := isActive
 
   // Colours of the corners, or texels at the positions that they hold
   private val albedos   = assembler.albedo +: bounceQueue.map(_.albedo).toSeq
-  private val isOfKind  = Seq(at6.at(9).isSurface && at6.at(9).light === 0.U, bouncesAt6.at(9))
+  private val isOfKind  = Seq(at6.at(8).isSurface && at6.at(8).light === 0.U, bounceAt7.at(8))
   private val atCorners = hit.colours.map { colours =>
     val corners = Module(new CornerStage(config)).io
     corners.phase   := phase
     corners.weights := hit.weights
     corners.colours := colours
     for ((albedo, isOfKind) <- albedos.zip(isOfKind); colour <- albedo.colour) {
-      colour.valid := isAt(9) && isOfKind
+      colour.valid := isAt(8) && isOfKind
       colour.bits  := corners.colour
     }
     corners.colour
@@ -177,8 +178,8 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   for ((port, layout) <- io.texture.zip(config.geometry.texture)) {
     val texels     = Module(new TexelReader(config, 2 * queued)).io
     val isTextured =
-      carry(latch(3)(material(config, io.materials, hit.material).hasTexture.get && !hit.isEnvironment), 9).at(9)
-    texels.hit.valid           := isAt(9) && isTextured && isOfKind.reduce(_ || _)
+      carry(latch(2)(material(config, io.materials, hit.material).hasTexture.get && !hit.isEnvironment), 8).at(8)
+    texels.hit.valid           := isAt(8) && isTextured && isOfKind.reduce(_ || _)
     texels.hit.bits.position.x := atCorners.get.r >> layout.fractionBits
     texels.hit.bits.position.y := atCorners.get.g >> layout.fractionBits
     texels.hit.bits.isBounce   := isOfKind.last
@@ -231,7 +232,7 @@ object ShadingPipeline {
   /** Mirrors and glass between the entry and their unit. */
   val bouncePlaces: Int = 4
 
-  /** Lights between the entry and the lit surface: what the stages hold and some, a power of two. */
+  /** Lights between the entry and the lit surface: what the stages hold and some. */
   private def places(config: ColonnadeConfig): Int =
     1 << log2Ceil(new BrightnessCycles(config.numbers).direct / ModuloSchedule.interval + 4)
 

@@ -2,8 +2,8 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{Cat, Mux1H}
-import colonnade.common.ModuloSchedule
-import colonnade.common.ModuloSchedule.xyz
+import colonnade.common.ModuloSchedule.{interval, xyz}
+import colonnade.common.{ModuloSchedule, Timed}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Normalise, Rounding}
 
@@ -11,26 +11,28 @@ import colonnade.numbers.{Normalise, Rounding}
 final class SurfaceStageIO(config: ColonnadeConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
-  val phase  = Input(UInt(2.W))
+  val phase  = Input(ModuloSchedule.phase())
   val offset = Input(UInt((config.numbers.gridBits - 2).W))
 
-  /** In cycles 0 to 3. */
+  /** In cycles 0 to 2. */
   val hit = Input(new ShadingHit(config))
 
-  /** From cycle 2 on: the geometric normal, turned against the ray; the ray's direction. */
+  /** From cycle 1 on: the geometric normal, turned against the ray; the ray's direction. */
   val faceForwardNormal = Output(SInt((NumberFormats.normalBits + 1).W))
   val dir               = Output(SInt((formats.shadeBits + 1).W))
 
-  /** From cycle 7 on: the hit point, moved off the surface; the shading normal, scaled to `shadeBits` bits. */
+  /** From cycle 6 on: the hit point, moved off the surface. */
   val origin = Output(SInt(ShaderFormats.originBits(config).W))
+
+  /** From cycle 7 on: the shading normal, scaled to `shadeBits` bits. */
   val normal = Output(SInt(formats.narrowBits.W))
 
-  /** In cycles 6 to 9: the normal is the smooth one. */
+  /** In cycles 7 and 8: the normal is the smooth one. */
   val isSmooth = Output(Bool())
 }
 
-/** The point and the shading normal of a hit: docs/numbers.md, 5.1 to 5.3 and 5.5. A hit every four cycles, by three
-  * multipliers for the normal, one for both products of a slope and the distance, in two digits each, and one for the offset.
+/** The point and the shading normal of a hit: docs/numbers.md, 5.1 to 5.3 and 5.5. A hit every three cycles, by three
+  * multipliers for the normal, two for the products of the slopes and the distance, digit by digit, and one for the offset.
   * A smooth normal of zero gives way to the geometric one without a second start.
   */
 final class SurfaceStage(config: ColonnadeConfig) extends Module {
@@ -42,7 +44,7 @@ final class SurfaceStage(config: ColonnadeConfig) extends Module {
   private val schedule = new ModuloSchedule(io.phase)
   import schedule._
 
-  private val hit = arriving(io.hit, 0, 3)
+  private val hit = arriving(io.hit, 0, interval - 1)
 
   /** The ray's axes that the object's axes are, in three cycles. */
   private def rayAxes(cycles: Seq[Int], axis: UInt): Seq[Bool] =
@@ -50,11 +52,11 @@ final class SurfaceStage(config: ColonnadeConfig) extends Module {
 
   // The geometric normal, and the longest of its components
   private val backSide          = latch(1)(hit.at(1).backSide)
-  private val geometricNormal   = select(xyz(1))(hit.at(xyz(1)).geometricNormal.axes(_))
+  private val geometricNormal   = select(xyz(0))(hit.at(xyz(0)).geometricNormal.axes(_))
   private val negated           = -geometricNormal.pad(NumberFormats.normalBits + 1)
   private val faceForwardNormal =
-    latch(xyz(1))(Mux(hit.at(xyz(1)).backSide, negated, geometricNormal.pad(NumberFormats.normalBits + 1)))
-  private val flatLength = longest(xyz(1), geometricNormal.pad(NumberFormats.normalBits + 1), negated)
+    latch(xyz(0))(Mux(hit.at(xyz(0)).backSide, negated, geometricNormal.pad(NumberFormats.normalBits + 1)))
+  private val flatLength = longest(xyz(0), geometricNormal.pad(NumberFormats.normalBits + 1), negated)
 
   // The smooth normal
   private val weighted = latch(xyz(0)) {
@@ -67,58 +69,48 @@ final class SurfaceStage(config: ColonnadeConfig) extends Module {
   private val smoothLength = longest(xyz(2), sum.at(xyz(2)), turned)
 
   // The shading normal, scaled
-  private val registerSaysFlat = latch(3)(hit.at(3).isFlat)
+  private val registerSaysFlat = latch(2)(hit.at(2).isFlat)
   private val flat             = registerSaysFlat.at(5) || smoothLength.at(5) === 0.U
   private val isFlat           = latch(5)(flat)
   private val normalZeros      = latch(5) {
-    val length = Mux(flat, flatLength.at(5).pad(formats.normalSumBits - 1), smoothLength.at(5))
+    val length = Mux(flat, carry(flatLength, 5).at(5).pad(formats.normalSumBits - 1), smoothLength.at(5))
     Normalise.countLeadingZeros(length)._2
   }
   private val normal = latch(xyz(6)) {
-    val flatNormal = delay(faceForwardNormal, xyz(2), 4).at(xyz(6)).pad(formats.normalSumBits)
+    val flatNormal = delay(faceForwardNormal, xyz(1), 5).at(xyz(6)).pad(formats.normalSumBits)
     val shading    = Mux(isFlat.at(xyz(6)), flatNormal, delay(smooth, xyz(3), 3).at(xyz(6)))
     val scaled     = (shading << normalZeros.at(xyz(6))).asUInt(formats.normalSumBits - 1, 0)
     scaled.head(formats.narrowBits).asSInt
   }
 
   // The offset, the ray's origin and the way along its dominant axis
-  private val offsetProduct = latch(xyz(2))(io.offset.zext * faceForwardNormal.at(xyz(2)))
-  private val offset = latch(xyz(3))(Rounding.nearestEven(offsetProduct.at(xyz(3)), NumberFormats.normalFraction))
-  private val start  = latch(xyz(1)) {
-    val now      = hit.at(xyz(1))
-    val axes     = rayAxes(xyz(1), now.axis)
+  private val offsetProduct = latch(xyz(1))(io.offset.zext * faceForwardNormal.at(xyz(1)))
+  private val offset = latch(xyz(2))(Rounding.nearestEven(offsetProduct.at(xyz(2)), NumberFormats.normalFraction))
+  private val start  = latch(xyz(0)) {
+    val now      = hit.at(xyz(0))
+    val axes     = rayAxes(xyz(0), now.axis)
     val isNeg    = axes.last && now.isNegative
     val distance = Mux(axes.last, now.distance, 0.S).pad(now.origin.head.getWidth)
     val addend   = Mux(isNeg, ~distance, distance)
     added(Mux1H(axes, now.origin), addend, isNeg)
   }
-  private val moved = latch(xyz(4))(delay(start, xyz(2), 2).at(xyz(4)) + offset.at(xyz(4)).pad(io.origin.getWidth))
+  private val moved = latch(xyz(3))(delay(start, xyz(1), 2).at(xyz(3)) + offset.at(xyz(3)).pad(io.origin.getWidth))
 
-  // The slopes times the distance, in two digits each, and the point
-  private val lowBits = (numbers.gridBits + 1) / 2
-  private val digit   = latch(0 to 3) {
-    val now    = hit.at(0 to 3)
-    val digits = now.shear.flatMap(slope => Seq(slope.asUInt(lowBits - 1, 0).zext, (slope >> lowBits).pad(lowBits + 1)))
-    now.distance * select(0 to 3)(digits(_))
+  // The slopes times the distance, and the point
+  private def ofHit[T <: Data](field: ShadingHit => T): Timed[T] = arriving(field(io.hit), hit.first, hit.last)
+  private val slides                                             = Seq.tabulate(2) { index =>
+    val slide = multiply(ofHit(_.distance), ofHit(_.shear(index)), 0)
+    latch(4)(Rounding.narrow(Rounding.nearestEven(slide.at(4), numbers.shearFraction), formats.pointBits))
   }
-  private val lowDigit = latch(Seq(1, 3))(digit.items(0, 2).at(Seq(1, 3)))
-  private val slide    = latch(Seq(2, 4)) {
-    (digit.items(1, 3).at(Seq(2, 4)) << lowBits).asSInt + lowDigit.at(Seq(2, 4))
-  }
-  private val rounded = Rounding.narrow(
-    Rounding.nearestEven(slide.at(Seq(4, 5)), numbers.shearFraction),
-    formats.pointBits
-  )
-  private val slides = Seq(latch(4)(rounded), latch(5)(rounded))
-  private val axis   = latch(5)(latch(3)(hit.at(3).axis).at(5))
-  private val origin = latch(xyz(6)) {
-    val addend = Mux1H(rayAxes(xyz(6), axis.at(xyz(6))).init, slides.map(_.at(xyz(6)))).pad(io.origin.getWidth)
-    added(delay(moved, xyz(5), 1).at(xyz(6)), addend, false.B)
+  private val axis   = latch(4)(latch(2)(hit.at(2).axis).at(4))
+  private val origin = latch(xyz(5)) {
+    val addend = Mux1H(rayAxes(xyz(5), axis.at(xyz(5))).init, slides.map(_.at(xyz(5)))).pad(io.origin.getWidth)
+    added(delay(moved, xyz(4), 1).at(xyz(5)), addend, false.B)
   }
 
   // The direction, as long as 2^(shadeBits - 1) along the dominant axis
-  private val dir = latch(xyz(1)) {
-    val now    = hit.at(xyz(1))
+  private val dir = latch(xyz(0)) {
+    val now    = hit.at(xyz(0))
     val one    = (BigInt(1) << (formats.shadeBits - 1)).S((formats.shadeBits + 1).W)
     val slopes = now.shear.map(slope =>
       Rounding.narrow(
@@ -126,14 +118,14 @@ final class SurfaceStage(config: ColonnadeConfig) extends Module {
         formats.shadeBits + 1
       ).pad(formats.shadeBits + 1)
     )
-    Mux1H(rayAxes(xyz(1), now.axis), slopes :+ Mux(now.isNegative, -one, one))
+    Mux1H(rayAxes(xyz(0), now.axis), slopes :+ Mux(now.isNegative, -one, one))
   }
 
-  io.faceForwardNormal := faceForwardNormal.at(xyz(2))
-  io.dir               := dir.at(xyz(2))
-  io.origin            := origin.at(xyz(7))
+  io.faceForwardNormal := faceForwardNormal.at(xyz(1))
+  io.dir               := dir.at(xyz(1))
+  io.origin            := origin.at(xyz(6))
   io.normal            := normal.at(xyz(7))
-  io.isSmooth          := !isFlat.at(6)
+  io.isSmooth          := !isFlat.at(7)
 
   /** The bitwise or of three magnitudes, which is as long as the largest of them; `negative` is the negated component. */
   private def longest(cycles: Seq[Int], component: SInt, negative: SInt) =

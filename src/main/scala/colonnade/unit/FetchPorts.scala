@@ -78,6 +78,9 @@ final class RecordFetchIO(config: ColonnadeConfig) extends Bundle {
   /** By [[RecordKind]]: the unit accepts a record in the next cycle. It must keep to this. */
   val readyNext = Input(Vec(RecordKind.all.size, Bool()))
 
+  /** With shared triangle units: a record waits for one. */
+  val waitsForTriangles = Option.when(config.sharesTriangleUnits)(Output(Bool()))
+
   /** The context that gets a response in the next cycle. */
   val grantNext = Output(Valid(Context(config)))
   val response  = Output(Valid(new FetchResponse(config)))

@@ -34,6 +34,9 @@ final class FetchStageIO(config: ColonnadeConfig) extends Bundle {
   /** `nodes`, `triangles` and `hits` are ready in the next cycle. */
   val readyNext = Input(Vec(RecordKind.all.size, Bool()))
 
+  /** With shared triangle units: a record waits for one. */
+  val waitsForTriangles = Option.when(config.sharesTriangleUnits)(Output(Bool()))
+
   /** Contexts that get no record because its address is illegal: during traversal, and for attributes. */
   val traversalError = Output(Valid(Context(config)))
   val attributeError = Output(Valid(Context(config)))
@@ -58,6 +61,7 @@ final class FetchStage(config: ColonnadeConfig) extends Module {
   recordFetch.io.fetches    := io.fetches
   recordFetch.io.readyNext  := io.readyNext
   io.requests :<>= recordFetch.io.requests
+  io.waitsForTriangles.zip(recordFetch.io.waitsForTriangles).foreach { case (waits, record) => waits := record }
 
   private val rays = ContextTable(config, new TracedRay(config.numbers))
   when(io.ray.valid) { rays.write(io.ray.bits.context, io.ray.bits.ray) }

@@ -8,7 +8,7 @@ import colonnade.environment.HitDistance
 import colonnade.formats.{RecordFormats, SceneMap}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PreparedRay, RayFormats}
-import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanes}
+import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanes, TriangleLanesIO}
 
 /** The closest hit of a ray that is to be shaded. */
 final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
@@ -72,10 +72,13 @@ final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
   val entered = Valid(new PreparedRay(config))
 
   /** Fetches of the first record, of the next record, and of the attributes of a hit. */
-  val fetches    = Vec(3, Valid(new FetchRequest(config)))
-  val nodes      = Flipped(Decoupled(new NodeCandidate(config)))
-  val triangles  = Flipped(Decoupled(new TriangleCandidate(config)))
-  val fetchError = Flipped(Valid(Context(config)))
+  val fetches   = Vec(3, Valid(new FetchRequest(config)))
+  val nodes     = Flipped(Decoupled(new NodeCandidate(config)))
+  val triangles = Flipped(Decoupled(new TriangleCandidate(config)))
+
+  /** To the triangle units that rows share. */
+  val triangleLanes = Option.when(config.sharesTriangleUnits)(Flipped(new TriangleLanesIO(config)))
+  val fetchError    = Flipped(Valid(Context(config)))
 
   /** `nodes` and `triangles` are ready in the next cycle. */
   val nodesReadyNext     = Output(Bool())
@@ -98,7 +101,7 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   val io = IO(new IntersectorIO(config))
 
   private val traversal = Module(new Traversal(config))
-  private val triangles = Module(new TriangleLanes(config))
+  private val triangles = io.triangleLanes.getOrElse(Module(new TriangleLanes(config)).io)
   private val hitTable  = Module(new HitTable(config))
   private val control   = io.control
 
@@ -127,11 +130,11 @@ final class Intersector(config: ColonnadeConfig) extends Module {
 
   // Test triangles: a result terminates an occluded shadow ray, or the ray resumes after its record.
   // The termination is registered, so that no path leads from the triangle unit through the hit table to the controller
-  private val result     = triangles.io.result
+  private val result     = triangles.result
   private val isShadow   = control.isShadow(result.bits.context)
   private val isOccluded = isShadow && hitTable.io.hasHitNow
   private val resumes    = Module(new Arbiter(Context(config), 2))
-  triangles.io.candidate :<>= io.triangles
+  triangles.candidate :<>= io.triangles
   hitTable.io.result.valid := result.fire
   hitTable.io.result.bits  := result.bits
   hitTable.io.isShadow     := isShadow
@@ -170,7 +173,7 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   io.fetches(2).bits.address := SurfaceHit.attributeAddress(config, io.scene, closest.id)
 
   io.nodesReadyNext     := traversal.io.readyNext
-  io.trianglesReadyNext := triangles.io.readyNext
+  io.trianglesReadyNext := triangles.readyNext
   control.hasHit        := hitTable.io.hasHit
   control.occlusions    := hitTable.io.occlusions
   hitTable.io.granted :<>= io.closestHit
@@ -180,7 +183,7 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   io.events.boxTests          := traversal.io.boxTests
   io.events.triangleTests     := result.fire
   io.events.busyBoxUnit       := traversal.io.busy
-  io.events.busyTriangleUnit  := triangles.io.busy
+  io.events.busyTriangleUnit  := triangles.busy
   io.events.contextsBox       := Occupancy(config, Seq(io.nodes.fire, traversal.io.resume.fire), Seq(step.fire))
   io.events.contextsTriangles := Occupancy(config, Seq(io.triangles.fire), Seq(result.fire && result.bits.isLast))
   io.events.deepestStack      := traversal.io.deepest

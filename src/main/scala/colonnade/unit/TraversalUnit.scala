@@ -7,6 +7,7 @@ import colonnade.common.{Context, First}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap, UnitEvents}
 import colonnade.ray.PreparedRay
+import colonnade.traversal.TriangleLanesIO
 
 /** Ports of [[TraversalUnit]]. `scene` is constant while a frame runs; `start` precedes the first ray. */
 final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
@@ -19,6 +20,10 @@ final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
   /** A ray that enters the object's box, with the context of its path; only in a cycle with `isFree`. */
   val rays   = Flipped(Valid(new PreparedRay(config.ofPaths)))
   val isFree = Output(Bool())
+
+  /** To the triangle units that rows share; a record waits for one. */
+  val triangleLanes     = Option.when(config.sharesTriangleUnits)(Flipped(new TriangleLanesIO(config)))
+  val waitsForTriangles = Option.when(config.sharesTriangleUnits)(Output(Bool()))
 
   /** In any order. */
   val results = Decoupled(new TraceResult(config.ofPaths))
@@ -71,6 +76,8 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   fetch.readyNext  := VecInit(intersector.nodesReadyNext, intersector.trianglesReadyNext, false.B)
   intersector.nodes :<>= fetch.nodes
   intersector.triangles :<>= fetch.triangles
+  io.triangleLanes.zip(intersector.triangleLanes).foreach { case (lanes, port) => port :<>= lanes }
+  io.waitsForTriangles.zip(fetch.waitsForTriangles).foreach { case (waits, record) => waits := record }
   intersector.fetchError := fetch.traversalError
   fetch.hits.ready       := false.B
   fetch.closestHit.hit   := DontCare

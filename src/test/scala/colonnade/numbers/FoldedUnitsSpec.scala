@@ -6,9 +6,9 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** [[FoldedDivider]] and [[FoldedSquareRoot]]: an operation every four cycles, whose operands are there for one. */
+/** [[FoldedDivider]] and [[FoldedSquareRoot]]: an operation every three cycles, whose operands are there for one. */
 class FoldedUnitsSpec extends AnyFlatSpec with ChiselScalatestTester {
-  private val interval = 4
+  private val interval = 3
 
   /** Steps of a clock for a unit; `offer` gives it the operands, or others that it must not take. */
   private def feed[X](clock: Clock, isStep: Bool, inputs: Seq[X], intervals: Int)(

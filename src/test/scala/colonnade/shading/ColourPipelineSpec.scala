@@ -75,9 +75,9 @@ class ColourPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
         }
         val none   = seen.direct.map(_ => 0)
         val opaque = seen.direct.map(_ => 2)
-        cycles("an end at a surface", 3 * lights + 1)(_ => End(false, none, isDirectView = true))
-        cycles("an end in the background", 4)(_ => End(true, none, isDirectView = false))
-        cycles("an end where one is shadowed", 3 * lights + 2)(context =>
+        cycles("an end at a surface", 3 * lights)(_ => End(false, none, isDirectView = true))
+        cycles("an end in the background", 3)(_ => End(true, none, isDirectView = false))
+        cycles("an end where one is shadowed", 3 * lights + 1)(context =>
           End(false, if (context == 0) opaque else none, isDirectView = true)
         )
         if (maxBounces > 0) {

@@ -2,6 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chiseltest._
+import colonnade.common.ModuloSchedule
 import colonnade.config.ColonnadeConfig
 import colonnade.{Always, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -140,7 +141,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   for (shining <- Seq(1, 2))
-    it should s"take a hit every ${4 * shining} cycles with $shining lights" in
+    it should s"take a hit every ${ModuloSchedule.interval * shining} cycles with $shining lights" in
       test(new ShaderHarness(TestConfigs.tiny.copy(units = TestConfigs.tiny.units.copy(pipelined = true))))
         .withAnnotations(Simulation.verilator) { dut =>
           val stimulus = new ShaderStimulus(TestConfigs.tiny, new Random(3))
@@ -150,13 +151,14 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
           dut.io.lit.ready.poke(true)
           pokeHit(dut.io.request.bits, stimulus.surfaceHit(light))
           var (taken, lit) = (0, 0)
-          for (_ <- 0 until 400 * shining) {
+          val cycles       = ModuloSchedule.interval * shining
+          for (_ <- 0 until 100 * cycles) {
             if (dut.io.request.ready.peekBoolean()) taken += 1
             if (dut.io.lit.valid.peekBoolean()) lit += 1
             dut.clock.step()
           }
           assert(taken == 100 && lit > 80, s"$taken hits taken, $lit lit")
-          info(s"${(taken - lit) * 4 * shining} cycles from hit to lit surface")
+          info(s"${(taken - lit) * cycles} cycles from hit to lit surface")
 
           // Nobody takes a surface for a while, and then all leave
           for (cycle <- 0 until 800) {

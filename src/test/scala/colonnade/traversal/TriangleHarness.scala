@@ -18,7 +18,8 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
 
   private val miss = ExpectedHit(isHit = false, 0, Seq.fill(3)(BigInt(0)), backSide = false)
 
-  private def expected(candidates: Seq[TestCandidate]): Seq[ExpectedResult] = {
+  /** Results in order, by the model. */
+  def expected(candidates: Seq[TestCandidate]): Seq[ExpectedResult] = {
     val hits = stimulus.expected(candidates.flatMap(c => c.triangles.map((c.ray, _)))).iterator
     candidates.flatMap { c =>
       if (c.triangles.isEmpty) Seq(ExpectedResult(c, 0, isLast = true, miss))
@@ -56,7 +57,7 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
     while (received < awaited.size) {
       withClue(s"after $received of ${awaited.size} results: ")(cycles should be < limit)
       if (!isOffered && sent < candidates.size && (bubbles == 0 || !stimulus.chance(bubbles))) {
-        poke(unit, candidates(sent))
+        poke(unit.io.candidate.bits, candidates(sent))
         isOffered = true
       }
       unit.io.candidate.valid.poke(isOffered.B)
@@ -97,8 +98,8 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
     }
   }
 
-  private def poke(unit: TriangleUnit, candidate: TestCandidate): Unit = {
-    val (bits, ray) = (unit.io.candidate.bits, unit.io.candidate.bits.ray)
+  def poke(bits: TriangleCandidate, candidate: TestCandidate): Unit = {
+    val ray = bits.ray
     bits.context.poke(candidate.context.U)
     bits.record.firstTriangle.poke(candidate.firstTriangle.U)
     val largest = (1 << bits.record.count.getWidth) - 1
@@ -118,7 +119,7 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
     case other          => fail(s"a raw number of type $other")
   }
 
-  private def peek(port: Fixed): BigInt = port.raw match {
+  def peek(port: Fixed): BigInt = port.raw match {
     case signed: SInt   => signed.peekInt()
     case unsigned: UInt => unsigned.peekInt()
     case other          => fail(s"a raw number of type $other")
