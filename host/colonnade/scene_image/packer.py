@@ -1,6 +1,7 @@
 """The packer: converts a mesh to the records of the column memory.
 
-It quantises the vertices, drops degenerate triangles, builds the tree and fills the records by the manifest's layouts.
+It quantises the vertices, drops degenerate triangles, builds the tree, rotates the corners of triangles that share an
+edge with the other one of their record, and fills the records by the manifest's layouts.
 The sections are nodes, triangles and attributes, in this order. Addresses in nodes are absolute.
 """
 
@@ -113,11 +114,13 @@ def pack(
     materials = mesh.materials if materials is None else tuple(materials)
     is_glass = np.array([material.kind == "glass" for material in materials])
     is_clear = is_glass[mesh.face_materials[quantised.mesh_faces]]
-    sections.append(_triangle_records(quantised, bvh.order, leaf_first, leaf_count, is_clear, manifest))
+    corners = quantised.vertices[quantised.faces[bvh.order]]
+    corner_order = shared_edge_order(corners, leaf_first, leaf_count)
+    corners = _reordered(corners, corner_order)
+    sections.append(_triangle_records(corners, leaf_first, leaf_count, is_clear[bvh.order], manifest))
     atlas = _atlas(mesh, manifest, materials, headroom)
     colours = _corner_colours(mesh, manifest, materials, headroom, atlas)
-    sections.append(_attribute_records(mesh, quantised, bvh.order, manifest, faces_per_record, colours))
-    corners = quantised.vertices[quantised.faces]
+    sections.append(_attribute_records(mesh, quantised, bvh.order, corner_order, manifest, faces_per_record, colours))
     header = ImageHeader(
         format_hash=manifest.format_hash,
         mesh=mesh.name,
@@ -203,22 +206,48 @@ def _node_records(bvh: Bvh, manifest: Manifest, triangle_base: int) -> Bytes:
     return manifest.layouts["node"].pack(values)
 
 
+def shared_edge_order(
+    corners: npt.NDArray[np.int32], leaf_first: npt.NDArray[np.uint32], leaf_count: npt.NDArray[np.uint32]
+) -> npt.NDArray[np.int64]:
+    """The order of each triangle's corners, int64 [m, 3], by which the triangle unit recognises a common edge.
+
+    The second triangle of such a leaf starts with the first one's corners 1 and 0. Windings do not change.
+
+    Args:
+        corners: int32 [m, 3, 3], vertex units, in the order of packed ids.
+        leaf_first, leaf_count: As in `Bvh`.
+    """
+    first = leaf_first[leaf_count == 2].astype(np.int64)
+    rotation = np.zeros(len(corners), dtype=np.int64)
+    for i in range(3):
+        for j in range(3):
+            start, end = corners[first, i], corners[first, (i + 1) % 3]
+            shares = (start == corners[first + 1, (j + 1) % 3]).all(axis=1) & (end == corners[first + 1, j]).all(axis=1)
+            rotation[first[shares]] = i
+            rotation[first[shares] + 1] = j
+    return (rotation[:, None] + np.arange(3)) % 3
+
+
+def _reordered(of_corners: npt.NDArray[Any], corner_order: npt.NDArray[np.int64]) -> npt.NDArray[Any]:
+    """Values [m, 3, n] of the corners of packed triangles, in the order of `shared_edge_order`."""
+    return np.take_along_axis(of_corners, corner_order[:, :, None], axis=1)
+
+
 def _triangle_records(
-    quantised: QuantisedMesh,
-    order: npt.NDArray[np.uint32],
+    corners: npt.NDArray[np.int32],
     leaf_first: npt.NDArray[np.uint32],
     leaf_count: npt.NDArray[np.uint32],
     is_clear: npt.NDArray[np.bool_],
     manifest: Manifest,
 ) -> Bytes:
+    """Pack the triangle records; corners and `is_clear` are in the order of packed ids."""
     values: dict[str, npt.NDArray[Any]] = {"firstTriangle": leaf_first, "count": leaf_count}
     for k in range(int(manifest.config["geometry"]["trianglesPerRecord"])):
         present = leaf_count > k
-        packed = np.minimum(leaf_first + k, len(order) - 1)
-        values[f"isClear[{k}]"] = is_clear[order[packed]] & present
-        corners = quantised.vertices[quantised.faces[order[packed]]] * present[:, None, None]
+        packed = np.minimum(leaf_first + k, len(corners) - 1)
+        values[f"isClear[{k}]"] = is_clear[packed] & present
         for j in range(3):
-            values |= _vector(f"vertices[{3 * k + j}]", corners[:, j])
+            values |= _vector(f"vertices[{3 * k + j}]", corners[packed, j] * present[:, None])
     return manifest.layouts["triangles"].pack(values)
 
 
@@ -268,6 +297,7 @@ def _attribute_records(
     mesh: Mesh,
     quantised: QuantisedMesh,
     order: npt.NDArray[np.uint32],
+    corner_order: npt.NDArray[np.int64],
     manifest: Manifest,
     per_record: int,
     colours: npt.NDArray[np.int64] | None,
@@ -277,7 +307,7 @@ def _attribute_records(
     rows = quantised.mesh_faces[order]
     count = -(-len(order) // per_record)
     normals = np.zeros((count * per_record, 4, 3), dtype=np.int64)
-    normals[: len(order), :3] = np.rint(mesh.corner_normals[rows] * one)
+    normals[: len(order), :3] = np.rint(_reordered(mesh.corner_normals[rows], corner_order) * one)
     normals[: len(order), 3] = np.rint(geometric_normals(quantised)[order] * one)
     materials = np.zeros(count * per_record, dtype=np.int64)
     materials[: len(order)] = mesh.face_materials[rows]
@@ -289,8 +319,9 @@ def _attribute_records(
         values |= _vector(f"faces[{k}].geometricNormal", normals[face, 3])
         values[f"faces[{k}].material"] = materials[face]
         if colours is not None:
+            of_corners = _reordered(colours[rows], corner_order)
             for j in range(3):
-                values |= {f"faces[{k}].colours[{j}].{name}": colours[rows, j, c] for c, name in enumerate("rgb")}
+                values |= {f"faces[{k}].colours[{j}].{name}": of_corners[:, j, c] for c, name in enumerate("rgb")}
     return manifest.layouts["attributes"].pack(values)
 
 

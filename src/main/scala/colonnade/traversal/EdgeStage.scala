@@ -6,66 +6,99 @@ import colonnade.config.NumberFormats
 import colonnade.numbers.{Fixed, Rounding}
 
 final class EdgeStageIO(formats: TriangleFormats) extends Bundle {
-  val schedule = Input(new TriangleSchedule)
 
-  /** x and y of vertices 0, 1, 2 in phases 2, 3, 0. */
+  /** The pipeline moves by a slot. */
+  val advances = Input(Bool())
+  val slot     = Input(new TriangleSlot)
+
+  /** x and y of the vertex of `slot`. */
   val sheared = Input(Vec(2, new Fixed(formats.grid)))
 
-  /** A triangle comes in this round of phases 2, 3, 0, 1; and one came in the round before. */
-  val isOccupied  = Input(Bool())
-  val wasOccupied = Input(Bool())
+  /** All edges of a triangle are known; the other outputs are valid. */
+  val decides = Output(Bool())
 
-  /** The ray's line crosses the triangle whose vertex 0 came seven cycles ago. All outputs are valid in phase 1. */
+  /** The triangle is the second one of a pair. */
+  val isSecond = Output(Bool())
+
+  /** The ray's line crosses the triangle. */
   val crossesTriangle = Output(Bool())
   val isPositive      = Output(Bool())
   val magnitudes      = Output(Vec(3, UInt(formats.edgeBits.W)))
 }
 
-/** Exact edge functions of the sheared triangle; numbers.md 4.3.
+/** Exact edge functions of the sheared triangles; numbers.md 4.3.
   *
-  * It multiplies in phases 0, 1, 2 (edges 2, 0, 1), then subtracts and tests the signs in the two cycles that follow.
-  * A triangle seen edge-on, whose edge functions are all zero, is not crossed. Without a triangle the registers hold,
-  * and in phase 3 so do the operands of the multipliers.
+  * One edge per slot, in the order 2, 0, 1: load two vertices, multiply, subtract, test the sign. The triangle is decided
+  * with its edge 1, four slots after its last vertex came. The second triangle of a pair needs only edges 0 and 1: its
+  * edge 2 is that of the first one, negated. A triangle seen edge-on, whose edge functions are all zero, is not
+  * crossed. Without a triangle the registers hold.
   */
 final class EdgeStage(numbers: NumberFormats) extends Module {
   private val formats = new TriangleFormats(numbers)
   val io              = IO(new EdgeStageIO(formats))
 
-  private val schedule = io.schedule
-  private val advances = schedule.advances
+  import TriangleStep._
 
-  // The edge's two vertices. The first one waits until the second one comes, and comes again to close the triangle
-  private val current, previous, first = Reg(Vec(2, new Fixed(formats.grid)))
-  when(io.isOccupied && advances) {
-    when(schedule.is(2)) {
-      first := io.sheared
-    }.otherwise {
-      current  := Mux(schedule.is(1), first, io.sheared)
-      previous := Mux(schedule.is(3), first, current)
+  private val advances = io.advances
+  private val step     = io.slot.step
+
+  // Which edge the vertex of this slot completes; the slot after the last one closes its triangle
+  private val none    = 0.U.asTypeOf(new EdgeSlot)
+  private val closes  = RegEnable(step === last, false.B, advances)
+  private val isPair  = RegEnable(io.slot.isPair, advances)
+  private val loading = Wire(new EdgeSlot)
+  loading.edge2    := step === second
+  loading.edge0    := step === third || step === last
+  loading.edge1    := closes || (step === gap && io.slot.isPair)
+  loading.isSecond := closes && isPair
+  private val loads = loading.edge2 || loading.edge0 || loading.edge1
+
+  // The edge's two vertices. The round's first two wait, to close the triangles
+  private val current, previous, firstVertex, secondVertex = Reg(Vec(2, new Fixed(formats.grid)))
+  when(advances) {
+    when(step === first) { firstVertex := io.sheared }
+    when(step === second) { secondVertex := io.sheared }
+    when(loads) {
+      current  := Mux(loading.edge1, Mux(loading.isSecond, secondVertex, firstVertex), io.sheared)
+      previous := Mux(loading.edge2, firstVertex, current)
     }
   }
-  private val multiplies = advances && !schedule.is(3) && Mux(schedule.is(2), io.wasOccupied, io.isOccupied)
-  private val forward    = RegEnable(previous(0).integer * current(1).integer, multiplies)
-  private val backward   = RegEnable(previous(1).integer * current(0).integer, multiplies)
 
-  // The three edges; the older two are kept as magnitudes. They hold in phase 0
-  private val edge          = Reg(SInt(formats.edgeBits.W))
-  private val edge0, edge2  = Reg(UInt(formats.edgeBits.W))
-  private val edgeMagnitude = edge.abs.asUInt
-  when(advances && !schedule.is(0) && Mux(schedule.is(1), io.isOccupied, io.wasOccupied)) {
-    edge  := Rounding.narrow(forward -& backward, formats.edgeBits)
-    edge0 := edgeMagnitude
-    edge2 := edge0
-  }
+  // Multiply, then subtract
+  private val multiplying = RegEnable(loading, none, advances)
+  private val subtracting = RegEnable(multiplying, none, advances)
+  private val testing     = RegEnable(subtracting, none, advances)
+  private val multiplies  = advances && multiplying.isValid
+  private val subtracts   = advances && subtracting.isValid
+  private val forward     = RegEnable(previous(0).integer * current(1).integer, multiplies)
+  private val backward    = RegEnable(previous(1).integer * current(0).integer, multiplies)
+  private val edge        = RegEnable(Rounding.narrow(forward -& backward, formats.edgeBits), subtracts)
+  private val isZero      = RegEnable(forward === backward, subtracts)
 
-  private val anyNegative, anyPositive = Reg(Bool())
-  when(!schedule.is(1)) {
-    val isFirst = schedule.is(2)
-    anyNegative := edge < 0.S || (anyNegative && !isFirst)
-    anyPositive := edge > 0.S || (anyPositive && !isFirst)
-  }
+  // The three edges; the older two are kept as magnitudes and signs. A pair's edge is negated for its second triangle
+  private val magnitude                                  = edge.abs.asUInt
+  private val isNegative                                 = edge < 0.S
+  private val isPositive                                 = !isNegative && !isZero
+  private def keep[T <: Data](value: T, isEdge: Bool): T = RegEnable(value, advances && isEdge)
+  private val (magnitude2, magnitude0) = (keep(magnitude, testing.edge2), keep(magnitude, testing.edge0))
+  private val (negative2, negative0)   = (keep(isNegative, testing.edge2), keep(isNegative, testing.edge0))
+  private val (positive2, positive0)   = (keep(isPositive, testing.edge2), keep(isPositive, testing.edge0))
+  private val anyNegative              = isNegative || negative0 || Mux(testing.isSecond, positive2, negative2)
+  private val anyPositive              = isPositive || positive0 || Mux(testing.isSecond, negative2, positive2)
 
+  io.decides         := testing.edge1
+  io.isSecond        := testing.isSecond
   io.crossesTriangle := anyNegative =/= anyPositive
   io.isPositive      := anyPositive
-  io.magnitudes      := VecInit(edge0, edgeMagnitude, edge2)
+  io.magnitudes      := VecInit(magnitude0, magnitude, magnitude2)
+}
+
+/** The edge function that a stage computes; at most one of the first three. */
+final private class EdgeSlot extends Bundle {
+  val edge2, edge0, edge1 = Bool()
+
+  /** With `edge1`: of the second triangle of a pair. */
+  val isSecond = Bool()
+
+  def isValid: Bool = edge2 || edge0 || edge1
 }

@@ -7,41 +7,41 @@ import colonnade.numbers.{Fixed, Normalise, Rounding}
 import colonnade.ray.RayFormats
 
 final class NumeratorStageIO(config: ColonnadeConfig) extends Bundle {
-  private val formats = new TriangleFormats(config.numbers)
-
   val weighted = Flipped(Decoupled(new WeightedTriangle(config)))
-
-  /** Multiplications for the shear stage; `products` is valid in the cycle after one was accepted. */
-  val weighing = Decoupled(new WeighingOperands(formats))
-  val products = Input(Vec(2, SInt((2 * config.numbers.gridBits).W)))
   val request  = Decoupled(new DistanceRequest(config))
 }
 
 /** Prepares the distance as a division of two mantissas; numbers.md 4.5.
   *
-  * One triangle at a time, every 5 cycles plus at most 3 cycles of wait for the shared multipliers: products, sum,
-  * magnitude, leading zeros, and the shift in the output cycle.
+  * One triangle at a time, every 7 cycles: four multiplications of a weight by half a rise, magnitude, leading zeros, and
+  * the shift in the output cycle.
   */
 final class NumeratorStage(config: ColonnadeConfig) extends Module {
   val io = IO(new NumeratorStageIO(config))
 
-  private object State extends ChiselEnum { val idle, multiplying, adding, negating, counting, offering = Value }
+  private object State extends ChiselEnum { val idle, multiplying, negating, counting, offering = Value }
   import State._
 
   private val numbers = config.numbers
   private val formats = new TriangleFormats(numbers)
 
   // Control
-  private val state = RegInit(idle)
-  io.weighing.valid := state === multiplying
+  private val state   = RegInit(idle)
+  private val beat    = Reg(UInt(2.W))
+  private val isFinal = beat === 3.U
   io.request.valid  := state === offering
   io.weighted.ready := state === idle || io.request.fire
-  when(io.weighing.fire) { state := adding }
-  when(state === adding) { state := negating }
+  when(state === multiplying) {
+    beat := beat + 1.U
+    when(isFinal) { state := negating }
+  }
   when(state === negating) { state := counting }
   when(state === counting) { state := offering }
   when(io.request.fire) { state := idle }
-  when(io.weighted.fire) { state := multiplying }
+  when(io.weighted.fire) {
+    state := multiplying
+    beat  := 0.U
+  }
 
   // Datapath
   private val triangle   = Reg(new WeightedTriangle(config))
@@ -49,19 +49,24 @@ final class NumeratorStage(config: ColonnadeConfig) extends Module {
   private val isNegative = Reg(Bool())
   private val zeros      = Reg(UInt(formats.zerosBits.W))
 
+  // Multiply by the upper halves of the rises, then by the lower ones; an upper half is signed
+  private val halfBits = (formats.riseBits + 1) / 2
+  private val halves   = VecInit(
+    triangle.depths.rises.map(Rounding.floor(_, halfBits).pad(halfBits + 1)) ++
+      triangle.depths.rises.map(_.asUInt(halfBits - 1, 0).zext)
+  )
+  private val isSecond = beat(0)
+  private val product  = Mux(isSecond, triangle.weights(2), triangle.weights(1)).zext * halves(beat)
+  private val soFar    = Mux(beat === 0.U, 0.S, Mux(isSecond, numerator, (numerator << halfBits).asSInt))
+
   when(io.weighted.fire) { triangle := io.weighted.bits }
-  when(state === adding) {
-    numerator := Rounding.narrow(io.products(0) +& io.products(1), formats.numeratorBits + 1)
-  }
+  when(state === multiplying) { numerator := Rounding.narrow(soFar +& product, formats.numeratorBits + 1) }
   when(state === negating) {
     isNegative := numerator < 0.S
     when(numerator < 0.S) { numerator := 0.S - numerator }
   }
   private val magnitude = numerator.asUInt(formats.numeratorBits - 1, 0)
   when(state === counting) { zeros := Normalise.countLeadingZeros(magnitude)._2 }
-
-  io.weighing.bits.weights := VecInit(triangle.weights.tail)
-  io.weighing.bits.rises   := triangle.depths.rises
 
   private def mantissa(x: UInt): UInt = {
     val (width, bits) = (x.getWidth, formats.mantissaBits)

@@ -1,58 +1,50 @@
 package colonnade.traversal
 
 import chisel3._
-import chisel3.util.{Decoupled, RegEnable}
+import chisel3.util.{RegEnable, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Vec3
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PermutedFrame, TriangleRay}
 
-/** Operands of the numerator stage for the two multipliers that it shares with the shear. */
-final class WeighingOperands(formats: TriangleFormats) extends Bundle {
-  val weights = Vec(2, UInt(formats.weightBits.W))
-  val rises   = Vec(2, SInt(formats.riseBits.W))
-}
-
 final class ShearStageIO(config: ColonnadeConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
-  val schedule = Input(new TriangleSchedule)
+  /** The pipeline moves by a slot. */
+  val advances = Input(Bool())
+  val slot     = Input(new TriangleSlot)
 
-  /** Vertex 0, 1, 2 in phase 0, 1, 2, if `isOccupied`. */
-  val vertex     = Input(Vec3(UInt(config.geometry.vertexBits.W)))
-  val isOccupied = Input(Bool())
+  /** The vertex of `slot` and its ray. */
+  val vertex = Flipped(Valid(Vec3(UInt(config.geometry.vertexBits.W))))
+  val ray    = Input(new TriangleRay(config.numbers))
 
-  /** Constant from phase 0 to 3. */
-  val ray = Input(new TriangleRay(config.numbers))
+  /** The slot two slots later, with x and y of its vertex relative to the ray. */
+  val shearedSlot = Output(new TriangleSlot)
+  val sheared     = Output(Vec(2, new Fixed(formats.grid)))
 
-  /** x and y of the vertex relative to the ray, two cycles after it came. */
-  val sheared = Output(Vec(2, new Fixed(formats.grid)))
-
-  /** Depths of the triangle that started nine cycles ago; valid in phase 1. */
-  val depths = Output(new TriangleDepths(formats))
-
-  /** Accepted when the multipliers are free; `products` is valid in the next cycle only. */
-  val weighing = Flipped(Decoupled(new WeighingOperands(formats)))
-  val products = Output(Vec(2, SInt((2 * config.numbers.gridBits).W)))
+  /** Depths of a round's triangle, or of its pair, from the slot after its last vertex is sheared to that of the next
+    * round's.
+    */
+  val depths = Output(Vec(2, new TriangleDepths(formats)))
 }
 
 /** Transforms vertices to the ray's frame: translation to its origin, permutation of axes, shear; numbers.md 4.1, 4.2.
   *
-  * One vertex per cycle in phases 0 to 2: select and subtract, multiply, round and subtract. The numerator stage may use
-  * the two multipliers in phase 0 and while phase 1 pauses, when the shear has no product in flight. Without a triangle
-  * the registers hold, and without a request of the numerator stage so do the operands of the multipliers.
+  * One vertex per slot: select and subtract, multiply, round and subtract. Without a vertex the registers hold.
   */
 final class ShearStage(config: ColonnadeConfig) extends Module {
   val io = IO(new ShearStageIO(config))
 
+  import TriangleStep._
+
   private val numbers  = config.numbers
   private val formats  = new TriangleFormats(numbers)
-  private val schedule = io.schedule
-  private val advances = schedule.advances
+  private val advances = io.advances
+  private val none     = 0.U.asTypeOf(new TriangleSlot)
 
   // Translate: differences are within 1.5 · 2^(gridBits - 3) steps
   private val orientation = io.ray.orientation
-  private val vertex      = PermutedFrame(io.vertex, orientation.axis).map { coordinate =>
+  private val vertex      = PermutedFrame(io.vertex.bits, orientation.axis).map { coordinate =>
     Rounding.nearestEven(coordinate, -numbers.gridFraction).zext
   }
   private val origin     = io.ray.origin.map(_.integer)
@@ -61,40 +53,48 @@ final class ShearStage(config: ColonnadeConfig) extends Module {
 
   private def grid(x: SInt): Fixed = Fixed(formats.grid, Rounding.narrow(x, numbers.gridBits))
 
-  private val translated = Seq(0, 1).map(a => RegEnable(grid(vertex(a) -& origin(a)), advances && io.isOccupied))
-  private val depth      = RegEnable(grid(minuend -& subtrahend), advances && io.isOccupied)
+  private val translated = Seq(0, 1).map(a => RegEnable(grid(vertex(a) -& origin(a)), io.vertex.valid))
+  private val depth      = RegEnable(grid(minuend -& subtrahend), io.vertex.valid)
+  private val factors    = RegEnable(io.ray.shear, io.vertex.valid && io.slot.step === first)
+  private val slot       = RegEnable(io.slot, none, advances)
 
-  // A vertex follows its translation by one cycle; the sequencer's occupation changes after phase 3
-  private val holdsVertex = RegEnable(io.isOccupied, advances)
+  // Multiply
+  private val multiplies = advances && slot.step =/= idle && slot.step =/= gap
+  private val products   = factors.map(factor => RegEnable(factor.integer * depth.integer, multiplies))
+  private val positions  = translated.map(RegEnable(_, multiplies))
+  io.shearedSlot := RegEnable(slot, none, advances)
 
-  // Multiply, for the shear or for the numerator stage
-  private val isShared = schedule.is(0) || schedule.pauses
-  io.weighing.ready := isShared
-  private val weighs   = io.weighing.fire
-  private val shears   = holdsVertex && advances && !schedule.is(0)
-  private val products = Seq(0, 1).map { a =>
-    val factor  = Mux(weighs, io.weighing.bits.weights(a).zext.pad(numbers.gridBits), io.ray.shear(a).integer)
-    val stretch = Mux(weighs, io.weighing.bits.rises(a).pad(numbers.gridBits), depth.integer)
-    RegEnable(factor * stretch, weighs || shears)
-  }
-  io.products.zip(products).foreach { case (port, product) => port := product }
-
-  // Shear: the sum of two numbers within 1.5 · 2^(gridBits - 3) steps. In phase 1 no product arrives.
-  private val position = translated.map(RegEnable(_, shears))
-  io.sheared.zip(position.zip(products)).foreach { case (port, (straight, product)) =>
-    port := grid(straight.integer -& Rounding.nearestEven(product, numbers.shearFraction))
+  // Shear: the sum of two numbers within 1.5 · 2^(gridBits - 3) steps
+  io.sheared.zip(positions.zip(products)).foreach { case (port, (position, product)) =>
+    port := grid(position.integer -& Rounding.nearestEven(product, numbers.shearFraction))
   }
 
-  // Keep the depths until the edges are known
-  private val early = Reg(new TriangleDepths(formats))
+  // Keep the depths until the edges are known: that of the first vertex, and the rises of the others
+  private val early = Reg(new PairDepths(formats))
   private val rise  = {
-    val Seq(here, first) = Seq(depth, early.first).map(z => Rounding.floor(z.integer, formats.commonDepthBits))
-    Rounding.narrow(here -& first, formats.riseBits)
+    val Seq(here, start) = Seq(depth, early.first).map(z => Rounding.floor(z.integer, formats.commonDepthBits))
+    Rounding.narrow(here -& start, formats.riseBits)
   }
-  when(holdsVertex) {
-    when(schedule.is(1) && advances) { early.first := depth }
-    when(schedule.is(2)) { early.rises(0) := rise }
-    when(schedule.is(3)) { early.rises(1) := rise }
+  when(advances) {
+    when(slot.step === first) { early.first := depth }
+    when(slot.step === second) { early.rises(0) := rise }
+    when(slot.step === third || (slot.step === last && !slot.isPair)) { early.rises(1) := rise }
+    when(slot.step === last && slot.isPair) { early.rises(2) := rise }
   }
-  io.depths := RegEnable(early, schedule.is(1) && advances)
+  private val late = RegEnable(early, advances && io.shearedSlot.step === last)
+
+  // The second triangle of a pair starts with vertices 1 and 0 of the first one
+  private val Seq(toSecond, toThird, toFourth) = late.rises.toSeq
+  io.depths(0).first := late.first
+  io.depths(0).rises := VecInit(toSecond, toThird)
+  io.depths(1).first := grid(late.first.integer +& Rounding.floor(toSecond, -formats.commonDepthBits))
+  io.depths(1).rises := VecInit(Seq(0.S -& toSecond, toFourth -& toSecond).map(Rounding.narrow(_, formats.riseBits)))
+}
+
+/** Depths of the vertices of a triangle, or of a pair of triangles, along the ray's dominant axis. */
+final private class PairDepths(formats: TriangleFormats) extends Bundle {
+  val first = new Fixed(formats.grid)
+
+  /** Rises of vertices 1 and 2, and in a pair of the second triangle's vertex 2. */
+  val rises = Vec(3, SInt(formats.riseBits.W))
 }

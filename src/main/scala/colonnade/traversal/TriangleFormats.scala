@@ -61,27 +61,34 @@ object TriangleFormats {
   }
 }
 
-/** The state of the four-cycle schedule of a [[TriangleUnit]]. A triangle starts in phase 0, one vertex per cycle.
-  * Phase 1 repeats while `advances` is false; the registers of the shear and edge stages then hold.
-  */
-final class TriangleSchedule extends Bundle {
-  val phase    = UInt(2.W)
-  val advances = Bool()
-
-  /** Phase 1 is stalled, and the numerator stage may use the shear's multipliers in this cycle. */
-  val pauses = Bool()
-
-  def is(number: Int): Bool = phase === number.U
+/** The slots of a round of the [[TriangleSequencer]]; `idle` is a slot without a round. */
+object TriangleStep extends ChiselEnum {
+  val idle, first, second, third, gap, last = Value
 }
 
-/** Identifies a triangle in the pipeline. */
+/** What a stage of the [[TriangleUnit]] processes in a cycle. */
+final class TriangleSlot extends Bundle {
+  val step = TriangleStep()
+
+  /** The round tests a pair of triangles; valid from `third` on. */
+  val isPair = Bool()
+}
+
+/** Identifies a round's triangle, or its pair of triangles. */
 final class TriangleTag(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
-  val id      = UInt(RecordFormats.idBits(config).W)
-  val isLast  = Bool()
 
-  /** The material transmits light. */
-  val isTransmissive = Bool()
+  /** Of the first triangle. */
+  val id = UInt(RecordFormats.idBits(config).W)
+
+  /** The round is the last of its record. */
+  val isLast = Bool()
+
+  /** The round tests a pair; its second triangle has the next id. */
+  val isPair = Bool()
+
+  /** The material transmits light; of the first triangle, and of the second one of a pair. */
+  val isTransmissive = Vec(2, Bool())
 
   /** A placeholder for a record without triangles; it always misses. */
   val isAbsent = Bool()

@@ -1,7 +1,7 @@
 package colonnade.traversal
 
 import chisel3._
-import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
+import chisel3.util.{Decoupled, Queue, RegEnable}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 
@@ -12,7 +12,7 @@ final class TriangleUnitIO(config: ColonnadeConfig) extends Bundle {
   /** `candidate` will be ready in the next cycle. */
   val readyNext = Output(Bool())
 
-  /** The unit accepts a triangle's vertices. */
+  /** A round of vertices enters the unit. */
   val busy = Output(Bool())
 }
 
@@ -27,18 +27,17 @@ final private class PendingTriangle(config: ColonnadeConfig) extends Bundle {
 /** Watertight test of a ray against the triangles of a record (after Woop, Benthin and Wald 2013, in integers);
   * docs/numbers.md, section 4. The hit table compares the result with the closest hit so far.
   *
-  * Throughput: one triangle every 4 cycles, one result each, in order. Latency of a miss: 11 cycles. A triangle that the
-  * ray's line crosses continues to weights, numerator and division. Its latency is about 30 cycles plus a quarter of the
-  * quotient's digits; its throughput is one every 8 cycles or one per rotation of the dividers, whichever is longer.
+  * Throughput: a record whose two triangles share an edge every 5 cycles, any other triangle every 4 cycles; one result
+  * for each triangle, in order. Latency of a miss: 10 cycles. A triangle that the ray's line crosses continues to
+  * weights, numerator and division. Its latency is about 30 cycles plus a quarter of the quotient's digits; its
+  * throughput is one every 7 cycles or one per rotation of the dividers, whichever is longer.
   *
   * {{{
   * candidate ▸ sequencer ▸ shear ▸ edges ▸ (crossed: weights ▸ numerator ▸ distance) ▸ result
-  *                          ▲ ────────── two multiplications ───────┘
   * }}}
   *
-  * Sequencer, shear and edges follow the schedule. Only phase 1 can stall, when a triangle's edges are known and the
-  * next stage is full. The numerator stage then gets the shear's multipliers in every second cycle, so the stages ahead
-  * always make progress.
+  * Sequencer, shear and edges move together, by one slot per cycle. They stall only when a triangle's edges are known
+  * and the next stage is full. The stages ahead share nothing with them, so these always make progress.
   *
   * A record with an illegal `count` gives one miss, its last. A triangle in a plane through the ray misses.
   *
@@ -56,55 +55,43 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, queueD
   private val distance  = Module(new DistanceStage(config, distanceLanes))
   private val pending   = Module(new Queue(new PendingTriangle(config), queueDepth))
 
-  // Schedule
-  private val schedule = Wire(new TriangleSchedule)
-  private val phase    = RegInit(0.U(2.W))
-  when(schedule.advances) { phase := phase + 1.U }
-  private val pauses = RegInit(false.B)
-  pauses                := schedule.is(1) && !schedule.advances && !pauses
-  schedule.phase        := phase
-  schedule.pauses       := pauses
-  sequencer.io.schedule := schedule
-  shear.io.schedule     := schedule
-  edges.io.schedule     := schedule
-
   // The path of every triangle
+  private val advances = Wire(Bool())
   sequencer.io.candidate <> io.candidate
-  io.readyNext        := sequencer.io.readyNext
-  shear.io.vertex     := sequencer.io.vertex
-  shear.io.ray        := sequencer.io.ray
-  shear.io.isOccupied := sequencer.io.tag.valid
-  edges.io.sheared    := shear.io.sheared
+  io.readyNext          := sequencer.io.readyNext
+  sequencer.io.advances := advances
+  shear.io.advances     := advances
+  shear.io.slot         := sequencer.io.slot
+  shear.io.vertex       := sequencer.io.vertex
+  shear.io.ray          := sequencer.io.ray
+  edges.io.advances     := advances
+  edges.io.slot         := shear.io.shearedSlot
+  edges.io.sheared      := shear.io.sheared
 
-  // Tags move with their triangles: one in the shear, one in the edge stage
-  private val none       = 0.U.asTypeOf(Valid(new TriangleTag(config)))
-  private val shiftsTags = schedule.is(1) && schedule.advances
-  private val sheared    = RegEnable(sequencer.io.tag, none, shiftsTags)
-  private val tested     = RegEnable(sheared, none, shiftsTags)
-  edges.io.isOccupied  := sheared.valid
-  edges.io.wasOccupied := tested.valid
+  // A round's tag moves with its last vertex: one in the shear, one in the edge stage
+  private val sheared = RegEnable(sequencer.io.tag.bits, sequencer.io.tag.valid)
+  private val tested  = RegEnable(sheared, advances && shear.io.shearedSlot.step === TriangleStep.last)
 
-  // Phase 1: the edge functions decide
-  private val crossesTriangle = edges.io.crossesTriangle && !tested.bits.isAbsent
+  // The edge functions decide
+  private val isSecond        = edges.io.isSecond
+  private val crossesTriangle = edges.io.crossesTriangle && !tested.isAbsent
   private val isTaken         = pending.io.enq.ready && (!crossesTriangle || weights.io.crossed.ready)
-  private val decides         = schedule.is(1) && tested.valid && !pauses
-  schedule.advances := !pauses && (!decides || isTaken)
+  private val decides         = edges.io.decides && isTaken
+  advances := !edges.io.decides || isTaken
 
-  pending.io.enq.valid                := decides && isTaken
-  pending.io.enq.bits.context         := tested.bits.context
-  pending.io.enq.bits.isLast          := tested.bits.isLast
-  pending.io.enq.bits.isTransmissive  := tested.bits.isTransmissive
+  pending.io.enq.valid                := decides
+  pending.io.enq.bits.context         := tested.context
+  pending.io.enq.bits.isLast          := Mux(tested.isPair, isSecond, tested.isLast)
+  pending.io.enq.bits.isTransmissive  := tested.isTransmissive(isSecond)
   pending.io.enq.bits.crossesTriangle := crossesTriangle
 
   // The path of crossed triangles
-  weights.io.crossed.valid           := decides && isTaken && crossesTriangle
+  weights.io.crossed.valid           := decides && crossesTriangle
   weights.io.crossed.bits.magnitudes := edges.io.magnitudes
-  weights.io.crossed.bits.depths     := shear.io.depths
-  weights.io.crossed.bits.id         := tested.bits.id
-  weights.io.crossed.bits.backSide   := edges.io.isPositive =/= tested.bits.isNegative
+  weights.io.crossed.bits.depths     := shear.io.depths(isSecond)
+  weights.io.crossed.bits.id         := tested.id + isSecond
+  weights.io.crossed.bits.backSide   := edges.io.isPositive =/= tested.isNegative
   numerator.io.weighted <> weights.io.weighted
-  shear.io.weighing <> numerator.io.weighing
-  numerator.io.products := shear.io.products
   distance.io.request <> numerator.io.request
 
   // Results in order
@@ -119,5 +106,5 @@ final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, queueD
   pending.io.deq.ready          := io.result.ready && isReady
   distance.io.hit.ready         := io.result.fire && head.crossesTriangle
 
-  io.busy := sequencer.io.tag.valid
+  io.busy := sequencer.io.slot.step =/= TriangleStep.idle
 }

@@ -12,7 +12,7 @@ final class WeightStageIO(config: ColonnadeConfig) extends Bundle {
 
 /** Barycentric weights: the edges' magnitudes, shifted so that their sum fills `weightBits`; numbers.md 4.4.
   *
-  * One triangle at a time, every 8 cycles: three cycles for the sum, one to count its leading zeros, three to shift the
+  * One triangle at a time, every 7 cycles: two cycles for the sum, one to count its leading zeros, three to shift the
   * edges through one shifter, one for the output, in which the next triangle may enter.
   */
 final class WeightStage(config: ColonnadeConfig) extends Module {
@@ -26,11 +26,10 @@ final class WeightStage(config: ColonnadeConfig) extends Module {
   // Control
   private val state   = RegInit(idle)
   private val edge    = Reg(UInt(2.W))
-  private val rotates = state === adding || state === shifting
-  private val isFinal = edge === 2.U
+  private val isFinal = edge === Mux(state === adding, 1.U, 2.U)
   io.weighted.valid := state === offering
   io.crossed.ready  := state === idle || io.weighted.fire
-  when(rotates) { edge := Mux(isFinal, 0.U, edge + 1.U) }
+  when(state === adding || state === shifting) { edge := Mux(isFinal, 0.U, edge + 1.U) }
   when(state === adding && isFinal) { state := counting }
   when(state === counting) { state := shifting }
   when(state === shifting && isFinal) { state := offering }
@@ -51,12 +50,12 @@ final class WeightStage(config: ColonnadeConfig) extends Module {
     TriangleFormats.shiftLeft(ring(0), zeros)(formats.edgeBits - 1, formats.edgeBits - formats.weightBits)
   private val sumSoFar = Mux(edge === 1.U, 0.U, sum) + ring(2)(formats.weightBits - 1, 0)
 
-  when(rotates) {
+  when(state === shifting) {
     ring(0) := ring(1)
     ring(1) := ring(2)
-    ring(2) := Mux(state === shifting, weight, ring(0))
+    ring(2) := weight
   }
-  when(state === adding) { total := Mux(edge === 0.U, 0.U, total) + ring(0) }
+  when(state === adding) { total := Mux(edge === 0.U, ring(0), total) + Mux(edge === 0.U, ring(1), ring(2)) }
   when(state === counting) { zeros := Normalise.countLeadingZeros(total)._2 }
   when(state === shifting) { sum := sumSoFar }
   when(io.crossed.fire) { triangle := io.crossed.bits }

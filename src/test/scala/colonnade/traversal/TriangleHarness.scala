@@ -52,6 +52,7 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
     val limit                    = 200 + awaited.size * 40 * stalls.max(1)
     var (sent, received, cycles) = (0, 0, 0)
     var isOffered                = false
+    var isPromised               = unit.io.candidate.ready.peekBoolean()
     unit.clock.setTimeout(0)
     while (received < awaited.size) {
       withClue(s"after $received of ${awaited.size} results: ")(cycles should be < limit)
@@ -66,6 +67,8 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
         check(unit.io.result.bits, awaited(received))
         received += 1
       }
+      unit.io.candidate.ready.expect(isPromised.B)
+      isPromised = unit.io.readyNext.peekBoolean()
       if (isOffered && unit.io.candidate.ready.peekBoolean()) {
         sent += 1
         isOffered = false

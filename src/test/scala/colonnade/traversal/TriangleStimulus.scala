@@ -77,10 +77,29 @@ final class TriangleStimulus(config: ColonnadeConfig, seed: Int) {
       TestTriangle(random.shuffle(near :+ opposite))
   }
 
+  /** Two triangles, most of them around a point. Half of them share an edge as neighbours of one winding do, the others
+    * almost: with opposite windings, at other vertices, as a point, or all three edges.
+    */
+  def pair(point: Seq[BigInt]): Seq[TestTriangle] = {
+    val Seq(a, b, c) = triangle(point).vertices
+    val d            = if (chance(2)) vertex else triangle(point).vertices.head
+    val (one, two)   = random.nextInt(12) match {
+      case 0 => (Seq(a, b, c), Seq(a, b, d))
+      case 1 => (Seq(a, b, c), Seq(a, d, b))
+      case 2 => (Seq(a, b, c), Seq(a, b, c))
+      case 3 => (Seq(a, b, c), Seq(b, a, c))
+      case 4 => (Seq(a, a, c), Seq(a, a, d))
+      case 5 => (Seq(a, b, c), triangle(point).vertices)
+      case _ => if (random.nextBoolean()) (Seq(a, b, c), Seq(b, a, d)) else (Seq(b, a, d), Seq(a, b, c))
+    }
+    Seq(TestTriangle(one), TestTriangle(two))
+  }
+
   /** A ray, three in four times aimed at a point, with triangles, most of them around that point. */
   def meeting(triangles: Int): (TestRay, Seq[TestTriangle]) = {
     val point = vertex
-    (if (chance(4)) ray else rayTo(point.map(steps)), Seq.fill(triangles)(triangle(point)))
+    val met   = if (triangles == 2) pair(point) else Seq.fill(triangles)(triangle(point))
+    (if (chance(4)) ray else rayTo(point.map(steps)), met)
   }
 
   /** Triangles that surround a vertex as a ray sees it, and the ray, aimed at it or at an edge that meets it. */

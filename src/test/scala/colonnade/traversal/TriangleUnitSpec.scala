@@ -34,25 +34,30 @@ class TriangleUnitSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
-  it should "take a triangle every four cycles, and a hit as fast as the lanes divide" in {
+  it should "take a pair with a common edge every five cycles, another triangle every four, and a hit every eleven" in {
     val config = TestConfigs.tiny
     test(new TriangleUnit(config)).withAnnotations(simulation) { unit =>
-      val stimulus = new TriangleStimulus(config, seed = 11)
-      val harness  = new TriangleHarness(config, stimulus)
-      val point    = stimulus.vertex
-      val flat     = TestTriangle(Seq(point, point, stimulus.vertex))
-      val misses   = Seq.fill(50)(harness.candidate(stimulus.ray, Seq(flat, flat)))
-      harness.run(unit, misses, bubbles = 0, stalls = 0) should matchPattern {
-        case (cycles: Int, 0) if cycles <= 4 * 100 + 16 =>
+      val stimulus                                        = new TriangleStimulus(config, seed = 11)
+      val harness                                         = new TriangleHarness(config, stimulus)
+      def cycles(record: => TestCandidate, hits: Boolean) = {
+        val (cycles, hit) = harness.run(unit, Seq.fill(50)(record), bubbles = 0, stalls = 0)
+        hit shouldBe (if (hits) 100 else 0)
+        cycles
       }
+      // Triangles without area
+      val Seq(a, b) = Seq.fill(2)(stimulus.vertex)
+      val flat      = Seq(Seq(a, b, b), Seq(b, a, b)).map(TestTriangle)
+      cycles(harness.candidate(stimulus.ray, flat), hits = false) should be <= 50 * 5 + 16
+      cycles(harness.candidate(stimulus.ray, Seq(flat.head, flat.head)), hits = false) should be <= 50 * 8 + 16
 
-      val middle   = BigInt(1) << (config.numbers.vertexBits - 2 + config.numbers.gridFraction)
-      val ray      = TestRay(2, Seq.fill(3)(false), Seq(middle, middle, 0), Seq(0, 0))
-      val triangle = TestTriangle(Seq(Seq[BigInt](0, 0, 9), Seq[BigInt](65535, 0, 70), Seq[BigInt](0, 65535, 65535)))
-      val hits     = Seq.fill(30)(harness.candidate(ray, Seq(triangle, triangle)))
-      harness.run(unit, hits, bubbles = 0, stalls = 0) should matchPattern {
-        case (cycles: Int, 60) if cycles <= 60 * 11 + 60 =>
-      }
+      val middle = BigInt(1) << (config.numbers.vertexBits - 2 + config.numbers.gridFraction)
+      val ray    = TestRay(2, Seq.fill(3)(false), Seq(middle, middle, 0), Seq(0, 0))
+      val met    = Seq(Seq[BigInt](0, 0, 9), Seq[BigInt](65535, 0, 70), Seq[BigInt](0, 65535, 65535))
+      val other  = Seq(met(1), met(0), Seq[BigInt](9, 65535, 9))
+      cycles(
+        harness.candidate(ray, Seq(TestTriangle(met), TestTriangle(other))),
+        hits = true
+      ) should be <= 100 * 11 + 60
     }
   }
 }
