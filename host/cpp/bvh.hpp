@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The binary tree over quantised triangles, from which every tree layout is derived.
 ///
-/// Splits are binned by the surface-area heuristic, and exact sweeps near the leaves. All costs are exact integers, so a mesh
+/// Splits are binned by a surface-area heuristic, and exact sweeps near the leaves. All costs are exact integers, so a mesh
 /// gives the same tree on every machine. The order of the leaves, left first, defines the triangles' packed ids.
 #pragma once
 
@@ -52,22 +52,38 @@ struct BinaryTree {
     std::vector<std::uint32_t> order;   ///< the triangle index of each packed id
 };
 
+/// Fraction bits of `readWeights`.
+constexpr int readWeightFraction = 8;
+
 /// Number of leaf records for `triangles` triangles.
 inline std::uint64_t leafRecords(std::uint64_t triangles, unsigned perRecord) { return (triangles + perRecord - 1) / perRecord; }
 
 /// Height of a balanced tree over `triangles` triangles; 0 for one leaf.
 inline unsigned balancedHeight(std::uint64_t triangles, unsigned perRecord) {
     unsigned height = 0;
-    while ((leafRecords(triangles, perRecord) >> height) + ((leafRecords(triangles, perRecord) & ((1ull << height) - 1)) != 0) > 1)
-        ++height;
+    while ((std::uint64_t{1} << height) < leafRecords(triangles, perRecord)) ++height;
     return height;
+}
+
+/// Expected reads in a subtree of each number of leaf records up to `most`, relative to one: the power 3/5, as an integer.
+/// Rays stop at a hit, so they do not read in proportion to the records.
+inline std::vector<std::uint32_t> readWeights(std::uint64_t most) {
+    std::vector<std::uint32_t> weights{0};
+    Cost weight = 0;
+    for (Cost records = 1; records <= most; ++records) {
+        const Cost power = records * records * records << 5 * readWeightFraction;
+        while ((weight + 1) * (weight + 1) * (weight + 1) * (weight + 1) * (weight + 1) <= power) ++weight;
+        weights.push_back(static_cast<std::uint32_t>(weight));
+    }
+    return weights;
 }
 
 /// Builds the binary tree. No leaf is deeper than `heightLimit` (0: no limit), which must be at least the balanced height.
 class BinaryBuilder {
 public:
     BinaryBuilder(const std::vector<Box>& boxes, unsigned perRecord, unsigned heightLimit)
-        : boxes_(boxes), perRecord_(perRecord), heightLimit_(heightLimit ? heightLimit : UINT32_MAX) {}
+        : boxes_(boxes), perRecord_(perRecord), heightLimit_(heightLimit ? heightLimit : UINT32_MAX),
+          weights_(readWeights(leafRecords(boxes.size(), perRecord))) {}
 
     BinaryTree build() {
         const auto count = static_cast<std::uint32_t>(boxes_.size());
@@ -95,7 +111,7 @@ public:
     }
 
 private:
-    static constexpr int bins = 16;
+    static constexpr int bins = 64;
     static constexpr std::uint32_t sweepBelow = 33;  ///< ranges of fewer triangles are split by an exact sweep
     static constexpr Cost worst = ~Cost{0};
 
@@ -115,7 +131,7 @@ private:
     }
 
     Cost cost(std::uint64_t leftArea, std::uint64_t leftCount, std::uint64_t rightArea, std::uint64_t rightCount) const {
-        return Cost{leftArea} * leafRecords(leftCount, perRecord_) + Cost{rightArea} * leafRecords(rightCount, perRecord_);
+        return Cost{leftArea} * weights_[leafRecords(leftCount, perRecord_)] + Cost{rightArea} * weights_[leafRecords(rightCount, perRecord_)];
     }
 
     bool fits(std::uint64_t left, std::uint64_t right, unsigned height) const {
@@ -228,6 +244,7 @@ private:
     const std::vector<Box>& boxes_;
     const unsigned perRecord_;
     const unsigned heightLimit_;
+    const std::vector<std::uint32_t> weights_;
     BinaryTree tree_;
     std::vector<std::uint32_t> scratch_;
 };

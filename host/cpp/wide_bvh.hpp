@@ -4,14 +4,13 @@
 /// Collapsing the binary tree keeps the order of the leaves, so the packed ids do not depend on the arity.
 #pragma once
 
-#include "bvh.hpp"
+#include <unordered_map>
+
+#include "reinsertion.hpp"
 
 namespace colonnade::bvh {
 
 enum class Kind : std::uint8_t { empty = 0, node = 1, leaf = 2 };
-
-/// Selects the child of a wide node that is replaced by its own two children.
-enum class PullUp { largest, tallest };
 
 /// Flat arrays with one entry per node, times the arity where stated. `firstTriangles` counts from the first leaf record.
 struct WideTree {
@@ -29,28 +28,33 @@ struct WideTree {
     std::size_t nodes() const { return firstChild.size(); }
 };
 
+/// Replaces the binary nodes by wide nodes with the least sum of areas, which is the expected number of node reads (Ylitie,
+/// Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs"). Dynamic programming over the binary tree finds it, within a limit of the stack.
 class Collapser {
 public:
-    Collapser(const BinaryTree& tree, unsigned arity, unsigned boxBits) : tree_(tree), arity_(arity), boxBits_(boxBits) {
-        height_.assign(tree.nodes.size(), 0);
+    /// `stackDepth`: at least the height of the tree, which is the least stack bound of all collapses.
+    Collapser(const BinaryTree& tree, unsigned arity, unsigned boxBits, unsigned stackDepth)
+        : tree_(tree), arity_(arity), boxBits_(boxBits), stackDepth_(stackDepth), heights_(heights(tree)), free_(tree.nodes.size()) {
         for (std::size_t i = tree.nodes.size(); i-- > 0;)
-            if (const BinaryNode& node = tree.nodes[i]; !node.isLeaf()) height_[i] = 1 + std::max(height_[node.left], height_[node.right]);
+            if (!tree.nodes[i].isLeaf())
+                for (unsigned slots = 1; slots < arity_; ++slots) free_[i][slots - 1] = findForm(static_cast<std::int32_t>(i), slots, unlimited);
     }
 
-    WideTree collapse(PullUp policy) const {
+    WideTree collapse() {
         WideTree wide;
         wide.arity = arity_;
         const double rootArea = std::max<double>(1.0, static_cast<double>(tree_.nodes[0].box.halfArea()));
 
-        struct Task { std::int32_t binary; std::uint32_t index; unsigned depth; };
-        std::vector<Task> tasks{{0, 0, 1}};
+        struct Task { std::int32_t binary; std::uint32_t index; unsigned depth, stack; };
+        std::vector<Task> tasks{{0, 0, 1, stackDepth_}};
         append(wide);
         while (!tasks.empty()) {
             const Task task = tasks.back();
             tasks.pop_back();
             wide.depth = std::max(wide.depth, task.depth);
             wide.cost += static_cast<double>(tree_.nodes[task.binary].box.halfArea()) / rootArea;
-            const std::vector<std::int32_t> children = childrenOf(task.binary, policy);
+            const std::vector<std::int32_t> children = childrenOf(task.binary, task.stack);
+            const unsigned below = task.stack - static_cast<unsigned>(children.size() - 1);
             quantise(wide, task.index, tree_.nodes[task.binary].box, children);
 
             // Siblings are adjacent and a subtree follows its root, which keeps spatial neighbours close in memory
@@ -66,7 +70,7 @@ public:
                 } else {
                     if (!hasKind(wide, task.index, slot, Kind::node)) wide.firstChild[task.index] = static_cast<std::uint32_t>(wide.nodes());
                     wide.kinds[task.index * arity_ + slot] = static_cast<std::uint8_t>(Kind::node);
-                    pending.push_back({children[slot], static_cast<std::uint32_t>(wide.nodes()), task.depth + 1});
+                    pending.push_back({children[slot], static_cast<std::uint32_t>(wide.nodes()), task.depth + 1, below});
                     append(wide);
                 }
             }
@@ -94,26 +98,92 @@ private:
         return false;
     }
 
-    /// The children in the order of their leaves. A root that is a leaf gets itself as its only child.
-    std::vector<std::int32_t> childrenOf(std::int32_t index, PullUp policy) const {
+    static constexpr unsigned unlimited = UINT16_MAX;
+
+    /// The wide nodes of a binary subtree: the sum of their areas, and the stack entries that they need.
+    struct Form {
+        Cost cost = ~Cost{0};
+        unsigned bound = unlimited;
+        bool isFeasible() const { return bound != unlimited; }
+        bool operator<(const Form& other) const { return cost != other.cost ? cost < other.cost : bound < other.bound; }
+    };
+
+    /// The best form of both subtrees of a binary node, which together take some slots, and the slots of the left one.
+    struct Split {
+        Form form;
+        unsigned left = 0;
+    };
+
+    /// The best form of a subtree in at most `slots` slots of a wide node, each within `stack` entries.
+    Form form(std::int32_t index, unsigned slots, unsigned stack) {
+        if (tree_.nodes[index].isLeaf()) return {0, 0};
+        if (heights_[index] > stack + slots - 1) return {};
+        // Without a limit the best form is known, and most subtrees fit with it
+        if (const Form& best = free_[index][slots - 1]; best.bound <= stack) return best;
+        const std::uint64_t key = (static_cast<std::uint64_t>(index) << 2 | slots) << 16 | stack;
+        if (const auto known = limited_.find(key); known != limited_.end()) return known->second;
+        return limited_[key] = findForm(index, slots, stack);
+    }
+
+    Form findForm(std::int32_t index, unsigned slots, unsigned stack) {
+        if (slots > 1) return std::min(form(index, slots - 1, stack), split(index, slots, stack).form);
+        return asNode(index, stack).form;
+    }
+
+    Split split(std::int32_t index, unsigned slots, unsigned stack) {
         const BinaryNode& node = tree_.nodes[index];
-        if (node.isLeaf()) return {index};
-        std::vector<std::int32_t> children{node.left, node.right};
-        while (children.size() < arity_) {
-            int chosen = -1;
-            for (std::size_t i = 0; i < children.size(); ++i)
-                if (!tree_.nodes[children[i]].isLeaf() && (chosen < 0 || before(children[i], children[chosen], policy))) chosen = static_cast<int>(i);
-            if (chosen < 0) break;
-            const BinaryNode& pulled = tree_.nodes[children[chosen]];
-            children[chosen] = pulled.left;
-            children.insert(children.begin() + chosen + 1, pulled.right);
+        Split best;
+        for (unsigned left = 1; left < slots; ++left) {
+            if (freeCost(node.left, left) + freeCost(node.right, slots - left) > best.form.cost) continue;
+            const Form one = form(node.left, left, stack), other = form(node.right, slots - left, stack);
+            if (!one.isFeasible() || !other.isFeasible()) continue;
+            const Form both{one.cost + other.cost, std::max(one.bound, other.bound)};
+            if (both < best.form) best = {both, left};
         }
+        return best;
+    }
+
+    /// The cost without a limit of the stack, which no form within a limit goes below.
+    Cost freeCost(std::int32_t index, unsigned slots) const { return tree_.nodes[index].isLeaf() ? 0 : free_[index][slots - 1].cost; }
+
+    /// A wide node in place of a binary node.
+    struct WideNode {
+        Form form;
+        unsigned children = 0;
+    };
+
+    WideNode asNode(std::int32_t index, unsigned stack) {
+        WideNode best;
+        for (unsigned children = std::min(arity_, stack + 1); children >= 2; --children) {
+            if (stack != unlimited && split(index, children, unlimited).form.cost + tree_.nodes[index].box.halfArea() > best.form.cost) continue;
+            const Form below = split(index, children, stack - (children - 1)).form;
+            if (!below.isFeasible()) continue;
+            const Form whole{below.cost + tree_.nodes[index].box.halfArea(), below.bound + children - 1};
+            if (whole < best.form) best = {whole, children};
+        }
+        return best;
+    }
+
+    /// The children in the order of their leaves. A root that is a leaf gets itself as its only child.
+    std::vector<std::int32_t> childrenOf(std::int32_t index, unsigned stack) {
+        if (tree_.nodes[index].isLeaf()) return {index};
+        if (free_[index][0].bound <= stack) stack = unlimited;
+        const unsigned count = asNode(index, stack).children;
+        std::vector<std::int32_t> children;
+        addSplit(index, count, stack - (count - 1), children);
         return children;
     }
 
-    bool before(std::int32_t one, std::int32_t other, PullUp policy) const {
-        if (policy == PullUp::tallest && height_[one] != height_[other]) return height_[one] > height_[other];
-        return tree_.nodes[one].box.halfArea() > tree_.nodes[other].box.halfArea();
+    void addSplit(std::int32_t index, unsigned slots, unsigned stack, std::vector<std::int32_t>& children) {
+        const unsigned left = split(index, slots, stack).left;
+        addForm(tree_.nodes[index].left, left, stack, children);
+        addForm(tree_.nodes[index].right, slots - left, stack, children);
+    }
+
+    void addForm(std::int32_t index, unsigned slots, unsigned stack, std::vector<std::int32_t>& children) {
+        if (slots == 1 || tree_.nodes[index].isLeaf()) children.push_back(index);
+        else if (split(index, slots, stack).form < form(index, slots - 1, stack)) addSplit(index, slots, stack, children);
+        else addForm(index, slots - 1, stack, children);
     }
 
     /// Rounds child boxes outward to multiples of 2^exponent from the node's low corner.
@@ -151,8 +221,10 @@ private:
     }
 
     const BinaryTree& tree_;
-    const unsigned arity_, boxBits_;
-    std::vector<unsigned> height_;
+    const unsigned arity_, boxBits_, stackDepth_;
+    const std::vector<unsigned> heights_;
+    std::vector<std::array<Form, 3>> free_;             ///< forms without a limit of the stack, by node and slots
+    std::unordered_map<std::uint64_t, Form> limited_;  ///< forms within a stack, by node, slots and stack
 };
 
 /// A wide tree and the order of its triangles.
@@ -162,29 +234,17 @@ struct Bvh {
     unsigned heightLimit = 0;          ///< height limit that the stack required; 0 for none
 };
 
-/// Builds the tree for one arity. If the tree of lowest cost needs a deeper stack, more balanced trees are tried. A tree is
-/// accepted if it fits with both arities, so that the packed ids do not depend on the arity. The caller must check
-/// whether the returned tree fits the stack.
+/// Builds the tree for one arity. If the binary tree is higher than the stack is deep, it is built again with that limit. The
+/// packed ids do not depend on the arity, since the height is the least stack bound of all arities. The caller must check whether
+/// the returned tree fits the stack.
 inline Bvh build(const std::vector<Box>& boxes, unsigned perRecord, unsigned arity, unsigned boxBits, unsigned stackDepth) {
-    const unsigned minimum = std::max(1u, balancedHeight(boxes.size(), perRecord));
-    std::vector<unsigned> limits{0};
-    for (unsigned limit = stackDepth; limit > minimum; limit = limit * 3 / 4) limits.push_back(limit);
-    limits.push_back(minimum);
-
-    for (const unsigned limit : limits) {
-        const BinaryTree tree = BinaryBuilder(boxes, perRecord, limit).build();
-        bool fits = true;
-        WideTree chosen;
-        for (const unsigned width : {2u, 4u}) {
-            const Collapser collapser(tree, width, boxBits);
-            WideTree wide = collapser.collapse(PullUp::largest);
-            if (wide.stackBound > stackDepth) wide = collapser.collapse(PullUp::tallest);
-            fits = fits && wide.stackBound <= stackDepth;
-            if (width == arity) chosen = std::move(wide);
-        }
-        if (fits || limit == minimum) return {std::move(chosen), tree.order, limit};
-    }
-    return {};
+    const unsigned limit = std::max(stackDepth, balancedHeight(boxes.size(), perRecord));
+    BinaryTree tree = BinaryBuilder(boxes, perRecord, 0).build();
+    const bool isTooHigh = heights(tree)[0] > limit;
+    if (isTooHigh) tree = BinaryBuilder(boxes, perRecord, limit).build();
+    tree = Reinsertion(std::move(tree), limit).optimise();
+    WideTree wide = Collapser(tree, arity, boxBits, limit).collapse();
+    return {std::move(wide), std::move(tree.order), isTooHigh ? limit : 0};
 }
 
 }  // namespace colonnade::bvh

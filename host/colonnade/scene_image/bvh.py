@@ -73,8 +73,8 @@ def build_bvh(
 ) -> Bvh:
     """Build the tree over triangles with integer vertices.
 
-    The order of the triangles depends on neither arity nor box bits. If the tree of lowest cost needs more than
-    ``stack_depth`` entries, more balanced trees are tried. The caller must compare ``statistics.stack_bound``.
+    The order of the triangles depends on neither arity nor box bits. The tree needs at most ``stack_depth`` entries,
+    unless a balanced tree needs more. The caller must compare ``statistics.stack_bound``.
 
     Args:
         vertices: int32 [n, 3], vertex units, from 0.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -81,18 +84,126 @@ def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, 
     spread=st.sampled_from([1, 3, 1000]),
     per_record=st.sampled_from([1, 2]),
     box_bits=st.integers(4, 12),
+    stack_depth=st.sampled_from([4, 8, 10, 12, 48]),
 )
-def test_boxes_contain_their_triangles_and_the_order_is_that_of_the_arity(
-    seed: int, count: int, spread: int, per_record: int, box_bits: int
+def test_boxes_contain_their_triangles_in_an_order_that_arity_and_box_bits_do_not_change(
+    seed: int, count: int, spread: int, per_record: int, box_bits: int, stack_depth: int
 ) -> None:
     vertices, faces = random_triangles(seed, count, spread)
-    trees = [
-        build(vertices, faces, arity=arity, triangles_per_record=per_record, box_bits=box_bits) for arity in (2, 4)
-    ]
-    for tree in trees:
-        check_tree(tree, vertices, faces, per_record, box_bits)
+    options = {"triangles_per_record": per_record, "stack_depth": stack_depth}
+    trees = [build(vertices, faces, arity=arity, box_bits=bits, **options) for arity, bits in ((2, 8), (4, box_bits))]
+    balanced = (-(-count // per_record) - 1).bit_length()
+    for tree, bits in zip(trees, (8, box_bits), strict=True):
+        check_tree(tree, vertices, faces, per_record, bits)
+        assert tree.statistics.stack_bound <= max(stack_depth, balanced)
     np.testing.assert_array_equal(trees[0].order, trees[1].order)
     assert sorted(trees[0].leaf_first.tolist()) == sorted(trees[1].leaf_first.tolist())
+
+
+@dataclass
+class Subtree:
+    """A binary subtree: half its box's area, and its two children unless it is a leaf."""
+
+    area: int
+    children: tuple[Subtree, Subtree] | None
+
+
+def binary_tree(tree: Bvh, vertices: Integers, faces: Integers) -> Subtree:
+    """The tree of arity 2 with exact boxes."""
+
+    def below(node: int) -> tuple[Subtree, Integers]:
+        found, node_child, leaf_child = [], int(tree.first_child[node]), int(tree.first_triangles[node])
+        for kind in tree.kinds[node][tree.kinds[node] != EMPTY]:
+            if kind == NODE:
+                found.append(below(node_child))
+                node_child += 1
+            else:
+                first, count = int(tree.leaf_first[leaf_child]), int(tree.leaf_count[leaf_child])
+                points = vertices[faces[tree.order[first : first + count]]].reshape(-1, 3)
+                found.append((Subtree(half_area(points), None), points))
+                leaf_child += 1
+        if len(found) == 1:
+            return found[0]
+        points = np.concatenate([points for _, points in found])
+        return Subtree(half_area(points), (found[0][0], found[1][0])), points
+
+    return below(0)[0]
+
+
+def half_area(points: Integers) -> int:
+    x, y, z = np.ptp(points.astype(np.int64), axis=0).tolist()
+    return int(x * y + y * z + z * x)
+
+
+def cuts(subtree: Subtree, most: int) -> Iterator[list[Subtree]]:
+    """All lists of at most `most` subtrees that together are `subtree`."""
+    yield [subtree]
+    if subtree.children is not None:
+        for count in range(1, most):
+            for left in cuts(subtree.children[0], count):
+                if len(left) == count:
+                    yield from (left + right for right in cuts(subtree.children[1], most - count))
+
+
+def least_area(subtree: Subtree, stack: int) -> float:
+    """Least sum of areas of nodes of four children within a stack, over all collapses."""
+    if subtree.children is None:
+        return 0
+    areas = [
+        sum(least_area(child, stack - len(cut) + 1) for child in cut)
+        for cut in cuts(subtree, 4)
+        if 1 < len(cut) <= stack + 1
+    ]
+    return subtree.area + min(areas, default=math.inf)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    count=st.integers(2, 14),
+    spread=st.sampled_from([1, 3, 1000]),
+    stack_depth=st.integers(4, 9),
+)
+def test_no_collapse_within_the_stack_reads_fewer_nodes(seed: int, count: int, spread: int, stack_depth: int) -> None:
+    vertices, faces = random_triangles(seed, count, spread)
+    options = {"triangles_per_record": 1, "stack_depth": stack_depth}
+    binary = binary_tree(build(vertices, faces, arity=2, **options), vertices, faces)
+    tree = build(vertices, faces, arity=4, **options)
+    corners = vertices[faces].reshape(-1, 3, 3)
+    leaves = sum(half_area(triangle) for triangle in corners)
+    assert tree.statistics.cost * binary.area == pytest.approx(least_area(binary, stack_depth) + leaves, rel=1e-9)
+
+
+def levels(tree: Bvh) -> dict[int, int]:
+    """The number of nodes above each leaf, by the first triangle of the leaf."""
+    found, tasks = {}, [(0, 1)]
+    while tasks:
+        node, level = tasks.pop()
+        node_child, leaf_child = int(tree.first_child[node]), int(tree.first_triangles[node])
+        for kind in tree.kinds[node]:
+            if kind == NODE:
+                tasks.append((node_child, level + 1))
+                node_child += 1
+            elif kind == LEAF:
+                found[int(tree.order[tree.leaf_first[leaf_child]])] = level
+                leaf_child += 1
+    return found
+
+
+def test_large_triangles_among_small_ones_move_up() -> None:
+    """Splits by position leave them beside the small triangles at their centres, and every box above is large."""
+
+    def moved(x: Integers, corners: list[list[int]]) -> Integers:
+        return np.stack([x, 0 * x, 0 * x], axis=1)[:, None] + np.array(corners, dtype=np.int32)
+
+    small = moved(
+        np.arange(0, 64_000, 1000, dtype=np.int32), [[0, 15_000, 15_000], [9, 15_009, 15_000], [0, 15_000, 15_009]]
+    )
+    large = moved(np.arange(0, 32_000, 10_000, dtype=np.int32), [[0, 0, 0], [31_000, 30_009, 0], [31_000, 0, 30_009]])
+    vertices = np.concatenate([small, large]).reshape(-1, 3)
+    tree = build(vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3), triangles_per_record=1, arity=2)
+    level = levels(tree)
+    assert max(level[len(small) + i] for i in range(len(large))) <= 4 < max(level.values())
 
 
 @pytest.mark.parametrize("arity", [2, 4])
