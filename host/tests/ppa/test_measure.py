@@ -16,7 +16,7 @@ from colonnade.ppa import measure
 from colonnade.ppa.library import liberty, liberty_files
 from colonnade.ppa.library.cells import Library, LookupTable
 from colonnade.ppa.netlist import memories
-from colonnade.ppa.netlist.hierarchy import BOUNDARIES, Hierarchy, Memory
+from colonnade.ppa.netlist.hierarchy import BOUNDARIES, SEPARATE, Hierarchy, Memory
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.netlist.synthesis import Technology, count_gates
 from colonnade.ppa.studies.guard import differences, gates_of_tiny
@@ -159,8 +159,11 @@ def test_synthesis_stops_at_units(tmp_path: Path) -> None:
     sources = {
         "Colonnade": "  Column columns_0 (\n  Column columns_1 (\n",
         "Column": "  RenderUnit a (\n  RenderUnit b (\n  records records_0 (\n  Arbiter arbiter (\n",
-        "RenderUnit": "  BoxUnit boxUnit (\n  Queue queue (\n",
+        "RenderUnit": "  BoxUnit boxUnit (\n  Queue queue (\n  Shader shader (\n",
         "BoxUnit": "  Divider one (\n  Divider other (\n",
+        "Shader": "  BounceUnit mirrors (\n  BounceUnit glass (\n",
+        "BounceUnit": "  rays rays_0 (\n",
+        "rays": "  rays_ext rays_ext (\n",
         "records": "  records_ext records_ext (\n",
         "Arbiter": "",
         "Queue": "",
@@ -169,9 +172,9 @@ def test_synthesis_stops_at_units(tmp_path: Path) -> None:
     for name, body in sources.items():
         (tmp_path / f"{name}.sv").write_text(f"module {name}(\n  input clock\n);\n{body}endmodule\n")
     shape = {"name": "records_ext", "depth": 8, "width": 4, "ports": ["rw"], "maskBits": None}
-    (tmp_path / "memories.json").write_text(json.dumps([shape]))
+    (tmp_path / "memories.json").write_text(json.dumps([shape, shape | {"name": "rays_ext"}]))
     hierarchy = Hierarchy(tmp_path)
-    assert hierarchy.closure("RenderUnit") == (["Queue", "RenderUnit"], ["BoxUnit"])
+    assert hierarchy.closure("RenderUnit") == (["Queue", "RenderUnit"], ["BoxUnit", "Shader"])
     assert hierarchy.closure("BoxUnit") == (["BoxUnit"], ["Divider"])
     assert hierarchy.parts("BoxUnit") == {"Divider": 2}
     assert hierarchy.parts("RenderUnit") == {}
@@ -180,8 +183,10 @@ def test_synthesis_stops_at_units(tmp_path: Path) -> None:
     assert hierarchy.count("BoxUnit", "Colonnade") == 4
     assert hierarchy.count("BoxUnit", "Colonnade", BOUNDARIES) == 0
     assert hierarchy.header("Queue") == "module Queue(\n  input clock\n);\nendmodule\n"
-    (memory,) = hierarchy.memories()
-    assert (memory.level, memory.unit, memory.count, memory.bits) == ("column", "rest of Column", 1, 32)
+    assert [hierarchy.instances(unit, SEPARATE[0]) for unit in ("RenderUnit", "BoxUnit", "BounceUnit")] == [1, 1, 2]
+    rays, records = hierarchy.memories()
+    assert (rays.level, rays.unit, rays.count) == ("render_unit", "BounceUnit", 2)
+    assert (records.level, records.unit, records.count, records.bits) == ("column", "rest of Column", 1, 32)
 
 
 def test_flip_flops_and_their_clock_gate_are_counted(small: Library) -> None:

@@ -16,12 +16,19 @@ PATHS = (
     *("BounceScheduler", "EnvironmentStage", "EnvironmentRays", "RtController"),
 )
 TRACE = ("BoxUnit", "TraversalStack", "TriangleUnit", "RecordFetch", "HitTable")
+
+#: Modules of a column that follow the paths of its traversal units.
+PATH_MODULES = ("PathUnit", "PathHits", "RayBus", "ResultBus")
+
+#: The triangle units that some rows of a column share.
+SHARED_TRIANGLES = "SharedTriangles"
+
 COLUMN = (
     "PathUnit",
     "PathHits",
     "RayBus",
     "ResultBus",
-    "SharedTriangles",
+    SHARED_TRIANGLES,
     "ColumnBvhController",
     "ColumnEnvironment",
     "EnvironmentMarches",
@@ -71,12 +78,6 @@ SHARED = (
     Level("column", "Column", (*PATHS, *COLUMN, "TriangleUnit"), "rest of Column"),
     ARRAY,
 )
-
-#: Modules of a column that follow the paths of its traversal units.
-PATH_MODULES = ("PathUnit", "PathHits", "RayBus", "ResultBus")
-
-#: Triangle units of some rows of a column.
-TRIANGLE_ROWS = "SharedTriangles"
 
 #: Names of the levels, the lowest first.
 LEVEL_NAMES = tuple(level.name for level in SEPARATE)
@@ -152,8 +153,10 @@ class Hierarchy:
 
     @property
     def replayed(self) -> tuple[str, ...]:
-        """The modules whose power is measured: the render unit, then the modules that follow its paths."""
-        return (self.levels[0].top, *(PATH_MODULES if self.has_path_unit else ()))
+        """The modules whose power is measured: the render unit, then those of the column that work for it."""
+        followers = PATH_MODULES if self.has_path_unit else ()
+        triangles = (SHARED_TRIANGLES,) if SHARED_TRIANGLES in self.files else ()
+        return (self.levels[0].top, *followers, *triangles)
 
     def units(self, level: Level) -> list[str]:
         """The units of a level that this design has."""

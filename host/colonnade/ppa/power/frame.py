@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from colonnade.common.errors import UserError
+from colonnade.ppa.netlist.hierarchy import SHARED_TRIANGLES
 from colonnade.ppa.power.recording import Recording
 
 #: Ports that count positions, pixels, shadow rays and hits, of the module that follows paths.
@@ -25,7 +27,7 @@ class Frame:
         counts: Numbers of pixels, rays (primary and shadow), in-box rays and hits: of the render unit, or of the column
             if it has a path unit.
         traced: In-box rays of the render unit.
-        share: The render unit's part of the power of the modules that follow its paths.
+        shares: The render unit's part of the power of each replayed module.
         records_share: The render unit's part of the reads of records.
     """
 
@@ -33,7 +35,7 @@ class Frame:
     end: int
     counts: Mapping[str, int]
     traced: int
-    share: float
+    shares: Mapping[str, float]
     records_share: float
 
     @property
@@ -41,20 +43,25 @@ class Frame:
         """Number of counted cycles."""
         return self.end - self.begin
 
+    @property
+    def rays(self) -> float:
+        """The render unit's part of the rays."""
+        return self.counts["rays"] * self.traced / (self.counts["rays_in_box"] or 1)
+
 
 def frame_of(recordings: Mapping[str, Recording], modules: Sequence[str], rows: int) -> Frame:
     """The cycles from the first input position to the last output pixel, and the rays in them.
 
     Args:
         recordings: The recordings of all `modules`.
-        modules: The render unit, and with a path unit the modules that follow its paths, `PATH_MODULES`.
+        modules: The replayed modules, the render unit first; see `Hierarchy.replayed`.
         rows: Render units of a column.
 
     Raises:
         UserError: No pixel has left, or no in-box ray is traced.
     """
     unit, *others = (recordings[module] for module in modules)
-    paths, column = (others[0], others[1]) if others else (unit, unit)
+    paths = others[0] if others else unit
     positions, pixels = paths.fires(_POSITIONS), paths.fires(_PIXELS)
     if True not in positions or True not in pixels:
         raise UserError("the recorded frame has no pixel: use more --cycles, or a larger --size")
@@ -62,7 +69,7 @@ def frame_of(recordings: Mapping[str, Recording], modules: Sequence[str], rows: 
     traced = sum(unit.of(_IN_BOX)[begin:end])
     if others and not traced:
         raise UserError("the recorded render unit traces no ray: use more --cycles, or a larger --size")
-    in_box = sum(column.fires(_COLUMN_RAYS)[begin:end]) if others else traced
+    in_box = sum(recordings["PathHits"].fires(_COLUMN_RAYS)[begin:end]) if others else traced
     shadow = sum(paths.of(_SHADOW)[begin:end])
     counts = {
         "pixels": sum(pixels[begin:end]),
@@ -70,5 +77,10 @@ def frame_of(recordings: Mapping[str, Recording], modules: Sequence[str], rows: 
         "rays_in_box": in_box,
         "hits": sum(paths.of(_HITS)[begin:end]),
     }
-    share = traced / in_box if others else 1.0
-    return Frame(begin, end, counts, traced, share, share if others else 1 / rows)
+    shares = {modules[0]: 1.0} | {module: traced / in_box for module in modules[1:]}
+    if SHARED_TRIANGLES in modules:
+        names = (port.name for port in recordings[SHARED_TRIANGLES].inputs)
+        served = sum(re.fullmatch(r"io_rows_\d+_candidate_valid", name) is not None for name in names)
+        rays = (sum(recordings["RayBus"].of(f"io_units_{row}_valid")[begin:end]) for row in range(served))
+        shares[SHARED_TRIANGLES] = traced / sum(rays)
+    return Frame(begin, end, counts, traced, shares, traced / in_box if others else 1 / rows)

@@ -169,7 +169,7 @@ def record(
     Args:
         config: Configuration, before `overrides`.
         overrides: Changes to the configuration, ``key.path=value``.
-        modules: Ports in Yosys's JSON of the modules: a render unit, and others that the column has once.
+        modules: Ports in Yosys's JSON of the modules: a render unit, and others of its column.
         stimulus: The workload.
         progress: Shows the steps.
     """
@@ -239,7 +239,7 @@ def _recorder(module: str, ports: _Ports, design: GeneratedDesign) -> str:
     scope, instance = module, ""
     if module not in UNITS:
         scope = COLUMN
-        (name,) = re.findall(rf"^  {module}\s+(\w+) \(", (design.dir / f"{COLUMN}.sv").read_text(), re.MULTILINE)
+        name = re.findall(rf"^  {module}\s+(\w+) \(", (design.dir / f"{COLUMN}.sv").read_text(), re.MULTILINE)[0]
         instance = f"{name}."
 
     def joined(names: Sequence[Port]) -> str:

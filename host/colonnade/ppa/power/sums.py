@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
-from colonnade.ppa.netlist.hierarchy import PATH_MODULES, PATHS, SEPARATE, TRACE
+from colonnade.ppa.netlist.hierarchy import PATHS, SEPARATE, SHARED, TRACE
 from colonnade.ppa.power.activity import NO_POWER, Power
 from colonnade.ppa.power.frame import Frame
 
@@ -33,11 +33,11 @@ class Sum:
         """Add a module.
 
         Args:
-            module: Name of the module. One that follows paths counts with the frame's share.
+            module: Name of the module.
             gates: Power by kind and by owner.
             memories_mw: Power of memories by owner, mW.
         """
-        part = self._frame.share if module in PATH_MODULES else 1.0
+        part = self._frame.shares[module]
         for kind, powers in gates.items():
             for unit, power in by_unit(powers, module).items():
                 self._gates[kind][unit] = self._gates[kind].get(unit, NO_POWER) + power * part
@@ -80,7 +80,7 @@ class Sum:
         """Energy per in-box ray and per ray, nJ."""
         return {
             "energy_per_ray_nj": self._energy(milliwatts, self._frame.traced),
-            "energy_per_any_ray_nj": self._energy(milliwatts, self._frame.counts["rays"] * self._frame.share),
+            "energy_per_any_ray_nj": self._energy(milliwatts, self._frame.rays),
         }
 
     def _energy(self, milliwatts: float, rays: float) -> float | None:
@@ -99,5 +99,5 @@ def by_unit(powers: Mapping[str, Power], module: str) -> dict[str, Power]:
 
 def _unit(owner: str, module: str) -> str:
     """The innermost unit of an instance's path within a replayed module."""
-    rest = module if module in PATH_MODULES else SEPARATE[0].rest
+    rest = {level.top: level.rest for level in (SEPARATE[0], SHARED[0])}.get(module, module)
     return next((name for name in reversed(owner.split("/")) if name in _UNITS), rest)

@@ -89,9 +89,9 @@ def test_power_belongs_to_the_innermost_unit() -> None:
 
 def test_a_path_unit_counts_with_the_rays_of_the_render_unit() -> None:
     """The energies of all units add up to that of a ray, with each part of a column counted once."""
-    frame = Frame(
-        10, 110, {"pixels": 40, "rays": 60, "rays_in_box": 50, "hits": 20}, traced=10, share=0.2, records_share=0.2
-    )
+    counts = {"pixels": 40, "rays": 60, "rays_in_box": 50, "hits": 20}
+    shares = {"TraversalUnit": 1.0, "PathUnit": 0.2, "PathHits": 0.2}
+    frame = Frame(10, 110, counts, traced=10, shares=shares, records_share=0.2)
     found = Sum(frame, megahertz=200, scale=3)
     for module, owners in (("TraversalUnit", ("BoxUnit", "")), ("PathUnit", ("RtController", "")), ("PathHits", ("",))):
         powers = dict.fromkeys(owners, Power(0.5, 2.0, 0.25))

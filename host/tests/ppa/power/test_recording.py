@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from colonnade.ppa.netlist.hierarchy import PATH_MODULES
+from colonnade.ppa.netlist.hierarchy import PATH_MODULES, SHARED_TRIANGLES
 from colonnade.ppa.power.frame import frame_of
 from colonnade.ppa.power.recording import Recording, Stimulus, record
 
 UNIT = "TraversalUnit"
-MODULES = (UNIT, *PATH_MODULES)
+MODULES = (UNIT, *PATH_MODULES, SHARED_TRIANGLES)
 
 
 def ports(inputs: Sequence[str], outputs: Sequence[str]) -> Mapping[str, Any]:
@@ -29,13 +29,14 @@ PORTS = {
         ("io_positions_ready", "io_pixels_valid", "io_events_raysShadow", "io_events_hits"),
     ),
     "PathHits": ports(("io_start", "io_rays_ready"), ("io_rays_valid",)),
-    "RayBus": ports(("io_rays_valid",), ("io_rays_ready", "io_units_0_valid")),
+    "RayBus": ports(("io_rays_valid",), ("io_rays_ready", "io_units_0_valid", "io_units_1_valid")),
     "ResultBus": ports((), ("io_results_valid",)),
+    SHARED_TRIANGLES: ports(("io_rows_0_candidate_valid", "io_rows_1_candidate_valid"), ()),
 }
 
 
 def recorded(cycles: int) -> dict[str, Recording]:
-    overrides = ("array.rows=3", "units.pathContexts=24", "units.pipelined=true")
+    overrides = ("array.rows=3", "units.pathContexts=24", "units.pipelined=true", "units.triangleRows=2")
     return record("tiny", overrides, PORTS, Stimulus.of_benchmark("cube", (24, 18), cycles))
 
 
@@ -55,4 +56,11 @@ def test_recordings_are_of_one_unit_and_its_paths_from_the_first_to_the_last_cyc
     assert whole["PathHits"].fires("io_rays") == whole["RayBus"].fires("io_rays")
     frame = frame_of(whole, MODULES, 3)
     assert 0 < frame.counts["hits"] < frame.counts["pixels"] <= 24 * 18
-    assert 0.2 < frame.share == frame.records_share == frame.traced / frame.counts["rays_in_box"] < 0.5
+    share = frame.traced / frame.counts["rays_in_box"]
+    assert 0.2 < share < 0.5
+    assert frame.records_share == share
+    # Two of the rows share a triangle unit
+    of_group = sum(sum(whole["RayBus"].of(f"io_units_{row}_valid")[frame.begin : frame.end]) for row in range(2))
+    shared = dict.fromkeys(PATH_MODULES, share) | {SHARED_TRIANGLES: frame.traced / of_group}
+    assert frame.shares == {UNIT: 1.0} | shared
+    assert share < shared[SHARED_TRIANGLES] < 1

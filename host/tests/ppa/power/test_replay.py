@@ -137,6 +137,15 @@ def test_a_memory_returns_written_words_and_counts_accesses(library: Library, hi
     assert activity.accesses == ((2, 1),)
 
 
+def test_a_read_port_without_an_enable_reads_in_every_cycle(library: Library, hierarchy: Hierarchy) -> None:
+    bits = {"R0_addr": [4, 5], "R0_clk": [2], "R0_data": [6, 7]}
+    directions = {port: "output" if port == "R0_data" else "input" for port in bits}
+    box = {"type": "table", "connections": bits, "port_directions": directions}
+    netlist = Netlist({"top": top({"box": box}, {"address": [4, 5]}, {"out": [6, 7]})}, "top", library)
+    activity = replay(netlist, hierarchy, [1] * netlist.size, recording(netlist, [(0, 0)] * 3))
+    assert activity.accesses == ((3, 0),)
+
+
 def test_a_net_without_a_driver_fails(library: Library, hierarchy: Hierarchy) -> None:
     netlist = Netlist({"top": top({"gate": cell("INV", A=8, Y=5)}, {}, {"z": [5]})}, "top", library)
     with pytest.raises(RuntimeError, match="1 nets of the gate netlist have no driver"):
