@@ -155,8 +155,8 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
     pool.request :<>= queue.request
     queue.result :<>= pool.result
     bounced :<>= queue.bounced
-    count      := count + (takes && entering.isBounce) - queue.request.fire
-    mayBounce  := count =/= bouncePlaces.U
+    count     := count + (takes && entering.isBounce) - queue.request.fire
+    mayBounce := count =/= bouncePlaces.U
     queue
   }
   io.busy := isActive
