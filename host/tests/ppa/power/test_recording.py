@@ -31,7 +31,7 @@ PORTS = {
     "PathHits": ports(("io_start", "io_rays_ready"), ("io_rays_valid",)),
     "RayBus": ports(("io_rays_valid",), ("io_rays_ready", "io_units_0_valid", "io_units_1_valid")),
     "ResultBus": ports((), ("io_results_valid",)),
-    SHARED_TRIANGLES: ports(("io_rows_0_candidate_valid", "io_rows_1_candidate_valid"), ()),
+    SHARED_TRIANGLES: ports(("io_rows_0_candidate_valid", "io_rows_1_candidate_valid"), ("io_rows_0_result_valid",)),
 }
 
 
