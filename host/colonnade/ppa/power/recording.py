@@ -235,7 +235,7 @@ def _with_recorders(design: GeneratedDesign, modules: Mapping[str, _Ports]) -> I
 
 
 def _recorder(module: str, ports: _Ports, design: GeneratedDesign) -> str:
-    """The recorder of a module, and what binds it."""
+    """The Verilog of a module's recorder, with its `bind` statement."""
     scope, instance = module, ""
     if module not in UNITS:
         scope = COLUMN

@@ -90,7 +90,7 @@ final class TriangleTag(config: ColonnadeConfig) extends Bundle {
   /** The material transmits light; of the first triangle, and of the second one of a pair. */
   val isTransmissive = Vec(2, Bool())
 
-  /** A placeholder for a record without triangles; it always misses. */
+  /** Stands for a record without triangles; it always misses. */
   val isAbsent = Bool()
 
   /** The ray's direction is negative on its dominant axis. */
