@@ -3,7 +3,7 @@ package colonnade.memory
 import chiseltest._
 import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordFormats
+import colonnade.formats.{Banks, RecordFormats}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
