@@ -40,16 +40,10 @@ lazy val colonnade = (project in file("."))
     Test / fork := true,
     Test / javaOptions ++= Seq("-Xmx4g", "-Xss16m"),
     Test / testForkedParallel := true,
-    // The simulators are compiled with the flags of the specs, not with those of the user.
-    Test / envVars ++= Seq(
-      "MAKEFLAGS",
-      "MFLAGS",
-      "GNUMAKEFLAGS",
-      "CFLAGS",
-      "CXXFLAGS",
-      "CPPFLAGS",
-      "LDFLAGS"
-    ).map(_ -> "").toMap + ("OBJCACHE" -> s"'${baseDirectory.value / "tools" / "verilated-object"}'"),
+    // The simulators are compiled with the flags of the specs, not with those of the user; and without optimisation:
+    // compiling takes longer than the short simulations.
+    Test / envVars ++= Seq("MFLAGS", "GNUMAKEFLAGS", "CFLAGS", "CXXFLAGS", "CPPFLAGS", "LDFLAGS").map(_ -> "").toMap ++
+      Map("MAKEFLAGS" -> "OPT_FAST=-O0", "OBJCACHE" -> s"'${baseDirectory.value / "tools" / "verilated-object"}'"),
     Test / testOptions += Tests.Argument(TestFrameworks.ScalaTest, "-oD"),
     // `make verify` sets the variable.
     Test / testOptions ++= (

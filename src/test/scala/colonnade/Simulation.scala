@@ -10,8 +10,12 @@ object Simulation {
   val safeFlags: Seq[String] = Seq("-fno-tree-slp-vectorize")
 
   /** Verilator, for units that are slow in the interpreter. Its headers take longer to compile than the unit: so all is one
-    * file.
+    * file. A limit of 0 would split off every constant.
     */
   val verilator =
-    Seq(VerilatorBackendAnnotation, VerilatorFlags(Seq("--output-split", "0")), VerilatorCFlags(safeFlags))
+    Seq(
+      VerilatorBackendAnnotation,
+      VerilatorFlags(Seq("--output-split", Int.MaxValue.toString)),
+      VerilatorCFlags(safeFlags)
+    )
 }
