@@ -155,7 +155,8 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.end.valid             := ending.valid
   io.end.bits.context      := ending.bits
   io.end.bits.isBackground := isBackground(ending.bits)
-  io.end.bits.occlusions   := occlusions(ending.bits)
+  io.end.bits.isStraight.foreach(_ := isPrimary(ending.bits))
+  io.end.bits.occlusions := occlusions(ending.bits)
   io.end.bits.isDirectView.foreach(_ := isDirectView(ending.bits))
   move(io.end.fire, ending.bits, ContextState.accumulating)
   move(io.accumulated.valid, io.accumulated.bits, ContextState.done)
