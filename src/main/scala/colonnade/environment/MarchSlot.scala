@@ -36,7 +36,7 @@ final class MarchSlot(config: ColonnadeConfig) extends Module {
   march.io.view                      := io.view
   march.io.request.valid             := isHeld
   march.io.request.bits.context      := order.request.context
-  march.io.request.bits.isDirectView := order.request.isDirectView
+  march.io.request.bits.isDirectView := order.request.isDirectView && !config.units.directView.B
   march.io.request.bits.ray          := order.ray
   march.io.request.bits.hitDistance  := order.hitDistance
   io.maps <> march.io.maps

@@ -101,11 +101,10 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
     step {
       m.accumulate()
       set(depth.slope, m.combine(aligned, scaledSum, subtract = true))
+      val directView = Option.when(m.hasDirectView)(DirectViewDepth.when(purpose === forDirectView, "direct view"))
       branch(
-        BoundingDepth.when(purpose === forBoundingPlane, "bounding plane"),
-        DirectViewDepth.when(purpose === forDirectView, "direct view"),
-        RecordFront.when(purpose === forFront, "nearest plane"),
-        DepthLabel.otherwise
+        Seq(BoundingDepth.when(purpose === forBoundingPlane, "bounding plane")) ++ directView :+
+          RecordFront.when(purpose === forFront, "nearest plane") :+ DepthLabel.otherwise: _*
       )
     }
   }

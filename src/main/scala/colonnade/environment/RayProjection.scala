@@ -36,7 +36,7 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
       align(at, m.dir, m.projectedDirExponent, begin = 7)
       at(10) {
         set(m.axis, 0.U)
-        branch(DirectView.when(request.isDirectView, "direct view"))
+        if (m.hasDirectView) branch(DirectView.when(request.isDirectView, "direct view"))
       }
     }
   }
