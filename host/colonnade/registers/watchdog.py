@@ -67,7 +67,6 @@ def _march(manifest: Manifest) -> int:
     rows, marches = 1 if units["pathContexts"] else int(array["rows"]), int(units["marches"])
     sharers = -(-rows // marches) if marches else 1
     requesters = marches + bool(units["directView"]) if marches else rows
-    if maps["shared"]:
-        requesters *= int(array["columns"])
+    requesters *= min(int(maps["columnsPerCopy"]), int(array["columns"]))
     tiles = (int(maps["width"]) + int(maps["height"])) // int(maps["tileSize"])
     return sharers * tiles * TILE_STEPS * (MARCH_CYCLES + requesters)

@@ -42,8 +42,12 @@ SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
 @pytest.mark.long_simulation
 @pytest.mark.parametrize(
     ("kind", "options"),
-    [("diffuse", ()), ("mirror", ()), ("glass", ("units.marches=1", "units.directView=true"))],
-    ids=["diffuse", "mirror", "glass, environment in the column"],
+    [
+        ("diffuse", ()),
+        ("mirror", ()),
+        ("glass", ("units.marches=1", "units.directView=true", "physicalAttributeMemory.columnsPerCopy=2")),
+    ],
+    ids=["diffuse", "mirror", "glass, environment in the column, maps shared by two columns"],
 )
 def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, ...]) -> None:
     """The relit room and the shadow window; two lights, one light, no bounces; a sample; a stalled sink."""

@@ -108,14 +108,16 @@ class AttributeLayout:
         """Build the layout of a configuration's section ``physicalAttributeMemory``."""
         names = {"tileSize": "tile_size", "paletteSize": "palette_size", "mapBytes": "map_bytes"}
         names |= {"planeBytes": "plane_bytes", "boundingPlanes": "bounding_planes"}
-        return AttributeLayout(**{names.get(key, key): value for key, value in section.items() if key != "shared"})
+        return AttributeLayout(
+            **{names.get(key, key): value for key, value in section.items() if key != "columnsPerCopy"}
+        )
 
     def to_config(self) -> dict[str, Any]:
         """The configuration section ``physicalAttributeMemory`` with these sizes."""
         names = {"tile_size": "tileSize", "palette_size": "paletteSize", "map_bytes": "mapBytes"}
         names |= {"plane_bytes": "planeBytes", "bounding_planes": "boundingPlanes"}
         sizes = {names.get(name, name): value for name, value in asdict(self).items() if name not in HOST_ONLY}
-        return {**sizes, "shared": False}
+        return {**sizes, "columnsPerCopy": 1}
 
     @property
     def tile_columns(self) -> int:

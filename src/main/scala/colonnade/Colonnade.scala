@@ -59,10 +59,10 @@ final class Colonnade(
   io.load.ready := !controller.io.status.busy
   columns.foreach(_.io.load := load)
 
-  // The environment's maps, if all columns share them
-  for (ports <- Some(columns.flatMap(_.io.environment)) if ports.nonEmpty) {
+  // The environment's maps, if columns share them
+  for (ports <- columns.flatMap(_.io.environment).grouped(config.columnsPerCopy)) {
     val tagBits = AttributeArbiter.tagBits(config.mapRequesters, AttributePort.tagBits(config))
-    val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, config.array.columns, tagBits)))
+    val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, ports.size, tagBits)))
     maps.io.load := load
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
   }

@@ -93,7 +93,7 @@ object ArbitraryConfig {
     boundingPlanes <- Gen.chooseNum(2, 16)
     mapHeap        <- Gen.chooseNum(66, 16384)
     planeHeap      <- Gen.chooseNum(20, 16384)
-    shared         <- flag
+    columnsPerCopy <- Gen.chooseNum(1, 4)
   } yield {
     def parts(size: Int, edge: Int) = (size + edge - 1) / edge
     val (tiles, blocks)             = (
@@ -115,7 +115,7 @@ object ArbitraryConfig {
       planes,
       planeBytes,
       boundingPlanes,
-      shared
+      columnsPerCopy
     )
   }
 

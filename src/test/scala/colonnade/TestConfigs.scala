@@ -62,7 +62,7 @@ object TestConfigs {
     planes = 128,
     planeBytes = 2000,
     boundingPlanes = 8,
-    shared = false
+    columnsPerCopy = 1
   )
 
   def withEnvironment(environment: PhysicalAttributeMemoryConfig): ColonnadeConfig =

@@ -4,9 +4,9 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, PopCount, RegEnable, Valid}
 import colonnade.common.RoundRobin
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordBroadcast, RecordRequest}
+import colonnade.formats.{Banks, RecordBroadcast, RecordRequest}
 import colonnade.frame.ColumnBvhEvents
-import colonnade.memory.{BankPort, Banks}
+import colonnade.memory.BankPort
 
 /** Ports of [[BankReader]]. */
 final class BankReaderIO(config: ColonnadeConfig) extends Bundle {

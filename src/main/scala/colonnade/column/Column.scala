@@ -52,8 +52,8 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   val pixels   = Decoupled(new Pixel(config))
   val progress = Output(new ColumnProgress)
 
-  /** If the columns share the maps of the environment. */
-  val environment = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
+  /** If columns share the maps of the environment. */
+  val environment = Option.when(config.columnsPerCopy > 1)(AttributePort.ofColumn(config))
 
   /** Delayed by one cycle. */
   val events = Output(new EventSums(config, 1))
@@ -113,7 +113,7 @@ final class Column(
   }
   for (error <- io.memoryError) error := RegNext(caches.flatMap(_.error).reduce(_ || _), false.B)
 
-  // Environment: units, or the marches that they share, read the column's own maps, or those that all columns share
+  // Environment: units, or the marches that they share, read the column's own maps, or those that some columns share
   private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(paths)).io)
   for (maps <- environment) {
     maps.load := io.load

@@ -3,9 +3,9 @@ package colonnade.column
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordBroadcast, RecordRequest}
+import colonnade.formats.{Banks, RecordBroadcast, RecordRequest}
 import colonnade.frame.ColumnBvhEvents
-import colonnade.memory.{BankPort, Banks}
+import colonnade.memory.BankPort
 
 /** Ports of [[ColumnBvhController]]. */
 final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {

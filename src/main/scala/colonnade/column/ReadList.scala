@@ -3,8 +3,7 @@ package colonnade.column
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordRequest
-import colonnade.memory.Banks
+import colonnade.formats.{Banks, RecordRequest}
 
 /** A read in flight. */
 final class Read(config: ColonnadeConfig) extends Bundle {

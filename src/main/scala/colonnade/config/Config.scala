@@ -223,6 +223,9 @@ final case class ColonnadeConfig(
   /** The render units of a column share their environment marches. */
   val sharesMarches: Boolean = hasEnvironment && units.marches > 0
 
+  /** Columns that read one copy of the environment's maps. */
+  val columnsPerCopy: Int = physicalAttributeMemory.fold(1)(_.columnsPerCopy.min(array.columns))
+
   /** Ports to a column's maps of an environment: of its render units, or of what they share. */
   val mapRequesters: Int = if (sharesMarches) units.marches + (if (units.directView) 1 else 0) else array.rows
 }

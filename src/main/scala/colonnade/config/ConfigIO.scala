@@ -147,7 +147,7 @@ object ConfigIO {
           "planes",
           "planeBytes",
           "boundingPlanes",
-          "shared"
+          "columnsPerCopy"
         )
         .map(physicalAttributeMemory),
       frame = FrameConfig(
@@ -226,7 +226,7 @@ object ConfigIO {
     planes = memory.int("planes"),
     planeBytes = memory.int("planeBytes"),
     boundingPlanes = memory.int("boundingPlanes"),
-    shared = memory.boolean("shared")
+    columnsPerCopy = memory.int("columnsPerCopy")
   )
 
   private def written(memory: PhysicalAttributeMemoryConfig) = ujson.Obj(
@@ -239,7 +239,7 @@ object ConfigIO {
     "planes"         -> memory.planes,
     "planeBytes"     -> memory.planeBytes,
     "boundingPlanes" -> memory.boundingPlanes,
-    "shared"         -> memory.shared
+    "columnsPerCopy" -> memory.columnsPerCopy
   )
 
   private def sceneCache(cache: ConfigReader) = SceneCacheConfig(

@@ -49,7 +49,7 @@ private[config] final class ConfigReader(path: String, json: ujson.Value, known:
 private[config] object ConfigReader {
 
   /** Keys of earlier versions, by their present names. */
-  private val renamed = Map("shellPlanes" -> "boundingPlanes")
+  private val renamed = Map("shellPlanes" -> "boundingPlanes", "shared" -> "columnsPerCopy")
 
   def wrong(where: String, found: ujson.Value, rule: String): ConfigError = {
     val subject = if (where.isEmpty) "the configuration" else where

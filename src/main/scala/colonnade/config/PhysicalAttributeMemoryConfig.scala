@@ -25,7 +25,7 @@ object MapEncoding {
   * @param planes      entries of the plane table
   * @param planeBytes  of the plane map, its table and the bounding planes
   * @param boundingPlanes bounding planes outside the view
-  * @param shared      one memory for the device; otherwise a copy in every column
+  * @param columnsPerCopy consecutive columns that read one copy of the maps; 1: each column has its own
   */
 final case class PhysicalAttributeMemoryConfig(
     width:          Int,
@@ -37,7 +37,7 @@ final case class PhysicalAttributeMemoryConfig(
     planes:         Int,
     planeBytes:     Int,
     boundingPlanes: Int,
-    shared:         Boolean
+    columnsPerCopy: Int
 ) {
   import PhysicalAttributeMemoryConfig._
 
@@ -47,6 +47,7 @@ final case class PhysicalAttributeMemoryConfig(
   Require.oneOf(s"$section.paletteSize", paletteSize, powers)
   Require.oneOf(s"$section.planes", planes, powers)
   Require.within(s"$section.boundingPlanes", boundingPlanes, 2, 16)
+  Require.within(s"$section.columnsPerCopy", columnsPerCopy, 1, ArrayConfig.mostColumns)
 
   /** All derived sizes. */
   val layout: AttributeLayout = AttributeLayout(this)

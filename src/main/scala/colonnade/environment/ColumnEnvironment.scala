@@ -15,12 +15,12 @@ final class ColumnEnvironmentIO(config: ColonnadeConfig) extends Bundle {
   /** One for each march: of a render unit, or shared. */
   val ports = Vec(config.mapRequesters, Flipped(port))
 
-  /** To the maps that all columns share, if the configuration says so. */
-  val shared = if (config.physicalAttributeMemory.exists(_.shared)) Some(AttributePort.ofColumn(config)) else None
+  /** To the maps that some columns share, if the configuration says so. */
+  val shared = Option.when(config.columnsPerCopy > 1)(AttributePort.ofColumn(config))
   val events = Output(new AttributeEvents)
 }
 
-/** A column's access to the environment's maps: its own copy, or a port to the device's only copy. */
+/** A column's access to the environment's maps: its own copy, or a port to one that some columns share. */
 final class ColumnEnvironment(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnEnvironmentIO(config))
 

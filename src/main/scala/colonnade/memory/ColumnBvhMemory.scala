@@ -3,7 +3,7 @@ package colonnade.memory
 import chisel3._
 import chisel3.util.{Decoupled, Pipe, Queue, Valid}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Load, LoadTarget, RecordFormats}
+import colonnade.formats.{Banks, Load, LoadTarget, RecordFormats}
 
 /** Ports of [[ColumnBvhMemory]]. */
 final class ColumnBvhMemoryIO(config: ColonnadeConfig) extends Bundle {

@@ -2,28 +2,27 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, MuxLookup}
-import colonnade.common.{Context, ContextTable}
+import colonnade.common.ContextTable
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, Rounding}
 
 /** [[ColourUnit]] as a pipeline, a channel a cycle: docs/shading.md. {{{
   *
-  * end ────┬▶ read ─▶ light · transmittance ─▶ light · albedo  ─▶ throughput · colour ─▶ colour, path
-  * bounce ─┘          throughput · tint        tinted · Fresnel   part · behind
+  * end ────┬▶ read ─▶ light · transmittance ─▶ sum of the lights ─▶ light · albedo  ─▶ throughput · colour ─▶ colour, path
+  * bounce ─┘          throughput · tint                             tinted · Fresnel   part · behind
   * }}}
-  * An end takes 3 · lights cycles, with the lights that are on, at least one; in the background 3. A bounce takes 6, and
-  * 3 · lights more if its reflection shows a surface. Colours come in any order; the throughput and radiance of every path
-  * are in a table.
+  * An end takes 3 · lights cycles, with the lights that are on, at least one; in the background 3. A bounce takes 3, and
+  * 3 · lights more if its reflection shows a surface; none if it is the path's first and has no Fresnel reflection.
+  * Colours come in any order; the throughput and radiance of every path are in a table.
   */
 final class ColourPipeline(config: ColonnadeConfig) extends Module {
-  private val lights         = config.frame.lights
-  private val hasBounces     = config.frame.hasBounces
-  private val hasReflections = hasBounces && config.hasEnvironment
-  private val fraction       = NumberFormats.lightFraction
-  private val colourBits     = NumberFormats.colourBits
-  private val sumBits        = NumberFormats.lightBits + log2Ceil(lights + 1)
-  private val weightBits     = fraction + 1
-  private val one            = (1 << fraction).U(weightBits.W)
+  private val lights     = config.frame.lights
+  private val hasBounces = config.frame.hasBounces
+  private val fraction   = NumberFormats.lightFraction
+  private val colourBits = NumberFormats.colourBits
+  private val sumBits    = NumberFormats.lightBits + log2Ceil(lights + 1)
+  private val weightBits = fraction + 1
+  private val one        = (1 << fraction).U(weightBits.W)
 
   val io = IO(new ColourUnitIO(config))
 
@@ -32,50 +31,42 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
   private val isIssuing = RegInit(false.B)
   private val next      = Reg(new ColourOperation(config))
   private val operation = Reg(new ColourOperation(config))
-  import operation.{context, hasSurface, isBounce, needsRatio, occlusions}
-  private val albedo   = Reg(Vec(3, UInt(colourBits.W)))
-  private val isTinted = Reg(Bool())
-  private val fresnel  = Reg(UInt(weightBits.W))
+  import operation.{hasSurface, isBounce, needsRatio, occlusions}
 
   /** A slot of the operation is a channel and a light of its surface, or a channel of its path. */
   private val ofSurface = Reg(Bool())
   private val channel   = Reg(UInt(2.W))
   private val light     = Reg(UInt(log2Ceil(lights.max(2)).W))
+  private val lastPass  = !(isBounce && ofSurface)
 
-  /** A path that a bounce is about to change; `isSettled` is false for one cycle more, for the table. */
-  private val isUpdating    = RegInit(false.B)
-  private val isSettled     = RegNext(!isUpdating, true.B)
-  private val resultContext = Reg(Context(config))
-  private val ratios        = Option.when(config.hasEnvironment)(Module(new ShadowRatios(config, sumBits)).io)
+  private def isLastLight(light: UInt): Bool = !ofSurface || light +& 1.U >= io.shading.lights // off, it adds nothing
 
-  private val isFirst     = channel === 0.U && light === 0.U
-  private val waits       = isUpdating || (isFirst && needsRatio && ratios.map(_.busy).getOrElse(false.B))
-  private val issues      = isIssuing && !waits
-  private val lastLight   = !ofSurface || light +& 1.U >= io.shading.lights // a light that is off adds nothing
-  private val lastPass    = !(isBounce && ofSurface)
-  private val isLast      = issues && lastLight && lastPass && channel === 2.U
+  private val lastLight   = isLastLight(light)
   private val lightThen   = Mux(lastLight, 0.U, light + 1.U)
   private val channelThen = Mux(!lastLight, channel, Mux(channel === 2.U, 0.U, channel + 1.U))
-  when(issues) {
-    light   := lightThen
-    channel := channelThen
-    when(lastLight && channel === 2.U && isBounce) { ofSurface := false.B }
-  }
-  ratios.foreach(_.claim := issues && isFirst && needsRatio)
+  private val isLast      = isIssuing && lastPass && channel === 2.U && lastLight
+  private val endsNext    = isIssuing && lastPass && channelThen === 2.U && isLastLight(lightThen)
 
-  // Take one while the last slot is issued; an end after an end one cycle before
-  private val isFree   = !isReading && (!isIssuing || isLast)
-  private val endsNext =
-    issues && !isBounce && channelThen === 2.U && (!ofSurface || lightThen +& 1.U >= io.shading.lights)
-  private val bounces = io.bounce.map(_.fire).getOrElse(false.B)
-  private val takes   = bounces || io.end.fire
-  private val taken   =
-    io.bounce.map(bounce => Mux(bounce.valid, bounce.bits.context, io.end.bits.context)).getOrElse(io.end.bits.context)
-  io.bounce.foreach(_.ready := isFree)
-  io.end.ready := (isFree || (endsNext && !isReading)) && !io.bounce.map(_.valid).getOrElse(false.B)
+  // Take one while the last slot is issued, or in the cycle before
+  private val isFree    = !isReading && (!isIssuing || isLast || endsNext)
+  private val isWriting = Wire(Bool())
+
+  /** The path's first bounce, without a Fresnel reflection: its tint is the throughput. It needs no slot. */
+  private val isDirect =
+    io.bounce.map(bounce => bounce.bits.isFirst && bounce.bits.fresnel.natural === 0.U).getOrElse(false.B)
+  private val mayBounce = io.bounce.map(_.valid && !isDirect).getOrElse(false.B)
+  private val bounces   = mayBounce && isFree
+  private val takes     = bounces || io.end.fire
+  private val taken = Mux(mayBounce, io.bounce.map(_.bits.context).getOrElse(io.end.bits.context), io.end.bits.context)
+  private val tints = io.bounce.map { bounce =>
+    bounce.bits.albedo.channels.map(albedo => Mux(bounce.bits.isTinted, albedo +& albedo(colourBits - 1), one))
+  }
+  io.bounce.foreach(_.ready := Mux(isDirect, !isWriting, isFree))
+  io.end.ready := isFree && !mayBounce
   when(takes) {
     next.context    := taken
     next.isBounce   := bounces
+    next.isStraight := ColourUnit.isStraight(io, bounces)
     next.occlusions := io.end.bits.occlusions
     when(bounces) { next.occlusions.foreach(_ := Occlusion.none) }
     val showsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
@@ -83,18 +74,25 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
     next.needsRatio := !bounces && showsSurface && io.end.bits.isDirectView.getOrElse(false.B) &&
       io.end.bits.occlusions.map(_ =/= Occlusion.none).reduce(_ || _)
     for (bounce <- io.bounce) when(bounces) {
-      albedo   := VecInit(bounce.bits.albedo.channels)
-      isTinted := bounce.bits.isTinted
-      fresnel  := bounce.bits.fresnel.natural
+      next.fresnel.get := bounce.bits.fresnel
+      next.tint.get.zip(tints.get).foreach { case (to, tint) => to := Fixed(to.format, tint) }
     }
   }
 
-  // Read its surface once; and its path again and again while a bounce of the same path is under way
-  private val repeats = isReading && !(isSettled && !isUpdating) && resultContext === next.context
-  private val reads   = takes || repeats
-  private val starts  = isReading && !repeats
+  // Its slots follow those of the operation before. Its path is read again and again while a bounce of the same path is
+  // under way, or while the ratio unit is busy
+  private val isUpdating = Wire(Bool())
+  private val ratios     = Option.when(config.hasEnvironment)(Module(new ShadowRatios(config, sumBits)).io)
+  private val starts     = isReading && !isUpdating && !(next.needsRatio && ratios.map(_.busy).getOrElse(false.B))
+  private val repeats    = isReading && !starts
+  private val reads      = takes || repeats
   assert(!starts || !isIssuing || isLast, "an operation before the end of another one")
   isReading := reads
+  when(isIssuing) {
+    light   := lightThen
+    channel := channelThen
+    when(lastLight && channel === 2.U && isBounce) { ofSurface := false.B }
+  }
   when(starts) {
     isIssuing := true.B
     operation := next
@@ -102,12 +100,13 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
     channel   := 0.U
     light     := 0.U
   }.elsewhen(isLast) { isIssuing := false.B }
+  ratios.foreach(_.claim := starts && next.needsRatio)
 
-  private val surfaces      = ContextTable(config, new TerminalSurface(config))
-  private val surface       = surfaces.read(taken, takes)
-  private val surfaceAlbedo = if (hasReflections) Reg(Vec(3, UInt(colourBits.W))) else albedo
-  private val directLight   = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
-  private val emission      = Option.when(config.frame.emission)(Reg(Vec(3, UInt(colourBits.W))))
+  private val surfaces    = ContextTable(config, new TerminalSurface(config))
+  private val surface     = surfaces.read(taken, takes)
+  private val albedo      = Reg(Vec(3, UInt(colourBits.W)))
+  private val directLight = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
+  private val emission    = Option.when(config.frame.emission)(Reg(Vec(3, UInt(colourBits.W))))
   when(io.surface.valid) {
     val surface = Wire(new TerminalSurface(config))
     surface.albedo      := io.surface.bits.albedo
@@ -116,7 +115,7 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
     surfaces.write(io.surface.bits.context, surface)
   }
   when(RegNext(takes, false.B)) {
-    when(hasReflections.B || !next.isBounce) { surfaceAlbedo := VecInit(surface.albedo.channels) }
+    albedo      := VecInit(surface.albedo.channels)
     directLight := VecInit(surface.directLight.map(light => VecInit(light.channels.map(_.natural))))
     emission.zip(surface.emission).foreach { case (to, from) => to := VecInit(from.channels) }
   }
@@ -125,9 +124,9 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
   private val throughput = if (hasBounces) Reg(Vec(3, UInt(weightBits.W))) else VecInit.fill(3)(one)
   private val radiance   = if (hasBounces) Reg(Vec(3, UInt(colourBits.W))) else VecInit.fill(3)(0.U(colourBits.W))
   for (path <- paths.map(_.read(Mux(repeats, next.context, taken), reads)))
-    when(isReading) {
-      throughput := VecInit(path.throughput.map(_.natural))
-      radiance   := VecInit(path.radiance.channels)
+    when(starts) {
+      throughput := VecInit(path.throughput.map(weight => Mux(next.isStraight, one, weight.natural)))
+      radiance   := VecInit(path.radiance.channels.map(Mux(next.isStraight, 0.U, _)))
     }
 
   private def of[T <: Data](channels: Seq[T], channel: UInt = channel): T =
@@ -139,85 +138,110 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
 
   private def drop(product: UInt, width: Int): UInt = Rounding.narrow(Rounding.floor(product, fraction), width)
 
-  // Light that arrives at the surface, or the tinted throughput
+  /** The slot, one stage later. */
+  private def after(slot: ColourSlot)(change: ColourSlot => Unit = _ => ()): ColourSlot = {
+    val now = WireInit(slot)
+    change(now)
+    val later = WireInit(RegNext(now))
+    later.isValid := RegNext(now.isValid, false.B)
+    later
+  }
+
+  // Light that arrives at the surface from a light, or the tinted throughput
+  private val slot = Wire(new ColourSlot(config))
+  slot.isValid      := isIssuing
+  slot.context      := operation.context
+  slot.isLast       := isLast
+  slot.isPath       := lastPass
+  slot.isBounce     := isBounce
+  slot.hasSurface   := hasSurface
+  slot.needsRatio   := needsRatio
+  slot.channel      := channel
+  slot.isFirstLight := light === 0.U
+  slot.isLastLight  := lastLight
+  slot.radiance     := of(radiance)
+  slot.weight       := of(throughput)
+  slot.emission.zip(emission).foreach { case (to, from) => to := of(from) }
   private val shadowTransmittance = io.shading.shadowTransmittance.map(_.natural).getOrElse(one)
   private val transmittance       =
     MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> one, Occlusion.transmissive -> shadowTransmittance))
-  private val tint    = Mux(isTinted, of(albedo) +& of(albedo)(colourBits - 1), one)
-  private val direct  = of(at(directLight))
-  private val left    = Mux(ofSurface, direct, of(throughput))
-  private val right   = Mux(ofSurface, transmittance, tint)
+  private val tint     = operation.tint.map(tint => of(tint.map(_.natural))).getOrElse(one)
+  private val fresnel  = operation.fresnel.map(_.natural).getOrElse(0.U(weightBits.W))
+  private val direct   = of(at(directLight))
+  private val arriving = Reg(UInt(NumberFormats.lightBits.W))
+  arriving := drop(
+    Mux(ofSurface, direct, of(throughput)) * Mux(ofSurface, transmittance, tint),
+    NumberFormats.lightBits
+  )
+
+  // The sum of the lights
+  private val arrival = after(slot)()
   private val lit     = Reg(UInt(sumBits.W))
   private val all     = Reg(UInt(sumBits.W))
-  private val ambient = of(io.ambient.channels).natural
-  lit := Mux(ofSurface, Mux(light === 0.U, ambient, lit), 0.U) + drop(left * right, NumberFormats.lightBits)
-  all := Mux(light === 0.U, ambient, all) + direct
+  private val ambient = of(io.ambient.channels, arrival.channel).natural
+  lit := Mux(arrival.isBounce && arrival.isPath, 0.U, Mux(arrival.isFirstLight, ambient, lit)) + arriving
+  all := Mux(arrival.isFirstLight, ambient, all) + RegNext(direct)
 
-  private val atAlbedo = Wire(new ColourSlot(config))
-  atAlbedo.isLast     := isLast
-  atAlbedo.isPath     := lastPass
-  atAlbedo.isBounce   := isBounce
-  atAlbedo.hasSurface := hasSurface
-  atAlbedo.needsRatio := needsRatio
-  atAlbedo.channel    := channel
-  atAlbedo.radiance   := of(radiance)
-  atAlbedo.weight     := of(throughput)
-  atAlbedo.emission.zip(emission).foreach { case (to, from) => to := of(from) }
-  private val hasLit = RegNext(issues && lastLight, false.B)
-  private val slot   = RegNext(atAlbedo)
-  private val factor = Reg(UInt(weightBits.W))
-  factor := Mux(ofSurface, of(surfaceAlbedo), fresnel)
+  // The light that leaves the surface, or the weight of the Fresnel reflection
+  private val sum       = after(arrival)(slot => slot.isValid := arrival.isValid && arrival.isLastLight)
+  private val factors   = Reg(Vec(2, UInt(weightBits.W)))
+  private val reflected = Reg(UInt((sumBits + weightBits - fraction).W))
+  factors   := VecInit(Mux(ofSurface, of(albedo), fresnel), factors(0))
+  reflected := Rounding.floor(lit * factors(1), fraction)
   for (ratios <- ratios) {
-    ratios.load.valid        := hasLit && slot.needsRatio
+    ratios.load.valid        := sum.isValid && sum.needsRatio
     ratios.load.bits.part    := lit
-    ratios.load.bits.channel := slot.channel
+    ratios.load.bits.channel := sum.channel
     ratios.whole             := all
   }
 
-  // The light that leaves the surface, or the weight of the Fresnel reflection
-  private val reflected = Rounding.floor(lit * factor, fraction)
-  private val colour    = Rounding.saturate(reflected, colourBits)
-  private val shown = slot.emission.map(emission => Rounding.saturate(colour +& emission, colourBits)).getOrElse(colour)
-  private val seen  = Reg(UInt(weightBits.W))
+  // Its colour
+  private val leaving = after(sum)(slot => when(sum.isBounce) { slot.weight := Rounding.narrow(lit, weightBits) })
+  private val colour  = Rounding.saturate(reflected, colourBits)
+  private val shown   =
+    leaving.emission.map(emission => Rounding.saturate(colour +& emission, colourBits)).getOrElse(colour)
+  private val seen = Reg(UInt(weightBits.W))
   seen := Mux(
-    slot.isBounce && slot.isPath,
+    leaving.isBounce && leaving.isPath,
     Rounding.narrow(reflected, weightBits),
-    Mux(slot.hasSurface, shown, background(slot))
+    Mux(leaving.hasSurface, shown, background(leaving))
   )
   private val reflection = Reg(Vec(3, UInt(colourBits.W)))
-  when(hasLit && !slot.isPath) { shiftIn(reflection, shown) }
+  when(leaving.isValid && !leaving.isPath) { shiftIn(reflection, shown) }
 
-  private val atPath = WireInit(slot)
-  when(slot.isBounce) { atPath.weight := Rounding.narrow(lit, weightBits) }
-  private val hasSeen = RegNext(hasLit && slot.isPath, false.B)
-  private val last    = RegNext(atPath)
-  private val weighed =
+  // What the path shows of it, and still lets through
+  private val weighed = after(leaving)(slot => slot.isValid := leaving.isValid && leaving.isPath)
+  private val weight  =
     if (hasBounces)
-      Mux(last.isBounce, Mux(last.hasSurface, of(reflection, last.channel), background(last)), last.weight)
-    else last.weight
-  private val total = Rounding.saturate(last.radiance +& drop(seen * weighed, weightBits), colourBits)
+      Mux(
+        weighed.isBounce,
+        Mux(weighed.hasSurface, of(reflection, weighed.channel), background(weighed)),
+        weighed.weight
+      )
+    else weighed.weight
+  private val part = Reg(UInt(weightBits.W))
+  part := drop(seen * weight, weightBits)
 
-  // The path's colour so far, and what it still lets through
+  // The path's colour so far
+  private val added   = after(weighed)(slot => slot.weight := weighed.weight - seen)
   private val colours = Reg(Vec(3, UInt(colourBits.W)))
   private val weights = Reg(Vec(3, UInt(weightBits.W)))
-  when(hasSeen) {
-    shiftIn(colours, total)
-    shiftIn(weights, last.weight - seen)
+  when(added.isValid) {
+    shiftIn(colours, Rounding.saturate(added.radiance +& part, colourBits))
+    shiftIn(weights, added.weight)
   }
-  private val isDone   = RegNext(hasSeen && last.isLast, false.B)
-  private val isStream = RegNext(!last.isBounce && !last.needsRatio)
-  when(isLast) { resultContext := context }
 
   // An end's colour leaves, or waits for its ratio
-  private val isShown = isDone && isStream
+  private val done    = after(added)(slot => slot.isValid := added.isValid && added.isLast)
+  private val isShown = done.isValid && !done.isBounce && !done.needsRatio
   private val result  = Wire(new PathColour(config))
-  result.context := resultContext
+  result.context := done.context
   result.colour.channels.zip(colours).foreach { case (to, from) => to := from }
   result.ratio.foreach(_.channels.foreach(to => to := Fixed(to.format, one)))
   io.colour.valid := isShown
   io.colour.bits  := result
   for (ratios <- ratios) {
-    ratios.colour.valid := isDone && RegNext(last.needsRatio)
+    ratios.colour.valid := done.isValid && done.needsRatio
     ratios.colour.bits  := result
     ratios.result.ready := !isShown
     when(!isShown) {
@@ -226,20 +250,18 @@ final class ColourPipeline(config: ColonnadeConfig) extends Module {
     }
   }
 
-  // A bounce's path enters the table, which has one write port: new paths have priority
-  for (table <- paths) {
-    val isBounced = RegInit(false.B)
-    val path      = Wire(new PathState)
-    path.throughput.zip(weights).foreach { case (to, from) =>
-      to := Fixed(to.format, Mux(io.start.valid, one, from))
-    }
-    path.radiance.channels.zip(colours).foreach { case (to, from) => to := Mux(io.start.valid, 0.U, from) }
-    when(io.start.valid || isBounced) { table.write(Mux(io.start.valid, io.start.bits, resultContext), path) }
-    when(hasSeen && last.isLast && last.isBounce) { isBounced := true.B }.elsewhen(!io.start.valid) {
-      isBounced := false.B
-    }
-    when(isLast && isBounce) { isUpdating := true.B }.elsewhen(isBounced && !io.start.valid) { isUpdating := false.B }
+  // A bounce's path enters the table; a read in the same cycle does not count
+  isWriting := done.isValid && done.isBounce
+  for (table <- paths; bounce <- io.bounce) when(isWriting || (bounce.fire && isDirect)) {
+    val path = Wire(new PathState)
+    for ((to, (weight, tint)) <- path.throughput.zip(weights.zip(tints.get)))
+      to := Fixed(to.format, Mux(isWriting, weight, tint))
+    path.radiance.channels.zip(colours).foreach { case (to, from) => to := Mux(isWriting, from, 0.U) }
+    table.write(Mux(isWriting, done.context, bounce.bits.context), path)
   }
+  isUpdating := Seq(slot, arrival, sum, leaving, weighed, added, done, after(done)())
+    .map(slot => slot.isValid && slot.isBounce && slot.context === next.context)
+    .reduce(_ || _)
 
   private def shiftIn(channels: Vec[UInt], value: UInt): Unit = {
     channels(0) := channels(1)

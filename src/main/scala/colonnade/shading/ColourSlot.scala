@@ -3,19 +3,28 @@ package colonnade.shading
 import chisel3._
 import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.formats.FrameRegisters
 
 /** A bounce or an end in [[ColourPipeline]]. */
 final private[shading] class ColourOperation(config: ColonnadeConfig) extends Bundle {
   val context    = Context(config)
   val isBounce   = Bool()
+  val isStraight = Bool()
   val hasSurface = Bool()
   val occlusions = Vec(config.frame.lights, Occlusion())
   val needsRatio = Bool()
+
+  /** Of a bounce: what the path lets through, and the weight of the Fresnel reflection. */
+  val tint    = Option.when(config.frame.hasBounces)(Vec(3, FrameRegisters.weight))
+  val fresnel = Option.when(config.frame.hasBounces)(FrameRegisters.weight)
 }
 
-/** A channel in the later stages of [[ColourPipeline]]. */
+/** A channel and a light of an operation in the stages of [[ColourPipeline]]. */
 final private[shading] class ColourSlot(config: ColonnadeConfig) extends Bundle {
   private val bits = NumberFormats.colourBits
+
+  val context = Context(config)
+  val isValid = Bool()
 
   /** The operation's last one; of its path, not of a reflected surface. */
   val isLast     = Bool()
@@ -24,6 +33,10 @@ final private[shading] class ColourSlot(config: ColonnadeConfig) extends Bundle 
   val hasSurface = Bool()
   val needsRatio = Bool()
   val channel    = UInt(2.W)
+
+  /** The first light of the channel, the last one. */
+  val isFirstLight = Bool()
+  val isLastLight  = Bool()
 
   /** The path's radiance and throughput. */
   val radiance = UInt(bits.W)

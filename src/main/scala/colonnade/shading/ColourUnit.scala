@@ -13,9 +13,6 @@ final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   val background = Input(Rgb(FrameRegisters.colour))
   val shading    = Input(new Shading(config))
 
-  /** A context takes a new pixel: its path starts. */
-  val start = Flipped(Valid(Context(config)))
-
   /** The surface at which a context's path ends; remembered. */
   val surface = Flipped(Valid(new LitSurface(config)))
   val bounce  = if (config.frame.hasBounces) Some(Flipped(Decoupled(new BounceUpdate(config)))) else None
@@ -46,8 +43,6 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val surfaces = ContextTable(config, new TerminalSurface(config))
   private val paths    = if (hasBounces) Some(ContextTable(config, new PathState)) else None
 
-  /** The path has hit neither mirror nor glass yet: its entry in `paths` is meaningless. */
-  private val isStraight = Reg(Vec(config.array.contexts, Bool()))
   when(io.surface.valid) {
     val surface = Wire(new TerminalSurface(config))
     surface.albedo      := io.surface.bits.albedo
@@ -68,6 +63,9 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val step    = Reg(UInt(log2Ceil(lights + 1).max(2).W))
   private val channel = Reg(UInt(2.W))
   private val isReady = Reg(Bool())
+
+  /** The path had hit neither mirror nor glass before: its entry in `paths` is meaningless. */
+  private val isStraight = Reg(Bool())
 
   /** The current product is the surface's, not the path's. */
   private val ofSurface  = Reg(Bool())
@@ -107,12 +105,13 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val pathRead    = paths.map(_.read(taken, takes))
   isRead := takes
   when(takes) {
-    isBusy  := true.B
-    isEnd   := !bounces
-    context := taken
-    channel := 0.U
-    isReady := false.B
-    step    := 0.U
+    isBusy     := true.B
+    isEnd      := !bounces
+    context    := taken
+    channel    := 0.U
+    isReady    := false.B
+    step       := 0.U
+    isStraight := ColourUnit.isStraight(io, bounces)
     val showsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
     ofSurface  := showsSurface
     hasSurface := showsSurface
@@ -126,11 +125,10 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     isDirectView := !bounces && io.end.bits.isDirectView.getOrElse(false.B)
   }
   when(isRead) {
-    val isStart = isStraight(context)
     throughput := VecInit.fill(3)((1 << fraction).U)
     radiance   := VecInit.fill(3)(0.U)
     pathRead.foreach { path =>
-      when(!isStart) {
+      when(!isStraight) {
         throughput := VecInit(path.throughput.map(_.natural))
         radiance   := VecInit(path.radiance.channels)
       }
@@ -225,16 +223,17 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
       path.throughput.zip(throughput).foreach { case (to, from) => to := Fixed(to.format, from) }
       path.radiance.channels.zip(radiance).foreach { case (to, from) => to := from }
       table.write(context, path)
-      isStraight(context) := false.B
     }
   }
-  when(io.start.valid) { isStraight(io.start.bits) := true.B }
-
   private def set(channels: Vec[UInt], value: UInt): Unit =
     for (index <- 0 until 3) when(channel === index.U) { channels(index) := value }
 }
 
 object ColourUnit {
+
+  /** Whether the path of a bounce that is taken, or else of an end, is new. */
+  private[shading] def isStraight(io: ColourUnitIO, isBounce: Bool): Bool =
+    io.bounce.map(bounce => Mux(isBounce, bounce.bits.isFirst, io.end.bits.isStraight.get)).getOrElse(true.B)
 
   /** The ports of a new unit: with `units.pipelined` a [[ColourPipeline]]. */
   def apply(config: ColonnadeConfig): ColourUnitIO =

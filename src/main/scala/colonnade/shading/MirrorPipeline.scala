@@ -1,8 +1,9 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{Cat, MuxLookup, PriorityEncoder, Reverse}
-import colonnade.common.{Context, ContextTable}
+import chisel3.util.{log2Ceil, Cat, PriorityEncoder, Reverse}
+import colonnade.common.ModuloSchedule.{interval, xyz}
+import colonnade.common.{Context, ContextTable, ModuloSchedule, ReservedQueue}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
@@ -18,14 +19,14 @@ final private[shading] class MirrorHit(config: ColonnadeConfig) extends Bundle {
   val dir               = Vec(3, SInt(formats.componentBits.W))
 }
 
-/** Reflections at mirrors, equal to those of [[BounceUnit]]: a hit every five cycles, in order but for restarts. {{{
+/** Reflections at mirrors, equal to those of [[BounceUnit]]: a hit every three cycles, in order but for restarts. {{{
   *
-  * request ─▶ n·n, n·d ─▶ |n|²·d + 2c·n ─▶ hemisphere check ─▶ result
+  * request ─▶ n·n, n·d ─▶ |n|²·d + 2c·n ─▶ hemisphere check ─▶ queue ─▶ result
   *      ▲                                        │ with the geometric normal
   *      └────────────────────────────────────────┘
   * }}}
-  * All stages are in step: three cycles for the axes, two for the sums. A result is offered 14 cycles after its request was
-  * taken; a restart takes 15 cycles more.
+  * The stages follow a [[ModuloSchedule]], an axis a cycle, and never stall: a hit enters only if it has a place in the
+  * queue. A result is offered 14 cycles after its request was taken; a restart takes 12 cycles more.
   */
 final class MirrorPipeline(config: ColonnadeConfig) extends Module {
   private val formats   = new BounceFormats(config.numbers)
@@ -36,117 +37,95 @@ final class MirrorPipeline(config: ColonnadeConfig) extends Module {
   /** `request.bits.isGlass` is false; the ports of glass have no effect. */
   val io = IO(new BounceUnitIO(config))
 
-  private val first, second, third          = Reg(new MirrorHit(config))
-  private val hasFirst, hasSecond, hasThird = RegInit(false.B)
-  private val phase                         = RegInit(4.U(3.W))
-  private val isEmpty                       = !hasFirst && !hasSecond && !hasThird
+  private val phase    = RegInit(0.U.asTypeOf(ModuloSchedule.phase()))
+  private val schedule = new ModuloSchedule(phase)
+  import schedule._
+  private val enters = isAt(interval - 1)
+  phase := Mux(enters, 0.U, phase + 1.U)
 
-  /** The axis of a phase. */
-  private def axis[T <: Data](vector: Seq[T], offset: Int = 0): T =
-    MuxLookup(phase, vector(2))(Seq(offset.U -> vector(0), (offset + 1).U -> vector(1)))
+  // The hit, an interval in each register
+  private val isHeld   = RegInit(VecInit.fill(4)(false.B))
+  private val entering = Wire(new MirrorHit(config))
+  private val hit      = Reg(new MirrorHit(config))
+  private val hits     = Seq.iterate(arriving(hit, 0, interval - 1), 4)(hit => latch(hit.last)(hit.at(hit.last)))
 
-  // First stage: lengths and angle
+  private def hitAt(cycle: Int): MirrorHit = hits(cycle / interval).at(cycle)
+
+  /** The axes of a vector of the hit, one after the other. */
+  private def axes[T <: Data](first: Int)(vector: MirrorHit => Vec[T]): T =
+    select(xyz(first))(axis => vector(hitAt(first + axis))(axis))
+
+  // Lengths and angle
+  private val squareOf = latch(xyz(0))(axes(0)(_.normal) * axes(0)(_.normal)).at(xyz(1))
+  private val angleOf  = latch(xyz(0))(axes(0)(_.normal) * axes(0)(_.dir)).at(xyz(1))
   private val square   = Reg(UInt(dotBits.W))
   private val against  = Reg(SInt((dotBits + 1).W))
-  private val squareOf = Reg(SInt(dotBits.W))
-  private val angleOf  = Reg(SInt(dotBits.W))
+  square  := Mux(isAt(1), 0.U, square) + squareOf.asUInt
+  against := Mux(isAt(1), 0.S, against) -& angleOf
+  private val top       = square(dotBits - 1, dotBits - 3)
+  private val exponent  = Mux(top.orR, 3.U - PriorityEncoder(Reverse(top)), 0.U)
+  private val turnsAway = carry(latch(4)(against <= 0.S), 11)
 
-  // Second stage: the direction, an axis at a time
-  private val scale      = Reg(UInt(shadeBits.W))
-  private val cosine     = Reg(UInt(formats.cosineBits.W))
-  private val turnsAway  = Reg(Vec(2, Bool())) // of the second stage, of the third
-  private val ofRay      = Reg(SInt((2 * shadeBits + 2).W))
-  private val ofNormal   = Reg(SInt((2 * shadeBits + 4).W))
-  private val reflection = Reg(Vec(3, SInt(formats.bounceBits.W)))
+  private def scaled(length: UInt) = Rounding.floor(Rounding.floor(length, shadeBits - 1), exponent)
 
-  // Hemisphere check
-  private val checkBits = formats.bounceBits + formats.faceForwardBits
-  private val checked   = Reg(SInt(checkBits.W))
-  private val side      = Reg(SInt((checkBits + 2).W))
-
-  // The result waits until it is taken; its origin comes from a table
-  private val hasResult = RegInit(false.B)
-  private val result    = Reg(new MirrorResult(config))
-  private val isWrong   = third.isSmooth && (turnsAway(1) || side <= 0.S)
-  private val ends      = phase === 1.U && hasThird && !isWrong
-  private val stalls    = ends && hasResult
-  private val enters    = phase === 4.U
-  private val restarts  = hasThird // has not ended
-
-  when(!stalls) {
-    phase := Mux(enters, Mux(isEmpty && !io.request.valid, 4.U, 0.U), phase + 1.U)
-
-    // Products of axes 0, 1, 2 in phases 0, 1, 2; their sums are complete in phase 4
-    squareOf := axis(first.normal) * axis(first.normal)
-    angleOf  := axis(first.normal) * axis(first.dir)
-    when(phase =/= 4.U) {
-      square  := Mux(phase === 1.U, 0.U, square) + squareOf.asUInt
-      against := Mux(phase === 1.U, 0.S, against) -& angleOf
-    }
-
-    ofRay    := scale.zext * axis(second.dir)
-    ofNormal := Cat(cosine, 0.U(1.W)).zext * axis(second.normal)
-    // The axes enter in phases 1, 2, 3
-    when(phase === 1.U || phase === 2.U || phase === 3.U) {
-      reflection(0) := reflection(1)
-      reflection(1) := reflection(2)
-      reflection(2) := Rounding.narrow(Rounding.floor(ofRay +& ofNormal, shadeBits - 4), formats.bounceBits)
-    }
-
-    // The new axis in phases 2, 3, 4; the sum is complete in phase 1 of the third stage
-    checked := reflection(2) * axis(second.faceForwardNormal, 2)
-    side    := Mux(phase === 3.U, 0.S, side) + checked
+  private val scale  = latch(4)(scaled(square)(shadeBits - 1, 0))
+  private val cosine = latch(4) {
+    Mux(against > 0.S, scaled(against.asUInt(dotBits - 1, 0))(formats.cosineBits - 1, 0), 0.U)
   }
 
-  // Move on
-  private val top        = square(dotBits - 1, dotBits - 3)
-  private val exponent   = Mux(top.orR, 3.U - PriorityEncoder(Reverse(top)), 0.U)
-  private val isAcute    = against > 0.S
-  private val scaleNext  = Rounding.floor(Rounding.floor(square, shadeBits - 1), exponent)
-  private val cosineNext = Rounding.floor(Rounding.floor(against.asUInt(dotBits - 1, 0), shadeBits - 1), exponent)
+  // The direction
+  private val ofRay     = latch(xyz(5))(scale.at(xyz(5)).zext * axes(5)(_.dir)).at(xyz(6))
+  private val ofNormal  = latch(xyz(5))(Cat(cosine.at(xyz(5)), 0.U(1.W)).zext * axes(5)(_.normal)).at(xyz(6))
+  private val component = Rounding.narrow(Rounding.floor(ofRay +& ofNormal, shadeBits - 4), formats.bounceBits)
+  private val latest    = xyz(6).map(cycle => latch(cycle)(component))
+
+  // Hemisphere check, in the hit's last cycle
+  private val dir     = select(xyz(7))(axis => latest(axis).at(7 + axis))
+  private val checked = latch(xyz(7))(dir * axes(7)(_.faceForwardNormal)).at(xyz(8))
+  private val side    = Reg(SInt((formats.bounceBits + formats.faceForwardBits + 2).W))
+  side := Mux(isAt(8), 0.S, side) + checked
+  private val last     = hitAt(11)
+  private val ends     = enters && isHeld.last
+  private val isWrong  = last.isSmooth && (turnsAway.at(11) || side <= 0.S)
+  private val restarts = isHeld.last && isWrong
+
+  // Enter with a place in the queue, or again
+  private val count    = RegInit(0.U(log2Ceil(MirrorPipeline.places + 1).W))
+  private val hasPlace = count =/= MirrorPipeline.places.U
+  count            := count + io.request.fire - io.result.fire
+  io.request.ready := enters && hasPlace && !restarts
+  io.busy          := count =/= 0.U
   when(enters) {
-    hasFirst  := io.request.valid || restarts
-    hasSecond := hasFirst
-    hasThird  := hasSecond
-    second    := first
-    third     := second
-    scale     := scaleNext(shadeBits - 1, 0)
-    cosine    := Mux(isAcute, cosineNext(formats.cosineBits - 1, 0), 0.U)
-    turnsAway := VecInit(!isAcute, turnsAway(0))
-
-    first.context  := io.request.bits.context
-    first.isSmooth := io.request.bits.isSmooth
-    for (axis <- 0 until 3) {
-      first.normal(axis)            := io.request.bits.normal.axes(axis)
-      first.faceForwardNormal(axis) := io.request.bits.faceForwardNormal.axes(axis)
-      first.dir(axis)               := io.request.bits.dir.axes(axis)
-    }
-    when(restarts) {
-      first          := third
-      first.isSmooth := false.B
-      first.normal   := VecInit(MirrorPipeline.normalised(third.faceForwardNormal, shadeBits))
-    }
+    hit    := entering
+    isHeld := VecInit((io.request.fire || restarts) +: isHeld.init)
   }
-  io.request.ready := enters && !restarts
-  io.busy          := !isEmpty || hasResult
-  when(ends && !stalls) { hasThird := false.B }
+  entering.context           := io.request.bits.context
+  entering.isSmooth          := io.request.bits.isSmooth
+  entering.normal            := VecInit(io.request.bits.normal.axes)
+  entering.faceForwardNormal := VecInit(io.request.bits.faceForwardNormal.axes)
+  entering.dir               := VecInit(io.request.bits.dir.axes)
+  when(restarts) {
+    entering          := last
+    entering.isSmooth := false.B
+    entering.normal   := VecInit(MirrorPipeline.normalised(last.faceForwardNormal, shadeBits))
+  }
 
-  // Results
-  private val origins = ContextTable(config, new BounceRequest(config).origin.cloneType)
-  when(io.request.fire) { origins.write(io.request.bits.context, io.request.bits.origin) }
-  private val origin = origins.read(result.context, hasResult)
-  private val isRead = RegNext(hasResult && !io.result.fire, false.B)
-  when(ends && !stalls) {
-    hasResult      := true.B
-    result.context := third.context
-    result.dir     := reflection
-  }.elsewhen(io.result.fire) { hasResult := false.B }
-  io.result.valid             := isRead
+  // Results, with the origins of their requests
+  private val origins = ContextTable(config, Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W)))
+  private val queue   = Module(new ReservedQueue(new MirrorResult(config), MirrorPipeline.places)).io
+  when(io.request.fire) { origins.write(io.request.bits.context, VecInit(io.request.bits.origin.axes)) }
+  queue.in.valid        := ends && !isWrong
+  queue.in.bits.context := last.context
+  queue.in.bits.dir     := VecInit(latest.map(carry(_, 11).at(11)))
+  queue.in.bits.origin  := origins.read(hitAt(10).context, isAt(10) && isHeld.last)
+  queue.out.ready       := io.result.ready
+  private val result = queue.out.bits
+  io.result.valid             := queue.out.valid
   io.result.bits.context      := result.context
   io.result.bits.isRefraction := false.B
   io.result.bits.fresnel.raw  := 0.U
   for (axis <- 0 until 3) {
-    io.result.bits.origin.axes(axis)     := Fixed(scene, origin.axes(axis))
+    io.result.bits.origin.axes(axis)     := Fixed(scene, result.origin(axis))
     io.result.bits.dir.axes(axis)        := result.dir(axis)
     io.result.bits.reflection.axes(axis) := result.dir(axis)
   }
@@ -155,10 +134,14 @@ final class MirrorPipeline(config: ColonnadeConfig) extends Module {
 /** A reflection that waits. */
 final private[shading] class MirrorResult(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
+  val origin  = Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W))
   val dir     = Vec(3, SInt(new BounceFormats(config.numbers).bounceBits.W))
 }
 
 object MirrorPipeline {
+
+  /** Reflections that are computed or wait, so many that the queue never delays one that is taken at once. */
+  val places: Int = 8
 
   /** A stored normal whose largest component gets `bits` bits. */
   private def normalised(normal: Seq[SInt], bits: Int): Seq[SInt] = {

@@ -12,6 +12,9 @@ final class PathTermination(config: ColonnadeConfig) extends Bundle {
   /** There is no surface: the path ends with the background's colour. */
   val isBackground = Bool()
 
+  /** The path has hit neither mirror nor glass. */
+  val isStraight = Option.when(config.frame.hasBounces)(Bool())
+
   /** By light: the shadow rays' outcomes. */
   val occlusions = Vec(config.frame.lights, Occlusion())
 
@@ -22,6 +25,9 @@ final class PathTermination(config: ColonnadeConfig) extends Bundle {
 /** The change of a path's throughput at a mirror or glass. */
 final class BounceUpdate(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
+
+  /** The first bounce of its path. */
+  val isFirst = Bool()
   val albedo  = Rgb(FrameRegisters.colour)
 
   /** The path is tinted by the albedo. */

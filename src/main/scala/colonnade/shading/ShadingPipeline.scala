@@ -230,7 +230,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
 object ShadingPipeline {
 
   /** Mirrors and glass between the entry and their unit. */
-  val bouncePlaces: Int = 4
+  val bouncePlaces: Int = 6
 
   /** Lights between the entry and the lit surface: what the stages hold and some. */
   private def places(config: ColonnadeConfig): Int =

@@ -11,7 +11,7 @@ import colonnade.numbers.Fixed
   */
 final class ShadowRatiosIO(config: ColonnadeConfig, bits: Int) extends Bundle {
 
-  /** A pixel claims the unit, only while it is not busy. Its channels follow, then its colour. */
+  /** A pixel claims the unit, only while it is not busy. Its channels follow from three cycles later on, then its colour. */
   val claim = Input(Bool())
   val busy  = Output(Bool())
 
@@ -22,7 +22,7 @@ final class ShadowRatiosIO(config: ColonnadeConfig, bits: Int) extends Bundle {
   /** Within 12 cycles after the last channel; its ratio is ignored. */
   val colour = Flipped(Valid(new PathColour(config)))
 
-  /** The pixel with its ratio; the unit is busy until it is taken. */
+  /** The pixel with its ratio; taken in the cycle in which it is offered, or in the next. */
   val result = Decoupled(new PathColour(config))
 }
 
@@ -34,14 +34,13 @@ final class ShadowRatios(config: ColonnadeConfig, bits: Int) extends Module {
 
   val io = IO(new ShadowRatiosIO(config, bits))
 
-  private val isBusy   = RegInit(false.B)
-  private val isLoaded = RegInit(false.B)
-  private val bitsLeft = Reg(UInt(log2Ceil(fraction + 1).W))
-  private val pixel    = Reg(new PathColour(config))
-  when(io.claim) { isBusy := true.B }.elsewhen(io.result.fire) { isBusy := false.B }
+  private val isClaimed = RegInit(false.B)
+  private val isLoaded  = RegInit(false.B)
+  private val bitsLeft  = Reg(UInt(log2Ceil(fraction + 1).W))
+  private val pixel     = Reg(new PathColour(config))
+  private val isLast    = io.load.valid && io.load.bits.channel === 2.U
+  when(io.claim) { isClaimed := true.B }.elsewhen(isLast) { isClaimed := false.B }
   when(io.colour.valid) { pixel := io.colour.bits }
-
-  private val isLast = io.load.valid && io.load.bits.channel === 2.U
   when(isLast) {
     isLoaded := true.B
     bitsLeft := fraction.U
@@ -71,7 +70,9 @@ final class ShadowRatios(config: ColonnadeConfig, bits: Int) extends Module {
     ratio
   }
 
-  io.busy         := isBusy
+  // The result has left when the first channel comes
+  io.busy := isClaimed || (isLoaded && bitsLeft > 2.U)
+  assert(!io.load.valid || !isLoaded || io.result.fire, "a channel before the result has left")
   io.result.valid := isLoaded && bitsLeft === 0.U
   io.result.bits  := pixel
   for (to <- io.result.bits.ratio)

@@ -53,6 +53,7 @@ final class BounceScheduler(config: ColonnadeConfig) extends Module {
   private val incoming = Wire(new PendingBounce(config))
   private val result   = io.in.bits.bounce
   incoming.update.context  := result.context
+  incoming.update.isFirst  := DontCare // known when it is issued
   incoming.update.albedo   := io.in.bits.albedo
   incoming.update.isTinted := io.in.bits.isTinted
   incoming.update.fresnel  := result.fresnel
@@ -78,6 +79,7 @@ final class BounceScheduler(config: ColonnadeConfig) extends Module {
   bounce.ready             := io.update.ready && (!isTraced || io.ray.ready)
   io.update.valid          := bounce.valid && (!isTraced || io.ray.ready)
   io.update.bits           := bounce.bits.update
+  io.update.bits.isFirst   := counts(context) === 0.U
   io.ray.valid             := bounce.valid && isTraced && io.update.ready
   io.ray.bits.context      := context
   io.ray.bits.isShadow     := false.B

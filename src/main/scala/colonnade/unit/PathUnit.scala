@@ -114,7 +114,6 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
   controller.fetchFailed                 := trace.attributeError
   controller.accumulated.valid           := colourUnit.colour.valid
   controller.accumulated.bits            := colourUnit.colour.bits.context
-  colourUnit.start                       := primaryRays.start
   bounces.foreach(_.start := primaryRays.start)
   environment.foreach(_.control :<>= controller.environment.get)
   io.isIdle := controller.idleCount === config.array.contexts.U && assembler.isIdle

@@ -13,7 +13,7 @@ import chisel3.util.{
   Valid
 }
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordBroadcast, RecordFormats}
+import colonnade.formats.{Banks, RecordBroadcast, RecordFormats}
 
 /** Fetches records for contexts: a small file of fill buffers with miss handling and snooping.
   *
@@ -41,6 +41,8 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
   val io = IO(new RecordFetchIO(config))
 
+  private val ports = io.fetches.size
+
   private object BufferState extends ChiselEnum {
     val empty, reserved, full = Value
   }
@@ -61,8 +63,14 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
     /** The context has requested its own read, which fills `buffer`. */
     val isIssued = Reg(Bool())
+
+    /** A reserved buffer, of any context, awaits the record. */
+    val isExpected = Reg(Bool())
+
+    /** By port: the fetch has come in the cycle before. */
+    val cameFrom = RegInit(VecInit.fill(ports)(false.B))
     val kind     = Reg(RecordKind())
-    val address  = Reg(UInt(RecordFormats.idBits(config).W))
+    val address  = Reg(UInt(RecordFormats.addressBits(config).W))
     val buffer   = Reg(UInt(log2Ceil(config.columnBvhMemory.recordBuffers.max(2)).W))
 
     /** The record comes later, without a request. */
@@ -70,6 +78,14 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
     /** The context has missed the broadcast it slept for. */
     val insists = if (hasCache) Some(Reg(Bool())) else None
+  }
+
+  /** By bank: its broadcast has this address. Only the bank of the address can have it. */
+  private def comes(address: UInt): Seq[Bool] = {
+    val banks     = io.broadcasts.indices.map(Banks.isIn(config, address, _))
+    val inBank    = Mux1H(banks, io.broadcasts.map(broadcast => Banks.addressIn(config, broadcast.bits.address)))
+    val isAddress = inBank === Banks.addressIn(config, address)
+    banks.map(_ && isAddress)
   }
 
   /** A broadcast that is a record. */
@@ -90,13 +106,16 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   /** Buffer `index` receives, or has received, the context's own read. */
   private def isOwnRead(fetch: ContextFetch, index: Int): Bool = fetch.isIssued && fetch.buffer === index.U
 
-  // Lookup: pending contexts compare with all full buffers. By context and buffer
-  private val bufferHits = fetches.map(fetch =>
-    buffers.zipWithIndex.map { case (buffer, index) =>
-      val isMatch = Mux(snooping, fetch.address === buffer.address, isOwnRead(fetch, index))
-      fetch.isPending && buffer.state === BufferState.full && isMatch
-    }
-  )
+  // Lookup: a new fetch compares with all buffers. Later only a fill or a new reservation changes what it finds.
+  // By port and buffer, then by context and buffer
+  private val newAddresses = io.fetches.map(port => RegEnable(port.bits.address, port.valid))
+  private val portMatches  = newAddresses.map(address => buffers.map(_.address === address))
+  private val newMatches   = fetches.map { fetch =>
+    buffers.indices.map(index => Mux1H(fetch.cameFrom, portMatches.map(_(index))) && fetch.isPending && snooping)
+  }
+  private val bufferHits = newMatches.map(_.zip(buffers).map { case (isMatch, buffer) =>
+    isMatch && buffer.state === BufferState.full
+  })
 
   // A full buffer may be replaced when no context uses its record
   private val isAvailable = buffers.zipWithIndex.map { case (buffer, index) =>
@@ -108,15 +127,13 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
   // Fill: a broadcast goes to its reserved buffer, else (snooping) to an available one if a context waits for it.
   // `waiters` is by broadcast and context, `bufferFills` by broadcast and buffer
-  private val waiters =
-    io.broadcasts.map(broadcast => fetches.map(fetch => fetch.isPending && fetch.address === broadcast.bits.address))
+  private val waiters = fetches.map(fetch => comes(fetch.address).map(_ && fetch.isPending)).transpose
+  private val awaited =
+    buffers.map(buffer => comes(buffer.address).map(_ && buffer.state === BufferState.reserved)).transpose
   private val (availableAfterFill, bufferFills) =
-    io.broadcasts.zip(waiters).foldLeft((isAvailable, Seq.empty[Seq[Bool]])) {
-      case ((available, fills), (broadcast, waits)) =>
-        val isReserved = buffers.map(buffer =>
-          buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address &&
-            (snooping || broadcast.bits.row === io.row)
-        )
+    io.broadcasts.zip(waiters.zip(awaited)).foldLeft((isAvailable, Seq.empty[Seq[Bool]])) {
+      case ((available, fills), (broadcast, (waits, awaits))) =>
+        val isReserved = awaits.map(_ && (snooping || broadcast.bits.row === io.row))
         val isMissing  = waits.zip(bufferHits).map { case (waits, hits) => waits && !hits.reduce(_ || _) }
         val isSnooped  = snooping && !isReserved.reduce(_ || _) && isMissing.reduce(_ || _)
         val allocOH    = PriorityEncoderOH(available).map(_ && isSnooped && isRecord(broadcast))
@@ -154,15 +171,12 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     fills.reduce(_ || _) && !fetch.isIssued
   })
 
-  // Miss: request the record of the first context whose record no buffer holds or expects
-  private val isBufferedOrPending = fetches.map(fetch =>
-    Mux(
-      snooping,
-      buffers.map(buffer => buffer.state =/= BufferState.empty && fetch.address === buffer.address).reduce(_ || _),
-      fetch.isIssued
-    )
-  )
-  private val missOH = PriorityEncoderOH(fetches.zip(isBufferedOrPending).map { case (fetch, isExpected) =>
+  // Miss: request the record of the first context whose record no buffer holds or awaits
+  private val isExpected = fetches.zip(newMatches).map { case (fetch, matches) =>
+    val isNow = buffers.zip(matches).map { case (buffer, isMatch) => isMatch && buffer.state =/= BufferState.empty }
+    Mux(snooping, fetch.isExpected || isNow.reduce(_ || _), fetch.isIssued)
+  }
+  private val missOH = PriorityEncoderOH(fetches.zip(isExpected).map { case (fetch, isExpected) =>
     fetch.isPending && !isExpected && !fetch.sleeps.getOrElse(false.B)
   })
   private val hasMiss = missOH.reduce(_ || _)
@@ -170,10 +184,14 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   private val allocOH = PriorityEncoderOH(availableAfterFill)
 
   // A record that arrives in this cycle needs no request
-  private val isArriving = io.broadcasts.map(broadcast => broadcast.valid && broadcast.bits.address === address)
+  private val isArriving = io.broadcasts.zip(comes(address)).map { case (broadcast, comes) => broadcast.valid && comes }
   io.requests.valid        := hasMiss && allocOH.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
   io.requests.bits.address := address
+  private val isAwaited = buffers.map(buffer => buffer.state === BufferState.reserved && buffer.address === address)
+  assert(!(snooping && io.requests.valid && isAwaited.reduce(_ || _)), "a record is requested twice")
+  fetches.zip(isExpected).foreach { case (fetch, isExpected) => fetch.isExpected := isExpected }
   when(io.requests.fire) {
+    fetches.foreach(fetch => when(fetch.address === address) { fetch.isExpected := true.B })
     buffers.zip(allocOH).foreach { case (buffer, isAllocated) =>
       when(isAllocated) {
         buffer.state   := BufferState.reserved
@@ -190,21 +208,22 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   }
 
   // A record that comes later frees its buffer, and its contexts sleep until it comes
-  for (broadcast <- io.broadcasts; isLater <- broadcast.bits.isLater) {
-    val keeps = buffers.map(buffer =>
-      buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address && buffer.isKept.get
-    )
+  for {
+    (broadcast, (waits, awaits)) <- io.broadcasts.zip(waiters.zip(awaited))
+    isLater                      <- broadcast.bits.isLater
+  } {
+    val isKept = buffers.zip(awaits).map { case (buffer, awaits) => awaits && buffer.isKept.get }.reduce(_ || _)
     when(broadcast.valid && isLater) {
-      buffers.zip(keeps).foreach { case (buffer, isKept) =>
-        when(buffer.state === BufferState.reserved && buffer.address === broadcast.bits.address && !isKept) {
-          buffer.state := BufferState.empty
-        }
+      buffers.zip(awaits).foreach { case (buffer, awaits) =>
+        when(awaits && !buffer.isKept.get) { buffer.state := BufferState.empty }
       }
     }
-    for ((fetch, fills) <- fetches.zip(contextFills)) {
-      val matches = broadcast.valid && fetch.isPending && fetch.address === broadcast.bits.address
-      when(matches && isLater && !keeps.reduce(_ || _)) { fetch.sleeps.foreach(_ := true.B) }
-      when(matches && !isLater && !fills.reduce(_ || _)) {
+    for (((fetch, waits), fills) <- fetches.zip(waits).zip(contextFills)) {
+      when(broadcast.valid && waits && isLater && !isKept) {
+        fetch.sleeps.foreach(_ := true.B)
+        fetch.isExpected := false.B
+      }
+      when(broadcast.valid && waits && !isLater && !fills.reduce(_ || _)) {
         fetch.sleeps.foreach(_ := false.B)
         fetch.insists.foreach(_ := true.B)
       }
@@ -252,14 +271,17 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
   // New fetches
   for {
-    port <- io.fetches
+    (port, number) <- io.fetches.zipWithIndex
     isLegal = isInSection(port.bits.address, port.bits.kind)
     (fetch, context) <- fetches.zipWithIndex
   } {
-    when(port.valid && port.bits.context === context.U) {
-      fetch.isPending := isLegal
-      fetch.isIllegal := !isLegal
-      fetch.isIssued  := false.B
+    val isNew = port.valid && port.bits.context === context.U
+    fetch.cameFrom(number) := isNew
+    when(isNew) {
+      fetch.isPending  := isLegal
+      fetch.isIllegal  := !isLegal
+      fetch.isIssued   := false.B
+      fetch.isExpected := false.B
       fetch.sleeps.foreach(_ := false.B)
       fetch.insists.foreach(_ := false.B)
       fetch.kind    := port.bits.kind

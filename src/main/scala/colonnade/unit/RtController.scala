@@ -1,10 +1,12 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{PopCount, PriorityEncoder, Valid}
+import chisel3.util.{Mux1H, PopCount, PriorityEncoder, Valid}
 import colonnade.common.First
 import colonnade.config.{ArrayConfig, ColonnadeConfig}
 import colonnade.shading.Occlusion
+
+import scala.collection.mutable
 
 /** Holds the state of every context and issues each one to its next stage; contains no arithmetic.
   *
@@ -30,6 +32,9 @@ final class RtController(config: ColonnadeConfig) extends Module {
   private val isLarge = contexts > ArrayConfig.mostContexts
 
   val io = IO(new RtControllerIO(config))
+
+  /** What moves a context to another state: whether it happens, the context, the state. */
+  private val moves = mutable.Buffer.empty[(Bool, UInt, ContextState.Type)]
 
   private val state        = RegInit(VecInit(Seq.fill(contexts)(ContextState.idle)))
   private val isShadow     = Reg(Vec(contexts, Bool()))
@@ -63,8 +68,8 @@ final class RtController(config: ColonnadeConfig) extends Module {
   // Allocate an idle context
   private val free = choose(isAt(ContextState.idle), io.allocation.allocate)
   io.allocation.free := free
+  move(io.allocation.allocate, free.bits, ContextState.raySetup)
   when(io.allocation.allocate) {
-    state(free.bits)     := ContextState.raySetup
     isShadow(free.bits)  := false.B
     isPrimary(free.bits) := true.B
     hasColour(free.bits) := false.B
@@ -80,25 +85,23 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.trace.isShadow  := isShadow
   io.trace.isPrimary := isPrimary
   io.trace.resolved  := choose(isAt(ContextState.resolve), true.B)
-  when(io.trace.entered.valid) { state(io.trace.entered.bits) := ContextState.traversing }
-  io.trace.ended.foreach(ended => when(ended.valid) { state(ended.bits) := ContextState.resolve })
+  move(io.trace.entered.valid, io.trace.entered.bits, ContextState.traversing)
+  io.trace.ended.foreach(ended => move(ended.valid, ended.bits, ContextState.resolve))
 
   // Resolve an ended ray
   private val resolved   = io.trace.resolved.bits
   private val hasVisible = io.trace.hasHit(resolved) && !mayBeHidden(resolved)
   io.trace.shades   := io.trace.resolved.valid && !isShadow(resolved) && hasVisible
   io.trace.measured := 0.U.asTypeOf(io.trace.measured)
+  private val afterTrace = Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
+  private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
+  move(io.trace.resolved.valid, resolved, Mux(isShadow(resolved), ContextState.shadowTest, afterHit))
   when(io.trace.resolved.valid) {
     when(isShadow(resolved)) {
-      state(resolved) := ContextState.shadowTest
       for (light <- 0 until lights)
         when((lights == 1).B || shadowLight(resolved) === light.U) {
           occlusions(resolved)(light) := io.trace.occlusions(resolved)
         }
-    }.elsewhen(hasVisible) {
-      state(resolved) := ContextState.shading
-    }.otherwise {
-      state(resolved) := Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
     }
     isBackground(resolved) := !isShadow(resolved) && !io.trace.hasHit(resolved)
     if (config.hasEnvironment) {
@@ -108,23 +111,21 @@ final class RtController(config: ColonnadeConfig) extends Module {
   }
 
   // Results of the shader
+  move(io.shaded.valid, io.shaded.bits.context, ContextState.shadowTest)
   when(io.shaded.valid) {
-    state(io.shaded.bits.context)         := ContextState.shadowTest
     shadowPending(io.shaded.bits.context) := io.shaded.bits.needsShadowRays
     occlusions(io.shaded.bits.context)    := VecInit.fill(lights)(Occlusion.none)
     isBackground(io.shaded.bits.context)  := false.B
   }
+  private val untraced = Mux(hasEnvironment, ContextState.environmentPending, ContextState.accumulatePending)
+  move(io.bounced.valid, io.bounced.bits.context, Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced))
   when(io.bounced.valid) {
-    val untraced = Mux(hasEnvironment, ContextState.environmentPending, ContextState.accumulatePending)
-    state(io.bounced.bits.context)        := Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced)
-    isPrimary(io.bounced.bits.context)    := false.B
-    isBackground(io.bounced.bits.context) := true.B
+    isPrimary(io.bounced.bits.context)                              := false.B
+    isBackground(io.bounced.bits.context)                           := true.B
     if (config.hasEnvironment) mayBeHidden(io.bounced.bits.context) := hasOcclusion && !io.bounced.bits.isInside
   }
-  when(io.fetchFailed.valid) {
-    state(io.fetchFailed.bits)        := ContextState.accumulatePending
-    isBackground(io.fetchFailed.bits) := true.B
-  }
+  move(io.fetchFailed.valid, io.fetchFailed.bits, ContextState.accumulatePending)
+  when(io.fetchFailed.valid) { isBackground(io.fetchFailed.bits) := true.B }
 
   // Issue shadow rays, one light after the other
   private val needsShadow = state.zip(shadowPending).map { case (at, lights) =>
@@ -135,8 +136,8 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.shadow.valid        := shadow.valid
   io.shadow.bits.context := shadow.bits
   io.shadow.bits.light   := PriorityEncoder(lightsLeft)
+  move(io.shadow.fire, shadow.bits, ContextState.raySetup)
   when(io.shadow.fire) {
-    state(shadow.bits)       := ContextState.raySetup
     isShadow(shadow.bits)    := true.B
     shadowLight(shadow.bits) := io.shadow.bits.light
     for (light <- 0 until lights)
@@ -154,26 +155,25 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.end.valid             := ending.valid
   io.end.bits.context      := ending.bits
   io.end.bits.isBackground := isBackground(ending.bits)
-  io.end.bits.occlusions   := occlusions(ending.bits)
+  io.end.bits.isStraight.foreach(_ := isPrimary(ending.bits))
+  io.end.bits.occlusions := occlusions(ending.bits)
   io.end.bits.isDirectView.foreach(_ := isDirectView(ending.bits))
-  when(io.end.fire) { state(ending.bits) := ContextState.accumulating }
-  when(io.accumulated.valid) {
-    state(io.accumulated.bits)     := ContextState.done
-    hasColour(io.accumulated.bits) := true.B
-  }
+  move(io.end.fire, ending.bits, ContextState.accumulating)
+  move(io.accumulated.valid, io.accumulated.bits, ContextState.done)
+  when(io.accumulated.valid) { hasColour(io.accumulated.bits) := true.B }
 
   // Retire pixels
   private val done = choose(isAt(ContextState.done), io.pixel.retire)
   io.pixel.done      := done
   io.pixel.hasColour := hasColour(done.bits)
-  when(io.pixel.retire) { state(done.bits) := ContextState.idle }
+  move(io.pixel.retire, done.bits, ContextState.idle)
 
   // Rays that miss the object, hits that may be hidden, and bounces that wait for their Fresnel reflection
   for (environment <- io.environment) {
-    when(environment.bypass.valid) { state(environment.bypass.bits) := ContextState.environmentPending }
+    move(environment.bypass.valid, environment.bypass.bits, ContextState.environmentPending)
     val reflection = environment.fresnelReflection
+    move(reflection.valid, reflection.bits, ContextState.environmentPending)
     when(reflection.valid) {
-      state(reflection.bits)               := ContextState.environmentPending
       isFresnelReflection(reflection.bits) := true.B
       isPrimary(reflection.bits)           := false.B
     }
@@ -189,25 +189,25 @@ final class RtController(config: ColonnadeConfig) extends Module {
     environment.req.bits.isOcclusionTest     := isTest
     io.trace.measured.valid                  := environment.req.fire && isTest
     io.trace.measured.bits                   := pending.bits
+    move(environment.req.fire, pending.bits, ContextState.environmentMarch)
     when(environment.req.fire) {
-      state(pending.bits)        := ContextState.environmentMarch
       isDirectView(pending.bits) := environment.req.bits.isDirectView
       isShadow(pending.bits)     := false.B
     }
-    when(environment.hit.valid) {
-      state(environment.hit.bits)           := ContextState.shading
-      isOcclusionTest(environment.hit.bits) := false.B
-    }
+    move(environment.hit.valid, environment.hit.bits, ContextState.shading)
+    move(environment.visible.valid, environment.visible.bits, ContextState.resolve)
+    when(environment.hit.valid) { isOcclusionTest(environment.hit.bits) := false.B }
     when(environment.visible.valid) {
-      state(environment.visible.bits)           := ContextState.resolve
       isDirectView(environment.visible.bits)    := false.B
       isOcclusionTest(environment.visible.bits) := false.B
     }
     val missed = environment.miss.bits
-    when(environment.miss.valid) {
-      state(missed)        := Mux(isFresnelReflection(missed), ContextState.resumeBounce, afterMiss(missed))
-      isBackground(missed) := true.B
-    }
+    move(
+      environment.miss.valid,
+      missed,
+      Mux(isFresnelReflection(missed), ContextState.resumeBounce, afterMiss(missed))
+    )
+    when(environment.miss.valid) { isBackground(missed) := true.B }
     val isResumable = isAt(ContextState.resumeBounce).zip(shadowDone.zip(isFresnelReflection)).map {
       case (waits, (shadowDone, reflection)) => waits || (shadowDone && reflection)
     }
@@ -215,11 +215,19 @@ final class RtController(config: ColonnadeConfig) extends Module {
     environment.resume.valid             := resumable.valid
     environment.resume.bits.context      := resumable.bits
     environment.resume.bits.isBackground := isBackground(resumable.bits)
-    when(environment.resume.fire) {
-      state(resumable.bits)               := ContextState.shading
-      isFresnelReflection(resumable.bits) := false.B
-    }
+    move(environment.resume.fire, resumable.bits, ContextState.shading)
+    when(environment.resume.fire) { isFresnelReflection(resumable.bits) := false.B }
   }
+
+  // Move contexts: at most one cause moves a context in a cycle
+  for ((at, context) <- state.zipWithIndex) {
+    val isMoved = moves.toSeq.map { case (happens, moved, _) => happens && moved === context.U }
+    val next    = Mux1H(isMoved, moves.toSeq.map { case (_, _, to) => to.asUInt })
+    when(isMoved.reduce(_ || _)) { at := ContextState.safe(next)._1 }
+    assert(PopCount(isMoved) <= 1.U, "two causes move a context")
+  }
+
+  private def move(happens: Bool, context: UInt, to: ContextState.Type): Unit = moves += ((happens, context, to))
 
   /** The next state of a ray that hits nothing; a primary ray's pixel has the background's colour. */
   private def afterMiss(context: UInt): ContextState.Type =

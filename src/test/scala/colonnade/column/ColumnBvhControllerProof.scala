@@ -3,7 +3,7 @@ package colonnade.column
 import chisel3._
 import chisel3.util.{log2Ceil, Mux1H, PopCount}
 import colonnade.config.ColonnadeConfig
-import colonnade.memory.Banks
+import colonnade.formats.Banks
 
 /** Drives rows that request, withdraw and change addresses at any time, and banks that stall and respond at any time, in
   * order. It observes one read of each bank, any that is accepted while the bank's bit of `observed` is set, up to its

@@ -10,7 +10,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** The maps of a device with several units: a copy in the only column, or one copy that all columns share. */
+/** The maps of a device with several units: a copy in the only column, or copies that columns share. */
 private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
   val load    = IO(Flipped(Valid(new Load(config))))
   val columns = Seq.fill(config.array.columns)(Module(new ColumnEnvironment(config)).io)
@@ -18,11 +18,11 @@ private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
   columns.foreach(_.load := load)
   events.zip(columns).foreach { case (port, column) => port := column.events }
 
-  if (config.physicalAttributeMemory.exists(_.shared)) {
+  for (ports <- columns.flatMap(_.shared).grouped(config.columnsPerCopy)) {
     val tagBits = AttributeArbiter.tagBits(config.array.rows, AttributePort.tagBits(config))
-    val maps    = Module(new PhysicalAttributeMemory(config, config.array.columns, tagBits))
+    val maps    = Module(new PhysicalAttributeMemory(config, ports.size, tagBits))
     maps.io.load := load
-    maps.io.ports.zip(columns).foreach { case (port, column) => column.shared.foreach(port <> _) }
+    maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
   }
 
   /** All channels of each unit. */
@@ -36,7 +36,7 @@ class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester
 
   private def config(encoding: MapEncoding, rows: Int, columns: Int): ColonnadeConfig = {
     val environment =
-      TestConfigs.withEnvironment(TestConfigs.environment.copy(encoding = encoding, shared = columns > 1))
+      TestConfigs.withEnvironment(TestConfigs.environment.copy(encoding = encoding, columnsPerCopy = 2))
     environment.copy(array = environment.array.copy(rows = rows, columns = columns))
   }
 

@@ -50,7 +50,7 @@ class TextureMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
       planes = 16,
       planeBytes = 8192,
       boundingPlanes = 2,
-      shared = false
+      columnsPerCopy = 1
     )
     TestConfigs.tiny.copy(physicalAttributeMemory = Some(memory))
   }

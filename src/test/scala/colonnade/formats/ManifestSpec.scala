@@ -85,7 +85,7 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
   it should "hash the settings of an environment's image, and not the number of its copies" in {
     def hash(environment: PhysicalAttributeMemoryConfig): String =
       Manifest(TestConfigs.withEnvironment(environment))("formatHash").str
-    hash(environment.copy(shared = true)) shouldBe hash(environment)
+    hash(environment.copy(columnsPerCopy = 2)) shouldBe hash(environment)
     val others = Seq(
       environment.copy(encoding = MapEncoding.Sliding),
       environment.copy(paletteSize = 128),

@@ -2,7 +2,7 @@ package colonnade.memory
 
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordFormats
+import colonnade.formats.{Banks, RecordFormats}
 import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers

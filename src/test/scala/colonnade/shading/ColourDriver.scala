@@ -80,6 +80,9 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
   private val todo     = Seq.fill(contexts)(mutable.Queue.empty[ColourEvent])
   private val waits    = Array.fill(contexts)(Option.empty[End])
 
+  /** By context, whether its path has not bounced. */
+  private val isStraight = Array.fill(contexts)(true)
+
   /** By context, the colours and shadow ratios of its paths. */
   val colours = Seq.fill(contexts)(mutable.ArrayBuffer.empty[(Seq[BigInt], Option[Seq[BigInt]])])
 
@@ -108,8 +111,7 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
     val bounce   = next { case it: Bounce => it }
     val end      = next { case it: End => it }
 
-    io.start.valid.poke(start.nonEmpty)
-    start.foreach { case (context, _) => io.start.bits.poke(context) }
+    start.foreach { case (context, _) => isStraight(context) = true }
     io.surface.valid.poke(remember.nonEmpty)
     for ((context, Remember(what)) <- remember) {
       io.surface.bits.context.poke(context)
@@ -121,6 +123,7 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       port.valid.poke(bounce.nonEmpty)
       for ((context, Bounce(albedo, isTinted, fresnel, hasSurface)) <- bounce) {
         port.bits.context.poke(context)
+        port.bits.isFirst.poke(isStraight(context))
         pokeUInt(port.bits.albedo, albedo)
         port.bits.isTinted.poke(isTinted)
         port.bits.fresnel.pokeRaw(fresnel)
@@ -131,6 +134,7 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
     for ((context, End(isBackground, occlusions, isDirectView)) <- end) {
       io.end.bits.context.poke(context)
       io.end.bits.isBackground.poke(isBackground)
+      io.end.bits.isStraight.foreach(_.poke(isStraight(context)))
       io.end.bits.isDirectView.foreach(_.poke(isDirectView))
       io.end.bits.occlusions.zip(occlusions).foreach { case (port, what) => port.poke(Occlusion.all(what)) }
     }
@@ -144,7 +148,10 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       waits(context) = None
     }
     (start ++ remember).foreach { case (context, _) => todo(context).dequeue() }
-    for ((context, _) <- bounce if io.bounce.get.ready.peekBoolean()) todo(context).dequeue()
+    for ((context, _) <- bounce if io.bounce.get.ready.peekBoolean()) {
+      todo(context).dequeue()
+      isStraight(context) = false
+    }
     for ((context, ended) <- end if io.end.ready.peekBoolean()) {
       todo(context).dequeue()
       waits(context) = Some(ended)

@@ -81,9 +81,12 @@ class ColourPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
           End(false, if (context == 0) opaque else none, isDirectView = true)
         )
         if (maxBounces > 0) {
-          cycles("a bounce", 6)(_ => Bounce(Seq.fill(3)(1000), isTinted = true, 99, hasSurface = false))
+          cycles("a bounce", 3)(_ => Bounce(Seq.fill(3)(1000), isTinted = true, 99, hasSurface = false))
+          cycles("a first bounce without a Fresnel reflection", 1)(_ =>
+            Bounce(Seq.fill(3)(1000), isTinted = true, 0, hasSurface = false)
+          )
           if (hasEnvironment)
-            cycles("a bounce at a surface", 6 + 3 * lights)(_ =>
+            cycles("a bounce at a surface", 3 + 3 * lights)(_ =>
               Bounce(Seq.fill(3)(9), isTinted = true, 99, hasSurface = true)
             )
         }

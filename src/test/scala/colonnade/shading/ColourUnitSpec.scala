@@ -50,6 +50,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
 
   private var throughput = Seq.fill(contexts)(Seq.fill(3)(one))
   private var radiance   = Seq.fill(contexts)(Seq.fill(3)(0))
+  private val isStraight = Array.fill(contexts)(true)
 
   def run(paths: Int): Unit = {
     poke(dut.io.ambient, ambient)
@@ -64,10 +65,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
   }
 
   private def begin(context: Int): Unit = {
-    dut.io.start.valid.poke(true)
-    dut.io.start.bits.poke(context)
-    dut.clock.step()
-    dut.io.start.valid.poke(false)
+    isStraight(context) = true
     throughput = throughput.updated(context, Seq.fill(3)(one))
     radiance = radiance.updated(context, Seq.fill(3)(0))
   }
@@ -78,6 +76,8 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
     val surface                     = Option.when(config.hasEnvironment && random.nextBoolean())(remember(context))
     val behind                      = surface.fold(background)(surface => shown(surface, surface.all))
     port.bits.context.poke(context)
+    port.bits.isFirst.poke(isStraight(context))
+    isStraight(context) = false
     pokeUInt(port.bits.albedo, albedo)
     port.bits.isTinted.poke(isTinted)
     port.bits.fresnel.pokeRaw(fresnel)
@@ -116,6 +116,7 @@ private class ColouredPaths(dut: ColourUnit, config: ColonnadeConfig, seed: Int)
 
     dut.io.end.bits.context.poke(context)
     dut.io.end.bits.isBackground.poke(isBackground)
+    dut.io.end.bits.isStraight.foreach(_.poke(isStraight(context)))
     dut.io.end.bits.isDirectView.foreach(_.poke(isDirectView))
     dut.io.end.bits.occlusions.zip(met).foreach { case (port, what) => port.poke(what) }
     offer(dut.io.end)

@@ -126,6 +126,7 @@ private class ControllerDriver(
     for (index <- shadowed) assert(contexts(index).shadowPending.contains(dut.io.shadow.bits.light.peekInt().toInt))
     for (index <- ended) {
       dut.io.end.bits.isBackground.expect(contexts(index).isBackground)
+      dut.io.end.bits.isStraight.foreach(_.expect(contexts(index).isPrimary))
       dut.io.end.bits.isDirectView.foreach(_.expect(contexts(index).isDirectView))
       if (!contexts(index).isBackground)
         dut.io.end.bits.occlusions.zip(contexts(index).occlusions).foreach { case (port, occlusion) =>

@@ -3,6 +3,7 @@ package colonnade.unit
 import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.SceneLines
 import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
@@ -130,10 +131,18 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       responses shouldBe fetches
     }
 
+    /** Banks are interleaved as in [[colonnade.formats.Banks]]. */
+    private def bankOf(address: Int): Int = (if (hasCache) address / SceneLines.records else address) % banks
+
+    private def recordIn(bank: Int): Int = {
+      val records = (0 until recordCount).filter(bankOf(_) == bank)
+      records(random.nextInt(records.size))
+    }
+
     private def broadcast(): Unit = for (bank <- 0 until banks) {
       val port = dut.io.broadcasts(bank)
       if (random.nextInt(4) == 0)
-        inFlight(bank).enqueue((now + 1 + random.nextInt(5), random.nextInt(recordCount / banks) * banks + bank, 2))
+        inFlight(bank).enqueue((now + 1 + random.nextInt(5), recordIn(bank), 2))
       val isDue  = inFlight(bank).headOption.exists(_._1 <= now)
       val filled = later(bank).indexWhere(_._1 <= now)
       port.valid.poke((isDue || filled >= 0).B)
@@ -161,7 +170,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       dut.io.requests.ready.poke(accepts.B)
       if (accepts && dut.io.requests.valid.peekBoolean()) {
         val address = dut.io.requests.bits.address.peekInt().toInt
-        inFlight(address % banks).enqueue((now + 1 + random.nextInt(5), address, row))
+        inFlight(bankOf(address)).enqueue((now + 1 + random.nextInt(5), address, row))
       }
     }
 
