@@ -21,13 +21,13 @@ render: setup ## render SCENE through the RTL of CONFIG at SIZE with SAMPLES a p
 	@mkdir -p out
 	@$(venv)/colonnade render $(SCENE) --config $(CONFIG) --backend rtl --size $(SIZE) --samples $(SAMPLES) --output out/render.png --json out/render.json
 
-test: setup ## the hardware's specs (sbt test) and the host's tests (pytest)
+test: ## the hardware's specs (sbt test) and the host's tests (pytest)
 	@tools/test
 
-test-hardware: setup ## only sbt test
+test-hardware: ## only sbt test
 	@tools/test hardware
 
-test-host: setup ## only pytest
+test-host: ## only pytest
 	@tools/test host
 
 verify: setup ## the full matrix: array shapes, precisions, meshes; long

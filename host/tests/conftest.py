@@ -175,6 +175,13 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLONNADE_PROGRESS", "off")
 
 
+@pytest.fixture(autouse=True)
+def quick_simulators(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Build simulators that are soon compiled, but for tests with the marks `matrix` and `long_simulation`."""
+    if not any(request.node.get_closest_marker(mark) for mark in ("matrix", "long_simulation")):
+        monkeypatch.setenv("COLONNADE_QUICK_SIMULATORS", "1")
+
+
 @pytest.fixture(scope="session")
 def make_manifest() -> MakeManifest:
     """A function that makes a manifest; keywords as in `manifest_data`."""

@@ -22,11 +22,11 @@ from colonnade.design.generator import GeneratedDesign
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.device.compiler import SAFE, require_right_compiler
 from colonnade.device.simulator_build import (
-    OPTIMISATION,
     PROGRAM,
-    VERILATOR_OPTIONS,
     build_environment,
+    optimisation,
     simulator_tools,
+    verilator_command,
 )
 from colonnade.device.verilator import run_program
 from colonnade.scene_image.device_image import device_image
@@ -210,22 +210,24 @@ def build_shell_simulator(design: GeneratedDesign, progress: Progress = QUIET) -
     """The simulator of a design in its shell, one model, built unless the cache has it."""
     tools = simulator_tools()
     harness = Path(__file__).parent / "harness" / "shell.cpp"
-    parts = [*tools.versions, Path(__file__).read_text(), harness.read_text(), design.digest()]
+    parts = [
+        *tools.versions,
+        Path(__file__).read_text(),
+        harness.read_text(),
+        *verilator_command(tools),
+        design.digest(),
+    ]
     key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
     folder = cache_directory(project_root()) / "simulator" / key
-    flags = " ".join(OPTIMISATION)
 
     def make(output: Path) -> None:
         log = folder.with_suffix(".log")
         with progress.step("building the simulator of the shell"), temporary_folder() as work:
-            require_right_compiler(tools.compiler, (*OPTIMISATION, *SAFE))
+            require_right_compiler(tools.compiler, (optimisation().flag, *SAFE))
             for source in [*design.sources, harness]:
                 shutil.copy(source, work / source.name)
             # Registers begin with random values, as at power-up
-            command = [str(tools.verilator), *VERILATOR_OPTIONS, "--x-initial", "unique", "--top-module", _TOP]
-            command += ["--Mdir", "obj"]
-            command += ["-CFLAGS", " ".join(SAFE), "-MAKEFLAGS", f"CXX={tools.compiler}"]
-            command += ["-MAKEFLAGS", f"OPT_FAST={flags}", "-MAKEFLAGS", f"OPT_GLOBAL={flags}"]
+            command = [*verilator_command(tools), "--x-initial", "unique", "--top-module", _TOP, "--Mdir", "obj"]
             command += ["--exe", "-o", PROGRAM, harness.name, *(source.name for source in design.sources)]
             with log.open("w") as stream:
                 done = processes.run(

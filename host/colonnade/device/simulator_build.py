@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import shlex
 import shutil
@@ -29,16 +30,33 @@ from colonnade.device.simulator_sources import DEVICE, write_sources
 PROGRAM = "simulator"
 
 #: Options of all models. Models are flattened, so that one structure holds the variables of the coupling.
-VERILATOR_OPTIONS = (
+_VERILATOR_OPTIONS = (
     "--cc --build -j 0 -O3 --flatten --noassert --x-assign fast --x-initial fast --threads 1 "
-    "--output-split 20000 --output-split-cfuncs 2000 -Wno-fatal"
+    "--output-split-cfuncs 2000 -Wno-fatal"
 ).split()
 
 #: Options of a simulator that writes waveforms. Records are wider than the default limit of Verilator.
 WAVEFORM_OPTIONS = ("--trace", "--trace-max-width", "1024", "-CFLAGS", "-DWAVEFORM")
 
-#: Replaces -Os of Verilator's makefile, which is a third slower; -O2 is 2 % slower.
-OPTIMISATION = ("-O3",)
+
+@dataclass(frozen=True)
+class Optimisation:
+    """How the C++ of a simulator is compiled.
+
+    Attributes:
+        flag: The compiler's level.
+        split: Size of Verilator's files. Each of them includes large headers.
+    """
+
+    flag: str
+    split: int
+
+
+#: Instead of -Os of Verilator's makefile, which is a third slower; -O2 is 2 % slower.
+FAST = Optimisation("-O3", 20000)
+
+#: For frames so small that compiling takes longer than simulating.
+QUICK = Optimisation("-O0", 2**31 - 1)
 
 _HARNESS = ("harness.cpp", "array.hpp", "dram.hpp")
 
@@ -65,6 +83,11 @@ def simulator_tools() -> Tools:
     return Tools(verilator, compiler, (verilator_version, compiler_version))
 
 
+def optimisation() -> Optimisation:
+    """`FAST`, or `QUICK` if ``COLONNADE_QUICK_SIMULATORS`` is set."""
+    return QUICK if os.environ.get("COLONNADE_QUICK_SIMULATORS") else FAST
+
+
 def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, waveform: bool = False) -> Path:
     """The simulator of a design, built unless `cache.entry` has it.
 
@@ -81,14 +104,14 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, wavefor
     harness = Path(__file__).parent / "harness"
     here = Path(__file__).parent
     recipe = [here / "simulator_build.py", here / "simulator_sources.py", *(harness / name for name in _HARNESS)]
-    parts = [*tools.versions, *(path.read_text() for path in recipe), design.digest()]
+    parts = [*tools.versions, *(path.read_text() for path in recipe), *verilator_command(tools), design.digest()]
     parts += ["waveform"] if waveform else []
     key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
     folder = cache_directory(project_root()) / "simulator" / key
 
     def make(output: Path) -> None:
         with progress.step("building the simulator"):
-            require_right_compiler(tools.compiler, (*OPTIMISATION, *SAFE))
+            require_right_compiler(tools.compiler, (optimisation().flag, *SAFE))
             _build(tools, design, harness, output, folder.with_suffix(".log"), waveform)
 
     return cache.entry(folder, make, "simulator", progress) / PROGRAM
@@ -126,15 +149,19 @@ def build_environment() -> dict[str, str]:
     return {**clean_environment(), "OBJCACHE": compiles}
 
 
-def _verilate(tools: Tools, top: str, sources: Sequence[Path]) -> list[str]:
-    """The Verilator command that translates and compiles one model into the folder ``obj_TOP``."""
-    flags = " ".join(OPTIMISATION)
+def verilator_command(tools: Tools) -> list[str]:
+    """Verilator with the options of all models, as it translates and compiles one."""
+    level = optimisation()
     return [
-        *(str(tools.verilator), *VERILATOR_OPTIONS, "--top-module", top, "--Mdir", f"obj_{top}"),
+        *(str(tools.verilator), *_VERILATOR_OPTIONS, "--output-split", str(level.split)),
         *("-CFLAGS", " ".join(SAFE), "-MAKEFLAGS", f"CXX={tools.compiler}"),
-        *("-MAKEFLAGS", f"OPT_FAST={flags}", "-MAKEFLAGS", f"OPT_GLOBAL={flags}"),
-        *map(str, sources),
+        *("-MAKEFLAGS", f"OPT_FAST={level.flag}", "-MAKEFLAGS", f"OPT_GLOBAL={level.flag}"),
     ]
+
+
+def _verilate(tools: Tools, top: str, sources: Sequence[Path]) -> list[str]:
+    """The Verilator command of one model, in the folder ``obj_TOP``."""
+    return [*verilator_command(tools), "--top-module", top, "--Mdir", f"obj_{top}", *map(str, sources)]
 
 
 def _ports_header(manifest: Manifest, sources: Sequence[Path]) -> str:

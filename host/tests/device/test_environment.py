@@ -39,6 +39,7 @@ SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
 
 
 @NEEDS_SIMULATOR
+@pytest.mark.long_simulation
 @pytest.mark.parametrize(
     ("kind", "options"),
     [

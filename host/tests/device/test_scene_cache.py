@@ -19,6 +19,8 @@ from colonnade.scene.parser import load_scene
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
+pytestmark = pytest.mark.long_simulation
+
 #: Counters that do not depend on time.
 EVENTS = ("raysPrimary", "raysShadow", "raysInBox", "nodeReads", "triangleTests", "hits")
 
@@ -31,10 +33,10 @@ def design_with(rows: int, columns: int, banks: int, buffers: int, sizes: tuple[
     return design_for("tiny", (f"array.rows={rows}", f"array.columns={columns}", *memory))
 
 
-def scene_of(design: GeneratedDesign) -> tuple[SceneImage, Mapping[str, int]]:
+def scene_of(design: GeneratedDesign, width: int, height: int) -> tuple[SceneImage, Mapping[str, int]]:
     image = pack(load_mesh("torus"), design.manifest)
     scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")
-    return image, frame_registers(scene, image.header, design.manifest, 48, 36)
+    return image, frame_registers(scene, image.header, design.manifest, width, height)
 
 
 def assert_same(frame: Frame, expected: Frame) -> None:
@@ -56,7 +58,7 @@ SHAPES = {
 def test_no_frame_depends_on_the_memory(shape: str) -> None:
     rows, columns, banks, buffers, sizes = SHAPES[shape]
     design = design_with(rows, columns, banks, buffers, sizes)
-    image, registers = scene_of(design)
+    image, registers = scene_of(design, 24, 18)
     expected = render_model(design.manifest, image, registers)
     for seed, (latency, random) in enumerate([(1, 0), (100, 0), (7, 60), (300, 20)]):
         stalls = Stalls(percent=10 * seed, seed=seed, dram_latency=latency, dram_random=random)
@@ -79,7 +81,7 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
 def test_a_scene_that_fits_is_read_once() -> None:
     """A line that the shared cache holds is never read again, whatever else happens while it is looked up."""
     design = design_with(1, 5, 1, 2, (4, 1, 4, 1024, 16, 8, 32, False))
-    image, registers = scene_of(design)
+    image, registers = scene_of(design, 48, 36)
     lines = -(-len(image.records) // 4)
     assert lines <= 1024
     expected = render_model(design.manifest, image, registers)

@@ -16,7 +16,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import Progress, Report
 from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.device import simulator_build
-from colonnade.device.simulator_build import PROGRAM, Tools, build_simulator
+from colonnade.device.simulator_build import PROGRAM, Tools, build_simulator, verilator_command
 
 
 @dataclass
@@ -90,6 +90,14 @@ def test_design_and_versions_are_in_the_key(builder: Builder) -> None:
     builder.tools = replace(builder.tools, versions=("Verilator 5.006", "g++ 14.1.0"))
     paths.add(build_simulator(Design()))  # type: ignore[arg-type]
     assert builder.builds == len(paths) == 4
+
+
+def test_quick_simulators_are_others(builder: Builder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLONNADE_QUICK_SIMULATORS", "1")
+    quick, command = build_simulator(Design()), verilator_command(builder.tools)  # type: ignore[arg-type]
+    monkeypatch.delenv("COLONNADE_QUICK_SIMULATORS")
+    assert build_simulator(Design()) != quick  # type: ignore[arg-type]
+    assert "OPT_FAST=-O0" in command and "OPT_FAST=-O3" in verilator_command(builder.tools)
 
 
 @pytest.mark.parametrize("poison", ["other", "cut", "gone", "unsealed"])

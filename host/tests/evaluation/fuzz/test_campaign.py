@@ -25,11 +25,12 @@ from colonnade.evaluation.fuzz.simulator import SimulatedFrame
 
 needs_verilator = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 
-#: Configurations whose simulators `test_frames.py` builds too, and their number of frames.
+#: Configurations and their number of frames.
 DESIGNS = (("tiny", 160), ("small", 120))
 
 
 @needs_verilator
+@pytest.mark.long_simulation
 @pytest.mark.parametrize(("config", "frames"), DESIGNS)
 def test_corrupt_frames_equal_the_models_and_leave_no_state(config: str, frames: int) -> None:
     report = campaign.fuzz(design_for(config, ()), frames, seed=1)
@@ -42,6 +43,7 @@ def test_corrupt_frames_equal_the_models_and_leave_no_state(config: str, frames:
 
 
 @needs_verilator
+@pytest.mark.long_simulation
 def test_a_wrong_model_is_found_and_its_frame_is_reproducible(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = campaign.model_frame
 

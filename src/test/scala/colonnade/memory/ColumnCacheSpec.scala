@@ -1,9 +1,9 @@
 package colonnade.memory
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Banks, RecordFormats}
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -17,7 +17,9 @@ class ColumnCacheSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   for ((banks, sets, ways, misses) <- Seq((1, 1, 1, 1), (2, 2, 2, 2), (2, 4, 1, 3), (4, 1, 4, 2)))
     it should s"answer from $sets sets of $ways ways, $misses misses, as one of $banks banks" in {
       val config = TestConfigs.withCache(banks = banks, sets = sets, ways = ways, misses = misses, parity = sets == 4)
-      test(new ColumnCache(config)) { dut => new Surroundings(dut, config, new Random(7 * sets + ways)).run(6000) }
+      test(new ColumnCache(config)).withAnnotations(Simulation.verilator) { dut =>
+        new Surroundings(dut, config, new Random(7 * sets + ways)).run(6000)
+      }
     }
 
   it should "answer zeros for a record whose parity is wrong, and report it" in {

@@ -2,7 +2,7 @@ package colonnade.traversal
 
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.{Always, Packed, PackedStreams, PackedUnit, TestConfigs}
+import colonnade.{Always, Packed, PackedStreams, PackedUnit, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -22,7 +22,7 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   for ((config, i) <- (TestConfigs.formats ++ (binary +: laneVariants)).zipWithIndex)
     it should s"follow the model under random stalls, format $i (${shape(config)})" taggedAs
       (if (i < TestConfigs.formats.size) Always.ifExtreme(config) else Always) in
-      test(new PackedBoxUnit(config)) { dut =>
+      test(new PackedBoxUnit(config)).withAnnotations(Simulation.verilator) { dut =>
         val cases = new BoxStimulus(config, seed = 100 + i)
         compare(dut, config, cases.atBoundaries(20), offered = 1, accepted = 1)
         for ((offered, accepted) <- Seq((0.4, 1.0), (0.8, 0.3))) compare(dut, config, cases(60), offered, accepted)

@@ -15,8 +15,9 @@ import scala.util.Random
 class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "RecordFetch"
 
-  /** The interpreter is slow with many contexts. */
-  private def simulation(contexts: Int) = if (contexts > 4) Simulation.verilator else Seq()
+  /** The interpreter is slow with many contexts, and in long simulations. */
+  private def simulation(contexts: Int, isLong: Boolean = false) =
+    if (contexts > (if (isLong) 1 else 4)) Simulation.verilator else Seq()
 
   private def variant(contexts: Int, banks: Int, snooping: Boolean, recordBuffers: Int = 2): ColonnadeConfig =
     TestConfigs.tiny.copy(
@@ -53,7 +54,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       val shape  = variant(contexts, banks = 2, snooping = true, recordBuffers)
       val cached = TestConfigs.withCache().columnBvhMemory.cache
       val config = shape.copy(columnBvhMemory = shape.columnBvhMemory.copy(depth = 256, cache = cached))
-      test(new RecordFetch(config)).withAnnotations(simulation(contexts)) { dut =>
+      test(new RecordFetch(config)).withAnnotations(simulation(contexts, isLong = true)) { dut =>
         new Column(dut, config, new Random(contexts)).run(fetches = 300)
       }
     }
