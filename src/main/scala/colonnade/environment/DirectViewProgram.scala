@@ -41,7 +41,7 @@ final class DirectViewProgram(
     }
     step {
       set(m.uvwOrigin(2), 0.S)
-      set(m.axis, 2.U)
+      projection.selectRow(2.U)
       set(planes.purpose, planes.forDirectView)
       set(hasCell, false.B)
       when(now) {

@@ -16,7 +16,8 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
   import m.formats._
   import m.program._
 
-  private val matrixRow   = VecInit(view.matrix.map(row => VecInit(row.axes)))(m.axis)
+  /** The row of the matrix that `m.axis` selects; a register, because a multiplication follows. */
+  private val matrixRow   = Reg(Vec(3, chiselTypeOf(view.matrix.head.x)))
   private val offset      = VecInit(view.offset.axes)(m.axis)
   private val offsetPower = {
     val isMax = view.offsetShift >= sceneBits.U // a larger shift counts as this one
@@ -35,13 +36,20 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
       }
       align(at, m.dir, m.projectedDirExponent, begin = 7)
       at(10) {
-        set(m.axis, 0.U)
+        selectRow(0.U)
         if (m.hasDirectView) branch(DirectView.when(request.isDirectView, "direct view"))
       }
     }
   }
 
-  /** Steps that compute the product of the matrix row `axis` and the direction. */
+  /** In a step: selects an axis and its row of the matrix. */
+  def selectRow(axis: UInt): Unit = {
+    set(m.axis, axis)
+    val selected = VecInit(view.matrix.map(row => VecInit(row.axes)))(axis)
+    for ((entry, column) <- matrixRow.zipWithIndex) set(entry, selected(column))
+  }
+
+  /** Steps that compute the product of the selected matrix row and the direction. */
   def describeDirRow(): Unit = row(terms(m.dir))
 
   /** Steps that project the ray. They end at `Finish` if the origin is behind the camera. */
@@ -108,7 +116,7 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
     step(m.normalise())
     step {
       latch(vector, maxExponent, m.axis)
-      set(m.axis, Mux(m.axis === 2.U, 0.U, m.axis + 1.U))
+      selectRow(Mux(m.axis === 2.U, 0.U, m.axis + 1.U))
       branch(name.when(m.axis =/= 2.U, "next row"))
     }
     overlap(align(_, vector, maxExponent, begin = 0))
