@@ -140,7 +140,7 @@ CASES |= {
             ("albedo", "object.material.albedo", '[[object]]\nmesh.name = "cube"\nmaterial.albedo = [2, 0, 0]\n'),
             ("no-room", "needs background.room", '[[object]]\nmesh.name = "cube"\nsize = 0.2\n'),
             ("and-mesh", "leave out [mesh]", 'mesh.name = "cube"\n[[object]]\nmesh.name = "cube"\n'),
-            ("and-motion", "motion.turn", '[[object]]\nmesh.name = "cube"\n[motion]\nturn = 9\n'),
+            ("and-motion", "give motion.translate", '[[object]]\nmesh.name = "cube"\n[motion]\nstand_at = [9, 9]\n'),
             ("many", "at most 64", '[[object]]\nmesh.name = "cube"\n' * 65),
             ("far", "beyond", '[[object]]\nmesh.name = "cube"\ntransform.translate = [1e300, 0, 0]\n'),
             (
@@ -153,7 +153,9 @@ CASES |= {
     "objects-and-mesh-option": Case(
         f"{X} --mesh cube", "has 1 [[object]]", {"x.toml": '[[object]]\nmesh.name = "cube"\n'}
     ),
-    "objects-and-frames": Case(f"{X} --frames 2", "give motion.light", {"x.toml": '[[object]]\nmesh.name = "cube"\n'}),
+    "objects-and-frames": Case(
+        f"{X} --frames 2", "stand still: give motion.light", {"x.toml": '[[object]]\nmesh.name = "cube"\n'}
+    ),
     "nan-ior": Case(X, "material.ior", scene('[material]\nkind = "glass"\nior = nan\n')),
     "zero-width": Case(X, "frame.width", scene("[frame]\nwidth = 0\n")),
     "negative-bounces": Case(X, "paths.bounces", scene("[paths]\nbounces = -1\n")),

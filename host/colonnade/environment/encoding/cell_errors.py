@@ -15,7 +15,7 @@ from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.tiles import inside_mask, split_tiles, sum_cells
 
 #: A tile's weight is 1 / (variance + this constant), on an 8-bit scale: texture masks errors.
-TEXTURE_MASKING = 58.0
+TEXTURE_MASKING = 150.0
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """Encodes the plane map: planes shared by the whole map, and one, two or four of them for each tile.
 
 The error of a pixel is the distance along the view ray, saturated at `_MAX_ERROR`. A wrong plane at a depth
-discontinuity costs much more than a plane on a curved surface, so the heap serves discontinuities first.
+discontinuity costs much more than a plane on a curved surface, so the heap serves discontinuities first. Tiles with the
+same planes may share words of the heap.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.environment.encoding.bounding_planes import choose_bounding_planes, pack_bounding_planes
+from colonnade.environment.encoding.heap import pack_words
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.plane_fit import Samples, fit_planes, refit_planes, sample_pixels
 from colonnade.environment.encoding.plane_map import PLANE_MODES, PlaneMap
 from colonnade.environment.encoding.planes import PlaneProjection, pack_planes, unpack_planes
 from colonnade.environment.encoding.selection import best_subsets, choose_within_budget
+from colonnade.environment.encoding.sharing import shared_words
+from colonnade.environment.encoding.subdivision import Subdivided
 from colonnade.environment.encoding.tiles import expand_cells, inside_mask, join_tiles, split_tiles, sum_cells
-from colonnade.environment.encoding.two_level import mask_words
 from colonnade.environment.model import Environment
 
 #: Largest error of a pixel, metres.
@@ -29,6 +32,8 @@ _COARSE = 8
 _ROUNDS = 3
 #: Candidate planes of a tile.
 _CANDIDATES = 12
+#: Tiles that have a mask in a heap so many times as large offer their words to all.
+_LARGER_HEAP = 2
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,20 @@ class _Choices:
         coarse: NDArray[np.float32] = sum_cells(fine, cells)
         return coarse
 
+    def errors_with(self, words: Subdivided) -> NDArray[np.float32]:
+        """Errors of all tiles with words, float32 [words, tiles]; infinite if a plane is no candidate of the tile."""
+        cells, count = words.mode.cells, self.candidates.shape[1]
+        costs = self.of_cells(cells)
+        errors = np.full((len(words.tiles), len(costs)), np.inf, np.float32)
+        slots = np.full(words.indices.max(initial=self.candidates.max()) + 1, count)
+        for tile, candidates in enumerate(self.candidates):
+            slots[candidates] = np.arange(count)
+            which = np.flatnonzero((slots[words.members] < count).all(axis=1))
+            taken = slots[words.indices[which]]
+            errors[which, tile] = np.take_along_axis(costs[tile].T, taken, axis=0).sum(axis=1)
+            slots[candidates] = count
+        return errors
+
 
 def encode_planes(environment: Environment, layout: AttributeLayout, rounds: int = _ROUNDS) -> PlaneMap:
     """Encode the plane map of an environment."""
@@ -64,12 +83,12 @@ def encode_planes(environment: Environment, layout: AttributeLayout, rounds: int
         words = pack_planes(planes)
         planes = unpack_planes(words)
         choices = _choices(pixels, planes, layout)
-        modes, members = _chosen(choices, layout)
+        parts = _chosen(choices, layout)
         if completed_rounds < rounds - 1:
-            planes = refit_planes(pixels, planes, _owners(modes, members, choices, layout))
+            planes = refit_planes(pixels, planes, _owners(parts, layout))
     table = np.zeros(layout.planes, np.uint64)
     table[: layout.infinite_plane] = words
-    descriptors, heap = _written(modes, members, choices, layout)
+    descriptors, heap = _written(parts, layout)
     bounding = pack_bounding_planes(
         choose_bounding_planes(environment, projection, planes, layout.bounding_planes), projection, layout
     )
@@ -94,8 +113,8 @@ def _choices(pixels: Samples, planes: NDArray[np.float64], layout: AttributeLayo
     return _Choices(candidates, costs, modes, finest)
 
 
-def _chosen(choices: _Choices, layout: AttributeLayout) -> tuple[NDArray[np.intp], dict[int, NDArray[np.intp]]]:
-    """Choose each tile's mode within the heap; also returns for each mode the members [tiles, ids]."""
+def _chosen(choices: _Choices, layout: AttributeLayout) -> list[Subdivided]:
+    """Choose each tile's mode and words within the heap; the tiles of each mode, with plane ids as members."""
     errors = np.empty((layout.tiles, len(choices.modes)))
     members: dict[int, NDArray[np.intp]] = {}
     for cells in sorted({PLANE_MODES[number].cells for number in choices.modes}):
@@ -105,54 +124,43 @@ def _chosen(choices: _Choices, layout: AttributeLayout) -> tuple[NDArray[np.intp
         for number, count in zip(numbers, counts, strict=True):
             members[number], errors[:, choices.modes.index(number)] = subsets[count]
     sizes = np.array([PLANE_MODES[number].words for number in choices.modes])
-    return np.array(choices.modes)[choose_within_budget(errors, sizes, layout.plane_heap_words)], members
+    chosen, larger = (
+        choose_within_budget(errors, sizes, times * layout.plane_heap_words) for times in (1, _LARGER_HEAP)
+    )
+    tiles, order = np.flatnonzero((chosen > 0) | (larger > 0)), np.arange(layout.planes)
+    flat, users = shared_words(
+        errors[:, 0],
+        [_subdivided(choices, number, tiles, members[number]).ordered(order) for number in choices.modes[1:]],
+        [chosen[tiles] == slot for slot in range(1, len(choices.modes))],
+        choices.errors_with,
+        layout.plane_heap_words,
+    )
+    return [_subdivided(choices, 0, flat, members[0]), *(part.subdivided() for part in users)]
 
 
-def _cell_choices(
-    choices: _Choices, number: int, which: NDArray[np.intp], members: NDArray[np.intp]
-) -> NDArray[np.int64]:
-    """The best member for each cell, for tiles of one mode: int64 [which, cells * cells]."""
-    costs = choices.of_cells(PLANE_MODES[number].cells, which)
-    member_costs = np.take_along_axis(costs, members[which][:, np.newaxis, :], axis=2)
-    taken: NDArray[np.int64] = member_costs.argmin(axis=2).astype(np.int64)
-    return taken
+def _subdivided(choices: _Choices, number: int, tiles: NDArray[np.intp], members: NDArray[np.intp]) -> Subdivided:
+    """Tiles in a mode, each cell with its best plane; ``members`` are intp [all tiles, ids], of the candidates."""
+    costs = choices.of_cells(PLANE_MODES[number].cells, tiles)
+    taken = np.take_along_axis(costs, members[tiles][:, np.newaxis, :], axis=2).argmin(axis=2).astype(np.int64)
+    ids = np.take_along_axis(choices.candidates[tiles], members[tiles], axis=1)
+    return Subdivided(number, PLANE_MODES[number], tiles, ids, taken)
 
 
-def _ids(choices: _Choices, which: NDArray[np.intp], members: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Plane ids of the tiles' members: intp [which, ids]."""
-    return np.take_along_axis(choices.candidates[which], members[which], axis=1)
-
-
-def _owners(
-    modes: NDArray[np.intp], members: dict[int, NDArray[np.intp]], choices: _Choices, layout: AttributeLayout
-) -> NDArray[np.intp]:
+def _owners(parts: list[Subdivided], layout: AttributeLayout) -> NDArray[np.intp]:
     """The plane id of each pixel in row-major order: intp [height * width]."""
-    size = layout.tile_size
-    owner = np.empty((layout.tiles, size, size), np.intp)
-    for number in choices.modes:
-        which = np.flatnonzero(modes == number)
-        taken = _cell_choices(choices, number, which, members[number])
-        owner[which] = expand_cells(np.take_along_axis(_ids(choices, which, members[number]), taken, axis=1), size)
+    owner = np.empty((layout.tiles, layout.tile_size, layout.tile_size), np.intp)
+    for part in parts:
+        owner[part.tiles] = expand_cells(part.indices, layout.tile_size)
     pixels: NDArray[np.intp] = join_tiles(owner, layout).ravel()
     return pixels
 
 
-def _written(
-    modes: NDArray[np.intp], members: dict[int, NDArray[np.intp]], choices: _Choices, layout: AttributeLayout
-) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+def _written(parts: list[Subdivided], layout: AttributeLayout) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
     """Pack descriptors and heap."""
+    flat, *divided = parts
+    heap, pointers = pack_words([part.words() for part in divided], layout.plane_heap_words)
     descriptors = np.zeros(layout.tiles, np.uint16)
-    heap = np.zeros(layout.plane_heap_words, np.uint16)
-    top = 0
-    for number in choices.modes:
-        mode, which = PLANE_MODES[number], np.flatnonzero(modes == number)
-        ids = _ids(choices, which, members[number])
-        if not mode.words:
-            descriptors[which] = number | ids[:, 0] << 3
-            continue
-        masks = mask_words(_cell_choices(choices, number, which, members[number]), mode.bits_per_cell)
-        for tile, own, mask in zip(which, ids, masks, strict=True):
-            heap[top : top + mode.words] = [*(own[0::2] | own[1::2] << 8), *mask]
-            descriptors[tile] = number | top << 3
-            top += mode.words
+    descriptors[flat.tiles] = flat.members[:, 0] << 3
+    for part, pointer in zip(divided, pointers, strict=True):
+        descriptors[part.tiles] = part.number | pointer << 3
     return descriptors, heap

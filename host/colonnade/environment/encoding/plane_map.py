@@ -44,6 +44,11 @@ class PlaneMode:
         return self.ids // 2
 
     @property
+    def in_descriptor(self) -> int:
+        """Ids in the descriptor."""
+        return self.ids % 2
+
+    @property
     def id_words(self) -> int:
         """Heap words of the ids."""
         return self.ids // 2

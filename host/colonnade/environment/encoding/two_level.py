@@ -48,6 +48,11 @@ class Mode:
         return -(-self.cells * self.cells * self.bits_per_cell // 16)
 
     @property
+    def in_descriptor(self) -> int:
+        """Entries in the descriptor."""
+        return 2
+
+    @property
     def words(self) -> int:
         """Heap words of the mask and of entries 2 and 3."""
         return self.mask_words + (self.entries == 4)

@@ -1,7 +1,8 @@
 """Encodes a two-level map: a palette for the whole map and a mode for each tile.
 
 Each round finds every mode's best entries and error in every tile, then the modes that minimise the weighted error
-within the heap. Finally it updates the palette's entries to the means of their pixels.
+within the heap. Finally it updates the palette's entries to the means of their pixels. In the last rounds tiles share
+words of the heap.
 """
 
 from __future__ import annotations
@@ -12,17 +13,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.environment.encoding.cell_errors import TilePixels
+from colonnade.environment.encoding.heap import pack_words
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.palette import initial_palette, nearest, update_palette
 from colonnade.environment.encoding.selection import best_subsets, choose_within_budget
+from colonnade.environment.encoding.sharing import shared_words
+from colonnade.environment.encoding.subdivision import Subdivided
 from colonnade.environment.encoding.tiles import expand_cells, sum_cells
-from colonnade.environment.encoding.two_level import MODES, Mode, TwoLevelMap, mask_words
+from colonnade.environment.encoding.two_level import MODES, Mode, TwoLevelMap
+from colonnade.environment.encoding.two_level_sharing import errors_with, fitted
 from colonnade.environment.encoding.vectors import VectorSpace
 
 #: Alternating rounds of choosing modes and updating the palette.
 _ROUNDS = 6
+#: The last of these rounds, in which tiles share words.
+_SHARED_ROUNDS = 2
 #: Candidate palette entries of a tile.
 _CANDIDATES = 32
+#: Tiles that have a mask in a heap so many times as large offer their words to all.
+_LARGER_HEAP = 2
 
 
 @dataclass(frozen=True)
@@ -30,14 +39,21 @@ class _Choices:
     """Options of each tile with the current palette.
 
     Attributes:
-        modes: Mode numbers that the tile size allows.
+        candidates: intp [tiles, candidates], palette indices.
+        modes: Mode numbers that the tile size allows; the first one is 0.
         errors: float64 [tiles, modes], weighted squared errors.
         members: For each mode the palette indices, intp [tiles, entries].
     """
 
+    candidates: NDArray[np.intp]
     modes: list[int]
     errors: NDArray[np.float64]
     members: list[NDArray[np.intp]]
+
+    def within(self, heap_words: int) -> NDArray[np.intp]:
+        """For each tile the place of its mode in `modes`, with words of its own in a heap."""
+        sizes = np.array([MODES[number].words for number in self.modes])
+        return choose_within_budget(self.errors, sizes, heap_words)
 
 
 def encode_two_level(
@@ -53,12 +69,12 @@ def encode_two_level(
         palette = space.to_points(space.vectors(words))
         last = completed_rounds == rounds - 1
         choices = _choices(pixels, palette, rounds=2 if last else 1)
-        sizes = np.array([MODES[number].words for number in choices.modes])
-        chosen = choose_within_budget(choices.errors, sizes, layout.heap_words)
+        is_shared = rounds - completed_rounds <= _SHARED_ROUNDS
+        parts = (_shared if is_shared else _own)(pixels, palette, choices)
         if not last:
-            index = _indices(pixels, palette, choices, chosen).ravel()
+            index = _indices(pixels, parts)
             palette = update_palette(palette, flat, weights, index, ((flat - palette[index]) ** 2).sum(axis=1))
-    return _written(pixels, words, palette, choices, chosen)
+    return _written(parts, words, layout)
 
 
 def _first_palette(pixels: TilePixels) -> NDArray[np.float64]:
@@ -94,52 +110,57 @@ def _choices(pixels: TilePixels, palette: NDArray[np.float64], rounds: int) -> _
             slot = modes.index(MODES.index(Mode(entries, cells)))
             errors[:, slot] = total
             members[slot] = np.take_along_axis(candidates, subset, axis=1)
-    return _Choices(modes, errors, members)
+    return _Choices(candidates, modes, errors, members)
 
 
-def _cell_choices(
-    pixels: TilePixels, palette: NDArray[np.float64], members: NDArray[np.intp], cells: int, which: NDArray[np.intp]
-) -> NDArray[np.int64]:
-    """The best member for each cell: int64 [which, cells * cells]."""
-    best: NDArray[np.int64] = pixels.cell_costs(cells, palette[members[which]], which).argmin(axis=2).astype(np.int64)
-    return best
+def _subdivided(
+    pixels: TilePixels, palette: NDArray[np.float64], choices: _Choices, slot: int, tiles: NDArray[np.intp]
+) -> Subdivided:
+    """Tiles in one of the modes, each cell with its best entry."""
+    mode, members = MODES[choices.modes[slot]], choices.members[slot][tiles]
+    taken = pixels.cell_costs(mode.cells, palette[members], tiles).argmin(axis=2).astype(np.int64)
+    return Subdivided(choices.modes[slot], mode, tiles, members, taken)
 
 
-def _indices(
-    pixels: TilePixels, palette: NDArray[np.float64], choices: _Choices, chosen: NDArray[np.intp]
-) -> NDArray[np.intp]:
-    """The palette index of each pixel: intp [tiles, size, size]."""
+def _own(pixels: TilePixels, palette: NDArray[np.float64], choices: _Choices) -> list[Subdivided]:
+    """The tiles of each mode within the heap, with words of their own."""
+    chosen = choices.within(pixels.layout.heap_words)
+    slots = range(len(choices.modes))
+    return [_subdivided(pixels, palette, choices, slot, np.flatnonzero(chosen == slot)) for slot in slots]
+
+
+def _shared(pixels: TilePixels, palette: NDArray[np.float64], choices: _Choices) -> list[Subdivided]:
+    """The tiles of each mode within the heap, with words that they share."""
+    chosen, larger = (choices.within(times * pixels.layout.heap_words) for times in (1, _LARGER_HEAP))
+    uses = np.bincount(_indices(pixels, _own(pixels, palette, choices)), minlength=len(palette))
+    ranks = uses.argsort(kind="stable").argsort()
+    tiles = np.flatnonzero((chosen > 0) | (larger > 0))
+    slots = range(1, len(choices.modes))
+    free, users = shared_words(
+        choices.errors[:, 0],
+        [_subdivided(pixels, palette, choices, slot, tiles).ordered(ranks) for slot in slots],
+        [chosen[tiles] == slot for slot in slots],
+        lambda words: errors_with(words, pixels, palette, choices.candidates),
+        pixels.layout.heap_words,
+    )
+    flat = _subdivided(pixels, palette, choices, 0, free)
+    return [flat, *(fitted(part, pixels, palette, choices.candidates) for part in users)]
+
+
+def _indices(pixels: TilePixels, parts: list[Subdivided]) -> NDArray[np.intp]:
+    """The palette index of each pixel, tile by tile: intp [pixels]."""
     index = np.empty(pixels.weights.shape, np.intp)
-    for slot, number in enumerate(choices.modes):
-        which = np.flatnonzero(chosen == slot)
-        members = choices.members[slot]
-        taken = _cell_choices(pixels, palette, members, MODES[number].cells, which)
-        index[which] = expand_cells(np.take_along_axis(members[which], taken, axis=1), pixels.layout.tile_size)
-    return index
+    for part in parts:
+        index[part.tiles] = expand_cells(part.indices, pixels.layout.tile_size)
+    return index.ravel()
 
 
-def _written(
-    pixels: TilePixels,
-    words: NDArray[np.uint64],
-    palette: NDArray[np.float64],
-    choices: _Choices,
-    chosen: NDArray[np.intp],
-) -> TwoLevelMap:
-    """Pack descriptors and heap, mode by mode."""
-    descriptors = np.zeros(len(chosen), np.uint32)
-    heap = np.zeros(pixels.layout.heap_words, np.uint16)
-    top = 0
-    for slot, number in enumerate(choices.modes):
-        mode, members = MODES[number], choices.members[slot]
-        which = np.flatnonzero(chosen == slot)
-        masks = mask_words(_cell_choices(pixels, palette, members, mode.cells, which), mode.bits_per_cell)
-        for tile, mask in zip(which, masks, strict=True):
-            own = members[tile]
-            pointer = top
-            if mode.words:
-                heap[top : top + mode.words] = [own[2] | own[3] << 8, *mask] if mode.entries == 4 else mask
-                top += mode.words
-            else:
-                pointer = int(mask[0])
-            descriptors[tile] = number | pointer << 3 | int(own[0]) << 16 | int(own[1]) << 24
+def _written(parts: list[Subdivided], words: NDArray[np.uint64], layout: AttributeLayout) -> TwoLevelMap:
+    """Pack descriptors and heap."""
+    heap, pointers = pack_words([part.words() for part in parts if part.mode.words], layout.heap_words)
+    pointers = [parts[0].words()[:, 0].astype(np.int64), *pointers]
+    descriptors = np.zeros(layout.tiles, np.uint32)
+    for part, pointer in zip(parts, pointers, strict=True):
+        entries = part.members[:, 0] << 16 | part.members[:, 1] << 24
+        descriptors[part.tiles] = part.number | pointer << 3 | entries
     return TwoLevelMap(descriptors, words, heap)
