@@ -45,7 +45,8 @@ def verify(
     reference: bool,
     json_file: Path | None,
 ) -> None:
-    """Render each benchmark mesh with the RTL, the model and Embree, and print the differences.
+    """Render each benchmark mesh, or a scene's several objects, with the RTL, the model and Embree, and print the
+    differences.
 
     The exit status is 1 if any pixel, hit or counter of the RTL differs from the model.
     """
@@ -57,7 +58,7 @@ def verify(
     from colonnade.common import progress
     from colonnade.common.text_table import Column, Table
     from colonnade.design.toolchain import project_root
-    from colonnade.evaluation import bench, verify
+    from colonnade.evaluation import verify
 
     table = Table(
         (
@@ -85,7 +86,7 @@ def verify(
         scene or project_root() / "scenes" / "object.toml",
         config,
         overrides,
-        meshes or bench.MESHES,
+        meshes,
         pixels,
         with_rtl=rtl,
         with_reference=reference,

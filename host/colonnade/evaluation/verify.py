@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,12 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import manifest_for
 from colonnade.device.verilator import require_hits
+from colonnade.evaluation.bench import MESHES
 from colonnade.quality.image_metrics import compare_hits, psnr
 from colonnade.render.frames import render
 from colonnade.render.request import Backend, RenderRequest
 from colonnade.render.result import RenderResult
+from colonnade.scene.parser import load_scene
 
 
 @dataclass(frozen=True)
@@ -82,20 +84,20 @@ def verify(
     scene: Path,
     config: str,
     overrides: Sequence[str],
-    meshes: Iterable[str],
+    meshes: Sequence[str],
     size: tuple[int, int] | None,
     with_rtl: bool = True,
     with_reference: bool = True,
     progress: Progress = QUIET,
     finished: Callable[[str, dict[str, Any]], None] = lambda name, result: None,
 ) -> dict[str, Any]:
-    """Render each mesh with the backends and compare the frames.
+    """Render each mesh with the backends and compare the frames; of a scene of several objects, these objects.
 
     Args:
-        scene: Scene file; its mesh is replaced.
+        scene: Scene file; its mesh is replaced, unless it has several objects.
         config: Configuration, before `overrides`.
         overrides: Changes to the configuration, ``key.path=value``.
-        meshes: Names or files.
+        meshes: Names or files; if empty, those of the benchmark, or the scene's several objects.
         size: Width and height, pixels; None: those of the scene.
         with_rtl: Compare the RTL with the model.
         with_reference: Compare the model with the reference.
@@ -103,15 +105,19 @@ def verify(
         finished: Called after each mesh with its name and result.
 
     Returns:
-        ``{"config", "equal", "meshes": {name: {"triangles", "rtl", "reference"}}}``; a skipped comparison is None.
+        ``{"config", "equal", "meshes": {name: {"triangles", "rtl", "reference"}}}``; a skipped comparison is None. The
+        name of several objects is that of the scene file.
     """
+    frames: dict[str, str | None] = {name: name for name in meshes or MESHES}
+    if not meshes and load_scene(scene).objects:
+        frames = {scene.stem: None}
     if with_rtl:
         require_hits(manifest_for(config, overrides, progress).manifest)
     results: dict[str, dict[str, Any]] = {}
     equal = True
-    for name in meshes:
+    for name, replacement in frames.items():
 
-        def frame(backend: Backend, mesh: str = name) -> RenderResult:
+        def frame(backend: Backend, mesh: str | None = replacement) -> RenderResult:
             request = RenderRequest(scene, config, overrides, backend, size, mesh=mesh, relit=True)
             return render(request, progress)
 

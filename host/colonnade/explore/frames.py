@@ -47,7 +47,8 @@ class Frame:
 
 def frame_of(name: str, scene: Scene, mesh: Mesh, source: str | None) -> Frame:
     """The frame of a scene with a mesh. Its identity is the content of mesh and room, and the scene without paths."""
-    plain = _SCENE.dump_python(scene, mode="json", exclude={"mesh": True, "background": {"room": True}})
+    paths: dict[str, Any] = {"mesh": True, "background": {"room": True}, "objects": {"__all__": {"mesh"}}}
+    plain = _SCENE.dump_python(scene, mode="json", exclude=paths)
     digest = hashlib.sha256()
     arrays = (mesh.vertices, mesh.faces, mesh.corner_normals, mesh.face_materials, mesh.source_faces)
     of_corners = tuple(array for array in (mesh.corner_colours, mesh.corner_positions) if array is not None)

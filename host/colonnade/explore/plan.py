@@ -22,6 +22,7 @@ from colonnade.explore.schedule import Outcome
 from colonnade.explore.study import StudyFile
 from colonnade.mesh.mesh import Mesh
 from colonnade.ppa.library.liberty_files import find_liberties
+from colonnade.render.lit_room import scene_room
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 
@@ -244,11 +245,11 @@ def _frames(file: StudyFile) -> list[Frame]:
         except UserError as error:
             raise file.error(("workload", "scenes", name), str(error)) from None
         for source in workload.meshes or (None,):
-            own = scene if source is None else scene.with_mesh(source)
-            key = f"{own.mesh_source} {own.mesh.crease}"
             try:
+                own = scene if source is None else scene.with_mesh(source)
+                key = name if own.objects else f"{own.mesh_source} {own.mesh.crease}"
                 if key not in meshes:
-                    meshes[key] = object_mesh(own, corner_colours=True)
+                    meshes[key] = object_mesh(own, scene_room(own) if own.objects else None, corner_colours=True)
             except UserError as error:
                 where = ("workload", "scenes", name) if source is None else ("workload", "meshes", source)
                 raise file.error(where, str(error)) from None

@@ -60,9 +60,10 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     width, height = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size((width, height), manifest)
-    if request.frames > 1 and scene.objects and scene.motion.light is None:
+    if request.frames > 1 and scene.objects and scene.motion.is_still:
         raise UserError(
-            f"nothing moves in these {request.frames} frames, since several objects stand still: give motion.light"
+            f"nothing moves in these {request.frames} frames, since several objects stand still: give motion.light, or"
+            " motion.turn or motion.translate, which move all of them"
         )
     if request.waveform is not None:
         _check_waveform(request, (width, height))

@@ -224,12 +224,13 @@ class SceneObject(Placement):
 
 @dataclass(frozen=True, config=_STRICT)
 class Motion:
-    """The motion of the object and the first light over a sequence of frames, starting at the scene's values.
+    """The motion of the object, or of all as one, and of the first light over a sequence of frames, from the scene on.
 
     Attributes:
         turn: Rotation of the object about the vertical through its centre, degrees.
         stand_at: Last value of ``object.stand_at``; the object moves straight to that surface point.
-        translate: Last value of ``transform.translate``, for an object that does not stand in a room.
+        translate: Last value of ``transform.translate``, for an object that does not stand in a room; of several
+            objects, the shift of all.
         light: Last world position of the first light.
         shutter: How long each frame is exposed, as a fraction of the interval to the next one.
     """
@@ -239,6 +240,11 @@ class Motion:
     translate: _Vector | None = None
     light: _Vector | None = None
     shutter: _Fraction = 0.0
+
+    @property
+    def is_still(self) -> bool:
+        """Whether nothing moves."""
+        return self.is_closed and self.turn == 0.0
 
     @property
     def is_closed(self) -> bool:

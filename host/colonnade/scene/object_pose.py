@@ -50,13 +50,11 @@ class Pose:
 def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -> Pose:
     """The pose of the scene's mesh at its motion's progress: by its transform, or standing in a room.
 
-    The joined mesh of several objects is in world space already.
+    The joined mesh of several objects is in world space already; the motion moves it as one.
 
     Raises:
         UserError: A pixel is outside the room's maps, or the motion does not match the kind of pose.
     """
-    if scene.objects:
-        return Pose(np.eye(3), 1.0, np.zeros(3))
     scene = settled(scene, extent, environment)
     placement, motion, progress = scene.placement, scene.motion, scene.motion_progress
     rotation = rotation_matrix(scene.transform)

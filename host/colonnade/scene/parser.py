@@ -65,13 +65,18 @@ def _beside(mesh: MeshSource, file: Path) -> MeshSource:
 
 
 def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Rename the file's tables to the fields of `Scene`; several ``[[light]]`` become `light` and `more_lights`."""
+    """Rename the file's tables to the fields of `Scene`; several ``[[light]]`` become `light` and `more_lights`.
+
+    Several objects do not turn unless the file says so.
+    """
     tables = dict(data) | {"names_light": "light" in data or "ambient" in data}
     if isinstance(light := tables.get("light"), list) and light:
         tables |= {"light": light[0], "more_lights": light[1:]}
     if isinstance(tables.get("object"), list):
         tables["objects"] = tables.pop("object")
         tables["mesh"] = {"name": "unused"}
+        if isinstance(motion := tables.get("motion", {}), dict):
+            tables["motion"] = {"turn": 0.0} | motion
     elif "object" in tables:
         tables["placement"] = tables.pop("object")
     return {"mesh": {}} | tables
@@ -124,9 +129,8 @@ def _check_objects(data: Mapping[str, Any]) -> None:
     for table in ("mesh", "transform", "material"):
         if table in data:
             raise ValueError(f"[[object]] has a {table} of its own: leave out [{table}], give object.{table}")
-    for key in ("turn", "stand_at", "translate"):
-        if key in data.get("motion", {}):
-            raise ValueError(f"motion.{key} moves a single object, the scene has [[object]]: give motion.light")
+    if "stand_at" in data.get("motion", {}):
+        raise ValueError("motion.stand_at moves a single object, the scene has [[object]]: give motion.translate")
     for number, one in enumerate(objects, 1):
         if not isinstance(one, dict):
             raise ValueError("object must be tables: [[object]]")

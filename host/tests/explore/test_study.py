@@ -125,6 +125,17 @@ def test_the_studies_of_the_repository_are_legal(path: Path) -> None:
     assert len(manifests_of(file, points[:2])) == len(points[:2])
 
 
+def test_scenes_of_several_objects_are_frames_of_their_own(tmp_path: Path) -> None:
+    several = '[[object]]\nmesh.name = "cube"\n[[object]]\nmesh.name = "sphere:64"\ntransform.translate = [3, 0, 0]\n'
+    (tmp_path / "several.toml").write_text(several)
+    alone = STUDY.replace("object.toml", "several.toml").replace('meshes = ["cube"]\n', "")
+    (frame,) = Plan(study(tmp_path, alone), {}).frames
+    assert frame.name == "several" and len(frame.mesh.faces) > 12
+    assert frame.mesh.vertices[:, 0].max() > 2.5
+    with pytest.raises(UserError, match=r"a mesh replaces that of a single object, but the scene has 2 \[\[object\]\]"):
+        Plan(study(tmp_path, alone.replace("[workload]", '[workload]\nmeshes = ["cube"]')), {})
+
+
 @pytest.mark.parametrize("text", ["frame.samples = 4", "light.radius = 0.5"])
 def test_scenes_of_several_samples_are_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "object.toml").write_text(f'mesh.name = "cube"\n{text}\n')

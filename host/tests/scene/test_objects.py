@@ -14,12 +14,15 @@ from colonnade.common.hits import read_hits, write_hits
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.model import Environment
 from colonnade.evaluation.studies.synthetic_attic import attic
+from colonnade.evaluation.verify import verify
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import psnr
-from colonnade.render.frames import render
+from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Material, MeshSource, Scene, SceneObject, Transform
+from colonnade.scene.object_pose import object_pose
+from colonnade.scene.parser import load_scene
 from colonnade.scene.standing import Footprint, free_place, surface_point
 
 TWO = """
@@ -91,10 +94,33 @@ def test_model_and_reference_show_the_same_objects(tmp_path: Path) -> None:
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 def test_hardware_shows_the_objects_of_the_model(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(TWO)
-    request = RenderRequest(tmp_path / "a.toml", "small", backend="rtl", size=(96, 72))
-    rtl, model = render(request), render(dataclasses.replace(request, backend="model"))
-    np.testing.assert_array_equal(rtl.image, model.image)
-    np.testing.assert_array_equal(rtl.hits().numbers(), model.hits().numbers())
+    report = verify(tmp_path / "a.toml", "small", (), (), (96, 72))
+    assert report["equal"] and list(report["meshes"]) == ["a"]
+    assert report["meshes"]["a"]["reference"]["psnr"] > 35.0
+
+
+def test_a_motion_moves_all_objects_as_one(tmp_path: Path) -> None:
+    fixed = TWO + "[camera]\nposition = [0, 0, 6]\ntarget = [0, 0, 0]\n[light]\nposition = [1, 4, 4]\n"
+    (tmp_path / "moves.toml").write_text(fixed + "[motion]\ntranslate = [0.5, -0.5, 0]\n")
+    (tmp_path / "stands.toml").write_text(fixed.replace("-1.5, 0", "-1, -0.5").replace("1.5, 0", "2, -0.5"))
+    request = RenderRequest(tmp_path / "moves.toml", "small", backend="model", size=(96, 72))
+    first, last = render_frames(dataclasses.replace(request, frames=2))
+    stands = render(dataclasses.replace(request, scene=tmp_path / "stands.toml"))
+    np.testing.assert_array_equal(first.image, render(request).image)
+    assert np.mean(last.hits().numbers() != stands.hits().numbers()) < 0.005
+    assert np.mean(first.hits().numbers() != stands.hits().numbers()) > 0.05
+
+
+def test_objects_turn_about_their_common_centre_if_asked(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(TWO)
+    (tmp_path / "turns.toml").write_text(TWO + "[motion]\nturn = 90\n")
+    still, turning = load_scene(tmp_path / "a.toml"), load_scene(tmp_path / "turns.toml")
+    extent = joined_mesh(still, None).extent
+    assert still.motion.is_still and not turning.motion.is_still
+    points = extent.centre + np.array([[0.0, 0, 0], [0, 2, 0], [1, 0, 0]])
+    np.testing.assert_allclose(object_pose(still.at(1.0), extent, None).to_world(points), points)
+    turned = extent.centre + np.array([[0.0, 0, 0], [0, 2, 0], [0, 0, -1]])
+    np.testing.assert_allclose(object_pose(turning.at(1.0), extent, None).to_world(points), turned, atol=1e-12)
 
 
 def test_objects_without_a_place_stand_apart_on_level_surfaces(room: Environment) -> None:

@@ -1,4 +1,7 @@
-"""Study: how much of an object that stands partly behind furniture is shown and hidden correctly."""
+"""Study: how much of an object that stands partly behind furniture is shown and hidden correctly.
+
+The frames are also compared with those of the reference in the rooms' real geometry (``--truth``).
+"""
 
 from __future__ import annotations
 
@@ -11,14 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common.image_io import write_png
+from colonnade.common.image_io import encode_srgb, write_png
 from colonnade.common.progress import QUIET, Progress
+from colonnade.common.types import Floats
 from colonnade.evaluation.studies.furnished_rooms import FURNISHED, Furnished
+from colonnade.quality.image_metrics import psnr
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Scene, Transform
 
 if TYPE_CHECKING:
+    from colonnade.environment.encoded import EncodedEnvironment
     from colonnade.evaluation.studies.synthetic_attic import SyntheticRoom
     from colonnade.mesh.mesh import Mesh
+    from colonnade.reference.render import ReferenceResult
     from colonnade.scene.view import View
 
 #: Nearer surfaces of the room than this, in metres, hide the object in the truth: Embree's precision.
@@ -36,6 +43,8 @@ class OcclusionResult:
         lost, kept: The shares that show the room in place of the object, and the object in place of the room.
         without: `right` of a frame without occlusion.
         tolerance: Of the device, metres along the ray's dominant axis.
+        agrees: The share that shows the same of object and room as the reference in the real room.
+        psnr, object_psnr: Of the frame in the photo against that reference, all pixels and these, decibels.
     """
 
     pixels: int
@@ -45,6 +54,9 @@ class OcclusionResult:
     kept: float
     without: float
     tolerance: float
+    agrees: float
+    psnr: float
+    object_psnr: float
 
 
 def true_occlusion(mesh: Mesh, view: View, made: SyntheticRoom) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -60,9 +72,8 @@ def true_occlusion(mesh: Mesh, view: View, made: SyntheticRoom) -> tuple[NDArray
 
     # From world space over the maps' view space to mesh space
     assert view.view_to_mesh is not None
-    to_world, surface = made.environment.camera_to_world, made.surface
-    in_view = (surface.vertices - to_world[:, 3]) @ to_world[:, :3]
-    walls = RayTracer(Triangles(in_view @ view.view_to_mesh[:, :3].T + view.view_to_mesh[:, 3], surface.faces))
+    in_mesh = _in_view(made) @ view.view_to_mesh[:, :3].T + view.view_to_mesh[:, 3]
+    walls = RayTracer(Triangles(in_mesh, made.surface.faces))
     directions = primary_directions(view, slice(0, view.height))
     origins = np.broadcast_to(view.origin, directions.shape)
     distances = []
@@ -134,10 +145,14 @@ def measure(
     registers = registers_of(view, packed.header, manifest)
     registers |= environment_registers(view, encoded, packed.header, manifest, relit=False)
     frame = render_model(manifest, packed, registers)
+    picture = composited(Accumulation.of_frame(frame), environment)
     if output is not None:
-        write_png(output, composited(Accumulation.of_frame(frame), environment))
+        write_png(output, picture)
 
     meets, visible = true_occlusion(mesh, view, made)
+    truth = _true_frame(mesh, view, made, encoded)
+    sums = Accumulation.of_pixels(truth.image, truth.object_mask, truth.shadow_ratio)
+    pair = encode_srgb(composited(sums, environment)), encode_srgb(picture)
     steps = packed.header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
     shown, visible = frame.is_object[meets], visible[meets]
     return OcclusionResult(
@@ -148,7 +163,31 @@ def measure(
         kept=float(np.mean(shown & ~visible)),
         without=float(np.mean(visible)),
         tolerance=registers["environment.occlusionTolerance"] / steps / _mesh_units(view),
+        agrees=float(np.mean(shown == truth.object_mask[meets])),
+        psnr=psnr(*pair),
+        object_psnr=psnr(*(image[meets][np.newaxis] for image in pair)),
     )
+
+
+def _true_frame(mesh: Mesh, view: View, made: SyntheticRoom, encoded: EncodedEnvironment) -> ReferenceResult:
+    """The reference's frame in the real geometry of a room, as with ``colonnade render --truth``."""
+    from colonnade.reference.embree import RayTracer, Triangles
+    from colonnade.reference.environment.decoded import BoundingPlanes
+    from colonnade.reference.environment.true_room import TrueRoom, TrueSurface
+    from colonnade.reference.render import render_reference
+
+    environment, faces = made.environment, made.surface.faces
+    colours = np.broadcast_to(environment.albedo.mean(axis=(0, 1)), (len(faces), 3))
+    surface = TrueSurface(RayTracer(Triangles(_in_view(made), faces)), colours)
+    bounding = BoundingPlanes(environment, encoded.image)
+    room = TrueRoom(environment, surface, environment.albedo, environment.normals, None, bounding, surface)
+    return render_reference(mesh, view, backdrop=room)
+
+
+def _in_view(made: SyntheticRoom) -> Floats:
+    """The vertices of a room's surface in view space, float64 [n, 3]."""
+    to_world = made.environment.camera_to_world
+    return np.asarray((made.surface.vertices - to_world[:, 3]) @ to_world[:, :3])
 
 
 def study(progress: Progress = QUIET, output: Path | None = None) -> dict[str, OcclusionResult]:
@@ -165,11 +204,15 @@ def study(progress: Progress = QUIET, output: Path | None = None) -> dict[str, O
 
 def table(results: Mapping[str, OcclusionResult]) -> str:
     """The results as a Markdown table."""
-    lines = ["| behind | object's pixels | hidden | right | lost, kept | right without occlusion | tolerance, cm |"]
-    lines.append("|" + "---|" * 7)
+    lines = [
+        "| behind | object's pixels | hidden | right | lost, kept | right without occlusion | tolerance, cm |"
+        " as the reference in the real room | dB from it: frame, object |"
+    ]
+    lines.append("|" + "---|" * 9)
     for name, result in results.items():
         shares = (
             f"{result.hidden:.1%} | {result.right:.2%} | {result.lost:.2%}, {result.kept:.2%} | {result.without:.1%}"
         )
-        lines.append(f"| {name} | {result.pixels:,} | {shares} | {100 * result.tolerance:.2f} |")
+        truth = f"{result.agrees:.2%} | {result.psnr:.1f}, {result.object_psnr:.1f}"
+        lines.append(f"| {name} | {result.pixels:,} | {shares} | {100 * result.tolerance:.2f} | {truth} |")
     return "\n".join(lines)

@@ -24,6 +24,7 @@ def test_furniture_hides_the_object_behind_it() -> None:
     assert result.right >= 0.98 and result.without < 0.8
     np.testing.assert_allclose(result.right + result.lost + result.kept, 1.0)
     np.testing.assert_allclose(result.without + result.hidden, 1.0)
+    assert result.agrees >= 0.98 and result.psnr > 40 and result.object_psnr > 25
     assert "chest" in table({"chest": result})
 
 
