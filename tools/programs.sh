@@ -100,6 +100,13 @@ too_old() {
   fi
 }
 
+# Whether all of the packages are optional: without z3 its proofs are cancelled, without Icarus Verilog its tests are
+# skipped. Usage: are_optional [PACKAGE]…
+are_optional() {
+  local package
+  for package in "$@"; do [ "$package" = z3 ] || [ "$package" = iverilog ] || return 1; done
+}
+
 sha256_matches() { [ -f "$1" ] && [ "$(sha256sum "$1" | cut -d' ' -f1)" = "$2" ]; }
 
 # Prints the Debian packages of missing programs on one line, separated by spaces.
@@ -110,6 +117,7 @@ missing_packages() {
   has g++ || missing+=(g++)
   has make || missing+=(make)
   has z3 || missing+=(z3)
+  has iverilog || missing+=(iverilog)
   # Maven only downloads the sbt launcher, so it is not needed if the launcher exists or COLONNADE_SBT is set.
   [ -n "${COLONNADE_SBT:-}" ] || has mvn || sha256_matches "$sbt_launcher" "$sbt_launcher_sha256" || missing+=(maven)
   python="$(python_program)"

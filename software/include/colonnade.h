@@ -33,7 +33,8 @@ enum colonnade_error {
     COLONNADE_BAD_SECTION,     /* an image has a section for a memory that the device lacks, or one that is too long */
     COLONNADE_BAD_LENGTH,      /* an image's sections do not fill it */
     COLONNADE_NO_PHOTO,        /* the device cannot composite a photo */
-    COLONNADE_FRAME_INVALID    /* the device has an error bit: colonnade_device_errors */
+    COLONNADE_FRAME_INVALID,   /* the device has an error bit: colonnade_device_errors */
+    COLONNADE_NO_SCENE         /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not */
 };
 
 /* Bits of `interrupt.status` and `interrupt.enable`. */
@@ -60,6 +61,8 @@ struct colonnade_design {
     uint32_t counters;        /* byte address of the first counter, each in two words */
     uint32_t counter_count;
     uint32_t tile_size;       /* pixels */
+    uint32_t scene_page;      /* byte address of `dram.page` and of `control.invalidate`; 0 if no scene lies in DRAM */
+    uint32_t invalidate;
 };
 
 struct colonnade {
@@ -68,6 +71,8 @@ struct colonnade {
     uint32_t capabilities;
     uint32_t max_width, max_height;
     uint32_t width, height; /* of the frame that is set; 0: none */
+    bool has_scene;
+    uint64_t scene; /* address of the records in DRAM */
 };
 
 /* Bus addresses from `base` up to, and without, `end`. */
@@ -118,6 +123,10 @@ enum colonnade_error colonnade_load(struct colonnade *device, const struct colon
 /* Reads a frame file of `bytes` bytes; `frame` points into it. */
 enum colonnade_error colonnade_open_frame(const struct colonnade_design *design, const void *data, size_t bytes,
                                           struct colonnade_frame *frame);
+
+/* Says where the records lie that `colonnade pack --dram-image` writes: a multiple of 4096. It holds for all frames that are
+ * set or started from now on. Call it again, also with the same address, when the records have changed. */
+enum colonnade_error colonnade_set_scene(struct colonnade *device, uint64_t address);
 
 /* Writes the registers of a frame, also while another one runs. */
 enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct colonnade_frame *frame);

@@ -39,6 +39,9 @@ extern "C" {
 #define COLONNADE_SHELL__CAPABILITIES__TEXTURES_bm 0x10
 #define COLONNADE_SHELL__CAPABILITIES__TEXTURES_bp 4
 #define COLONNADE_SHELL__CAPABILITIES__TEXTURES_bw 1
+#define COLONNADE_SHELL__CAPABILITIES__PIXELSTREAM_bm 0x20
+#define COLONNADE_SHELL__CAPABILITIES__PIXELSTREAM_bp 5
+#define COLONNADE_SHELL__CAPABILITIES__PIXELSTREAM_bw 1
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bm 0xf00
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bp 8
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bw 4
@@ -307,6 +310,11 @@ extern "C" {
 #define COLONNADE_SHELL__PHOTO_ENABLED__VALUE_bp 0
 #define COLONNADE_SHELL__PHOTO_ENABLED__VALUE_bw 1
 
+// reg - colonnade_shell::stream_enabled
+#define COLONNADE_SHELL__STREAM_ENABLED__VALUE_bm 0x1
+#define COLONNADE_SHELL__STREAM_ENABLED__VALUE_bp 0
+#define COLONNADE_SHELL__STREAM_ENABLED__VALUE_bw 1
+
 // addrmap - colonnade_shell
 typedef struct __attribute__ ((__packed__)) {
     uint32_t identity;
@@ -355,11 +363,12 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t photo_windowEnd_high;
     uint32_t photo_stride;
     uint32_t photo_enabled;
+    uint32_t stream_enabled;
 } colonnade_shell_t;
 
 
 #ifndef __cplusplus
-_Static_assert(sizeof(colonnade_shell_t) == 0x100, "Packing error");
+_Static_assert(sizeof(colonnade_shell_t) == 0x104, "Packing error");
 #endif
 
 #ifdef __cplusplus

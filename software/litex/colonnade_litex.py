@@ -48,26 +48,37 @@ class Colonnade(LiteXModule):  # type: ignore[misc]
     Attributes:
         registers: AXI4-Lite slave, 32 bits.
         memory: AXI4 master, as wide as the design's bus.
+        scene: AXI4 master that reads a scene in DRAM, as wide as the caches' bus; None if the scene is on chip.
         ev: The interrupt.
     """
 
     def __init__(self, platform: Any, design: str | Path) -> None:
         folder = Path(design)
         width = 8 * int(json.loads((folder / "shell.json").read_text())["busBytes"])
+        records = json.loads((folder / "manifest.json").read_text())["config"]["columnBvhMemory"]
         self.registers = axi.AXILiteInterface(data_width=32, address_width=32)
         self.memory = axi.AXIInterface(data_width=width, address_width=32, id_width=1)
         self.ev = _Interrupt()
         ports = {"i_clock": ClockSignal("sys"), "i_reset": ResetSignal("sys"), "o_irq": self.ev.irq}
         ports |= _ports("s_axil", self.registers, _LITE, is_slave=True)
         ports |= _ports("m_axi", self.memory, _FULL, is_slave=False)
+        self.scene = None
+        if records["cache"]:
+            identifiers = max(1, (records["banks"] - 1).bit_length())
+            width = 8 * records["cache"]["busBytes"]
+            self.scene = axi.AXIInterface(data_width=width, address_width=32, id_width=identifiers)
+            reads = {channel: _FULL[channel] for channel in ("ar", "r")}
+            ports |= _ports("m_axi_scene", self.scene, reads, is_slave=False)
         self.specials += Instance("ColonnadeAxi", **ports)
         for name in (folder / "filelist.f").read_text().split():
             platform.add_source(str((folder / name).resolve()), "systemverilog")
 
     def attach(self, soc: Any, name: str, origin: int) -> None:
-        """Put the registers at ``origin``, where the processor does not cache, and connect master and interrupt."""
+        """Put the registers at ``origin``, where the processor does not cache, and connect masters and interrupt."""
         soc.bus.add_slave(name, self.registers, SoCRegion(origin=origin, size=REGISTER_BYTES, cached=False))
         soc.bus.add_master(name=name, master=self.memory)
+        if self.scene is not None:
+            soc.bus.add_master(name=f"{name}_scene", master=self.scene)
         if soc.irq.enabled:
             soc.irq.add(name, use_loc_if_exists=True)
 

@@ -20,6 +20,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.registers.frame_file import read_frame_file
 from colonnade.scene_image.device_image import device_image
+from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.file import SceneImage
 from PIL import Image
 
@@ -39,8 +40,10 @@ def main() -> None:
     memory = np.array([int(word, 16) for word in words if not word.startswith(("@", "//"))], dtype="<u4").view(np.uint8)
 
     files = {"frame": frame, "image": device_image(image, manifest)}
+    if "scene" in layout:
+        files["scene"] = dram_image(image, manifest)
     untouched = memory[layout["frame"] - layout["main_ram"] :].copy()
-    for name in ("frame", "image", "framebuffer"):
+    for name in (*files, "framebuffer"):
         start, size = layout[name] - layout["frame"], layout[f"{name}_bytes"]
         if name in files and untouched[start : start + size].tobytes() != files[name]:
             raise SystemExit(f"soc: the {name} in memory has changed")

@@ -1,9 +1,10 @@
 """A SoC in LiteX's simulator: VexRiscv, main memory, console, Colonnade. Its program renders a frame (docs/soc.md).
 
-Usage: simulation.py DESIGN REGISTERS IMAGE FRAME OUTPUT CONSOLE
+Usage: simulation.py DESIGN REGISTERS IMAGE FRAME OUTPUT CONSOLE [SCENE]
 
 DESIGN and REGISTERS are folders of ``colonnade generate --axi 4`` and ``colonnade registers``, IMAGE and FRAME files of
-``colonnade pack``. OUTPUT receives the build, gateware/memory.hex, and layout.json, which says where things are in it.
+``colonnade pack``, and SCENE its DRAM image if the design has a cache. OUTPUT receives the build, gateware/memory.hex,
+and layout.json, which says where things are in it.
 CONSOLE is a file for what the SoC prints.
 """
 
@@ -107,27 +108,28 @@ class ProgramBuilder(Builder):  # type: ignore[misc]
         self.soc.init_ram("main_ram", contents=words)
 
 
-def memory_layout(image: bytes, frame: bytes) -> dict[str, int]:
+def memory_layout(files: dict[str, bytes]) -> dict[str, int]:
     """Addresses and sizes; every part has an untouched page behind it."""
-    width, height = struct.unpack_from("<2I", frame, 48)
+    width, height = struct.unpack_from("<2I", files["frame"], 48)
     stride = -(-width // 16) * 16 * 4
     layout = {"width": width, "height": height, "stride": stride}
     place = MAIN_RAM + PROGRAM_BYTES
-    for name, size in {"frame": len(frame), "image": len(image), "framebuffer": stride * height}.items():
+    for name, size in {**{name: len(file) for name, file in files.items()}, "framebuffer": stride * height}.items():
         layout |= {name: place, f"{name}_bytes": size}
         place += -(-size // PAGE) * PAGE + PAGE
     if place > MAIN_RAM + MAIN_RAM_BYTES:
-        raise SystemExit(f"image and framebuffer need {place - MAIN_RAM} bytes, the memory has {MAIN_RAM_BYTES}")
+        raise SystemExit(f"files and framebuffer need {place - MAIN_RAM} bytes, the memory has {MAIN_RAM_BYTES}")
     return layout
 
 
 def main() -> None:
     """Build, simulate."""
-    if len(sys.argv) != 7:
+    if len(sys.argv) not in (7, 8):
         raise SystemExit(__doc__)
-    design, registers, image, frame, output, console = (Path(argument).resolve() for argument in sys.argv[1:])
-    files = {"image": image.read_bytes(), "frame": frame.read_bytes()}
-    layout = memory_layout(files["image"], files["frame"])
+    design, registers, image, frame, output, console, *scene = (Path(argument).resolve() for argument in sys.argv[1:])
+    names = {"frame": frame, "image": image} | dict(zip(("scene",), scene, strict=False))
+    files = {name: file.read_bytes() for name, file in names.items()}
+    layout = memory_layout(files)
     output.mkdir(parents=True, exist_ok=True)
     (output / "layout.json").write_text(json.dumps({"main_ram": MAIN_RAM, **layout}, indent=1) + "\n")
     gateware = output / "gateware"

@@ -4,7 +4,7 @@
 
 #define REGISTER(name) ((uint32_t)offsetof(colonnade_shell_t, name))
 
-enum { IDENTITY = 0x434C4E44, DEVICE_BASE = 0x8000, IMAGE_ALIGNMENT = 128 };
+enum { IDENTITY = 0x434C4E44, DEVICE_BASE = 0x8000, IMAGE_ALIGNMENT = 128, PAGE_LOG = 12 };
 
 static uint32_t get(const struct colonnade *device, uint32_t address) {
     return device->bus->read(device->bus->context, address);
@@ -80,11 +80,26 @@ static bool takes_a_frame(const struct colonnade *device) {
     return (get(device, REGISTER(status)) & ~(uint32_t)COLONNADE_SHELL__STATUS__ISRUNNING_bm) == 0;
 }
 
+enum colonnade_error colonnade_set_scene(struct colonnade *device, uint64_t address) {
+    const struct colonnade_design *design = device->design;
+    if (design->scene_page == 0) return COLONNADE_NO_SCENE;
+    if (address % (1u << PAGE_LOG) != 0) return COLONNADE_MISALIGNED;
+    if (address >> 40 != 0) return COLONNADE_TOO_LARGE;
+    if (!takes_a_frame(device)) return COLONNADE_BUSY;
+    device->scene = address;
+    device->has_scene = true;
+    set(device, design->scene_page, (uint32_t)(address >> PAGE_LOG));
+    set(device, design->invalidate, 1);
+    return COLONNADE_OK;
+}
+
 enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct colonnade_frame *frame) {
     if (frame->width > device->max_width || frame->height > device->max_height) return COLONNADE_TOO_LARGE;
     if (!takes_a_frame(device)) return COLONNADE_BUSY;
     for (size_t i = 0; i < frame->count; ++i)
         set(device, DEVICE_BASE + 4 * word(frame->writes + 8 * i), word(frame->writes + 8 * i + 4));
+    /* The file has page 0 */
+    if (device->has_scene) set(device, device->design->scene_page, (uint32_t)(device->scene >> PAGE_LOG));
     device->width = frame->width;
     device->height = frame->height;
     return COLONNADE_OK;
@@ -125,6 +140,7 @@ enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct 
 enum colonnade_error colonnade_start(struct colonnade *device, const struct colonnade_framebuffer *framebuffer) {
     static const uint32_t pixel_bytes[] = {4, 2, 8};
     if (device->width == 0 || device->height == 0) return COLONNADE_NO_FRAME;
+    if (device->design->scene_page != 0 && !device->has_scene) return COLONNADE_NO_SCENE;
     if ((uint32_t)framebuffer->format > COLONNADE_LINEAR16) return COLONNADE_BAD_FORMAT;
     uint32_t row = device->design->tile_size * pixel_bytes[framebuffer->format];
     if (framebuffer->base % row != 0 || framebuffer->stride % row != 0) return COLONNADE_MISALIGNED;
@@ -199,7 +215,7 @@ const char *colonnade_error_name(enum colonnade_error error) {
         "ok",          "noDevice",    "unknownVersion", "otherFormat", "notAnImage", "notAFrame",
         "truncated",   "tooLarge",    "misaligned",     "badRegister", "badFormat",  "noFrame",
         "busy",        "timeout",     "busResponse",    "badSection",  "badLength",  "noPhoto",
-        "frameInvalid",
+        "frameInvalid", "noScene",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }

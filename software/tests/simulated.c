@@ -1,9 +1,10 @@
 /* The driver against a simulated device: commands of the shell's test bench go to the standard output, its answers come
  * from the standard input. Renders a frame in each format, two of them queued, and then tries what the device has to refuse.
  *
- * usage: simulated IMAGE FRAME interrupt|poll
+ * usage: simulated IMAGE FRAME interrupt|poll [SCENE]
  *
- * Memory: the image at PAGE, framebuffers behind it, each in a window of its size with a page of untouched memory around. */
+ * Memory: the image at PAGE, the records of a scene in DRAM behind it, then framebuffers, each in a window of its size.
+ * A page of untouched memory is around each of them. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -66,7 +67,7 @@ static uint64_t pages(uint64_t bytes) { return (bytes + PAGE - 1) / PAGE * PAGE;
 int main(int argc, char **argv) {
     static const struct colonnade_bus bus = {bus_read, bus_write, bus_wait, NULL};
     static const uint32_t pixel_bytes[] = {4, 2, 8};
-    if (argc != 4) fail("usage");
+    if (argc != 4 && argc != 5) fail("usage");
     waits_for_interrupt = strcmp(argv[3], "interrupt") == 0;
     size_t image_bytes, frame_bytes;
     uint8_t *image_data = read_file(argv[1], &image_bytes);
@@ -95,6 +96,14 @@ int main(int argc, char **argv) {
     if (waits_for_interrupt) colonnade_enable_interrupts(&device, COLONNADE_FRAME_DONE);
     uint32_t tile = colonnade_design.tile_size, columns = (frame.width + tile - 1) / tile * tile;
     uint64_t place = PAGE + pages(image_bytes) + PAGE;
+    if (argc == 5) {
+        size_t scene_bytes;
+        free(read_file(argv[4], &scene_bytes));
+        printf("store %s %" PRIu64 "\n", argv[4], place);
+        expect(colonnade_set_scene(&device, place), COLONNADE_OK, "set scene");
+        fprintf(stderr, "scene %" PRIu64 "\n", place);
+        place += pages(scene_bytes) + PAGE;
+    }
     for (uint32_t format = COLONNADE_XRGB8888; format <= COLONNADE_LINEAR16; ++format) {
         uint32_t stride = columns * pixel_bytes[format];
         uint64_t bytes = (uint64_t)stride * frame.height;

@@ -227,6 +227,35 @@ static void test_frames(struct stub *stub, struct colonnade *device) {
     free(file);
 }
 
+/* A scene on chip; then one in DRAM, whose page every frame gets. */
+static void test_scenes(struct stub *stub, struct colonnade *device) {
+    static const uint8_t writes[8] = {8}; /* page 0 */
+    const struct colonnade_frame frame = {writes, 1, 10, 2};
+    const struct colonnade_framebuffer framebuffer = {4096, 64, COLONNADE_XRGB8888, {4096, 4096 + 128}};
+    CHECK(colonnade_set_scene(device, 4096) == COLONNADE_NO_SCENE);
+    struct colonnade_design in_dram = design;
+    in_dram.scene_page = 0x8020;
+    in_dram.invalidate = 0x8000;
+    device->design = &in_dram;
+    stub->shell[AT(status)] = 1;
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK);
+    CHECK(colonnade_start(device, &framebuffer) == COLONNADE_NO_SCENE);
+    CHECK(colonnade_set_scene(device, 2048) == COLONNADE_MISALIGNED);
+    CHECK(colonnade_set_scene(device, 1ull << 40) == COLONNADE_TOO_LARGE);
+    stub->shell[AT(status)] = 2;
+    CHECK(colonnade_set_scene(device, 4096) == COLONNADE_BUSY);
+    stub->shell[AT(status)] = 1;
+    CHECK(colonnade_start(device, &framebuffer) == COLONNADE_NO_SCENE);
+    CHECK(colonnade_set_scene(device, (1ull << 40) - 4096) == COLONNADE_OK);
+    CHECK(stub->device[8] == 0xFFFFFFF && stub->device[0] == 1);
+    stub->device[8] = 0;
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK && stub->device[8] == 0xFFFFFFF);
+    CHECK(colonnade_start(device, &framebuffer) == COLONNADE_OK);
+    stub->shell[AT(status)] = 0;
+    device->design = &design;
+    device->has_scene = false;
+}
+
 static void test_photos(struct stub *stub, struct colonnade *device) {
     struct colonnade_photo photo = {4096, 64, {4096, 4096 + 2 * 64}};
     device->width = device->height = 0;
@@ -262,9 +291,10 @@ int main(void) {
     test_images(stub, &device);
     test_frames(stub, &device);
     test_photos(stub, &device);
-    for (int error = COLONNADE_OK; error <= COLONNADE_FRAME_INVALID; ++error)
+    test_scenes(stub, &device);
+    for (int error = COLONNADE_OK; error <= COLONNADE_NO_SCENE; ++error)
         CHECK(strcmp(colonnade_error_name((enum colonnade_error)error), "unknown") != 0);
-    CHECK(strcmp(colonnade_error_name((enum colonnade_error)(COLONNADE_FRAME_INVALID + 1)), "unknown") == 0);
+    CHECK(strcmp(colonnade_error_name((enum colonnade_error)(COLONNADE_NO_SCENE + 1)), "unknown") == 0);
     uint32_t word = 3;
     colonnade_mmio_write(&word, 0, 4);
     CHECK(colonnade_mmio_read(&word, 0) == 4);

@@ -18,6 +18,7 @@ from colonnade.common.errors import UserError
 @click.option("--print", "print_manifest", is_flag=True, help="Print the manifest instead of writing files.")
 @click.option("--black-box-memories", is_flag=True, help="Emit memories as black boxes, for SRAM macros.")
 @click.option("--axi", "bus_bytes", type=int, metavar="BYTES", help="Add the AXI4 shell, with a bus of 4 to 128 BYTES.")
+@click.option("--pixel-stream", is_flag=True, help="Add an AXI4-Stream of pixels to the shell of --axi.")
 @json_option
 def generate(
     config: str,
@@ -27,6 +28,7 @@ def generate(
     print_manifest: bool,
     black_box_memories: bool,
     bus_bytes: int | None,
+    pixel_stream: bool,
     json_file: Path | None,
 ) -> None:
     """Generate the accelerator: SystemVerilog files, their list filelist.f, and manifest.json.
@@ -51,7 +53,9 @@ def generate(
         design = generator.manifest_for(config, overrides, terminal)
         echo((design.dir / "manifest.json").read_text().rstrip("\n"))
     else:
-        design = generator.generate(config, overrides, output, manifest_only, black_box_memories, terminal, bus_bytes)
+        design = generator.generate(
+            config, overrides, output, manifest_only, black_box_memories, terminal, bus_bytes, pixel_stream
+        )
     files = design_folder.listed(design.dir)
     manifest = json.loads((design.dir / "manifest.json").read_text())
     if output is not None:

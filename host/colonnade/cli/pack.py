@@ -29,6 +29,12 @@ from colonnade.cli.options import (
     "--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; created if missing."
 )
 @click.option("--device-image", type=FILE, metavar="FILE", help="Also write the image that the AXI4 shell loads.")
+@click.option(
+    "--dram-image",
+    type=FILE,
+    metavar="FILE",
+    help="Also write the records as a design with a cache reads them from DRAM.",
+)
 @click.option("--frame-file", type=FILE, metavar="FILE", help="Also write the registers of a frame, for a driver.")
 @size_option("Frame size of --frame-file, e.g. 640x480.  [default: that of the scene]")
 @strict_option
@@ -41,6 +47,7 @@ def pack(
     background: Path | None,
     output: Path,
     device_image: Path | None,
+    dram_image: Path | None,
     frame_file: Path | None,
     size: str | None,
     json_file: Path | None,
@@ -61,13 +68,15 @@ def pack(
     from colonnade.scene.object_mesh import object_mesh
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.device_image import device_image as encode_device_image
+    from colonnade.scene_image.dram_image import dram_image as encode_dram_image
+    from colonnade.scene_image.dram_image import line_layout
     from colonnade.scene_image.file import check_image_file, image_file
     from colonnade.scene_image.inspect import describe, print_report
     from colonnade.scene_image.packer import memory_use
 
     file = image_file(output)
     check_image_file(file)
-    require_outputs(json_file, device_image, frame_file, folders=[file.parent])
+    require_outputs(json_file, device_image, dram_image, frame_file, folders=[file.parent])
     declare_output(file)
     terminal = progress.for_terminal()
     pixels = parse_size(size) if size is not None else None
@@ -77,6 +86,8 @@ def pack(
     if background is not None:
         described = described.with_environment(background)
     manifest = manifest_for(config, overrides, terminal).manifest
+    if dram_image is not None:
+        line_layout(manifest)
     with terminal.step("packing"):
         maps = device_room(described, manifest)
         surface = object_mesh(described, maps, manifest.corner_colours)
@@ -89,6 +100,10 @@ def pack(
         with replacing(device_image) as stream:
             stream.write(encode_device_image(image, manifest))
         echo(f"for a bus   {device_image}")
+    if dram_image is not None:
+        with replacing(dram_image) as stream:
+            stream.write(encode_dram_image(image, manifest))
+        echo(f"for DRAM    {dram_image}")
     if frame_file is not None:
         width, height = pixels or (described.frame.width, described.frame.height)
         registers = frame_registers(room.scene, image.header, manifest, width, height, environment)

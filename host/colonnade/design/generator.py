@@ -89,10 +89,15 @@ def shell_manifest_for(
 
 
 def shell_design_for(
-    config: str, overrides: Sequence[str] = (), bus_bytes: int = 16, progress: Progress = QUIET
+    config: str,
+    overrides: Sequence[str] = (),
+    bus_bytes: int = 16,
+    progress: Progress = QUIET,
+    pixel_stream: bool = False,
 ) -> GeneratedDesign:
     """Generate the device in its AXI4 shell, for simulation; ``shell.json`` has the shell's registers."""
-    return _cached(config, overrides, _shell_options(bus_bytes), progress)
+    options = (*_shell_options(bus_bytes), *("--pixel-stream",) * pixel_stream)
+    return _cached(config, overrides, options, progress)
 
 
 def generate(
@@ -103,6 +108,7 @@ def generate(
     black_box_memories: bool = False,
     progress: Progress = QUIET,
     bus_bytes: int | None = None,
+    pixel_stream: bool = False,
 ) -> GeneratedDesign:
     """Generate into the user's folder ``output``; `design_folder` defines which folders it may replace.
 
@@ -112,10 +118,12 @@ def generate(
         manifest_only, black_box_memories: Options of the generator.
         progress: Shows the steps.
         bus_bytes: Generate the AXI4 shell, too, with a bus of so many bytes.
+        pixel_stream: The shell has an AXI4-Stream of pixels.
     """
     check_replaceable(output)
     options = ("--manifest-only",) * manifest_only + ("--black-box-memories",) * black_box_memories
     options += () if bus_bytes is None else _shell_options(bus_bytes)
+    options += ("--pixel-stream",) * pixel_stream
     design = _cached(config, overrides, options, progress)
     replace_folder(design.dir, output)
     return GeneratedDesign(output, design.manifest)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import shutil
-import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,25 +11,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from colonnade.common import cache, processes
 from colonnade.common.framebuffer_formats import PIXEL_BYTES
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import GeneratedDesign
-from colonnade.design.toolchain import cache_directory, project_root
-from colonnade.device.compiler import SAFE, require_right_compiler
-from colonnade.device.simulator_build import (
-    PROGRAM,
-    build_environment,
-    optimisation,
-    simulator_tools,
-    verilator_command,
-)
+from colonnade.device.shell_build import build_shell_simulator
 from colonnade.device.verilator import run_program
 from colonnade.scene_image.device_image import device_image
+from colonnade.scene_image.dram_image import PAGE_BYTES, dram_image
 from colonnade.scene_image.file import SceneImage
 
-_TOP = "ColonnadeAxi"
 _START, _LOAD = 1, 2
 _MAX_CYCLES = 50_000_000
 
@@ -98,8 +86,11 @@ def render_shell(
     bus: Bus | None = None,
     progress: Progress = QUIET,
     photo: npt.NDArray[np.uint8] | None = None,
+    scene_errors: Sequence[int] = (),
 ) -> list[ShellFrame]:
     """Render a frame for each set of registers, in the format of the same index, through the bus.
+
+    With a cache the records lie behind the frames, and ``dram.page`` is set to their address.
 
     Args:
         design: A design with its shell (`generator.shell_design_for`).
@@ -109,6 +100,7 @@ def render_shell(
         bus: The memory's timing.
         progress: Shows the steps.
         photo: Composited into the frames, which then have one size: sRGB, uint8 [height, width, 3].
+        scene_errors: With a cache: for each frame, how many of 1024 beats of the scene's reads fail; none if empty.
 
     Raises:
         RuntimeError: The shell breaks a rule of AXI, refuses an access, leaves its windows, or hangs.
@@ -118,12 +110,12 @@ def render_shell(
     shell = ShellMap(design)
     tile = int(design.manifest.config["frame"]["tileSize"])
     data = device_image(image, design.manifest)
-    base = -(-len(data) // 4096) * 4096
+    base = _pages(len(data))
     places, end = [], base
     for values, code in zip(registers, formats, strict=True):
         stride = -(-values["frame.width"] // tile) * tile * PIXEL_BYTES[code]
         places.append((end, stride, values["frame.height"]))
-        end += -(-stride * values["frame.height"] // 4096) * 4096
+        end += _pages(stride * values["frame.height"])
     with temporary_folder() as folder:
         (folder / "image").write_bytes(data)
         lines = ["store image 0", *_load(shell, len(data))]
@@ -132,8 +124,16 @@ def render_shell(
             (folder / "photo").write_bytes(stored.tobytes())
             lines += [f"store photo {end}", *_photo(shell, end, stored)]
             end += stored.size
+        scene = {}
+        if design.manifest.config["columnBvhMemory"]["cache"]:
+            (folder / "scene").write_bytes(records := dram_image(image, design.manifest))
+            end = _pages(end)
+            lines.append(f"store scene {end}")
+            scene = {"dram.page": end // PAGE_BYTES}
+            end += len(records)
         for index, (values, code, place) in enumerate(zip(registers, formats, places, strict=True)):
-            lines += _frame(shell, design, values, code, place)
+            lines += [f"fail {scene_errors[index]}"] if scene_errors else []
+            lines += _frame(shell, design, {**values, **scene}, code, place)
             lines.append(f"dump frame{index} {place[0]} {place[1] * place[2]}")
         (folder / "job").write_text("\n".join(lines) + "\n")
         options = {"bus": shell.bus_bytes, "memory": end, "latency": bus.latency, "stall": bus.stall, "seed": bus.seed}
@@ -141,6 +141,11 @@ def render_shell(
         with progress.step("rendering through the bus") as report:
             output = run_program([str(program), *arguments, "job"], folder, report)
         return _frames(folder, output, places)
+
+
+def _pages(size: int) -> int:
+    """Bytes of the pages that hold so many bytes."""
+    return -(-size // PAGE_BYTES) * PAGE_BYTES
 
 
 def _photo_lines(photo: npt.NDArray[np.uint8], tile: int) -> npt.NDArray[np.uint8]:
@@ -204,38 +209,3 @@ def _frames(folder: Path, output: Sequence[str], places: Sequence[tuple[int, int
         of_frame = values[index + 1]
         frames.append(ShellFrame(lines, waits[index + 1], of_frame.pop("framebuffer.errors"), of_frame))
     return frames
-
-
-def build_shell_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path:
-    """The simulator of a design in its shell, one model, built unless the cache has it."""
-    tools = simulator_tools()
-    harness = Path(__file__).parent / "harness" / "shell.cpp"
-    parts = [
-        *tools.versions,
-        Path(__file__).read_text(),
-        harness.read_text(),
-        *verilator_command(tools),
-        design.digest(),
-    ]
-    key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
-    folder = cache_directory(project_root()) / "simulator" / key
-
-    def make(output: Path) -> None:
-        log = folder.with_suffix(".log")
-        with progress.step("building the simulator of the shell"), temporary_folder() as work:
-            require_right_compiler(tools.compiler, (optimisation().flag, *SAFE))
-            for source in [*design.sources, harness]:
-                shutil.copy(source, work / source.name)
-            # Registers begin with random values, as at power-up
-            command = [*verilator_command(tools), "--x-initial", "unique", "--top-module", _TOP, "--Mdir", "obj"]
-            command += ["--exe", "-o", PROGRAM, harness.name, *(source.name for source in design.sources)]
-            with log.open("w") as stream:
-                done = processes.run(
-                    command, cwd=work, env=build_environment(), stdout=stream, stderr=subprocess.STDOUT
-                )
-            if done.returncode != 0:
-                raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
-            shutil.move(work / "obj" / PROGRAM, output / PROGRAM)
-        log.unlink()
-
-    return cache.entry(folder, make, "simulator", progress) / PROGRAM

@@ -125,7 +125,7 @@ def _build(
         if not _PLAIN_PATH.fullmatch(str(work)):
             raise UserError(f"make cannot build a simulator in {work.parent.parent}: set TMPDIR to a plain path")
         models = write_sources(design.sources, work)
-        (work / "ports.hpp").write_text(_ports_header(design.manifest, design.sources))
+        (work / "ports.hpp").write_text(ports_header(design.manifest, design.sources))
         for name in _HARNESS:
             shutil.copy(harness / name, work / name)
         commands = [_verilate(tools, top, [path.relative_to(work) for path in paths]) for top, paths in models.items()]
@@ -164,7 +164,7 @@ def _verilate(tools: Tools, top: str, sources: Sequence[Path]) -> list[str]:
     return [*verilator_command(tools), "--top-module", top, "--Mdir", f"obj_{top}", *map(str, sources)]
 
 
-def _ports_header(manifest: Manifest, sources: Sequence[Path]) -> str:
+def ports_header(manifest: Manifest, sources: Sequence[Path]) -> str:
     """``ports.hpp``: macros with the port names and counts of this design, for the harness."""
     columns = int(manifest.config["array"]["columns"])
     header = "#pragma once\n#define EACH_COLUMN(DO) " + " ".join(f"DO({column})" for column in range(columns)) + "\n"

@@ -35,6 +35,7 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
         f"    .counters = {_place(table, manifest, counters)},",
         f"    .counter_count = {len(counters)},",
         f"    .tile_size = {manifest.config['frame']['tileSize']},",
+        *_scene_in_dram(table, manifest),
         "};",
         "",
         "#endif",
@@ -62,6 +63,18 @@ def _first_frame_register(table: RegisterTable) -> int:
 
 def _place(table: RegisterTable, manifest: Manifest, names: list[str]) -> str:
     return f"{table.device.base + 4 * manifest.registers[names[0]].address:#x}"
+
+
+def _scene_in_dram(table: RegisterTable, manifest: Manifest) -> list[str]:
+    """The registers that place the scene, in a design with a cache."""
+    if not manifest.config["columnBvhMemory"]["cache"]:
+        return []
+    if manifest.registers["dram.page"].words != 1:
+        raise ValueError("dram.page has more than one word")
+    return [
+        f"    .scene_page = {_place(table, manifest, ['dram.page'])},",
+        f"    .invalidate = {_place(table, manifest, ['control.invalidate'])},",
+    ]
 
 
 def _constant(name: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,25 @@ def test_frames_in_memory_are_those_of_the_model(design: GeneratedDesign, bus: B
         assert_bytes(frame, framebuffer_bytes(expected, code), PIXEL_BYTES[code])
         assert frame.values["counters.hits"] == expected.counters["hits"]
         assert not any(value for name, value in frame.values.items() if name.startswith("errors."))
+
+
+def test_a_scene_in_dram_is_read_by_the_second_master() -> None:
+    """A frame whose reads fail ends and says so, and the next one is right. Reads overtake each other."""
+    cache = {"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2, "sharedMisses": 8}
+    cache |= {"busBytes": 32, "parity": True}
+    design = shell_design_for("tiny", ("array.columns=2", f"columnBvhMemory.cache={json.dumps(cache)}"), bus_bytes=16)
+    image = pack(load_mesh("torus"), design.manifest)
+    scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")
+    registers = frame_registers(scene, image.header, design.manifest, WIDTH, HEIGHT)
+    expected = render_model(design.manifest, image, registers)
+    errors, formats = [0, 4, 0, 30, 0], [0, 1, 1, 0, 2]
+    bus = Bus(latency=30, stall=20, seed=5)
+    frames = render_shell(design, image, [registers] * len(errors), formats, bus, scene_errors=errors)
+    for frame, error, code in zip(frames, errors, formats, strict=True):
+        assert (frame.values["errors.memory"] != 0) is (error > 0)
+        assert frame.errors == 0 and frame.values["counters.dramReads"] > 0
+        if not error:
+            assert_bytes(frame, framebuffer_bytes(expected, code), PIXEL_BYTES[code])
 
 
 @pytest.mark.matrix

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 from pathlib import Path
@@ -13,7 +14,7 @@ from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
-from colonnade.device.shell import build_shell_simulator
+from colonnade.device.shell_build import build_shell_simulator
 from colonnade.integration.design_header import design_header
 from colonnade.integration.register_table import register_table
 from colonnade.mesh.load import load_mesh
@@ -21,6 +22,7 @@ from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.device_image import device_image
+from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.packer import pack
 
 SOFTWARE = toolchain.project_root() / "software"
@@ -31,6 +33,10 @@ RISCV = "riscv64-unknown-elf-gcc"
 WIDTH, HEIGHT = 44, 33
 PAGE = 4096
 UNWRITTEN = 0xA5
+CACHE = {
+    **{"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2, "sharedMisses": 8},
+    **{"busBytes": 32, "parity": False},
+}
 
 
 @pytest.fixture(scope="module")
@@ -66,18 +72,30 @@ def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> 
     compile_c([SOFTWARE / "examples" / "uio.c", *DRIVER], tmp_path / "uio")
 
 
-@pytest.mark.parametrize("mode", ["interrupt", "poll"])
-def test_frames_by_the_driver_are_those_of_the_model(tmp_path: Path, design: GeneratedDesign, mode: str) -> None:
+#: A design, and how the driver waits.
+CASES = {
+    "by interrupts": ((), "interrupt"),
+    "by polling": ((), "poll"),
+    "scene in DRAM": ((f"columnBvhMemory.cache={json.dumps(CACHE)}",), "interrupt"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_frames_by_the_driver_are_those_of_the_model(tmp_path: Path, case: str) -> None:
     """Bad images are refused by name, and no byte outside the windows changes."""
+    overrides, mode = CASES[case]
+    design = shell_design_for("tiny", ("array.columns=2", *overrides), bus_bytes=16)
     manifest = design.manifest
     image = pack(load_mesh("torus"), manifest)
     scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")
     registers = frame_registers(scene, image.header, manifest, WIDTH, HEIGHT)
     expected = render_model(manifest, image, registers)
     data = device_image(image, manifest)
-    (tmp_path / "image").write_bytes(data)
-    (tmp_path / "other").write_bytes(data[:44] + bytes([data[44] ^ 1]) + data[45:])
-    (tmp_path / "frame").write_bytes(frame_file(registers, manifest))
+    records = dram_image(image, manifest) if overrides else b""
+    files = {"image": data, "other": data[:44] + bytes([data[44] ^ 1]) + data[45:], "scene": records}
+    files["frame"] = frame_file(registers, manifest)
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
     (tmp_path / "colonnade_design.h").write_text(design_header(register_table(design), manifest))
     driver = compile_c([SOFTWARE / "tests" / "simulated.c", *DRIVER], tmp_path / "driver")
 
@@ -87,7 +105,7 @@ def test_frames_by_the_driver_are_those_of_the_model(tmp_path: Path, design: Gen
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "cwd": tmp_path}
     with subprocess.Popen([simulator, *arguments, "-"], stderr=subprocess.PIPE, **pipes) as device:
         done = subprocess.run(
-            [driver, "image", "frame", mode],
+            [driver, "image", "frame", mode, *(["scene"] if records else [])],
             stdin=device.stdout,
             stdout=device.stdin,
             stderr=subprocess.PIPE,
@@ -102,6 +120,10 @@ def test_frames_by_the_driver_are_those_of_the_model(tmp_path: Path, design: Gen
     np.testing.assert_array_equal(memory[PAGE : PAGE + len(data)], np.frombuffer(data, dtype=np.uint8))
     memory[PAGE : PAGE + len(data)] = UNWRITTEN
     frames = [line.split() for line in done.stderr.decode().splitlines()]
+    if records:
+        place = int(frames.pop(0)[1])
+        assert memory[place : place + len(records)].tobytes() == records
+        memory[place : place + len(records)] = UNWRITTEN
     assert len(frames) == 4
     for code, (_, place, stride, _, hits) in zip((0, 1, 2, 0), frames, strict=True):
         lines = memory[int(place) : int(place) + int(stride) * HEIGHT].reshape(HEIGHT, int(stride))

@@ -75,6 +75,9 @@ int main(void) {
     check("load", colonnade_load(&device, &image, ATTEMPTS));
     uint32_t loaded = now();
 
+#ifdef SCENE
+    check("set scene", colonnade_set_scene(&device, SCENE));
+#endif
     struct colonnade_frame frame;
     check("frame file", colonnade_open_frame(&colonnade_design, (const void *)FRAME, FRAME_BYTES, &frame));
     check("set frame", colonnade_set_frame(&device, &frame));

@@ -20,7 +20,11 @@ struct DramOptions {
 /// Layout of the scene: lines of `lineRecords` records at a pitch of `linePitch` bytes, from address 0.
 template <class Top> class Dram {
 public:
-    Dram(Top& top, const DramOptions& options) : top_(top), options_(options), random_(options.seed) {}
+    Dram(Top& top, const DramOptions& options) : Dram(top, options, own_) {}
+
+    /// A DRAM whose content is `memory`, which others may change.
+    Dram(Top& top, const DramOptions& options, std::vector<unsigned char>& memory)
+        : top_(top), options_(options), random_(options.seed), memory_(memory) {}
 
     /// Writes a record, as the host would.
     void store(std::uint64_t address, const void* record, std::size_t bytes) {
@@ -66,6 +70,9 @@ public:
     /// From now on no read fails.
     void stopFailing() { options_.errorsPer1024 = options_.silentAfter = 0; }
 
+    /// From now on so many of 1024 beats fail.
+    void fail(unsigned errorsPer1024) { options_.errorsPer1024 = errorsPer1024; }
+
 private:
     struct Read {
         std::uint64_t address, due;
@@ -94,7 +101,8 @@ private:
     Top& top_;
     DramOptions options_;
     std::mt19937 random_;
-    std::vector<unsigned char> memory_;
+    std::vector<unsigned char> own_;
+    std::vector<unsigned char>& memory_;
     std::deque<Read> reads_;
     std::size_t chosen_ = 0;
     bool offers_ = false, fails_ = false;

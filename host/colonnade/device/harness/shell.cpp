@@ -7,117 +7,22 @@
 //   wait CYCLES                waits for the interrupt, so many cycles at most; prints "waited CYCLES"
 //   run CYCLES                 goes on for so many cycles, or until the interrupt; prints "ran CYCLES"
 //   dump FILE ADDRESS BYTES    writes a range of the memory to a file; bytes that were never written are 0xA5
+//   fail BEATS                 so many of 1024 beats of the scene's reads are answered with an error from now on
 //
 // Options: --bus BYTES of the data bus; --memory BYTES of memory, from address 0; --latency CYCLES of an answer; --stall
 // PERCENT of cycles in which a channel does not move; --seed N of stalls and of the state at power-up. An access beyond the memory, an answer with an error, or a
 // broken rule of AXI ends the run. Exit status 0, or 3 on an error.
 #include <cstdint>
-#include <cstring>
-#include <deque>
 #include <fstream>
 #include <iostream>
 #include <map>
-#include <random>
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
-#include "VColonnadeAxi.h"
+#include "shell_memory.hpp"
 
 namespace {
-
-/// The memory behind m_axi. Answers come in order.
-class Memory {
-public:
-    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options)
-        : top_(top), bus_(options["--bus"]), latency_(options["--latency"]), stall_(options["--stall"]), random_(options["--seed"]),
-          bytes_(options["--memory"], 0xA5) {}
-
-    std::uint8_t* range(std::uint64_t address, std::uint64_t size) {
-        if (address > bytes_.size() || size > bytes_.size() - address) throw std::runtime_error("an access beyond the memory");
-        return &bytes_[address];
-    }
-
-    /// Sets the inputs for this cycle. What is offered stays.
-    void offer() {
-        ++now_;
-        top_.m_axi_awready = moves();
-        top_.m_axi_wready = moves();
-        top_.m_axi_arready = moves();
-        top_.m_axi_bvalid = top_.m_axi_bvalid ? 1 : !answers_.empty() && answers_.front() <= now_ && moves();
-        top_.m_axi_rvalid = top_.m_axi_rvalid ? 1 : !reads_.empty() && reads_.front().due <= now_ && moves();
-        if (top_.m_axi_rvalid) {
-            const Burst& read = reads_.front();
-            std::memcpy(&top_.m_axi_rdata, range(read.address + read.done * bus_, bus_), bus_);
-            top_.m_axi_rlast = read.done + 1 == read.beats;
-        }
-        top_.eval();
-    }
-
-    /// Takes the transfers of this cycle; afterwards `offer` may change what was taken.
-    void take() {
-        if (top_.m_axi_awvalid && top_.m_axi_awready) writes_.push_back(burst(top_.m_axi_awaddr, top_.m_axi_awlen));
-        if (top_.m_axi_arvalid && top_.m_axi_arready) reads_.push_back(burst(top_.m_axi_araddr, top_.m_axi_arlen));
-        if (top_.m_axi_wvalid && top_.m_axi_wready) write();
-        if (top_.m_axi_bvalid && top_.m_axi_bready) {
-            answers_.pop_front();
-            takenB_ = true;
-        }
-        if (top_.m_axi_rvalid && top_.m_axi_rready) {
-            if (++reads_.front().done == reads_.front().beats) reads_.pop_front();
-            takenR_ = true;
-        }
-    }
-
-    /// After the clock edge: withdraws what was taken.
-    void finish() {
-        if (takenB_) top_.m_axi_bvalid = 0;
-        if (takenR_) top_.m_axi_rvalid = 0;
-        takenB_ = takenR_ = false;
-    }
-
-private:
-    struct Burst {
-        std::uint64_t address, due;
-        unsigned beats, done;
-    };
-
-    bool moves() { return stall_ == 0 || random_() % 100 >= stall_; }
-
-    Burst burst(std::uint64_t address, unsigned length) {
-        const std::uint64_t first = address / bus_ * bus_, end = first + (length + 1ull) * bus_;
-        if (first / 4096 != (end - 1) / 4096) throw std::runtime_error("a burst crosses a page of 4 KB");
-        range(first, end - first);
-        return {first, now_ + latency_, length + 1, 0};
-    }
-
-    void write() {
-        if (writes_.empty()) throw std::runtime_error("data come before their address");
-        Burst& burst = writes_.front();
-        std::uint8_t data[128];
-        std::memcpy(data, &top_.m_axi_wdata, bus_);
-        std::uint8_t strobes[16] = {};
-        std::memcpy(strobes, &top_.m_axi_wstrb, (bus_ + 7) / 8);
-        std::uint8_t* to = range(burst.address + burst.done * bus_, bus_);
-        for (unsigned i = 0; i < bus_; ++i)
-            if (strobes[i / 8] >> i % 8 & 1) to[i] = data[i];
-        ++burst.done;
-        if ((top_.m_axi_wlast != 0) != (burst.done == burst.beats)) throw std::runtime_error("a burst does not end with its last beat");
-        if (burst.done < burst.beats) return;
-        writes_.pop_front();
-        answers_.push_back(now_ + latency_);
-    }
-
-    VColonnadeAxi& top_;
-    unsigned bus_, latency_, stall_;
-    std::mt19937 random_;
-    std::vector<std::uint8_t> bytes_;
-    std::deque<Burst> writes_, reads_;
-    std::deque<std::uint64_t> answers_;
-    std::uint64_t now_ = 0;
-    bool takenB_ = false, takenR_ = false;
-};
 
 class Harness {
 public:
@@ -182,6 +87,8 @@ public:
         return value;
     }
 
+    void fail(unsigned errorsPer1024) { memory_.failScene(errorsPer1024); }
+
     std::uint64_t wait(std::uint64_t most) {
         std::uint64_t cycles = 0;
         for (; !top_.irq; ++cycles) {
@@ -223,14 +130,15 @@ void run(const std::string& job, std::map<std::string, unsigned>& options) {
         std::string command, name;
         std::uint64_t first = 0, second = 0;
         words >> command;
-        const bool isWait = command == "wait" || command == "run";
-        if (command != "write" && !isWait) words >> name;
+        const bool isNumber = command == "wait" || command == "run" || command == "fail";
+        if (command != "write" && !isNumber) words >> name;
         words >> first;
-        if (command != "store" && !isWait) words >> second;
+        if (command != "store" && !isNumber) words >> second;
         if (!words) throw std::runtime_error("cannot parse: " + line);
         if (command == "store") harness.store(name, first);
         else if (command == "dump") harness.dump(name, first, second);
         else if (command == "write") harness.write(static_cast<unsigned>(first), static_cast<std::uint32_t>(second));
+        else if (command == "fail") harness.fail(static_cast<unsigned>(first));
         else if (command == "wait") std::cout << "waited " << harness.wait(first) << '\n';
         else if (command == "run") std::cout << "ran " << harness.run(first) << '\n';
         else if (command == "read") {

@@ -26,13 +26,19 @@ final class ColonnadeAxi(
   val scenePins = config.columnBvhMemory.cache.map { cache =>
     IO(AxiPins.reads(DramPort.idBits(config), cache.busBytes)).suggestName("m_axi_scene")
   }
+
+  /** With a pixel stream: rows of tiles. */
+  val streamPins =
+    Option.when(shell.pixelStream)(IO(AxiPins.stream(new PixelBeat(shell.busBytes))).suggestName("m_axis"))
   val interrupt = IO(Output(Bool())).suggestName("irq")
 
   private val slave      = Module(new AxiLiteSlave(ShellMap.addressBits))
   private val registers  = Module(new ShellRegisters(config, shell))
-  private val control    = Module(new ShellControl(config))
+  private val control    = Module(new ShellControl(config, shell))
   private val writeGuard = Module(new AxiWriteGuard(BurstWriter.idBits, shell.busBytes))
   private val readGuard  = Module(new AxiReadGuard(BurstWriter.idBits, shell.busBytes, PhotoCompositor.maxRows))
+
+  private val streamGuard = streamPins.map(_ => Module(new StreamGuard(shell.busBytes)))
 
   // What a soft reset resets
   private val clears = reset.asBool || control.io.reset
@@ -65,13 +71,18 @@ final class ColonnadeAxi(
 
   // Frames
   control.io.deviceDone   := device.io.done
-  control.io.writerIsIdle := writer.io.isIdle && writeGuard.io.isIdle
+  control.io.writerIsIdle := writer.io.isIdle && writeGuard.io.isIdle && streamGuard.fold(true.B)(_.isIdle)
   control.io.writerErrors := writer.io.errors
   writer.io.clearErrors   := control.io.clearErrors
   writer.io.flush         := control.io.flush
   writer.io.settings      := control.io.framebuffer
   writer.io.pixels.zip(device.io.pixels).foreach { case (sink, pixels) => sink :<>= pixels }
   writeGuard.io.inner :<>= writer.io.axi
+  for (pins <- streamPins; guard <- streamGuard) {
+    guard.inner :<>= writer.io.stream.get
+    guard.abandon := control.io.reset
+    pins.stream(guard.out)
+  }
 
   // Images
   control.io.loaderIsIdle := loader.io.isIdle
@@ -108,5 +119,7 @@ final class ColonnadeAxi(
   private val guards = readGuard +: sceneGuard.toSeq
   guards.foreach(_.io.abandon := control.io.reset)
   writeGuard.io.abandon := control.io.reset
-  control.io.busIsIdle  := writeGuard.io.isIdle && guards.map(_.io.isIdle).reduce(_ && _)
+  control.io.busIsIdle  := writeGuard.io.isIdle && streamGuard.fold(true.B)(_.isIdle) && guards.map(
+    _.io.isIdle
+  ).reduce(_ && _)
 }

@@ -20,6 +20,7 @@ object Generate {
       |  --output DIR          takes the place of an earlier output that nobody changed; never half-written
       |  --manifest-only       writes no Verilog
       |  --axi BYTES           puts the device into its AXI4 shell, with a bus of 4 to 128 BYTES; shell.json has its registers
+      |  --pixel-stream        gives the shell an AXI4-Stream of pixels, to which frames can go
       |  --black-box-memories  leaves memories to be filled in; memories.json lists their shapes
       |  --formats-page FILE   writes the formats as a Markdown page
       |  --help                prints this
@@ -31,6 +32,7 @@ object Generate {
       output:           Option[String] = None,
       formatsPage:      Option[String] = None,
       axi:              Option[ShellConfig] = None,
+      pixelStream:      Boolean = false,
       manifestOnly:     Boolean = false,
       blackBoxMemories: Boolean = false,
       help:             Boolean = false
@@ -56,6 +58,9 @@ object Generate {
     axi.fold[RawModule](new Colonnade(config))(new ColonnadeAxi(config, _))
 
   private def generate(options: Options): Unit = {
+    if (options.pixelStream && options.axi.isEmpty)
+      throw new ConfigError("--pixel-stream is a port of the AXI4 shell: it needs --axi")
+    val axi    = options.axi.map(_.copy(pixelStream = options.pixelStream))
     val name   = options.config.getOrElse(throw new ConfigError("--config is missing; see --help"))
     val config = ConfigIO.load(name, options.overrides)
     if (options.output.isEmpty && options.formatsPage.isEmpty)
@@ -65,12 +70,11 @@ object Generate {
     options.output.foreach { directory =>
       OutputFiles.replaceDirectory(path(directory)) { fresh =>
         if (!options.manifestOnly) {
-          Emit(top(config, options.axi), fresh, options.blackBoxMemories)
+          Emit(top(config, axi), fresh, options.blackBoxMemories)
           CoreFile.write(if (options.axi.isEmpty) "Colonnade" else "ColonnadeAxi", fresh)
         }
         OutputFiles.writeFile(fresh.resolve("manifest.json"), formats.Json.pretty(Manifest(config)))
-        for (shell <- options.axi)
-          OutputFiles.writeFile(fresh.resolve("shell.json"), ShellMap.json(config, shell.busBytes))
+        for (shell <- axi) OutputFiles.writeFile(fresh.resolve("shell.json"), ShellMap.json(config, shell))
       }
     }
   }
@@ -79,6 +83,7 @@ object Generate {
     case Nil                             => options
     case "--help" :: rest                => parse(rest, options.copy(help = true))
     case "--manifest-only" :: rest       => parse(rest, options.copy(manifestOnly = true))
+    case "--pixel-stream" :: rest        => parse(rest, options.copy(pixelStream = true))
     case "--black-box-memories" :: rest  => parse(rest, options.copy(blackBoxMemories = true))
     case Valued(name, "", _)             => throw new ConfigError(s"$name needs a value; see --help")
     case Valued("--config", value, rest) => parse(rest, options.copy(config = Some(value)))

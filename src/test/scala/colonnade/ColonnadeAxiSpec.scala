@@ -53,7 +53,7 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     val hash = (0 until 8).map(i => f"${host(s"formatHash[$i]")}%08x").mkString
     assert(hash == Manifest(config)("formatHash").str)
     assert(host("frameSize") == (480 << 16 | 640) && host("capabilities") == (4 << 8 | 4))
-    for (unknown <- Seq(0x3c, 0x100, 0x7ffc, 0xfffc)) {
+    for (unknown <- Seq(0x3c, 0x104, 0x7ffc, 0xfffc)) {
       assert(host.read(unknown) == ((BigInt(0), false)))
       assert(!host.write(unknown, 1))
     }
@@ -64,6 +64,7 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     assert(!host.write(ShellMap.deviceBase, 1))            // the shell starts frames
     assert(!host.write(ShellMap.deviceBase + 4, 1))        // status.busy
     assert(!host.write(0x40, 3))                           // two commands
+    assert(!host.write(0x100, 1))                          // no pixel stream
     bench.write("lights[0].position.x", 0x12345678)
     assert(bench.read("lights[0].position.x") == 0x12345678)
     assert(host("status") == 0)

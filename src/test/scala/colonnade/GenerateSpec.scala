@@ -63,6 +63,12 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
       Seq("isRunning" -> 0, "isQueued" -> 1, "isLoading" -> 2, "isResetting" -> 3)
   }
 
+  it should "refuse a pixel stream without the shell" in inScratch { scratch =>
+    val output = scratch.resolve("out").toString
+    refused("--config", "tiny", "--output", output, "--manifest-only", "--pixel-stream")("it needs --axi")
+    run("--config", "tiny", "--output", output, "--manifest-only", "--axi", "16", "--pixel-stream")._1 shouldBe 0
+  }
+
   it should "replace an earlier output, but no other directory" in inScratch { scratch =>
     val output = scratch.resolve("out")
     for (_ <- 0 until 2) run("--config", "tiny", "--output", output.toString, "--manifest-only")._1 shouldBe 0

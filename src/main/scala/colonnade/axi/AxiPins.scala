@@ -36,6 +36,9 @@ final class AxiPins(channels: => AxiChannels, isMaster: Boolean) extends Record 
     sink.bits.elements.foreach { case (field, data) => data := pin(s"$channel$field") }
   }
 
+  /** Connects a stream without channels, such as AXI4-Stream, that leaves at these pins. */
+  def stream(source: DecoupledIO[Bundle]): Unit = drive("t", source)
+
   /** Connects the pins of a slave to its port. */
   def attach(port: AxiLitePort): Unit = {
     Seq("aw" -> port.aw, "w" -> port.w, "ar" -> port.ar).foreach { case (channel, sink) => receive(channel, sink) }
@@ -60,6 +63,9 @@ object AxiPins {
     ),
     isMaster = false
   )
+
+  /** Of the device as the source of an AXI4-Stream. */
+  def stream(payload: => Bundle): AxiPins = new AxiPins(AxiChannels(Seq("t" -> payload), Nil), isMaster = true)
 
   /** Of the device as a master that reads. */
   def reads(idBits: Int, busBytes: Int): AxiPins =

@@ -38,6 +38,7 @@ final class BurstWriter(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   private val hasRow      = RegInit(false.B)
   private val row         = RegEnable(io.rows.bits, io.rows.fire)
   private val address     = RegEnable(addressOf(io.rows.bits), io.rows.fire)
+  private val rowBeats    = RowBeats(config, shell, io.settings.format, row, address)
   private val isInside    = io.settings.window.contains(address, rowBytes)
   private val isOffered   = RegInit(false.B) // the address is on the bus, and holds
   private val isDropped   = hasRow && !isOffered && (io.drop || !isInside)
@@ -71,29 +72,17 @@ final class BurstWriter(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   isOffered            := io.axi.aw.valid && !io.axi.aw.ready
   io.axi.aw.bits.id    := 0.U
   io.axi.aw.bits.addr  := address
-  io.axi.aw.bits.len   := Mux1H(formats.map { case (is, bytes) => is -> (beatsOf(bytes) - 1).U })
+  io.axi.aw.bits.len   := rowBeats.len
   io.axi.aw.bits.size  := Axi.size(bus)
   io.axi.aw.bits.burst := Axi.incr
   when(isAddressed) {
-    beats  := Mux1H(formats.map { case (is, bytes) => is -> beatsOf(bytes).U })
-    data   := Mux1H(formats.map { case (is, bytes) => is -> lanes(packed(bytes), data.getWidth) })
-    strobe := Mux1H(formats.map { case (is, bytes) =>
-      val size = tileSize * bytes
-      val lane = if (size < bus) address(log2Ceil(bus) - 1, log2Ceil(size)) * size.U else 0.U
-      is -> (row.mask.asBools.map(Fill(bytes, _)).reduceRight((low, high) => high ## low) << lane)
-    })
+    beats  := rowBeats.count
+    data   := rowBeats.data
+    strobe := rowBeats.strobe
   }
 
   io.axi.b.ready := true.B
   io.isIdle      := !hasRow && beats === 0.U
-
-  private def formats: Seq[(Bool, Int)] = Seq(1, 2, 3).map(log => (bytesLog === log.U) -> (1 << log))
-  private def beatsOf(bytes: Int): Int  = (tileSize * bytes / bus).max(1)
-  private def packed(bytes:  Int): UInt = Cat(row.pixels.reverse.map(_(8 * bytes - 1, 0)))
-
-  /** A narrow row in all lanes. */
-  private def lanes(packed: UInt, width: Int): UInt =
-    if (packed.getWidth < 8 * bus) Fill(8 * bus / packed.getWidth, packed) else packed.pad(width)
 }
 
 object BurstWriter {

@@ -71,6 +71,9 @@ final class FramebufferSettings extends Bundle {
   val format = UInt(PixelFormat.getWidth.W)
   val window = new AddressWindow
   val photo  = new PhotoSettings
+
+  /** To the pixel stream, not to memory. */
+  val toStream = Bool()
 }
 
 /** The camera's photo, XRGB8888 in sRGB, for the pixels that do not show the object. */

@@ -25,6 +25,9 @@ final class FramebufferWriterIO(config: ColonnadeConfig, shell: ShellConfig) ext
   /** With an environment: reads of the photo. */
   val photo = Option.when(config.hasEnvironment)(new AxiReadPort(BurstWriter.idBits, shell.busBytes))
 
+  /** With a pixel stream: rows of frames that go there. */
+  val stream = Option.when(shell.pixelStream)(Decoupled(new PixelBeat(shell.busBytes)))
+
   /** A pulse, while idle. */
   val clearErrors = Input(Bool())
 
@@ -74,7 +77,18 @@ final class FramebufferWriter(config: ColonnadeConfig, shell: ShellConfig) exten
     photo :<>= compositor.io.axi
     compositor
   }
-  bursts.io.rows :<>= compositor.fold(rows)(_.io.out)
+  private val written = compositor.fold(rows)(_.io.out)
+  bursts.io.rows :<>= written
+  private val streamer = io.stream.map { stream =>
+    val streamer = Module(new RowStreamer(config, shell))
+    streamer.format      := io.settings.format
+    streamer.rows.bits   := written.bits
+    streamer.rows.valid  := written.valid && io.settings.toStream
+    bursts.io.rows.valid := written.valid && !io.settings.toStream
+    written.ready        := Mux(io.settings.toStream, streamer.rows.ready, bursts.io.rows.ready)
+    stream :<>= streamer.out
+    streamer
+  }
   bursts.io.settings := io.settings
   bursts.io.drop     := io.errors.response
   io.axi :<>= bursts.io.axi
@@ -89,5 +103,5 @@ final class FramebufferWriter(config: ColonnadeConfig, shell: ShellConfig) exten
   io.errors.photoWindow   := compositor.fold(false.B)(unit => sticky(unit.io.isOutside))
   io.errors.photoResponse := compositor.fold(false.B)(unit => sticky(unit.io.isError))
   io.isIdle               := encoders.map(_.isIdle).reduce(_ && _) && buffers.map(_.isIdle).reduce(_ && _) &&
-    compositor.fold(true.B)(_.io.isIdle) && bursts.io.isIdle
+    compositor.fold(true.B)(_.io.isIdle) && bursts.io.isIdle && streamer.fold(true.B)(_.isIdle)
 }

@@ -47,11 +47,15 @@ final class ImageLoader(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   private val count    = Reg(UInt(32.W))
   private val address  = Reg(UInt(32.W))
   private val isTarget = shapes.map(shape => target === shape.target.U)
-  private val length   = Mux1H(isTarget, shapes.map(_.words.U))
-  private val depth    = Mux1H(isTarget, shapes.map(_.depth.U))
+  private val length   = ofTarget(_.words)
+  private val depth    = ofTarget(_.depth)
+
+  /** A number of the section's memory, 0 if there is none. */
+  private def ofTarget(number: ImageLoader.Shape => Int): UInt =
+    isTarget.zip(shapes).map { case (is, shape) => Mux(is, number(shape).U, 0.U) }.foldLeft(0.U)(_ | _)
 
   // Record; words of narrower memories have undefined high bits
-  private val widest = shapes.map(_.words).max
+  private val widest = shapes.map(_.words).foldLeft(2)(_ max _)
   require(widest <= 32, "a record has at most 1024 bits")
   private val record = Reg(Vec(widest, UInt(32.W)))
 
@@ -115,7 +119,7 @@ final class ImageLoader(config: ColonnadeConfig, shell: ShellConfig) extends Mod
             position := 0.U
             address  := 0.U
             sections := sections - 1.U
-            when(!VecInit(isTarget).asUInt.orR || count > depth) {
+            when(!isTarget.foldLeft(false.B)(_ || _) || count > depth) {
               refuse(_.section)
             }.elsewhen(count =/= 0.U) { state := State.record }
           }
@@ -155,7 +159,7 @@ object ImageLoader {
   /** A memory of the device: `words` of 32 bits for each of at most `depth` records. */
   final case class Shape(target: Int, words: Int, depth: Int)
 
-  /** All memories that an image may fill. With a cache, the scene lies in DRAM. */
+  /** All memories that an image may fill. With a cache the scene lies in DRAM; without an environment there are none then. */
   def shapes(config: ColonnadeConfig): Seq[Shape] = {
     val records = Shape(0, new RecordFormats(config).recordBits / 32, config.columnBvhMemory.depth)
     Option.when(config.columnBvhMemory.cache.isEmpty)(records).toSeq ++

@@ -2,7 +2,7 @@ package colonnade.bus
 
 import chisel3._
 import chisel3.util._
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 final class ShellControlIO extends Bundle {
   val commands = Input(new ShellCommands)
@@ -48,7 +48,7 @@ final class ShellControlIO extends Bundle {
   * A frame ends when the device has ended it, all its rows are written and all writes are answered. A frame that is started
   * while one runs is queued, and begins when the device has its registers. A soft reset takes effect in any state.
   */
-final class ShellControl(config: ColonnadeConfig) extends Module {
+final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   import ShellControl._
 
   val io = IO(new ShellControlIO)
@@ -66,7 +66,8 @@ final class ShellControl(config: ColonnadeConfig) extends Module {
   private val isLegal     = PixelFormat.isLegal(settings.format)
   private val photoMask   = (config.frame.tileSize * PhotoCompositor.photoBytes - 1).U
   private val photo       = settings.photo
-  private val isAligned   = !((settings.base | settings.stride) & rowMask).orR &&
+  private val hasBase     = if (shell.pixelStream) !settings.toStream else true.B
+  private val isAligned   = (!hasBase || !((settings.base | settings.stride) & rowMask).orR) &&
     !(photo.isEnabled && ((photo.base | photo.stride) & photoMask).orR)
   private val begins = state === State.begin
 

@@ -2,7 +2,7 @@ package colonnade.bus
 
 import chisel3.Bundle
 import colonnade.axi.AxiLite
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{Access, Field, Json, Layout, Manifest, RegisterMap}
 
 /** A register of the shell.
@@ -36,11 +36,12 @@ object ShellMap {
   val identity: BigInt = 0x434c4e44
 
   /** Major and minor version of these registers. A driver refuses another major version. */
-  val version: BigInt = 0x00010001
+  val version: BigInt = 0x00010002
 
   private val byteAddress = 40 // bits
 
-  private val features         = Seq("environment", "sceneInDram", "mirrorsAndGlass", "cornerColours", "textures")
+  private val features =
+    Seq("environment", "sceneInDram", "mirrorsAndGlass", "cornerColours", "textures", "pixelStream")
   private val capabilityFields = bits(features) :+ Field("busBytesLog2", 8, 4, signed = false, fraction = 0)
 
   val registers: Seq[ShellRegister] = Seq(
@@ -72,7 +73,8 @@ object ShellMap {
     setting("photo.windowBase", 0xe8, byteAddress, "No photo is read below this address."),
     setting("photo.windowEnd", 0xf0, byteAddress, "No photo is read from this address on."),
     setting("photo.stride", 0xf8, 24, "Bytes from a line of the photo to the next."),
-    setting("photo.enabled", 0xfc, 1, "1: the photo shows where the object does not.")
+    setting("photo.enabled", 0xfc, 1, "1: the photo shows where the object does not."),
+    setting("stream.enabled", 0x100, 1, "1: frames go to the pixel stream, not to the framebuffer.")
   )
 
   private def interrupt(name: String, address: Int, access: Access, description: String): ShellRegister =
@@ -95,17 +97,18 @@ object ShellMap {
     Seq(Field(low, 0, 16, signed = false, fraction = 0), Field(high, 16, 16, signed = false, fraction = 0))
 
   /** What the design can do: bits 0 to 7 for a driver, and the base-2 logarithm of the bus bytes in bits 11 to 8. */
-  def capabilities(config: ColonnadeConfig, busBytes: Int): BigInt = {
+  def capabilities(config: ColonnadeConfig, shell: ShellConfig): BigInt = {
     val flags = Seq(
       config.hasEnvironment,
       config.columnBvhMemory.cache.nonEmpty,
       config.frame.hasBounces,
       config.geometry.cornerColours,
-      config.geometry.texture.nonEmpty
+      config.geometry.texture.nonEmpty,
+      shell.pixelStream
     )
     require(flags.size == features.size)
     val mask = flags.zipWithIndex.collect { case (true, bit) => 1 << bit }.sum
-    BigInt(mask | (Integer.numberOfTrailingZeros(busBytes) << 8))
+    BigInt(mask | (Integer.numberOfTrailingZeros(shell.busBytes) << 8))
   }
 
   def frameSize(config: ColonnadeConfig): BigInt = BigInt(config.frame.maxWidth) | BigInt(config.frame.maxHeight) << 16
@@ -115,10 +118,10 @@ object ShellMap {
     Manifest(config)("formatHash").str.grouped(8).map(BigInt(_, 16)).toSeq
 
   /** `shell.json`, for drivers and test benches. */
-  def json(config: ColonnadeConfig, busBytes: Int): String = Json.pretty(
+  def json(config: ColonnadeConfig, shell: ShellConfig): String = Json.pretty(
     ujson.Obj(
       "version"    -> version.toInt,
-      "busBytes"   -> busBytes,
+      "busBytes"   -> shell.busBytes,
       "deviceBase" -> deviceBase,
       "registers"  -> ujson.Arr.from(registers.map { register =>
         ujson.Obj(

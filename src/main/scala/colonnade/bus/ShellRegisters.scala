@@ -106,6 +106,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
     case image if image.startsWith("image.")             => !io.status.isLoading
     case framebuffer if framebuffer.startsWith("frameb") => canChange
     case "photo.enabled"                                 => canChange && config.hasEnvironment.B
+    case "stream.enabled"                                => canChange && shell.pixelStream.B
     case photo if photo.startsWith("photo.")             => canChange
     case _                                               => true.B
   }
@@ -137,6 +138,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   io.framebuffer.base              := value("framebuffer.base")
   io.framebuffer.stride            := value("framebuffer.stride")
   io.framebuffer.format            := value("framebuffer.format")
+  io.framebuffer.toStream          := value("stream.enabled")
   io.framebuffer.window.base       := value("framebuffer.windowBase")
   io.framebuffer.window.end        := value("framebuffer.windowEnd")
   io.framebuffer.photo.base        := value("photo.base")
@@ -165,7 +167,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private val constants = Map(
     "identity"     -> ShellMap.identity,
     "version"      -> ShellMap.version,
-    "capabilities" -> ShellMap.capabilities(config, shell.busBytes),
+    "capabilities" -> ShellMap.capabilities(config, shell),
     "frameSize"    -> ShellMap.frameSize(config)
   ) ++ ShellMap.formatHash(config).zipWithIndex.map { case (word, index) => s"formatHash[$index]" -> word }
   private val observed = Map(

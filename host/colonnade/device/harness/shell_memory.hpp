@@ -1,0 +1,151 @@
+// The memory of the shell's testbench (shell.cpp).
+#pragma once
+#include <cstdint>
+#include <cstring>
+#include <deque>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "VColonnadeAxi.h"
+#include "ports.hpp"
+
+#include "dram.hpp"
+
+#ifdef DRAM_BUS_BYTES
+/// The pins of m_axi_scene, under the names that the core's read port has.
+struct ScenePins {
+    explicit ScenePins(VColonnadeAxi& top)
+        : io_memory_ar_valid(top.m_axi_scene_arvalid), io_memory_ar_ready(top.m_axi_scene_arready), io_memory_ar_bits_addr(top.m_axi_scene_araddr),
+          io_memory_ar_bits_len(top.m_axi_scene_arlen), io_memory_ar_bits_size(top.m_axi_scene_arsize), io_memory_ar_bits_id(top.m_axi_scene_arid),
+          io_memory_r_valid(top.m_axi_scene_rvalid), io_memory_r_ready(top.m_axi_scene_rready), io_memory_r_bits_data(top.m_axi_scene_rdata),
+          io_memory_r_bits_id(top.m_axi_scene_rid), io_memory_r_bits_last(top.m_axi_scene_rlast), io_memory_r_bits_resp(top.m_axi_scene_rresp) {}
+
+    CData &io_memory_ar_valid, &io_memory_ar_ready;
+    QData& io_memory_ar_bits_addr;
+    CData &io_memory_ar_bits_len, &io_memory_ar_bits_size, &io_memory_ar_bits_id, &io_memory_r_valid, &io_memory_r_ready;
+    decltype(VColonnadeAxi::m_axi_scene_rdata) io_memory_r_bits_data; // a reference, whose type depends on the width
+    CData &io_memory_r_bits_id, &io_memory_r_bits_last, &io_memory_r_bits_resp;
+};
+
+/// Reads of the scene: those of different ids overtake each other where channels stall.
+class Scene {
+public:
+    Scene(VColonnadeAxi& top, const DramOptions& options, std::vector<std::uint8_t>& bytes) : pins_(top), dram_(pins_, options, bytes) {}
+    void offer() { dram_.offer(); }
+    void take() { dram_.take(); }
+    void fail(unsigned errorsPer1024) { dram_.fail(errorsPer1024); }
+
+private:
+    ScenePins pins_;
+    Dram<ScenePins> dram_;
+};
+#else
+/// A design without a scene in DRAM.
+struct Scene {
+    Scene(VColonnadeAxi&, const DramOptions&, std::vector<std::uint8_t>&) {}
+    void offer() {}
+    void take() {}
+    void fail(unsigned) { throw std::runtime_error("this design reads no scene"); }
+};
+#endif
+
+/// The memory behind m_axi, whose answers come in order, and behind m_axi_scene.
+class Memory {
+public:
+    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options)
+        : top_(top), bus_(options["--bus"]), latency_(options["--latency"]), stall_(options["--stall"]), random_(options["--seed"]),
+          bytes_(options["--memory"], 0xA5), scene_(top, {latency_, stall_, 0, 0, options["--seed"]}, bytes_) {}
+
+    std::uint8_t* range(std::uint64_t address, std::uint64_t size) {
+        if (address > bytes_.size() || size > bytes_.size() - address) throw std::runtime_error("an access beyond the memory");
+        return &bytes_[address];
+    }
+
+    /// Sets the inputs for this cycle. What is offered stays.
+    void offer() {
+        ++now_;
+        top_.m_axi_awready = moves();
+        top_.m_axi_wready = moves();
+        top_.m_axi_arready = moves();
+        top_.m_axi_bvalid = top_.m_axi_bvalid ? 1 : !answers_.empty() && answers_.front() <= now_ && moves();
+        top_.m_axi_rvalid = top_.m_axi_rvalid ? 1 : !reads_.empty() && reads_.front().due <= now_ && moves();
+        if (top_.m_axi_rvalid) {
+            const Burst& read = reads_.front();
+            std::memcpy(&top_.m_axi_rdata, range(read.address + read.done * bus_, bus_), bus_);
+            top_.m_axi_rlast = read.done + 1 == read.beats;
+        }
+        scene_.offer();
+        top_.eval();
+    }
+
+    /// Takes the transfers of this cycle; afterwards `offer` may change what was taken.
+    void take() {
+        if (top_.m_axi_awvalid && top_.m_axi_awready) writes_.push_back(burst(top_.m_axi_awaddr, top_.m_axi_awlen));
+        if (top_.m_axi_arvalid && top_.m_axi_arready) reads_.push_back(burst(top_.m_axi_araddr, top_.m_axi_arlen));
+        if (top_.m_axi_wvalid && top_.m_axi_wready) write();
+        if (top_.m_axi_bvalid && top_.m_axi_bready) {
+            answers_.pop_front();
+            takenB_ = true;
+        }
+        if (top_.m_axi_rvalid && top_.m_axi_rready) {
+            if (++reads_.front().done == reads_.front().beats) reads_.pop_front();
+            takenR_ = true;
+        }
+        scene_.take();
+    }
+
+    /// So many of 1024 beats of the scene's reads fail from now on.
+    void failScene(unsigned errorsPer1024) { scene_.fail(errorsPer1024); }
+
+    /// After the clock edge: withdraws what was taken.
+    void finish() {
+        if (takenB_) top_.m_axi_bvalid = 0;
+        if (takenR_) top_.m_axi_rvalid = 0;
+        takenB_ = takenR_ = false;
+    }
+
+private:
+    struct Burst {
+        std::uint64_t address, due;
+        unsigned beats, done;
+    };
+
+    bool moves() { return stall_ == 0 || random_() % 100 >= stall_; }
+
+    Burst burst(std::uint64_t address, unsigned length) {
+        const std::uint64_t first = address / bus_ * bus_, end = first + (length + 1ull) * bus_;
+        if (first / 4096 != (end - 1) / 4096) throw std::runtime_error("a burst crosses a page of 4 KB");
+        range(first, end - first);
+        return {first, now_ + latency_, length + 1, 0};
+    }
+
+    void write() {
+        if (writes_.empty()) throw std::runtime_error("data come before their address");
+        Burst& burst = writes_.front();
+        std::uint8_t data[128];
+        std::memcpy(data, &top_.m_axi_wdata, bus_);
+        std::uint8_t strobes[16] = {};
+        std::memcpy(strobes, &top_.m_axi_wstrb, (bus_ + 7) / 8);
+        std::uint8_t* to = range(burst.address + burst.done * bus_, bus_);
+        for (unsigned i = 0; i < bus_; ++i)
+            if (strobes[i / 8] >> i % 8 & 1) to[i] = data[i];
+        ++burst.done;
+        if ((top_.m_axi_wlast != 0) != (burst.done == burst.beats)) throw std::runtime_error("a burst does not end with its last beat");
+        if (burst.done < burst.beats) return;
+        writes_.pop_front();
+        answers_.push_back(now_ + latency_);
+    }
+
+    VColonnadeAxi& top_;
+    unsigned bus_, latency_, stall_;
+    std::mt19937 random_;
+    std::vector<std::uint8_t> bytes_;
+    Scene scene_;
+    std::deque<Burst> writes_, reads_;
+    std::deque<std::uint64_t> answers_;
+    std::uint64_t now_ = 0;
+    bool takenB_ = false, takenR_ = false;
+};
