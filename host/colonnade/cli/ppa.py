@@ -105,7 +105,7 @@ def ppa(
     from colonnade.common import progress
     from colonnade.design.generator import manifest_for
     from colonnade.ppa.measure import measure
-    from colonnade.ppa.pages.equal_area import at_equal_area, rates_of
+    from colonnade.ppa.pages.equal_area import at_clock, at_equal_area, rates_of
     from colonnade.ppa.pages.text import UnitTable, summary
     from colonnade.ppa.power.recording import Stimulus
     from colonnade.ppa.power.report import Operation
@@ -121,6 +121,7 @@ def ppa(
         echo(line)
     if faster is not None:
         echo(at_equal_area(report, faster))
+        echo(at_clock(report, faster))
     finish(report, json_file)
 
 

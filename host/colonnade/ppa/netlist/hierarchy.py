@@ -33,6 +33,7 @@ COLUMN = (
     "ColumnEnvironment",
     "EnvironmentMarches",
     "TileWalker",
+    "EnvironmentWalker",
     "BackgroundWalker",
     "PixelCollector",
 )

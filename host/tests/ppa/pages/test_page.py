@@ -10,7 +10,7 @@ import pytest
 
 from colonnade.common.errors import UserError
 from colonnade.ppa.pages.area import equal_area, gates
-from colonnade.ppa.pages.equal_area import at_equal_area, rates_of
+from colonnade.ppa.pages.equal_area import at_clock, at_equal_area, rates_of
 from colonnade.ppa.pages.page import page
 
 
@@ -69,6 +69,16 @@ def test_the_rate_at_the_area_of_everything_is_of_the_same_configuration(tmp_pat
         file.write_text(wrong)
         with pytest.raises(UserError, match="not a report"):
             rates_of(file, "same")
+
+
+def test_the_clock_is_that_of_the_slowest_path_within_or_across_units() -> None:
+    within, across = {"unit": "Small", "fo4": 50.0}, {"register_to_register": {"fo4": 40.0}}
+    line = at_clock(report() | {"slowest_path": within, "render_unit_paths": across}, 10.0)
+    assert "50.0 FO4 of 14 ps, takes 0.70 ns, so at most 1,429 MHz" in line
+    assert "2,971 in-box MRay/s" in line
+    slower = {"register_to_register": {"fo4": 60.0}}
+    assert "60.0 FO4" in at_clock(report() | {"slowest_path": within, "render_unit_paths": slower}, 10.0)
+    assert "--liberty" in at_clock(report() | {"slowest_path": {"unit": None}, "render_unit_paths": None}, 10.0)
 
 
 def test_the_page_keeps_its_text_and_reports_missing_data(tmp_path: Path) -> None:

@@ -96,8 +96,7 @@ final class Colonnade(
   for ((column, index) <- columns.zipWithIndex) {
     column.io.registers := registers.io.frame
     column.io.start     := controller.io.frameStart
-    column.io.tiles <> controller.io.tiles(index)
-    column.io.backgroundTiles <> controller.io.backgroundTiles(index)
+    column.io.tiles :<>= controller.io.tiles(index)
     io.pixels(index) <> column.io.pixels
     for (columnHolds <- column.io.holds; holds <- io.memoryHolds) {
       columnHolds := holds >> (index * config.columnBvhMemory.banks)

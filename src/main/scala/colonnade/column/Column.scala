@@ -9,10 +9,11 @@ import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{
   BackgroundWalker,
   ColumnProgress,
+  ColumnTiles,
+  EnvironmentWalker,
   EnvironmentWindow,
   EventSums,
   PixelCollector,
-  Tile,
   TileWalker
 }
 import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
@@ -43,10 +44,7 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
 
   /** With parity: a record in the cache is wrong. */
   val memoryError = Option.when(Lines.hasParity(config))(Output(Bool()))
-  val tiles       = Flipped(Decoupled(new Tile(config)))
-
-  /** Tiles without a pixel whose primary ray may hit the object. */
-  val backgroundTiles = Flipped(Decoupled(new Tile(config)))
+  val tiles       = Flipped(new ColumnTiles(config))
 
   /** In any order. */
   val pixels   = Decoupled(new Pixel(config))
@@ -72,23 +70,35 @@ final class Column(
 
   private val paths      = config.ofPaths
   private val hasCache   = config.columnBvhMemory.cache.nonEmpty
-  private val walker     = Module(new TileWalker(paths))
+  private val walker     = Module(new TileWalker(paths, Column.mostEnvironment(config)))
   private val background = Module(new BackgroundWalker(config))
   private val units = if (config.hasPathUnit) ColumnUnits.sharing(config) else ColumnUnits.separate(config, renderUnit)
   private val controller = Module(new ColumnBvhController(config))
   private val collector  = Module(new PixelCollector(config, paths.array.rows + 1))
 
   // Walk tiles: pixel positions for the units
+  private val window = EnvironmentWindow(config, io.registers)
   walker.io.frame  := io.registers.frame
-  walker.io.window := EnvironmentWindow(config, io.registers)
-  walker.io.tiles <> io.tiles
+  walker.io.window := window
+  walker.io.tiles :<>= io.tiles.ofObject
   units.positions.zip(walker.io.positions).foreach { case (unit, positions) => unit <> positions }
 
-  // Tiles of the background, and pixels outside the object's outline, become finished pixels at once
+  // Tiles of the environment
+  walker.io.environmentLeaves := units.environmentLeaves
+  private val environmentWalker = io.tiles.ofEnvironment.map { tiles =>
+    val walker = Module(new EnvironmentWalker(config)).io
+    walker.frame  := io.registers.frame
+    walker.window := window
+    walker.tiles :<>= tiles
+    walker
+  }
+  for (from <- environmentWalker; to <- walker.io.environment) to :<>= from.positions
+
+  // Tiles of the background, and pixels outside outline and window, become finished pixels at once
   background.io.frame  := io.registers.frame
   background.io.colour := io.registers.background
-  background.io.tiles <> io.backgroundTiles
-  background.io.others <> walker.io.others
+  background.io.tiles :<>= io.tiles.ofBackground
+  for ((to, from) <- background.io.others.zip(walker.io.others +: environmentWalker.map(_.others).toSeq)) to :<>= from
 
   // Records: units send requests and receive all broadcasts
   controller.io.requests.zip(units.requests).foreach { case (requests, unit) => requests <> unit }
@@ -150,8 +160,9 @@ final class Column(
   private val retired  = io.pixels.fire
   inFlight := inFlight + enters - retired
 
-  io.progress.isDrained := walker.io.isIdle && background.io.isIdle && inFlight === retired.asUInt
-  io.progress.isIdle    := RegNext(
+  io.progress.isDrained := environmentWalker.fold(true.B)(_.isIdle) && walker.io.isIdle && background.io.isIdle &&
+    inFlight === retired.asUInt
+  io.progress.isIdle := RegNext(
     units.isIdle && controller.io.isIdle && caches.map(_.isIdle).fold(true.B)(_ && _),
     true.B
   )
@@ -163,4 +174,11 @@ final class Column(
     environment.map(_.events),
     marches.map(_.events)
   ))
+}
+
+object Column {
+
+  /** Pixels of a tile of the environment that a path unit has in flight at most: about those that its pipelines hold. */
+  private def mostEnvironment(config: ColonnadeConfig): Option[Int] =
+    Option.when(config.hasPathUnit)((config.units.pathContexts / 4).max(1))
 }

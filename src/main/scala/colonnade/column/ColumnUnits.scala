@@ -21,8 +21,10 @@ private[column] final case class ColumnUnits(
     maps:       Seq[AttributePort],
     marches:    Seq[MarchPort],
     texture:    Seq[TexturePort],
-    isIdle:     Bool,
-    events:     Seq[Record]
+    /* A pixel of a tile of the environment leaves; only of a path unit. */
+    environmentLeaves: Bool,
+    isIdle:            Bool,
+    events:            Seq[Record]
 )
 
 private[column] object ColumnUnits {
@@ -43,6 +45,7 @@ private[column] object ColumnUnits {
       maps = units.flatMap(_.maps),
       marches = units.flatMap(_.marches),
       texture = units.flatMap(_.texture),
+      environmentLeaves = false.B,
       isIdle = units.map(_.isIdle).reduce(_ && _),
       events = units.map(_.events)
     )
@@ -90,6 +93,7 @@ private[column] object ColumnUnits {
       maps = Nil,
       marches = paths.marches.toSeq,
       texture = paths.texture.toSeq,
+      environmentLeaves = paths.environmentLeaves,
       isIdle = paths.isIdle,
       events = traversals.map(_.events) ++ Seq(paths.events, hits.events)
     )

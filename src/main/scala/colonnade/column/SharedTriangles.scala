@@ -33,13 +33,14 @@ final class SharedTriangles(config: ColonnadeConfig, count: Int) extends Module 
   private val lanes   = Module(new TriangleLanes(shared)).io
   private val queue   = Module(new Queue(new TriangleCandidate(shared), SharedTriangles.places, flow = true)).io
 
-  // Choose a row. It may use the next cycle if the queue has a place beside the records that are on their way
+  // Choose a row. It may use the next cycle if the queue has a place then, beside the record that comes now
   private val arbiter  = Module(new RoundRobin(count)).io
   private val chosen   = RegInit(0.U(count.W))
   private val hasPlace = Wire(Bool())
   private val isOpen   = RegInit(false.B)
   private val sender   = RegEnable(chosen, hasPlace)
-  hasPlace         := queue.count +& isOpen < SharedTriangles.places.U
+  private val moves    = RegNext(lanes.readyNext, false.B)
+  hasPlace         := queue.count +& isOpen < SharedTriangles.places.U +& moves
   arbiter.requests := io.waits.asUInt & ~Mux(hasPlace, chosen, 0.U)
   arbiter.isTaken  := hasPlace || !chosen.orR
   when(arbiter.isTaken) { chosen := arbiter.grant }
@@ -80,5 +81,5 @@ final class SharedTriangles(config: ColonnadeConfig, count: Int) extends Module 
 object SharedTriangles {
 
   /** Records that wait for a triangle unit. */
-  val places: Int = 2
+  val places: Int = 1
 }

@@ -20,6 +20,9 @@ object ArrayConfig {
   /** Maximum number of contexts of a render unit; a path unit may have more. */
   val mostContexts: Int = 16
 
+  /** Only a path unit has so many contexts. */
+  def isLarge(contexts: Int): Boolean = contexts > mostContexts
+
   val mostRows:    Int = 256
   val mostColumns: Int = 256
 

@@ -15,9 +15,11 @@ final class CellLookupIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
 
 /** Looks up the planes of a pixel's tile, or the plane of its cell; see `PlaneDescriptor`. A mode beyond 4 counts as 0.
   *
-  * A tile has consecutive words: two plane ids per word, then the cells' mask. Latency five cycles and one request a cycle
-  * if it needs at most one word. Each further word takes one cycle; the most are three words, for a cell of four planes.
-  * A word beyond the heap is 0 and makes the response illegal; the last word that is read decides.
+  * A tile has consecutive words: two plane ids per word, then the cells' mask. A tile's ids are read word by word. For a
+  * cell its mask is read first, and then the word with the id that the mask selects. So each request takes two cycles at
+  * most, and columns that share the memory can count on that. Latency five cycles and one request a cycle if it needs at
+  * most one word; one cycle more for a second word. A word beyond the heap is 0 and makes the response illegal; the highest
+  * address decides, which is that of a tile's last word or of a cell's mask.
   */
 final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   val io = IO(new CellLookupIO(config, tagBits))
@@ -41,45 +43,45 @@ final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   tiles.io.pixel.bits.sideband.tag       := req.bits.tag
   req.ready                              := tiles.io.pixel.ready
 
-  // Its words, one a cycle
+  // Its words, one a cycle: ids in sequence, or the mask and then the word with the id that it selects
   private val isValid  = tiles.io.tile.valid
   private val tile     = tiles.io.tile.bits
   private val kind     = TileKind(tile.descriptor.mode)
+  private val isCell   = !kind.isFlat && !tile.sideband.wholeTile
   private val cell     = Mux(kind.isFine, tile.cell(3), tile.cell(2))
-  private val step     = RegInit(0.U(2.W))
-  private val idWords  = Mux(kind.hasFour, 2.U, 1.U)
-  private val isMask   = !kind.isFlat && step === idWords
-  private val isLast   = kind.isFlat || step === Mux(tile.sideband.wholeTile, idWords - 1.U, idWords)
-  private val maskWord = Mux(kind.hasFour, cell >> 3, cell >> 4)
-  when(isValid) { step := Mux(isLast, 0.U, step + 1.U) }
+  private val isSecond = RegInit(false.B)
+  private val isLast   = isSecond || !(isCell || kind.hasFour)
+  private val maskWord = Mux(kind.hasFour, (cell >> 3) +& 2.U, (cell >> 4) +& 1.U)
+  private val selected =
+    Mux(kind.hasFour, (heap.word >> Cat(cell(2, 0), 0.U(1.W)))(1, 0), (heap.word >> cell(3, 0))(0))
+  private val idWord = Mux(isCell, selected(1), isSecond)
+  when(isValid) { isSecond := !isLast }
   tiles.io.tile.ready := isLast
-  heap.read(isValid && !kind.isFlat, tile.descriptor.pointer +& Mux(isMask, idWords +& maskWord, step))
+  heap.read(isValid && !kind.isFlat, tile.descriptor.pointer +& Mux(isCell && !isSecond, maskWord, idWord))
 
-  // The ids that have been read
-  private val read    = Pipe(isValid, tile)
-  private val from    = RegEnable(kind, isValid)
-  private val wasMask = RegEnable(isMask, isValid)
-  private val wasStep = RegEnable(step(0), isValid)
-  private val isDone  = RegEnable(isLast, isValid)
-  private val index   = RegEnable(cell(3, 0), isValid)
-  private val known   = Reg(Vec(4, UInt(AttributeLayout.indexBits.W)))
-  private val ids     = WireInit(known)
-  for (i <- 0 until 4; isRead = !wasMask && wasStep === (i / 2).U)
-    when(isRead) { ids(i) := (if (i % 2 == 0) heap.word(7, 0) else heap.word(15, 8)) }
-  when(read.valid) { known := ids }
+  // What has been read in the cycle before, and one cycle earlier
+  private val read        = Pipe(isValid, tile)
+  private val from        = RegEnable(kind, isValid)
+  private val wasCell     = RegEnable(isCell, isValid)
+  private val wasSecond   = RegEnable(isSecond, isValid)
+  private val isDone      = RegEnable(isLast, isValid)
+  private val choice      = RegEnable(selected(0), isValid)
+  private val illegalMask = RegNext(heap.isIllegal)
+  private val earlier     = RegEnable(heap.word, read.valid)
+  private val first       = Mux(wasSecond, earlier, heap.word)
 
   // The response
-  private val choice = Mux(from.hasFour, (heap.word >> Cat(index(2, 0), 0.U(1.W)))(1, 0), (heap.word >> index)(0))
-  private val isOne  = from.isFlat || !read.bits.sideband.wholeTile
-  private val count  = Mux(isOne, 1.U, Mux(from.hasFour, 4.U, 2.U))
-  private val resp   = Wire(new TaggedResponse(new CellResponse(layout), tagBits))
+  private val count = Mux(from.isFlat || wasCell, 1.U, Mux(from.hasFour, 4.U, 2.U))
+  private val resp  = Wire(new TaggedResponse(new CellResponse(layout), tagBits))
   resp.tag             := read.bits.sideband.tag
-  resp.isIllegal       := heap.isIllegal
+  resp.isIllegal       := Mux(wasCell, illegalMask, heap.isIllegal)
   resp.content.count   := count
   resp.content.cellLog := layout.tileLog.U - Mux(from.isFlat, 0.U, Mux(from.isFine, 3.U, 2.U))
-  resp.content.ids     := VecInit(ids.zipWithIndex.map { case (id, i) => Mux(count > i.U, id, 0.U) })
+  resp.content.ids     := VecInit(Seq(first(7, 0), first(15, 8), heap.word(7, 0), heap.word(15, 8)).zipWithIndex.map {
+    case (id, i) => Mux(count > i.U, id, 0.U)
+  })
   when(from.isFlat) { resp.content.ids(0) := read.bits.descriptor.pointer }
-    .elsewhen(isOne) { resp.content.ids(0) := ids(choice) }
+    .elsewhen(wasCell) { resp.content.ids(0) := Mux(choice, heap.word(15, 8), heap.word(7, 0)) }
   io.cells.resp := Pipe(read.valid && isDone, resp)
 }
 
@@ -100,7 +102,7 @@ private object TileKind {
   def apply(mode: UInt): TileKind = {
     val kind = Wire(new TileKind)
     kind.isFlat  := mode === 0.U || mode > 4.U
-    kind.hasFour := mode > 2.U
+    kind.hasFour := mode === 3.U || mode === 4.U
     kind.isFine  := !mode(0)
     kind
   }

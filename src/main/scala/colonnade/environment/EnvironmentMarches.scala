@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, PopCount, PriorityEncoderOH, Queue, RegEnable}
+import chisel3.util.{log2Ceil, Decoupled, DecoupledIO, Mux1H, OHToUInt, PopCount, PriorityEncoderOH, Queue, RegEnable}
 import colonnade.common.RoundRobin
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.EnvironmentView
@@ -45,15 +45,12 @@ final class EnvironmentMarches(config: ColonnadeConfig) extends Module {
   private val isAwaited = RegInit(VecInit.fill(config.units.marches)(false.B))
   private val isFree    = VecInit(marches.zip(isAwaited).map { case (march, awaited) => march.isEmpty && !awaited })
   private val mayDirect = RegInit(true.B) // no pixel came into the pipeline in the cycle before
-  private val asks      = VecInit(io.units.map(_.req.valid)).asUInt
-  private val isDirect  = VecInit(io.units.map(_.req.bits.isDirectView && config.units.directView.B)).asUInt
-  private val seenGrant = grant(asks & isDirect, direct.fold(false.B)(_.isReady && mayDirect))
+  private val seenGrant = direct.fold(0.U)(pipeline => grant(io.units.map(_.direct.get), pipeline.isReady && mayDirect))
   private val toDirect  = seenGrant.orR
-  private val rayGrant  = grant(asks & ~isDirect, isFree.asUInt.orR && !toDirect)
+  private val rayGrant  = grant(io.units.map(_.march), isFree.asUInt.orR && !toDirect)
   private val grants    = seenGrant | rayGrant
   private val granted   = RegEnable(grants, grants.orR)
   private val order     = Wire(new RowOrder(config))
-  io.units.zip(grants.asBools).foreach { case (unit, isGranted) => unit.req.ready := isGranted }
   order.row                                                                 := OHToUInt(granted)
   order.order                                                               := Mux1H(granted, io.units.map(_.order))
   mayDirect                                                                 := !toDirect
@@ -102,11 +99,13 @@ final class EnvironmentMarches(config: ColonnadeConfig) extends Module {
   io.events.busyEnvironment := PopCount(marches.map(_.events.busy))
   io.events.illegalRecord   := marches.map(_.events.illegal).reduce(_ || _) || direct.fold(false.B)(_.isIllegal)
 
-  /** One of the requests, one-hot, by round-robin, if one may go. */
-  private def grant(requests: UInt, mayGo: Bool): UInt = {
+  /** Accepts one of the requests, by round-robin, if one may go; returns which one, one-hot. */
+  private def grant(requests: Seq[DecoupledIO[EnvironmentRequest]], mayGo: Bool): UInt = {
     val arbiter = Module(new RoundRobin(config.array.rows)).io
-    arbiter.requests := requests
+    arbiter.requests := VecInit(requests.map(_.valid)).asUInt
     arbiter.isTaken  := mayGo
-    Mux(mayGo, arbiter.grant, 0.U)
+    val granted = Mux(mayGo, arbiter.grant, 0.U)
+    requests.zip(granted.asBools).foreach { case (request, isGranted) => request.ready := isGranted }
+    granted
   }
 }

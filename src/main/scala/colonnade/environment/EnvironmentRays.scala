@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{Queue, RegEnable}
+import chisel3.util.{DecoupledIO, Mux1H, Queue, RegEnable}
 import colonnade.common.{Context, ContextTable, First}
 import colonnade.config.ColonnadeConfig
 import colonnade.shading.EnvironmentSurface
@@ -31,12 +31,19 @@ final class EnvironmentRays(config: ColonnadeConfig) extends Module {
     )
   }
 
-  // A request waits until the column takes it; its ray is read then
-  private val request = Queue(io.req, 1)
-  private val isTaken = request.fire
-  column.req :<>= request
-  column.order.hitDistance := RegEnable(io.hitDistance, RegNext(io.req.fire, false.B))
-  column.order.request     := RegEnable(request.bits, isTaken)
+  // A request of each kind waits until the column takes it; its ray is read then
+  private val isDirect = column.direct.fold(false.B)(_ => io.req.bits.isDirectView)
+  private val march    = new Waiting(column.march, !isDirect)
+  private val direct   = column.direct.map(new Waiting(_, isDirect))
+  private val kinds    = direct.toSeq :+ march
+  private val isTaken  = kinds.map(_.isTaken).reduce(_ || _)
+  private val taken    = Mux1H(kinds.map(kind => kind.isTaken -> kind.request.bits))
+  private val leaves   = kinds.map(kind => RegNext(kind.isTaken, false.B))
+  io.accepts.march         := march.accepts
+  io.accepts.directView    := direct.fold(march.accepts)(_.accepts)
+  io.req.ready             := Mux(isDirect, io.accepts.directView, march.accepts)
+  column.order.request     := RegEnable(taken, isTaken)
+  column.order.hitDistance := Mux1H(leaves, kinds.map(_.hitDistance))
 
   // Points wait in the table; one of them is offered to the shader
   private val hasPoint  = RegInit(VecInit.fill(config.array.contexts)(false.B))
@@ -53,7 +60,7 @@ final class EnvironmentRays(config: ColonnadeConfig) extends Module {
     hasPoint(chosen) := false.B
   }
 
-  private val entry = table.read(Mux(isTaken, request.bits.context, chosen), isTaken || isChosen)
+  private val entry = table.read(Mux(isTaken, taken.context, chosen), isTaken || isChosen)
   column.order.ray := entry(rayType.getWidth - 1, 0).asTypeOf(rayType)
   io.surface.valid := isOffered
   io.surface.bits  := entry(point.getWidth - 1, 0).asTypeOf(point)
@@ -61,4 +68,18 @@ final class EnvironmentRays(config: ColonnadeConfig) extends Module {
   io.miss.bits     := answer.bits.surface.context
   io.visible.valid := answer.fire && !answer.bits.isHit && answer.bits.isOcclusionTest
   io.visible.bits  := answer.bits.surface.context
+
+  /** A place for a request of one kind, in front of its taker in the column. */
+  private class Waiting(taker: DecoupledIO[EnvironmentRequest], isOfKind: Bool) {
+    private val enters = Wire(chiselTypeOf(taker))
+    enters.valid := io.req.valid && isOfKind
+    enters.bits  := io.req.bits
+    val request = Queue(enters, 1)
+    val accepts = enters.ready
+    val isTaken = request.fire
+    taker :<>= request
+
+    /** Comes in the cycle after the request. */
+    val hitDistance = RegEnable(io.hitDistance, RegNext(enters.fire, false.B))
+  }
 }

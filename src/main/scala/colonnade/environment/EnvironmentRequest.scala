@@ -17,3 +17,9 @@ final class EnvironmentRequest(config: ColonnadeConfig) extends Bundle {
   /** The ray has hit the object: does the environment hide the hit? */
   val isOcclusionTest = Bool()
 }
+
+/** Which requests are accepted in this cycle: rays from the camera, and others. So one kind does not wait for the other. */
+final class EnvironmentAccepts extends Bundle {
+  val directView = Bool()
+  val march      = Bool()
+}

@@ -22,7 +22,9 @@ final class EnvironmentStageIO(config: ColonnadeConfig) extends Bundle {
   /** Stored in place of the context's previous ray. */
   val ray = Flipped(Valid(new StoredRay(config)))
 
-  val req = Flipped(Decoupled(new EnvironmentRequest(config)))
+  /** Ready as [[accepts]] says of its kind. */
+  val req     = Flipped(Decoupled(new EnvironmentRequest(config)))
+  val accepts = Output(new EnvironmentAccepts)
 
   /** In the cycle after an occlusion test's `req`: the distance of its hit. */
   val hitDistance = Input(HitDistance(config))
@@ -54,6 +56,8 @@ final class EnvironmentStage(config: ColonnadeConfig) extends Module {
   // A ray is read in the cycle after its request
   private val isTaken = RegNext(io.req.fire, false.B)
   io.req.ready                   := !isTaken && slot.io.isReady
+  io.accepts.directView          := io.req.ready
+  io.accepts.march               := io.req.ready
   slot.io.view                   := io.view
   slot.io.order.valid            := isTaken
   slot.io.order.bits.request     := RegEnable(io.req.bits, io.req.fire)

@@ -44,9 +44,12 @@ final class RowAnswer(config: ColonnadeConfig) extends Bundle {
 
 /** A render unit's port to the marches of its column. */
 final class MarchPort(config: ColonnadeConfig) extends Bundle {
-  val req = Decoupled(new EnvironmentRequest(config))
 
-  /** The order, in the cycle after its `req` is accepted, and only then. */
+  /** For the pipeline of directly seen pixels, if there is one; for the marches. At most one is accepted in a cycle. */
+  val direct = Option.when(config.units.directView)(Decoupled(new EnvironmentRequest(config)))
+  val march  = Decoupled(new EnvironmentRequest(config))
+
+  /** The order, in the cycle after its request is accepted, and only then. */
   val order = Output(new MarchOrder(config))
 
   /** In any order. */
@@ -54,8 +57,10 @@ final class MarchPort(config: ColonnadeConfig) extends Bundle {
 
   /** Ties off a port without a requester. */
   def tieOff(): Unit = {
-    req.valid    := false.B
-    req.bits     := DontCare
+    for (req <- direct.toSeq :+ march) {
+      req.valid := false.B
+      req.bits  := DontCare
+    }
     order        := DontCare
     answer.ready := true.B
   }

@@ -14,4 +14,7 @@ final class UnitPosition(config: ColonnadeConfig) extends PixelPosition(config) 
 
   /** Its primary ray may hit the object; always so without an environment. */
   val meetsObject = if (config.hasEnvironment) Some(Bool()) else None
+
+  /** It is of a tile that may show the object, and not of one that only shows the environment. */
+  val inObjectTile = if (config.hasEnvironment) Some(Bool()) else None
 }

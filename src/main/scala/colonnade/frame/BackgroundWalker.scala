@@ -11,8 +11,8 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val colour = Input(Rgb(FrameRegisters.colour))
   val tiles  = Flipped(Decoupled(new Tile(config)))
 
-  /** Background pixels of other tiles; they have priority. */
-  val others = Flipped(Decoupled(new PixelPosition(config)))
+  /** Background pixels of tiles of other kinds, by priority; they go before those of its own tiles. */
+  val others = Vec(TileKind.all(config).size - 1, Flipped(Decoupled(new PixelPosition(config))))
   val pixels = Decoupled(new Pixel(config))
 
   /** No pixel of a tile is left. */
@@ -20,18 +20,17 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Colours the pixels that show the background, in parallel with the render units: all pixels of its own tiles, and those
-  * that the column's [[TileWalker]] rejects. Throughput: one pixel per cycle.
+  * that the column's [[TileWalker]] and [[EnvironmentWalker]] reject. Throughput: one pixel per cycle.
   */
 final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new BackgroundWalkerIO(config))
 
   private val scan      = Module(new TileScan(config))
-  private val positions = Module(new Arbiter(new PixelPosition(config), 2))
+  private val positions = Module(new Arbiter(new PixelPosition(config), io.others.size + 1))
   scan.io.frame := io.frame
   scan.io.tiles <> io.tiles
 
-  positions.io.in(0) <> io.others
-  positions.io.in(1) <> scan.io.positions
+  positions.io.in.zip(io.others :+ scan.io.positions).foreach { case (in, positions) => in <> positions }
 
   io.pixels.valid         := positions.io.out.valid
   io.pixels.bits.x        := positions.io.out.bits.x

@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{is, log2Ceil, switch, Decoupled}
+import chisel3.util.{is, log2Ceil, switch}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, Status}
 
@@ -33,16 +33,13 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   val start = Input(Bool())
   val frame = Input(new FrameSettings(config.numbers))
 
-  /** Render units get the pixels of this window, too. */
+  /** Where pixels show the environment. */
   val window = Input(new EnvironmentWindow(config))
 
-  /** Valid only where ready is set, see `Dispatcher`. */
-  val tiles = Vec(columns, Decoupled(new Tile(config)))
-
-  /** Tiles without a pixel for the render units. */
-  val backgroundTiles = Vec(columns, Decoupled(new Tile(config)))
-  val progress        = Input(Vec(columns, new ColumnProgress))
-  val traffic         = Input(new PixelTraffic)
+  /** By column. Valid only where ready is set, see `Dispatcher`. */
+  val tiles    = Vec(columns, new ColumnTiles(config))
+  val progress = Input(Vec(columns, new ColumnProgress))
+  val traffic  = Input(new PixelTraffic)
 
   /** No read of the scene is in flight outside the columns. */
   val memoryIsIdle = Input(Bool())
@@ -65,7 +62,7 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   val watchdogError = Output(Bool())
 }
 
-/** Runs frames: dispatches tiles for the object and for the background in parallel, waits for the last pixel, and ends the
+/** Runs frames: dispatches tiles of all kinds in parallel, waits for the last pixel, and ends the
   * frame when the device is idle.
   *
   * The first tile comes four cycles after the start. `done` follows the last pixel by [[FrameController.settleCycles]] or
@@ -86,11 +83,11 @@ final class FrameController(config: ColonnadeConfig) extends Module {
   private val error    = RegInit(false.B)
 
   private val schedulers = withReset(reset.asBool || io.aborts) {
-    Seq(true, false).map(ofObject => Module(new TileScheduler(config, ofObject)))
+    TileKind.all(config).map(kind => kind -> Module(new TileScheduler(config, kind)))
   }
   private val watchdog = Module(new Watchdog(io.frame.watchdogCycles.getWidth))
 
-  private val isFinished = schedulers.map(_.io.isIdle).reduce(_ && _) && io.progress.map(_.isDrained).reduce(_ && _)
+  private val isFinished = schedulers.map(_._2.io.isIdle).reduce(_ && _) && io.progress.map(_.isDrained).reduce(_ && _)
   private val isSettled  = settling === 0.U && io.progress.map(_.isIdle).reduce(_ && _)
 
   switch(state) {
@@ -143,11 +140,11 @@ final class FrameController(config: ColonnadeConfig) extends Module {
   watchdog.io.restart := starts || io.frameStart || io.aborts || io.traffic.retires
   watchdog.io.hold    := io.traffic.stalls || state === State.waiting
 
-  schedulers.zip(Seq(io.tiles, io.backgroundTiles)).foreach { case (scheduler, tiles) =>
+  for ((kind, scheduler) <- schedulers) {
     scheduler.io.frame  := io.frame
     scheduler.io.window := io.window
     scheduler.io.start  := io.frameStart
-    tiles <> scheduler.io.tiles
+    io.tiles.zip(scheduler.io.tiles).foreach { case (column, tiles) => column(kind) :<>= tiles }
   }
 
   io.status.busy   := state =/= State.waiting

@@ -18,6 +18,9 @@ final class TestedSquare(config: ColonnadeConfig) extends Bundle {
 final class EnvironmentWindow(config: ColonnadeConfig) extends Bundle {
   val enabled = Bool()
   val rect    = new PixelRect(config.numbers.coordinateBits)
+
+  /** A square of `size` pixels and the window have pixels in common. */
+  def meets(first: PixelPosition, size: Int): Bool = enabled && EnvironmentWindow.meets(rect, first, size)
 }
 
 object EnvironmentWindow {
@@ -30,6 +33,12 @@ object EnvironmentWindow {
       window.rect    := environment.window
     }
     window
+  }
+
+  /** A square of `size` pixels and a rectangle have pixels in common. */
+  def meets(rect: PixelRect, first: PixelPosition, size: Int): Bool = {
+    def spans(first: UInt, low: UInt, high: UInt): Bool = low < high && first < high && first +& size.U > low
+    spans(first.x, rect.x0, rect.x1) && spans(first.y, rect.y0, rect.y1)
   }
 }
 
@@ -69,8 +78,8 @@ final class OutlineTest(config: ColonnadeConfig, size: Int) extends Module {
 
   // Products of the corner that is farthest inside
   private val square   = io.squares.bits
-  private val inRect   = meets(rectangle)
-  private val inWindow = io.window.enabled && meets(io.window.rect)
+  private val inRect   = EnvironmentWindow.meets(rectangle, square, size)
+  private val inWindow = io.window.meets(square, size)
   private val products = outline.map { edge =>
     Seq(edge.x -> square.x, edge.y -> square.y).map { case (normal, first) =>
       val furthest = Mux(normal > 0.S, first +& (size - 1).U, first)
@@ -87,10 +96,4 @@ final class OutlineTest(config: ColonnadeConfig, size: Int) extends Module {
   io.tested.bits.first       := RegEnable(multiplied, adds)
   io.tested.bits.meetsObject := RegEnable(isInRect && isInside, adds)
   io.tested.bits.isForUnits  := RegEnable((isInRect && isInside) || isInWindow, adds)
-
-  private def meets(rect: PixelRect): Bool = spans(square.x, rect.x0, rect.x1) && spans(square.y, rect.y0, rect.y1)
-
-  /** The square, and an interval that may be empty, have pixels in common in one direction. */
-  private def spans(first: UInt, low: UInt, high: UInt): Bool =
-    low < high && first < high && first +& size.U > low
 }

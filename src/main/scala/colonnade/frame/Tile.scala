@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.log2Ceil
+import chisel3.util.{log2Ceil, Decoupled, DecoupledIO}
 import colonnade.config.ColonnadeConfig
 
 /** The first pixel of a square of `frame.tileSize`; both are multiples of it. */
@@ -17,4 +17,34 @@ object Tile {
 
   /** Levels of the Morton code of a tile, for any frame that the registers can hold. */
   def tileLevels(config: ColonnadeConfig): Int = (config.numbers.coordinateBits - pixelLevels(config)).max(1)
+}
+
+/** What the pixels of a tile may show. */
+object TileKind extends Enumeration {
+
+  /** The object in some pixel. */
+  val OfObject = Value
+
+  /** The environment in some pixel, the object in none. */
+  val OfEnvironment = Value
+
+  /** The background only. */
+  val OfBackground = Value
+
+  /** Those of a device. */
+  def all(config: ColonnadeConfig): Seq[TileKind.Value] =
+    values.toSeq.filter(kind => kind != OfEnvironment || config.hasEnvironment)
+}
+
+/** Tiles for a column, by kind. */
+final class ColumnTiles(config: ColonnadeConfig) extends Bundle {
+  val ofObject      = Decoupled(new Tile(config))
+  val ofEnvironment = Option.when(config.hasEnvironment)(Decoupled(new Tile(config)))
+  val ofBackground  = Decoupled(new Tile(config))
+
+  def apply(kind: TileKind.Value): DecoupledIO[Tile] = kind match {
+    case TileKind.OfObject      => ofObject
+    case TileKind.OfEnvironment => ofEnvironment.get
+    case TileKind.OfBackground  => ofBackground
+  }
 }

@@ -10,7 +10,7 @@ import colonnade.formats.FrameSettings
 final class TileSchedulerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 
-  /** Tiles that meet it go to render units, too. */
+  /** Where pixels show the environment. */
   val window = Input(new EnvironmentWindow(config))
 
   /** Starts the tiles of a frame; only while idle. */
@@ -23,13 +23,13 @@ final class TileSchedulerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Dispatches the tiles of a frame in Morton order to ready columns, round-robin: those for render units, or the others.
+/** Dispatches the tiles of a frame that are of one kind, in Morton order, to ready columns, round-robin.
   *
   * Throughput: one tile per cycle while the queue holds tiles; the first one comes four cycles after the start. The queue
   * hides the cycles in which codes outside the frame are skipped: a column needs more cycles per tile than a skip takes.
-  * A tile of the other kind takes one cycle.
+  * A tile of another kind takes one cycle.
   */
-final class TileScheduler(config: ColonnadeConfig, ofObject: Boolean) extends Module {
+final class TileScheduler(config: ColonnadeConfig, kind: TileKind.Value) extends Module {
   import TileScheduler._
 
   val io = IO(new TileSchedulerIO(config))
@@ -53,7 +53,11 @@ final class TileScheduler(config: ColonnadeConfig, ofObject: Boolean) extends Mo
   scan.io.cells.ready       := outline.io.squares.ready
 
   private val tested     = outline.io.tested
-  private val isSelected = tested.bits.isForUnits === ofObject.B
+  private val isSelected = kind match {
+    case TileKind.OfObject      => tested.bits.meetsObject
+    case TileKind.OfEnvironment => tested.bits.isForUnits && !tested.bits.meetsObject
+    case TileKind.OfBackground  => !tested.bits.isForUnits
+  }
   tiles.valid  := tested.valid && isSelected
   tiles.bits.x := tested.bits.first.x
   tiles.bits.y := tested.bits.first.y

@@ -11,6 +11,12 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
   val tiles = Flipped(Decoupled(new Tile(config)))
 
+  /** Pixels of another tile, which shows the environment only. */
+  val environment = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
+
+  /** A pixel of `environment` has left the column. */
+  val environmentLeaves = Input(Bool())
+
   /** Pixels to render, by render unit. */
   val positions = Vec(config.array.rows, Decoupled(new UnitPosition(config)))
 
@@ -25,13 +31,17 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Dispatches the pixels of a tile in the order of [[TileScan]]: those that may show the object or the environment to ready
-  * render units, round-robin; the others to the background walker.
+  * render units, round-robin; the others to the background walker. With an environment a [[PixelMixer]] mixes them with
+  * pixels of another tile.
   *
   * Throughput: one pixel per cycle, the first one four cycles after its tile is accepted. A queue of one entry before each
   * render unit holds its next pixel. The next tile is accepted when only these and two more pixels are left, so tiles
   * follow each other without a gap, and no column takes tiles early.
+  *
+  * @param mostEnvironment
+  *   `most` of [[PixelMixer]]
   */
-final class TileWalker(config: ColonnadeConfig) extends Module {
+final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = None) extends Module {
   val io = IO(new TileWalkerIO(config))
 
   private val scan     = Module(new TileScan(config))
@@ -46,13 +56,23 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
 
   private val tested   = outline.io.tested
   private val forUnits = tested.bits.isForUnits
-  dispatch.io.items.valid  := tested.valid && forUnits
-  dispatch.io.items.bits.x := tested.bits.first.x
-  dispatch.io.items.bits.y := tested.bits.first.y
-  dispatch.io.items.bits.meetsObject.foreach(_ := tested.bits.meetsObject)
+  private val taken    = Wire(Decoupled(new UnitPosition(config)))
+  taken.valid  := tested.valid && forUnits
+  taken.bits.x := tested.bits.first.x
+  taken.bits.y := tested.bits.first.y
+  taken.bits.meetsObject.foreach(_ := tested.bits.meetsObject)
+  taken.bits.inObjectTile.foreach(_ := true.B)
   io.others.valid := tested.valid && !forUnits
   io.others.bits  := tested.bits.first
-  tested.ready    := Mux(forUnits, dispatch.io.items.ready, io.others.ready)
+  tested.ready    := Mux(forUnits, taken.ready, io.others.ready)
+
+  dispatch.io.items :<>= io.environment.fold(taken) { environment =>
+    val mixer = Module(new PixelMixer(config, mostEnvironment)).io
+    mixer.objects :<>= taken
+    mixer.environment :<>= environment
+    mixer.leaves := io.environmentLeaves
+    mixer.positions
+  }
 
   io.positions.zip(dispatch.io.takers).foreach { case (position, taker) => position <> Queue(taker, 1, pipe = true) }
   io.isIdle := scan.io.isIdle && outline.io.isIdle && !io.positions.map(_.valid).reduce(_ || _)

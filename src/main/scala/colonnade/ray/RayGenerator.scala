@@ -14,7 +14,8 @@ final class RayPosition(config: ColonnadeConfig) extends Bundle {
   val y       = UInt(config.numbers.coordinateBits.W)
 
   /** [[colonnade.formats.UnitPosition]]'s. */
-  val meetsObject = if (config.hasEnvironment) Some(Bool()) else None
+  val meetsObject  = if (config.hasEnvironment) Some(Bool()) else None
+  val inObjectTile = if (config.hasEnvironment) Some(Bool()) else None
 }
 
 /** The frame registers that define a primary ray. */

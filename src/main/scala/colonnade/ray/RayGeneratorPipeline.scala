@@ -7,7 +7,8 @@ import colonnade.numbers.{CarrySave, Fixed}
 
 /** What [[RayGenerator]] does, a ray per cycle while each pixel follows the one before it in the Morton order of a tile.
   *
-  * Such a pixel needs one addition to the direction before. The direction of another pixel is summed up bit by bit, in
+  * Such a pixel needs one addition to the direction before. Pixels of two tiles may be mixed, `inObjectTile` tells them
+  * apart; the direction before is kept for both. The direction of another pixel is summed up bit by bit, in
   * `coordinateBits` + 1 cycles. Any order gives the same rays. Latency: a ray is offered 2 cycles after its pixel was
   * accepted, later by the cycles of a sum bit by bit, and if another ray waits before it. The registers may change when
   * the unit has been empty for [[RayGeneratorPipeline.emptyCycles]] cycles. Source: docs/ray-setup.md, pipelines.
@@ -23,11 +24,20 @@ final class RayGeneratorPipeline(config: ColonnadeConfig) extends RayGeneratorMo
   private val empty    = RegInit(RayGeneratorPipeline.emptyCycles.U)
   private val isNew    = empty === RayGeneratorPipeline.emptyCycles.U
   private val position = RegEnable(io.position.bits, io.position.fire)
-  private val follows  = RegEnable(!isNew && isNext(position, io.position.bits), io.position.fire)
-  private val topBit   = numbers.coordinateBits
-  private val bit      = RegInit(topBit.U)
-  private val sums     = inFront && (!inBack || io.ray.ready)
-  private val moves    = sums && (follows || bit === 0.U)
+
+  // The tiles' last pixels, and whether a pixel comes after those of the other tile
+  private val takes    = io.position.fire
+  private val changes  = !isNew && tileOf(io.position.bits) =/= tileOf(position)
+  private val isChange = RegEnable(changes, takes)
+  private val other    = RegEnable(position, takes && changes)
+  private val hasOther = Reg(Bool())
+  when(takes) { hasOther := !isNew && (hasOther || changes) }
+  private val isKnown = !isNew && (!changes || hasOther)
+  private val follows = RegEnable(isKnown && isNext(Mux(changes, other, position), io.position.bits), takes)
+  private val topBit  = numbers.coordinateBits
+  private val bit     = RegInit(topBit.U)
+  private val sums    = inFront && (!inBack || io.ray.ready)
+  private val moves   = sums && (follows || bit === 0.U)
 
   io.ray.valid      := inBack
   io.position.ready := !inFront || moves
@@ -75,16 +85,22 @@ final class RayGeneratorPipeline(config: ColonnadeConfig) extends RayGeneratorMo
     def shifted(term: UInt, by: Int): UInt = (term << by)(bits - 1, 0)
     val subtracted = sets.indices.tail.map(n => sets(n) -> ~shifted(terms((n + 1) % 2), (n + 1) / 2))
     val third      = Mux1H((addsDir -> terms(2)) +: subtracted)
-    val before     = Mux1H(Seq(follows -> sum, isDouble -> shifted(sum, 1)))
+    // The direction before: the last one, or that of the other tile, which is kept when the tile changes
+    val ofOther = RegEnable(sum, sums && isChange && (follows || bit === topBit.U))
+    val start   =
+      Mux1H(Seq((follows && !isChange) -> sum, (follows && isChange) -> ofOther, isDouble -> shifted(sum, 1)))
 
     val (steps, stepCarries) = CarrySave(Mux(addsX, terms(0), 0.U), Mux(addsY, terms(1), 0.U), third, clears)
-    val (whole, carries)     = CarrySave(before, steps, stepCarries)
+    val (whole, carries)     = CarrySave(start, steps, stepCarries)
     when(sums) { sum := whole + carries }
     sum.asSInt
   }
 
   /** The bit of a coordinate that is added; the highest step has none. */
   private def bitOf(coordinate: UInt): Bool = (0.U(1.W) ## coordinate)(bit)
+
+  /** Which of two tiles a pixel belongs to. */
+  private def tileOf(pixel: RayPosition): Bool = pixel.inObjectTile.getOrElse(true.B)
 
   /** Whether a pixel follows another one in a tile. */
   private def isNext(before: RayPosition, pixel: RayPosition): Bool = {

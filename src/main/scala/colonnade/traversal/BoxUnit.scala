@@ -2,7 +2,7 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Mux1H, PopCount, Queue, RegEnable, ShiftRegister}
-import colonnade.common.Context
+import colonnade.common.{Context, ReservedQueue}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{ChildKind, RecordFormats}
 import colonnade.numbers.Fixed
@@ -41,18 +41,21 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
 
   val io = IO(new BoxUnitIO(config))
 
-  private val inFlight = Module(new Queue(new NodeTag(config), queueDepth))
-  private val sorted   = Module(new Queue(new ChildOrder(config), queueDepth))
+  private val tags   = Module(new ReservedQueue(new NodeTag(config), queueDepth)).io
+  private val sorted = Module(new Queue(new ChildOrder(config), queueDepth))
 
   // Accept a node; its first children start at once, the others follow in consecutive beats
-  private val beat     = RegInit(0.U(log2Ceil(beats.max(2)).W))
-  private val follows  = beat =/= 0.U
-  private val nextBeat = Mux(io.in.fire || follows, Mux(beat === (beats - 1).U, 0.U, beat + 1.U), beat)
-  beat                  := nextBeat
-  io.in.ready           := inFlight.io.enq.ready && !follows
-  io.readyNext          := nextBeat === 0.U && inFlight.io.count +& io.in.fire - inFlight.io.deq.fire < queueDepth.U
-  inFlight.io.enq.valid := io.in.fire
-  inFlight.io.enq.bits  := NodeTag(config, io.in.bits)
+  private val beat         = RegInit(0.U(log2Ceil(beats.max(2)).W))
+  private val follows      = beat =/= 0.U
+  private val nextBeat     = Mux(io.in.fire || follows, Mux(beat === (beats - 1).U, 0.U, beat + 1.U), beat)
+  private val inFlight     = RegInit(0.U(log2Ceil(queueDepth + 1).W))
+  private val nextInFlight = inFlight + io.in.fire - io.out.fire
+  beat          := nextBeat
+  inFlight      := nextInFlight
+  io.in.ready   := inFlight =/= queueDepth.U && !follows
+  io.readyNext  := nextBeat === 0.U && nextInFlight =/= queueDepth.U
+  tags.in.valid := io.in.fire
+  tags.in.bits  := NodeTag(config, io.in.bits)
   private val starts   = io.in.fire || follows
   private val endsNode = starts && beat === (beats - 1).U
 
@@ -82,11 +85,12 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   sorted.io.enq.bits  := ChildOrder(config, allBeats(isEntered), allBeats(tNear), datapath.io.distance)
   assert(!ends || sorted.io.enq.ready, "a node was accepted without queue space for its result")
 
-  io.out.valid          := sorted.io.deq.valid
-  sorted.io.deq.ready   := io.out.ready
-  inFlight.io.deq.ready := io.out.fire
-  io.out.bits           := inFlight.io.deq.bits.result(sorted.io.deq.bits)
-  io.busy               := starts
+  io.out.valid        := sorted.io.deq.valid
+  sorted.io.deq.ready := io.out.ready
+  tags.out.ready      := io.out.fire
+  io.out.bits         := tags.out.bits.result(sorted.io.deq.bits)
+  io.busy             := starts
+  assert(!io.out.valid || tags.out.valid, "sorted children without their node")
 }
 
 /** What the result needs of a node besides the sorted children. */

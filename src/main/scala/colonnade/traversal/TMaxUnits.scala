@@ -1,9 +1,16 @@
 package colonnade.traversal
 
 import chisel3._
-import colonnade.config.NumberFormats
+import colonnade.common.Context
+import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
+
+/** Reads the largest entry distance of a box that may hold a closer hit, of the ray of a context: in the same cycle. */
+final class TMaxReader(config: ColonnadeConfig) extends Bundle {
+  val context = Output(Context(config))
+  val units   = Input(new Fixed(new RayFormats(config.numbers).units))
+}
 
 /** Converts a ray's largest t from grid steps to whole units: the largest `tNear` of a box that may still hold a hit.
   *

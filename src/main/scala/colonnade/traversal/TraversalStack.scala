@@ -4,8 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.RayFormats
+import colonnade.numbers.Rounding
 
 /** The next step of a ray: a record to visit, or the end of traversal. */
 final class TraversalStep(config: ColonnadeConfig) extends Bundle {
@@ -28,9 +27,9 @@ final class TraversalStackIO(config: ColonnadeConfig) extends Bundle {
   /** A context that has finished a leaf. */
   val resume = Flipped(Decoupled(Context(config)))
 
-  /** By context: the largest entry distance that may hold a hit, in units; up to date for an offered operation. */
-  val tMaxUnits = Input(Vec(config.array.contexts, new Fixed(new RayFormats(config.numbers).units)))
-  val steps     = Decoupled(new TraversalStep(config))
+  /** Of the operation that starts; up to date for an offered operation. */
+  val tMax  = new TMaxReader(config)
+  val steps = Decoupled(new TraversalStep(config))
 
   /** An entry was dropped because the stack was full. */
   val overflow = Output(Bool())
@@ -94,10 +93,11 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
 
   // Update the level of the stack
   private val context = Mux(selectsResult, io.results.bits.context, io.resume.bits)
-  private val level   = element(levels, context)
-  private val isFull  = level === stackDepth.U
-  private val pushes  = starts && needsPush && !isFull
-  private val pops    = starts && needsPop && level =/= 0.U
+  io.tMax.context := context
+  private val level  = element(levels, context)
+  private val isFull = level === stackDepth.U
+  private val pushes = starts && needsPush && !isFull
+  private val pops   = starts && needsPop && level =/= 0.U
   when(pushes || pops || popsAgain) {
     val changed = Mux(popsAgain, operation.context, context)
     element(levels, changed) := Mux(popsAgain, operation.level - 1.U, Mux(pops, level - 1.U, level + 1.U))
@@ -121,7 +121,7 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
     operation.isPop       := pops
     operation.isDone      := needsPop
     operation.target      := io.results.bits.children(0).target
-    operation.tMax        := element(io.tMaxUnits, context).integer
+    operation.tMax        := io.tMax.units.integer
     operation.level       := level - 1.U
     operation.nextAddress := freeAddress - 2.U
   }

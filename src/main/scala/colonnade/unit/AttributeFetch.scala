@@ -104,9 +104,14 @@ final class AttributeFetch(config: ColonnadeConfig) extends Module {
 object AttributeFetch {
 
   /** Hits whose attributes are awaited at a time. */
-  val slots: Int = 16
+  val slots: Int = 8
 
-  /** A configuration whose contexts are the slots. */
-  def slotConfig(config: ColonnadeConfig): ColonnadeConfig =
-    config.copy(array = config.array.copy(contexts = slots.min(config.units.pathContexts)))
+  /** Their record buffers: a hit needs a record for two or three cycles of its shading. */
+  val buffers: Int = 2
+
+  /** A configuration whose contexts are the slots, with as many record buffers as they have. */
+  def slotConfig(config: ColonnadeConfig): ColonnadeConfig = config.copy(
+    array = config.array.copy(contexts = slots.min(config.units.pathContexts)),
+    columnBvhMemory = config.columnBvhMemory.copy(recordBuffers = buffers.min(config.columnBvhMemory.recordBuffers))
+  )
 }

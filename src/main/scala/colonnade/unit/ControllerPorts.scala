@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.EnvironmentRequest
+import colonnade.environment.{EnvironmentAccepts, EnvironmentRequest}
 import colonnade.shading.{Occlusion, PathTermination, ShadowRequest}
 
 /** The state of a context. */
@@ -25,7 +25,7 @@ object ContextState extends ChiselEnum {
   /** Its hit, or its point of the environment, waits for attributes or is in the shader. */
   val shading = Value
 
-  /** Its surface is known; shadow rays may be left to trace. */
+  /** Its surface is known; a shadow ray is left to trace. */
   val shadowTest = Value
 
   /** Its ray has missed the object: it waits for the environment march, or is in it. */
@@ -39,6 +39,9 @@ object ContextState extends ChiselEnum {
 
   /** The colour of its pixel is complete. */
   val done = Value
+
+  /** Its surface and all shadow rays of it are known; the path ends, or the bounce of the surface resumes. */
+  val lit = Value
 }
 
 /** A context whose hit has been shaded. */
@@ -83,8 +86,11 @@ final class EnvironmentControl(config: ColonnadeConfig) extends Bundle {
   /** A Fresnel reflection that is resolved first, while its path's bounce is deferred. */
   val fresnelReflection = Flipped(Valid(Context(config)))
 
-  /** A ray to march through the environment; its result. An occlusion test ends in `hit` or `visible`. */
+  /** A ray to find in the environment, of a kind that is accepted; its result. An occlusion test ends in `hit` or
+    * `visible`.
+    */
   val req     = Decoupled(new EnvironmentRequest(config))
+  val accepts = Input(new EnvironmentAccepts)
   val hit     = Flipped(Valid(Context(config)))
   val miss    = Flipped(Valid(Context(config)))
   val visible = Flipped(Valid(Context(config)))

@@ -50,6 +50,7 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
 
   // March
   stage.req :<>= control.req
+  control.accepts   := stage.accepts
   control.miss      := stage.miss
   control.visible   := stage.visible
   stage.hitDistance := io.hitDistance

@@ -8,7 +8,7 @@ import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 import colonnade.shading.Occlusion
-import colonnade.traversal.{TMaxUnits, TriangleResult}
+import colonnade.traversal.{TMaxReader, TMaxUnits, TriangleResult}
 
 /** A ray whose trace starts: only hits with t < `tMax` count. */
 final class TraceStart(config: ColonnadeConfig) extends Bundle {
@@ -29,9 +29,11 @@ final class HitTableIO(config: ColonnadeConfig) extends Bundle {
   /** The ray of `result` has a hit, this result included; for a shadow ray only opaque hits count. */
   val hasHitNow = Output(Bool())
 
-  /** By context: the largest entry distance of a box that may hold a closer hit; whether the ray has a hit. */
-  val tMaxUnits = Output(Vec(contexts, new Fixed(new RayFormats(config.numbers).units)))
-  val hasHit    = Output(Vec(contexts, Bool()))
+  /** For box unit and stack. */
+  val tMax = Vec(2, Flipped(new TMaxReader(config)))
+
+  /** By context: whether the ray has a hit. */
+  val hasHit = Output(Vec(contexts, Bool()))
 
   /** By context: what its shadow ray has hit. */
   val occlusions = Output(Vec(contexts, Occlusion()))
@@ -53,10 +55,9 @@ final class HitTable(config: ColonnadeConfig) extends Module {
 
   val io = IO(new HitTableIO(config))
 
-  private val closestT  = Reg(Vec(contexts, new Fixed(formats.grid)))
-  private val ids       = Reg(Vec(contexts, UInt(RecordFormats.idBits(config).W)))
-  private val tMaxUnits = Reg(Vec(contexts, new Fixed(formats.units)))
-  private val hasHit    = Reg(Vec(contexts, Bool()))
+  private val closestT = Reg(Vec(contexts, new Fixed(formats.grid)))
+  private val ids      = Reg(Vec(contexts, UInt(RecordFormats.idBits(config).W)))
+  private val hasHit   = Reg(Vec(contexts, Bool()))
 
   /** The shadow ray has hit a transmissive triangle. */
   private val hasTransmissiveHit = Reg(Vec(contexts, Bool()))
@@ -78,19 +79,17 @@ final class HitTable(config: ColonnadeConfig) extends Module {
     detail.weights  := hit.weights
     detail.backSide := hit.backSide
     details.write(context, detail)
-    ids(context)       := hit.id
-    closestT(context)  := hit.t
-    tMaxUnits(context) := TMaxUnits(config.numbers)(hit.t)
+    ids(context)      := hit.id
+    closestT(context) := hit.t
   }
 
   when(io.start.valid) {
     closestT(io.start.bits.context)           := io.start.bits.tMax
-    tMaxUnits(io.start.bits.context)          := TMaxUnits(config.numbers)(io.start.bits.tMax)
     hasHit(io.start.bits.context)             := false.B
     hasTransmissiveHit(io.start.bits.context) := false.B
   }
 
-  io.tMaxUnits  := tMaxUnits
+  io.tMax.foreach(reader => reader.units := TMaxUnits(config.numbers)(closestT(reader.context)))
   io.hasHit     := hasHit
   io.occlusions := VecInit(hasHit.zip(hasTransmissiveHit).map { case (hasOpaqueHit, hasTransmissiveHit) =>
     Mux(hasOpaqueHit, Occlusion.opaque, Mux(hasTransmissiveHit, Occlusion.transmissive, Occlusion.none))

@@ -120,9 +120,9 @@ final class Intersector(config: ColonnadeConfig) extends Module {
 
   // Traverse the BVH
   private val step = traversal.io.steps
-  traversal.io.clear     := io.start
-  traversal.io.scene     := io.scene
-  traversal.io.tMaxUnits := hitTable.io.tMaxUnits
+  traversal.io.clear := io.start
+  traversal.io.scene := io.scene
+  hitTable.io.tMax.zip(traversal.io.tMax).foreach { case (table, reader) => table :<>= reader }
   traversal.io.nodes :<>= io.nodes
   step.ready := true.B
   drive(control.ended(1), step.fire && step.bits.isDone, step.bits.context)

@@ -24,6 +24,9 @@ final class PathUnitIO(config: ColonnadeConfig) extends Bundle {
   /** To the textures. */
   val texture = config.geometry.texture.map(_ => new TexturePort(config))
 
+  /** A pixel of a tile of the environment leaves. */
+  val environmentLeaves = Output(Bool())
+
   /** No pixel is in flight. */
   val isIdle = Output(Bool())
   val events = Output(new PathEvents(config))
@@ -102,6 +105,7 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
   assembler.surfaceHit := trace.surfaceHit
   assembler.colour     := colourUnit.colour
   io.pixels :<>= assembler.pixels
+  io.environmentLeaves := assembler.environmentLeaves
 
   // Control: the state of every context
   controller.allocation :<>= primaryRays.control

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.{ArrayConfig, ColonnadeConfig}
-import colonnade.formats.{FrameRegisters, Pixel, PixelHit, PixelPosition, Rgb}
+import colonnade.formats.{FrameRegisters, Pixel, PixelHit, Rgb, UnitPosition}
 import colonnade.shading.PathColour
 
 /** Ports of [[PixelAssembler]]. */
@@ -20,6 +20,9 @@ final class PixelAssemblerIO(config: ColonnadeConfig) extends Bundle {
   val control = new PixelControl(config)
   val pixels  = Decoupled(new Pixel(config))
 
+  /** The pixel of a context that retires is of a tile of the environment. */
+  val environmentLeaves = Output(Bool())
+
   /** No pixel waits here. */
   val isIdle = Output(Bool())
 }
@@ -32,7 +35,7 @@ final class PixelAssemblerIO(config: ColonnadeConfig) extends Bundle {
 final class PixelAssembler(config: ColonnadeConfig) extends Module {
   val io = IO(new PixelAssemblerIO(config))
 
-  private val pixels   = ContextTable(config, new PixelPosition(config))
+  private val pixels   = ContextTable(config, new UnitPosition(config))
   private val colours  = ContextTable(config, new PathColour(config))
   private val isObject = Reg(Vec(config.array.contexts, Bool()))
   when(io.allocated.valid) {
@@ -43,7 +46,7 @@ final class PixelAssembler(config: ColonnadeConfig) extends Module {
   when(io.colour.valid) { colours.write(io.colour.bits.context, io.colour.bits) }
 
   /** Finished pixels that wait. Many contexts give a pixel a cycle: two wait while one is on its way. */
-  private val places = if (config.array.contexts > ArrayConfig.mostContexts) 3 else 1
+  private val places = if (ArrayConfig.isLarge(config.array.contexts)) 3 else 1
 
   // Retire a context
   private val done     = io.control.done
@@ -59,6 +62,7 @@ final class PixelAssembler(config: ColonnadeConfig) extends Module {
   private val pixel     = pixels.read(done.bits, retires)
   private val colour    = colours.read(done.bits, retires)
   private val hasColour = RegEnable(io.control.hasColour, retires)
+  io.environmentLeaves   := finished.valid && !pixel.inObjectTile.getOrElse(true.B)
   finished.valid         := RegNext(retires, false.B)
   finished.bits.x        := pixel.x
   finished.bits.y        := pixel.y

@@ -10,7 +10,7 @@ import colonnade.ray.{CameraRegisters, RayGenerator, RayRequest}
 /** A context that gets a pixel. */
 final class AllocatedPixel(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
-  val pixel   = new PixelPosition(config)
+  val pixel   = new UnitPosition(config)
 }
 
 /** Ports of [[PrimaryRays]]. */
@@ -46,6 +46,7 @@ final class PrimaryRays(config: ColonnadeConfig) extends Module {
   generator.io.position.bits.x       := position.x
   generator.io.position.bits.y       := position.y
   generator.io.position.bits.meetsObject.zip(position.meetsObject).foreach { case (to, from) => to := from }
+  generator.io.position.bits.inObjectTile.zip(position.inObjectTile).foreach { case (to, from) => to := from }
   io.positions.ready := generator.io.position.ready && free.valid
 
   io.control.allocate       := generator.io.position.fire
@@ -53,8 +54,7 @@ final class PrimaryRays(config: ColonnadeConfig) extends Module {
   io.start.bits             := free.bits
   io.allocated.valid        := generator.io.position.fire
   io.allocated.bits.context := free.bits
-  io.allocated.bits.pixel.x := position.x
-  io.allocated.bits.pixel.y := position.y
+  io.allocated.bits.pixel   := position
 
   io.ray :<>= generator.io.ray
   io.pixel.x     := generator.io.pixel.x

@@ -1,24 +1,23 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Mux1H, PopCount, PriorityEncoder, Valid}
-import colonnade.common.First
+import chisel3.util.{Mux1H, PopCount}
+import colonnade.common.{Choice, First}
 import colonnade.config.{ArrayConfig, ColonnadeConfig}
-import colonnade.shading.Occlusion
 
 import scala.collection.mutable
 
 /** Holds the state of every context and issues each one to its next stage; contains no arithmetic.
   *
   * A context goes idle → raySetup → traversing → resolve → shading. From a mirror or glass it returns to raySetup. Other
-  * surfaces go to shadowTest, and for each shadow ray → raySetup → traversing → resolve → shadowTest. Then the path ends:
-  * accumulatePending → accumulating → done → idle. A primary ray that misses goes to done at once; a later ray that
+  * surfaces go to shadowTest, and for each shadow ray → raySetup → traversing → resolve → shadowTest. Then they are lit, and
+  * the path ends: accumulatePending → accumulating → done → idle. A primary ray that misses goes to done at once; a later ray that
   * misses goes to accumulatePending.
   *
   * With an environment, a ray that misses goes environmentPending → environmentMarch → shading; if it hits nothing there
   * either, it continues as above. A hit that the environment may hide is tested there as well: resolve →
   * environmentPending → environmentMarch, and back to resolve if it is visible. At glass, the Fresnel reflection is resolved first: shading → environmentPending →
-  * environmentMarch → shading → shadowTest, then the deferred bounce resumes. If the reflection misses, the context waits
+  * environmentMarch → shading → lit, then the deferred bounce resumes. If the reflection misses, the context waits
   * in resumeBounce.
   *
   * Contexts are tokens: there are `contexts` of them, so no queue for contexts overflows. In each cycle, at most one ended
@@ -26,21 +25,19 @@ import scala.collection.mutable
   */
 final class RtController(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
-  private val lights   = config.frame.lights
 
-  /** So many contexts that a choice of one of them, or their number, takes a cycle. */
-  private val isLarge = contexts > ArrayConfig.mostContexts
+  /** A choice of one of the contexts, or their number, takes a cycle. */
+  private val isLarge = ArrayConfig.isLarge(contexts)
 
   val io = IO(new RtControllerIO(config))
 
   /** What moves a context to another state: whether it happens, the context, the state. */
   private val moves = mutable.Buffer.empty[(Bool, UInt, ContextState.Type)]
 
-  private val state        = RegInit(VecInit(Seq.fill(contexts)(ContextState.idle)))
-  private val isShadow     = Reg(Vec(contexts, Bool()))
-  private val isPrimary    = Reg(Vec(contexts, Bool()))
-  private val hasColour    = Reg(Vec(contexts, Bool()))
-  private val isBackground = Reg(Vec(contexts, Bool()))
+  private val state     = RegInit(VecInit(Seq.fill(contexts)(ContextState.idle)))
+  private val isShadow  = Reg(Vec(contexts, Bool()))
+  private val isPrimary = Reg(Vec(contexts, Bool()))
+  private val hasColour = Reg(Vec(contexts, Bool()))
 
   /** The camera sees the environment directly in this pixel. */
   private val isDirectView = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
@@ -56,17 +53,12 @@ final class RtController(config: ColonnadeConfig) extends Module {
     if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
   private val hasOcclusion = io.environment.map(_.occlusion).getOrElse(false.B) && hasEnvironment
 
-  /** By light: a shadow ray is still to be traced; the results of those that were traced. */
-  private val shadowPending = Reg(Vec(contexts, Vec(lights, Bool())))
-  private val occlusions    = Reg(Vec(contexts, Vec(lights, Occlusion())))
-
-  /** The light of a context's current shadow ray. */
-  private val shadowLight = Reg(Vec(contexts, chiselTypeOf(io.shadow.bits.light)))
+  private val shadows = new ShadowProgress(config)
   io.idleCount     := count(isAt(ContextState.idle), atReset = contexts)
   io.raySetupCount := count(isAt(ContextState.raySetup))
 
   // Allocate an idle context
-  private val free = choose(isAt(ContextState.idle), io.allocation.allocate)
+  private val free = choose(isAt(ContextState.idle), io.allocation.allocate).now
   io.allocation.free := free
   move(io.allocation.allocate, free.bits, ContextState.raySetup)
   when(io.allocation.allocate) {
@@ -84,7 +76,8 @@ final class RtController(config: ColonnadeConfig) extends Module {
   // Trace its ray
   io.trace.isShadow  := isShadow
   io.trace.isPrimary := isPrimary
-  io.trace.resolved  := choose(isAt(ContextState.resolve), true.B)
+  private val ended = choose(isAt(ContextState.resolve), true.B)
+  io.trace.resolved := ended.now
   move(io.trace.entered.valid, io.trace.entered.bits, ContextState.traversing)
   io.trace.ended.foreach(ended => move(ended.valid, ended.bits, ContextState.resolve))
 
@@ -95,75 +88,54 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.trace.measured := 0.U.asTypeOf(io.trace.measured)
   private val afterTrace = Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
-  move(io.trace.resolved.valid, resolved, Mux(isShadow(resolved), ContextState.shadowTest, afterHit))
-  when(io.trace.resolved.valid) {
-    when(isShadow(resolved)) {
-      for (light <- 0 until lights)
-        when((lights == 1).B || shadowLight(resolved) === light.U) {
-          occlusions(resolved)(light) := io.trace.occlusions(resolved)
-        }
-    }
-    isBackground(resolved) := !isShadow(resolved) && !io.trace.hasHit(resolved)
-    if (config.hasEnvironment) {
-      mayBeHidden(resolved)     := false.B
-      isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit(resolved) && mayBeHidden(resolved)
-    }
+  private val lightsLeft =
+    shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusions(resolved))
+  move(ended.now.valid, resolved, Mux(isShadow(resolved), afterLights(lightsLeft), afterHit))
+  if (config.hasEnvironment) when(ended.now.valid) {
+    mayBeHidden(resolved)     := false.B
+    isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit(resolved) && mayBeHidden(resolved)
   }
 
   // Results of the shader
-  move(io.shaded.valid, io.shaded.bits.context, ContextState.shadowTest)
-  when(io.shaded.valid) {
-    shadowPending(io.shaded.bits.context) := io.shaded.bits.needsShadowRays
-    occlusions(io.shaded.bits.context)    := VecInit.fill(lights)(Occlusion.none)
-    isBackground(io.shaded.bits.context)  := false.B
-  }
+  private val needs = io.shaded.bits.needsShadowRays.asUInt
+  move(io.shaded.valid, io.shaded.bits.context, afterLights(needs.orR))
+  shadows.begin(io.shaded.valid, io.shaded.bits.context, needs)
   private val untraced = Mux(hasEnvironment, ContextState.environmentPending, ContextState.accumulatePending)
   move(io.bounced.valid, io.bounced.bits.context, Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced))
   when(io.bounced.valid) {
     isPrimary(io.bounced.bits.context)                              := false.B
-    isBackground(io.bounced.bits.context)                           := true.B
     if (config.hasEnvironment) mayBeHidden(io.bounced.bits.context) := hasOcclusion && !io.bounced.bits.isInside
   }
   move(io.fetchFailed.valid, io.fetchFailed.bits, ContextState.accumulatePending)
-  when(io.fetchFailed.valid) { isBackground(io.fetchFailed.bits) := true.B }
 
-  // Issue shadow rays, one light after the other
-  private val needsShadow = state.zip(shadowPending).map { case (at, lights) =>
-    at === ContextState.shadowTest && lights.reduce(_ || _)
-  }
-  private val shadow     = choose(needsShadow, io.shadow.ready)
-  private val lightsLeft = shadowPending(shadow.bits)
+  // Issue shadow rays, one light after the other. A Fresnel reflection has none, so the ray before the first one is none
+  private val tested = choose(isAt(ContextState.shadowTest), io.shadow.ready)
+  private val shadow = tested.now
   io.shadow.valid        := shadow.valid
   io.shadow.bits.context := shadow.bits
-  io.shadow.bits.light   := PriorityEncoder(lightsLeft)
+  io.shadow.bits.light   := shadows.next(tested, isFirst = !isShadow(shadow.bits))
+  shadows.trace(io.shadow.fire, shadow.bits, io.shadow.bits.light)
   move(io.shadow.fire, shadow.bits, ContextState.raySetup)
-  when(io.shadow.fire) {
-    isShadow(shadow.bits)    := true.B
-    shadowLight(shadow.bits) := io.shadow.bits.light
-    for (light <- 0 until lights)
-      when(io.shadow.bits.light === light.U) { shadowPending(shadow.bits)(light) := false.B }
-  }
+  when(io.shadow.fire) { isShadow(shadow.bits) := true.B }
 
   // End paths: all shadow rays of the surface are traced, or the path meets the background
-  private val shadowDone = state.zip(shadowPending).map { case (at, lights) =>
-    at === ContextState.shadowTest && !lights.reduce(_ || _)
+  private val isEnding = state.zip(isFresnelReflection).map { case (at, reflection) =>
+    at === ContextState.accumulatePending || (at === ContextState.lit && !reflection)
   }
-  private val isEnding = state.zip(shadowDone.zip(isFresnelReflection)).map { case (at, (shadowDone, reflection)) =>
-    at === ContextState.accumulatePending || (shadowDone && !reflection)
-  }
-  private val ending = choose(isEnding, io.end.ready)
+  private val last   = choose(isEnding, io.end.ready)
+  private val ending = last.now
   io.end.valid             := ending.valid
   io.end.bits.context      := ending.bits
-  io.end.bits.isBackground := isBackground(ending.bits)
+  io.end.bits.isBackground := state(ending.bits) === ContextState.accumulatePending
   io.end.bits.isStraight.foreach(_ := isPrimary(ending.bits))
-  io.end.bits.occlusions := occlusions(ending.bits)
+  io.end.bits.occlusions := VecInit(shadows.occlusions(last))
   io.end.bits.isDirectView.foreach(_ := isDirectView(ending.bits))
   move(io.end.fire, ending.bits, ContextState.accumulating)
   move(io.accumulated.valid, io.accumulated.bits, ContextState.done)
   when(io.accumulated.valid) { hasColour(io.accumulated.bits) := true.B }
 
   // Retire pixels
-  private val done = choose(isAt(ContextState.done), io.pixel.retire)
+  private val done = choose(isAt(ContextState.done), io.pixel.retire).now
   io.pixel.done      := done
   io.pixel.hasColour := hasColour(done.bits)
   move(io.pixel.retire, done.bits, ContextState.idle)
@@ -177,22 +149,34 @@ final class RtController(config: ColonnadeConfig) extends Module {
       isFresnelReflection(reflection.bits) := true.B
       isPrimary(reflection.bits)           := false.B
     }
-    val pending = choose(isAt(ContextState.environmentPending), environment.req.fire)
+    // A ray from the camera goes first, if it is accepted; no kind waits for the other
+    val isServed            = Wire(Vec(2, Bool()))
+    val Seq(camera, others) = Seq(true.B, false.B).zip(isServed).map { case (ofCamera, isServed) =>
+      choose(
+        isAt(ContextState.environmentPending).zip(isPrimary).map { case (waits, is) => waits && is === ofCamera },
+        isServed
+      ).now
+    }
+    val isCamera = camera.valid && environment.accepts.directView
+    val pending  = Mux(isCamera, camera.bits, others.bits)
+    isServed(0)             := environment.req.fire && isCamera
+    isServed(1)             := environment.req.fire && !isCamera
     io.environmentCount.get :=
       count(state.map(at => at === ContextState.environmentPending || at === ContextState.environmentMarch))
     // The distance of a hit is read through the port that serves the surfaces to shade
-    val isTest = isOcclusionTest(pending.bits)
-    environment.req.valid                    := pending.valid && !(isTest && io.trace.shades)
-    environment.req.bits.context             := pending.bits
-    environment.req.bits.isDirectView        := isPrimary(pending.bits)
-    environment.req.bits.isFresnelReflection := isFresnelReflection(pending.bits)
+    val isTest = isOcclusionTest(pending)
+    val isAny  = isCamera || (others.valid && environment.accepts.march)
+    environment.req.valid                    := isAny && !(isTest && io.trace.shades)
+    environment.req.bits.context             := pending
+    environment.req.bits.isDirectView        := isPrimary(pending)
+    environment.req.bits.isFresnelReflection := isFresnelReflection(pending)
     environment.req.bits.isOcclusionTest     := isTest
     io.trace.measured.valid                  := environment.req.fire && isTest
-    io.trace.measured.bits                   := pending.bits
-    move(environment.req.fire, pending.bits, ContextState.environmentMarch)
+    io.trace.measured.bits                   := pending
+    move(environment.req.fire, pending, ContextState.environmentMarch)
     when(environment.req.fire) {
-      isDirectView(pending.bits) := environment.req.bits.isDirectView
-      isShadow(pending.bits)     := false.B
+      isDirectView(pending) := environment.req.bits.isDirectView
+      isShadow(pending)     := false.B
     }
     move(environment.hit.valid, environment.hit.bits, ContextState.shading)
     move(environment.visible.valid, environment.visible.bits, ContextState.resolve)
@@ -207,14 +191,13 @@ final class RtController(config: ColonnadeConfig) extends Module {
       missed,
       Mux(isFresnelReflection(missed), ContextState.resumeBounce, afterMiss(missed))
     )
-    when(environment.miss.valid) { isBackground(missed) := true.B }
-    val isResumable = isAt(ContextState.resumeBounce).zip(shadowDone.zip(isFresnelReflection)).map {
-      case (waits, (shadowDone, reflection)) => waits || (shadowDone && reflection)
+    val isResumable = state.zip(isFresnelReflection).map { case (at, reflection) =>
+      at === ContextState.resumeBounce || (at === ContextState.lit && reflection)
     }
-    val resumable = choose(isResumable, environment.resume.ready)
+    val resumable = choose(isResumable, environment.resume.ready).now
     environment.resume.valid             := resumable.valid
     environment.resume.bits.context      := resumable.bits
-    environment.resume.bits.isBackground := isBackground(resumable.bits)
+    environment.resume.bits.isBackground := state(resumable.bits) === ContextState.resumeBounce
     move(environment.resume.fire, resumable.bits, ContextState.shading)
     when(environment.resume.fire) { isFresnelReflection(resumable.bits) := false.B }
   }
@@ -233,11 +216,13 @@ final class RtController(config: ColonnadeConfig) extends Module {
   private def afterMiss(context: UInt): ContextState.Type =
     Mux(isPrimary(context), ContextState.done, ContextState.accumulatePending)
 
+  private def afterLights(isLeft: Bool): ContextState.Type = Mux(isLeft, ContextState.shadowTest, ContextState.lit)
+
   private def isAt(wanted: ContextState.Type): Seq[Bool] = state.map(_ === wanted)
 
   /** The context that is served next, of those that wait for it. Of many contexts it is chosen one cycle early. */
-  private def choose(claims: Seq[Bool], isServed: => Bool): Valid[UInt] =
-    if (isLarge) First.registered(claims, isServed) else First(claims)
+  private def choose(claims: Seq[Bool], isServed: => Bool): Choice =
+    if (isLarge) First.registered(claims, isServed) else Choice(First(claims))
 
   private def count(claims: Seq[Bool], atReset: Int = 0): UInt = {
     val number = PopCount(claims)

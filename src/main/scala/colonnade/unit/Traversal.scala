@@ -5,9 +5,7 @@ import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
-import colonnade.numbers.Fixed
-import colonnade.ray.RayFormats
-import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TraversalStack, TraversalStep}
+import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalStack, TraversalStep}
 
 /** Ports of [[Traversal]]. */
 final class TraversalIO(config: ColonnadeConfig) extends Bundle {
@@ -24,9 +22,11 @@ final class TraversalIO(config: ColonnadeConfig) extends Bundle {
   val readyNext = Output(Bool())
 
   /** Contexts that have finished a triangle record. */
-  val resume    = Flipped(Decoupled(Context(config)))
-  val tMaxUnits = Input(Vec(config.array.contexts, new Fixed(new RayFormats(config.numbers).units)))
-  val steps     = Decoupled(new TraversalStep(config))
+  val resume = Flipped(Decoupled(Context(config)))
+
+  /** Of the context of `nodes`, and of that whose stack is used. */
+  val tMax  = Vec(2, new TMaxReader(config))
+  val steps = Decoupled(new TraversalStep(config))
 
   /** For the counters. */
   val boxTests = Output(UInt(log2Ceil(config.geometry.arity + 1).W))
@@ -55,7 +55,8 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     boxUnit.io.in.bits.node    := io.nodes.bits.node
     when(!isLegal)(boxUnit.io.in.bits.node.kinds.foreach(_ := ChildKind.empty))
     boxUnit.io.in.bits.ray  := io.nodes.bits.ray
-    boxUnit.io.in.bits.tMax := io.tMaxUnits(io.nodes.bits.context)
+    boxUnit.io.in.bits.tMax := io.tMax(0).units
+    io.tMax(0).context      := io.nodes.bits.context
     io.nodes.ready          := boxUnit.io.in.ready
     io.readyNext            := boxUnit.io.readyNext
 
@@ -63,7 +64,7 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     stack.io.start := io.start
     stack.io.results :<>= boxUnit.io.out
     stack.io.resume :<>= resume
-    stack.io.tMaxUnits := io.tMaxUnits
+    io.tMax(1) :<>= stack.io.tMax
     io.steps :<>= stack.io.steps
 
     io.boxTests := Mux(boxUnit.io.out.fire, boxUnit.io.out.bits.tests, 0.U)
@@ -78,6 +79,7 @@ final class Traversal(config: ColonnadeConfig) extends Module {
     scan.io.resume :<>= resume
     io.steps :<>= scan.io.steps
 
+    io.tMax.foreach(_.context := 0.U)
     io.nodes.ready := true.B
     io.readyNext   := true.B
     io.boxTests    := 0.U

@@ -58,7 +58,7 @@ class EnvironmentStageSpec extends AnyFlatSpec with ChiselScalatestTester {
       var distance = Option.empty[BigInt]
       var held     = Option.empty[BigInt]
       var idle     = 0
-      while (found.size < 120) {
+      while (found.size < 240) {
         // An idle context may get another ray
         val busy = (offered ++ requests.drop(found.size)).map(_.ray.context).toSet
         val free = (0 until contexts).filterNot(busy)

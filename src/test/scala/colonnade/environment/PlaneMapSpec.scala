@@ -41,8 +41,8 @@ class PlaneMapSpec extends AnyFlatSpec with ChiselScalatestTester {
           val (cells, planes) =
             (tester("cells", map.cells, environment.cells(500)), tester("planes", map.planes, environment.planes(400)))
           val cycles = ChannelTester.run(map.clock, Seq(cells, planes))
-          // Three words a cell at most.
-          if (offered == 1) assert(cycles <= 3 * 500 + 8)
+          // Two words a cell at most
+          if (offered == 1) assert(cycles <= 2 * 500 + 8)
           assert((cells.latency, planes.latency) == ((5, 1)))
         }
       }

@@ -46,10 +46,10 @@ class BackgroundWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.tiles.valid.poke(true)
       dut.clock.step()
       dut.io.tiles.valid.poke(false)
-      dut.io.others.bits.x.poke(100)
-      dut.io.others.bits.y.poke(7)
+      dut.io.others(0).bits.x.poke(100)
+      dut.io.others(0).bits.y.poke(7)
       val xs = for (cycle <- 0 until 65) yield {
-        dut.io.others.valid.poke(cycle == 5)
+        dut.io.others(0).valid.poke(cycle == 5)
         dut.io.pixels.valid.expect(true)
         val x = dut.io.pixels.bits.x.peekInt()
         dut.clock.step()

@@ -1,6 +1,7 @@
 package colonnade.frame
 
 import chiseltest._
+import colonnade.config.ColonnadeConfig
 import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -11,31 +12,36 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private val columns  = 3
   private val tileSize = 8
-  private val config   = TestConfigs.tiny.copy(array = TestConfigs.tiny.array.copy(columns = columns))
+  private val noTiles  = Vector.empty[(Int, Int)]
+  private val config   = withColumns(TestConfigs.tiny)
+
+  private def withColumns(base: ColonnadeConfig) = base.copy(array = base.array.copy(columns = columns))
 
   /** A model of a column with random time per tile, or one that is stuck. */
   private final class FakeColumn(dut: FrameController, index: Int, random: Random) {
-    var isStuck      = false
-    var tiles        = Vector.empty[(Int, Int)]
-    var backgrounds  = Vector.empty[(Int, Int)]
-    private var left = 0
+    var isStuck            = false
+    var tiles              = Vector.empty[(Int, Int)]
+    var others             = Map(TileKind.OfEnvironment -> noTiles, TileKind.OfBackground -> noTiles)
+    private var left       = 0
+    private val otherPorts =
+      dut.io.tiles(index).ofEnvironment.map(TileKind.OfEnvironment -> _).toMap +
+        (TileKind.OfBackground -> dut.io.tiles(index).ofBackground)
 
     /** Drives the ports of this cycle; returns whether a pixel retires. */
     def drive(): Boolean = {
-      val port    = dut.io.tiles(index)
+      val port    = dut.io.tiles(index).ofObject
       val retires = left > 0 && !isStuck
       port.ready.poke(left == 0)
-      dut.io.backgroundTiles(index).ready.poke(random.nextBoolean())
+      otherPorts.values.foreach(_.ready.poke(random.nextBoolean()))
       dut.io.progress(index).isDrained.poke(left == 0 || (left == 1 && retires))
       dut.io.progress(index).isIdle.poke(left == 0)
       retires
     }
 
     def step(): Unit = {
-      val port       = dut.io.tiles(index)
-      val background = dut.io.backgroundTiles(index)
-      if (background.ready.peekBoolean() && background.valid.peekBoolean())
-        backgrounds :+= (background.bits.x.peekInt().toInt, background.bits.y.peekInt().toInt)
+      val port = dut.io.tiles(index).ofObject
+      for ((kind, other) <- otherPorts if other.ready.peekBoolean() && other.valid.peekBoolean())
+        others += kind -> (others(kind) :+ (other.bits.x.peekInt().toInt, other.bits.y.peekInt().toInt))
       if (dut.io.aborts.peekBoolean()) left = 0
       else if (left > 0 && !isStuck) left -= 1
       else if (port.ready.peekBoolean() && port.valid.peekBoolean()) {
@@ -107,14 +113,21 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.clock.step()
     }
 
-    def expectTiles(wide: Int, high: Int, isObjects: ((Int, Int)) => Boolean = _ => true): Unit = {
-      val (objects, backgrounds) =
+    def expectTiles(
+        wide:           Int,
+        high:           Int,
+        isObjects:      ((Int, Int)) => Boolean = _ => true,
+        isEnvironments: ((Int, Int)) => Boolean = _ => false
+    ): Unit = {
+      val tiles =
         Morton
           .cells((wide + tileSize - 1) / tileSize, (high + tileSize - 1) / tileSize)
           .map { case (x, y) => (x * tileSize, y * tileSize) }
-          .partition(isObjects)
+      val (objects, others)           = tiles.partition(isObjects)
+      val (environments, backgrounds) = others.partition(isEnvironments)
       expectDealt(objects, columns.map(_.tiles))
-      expectDealt(backgrounds, columns.map(_.backgrounds))
+      expectDealt(environments, columns.map(_.others(TileKind.OfEnvironment)))
+      expectDealt(backgrounds, columns.map(_.others(TileKind.OfBackground)))
     }
 
     private def expectDealt(expected: Seq[(Int, Int)], dealt: Seq[Seq[(Int, Int)]]): Unit = {
@@ -152,20 +165,22 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "dispatch the tiles of the environment's window to the columns, whatever the object's rectangle" in {
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+  it should "dispatch the tiles of the environment's window apart from the object's" in {
+    test(
+      new FrameController(withColumns(TestConfigs.withEnvironment(TestConfigs.environment)))
+    ).withAnnotations(Simulation.verilator) { dut =>
       dut.clock.setTimeout(0)
       val bench  = new Bench(dut)
       val window = dut.io.window
-      for ((hasWindow, right, tiles) <- Seq((true, 64, 48), (false, 64, 1), (true, 17, 18))) {
+      for ((hasWindow, right, tiles) <- Seq((true, 64, 47), (false, 64, 0), (true, 17, 17))) {
         window.enabled.poke(hasWindow)
         window.rect.x0.poke(0)
         window.rect.y0.poke(0)
         window.rect.x1.poke(right)
         window.rect.y1.poke(48)
         assert(bench.frame(64, 48, watchdog = 0, rect = Some((9, 9, 15, 15))).nonEmpty)
-        bench.expectTiles(64, 48, tile => (hasWindow && tile._1 < right) || tile == (8, 8))
-        assert(bench.columns.map(_.tiles.size).sum == tiles)
+        bench.expectTiles(64, 48, _ == (8, 8), tile => hasWindow && tile._1 < right)
+        assert(bench.columns.map(_.others(TileKind.OfEnvironment).size).sum == tiles)
       }
     }
   }
@@ -187,16 +202,16 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.frame.objectRect.x1.poke(64)
       dut.io.frame.objectRect.y1.poke(64)
       dut.io.memoryIsIdle.poke(true)
-      dut.io.tiles.foreach(_.ready.poke(true))
+      dut.io.tiles.foreach(_.ofObject.ready.poke(true))
       dut.io.start.poke(true)
       dut.clock.step()
       dut.io.start.poke(false)
       dut.clock.step(3)
       for (_ <- 0 until 64) {
-        assert(dut.io.tiles.count(_.valid.peekBoolean()) == 1)
+        assert(dut.io.tiles.count(_.ofObject.valid.peekBoolean()) == 1)
         dut.clock.step()
       }
-      assert(dut.io.tiles.count(_.valid.peekBoolean()) == 0)
+      assert(dut.io.tiles.count(_.ofObject.valid.peekBoolean()) == 0)
     }
   }
 

@@ -72,6 +72,50 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
+  it should "send every pixel's exact ray of two mixed tiles under random stalls" in {
+    val config = withPipeline(TestConfigs.withEnvironment(TestConfigs.environment), pipelined = true)
+    test(RayGenerator(config)) { generator =>
+      val random = new Random(4)
+      for (frame <- frames(config, random)) {
+        setRegisters(generator, frame)
+        for (tiles <- Seq.fill(4)(Seq.fill(2)(tileWithGaps(config, random))))
+          run(generator, mixed(tiles, random), random)(frame)
+        stop(generator, RayGeneratorPipeline.emptyCycles)
+      }
+    }
+  }
+
+  it should "forget the registers of both tiles when it is empty" in {
+    val config = withPipeline(TestConfigs.withEnvironment(TestConfigs.environment), pipelined = true)
+    test(RayGenerator(config)) { generator =>
+      val random = new Random(6)
+      val tiles  = Seq(true, false).map(isObject => tile(config, random).map(_.copy(inObjectTile = isObject)))
+      for ((frame, pixels) <- frames(config, random).zip(tiles.transpose)) {
+        setRegisters(generator, frame)
+        run(generator, pixels, random)(frame)
+        stop(generator, RayGeneratorPipeline.emptyCycles)
+      }
+    }
+  }
+
+  it should "accept a pixel of two mixed tiles every cycle, after the first ones" in {
+    val config = withPipeline(TestConfigs.withEnvironment(TestConfigs.environment), pipelined = true)
+    test(RayGenerator(config)) { generator =>
+      val random = new Random(5)
+      val pixels = mixed(Seq.fill(2)(tile(config, random)), random)
+      generator.io.position.valid.poke(true)
+      generator.io.ray.ready.poke(true)
+      var (sent, cycles) = (0, 0)
+      while (sent < pixels.size) {
+        poke(generator, pixels(sent))
+        if (generator.io.position.ready.peekBoolean()) sent += 1
+        generator.clock.step()
+        cycles += 1
+      }
+      cycles should be <= pixels.size + 2 * (config.numbers.coordinateBits + 1)
+    }
+  }
+
   private def run(generator: RayGeneratorModule, pixels: Seq[Pixel], random: Random)(frame: Frame): Unit = {
     var (sent, received, cycle) = (0, 0, 0)
     while (received < pixels.size) {
@@ -99,6 +143,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     generator.io.position.bits.context.poke(pixel.context)
     generator.io.position.bits.x.poke(pixel.x)
     generator.io.position.bits.y.poke(pixel.y)
+    generator.io.position.bits.inObjectTile.foreach(_.poke(pixel.inObjectTile))
   }
 
   /** Leaves the empty generator without a pixel. */
@@ -123,7 +168,7 @@ object RayGeneratorSpec {
     config.copy(units = config.units.copy(pipelined = pipelined))
 
   private type Vector = Seq[BigInt]
-  private case class Pixel(context: Int, x: BigInt, y: BigInt)
+  private case class Pixel(context: Int, x: BigInt, y: BigInt, inObjectTile: Boolean = true)
   private case class Frame(
       position:  Vector,
       dir:       Vector,
@@ -180,6 +225,15 @@ object RayGeneratorSpec {
         case _ => Some(pixel)
       }
     }
+  }
+
+  /** The pixels of two tiles, mixed at random: in turns, and in runs. */
+  private def mixed(tiles: Seq[Seq[Pixel]], random: Random): Seq[Pixel] = {
+    val isObjects = random.shuffle(tiles.zip(Seq(true, false)).flatMap { case (tile, isObject) =>
+      tile.map(_ => isObject)
+    })
+    val left = tiles.map(_.iterator)
+    isObjects.map(isObject => left(if (isObject) 0 else 1).next().copy(inObjectTile = isObject))
   }
 
   private def setRegisters(generator: RayGeneratorModule, frame: Frame): Unit = {

@@ -45,10 +45,11 @@ private[traversal] final class TraversalStackProof(config: ColonnadeConfig) exte
   dut.io.resume.bits  := resumed
   dut.io.start.valid  := starts
   dut.io.start.bits   := started
-  for ((tMax, bits) <- dut.io.tMaxUnits.zip(tMaxUnits))
-    tMax       := Fixed(tMax.format, (bits(1) ## Fill(tMax.format.width - 1, bits(0))).asSInt)
-  dut.io.clear := false.B
-  step.ready   := ready
+  private val limit  = tMaxUnits(dut.io.tMax.context)
+  private val format = dut.io.tMax.units.format
+  dut.io.tMax.units := Fixed(format, (limit(1) ## Fill(format.width - 1, limit(0))).asSInt)
+  dut.io.clear      := false.B
+  step.ready        := ready
 
   // The contract: one operation per context at a time, a waiting result is stable, a start without an operation
   private val underWay = RegInit(VecInit.fill(contexts)(false.B))

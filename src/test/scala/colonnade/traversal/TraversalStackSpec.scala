@@ -110,7 +110,6 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
 
   def setLimit(context: Int, tMax: BigInt): Unit = {
     tMaxUnits(context) = tMax
-    dut.io.tMaxUnits(context).raw.asInstanceOf[SInt].poke(tMax.S)
   }
 
   /** @return cycles until the step */
@@ -186,6 +185,7 @@ private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: In
     for (resumed <- resumedQueue.headOption) dut.io.resume.bits.poke(resumed.context.U)
     val accepts = random.nextDouble() < accepted
     dut.io.steps.ready.poke(accepts.B)
+    dut.io.tMax.units.raw.asInstanceOf[SInt].poke(tMaxUnits(dut.io.tMax.context.peekInt().toInt).S)
 
     waited += 1
     assert(waited < 100, "nothing happens")

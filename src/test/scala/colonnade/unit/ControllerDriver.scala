@@ -36,7 +36,7 @@ private class ControllerDriver(
   private def at(state: ContextState.Type): Seq[Int] = contextsWith(_.state == state)
 
   private def needsShadow: Seq[Int] =
-    contextsWith(context => context.state == ContextState.shadowTest && context.shadowPending.nonEmpty)
+    contextsWith(context => context.state == ContextState.shadowTest)
 
   private def ending: Seq[Int] =
     contextsWith(context =>
@@ -49,7 +49,7 @@ private class ControllerDriver(
     )
 
   private def isShadowDone(context: ContextModel): Boolean =
-    context.state == ContextState.shadowTest && context.shadowPending.isEmpty
+    context.state == ContextState.lit
 
   def run(pixels: Int, eagerness: Double): Unit = {
     def happens = random.nextDouble() < eagerness
@@ -105,7 +105,19 @@ private class ControllerDriver(
     val shades =
       resolved.exists(index => !contexts(index).isShadow && contexts(index).hasHit && !contexts(index).mayBeHidden)
     dut.io.trace.shades.expect(shades)
-    val pending = at(ContextState.environmentPending)
+    // Rays from the camera go before others; each kind only if it is accepted
+    val accepts = dut.io.environment.toSeq.flatMap { environment =>
+      Seq(environment.accepts.directView, environment.accepts.march).map { port =>
+        val isAccepted = random.nextInt(3) > 0
+        port.poke(isAccepted)
+        isAccepted
+      }
+    }
+    val (camera, others) = at(ContextState.environmentPending).partition(contexts(_).isPrimary)
+    val pending          =
+      if (accepts.headOption.contains(true) && camera.nonEmpty) camera
+      else if (accepts.lastOption.contains(true)) others
+      else Seq()
     val waits   = shades && pending.headOption.exists(contexts(_).isOcclusionTest)
     val marched = dut.io.environment.flatMap(environment =>
       shown(environment.req.valid, environment.req.bits.context, if (waits) Seq() else pending)
@@ -178,9 +190,9 @@ private class ControllerDriver(
       dut.io.trace.occlusions(index).poke(context.occlusion)
     }
     for ((index, needs) <- events.shaded) change(Some(index)) { context =>
-      context.state = ContextState.shadowTest
       context.isBackground = false
       context.shadowPending = needs.indices.filter(needs(_))
+      context.state = afterLights(context)
       context.occlusions = Seq.fill(lights)(Occlusion.none)
     }
     for ((index, isTraced) <- events.bounced) change(Some(index)) { context =>
@@ -251,7 +263,7 @@ private class ControllerDriver(
 
   private def resolve(context: ContextModel): Unit =
     if (context.isShadow) {
-      context.state = ContextState.shadowTest
+      context.state = afterLights(context)
       context.occlusions = context.occlusions.updated(context.shadowLight, context.occlusion)
     } else if (context.hasHit && context.mayBeHidden) {
       context.state = ContextState.environmentPending
@@ -266,6 +278,9 @@ private class ControllerDriver(
       context.state = if (hasEnvironment) ContextState.environmentPending else afterMiss(context)
       context.isBackground = true
     }
+
+  private def afterLights(context: ContextModel): ContextState.Type =
+    if (context.shadowPending.nonEmpty) ContextState.shadowTest else ContextState.lit
 
   private def afterMiss(context: ContextModel): ContextState.Type =
     if (context.isPrimary) ContextState.done else ContextState.accumulatePending

@@ -101,7 +101,7 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
   private val random   = new Random(seed)
   private val traces   = Array.fill(contexts)(Option.empty[Trace])
 
-  /** Pairs of a tMax in grid steps and the table's tMaxUnits; the model checks them at the end. */
+  /** Pairs of a tMax in grid steps and what the table's readers get; the model checks them at the end. */
   private val tMaxUnits = Seq.newBuilder[(BigInt, BigInt)]
 
   dut.io.start.valid.poke(false)
@@ -145,7 +145,10 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
   def check(): Unit = for ((trace, context) <- traces.zipWithIndex; ray <- trace) {
     dut.io.hasHit(context).expect(ray.hits.nonEmpty, s"context $context, $ray")
     // Hits do not shorten a shadow ray
-    tMaxUnits += (if (ray.isShadow) ray.tMax else ray.best.fold(ray.tMax)(_.t)) -> dut.io.tMaxUnits(context).peekRaw()
+    for (reader <- dut.io.tMax) {
+      reader.context.poke(context)
+      tMaxUnits += (if (ray.isShadow) ray.tMax else ray.best.fold(ray.tMax)(_.t)) -> reader.units.peekRaw()
+    }
     if (ray.isShadow) dut.io.occlusions(context).expect(ray.occlusion)
     for (hit <- ray.best if !ray.isShadow) {
       dut.io.closest.context.poke(context)

@@ -31,7 +31,7 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
               rounds.outcomes
             }
           val rounds = new ControllerDriver(dut, contexts, seed = 6, hasEnvironment = true, occlusion = true)
-          rounds.run(pixels = if (contexts > 3) 120 else 300, eagerness = 0.8)
+          rounds.run(pixels = 300, eagerness = 0.8)
           assert(rounds.tests.size == 4, "hits of primary and later rays, hidden and visible")
           assert(outcomes.flatten.distinct.size == 4, "all results of the march occur")
           assert(outcomes.last.isEmpty)

@@ -4,8 +4,9 @@ import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{NodeRecord, RecordFormats}
+import colonnade.numbers.Fixed
 import colonnade.numbers.FixedPorts._
-import colonnade.ray.BoxRay
+import colonnade.ray.{BoxRay, RayFormats}
 import colonnade.traversal.{SmallTree, StackReference}
 import colonnade.{Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -56,7 +57,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
     )
     test(new TraversalHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
       dut.io.steps.ready.poke(true)
-      dut.io.tMaxUnits(0).pokeRaw((BigInt(1) << (shape.numbers.boxDistanceBits - 1)) - 1)
+      dut.tMaxUnits(0).pokeRaw((BigInt(1) << (shape.numbers.boxDistanceBits - 1)) - 1)
       for (((fields, address, isLegal), index) <- cases.zipWithIndex) withClue(s"case $index: ") {
         dut.io.start.valid.poke(true)
         dut.io.start.bits.poke(0)
@@ -106,14 +107,18 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
 }
 
-/** Packs node and ray into one port each. */
+/** Packs node and ray into one port each, and has a limit for each context. */
 private class TraversalHarness(config: ColonnadeConfig) extends Module {
   private val unit = Module(new Traversal(config))
 
   val node = IO(Input(UInt(new NodeRecord(config).getWidth.W)))
   val ray  = IO(Input(UInt(new BoxRay(config.numbers).getWidth.W)))
   val io   = IO(chiselTypeOf(unit.io))
+
+  private val units = new Fixed(new RayFormats(config.numbers).units)
+  val tMaxUnits     = IO(Input(Vec(config.array.contexts, units)))
   io :<>= unit.io
+  unit.io.tMax.foreach(reader => reader.units := tMaxUnits(reader.context))
   unit.io.nodes.bits.node := node.asTypeOf(new NodeRecord(config))
   unit.io.nodes.bits.ray  := ray.asTypeOf(new BoxRay(config.numbers))
 }
@@ -179,7 +184,7 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
     dut.io.start.bits.poke(context)
     reference.start(context)
     walks(context) = new Walk(begun)
-    dut.io.tMaxUnits(context).pokeRaw(farthest)
+    dut.tMaxUnits(context).pokeRaw(farthest)
     reading(context) = StackReference.Child(isLeaf = false, address = 0, tNear = 0)
     begun += 1
   }
@@ -204,7 +209,7 @@ private class TreeWalkers(dut: TraversalHarness, config: ColonnadeConfig, seed: 
       walk.leaves :+= target.address.toInt
       if (shrinks && random.nextBoolean()) {
         walk.tMax = walk.tMax.min(target.tNear + random.nextInt(1 << (config.numbers.vertexBits - 3)))
-        dut.io.tMaxUnits(context).pokeRaw(walk.tMax)
+        dut.tMaxUnits(context).pokeRaw(walk.tMax)
       }
       expected(context) = reference.resume(context, walk.tMax)
       resuming += context

@@ -1,0 +1,52 @@
+package colonnade.frame
+
+import chisel3._
+import chisel3.util.{log2Ceil, Decoupled}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{PixelPosition, UnitPosition}
+
+/** Ports of [[PixelMixer]]. */
+final class PixelMixerIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Pixels of a tile that may show the object. */
+  val objects = Flipped(Decoupled(new UnitPosition(config)))
+
+  /** Pixels of a tile that shows the environment only. */
+  val environment = Flipped(Decoupled(new PixelPosition(config)))
+  val positions   = Decoupled(new UnitPosition(config))
+
+  /** A pixel of `environment` has left the column. */
+  val leaves = Input(Bool())
+}
+
+/** Mixes the pixels of two tiles: those of the environment use units that those of the object leave idle, and the other
+  * way round. Combinational, one pixel per cycle.
+  *
+  * With `most`, pixels of the environment go first while fewer of them are in flight, and wait otherwise. Without it the
+  * tiles take turns.
+  */
+final class PixelMixer(config: ColonnadeConfig, most: Option[Int]) extends Module {
+  val io = IO(new PixelMixerIO(config))
+
+  private val isEnvironment = most match {
+    case None =>
+      val wasEnvironment = RegInit(false.B)
+      when(io.positions.fire) { wasEnvironment := io.environment.fire }
+      io.environment.valid && !(wasEnvironment && io.objects.valid)
+    case Some(number) =>
+      val inFlight = RegInit(0.U(log2Ceil(number + 1).W))
+      inFlight := inFlight + io.environment.fire - io.leaves
+      io.environment.valid && inFlight =/= number.U
+  }
+  io.objects.ready     := io.positions.ready && !isEnvironment
+  io.environment.ready := io.positions.ready && isEnvironment
+
+  io.positions.valid := io.objects.valid || isEnvironment
+  io.positions.bits  := io.objects.bits
+  when(isEnvironment) {
+    io.positions.bits.x               := io.environment.bits.x
+    io.positions.bits.y               := io.environment.bits.y
+    io.positions.bits.meetsObject.get := false.B
+  }
+  io.positions.bits.inObjectTile.get := !isEnvironment
+}
