@@ -22,6 +22,60 @@ _MOST_ERRORS = 1 << 26
 
 
 @dataclass(frozen=True)
+class Offered:
+    """Sequences of words that tiles may have.
+
+    Attributes:
+        free: float32 [tiles], errors of tiles without a sequence.
+        errors: float32 [sequences, tiles].
+        sizes: int64 [sequences], words.
+    """
+
+    free: NDArray[np.float32]
+    errors: NDArray[np.float32]
+    sizes: NDArray[np.int64]
+
+    def reached(self, chosen: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """The error of each tile with the best of the chosen sequences, float32 [tiles]."""
+        reached: NDArray[np.float32] = np.minimum(self.free, self.errors[chosen].min(axis=0, initial=np.inf))
+        return reached
+
+    def without_least(self, chosen: NDArray[np.bool_], words: int) -> NDArray[np.bool_]:
+        """The chosen sequences without those that gain least per word: as many as have so many words, at least one."""
+        which = np.flatnonzero(chosen)
+        options = np.vstack([self.free, self.errors[which]])
+        if len(options) < 2:
+            return chosen
+        two = np.partition(options, 1, axis=0)[:2]
+        loss = np.bincount(options.argmin(axis=0), two[1] - two[0], len(options))[1:]
+        order = np.argsort(loss / self.sizes[which], kind="stable")
+        kept, count = chosen.copy(), np.searchsorted(self.sizes[which][order].cumsum(), words, side="right")
+        kept[which[order[: max(1, count)]]] = False
+        return kept
+
+    def filled(self, chosen: NDArray[np.bool_], budget: int) -> NDArray[np.bool_]:
+        """Add sequences to the chosen ones, always the one that gains most per word, until the budget is spent."""
+        filled, left = chosen.copy(), budget - int(self.sizes[chosen].sum())
+        reached = self.reached(chosen)
+        gains = np.maximum(reached - self.errors, 0).sum(axis=1) / self.sizes
+        queue = [(-float(gains[which]), int(which)) for which in np.flatnonzero((gains > 0) & ~chosen)]
+        heapq.heapify(queue)
+        while queue:
+            _, which = heapq.heappop(queue)
+            if self.sizes[which] > left:
+                continue
+            # A gain only falls while others are added, so the first that is still the largest is the best
+            gain = float(np.maximum(reached - self.errors[which], 0).sum() / self.sizes[which])
+            if queue and gain < -queue[0][0]:
+                heapq.heappush(queue, (-gain, which))
+            elif gain > 0:
+                filled[which] = True
+                left -= int(self.sizes[which])
+                reached = np.minimum(reached, self.errors[which])
+        return filled
+
+
+@dataclass(frozen=True)
 class Users:
     """The tiles that share words of one mode.
 
@@ -76,7 +130,7 @@ def shared_words(
     errors = np.concatenate([errors_of(part) for part in distinct])
     counts = [len(part.tiles) for part in distinct]
     sizes = np.repeat([part.mode.words for part in distinct], counts)
-    which = np.flatnonzero(choose_shared(base, errors, sizes, budget, np.concatenate(starts)))
+    which = np.flatnonzero(choose_shared(Offered(base, errors, sizes), budget, np.concatenate(starts)))
     best = np.vstack([base, errors[which]]).argmin(axis=0)
     has = np.append(-1, which)[best]
     users = []
@@ -87,89 +141,27 @@ def shared_words(
     return np.flatnonzero(has < 0), users
 
 
-def choose_shared(
-    free: NDArray[np.float32],
-    errors: NDArray[np.float32],
-    sizes: NDArray[np.int64],
-    budget: int,
-    start: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
+def choose_shared(offered: Offered, budget: int, start: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Choose sequences so that the sum of the tiles' errors is small, where each tile takes the best chosen sequence.
 
     From ``start`` on, each step drops the sequences that gain least per word, and adds those that gain most per word
     in their place. A step that does not reduce the error is undone and followed by a smaller one.
 
     Args:
-        free: float32 [tiles], errors of tiles without a sequence.
-        errors: float32 [sequences, tiles].
-        sizes: int64 [sequences], words.
+        offered: The sequences.
         budget: Words of all chosen sequences; those of ``start`` are within it.
         start: bool [sequences], the first choice; the result has at most its error.
 
     Returns:
         bool [sequences].
     """
-    best, share = _filled(free, errors, sizes, budget, start), _FIRST_SHARE
-    least = float(_reached(free, errors, best).sum(dtype=np.float64))
+    best, share = offered.filled(start, budget), _FIRST_SHARE
+    least = float(offered.reached(best).sum(dtype=np.float64))
     while share >= _LEAST_SHARE:
-        tried = _filled(free, errors, sizes, budget, _thinned(free, errors, sizes, best, int(share * budget)))
-        error = float(_reached(free, errors, tried).sum(dtype=np.float64))
+        tried = offered.filled(offered.without_least(best, int(share * budget)), budget)
+        error = float(offered.reached(tried).sum(dtype=np.float64))
         if error < least * (1 - 1e-4):
             best, least = tried, error
         else:
             share /= 2
     return best
-
-
-def _reached(free: NDArray[np.float32], errors: NDArray[np.float32], chosen: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """The error of each tile, float32 [tiles]."""
-    reached: NDArray[np.float32] = np.minimum(free, errors[chosen].min(axis=0, initial=np.inf))
-    return reached
-
-
-def _thinned(
-    free: NDArray[np.float32],
-    errors: NDArray[np.float32],
-    sizes: NDArray[np.int64],
-    chosen: NDArray[np.bool_],
-    words: int,
-) -> NDArray[np.bool_]:
-    """The chosen sequences without those that gain least per word: as many as have so many words, at least one."""
-    which = np.flatnonzero(chosen)
-    options = np.vstack([free, errors[which]])
-    if len(options) < 2:
-        return chosen
-    two = np.partition(options, 1, axis=0)[:2]
-    loss = np.bincount(options.argmin(axis=0), two[1] - two[0], len(options))[1:]
-    order = np.argsort(loss / sizes[which], kind="stable")
-    kept, count = chosen.copy(), np.searchsorted(sizes[which][order].cumsum(), words, side="right")
-    kept[which[order[: max(1, count)]]] = False
-    return kept
-
-
-def _filled(
-    free: NDArray[np.float32],
-    errors: NDArray[np.float32],
-    sizes: NDArray[np.int64],
-    budget: int,
-    chosen: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
-    """Add sequences to the chosen ones, always the one that gains most per word, until the budget is spent."""
-    filled, left = chosen.copy(), budget - int(sizes[chosen].sum())
-    reached = _reached(free, errors, chosen)
-    gains = np.maximum(reached - errors, 0).sum(axis=1) / sizes
-    queue = [(-float(gains[which]), int(which)) for which in np.flatnonzero((gains > 0) & ~chosen)]
-    heapq.heapify(queue)
-    while queue:
-        _, which = heapq.heappop(queue)
-        if sizes[which] > left:
-            continue
-        # A gain only falls while others are added, so the first that is still the largest is the best
-        gain = float(np.maximum(reached - errors[which], 0).sum() / sizes[which])
-        if queue and gain < -queue[0][0]:
-            heapq.heappush(queue, (-gain, which))
-        elif gain > 0:
-            filled[which] = True
-            left -= int(sizes[which])
-            reached = np.minimum(reached, errors[which])
-    return filled

@@ -12,7 +12,7 @@ from colonnade.environment.encoding import plane_encoder, sharing, two_level_enc
 from colonnade.environment.encoding.heap import pack_words
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.plane_encoder import encode_planes
-from colonnade.environment.encoding.sharing import Users, choose_shared
+from colonnade.environment.encoding.sharing import Offered, Users, choose_shared
 from colonnade.environment.encoding.subdivision import Subdivided
 from colonnade.environment.encoding.tiles import expand_cells, join_tiles
 from colonnade.environment.encoding.two_level import MODES
@@ -60,7 +60,7 @@ def test_sharing_keeps_the_budget_and_never_raises_the_error(seed: int, count: i
     start = np.zeros(count, dtype=np.bool_)
     for which in random.permutation(count)[: count // 2]:
         start[which] = sizes[start].sum() + sizes[which] <= budget
-    chosen = choose_shared(free, errors, sizes, budget, start)
+    chosen = choose_shared(Offered(free, errors, sizes), budget, start)
     assert sizes[chosen].sum() <= budget
     reached, before = (np.minimum(free, errors[which].min(axis=0, initial=np.inf)).sum() for which in (chosen, start))
     assert reached <= before * (1 + 1e-6)
@@ -73,10 +73,10 @@ def test_the_best_words_are_found() -> None:
     # The first words serve three tiles well, each of the others one tile perfectly
     errors = np.array([[1, 1, 1], [0, 9, 9], [9, 0, 9], [9, 9, 0]], np.float32)
     free, sizes = np.full(3, 8, np.float32), np.array([4, 4, 4, 4])
-    chosen = choose_shared(free, errors, sizes, 4, np.array([False, True, False, False]))
+    chosen = choose_shared(Offered(free, errors, sizes), 4, np.array([False, True, False, False]))
     assert list(chosen) == [True, False, False, False]
-    assert list(choose_shared(free, errors, sizes, 12, chosen)) == [True, True, True, False]
-    assert list(choose_shared(free, errors, sizes, 16, chosen)) == [True, True, True, True]
+    assert list(choose_shared(Offered(free, errors, sizes), 12, chosen)) == [True, True, True, False]
+    assert list(choose_shared(Offered(free, errors, sizes), 16, chosen)) == [True, True, True, True]
 
 
 def pattern(layout: AttributeLayout, seed: int) -> NDArray[np.float64]:
