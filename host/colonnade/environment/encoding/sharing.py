@@ -160,7 +160,8 @@ def choose_shared(offered: Offered, budget: int, start: NDArray[np.bool_]) -> ND
     while share >= _LEAST_SHARE:
         tried = offered.filled(offered.without_least(best, int(share * budget)), budget)
         error = float(offered.reached(tried).sum(dtype=np.float64))
-        if error < least * (1 - 1e-4):
+        # Rounding makes sums of tiny errors negative
+        if error < least - 1e-4 * abs(least):
             best, least = tried, error
         else:
             share /= 2
