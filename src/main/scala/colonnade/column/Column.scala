@@ -180,5 +180,5 @@ object Column {
 
   /** Pixels of a tile of the environment that a path unit has in flight at most: about those that its pipelines hold. */
   private def mostEnvironment(config: ColonnadeConfig): Option[Int] =
-    Option.when(config.hasPathUnit)((config.units.pathContexts / 4).max(1))
+    Option.when(config.hasPathUnit)((config.units.pathContexts * 3 / 8).max(1))
 }

@@ -75,7 +75,8 @@ final class CellProgram(
     step(CellEdge) {
       val cell = stepper.cell(m.axis(0))
       val last = Mux(isFine, 7.U, 3.U)
-      m.multiply(width(m.axis(0)).zext, Mux(dda.isNegative(m.axis(0)), cell, last - cell).zext)
+      // To the last cell, last - cell, without a carry before the multiplier
+      m.multiply(width(m.axis(0)).zext, (cell ^ Mux(dda.isNegative(m.axis(0)), 0.U, last)).zext)
     }
     step(set(firstEdge, m.combine(dda.edge(m.axis(0)).zext, m.product, subtract = true)))
     step {

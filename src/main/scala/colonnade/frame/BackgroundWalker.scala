@@ -27,7 +27,8 @@ final class BackgroundWalker(config: ColonnadeConfig) extends Module {
 
   private val scan      = Module(new TileScan(config))
   private val positions = Module(new Arbiter(new PixelPosition(config), io.others.size + 1))
-  scan.io.frame := io.frame
+  scan.io.frame     := io.frame
+  scan.io.isDivided := false.B
   scan.io.tiles <> io.tiles
 
   positions.io.in.zip(io.others :+ scan.io.positions).foreach { case (in, positions) => in <> positions }

@@ -29,7 +29,8 @@ final class EnvironmentWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentWalkerIO(config))
 
   private val scan = Module(new TileScan(config))
-  scan.io.frame := io.frame
+  scan.io.frame     := io.frame
+  scan.io.isDivided := false.B
   scan.io.tiles <> io.tiles
   io.isIdle := scan.io.isIdle
 

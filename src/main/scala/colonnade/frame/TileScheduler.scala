@@ -23,7 +23,8 @@ final class TileSchedulerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Dispatches the tiles of a frame that are of one kind, in Morton order, to ready columns, round-robin.
+/** Dispatches the tiles of a frame that are of one kind, in Morton order, to ready columns, round-robin. A [[TileDivider]]
+  * may divide those of the object.
   *
   * Throughput: one tile per cycle while the queue holds tiles; the first one comes four cycles after the start. The queue
   * hides the cycles in which codes outside the frame are skipped: a column needs more cycles per tile than a skip takes.
@@ -63,7 +64,14 @@ final class TileScheduler(config: ColonnadeConfig, kind: TileKind.Value) extends
   tiles.bits.y := tested.bits.first.y
   tested.ready := tiles.ready || !isSelected
 
-  dispatch.io.items <> Queue(tiles, queueEntries)
+  private val parts = if (kind == TileKind.OfObject) {
+    val divider = Module(new TileDivider(config)).io
+    divider.frame   := io.frame
+    divider.divides := divides(io.window)
+    divider.tiles :<>= tiles
+    divider.parts
+  } else tiles
+  dispatch.io.items <> Queue(parts, queueEntries)
   io.tiles <> dispatch.io.takers
   io.isIdle := scan.io.isIdle && outline.io.isIdle && !dispatch.io.items.valid
 
@@ -74,5 +82,9 @@ final class TileScheduler(config: ColonnadeConfig, kind: TileKind.Value) extends
 }
 
 object TileScheduler {
+
+  /** Whether tiles of the object are divided: in frames with an environment, where few of them are most of the work. */
+  def divides(window: EnvironmentWindow): Bool = window.enabled
+
   private val queueEntries = 4
 }

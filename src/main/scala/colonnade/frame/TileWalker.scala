@@ -48,7 +48,8 @@ final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = N
   private val outline  = Module(new OutlineTest(config, size = 1))
   private val dispatch = Module(new Dispatcher(new UnitPosition(config), config.array.rows))
 
-  scan.io.frame := io.frame
+  scan.io.frame     := io.frame
+  scan.io.isDivided := TileScheduler.divides(io.window)
   scan.io.tiles <> io.tiles
   outline.io.frame  := io.frame
   outline.io.window := io.window

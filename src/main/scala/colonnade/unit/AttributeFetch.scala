@@ -104,7 +104,7 @@ final class AttributeFetch(config: ColonnadeConfig) extends Module {
 object AttributeFetch {
 
   /** Hits whose attributes are awaited at a time. */
-  val slots: Int = 8
+  val slots: Int = 16
 
   /** Their record buffers: a hit needs a record for two or three cycles of its shading. */
   val buffers: Int = 2

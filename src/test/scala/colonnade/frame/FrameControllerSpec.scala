@@ -117,7 +117,8 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         wide:           Int,
         high:           Int,
         isObjects:      ((Int, Int)) => Boolean = _ => true,
-        isEnvironments: ((Int, Int)) => Boolean = _ => false
+        isEnvironments: ((Int, Int)) => Boolean = _ => false,
+        isDivided:      Boolean = false
     ): Unit = {
       val tiles =
         Morton
@@ -125,7 +126,11 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
           .map { case (x, y) => (x * tileSize, y * tileSize) }
       val (objects, others)           = tiles.partition(isObjects)
       val (environments, backgrounds) = others.partition(isEnvironments)
-      expectDealt(objects, columns.map(_.tiles))
+      val parts                       = if (isDivided) Seq((0, 0), (4, 0), (0, 4), (4, 4)) else Seq((0, 0))
+      expectDealt(
+        objects.flatMap { case (x, y) => parts.map(part => (x + part._1, y + part._2)) },
+        columns.map(_.tiles)
+      )
       expectDealt(environments, columns.map(_.others(TileKind.OfEnvironment)))
       expectDealt(backgrounds, columns.map(_.others(TileKind.OfBackground)))
     }
@@ -165,7 +170,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "dispatch the tiles of the environment's window apart from the object's" in {
+  it should "dispatch the tiles of the environment's window apart from the object's, which are divided" in {
     test(
       new FrameController(withColumns(TestConfigs.withEnvironment(TestConfigs.environment)))
     ).withAnnotations(Simulation.verilator) { dut =>
@@ -179,7 +184,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         window.rect.x1.poke(right)
         window.rect.y1.poke(48)
         assert(bench.frame(64, 48, watchdog = 0, rect = Some((9, 9, 15, 15))).nonEmpty)
-        bench.expectTiles(64, 48, _ == (8, 8), tile => hasWindow && tile._1 < right)
+        bench.expectTiles(64, 48, _ == (8, 8), tile => hasWindow && tile._1 < right, isDivided = hasWindow)
         assert(bench.columns.map(_.others(TileKind.OfEnvironment).size).sum == tiles)
       }
     }

@@ -11,21 +11,22 @@ class TileScanSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "TileScan"
 
   for (tileSize <- Seq(4, 8, 16))
-    it should s"give the pixels of clipped tiles of $tileSize once, in Morton order, under stalls" in {
-      val config = TileScanSpec.config(tileSize)
-      val size   = (2 * tileSize + 3, tileSize + 1)
-      val tiles  = TileScanSpec.tiles(size, tileSize)
-      test(new TileScan(config)) { dut =>
+    it should s"give the pixels of clipped tiles of $tileSize, and of their quarters, once, in Morton order, under stalls" in {
+      val size = (2 * tileSize + 3, tileSize + 1)
+      test(new TileScan(TileScanSpec.config(tileSize))) { dut =>
         dut.clock.setTimeout(0)
         dut.io.frame.pixelsWide.poke(size._1)
         dut.io.frame.pixelsHigh.poke(size._2)
-        for ((willing, seed) <- Seq((1.0, 1), (0.3, 2))) {
-          val random  = new Random(seed)
+        for ((willing, isDivided, seed) <- Seq((1.0, false, 1), (0.3, false, 2), (0.3, true, 3))) {
+          val random = new Random(seed)
+          val edge   = if (isDivided) tileSize / 2 else tileSize
+          val tiles  = TileScanSpec.tiles(size, edge)
+          dut.io.isDivided.poke(isDivided)
           val visited = TileScanSpec.walk(dut.clock, dut.io.tiles, dut.io.positions, () => dut.io.isIdle.peekBoolean())(
             tiles,
             () => random.nextDouble() < willing
           )(bits => (bits.x.peekInt().toInt, bits.y.peekInt().toInt))
-          assert(visited == tiles.flatMap(TileScanSpec.pixels(size, _, tileSize)))
+          assert(visited == tiles.flatMap(TileScanSpec.pixels(size, _, edge)))
         }
       }
     }
@@ -75,7 +76,8 @@ private object TileScanSpec {
     */
   def walk[O <: Data, T](clock: Clock, in: DecoupledIO[Tile], out: DecoupledIO[O], isIdle: () => Boolean)(
       tiles:     Seq[(Int, Int)],
-      isWilling: () => Boolean
+      isWilling: () => Boolean,
+      onAccept:  () => Unit = () => ()
   )(peek: O => T): Seq[T] = {
     var waiting = tiles
     var offers  = false
@@ -97,6 +99,7 @@ private object TileScanSpec {
       if (offers && in.ready.peekBoolean()) {
         waiting = waiting.tail
         offers = false
+        onAccept()
       }
       clock.step()
       cycles += 1

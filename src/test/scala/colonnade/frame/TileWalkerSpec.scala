@@ -93,17 +93,21 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
           }
           val inWindow = (pixel: (Int, Int)) =>
             hasWindow && pixel._1 >= 2 && pixel._2 >= 3 && pixel._1 < 12 && pixel._2 < 15
+          // With a window the object's tiles are quarters
+          val size  = if (hasWindow) 4 else 8
+          val tiles =
+            for (first <- Seq(0, 8); y <- 0 until 8 by size; x <- 0 until 8 by size) yield (first + x, first + y)
           var claims         = Map.empty[(Int, Int), Boolean]
           val (positions, _) =
             walk(
               dut,
               (640, 480),
-              Seq((0, 0), (8, 8)),
+              tiles,
               row => random.nextInt(3 + 2 * row + 2) == 0,
               (pixel, meets) => claims += pixel -> meets
             )
           val (others, units)     = positions.partition(_._1 < 0)
-          val expected            = Seq((0, 0), (8, 8)).flatMap(pixels((640, 480), _, 8))
+          val expected            = tiles.flatMap(pixels((640, 480), _, size))
           val sees                = (pixel: (Int, Int)) => 3 * pixel._1 - 2 * pixel._2 - 9 >= 0
           val (isTaken, isOthers) = expected.partition(pixel => inWindow(pixel) || sees(pixel))
           assert(units.map(_._2).sorted == isTaken.sorted)

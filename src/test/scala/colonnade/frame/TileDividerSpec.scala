@@ -1,0 +1,35 @@
+package colonnade.frame
+
+import chiseltest._
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+class TileDividerSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "TileDivider"
+
+  for (divides <- Seq(true, false))
+    it should s"give ${if (divides) "the quarters in the frame, in Morton order," else "tiles as they are"} under stalls" in {
+      val random = new Random(1)
+      test(new TileDivider(TileScanSpec.config(tileSize = 8))) { dut =>
+        for (size <- Seq((16, 16), (19, 13), (21, 12), (1, 8))) {
+          val tiles = TileScanSpec.tiles(size, 8)
+          dut.io.frame.pixelsWide.poke(size._1)
+          dut.io.frame.pixelsHigh.poke(size._2)
+          dut.io.divides.poke(divides)
+          var waiting = tiles
+          val parts   = TileScanSpec.walk(dut.clock, dut.io.tiles, dut.io.parts, () => waiting.isEmpty)(
+            tiles,
+            () => random.nextInt(3) > 0,
+            () => waiting = waiting.tail
+          )(bits => (bits.x.peekInt().toInt, bits.y.peekInt().toInt))
+          assert(parts == (if (divides) tiles.flatMap(quarters(size, _)) else tiles))
+        }
+      }
+    }
+
+  private def quarters(size: (Int, Int), tile: (Int, Int)): Seq[(Int, Int)] =
+    Seq((0, 0), (4, 0), (0, 4), (4, 4)).map { case (x, y) => (tile._1 + x, tile._2 + y) }.filter { case (x, y) =>
+      x < size._1 && y < size._2
+    }
+}
