@@ -84,5 +84,5 @@ def test_every_flipped_bit_is_detected(tmp_path: Path, image: SceneImage, positi
     data = bytearray(file.read_bytes())
     data[int(position * len(data))] ^= 1 << bit
     file.write_bytes(data)
-    with pytest.raises(UserError, match=r"corrupt|truncated|is not a scene image"):
+    with pytest.raises(UserError, match=r"corrupt|truncated|is not a scene image|another version"):
         SceneImage.load(file)
