@@ -1,8 +1,7 @@
 package colonnade.column
 
 import chisel3._
-import chisel3.util.{log2Ceil, Cat, Mux1H, OHToUInt, Queue, RegEnable}
-import colonnade.common.RoundRobin
+import chisel3.util.{log2Ceil, Cat, Mux1H, OHToUInt, Queue}
 import colonnade.config.ColonnadeConfig
 import colonnade.traversal.{TriangleCandidate, TriangleLanes, TriangleLanesIO}
 
@@ -33,25 +32,16 @@ final class SharedTriangles(config: ColonnadeConfig, count: Int) extends Module 
   private val lanes   = Module(new TriangleLanes(shared)).io
   private val queue   = Module(new Queue(new TriangleCandidate(shared), SharedTriangles.places, flow = true)).io
 
-  // Choose a row. It may use the next cycle if the queue has a place then, beside the record that comes now
-  private val arbiter  = Module(new RoundRobin(count)).io
-  private val chosen   = RegInit(0.U(count.W))
-  private val hasPlace = Wire(Bool())
-  private val isOpen   = RegInit(false.B)
-  private val sender   = RegEnable(chosen, hasPlace)
-  private val moves    = RegNext(lanes.readyNext, false.B)
-  hasPlace         := queue.count +& isOpen < SharedTriangles.places.U +& moves
-  arbiter.requests := io.waits.asUInt & ~Mux(hasPlace, chosen, 0.U)
-  arbiter.isTaken  := hasPlace || !chosen.orR
-  when(arbiter.isTaken) { chosen := arbiter.grant }
-  isOpen := hasPlace && chosen.orR
-
-  // Take its record
-  queue.enq.valid := isOpen && Mux1H(sender, io.rows.map(_.candidate.valid))
-  queue.enq.bits  := Mux1H(sender, io.rows.map(row => widened(row.candidate.bits, sender)))
+  // Choose a row, and take its record
+  private val grants = Module(new TriangleGrants(count)).io
+  grants.waits     := io.waits.asUInt
+  grants.queued    := queue.count
+  grants.readyNext := lanes.readyNext
+  queue.enq.valid  := Mux1H(grants.sender, io.rows.map(_.candidate.valid))
+  queue.enq.bits   := Mux1H(grants.sender, io.rows.map(row => widened(row.candidate.bits, grants.sender)))
   for ((row, index) <- io.rows.zipWithIndex) {
-    row.readyNext       := hasPlace && chosen(index)
-    row.candidate.ready := isOpen && sender(index)
+    row.readyNext       := grants.grant(index)
+    row.candidate.ready := grants.sender(index)
   }
   lanes.candidate :<>= queue.deq
 

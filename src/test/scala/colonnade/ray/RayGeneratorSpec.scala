@@ -90,9 +90,10 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     test(RayGenerator(config)) { generator =>
       val random = new Random(6)
       val tiles  = Seq(true, false).map(isObject => tile(config, random).map(_.copy(inObjectTile = isObject)))
-      for ((frame, pixels) <- frames(config, random).zip(tiles.transpose)) {
+      for (((frame, pixels), index) <- frames(config, random).zip(tiles.transpose).zipWithIndex) {
         setRegisters(generator, frame)
-        run(generator, pixels, random)(frame)
+        // The second pixel follows one of the frame before, whose tile was the first then
+        run(generator, if (index % 2 == 0) pixels else pixels.reverse, random)(frame)
         stop(generator, RayGeneratorPipeline.emptyCycles)
       }
     }
