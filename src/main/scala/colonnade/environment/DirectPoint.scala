@@ -46,12 +46,13 @@ final class DirectPoint(config: ColonnadeConfig) extends Module {
 
   val io = IO(new DirectPointIO(config))
 
-  private val isHeld   = RegInit(false.B)
-  private val at       = Reg(UInt(2.W))
-  private val isDone   = RegInit(false.B)    // the pixel before waits for its answer to be taken
-  private val found    = latch(io.distance.bits, io.distance.fire)
-  private val pixel    = io.pixel.bits
-  private val isReady  = io.pixel.valid && (!found.isHit || (io.albedo.valid && io.normal.valid))
+  private val isHeld = RegInit(false.B)
+  private val at     = Reg(UInt(2.W))
+  private val isDone = RegInit(false.B) // the pixel before waits for its answer to be taken
+  private val found  = latch(io.distance.bits, io.distance.fire)
+  private val pixel  = io.pixel.bits
+  // From its first step on, a pixel is ready until its last one. Its albedo may come later, behind that of the pixel before
+  private val isReady  = io.pixel.valid && (!found.isHit || io.normal.valid)
   private val takes    = io.answer.fire
   private val moves    = isHeld && isReady && (at =/= 1.U || !isDone || takes)
   private val isLast   = isHeld && at === 3.U
@@ -107,7 +108,7 @@ final class DirectPoint(config: ColonnadeConfig) extends Module {
   private val answer  = io.answer.bits.answer
   private val request = latch(pixel.request, isLast)
   private val isHit   = latch(found.isHit, isLast)
-  io.answer.valid        := isDone
+  io.answer.valid        := isDone && (!isHit || io.albedo.valid)
   io.albedo.ready        := takes && isHit
   io.answer.bits.row     := latch(pixel.row, isLast)
   answer.isOcclusionTest := request.isOcclusionTest

@@ -18,6 +18,7 @@ private class DirectViewHarness(config: ColonnadeConfig) extends Module {
   val load      = IO(Flipped(Valid(new Load(config))))
   val view      = IO(Input(UInt(pipeline.io.view.getWidth.W)))
   val order     = IO(Flipped(Valid(UInt(pipeline.io.order.bits.getWidth.W))))
+  val isSlow    = IO(Input(Bool()))
   val isReady   = IO(Output(Bool()))
   val answer    = IO(chisel3.util.Decoupled(UInt(pipeline.io.answer.bits.getWidth.W)))
   val isIllegal = IO(Output(Bool()))
@@ -29,7 +30,7 @@ private class DirectViewHarness(config: ColonnadeConfig) extends Module {
   answer.bits              := pipeline.io.answer.bits.asUInt
   isReady                  := pipeline.io.isReady
   isIllegal                := pipeline.io.isIllegal
-  pipeline.io.maps <> maps.io.ports.head
+  SlowMaps.connect(pipeline.io.maps, maps.io.ports.head, isSlow)
   maps.io.load := load
 }
 
@@ -75,7 +76,8 @@ class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
             view,
             rays.map(_.copy(origin = origin)),
             random,
-            if (round == 0) 1 else 0.1
+            willing = if (round == 0) 1 else random.nextDouble().max(0.1),
+            isSlow = round > 0
           )
           if (round == 0) cycles :+= time
         }
@@ -95,15 +97,17 @@ class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
       view:    ViewCase,
       rays:    Seq[MarchCase],
       random:  Random,
-      willing: Double
+      willing: Double,
+      isSlow:  Boolean
   ): Seq[Map[String, BigInt]] = {
     val (order, answer) = (new Packed(new RowOrder(config)), new Packed(new RowAnswer(config)))
     val isTest          = rays.map(_ => random.nextBoolean())
-    var sent            = 0
-    var found           = Vector.empty[BigInt]
-    var mayOrder        = false
-    var isIllegal       = false
-    var cycle           = 0
+    dut.isSlow.poke(isSlow)
+    var sent      = 0
+    var found     = Vector.empty[BigInt]
+    var mayOrder  = false
+    var isIllegal = false
+    var cycle     = 0
     while (found.size < rays.size) {
       val sends = mayOrder && sent < rays.size && (willing == 1 || random.nextInt(4) > 0)
       dut.order.valid.poke(sends)

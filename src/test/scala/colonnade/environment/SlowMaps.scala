@@ -2,18 +2,22 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.random.LFSR
-import chisel3.util.{Decoupled, Queue}
+import chisel3.util.{Counter, Decoupled, Queue, RegEnable}
 
 /** Delays requests to an environment's maps, and their responses, at random. */
 object SlowMaps {
 
-  /** @param requester has at most eight requests in flight in each channel */
+  /** @param requester has at most 16 requests in flight in each channel */
   def connect(requester: AttributePort, maps: AttributePort, isSlow: Bool): Unit = {
-    val noise = LFSR(16)
-    join(requester.cells, maps.cells, isSlow && noise(0))
-    join(requester.planes, maps.planes, isSlow && noise(5))
-    join(requester.albedo, maps.albedo, isSlow && noise(9))
-    join(requester.normals, maps.normals, isSlow && noise(3))
+    // Each channel stops for single cycles, and for 16 together, so that it falls behind the others
+    val noise                 = LFSR(16)
+    val (_, ends)             = Counter(true.B, 16)
+    val stops                 = RegEnable(noise, 0.U, ends)
+    def holds(bit: Int): Bool = isSlow && (noise(bit) || stops(bit))
+    join(requester.cells, maps.cells, holds(0))
+    join(requester.planes, maps.planes, holds(5))
+    join(requester.albedo, maps.albedo, holds(9))
+    join(requester.normals, maps.normals, holds(3))
   }
 
   private def join[Q <: Data, R <: Data](
@@ -28,7 +32,7 @@ object SlowMaps {
     val responses = Wire(Decoupled(chiselTypeOf(map.resp.bits)))
     responses.valid := map.resp.valid
     responses.bits  := map.resp.bits
-    val waiting = Queue(responses, 8, flow = true)
+    val waiting = Queue(responses, 16, flow = true)
     waiting.ready        := !holds
     requester.resp.valid := waiting.fire
     requester.resp.bits  := waiting.bits
