@@ -79,7 +79,10 @@ def test_a_signal_to_the_parent_ends_everything(
     kind: str, programs: int, number: signal.Signals, tmp_path: Path, begun: list[subprocess.Popen[str]]
 ) -> None:
     command = [sys.executable, "-c", STUDY, str(tmp_path), kind]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    # `nohup make test` ignores hangups
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, preexec_fn=lambda: signal.signal(number, signal.SIG_DFL)
+    )
     begun.append(process)
     wait_for(lambda: len(children(process.pid)) == programs)
     if programs == 0:
