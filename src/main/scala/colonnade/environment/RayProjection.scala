@@ -16,9 +16,9 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
   import m.formats._
   import m.program._
 
-  /** The row of the matrix that `m.axis` selects; a register, because a multiplication follows. */
+  // What `m.axis` selects: a row of the matrix, and of the offset. Registers, because a multiplication follows
   private val matrixRow   = Reg(Vec(3, chiselTypeOf(view.matrix.head.x)))
-  private val offset      = VecInit(view.offset.axes)(m.axis)
+  private val offset      = Reg(chiselTypeOf(view.offset.axes.head))
   private val offsetPower = {
     val isMax = view.offsetShift >= sceneBits.U // a larger shift counts as this one
     isMax ## (1.U(1.W) << view.offsetShift)(sceneBits - 1, 0)
@@ -42,11 +42,12 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
     }
   }
 
-  /** In a step: selects an axis and its row of the matrix. */
+  /** In a step: selects an axis, and its row of matrix and offset. */
   def selectRow(axis: UInt): Unit = {
     set(m.axis, axis)
     val selected = VecInit(view.matrix.map(row => VecInit(row.axes)))(axis)
     for ((entry, column) <- matrixRow.zipWithIndex) set(entry, selected(column))
+    set(offset, VecInit(view.offset.axes)(axis))
   }
 
   /** Steps that compute the product of the selected matrix row and the direction. */
