@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, DecoupledIO}
 import colonnade.config.ColonnadeConfig
 
-/** The first pixel of a square of `frame.tileSize`; both are multiples of it. */
+/** The first pixel of a square of `frame.tileSize`, or of one of its quarters: [[TileDivider]]. */
 final class Tile(config: ColonnadeConfig) extends Bundle {
   val x = UInt(config.numbers.coordinateBits.W)
   val y = UInt(config.numbers.coordinateBits.W)
