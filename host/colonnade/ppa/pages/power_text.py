@@ -55,6 +55,10 @@ def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
             energies = (unit["energy_per_ray_nj_at_28nm"][kind] for kind in KINDS)
             without, glitches = (f"{1e3 * energy:.1f}" for energy in energies)
             yield f"    {name:22}{unit['power_mw']:8.3f} mW {without:>8} {glitches:>8} pJ"
+    yield "  memories by energy per in-box ray:"
+    for memory in power["memories"]:
+        if memory["energy_per_ray_nj"]:
+            yield f"    {memory['memory']} in {memory['unit']}: {1e3 * memory['energy_per_ray_nj']:.1f} pJ"
     yield (
         "  Method: replay on the gate netlist, checked against the RTL in every cycle; no wires, no clock tree; mean "
         f"leakage over the states of a cell. {OUTSIDE[has_path_unit]}"

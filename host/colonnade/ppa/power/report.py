@@ -105,6 +105,7 @@ def measure_power(
         "scale_to_28nm": scale,
         **found.totals(),
         "units": found.units(),
+        "memories": found.memories(),
         "opensta_mw": second,
         "opensta_is_there": opensta.is_available(),
     }
@@ -118,12 +119,14 @@ def node_scale(gate_um2: float, volts: float) -> float:
     return float((memories.CHIP_GATE_UM2 / gate_um2) ** 0.5 * (VOLTAGE_28NM / volts) ** 2)
 
 
-def memory_power(netlist: Netlist, hierarchy: Hierarchy, activity: Activity, megahertz: float) -> dict[str, float]:
-    """Power of the memories of a netlist by owner, mW."""
-    found: dict[str, float] = defaultdict(float)
+def memory_power(
+    netlist: Netlist, hierarchy: Hierarchy, activity: Activity, megahertz: float
+) -> dict[tuple[str, str], float]:
+    """Power of the memories of a netlist by owner and by the memory's module, mW."""
+    found: dict[tuple[str, str], float] = defaultdict(float)
     for box, (reads, writes) in zip(netlist.boxes, activity.accesses, strict=True):
         bits = (reads + writes) * hierarchy.shape(box.kind)[1]
-        found[box.owner] += _memory_milliwatts(bits, activity.cycles, megahertz)
+        found[box.owner, box.kind] += _memory_milliwatts(bits, activity.cycles, megahertz)
     return found
 
 

@@ -27,22 +27,24 @@ class Sum:
         self.records = 0.0
         self._frame, self._megahertz, self._scale = frame, megahertz, scale
         self._gates: dict[str, dict[str, Power]] = {kind: {} for kind in KINDS}
-        self._memories: dict[str, float] = defaultdict(float)
+        self._memories: dict[tuple[str, str], float] = defaultdict(float)
 
-    def add(self, module: str, gates: Mapping[str, Mapping[str, Power]], memories_mw: Mapping[str, float]) -> None:
+    def add(
+        self, module: str, gates: Mapping[str, Mapping[str, Power]], memories_mw: Mapping[tuple[str, str], float]
+    ) -> None:
         """Add a module.
 
         Args:
             module: Name of the module.
             gates: Power by kind and by owner.
-            memories_mw: Power of memories by owner, mW.
+            memories_mw: Power of memories by owner and memory, mW.
         """
         part = self._frame.shares[module]
         for kind, powers in gates.items():
             for unit, power in by_unit(powers, module).items():
                 self._gates[kind][unit] = self._gates[kind].get(unit, NO_POWER) + power * part
-        for owner, milliwatts in memories_mw.items():
-            self._memories[_unit(owner, module)] += milliwatts * part
+        for (owner, memory), milliwatts in memories_mw.items():
+            self._memories[_unit(owner, module), memory] += milliwatts * part
 
     def kinds(self) -> dict[str, float]:
         """Power of memories of the render unit, and of its records, mW."""
@@ -64,13 +66,26 @@ class Sum:
         """Power of each unit with glitches, and its energy per in-box ray by kind."""
         found: dict[str, dict[str, Any]] = {}
         for unit, power in self._gates["glitch_aware"].items():
-            facts = self._facts(power, self._memories.get(unit, 0.0))
+            memory = sum(milliwatts for (of, _), milliwatts in self._memories.items() if of == unit)
+            facts = self._facts(power, memory)
             scaled = {
                 kind: self._energy(powers[unit].dynamic * self._scale + facts["memory_mw"], self._frame.traced)
                 for kind, powers in self._gates.items()
             }
             found[unit] = facts | {"power_mw": facts.pop("total_mw"), "energy_per_ray_nj_at_28nm": scaled}
         return found
+
+    def memories(self) -> list[dict[str, Any]]:
+        """Power and energy per in-box ray of each memory, the largest first."""
+        return [
+            {
+                "unit": unit,
+                "memory": memory,
+                "power_mw": milliwatts,
+                "energy_per_ray_nj": self._energy(milliwatts, self._frame.traced),
+            }
+            for (unit, memory), milliwatts in sorted(self._memories.items(), key=lambda item: (-item[1], item[0]))
+        ]
 
     def _facts(self, power: Power, memory: float) -> dict[str, Any]:
         facts = {"clock_mw": power.clock, "dynamic_mw": power.dynamic, "leakage_mw": power.leakage}

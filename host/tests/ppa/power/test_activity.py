@@ -96,7 +96,7 @@ def test_a_path_unit_counts_with_the_rays_of_the_render_unit() -> None:
     for module, owners in (("TraversalUnit", ("BoxUnit", "")), ("PathUnit", ("RtController", "")), ("PathHits", ("",))):
         powers = dict.fromkeys(owners, Power(0.5, 2.0, 0.25))
         still = dict.fromkeys(owners, Power(0.5, 1.0, 0.25))
-        found.add(module, {"zero_delay": still, "glitch_aware": powers}, {"": 1.0})
+        found.add(module, {"zero_delay": still, "glitch_aware": powers}, {("", "table"): 1.0})
     found.records = 0.5
     assert found.kinds() == {"own": pytest.approx(1.4), "records": 0.5}
     total = found.totals()["glitch_aware"]
@@ -109,6 +109,9 @@ def test_a_path_unit_counts_with_the_rays_of_the_render_unit() -> None:
     units = found.units()
     assert set(units) == {"BoxUnit", "contexts", "RtController", "PathUnit", "PathHits"}
     assert units["PathHits"]["power_mw"] == pytest.approx((2.25 + 1.0) / 5)
+    table = {"memory": "table", "power_mw": 1.0, "energy_per_ray_nj": pytest.approx(0.05)}
+    assert found.memories()[0] == {"unit": "contexts"} | table
+    assert sum(memory["power_mw"] for memory in found.memories()) == pytest.approx(1.4)
     for kind, of_kind in found.totals().items():
         energies = [unit["energy_per_ray_nj_at_28nm"][kind] for unit in units.values()]
         records = 0.5 * 0.5 / 10
