@@ -46,11 +46,12 @@ final class AttributeFetchIO(config: ColonnadeConfig) extends Bundle {
   * [[RecordFetch]]; so as many records as there are slots may be awaited. Responses come in any order.
   *
   * @param config of the column
+  * @param most   the largest number of slots
   */
-final class AttributeFetch(config: ColonnadeConfig) extends Module {
+final class AttributeFetch(config: ColonnadeConfig, most: Int = AttributeFetch.slots) extends Module {
   val io = IO(new AttributeFetchIO(config))
 
-  private val slotConfig = AttributeFetch.slotConfig(config)
+  private val slotConfig = AttributeFetch.slotConfig(config, most)
   private val slots      = slotConfig.array.contexts
   private val fetch      = Module(new RecordFetch(slotConfig)).io
   private val isUsed     = RegInit(VecInit.fill(slots)(false.B))
@@ -110,8 +111,8 @@ object AttributeFetch {
   val buffers: Int = 2
 
   /** A configuration whose contexts are the slots, with as many record buffers as they have. */
-  def slotConfig(config: ColonnadeConfig): ColonnadeConfig = config.copy(
-    array = config.array.copy(contexts = slots.min(config.units.pathContexts)),
+  def slotConfig(config: ColonnadeConfig, most: Int = slots): ColonnadeConfig = config.copy(
+    array = config.array.copy(contexts = most.min(config.units.pathContexts)),
     columnBvhMemory = config.columnBvhMemory.copy(recordBuffers = buffers.min(config.columnBvhMemory.recordBuffers))
   )
 }
