@@ -9,11 +9,17 @@ final class ReservedQueueIO[T <: Data](item: T) extends Bundle {
   /** Only while the queue has space. */
   val in  = Flipped(Valid(item))
   val out = Decoupled(item)
+
+  /** `out` may be taken in the next cycle. Otherwise it is not offered then, and the memory is not read. */
+  val mayTakeNext = Input(Bool())
+
+  /** `out` is offered in the next cycle, if it may be taken. */
+  val validNext = Output(Bool())
 }
 
 /** A queue in a memory with one read port and one write port, for items that have their place reserved: it has no
-  * back-pressure. An item is offered from the second cycle after it
-  * came until it is taken.
+  * back-pressure. An item is offered from the second cycle after it came until it is taken, if it may be. Each cycle of an
+  * offer takes a read.
   */
 final class ReservedQueue[T <: Data](item: T, places: Int) extends Module {
   require(places > 1, s"a queue of $places places; it must have two at least")
@@ -29,11 +35,13 @@ final class ReservedQueue[T <: Data](item: T, places: Int) extends Module {
     memory.write(tail, io.in.bits.asUInt)
     tail := after(tail)
   }
-  private val next = Mux(io.out.fire, after(head), head)
+  private val next  = Mux(io.out.fire, after(head), head)
+  private val reads = io.validNext && io.mayTakeNext
   head         := next
   count        := count + io.in.valid - io.out.fire
-  io.out.valid := RegNext(count =/= io.out.fire.asUInt, false.B)
-  io.out.bits  := memory.read(next, count =/= 0.U).asTypeOf(item)
+  io.validNext := count =/= io.out.fire.asUInt
+  io.out.valid := RegNext(reads, false.B)
+  io.out.bits  := memory.read(next, reads).asTypeOf(item)
   assert(!io.in.valid || count < places.U, "an item without a place")
 
   private def after(place: UInt): UInt =

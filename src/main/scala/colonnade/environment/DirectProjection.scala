@@ -97,12 +97,19 @@ final class DirectProjection(config: ColonnadeConfig) extends Module {
   io.place.bits.pixel.x := coordinates.head._2
   io.place.bits.pixel.y := coordinates.last._2
 
-  // The growth of the depth: the matrix's last row times the direction
+  // The growth of the depth: the matrix's last row times the direction. Both shift, so that the factors are registers
   private val atRate  = RegInit(4.U(3.W))
-  private val rateDir = latch(io.dir, leaves)
-  private val product = latch(VecInit(rateDir :+ rateDir.head)(atRate(1, 0)) * VecInit(
-    io.view.matrix(2).axes :+ io.view.matrix(2).axes.head
-  )(atRate(1, 0)))
+  private val row     = io.view.matrix(2).axes
+  private val rateDir = Reg(chiselTypeOf(io.dir))
+  private val factor  = Reg(chiselTypeOf(row.head))
+  private val product = latch(rateDir.head * factor)
+  when(leaves) {
+    rateDir := io.dir
+    factor  := row.head
+  }.elsewhen(atRate < 4.U) {
+    rateDir := VecInit(rateDir.tail :+ rateDir.last)
+    factor  := Mux(atRate(0), row(2), row(1))
+  }
   private val sum = Reg(SInt((product.getWidth + 2).W))
   when(leaves) { atRate := 0.U }.elsewhen(atRate < 4.U) { atRate := atRate + 1.U }
   when(atRate === 1.U) { sum := product }.elsewhen(atRate === 2.U || atRate === 3.U) { sum := sum + product }

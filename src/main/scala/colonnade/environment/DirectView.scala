@@ -50,8 +50,9 @@ final class DirectView(config: ColonnadeConfig) extends Module {
   /** A queue of pixels, with its input. */
   private def queue[T <: Data](item: T, places: Int)(valid: Bool, bits: T): DecoupledIO[T] = {
     val queue = Module(new ReservedQueue(item, places)).io
-    queue.in.valid := valid
-    queue.in.bits  := bits
+    queue.in.valid    := valid
+    queue.in.bits     := bits
+    queue.mayTakeNext := true.B
     queue.out
   }
 

@@ -64,7 +64,8 @@ final class BounceQueue(config: ColonnadeConfig, places: Int) extends Module {
 
   private def queue[T <: Data](in: Valid[T]) = {
     val queue = Module(new ReservedQueue(in.bits.cloneType, places)).io
-    queue.in := in
+    queue.in          := in
+    queue.mayTakeNext := true.B
     queue.out
   }
 

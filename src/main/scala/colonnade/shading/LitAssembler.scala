@@ -52,11 +52,14 @@ final class LitAssembler(config: ColonnadeConfig, places: Int) extends Module {
   private val lights  = Module(new ReservedQueue(new LightOnSurface(config), places)).io
   private val origins = io.origin.map { component =>
     val queue = Module(new ReservedQueue(component.bits.cloneType, places)).io
-    queue.in := component
+    queue.in          := component
+    queue.mayTakeNext := lights.validNext
     queue.out
   }
-  labels.in := io.label
-  lights.in := io.light
+  labels.in          := io.label
+  labels.mayTakeNext := lights.validNext
+  lights.in          := io.light
+  lights.mayTakeNext := true.B
 
   private val label         = labels.out.bits
   private val light         = lights.out.bits

@@ -119,6 +119,7 @@ final class MirrorPipeline(config: ColonnadeConfig) extends Module {
   queue.in.bits.dir     := VecInit(latest.map(carry(_, 11).at(11)))
   queue.in.bits.origin  := origins.read(hitAt(10).context, isAt(10) && isHeld.last)
   queue.out.ready       := io.result.ready
+  queue.mayTakeNext     := true.B
   private val result = queue.out.bits
   io.result.valid             := queue.out.valid
   io.result.bits.context      := result.context

@@ -29,8 +29,9 @@ final private[shading] class ObjectAlbedo(
 ) {
   private def queue(in: Valid[Rgb[UInt]], isTaken: Bool) = {
     val queue = Module(new ReservedQueue(Rgb(FrameRegisters.colour), places)).io
-    queue.in        := in
-    queue.out.ready := isTaken
+    queue.in          := in
+    queue.out.ready   := isTaken
+    queue.mayTakeNext := true.B
     queue.out
   }
   private val isTextured = material.hasTexture.map(_ && hasMaterial).getOrElse(false.B)
@@ -75,13 +76,14 @@ final class TexelReader(config: ColonnadeConfig, places: Int) extends Module {
   private val waiting = Module(new ReservedQueue(new TexturedHit(config), places)).io
   private val kinds   = Module(new Queue(Bool(), places)).io // of texels that are under way
   private val texel   = io.port.resp
-  waiting.in        := io.hit
-  io.port.req.valid := waiting.out.valid
-  io.port.req.bits  := waiting.out.bits.position
-  waiting.out.ready := io.port.req.ready
-  kinds.enq.valid   := io.port.req.fire
-  kinds.enq.bits    := waiting.out.bits.isBounce
-  kinds.deq.ready   := texel.valid
+  waiting.in          := io.hit
+  waiting.mayTakeNext := true.B
+  io.port.req.valid   := waiting.out.valid
+  io.port.req.bits    := waiting.out.bits.position
+  waiting.out.ready   := io.port.req.ready
+  kinds.enq.valid     := io.port.req.fire
+  kinds.enq.bits      := waiting.out.bits.isBounce
+  kinds.deq.ready     := texel.valid
   for ((to, isOfKind) <- Seq(io.lit -> !kinds.deq.bits, io.bounced -> kinds.deq.bits)) {
     to.valid := texel.valid && isOfKind
     val colour = texel.bits.colour

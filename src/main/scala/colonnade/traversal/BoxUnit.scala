@@ -88,6 +88,7 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   io.out.valid        := sorted.io.deq.valid
   sorted.io.deq.ready := io.out.ready
   tags.out.ready      := io.out.fire
+  tags.mayTakeNext    := ends || sorted.io.count =/= io.out.fire.asUInt
   io.out.bits         := tags.out.bits.result(sorted.io.deq.bits)
   io.busy             := starts
   assert(!io.out.valid || tags.out.valid, "sorted children without their node")

@@ -67,11 +67,11 @@ final class EnvironmentPort(config: ColonnadeConfig) extends Module {
     bounces.resume :<>= control.resume
   }
 
-  // Store rays; those of bounces have priority
+  // Store rays, if they may march; those of bounces have priority
   private val primary   = io.primary.bits
   private val bounceRay = io.bounces.map(_.ray)
   private val isBounce  = bounceRay.map(_.valid).getOrElse(false.B)
-  stage.ray.valid           := isBounce || io.primary.fire
+  stage.ray.valid           := io.view.enabled && (isBounce || io.primary.fire)
   stage.ray.bits.context    := primary.context
   stage.ray.bits.ray.origin := primary.origin
   stage.ray.bits.ray.dir    := primary.dir

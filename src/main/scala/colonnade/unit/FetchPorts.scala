@@ -81,10 +81,11 @@ final class RecordFetchIO(config: ColonnadeConfig) extends Bundle {
   /** With shared triangle units: a record waits for one. */
   val waitsForTriangles = Option.when(config.sharesTriangleUnits)(Output(Bool()))
 
-  /** The context that gets a response in the next cycle. */
-  val grantNext = Output(Valid(Context(config)))
-  val response  = Output(Valid(new FetchResponse(config)))
-  val error     = Output(Valid(new FetchError(config)))
+  /** The context that gets a response in the next cycle, and whether its record is a node. */
+  val grantNext      = Output(Valid(Context(config)))
+  val grantsNodeNext = Output(Bool())
+  val response       = Output(Valid(new FetchResponse(config)))
+  val error          = Output(Valid(new FetchError(config)))
 
   /** Contexts that wait for their record, and contexts whose record waits for its unit. */
   val stalledContexts = Output(contextCount)

@@ -259,6 +259,7 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   }
   io.grantNext.valid := grantKindOH.reduce(_ || _)
   io.grantNext.bits  := OHToUInt(grantOH)
+  io.grantsNodeNext  := grantKindOH(RecordKind.node.litValue.toInt)
   fetches.zip(grantOH).foreach { case (fetch, isGranted) => when(isGranted) { fetch.hasRecord := false.B } }
 
   // Response
