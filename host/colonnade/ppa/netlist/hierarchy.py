@@ -32,6 +32,8 @@ COLUMN = (
     "ColumnBvhController",
     "ColumnEnvironment",
     "EnvironmentMarches",
+    "MarchSlot",
+    "DirectView",
     "TileWalker",
     "EnvironmentWalker",
     "BackgroundWalker",
