@@ -57,14 +57,18 @@ final class ModuloSchedule(phase: UInt, interval: Int = ModuloSchedule.interval)
   }
 
   /** A register that takes its input at the end of these cycles. */
-  def latch[T <: Data](cycles: Seq[Int])(next: T): Timed[T] = {
+  def latch[T <: Data](cycles: Seq[Int])(next: T): Timed[T] = latched(cycles, Reg(chiselTypeOf(next)))(next)
+
+  def latch[T <: Data](cycle: Int)(next: T): Timed[T] = latch(Seq(cycle))(next)
+
+  /** As [[latch]], and a reset clears the register: for a flag that tells whether there is an operation. */
+  def latchFlag(cycle: Int)(next: Bool): Timed[Bool] = latched(Seq(cycle), RegInit(false.B))(next)
+
+  private def latched[T <: Data](cycles: Seq[Int], register: T)(next: T): Timed[T] = {
     check(cycles)
-    val register = Reg(chiselTypeOf(next))
     when(cycles.map(isAt).reduce(_ || _))(register := next)
     new Timed(register, cycles.map(cycle => (cycle + 1) -> (cycle + untilNext(cycle, cycles))))
   }
-
-  def latch[T <: Data](cycle: Int)(next: T): Timed[T] = latch(Seq(cycle))(next)
 
   /** Combines the inputs of these cycles. */
   def accumulate[T <: Data](cycles: Seq[Int], next: T)(combine: (T, T) => T): Timed[T] = {
@@ -78,6 +82,10 @@ final class ModuloSchedule(phase: UInt, interval: Int = ModuloSchedule.interval)
   /** A single value, in a register of each interval up to a cycle. */
   def carry[T <: Data](value: Timed[T], to: Int): Timed[T] =
     if (to <= value.last) value else carry(latch(value.last)(value.at(value.last)), to)
+
+  /** As [[carry]], with the registers of [[latchFlag]]. */
+  def carryFlag(value: Timed[Bool], to: Int): Timed[Bool] =
+    if (to <= value.last) value else carryFlag(latchFlag(value.last)(value.at(value.last)), to)
 
   /** Successive values of a register, so many cycles after its own. */
   def delay[T <: Data](values: Timed[T], cycles: Seq[Int], by: Int): Timed[T] = {

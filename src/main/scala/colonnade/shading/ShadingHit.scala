@@ -41,11 +41,8 @@ final class ShadingHit(config: ColonnadeConfig) extends Bundle {
 
 /** What the end of the [[ShadingPipeline]] has to know of a light on a hit. */
 final class LightSlot(config: ColonnadeConfig) extends Bundle {
-
-  /** The pipeline holds a hit to light; otherwise a mirror or glass, or nothing. */
-  val isSurface = Bool()
-  val light     = UInt(log2Ceil(config.frame.lights.max(2)).W)
-  val isLast    = Bool()
+  val light  = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val isLast = Bool()
 
   /** A shadow ray is needed if the surface faces the light. */
   val shadows = Bool()

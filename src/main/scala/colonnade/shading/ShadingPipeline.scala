@@ -67,18 +67,20 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
 
   // Stages
   private val slot = Wire(new LightSlot(config))
-  slot.isSurface := isActive && !hit.isBounce
-  slot.light     := light
-  slot.isLast    := isLast
-  slot.shadows   := shadows
-  slot.isOn      := light < io.shading.lights
-  private val slots   = carry(arriving(slot, 0, interval - 1), 4)
-  private val at5     = latch(4)(slots.at(4))
-  private val at6     = carry(slots, 6)
-  private val at17    = carry(at5, 17)
-  private val surface = Module(new SurfaceStage(config)).io
-  private val angle   = Module(new AngleStage(config)).io
-  private val bright  = Module(new BrightnessStage(config)).io
+  slot.light   := light
+  slot.isLast  := isLast
+  slot.shadows := shadows
+  slot.isOn    := light < io.shading.lights
+  private val slots      = carry(arriving(slot, 0, interval - 1), 4)
+  private val at5        = latch(4)(slots.at(4))
+  private val at6        = carry(slots, 6)
+  private val at17       = carry(at5, 17)
+  private val isLight    = arriving(isActive && !hit.isBounce, 0, interval - 1)
+  private val lightAt6   = carryFlag(isLight, 6)
+  private val lightAtEnd = carryFlag(lightAt6, cycles.direct)
+  private val surface    = Module(new SurfaceStage(config)).io
+  private val angle      = Module(new AngleStage(config)).io
+  private val bright     = Module(new BrightnessStage(config)).io
   surface.phase      := phase
   surface.offset     := io.shading.offset
   surface.hit        := hit
@@ -99,7 +101,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   private val assembler = Module(new LitAssembler(config, queued)).io
   private val label     = assembler.label.bits
   assembler.materials   := io.materials
-  assembler.label.valid := isAt(1) && slot.isSurface && light === 0.U
+  assembler.label.valid := isAt(1) && isLight.at(1) && light === 0.U
   label.context         := hit.context
   label.material        := hit.material
   for (environment <- label.environment; port <- io.environment) {
@@ -107,7 +109,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
     environment.bits  := RegEnable(port.bits.albedo, takes)
   }
   for ((component, cycle) <- assembler.origin.zip(xyz(6))) {
-    component.valid := isAt(cycle) && at6.at(cycle).isSurface && at6.at(cycle).light === 0.U
+    component.valid := isAt(cycle) && lightAt6.at(cycle) && at6.at(cycle).light === 0.U
     component.bits  := surface.origin
   }
   private val facing = latch(17) {
@@ -118,7 +120,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   private val atColour = latch(cycles.colour - 1)(carry(facing, cycles.colour - 1).at(cycles.colour - 1))
   private val ended    = carry(atColour, cycles.direct).at(cycles.direct)
   bright.colour                       := entry(io.lights, atColour.at(xyz(cycles.colour)).light).colour
-  assembler.light.valid               := isAt(cycles.direct) && ended.isSurface
+  assembler.light.valid               := isAt(cycles.direct) && lightAtEnd.at(cycles.direct)
   assembler.light.bits.light          := ended.light
   assembler.light.bits.isLast         := ended.isLast
   assembler.light.bits.direct         := bright.direct
@@ -127,8 +129,8 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   lightCount := lightCount + isCounted - assembler.isTaken
 
   // Mirrors and glass
-  private val isBounce    = latch(0)(isActive && hit.isBounce)
-  private val bounceAt7   = latch(6)(carry(isBounce, 6).at(6))
+  private val isBounce    = latchFlag(0)(isActive && hit.isBounce)
+  private val bounceAt7   = latchFlag(6)(carryFlag(isBounce, 6).at(6))
   private val bounceQueue = io.bounced.map { bounced =>
     val queue = Module(new BounceQueue(config, bouncePlaces)).io
     val pool  = Module(new BouncePipeline(config)).io
@@ -163,7 +165,7 @@ final class ShadingPipeline(config: ColonnadeConfig) extends Module {
 
   // Colours of the corners, or texels at the positions that they hold
   private val albedos   = assembler.albedo +: bounceQueue.map(_.albedo).toSeq
-  private val isOfKind  = Seq(at6.at(8).isSurface && at6.at(8).light === 0.U, bounceAt7.at(8))
+  private val isOfKind  = Seq(lightAt6.at(8) && at6.at(8).light === 0.U, bounceAt7.at(8))
   private val atCorners = hit.colours.map { colours =>
     val corners = Module(new CornerStage(config)).io
     corners.phase   := phase

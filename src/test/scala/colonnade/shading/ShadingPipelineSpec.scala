@@ -58,6 +58,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
           val light = if (round < 4) stimulus.typicalLight() else stimulus.light()
           pokeLight(dut.registers, light)
           pokeBounces(dut.registers, config, random)
+          abandon(dut, stimulus.surfaceHit(light), random)
           // A context has one hit at a time
           val inputs = Seq.tabulate(config.array.contexts) { context =>
             random.nextInt(if (config.hasEnvironment) 8 else 6) match {
@@ -129,6 +130,25 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.clock.step()
     }
     (lit, bounced)
+  }
+
+  /** Resets the units for one cycle while they shade hits, of which nothing may come out. */
+  private def abandon(dut: ShadersHarness, hit: HitCase, random: Random): Unit = {
+    var arePromised = dut.shaders.map(_ => false)
+    for (_ <- 0 until random.nextInt(100)) {
+      for ((io, isPromised) <- dut.shaders.zip(arePromised)) {
+        io.request.valid.poke(isPromised)
+        pokeHit(io.request.bits, hit)
+        (io.lit +: io.bounced.toSeq).foreach(_.ready.poke(true))
+        io.environment.foreach(_.valid.poke(false))
+      }
+      arePromised = dut.shaders.map(_.readyNext.peekBoolean())
+      dut.clock.step()
+    }
+    dut.reset.asBool.poke(true)
+    dut.clock.step()
+    dut.reset.asBool.poke(false)
+    dut.shaders.foreach(_.request.valid.poke(false))
   }
 
   /** The numbers of a port. */
