@@ -85,6 +85,25 @@ def test_a_path_unit_renders_what_the_model_renders(shape: tuple[str, str, tuple
         assert simulated.frames[0].is_object.any()
 
 
+def test_a_frame_after_an_abort_is_right() -> None:
+    """The watchdog aborts frames with rays, lights and bounces in all stages; nothing of them is in the next frame."""
+    _, config, overrides = SHAPES[0]
+    design = design_for(config, (*overrides, *FRAME))
+    for material in (Material(), Material(kind="mirror"), Material(kind="glass", ior=1.45)):
+        mesh = load_mesh("teapot:4")
+        image = pack(mesh, design.manifest, with_overrides(mesh.materials, material))
+        scene = replace(TEAPOT, material=material, more_lights=LIGHTS)
+        settings = frame_registers(scene, image.header, design.manifest, 17, 9)
+        expected = render_model(design.manifest, image, settings)
+        limits = range(30, 350, 20)
+        registers = [frame for limit in limits for frame in (settings | {"frame.watchdogCycles": limit}, settings)]
+        frames = render_rtl(design, image, registers, Stalls(percent=20, memory_percent=40, seed=3)).frames
+        aborted = [frame.errors == ["watchdog"] for frame in frames[::2]]
+        assert sum(aborted) > len(aborted) // 2, "the limits are too long"
+        for frame in frames[1::2]:
+            _assert_equal(frame, expected)
+
+
 def test_counters_account_for_every_context_and_record() -> None:
     """The contexts are those of the path unit: each one is in one state, and each record taken has a reason."""
     design = design_for("tiny", ("array.rows=3", "units.pathContexts=24", "units.pipelined=true", *FRAME))
