@@ -94,6 +94,31 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, 
     assert differs.any() == (kind != "diffuse"), "the room hides hits of later rays"
 
 
+@NEEDS_SIMULATOR
+@pytest.mark.long_simulation
+def test_a_room_after_an_abort_is_right() -> None:
+    """A column with a path unit, with pixels in all stages when the watchdog aborts: none is in the next frame."""
+    units = ("units.pathContexts=24", "units.pipelined=true", "units.marches=2", "units.directView=true")
+    design = design_for("small", ("array.rows=3", *units))
+    held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
+    mesh, material = load_mesh("teapot:4"), Material(kind="glass")
+    image = with_environment(
+        pack(mesh, design.manifest, with_overrides(mesh.materials, material)), held, design.manifest
+    )
+    scene = replace(TABLE, material=material, more_lights=(SECOND,))
+    settings = frame_registers(scene, image.header, design.manifest, 40, 30, held, True)
+    registers = [
+        frame for limit in range(20, 300, 40) for frame in (settings | {"frame.watchdogCycles": limit}, settings)
+    ]
+    frames = render_rtl(design, image, registers, Stalls(20, 5)).frames
+    model = render_model(design.manifest, image, settings)
+    assert model.is_object.any() and sum(frame.errors == ["watchdog"] for frame in frames) > 3
+    for frame in frames[1::2]:
+        assert frame.errors == model.errors == []
+        np.testing.assert_array_equal(frame.colour, model.colour)
+        assert {name: frame.counters[name] for name in model.counters} == model.counters
+
+
 def sunken(scene: Scene, held: EncodedEnvironment, extent: Extent) -> Scene:
     """The scene with its object 15 cm lower."""
     pose = object_pose(scene, extent, held.environment)
