@@ -22,8 +22,8 @@ final case class SceneCacheConfig(
     busBytes:     Int,
     parity:       Boolean
 ) {
-  Require.oneOf("columnBvhMemory.cache.ways", ways, Seq(1, 2, 4, 8, 16))
-  Require.oneOf("columnBvhMemory.cache.sharedWays", sharedWays, Seq(1, 2, 4, 8, 16))
+  Require.within("columnBvhMemory.cache.ways", ways, 1, 16)
+  Require.within("columnBvhMemory.cache.sharedWays", sharedWays, 1, 16)
   Require.within("columnBvhMemory.cache.misses", misses, 1, 64)
   Require.within("columnBvhMemory.cache.sharedMisses", sharedMisses, 1, 256)
   Require.oneOf("columnBvhMemory.cache.busBytes", busBytes, Seq(4, 8, 16, 32, 64, 128))

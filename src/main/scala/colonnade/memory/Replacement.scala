@@ -1,36 +1,45 @@
 package colonnade.memory
 
 import chisel3._
-import chisel3.util.{isPow2, log2Ceil, UIntToOH}
+import chisel3.util.log2Ceil
 
 /** Pseudo-LRU replacement for one cache: a binary tree of bits for each set, which point away from recent uses.
   *
+  * Each node halves its ways; halves of an odd number differ by one. So a number of ways that is no power of two is
+  * possible, and its ways are not replaced equally often: at most twice as often as others.
+  *
   * @param sets sets of the cache
-  * @param ways ways of a set, a power of two
+  * @param ways ways of a set
   */
 private[memory] final class Replacement(sets: Int, ways: Int) {
-  require(isPow2(ways))
-  private val levels = log2Ceil(ways)
+  private val wayBits = log2Ceil(ways.max(2))
 
-  /** Node n has the children 2n and 2n + 1; the root is node 1. A set bit leads to the upper half. */
-  private val trees = RegInit(VecInit(Seq.fill(sets)(0.U(ways.W))))
+  /** Node n lies between the ways n and n + 1. A set bit leads to the upper half. */
+  private val trees = RegInit(VecInit(Seq.fill(sets)(0.U((ways - 1).max(1).W))))
 
   /** The way to replace. */
-  def victim(set: UInt): UInt = if (ways == 1) 0.U
-  else {
-    val tree = trees(set)
-    (0 until levels).foldLeft(1.U(1.W): UInt)((node, _) => node ## tree(node.pad(levels)))(levels - 1, 0)
+  def victim(set: UInt): UInt = {
+    val tree                              = trees(set)
+    def among(first: Int, end: Int): UInt =
+      if (end - first == 1) first.U(wayBits.W)
+      else {
+        val upper = (first + end) / 2
+        Mux(tree(upper - 1), among(upper, end), among(first, upper))
+      }
+    among(0, ways)
   }
 
   /** Marks a way as used. */
   def use(set: UInt, way: UInt): Unit = if (ways > 1) {
-    val updates = (0 until levels).map { level =>
-      val node = 1.U(1.W) ## way(levels - 1, 0).head(level)
-      val bit  = way(levels - 1 - level)
-      val mask = UIntToOH(node, ways)
-      (mask, Mux(bit, 0.U, mask))
+    val tree                               = trees(set)
+    val updated                            = Wire(Vec(ways - 1, Bool()))
+    def update(first: Int, end: Int): Unit = if (end - first > 1) {
+      val upper = (first + end) / 2
+      updated(upper - 1) := Mux(way >= first.U && way < end.U, way < upper.U, tree(upper - 1))
+      update(first, upper)
+      update(upper, end)
     }
-    val (clears, sets) = updates.unzip
-    trees(set) := (trees(set) & ~clears.reduce(_ | _)).asUInt | sets.reduce(_ | _)
+    update(0, ways)
+    trees(set) := updated.asUInt
   }
 }

@@ -6,7 +6,7 @@ import chisel3.util.{log2Ceil, PriorityEncoder, UIntToOH}
 /** Which lines one bank of a cache holds, and where: a memory of tags with a single port, valid bits and the replacement.
   *
   * @param sets     sets of the bank, a power of two
-  * @param ways     ways of a set, a power of two
+  * @param ways     ways of a set
   * @param lineBits width of the number of a line
   */
 private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int) {
@@ -51,8 +51,8 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int) {
     replacement.use(setOf(line), way)
   }
 
-  /** The number of a line's place in the bank. */
-  def place(line: UInt, way: UInt): UInt = setOf(line) ## way(log2Ceil(ways) - 1, 0)
+  /** The number of a line's place in the bank: the places of a way follow each other. */
+  def place(line: UInt, way: UInt): UInt = way ## line.pad(setBits + 1)(setBits - 1, 0)
 
   /** Forgets all lines. */
   def clear(): Unit = isValid.foreach(_ := 0.U)

@@ -14,7 +14,7 @@ import scala.util.Random
 class ColumnCacheSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "ColumnCache"
 
-  for ((banks, sets, ways, misses) <- Seq((1, 1, 1, 1), (2, 2, 2, 2), (2, 4, 1, 3), (4, 1, 4, 2)))
+  for ((banks, sets, ways, misses) <- Seq((1, 1, 1, 1), (2, 2, 2, 2), (2, 4, 1, 3), (4, 1, 4, 2), (1, 2, 3, 2)))
     it should s"answer from $sets sets of $ways ways, $misses misses, as one of $banks banks" in {
       val config = TestConfigs.withCache(banks = banks, sets = sets, ways = ways, misses = misses, parity = sets == 4)
       test(new ColumnCache(config)).withAnnotations(Simulation.verilator) { dut =>

@@ -15,7 +15,8 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   behavior of "SceneMemory"
 
   for (
-    (columns, banks, sets, ways, bus) <- Seq((1, 1, 1, 1, 64), (3, 2, 2, 2, 32), (3, 4, 1, 4, 16), (6, 2, 4, 1, 128))
+    (columns, banks, sets, ways, bus) <-
+      Seq((1, 1, 1, 1, 64), (3, 2, 2, 2, 32), (3, 4, 1, 4, 16), (6, 2, 4, 1, 128), (2, 2, 2, 5, 64))
   )
     it should s"serve $columns columns from $banks banks of $sets sets of $ways ways over a bus of $bus bytes" in {
       val config =
