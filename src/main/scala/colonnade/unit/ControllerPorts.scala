@@ -117,9 +117,13 @@ final class TraceControl(config: ColonnadeConfig) extends Bundle {
   /** Traces that have ended: the ray misses the box, has no record left to visit, or is occluded. */
   val ended = Vec(3, Valid(Context(config)))
 
-  /** By context: its ray has a hit; what its shadow ray has hit. */
-  val hasHit     = Output(Vec(contexts, Bool()))
-  val occlusions = Output(Vec(contexts, Occlusion()))
+  /** A context whose ray has ended; of many contexts, the one that is asked for in the next cycle. */
+  val asked     = Flipped(Valid(Context(config)))
+  val askedNext = Flipped(Valid(Context(config)))
+
+  /** Its ray has a hit; what it has hit as a shadow ray. */
+  val hasHit    = Output(Bool())
+  val occlusion = Output(Occlusion())
 
   /** The ended ray that is resolved in this cycle. */
   val resolved = Flipped(Valid(Context(config)))

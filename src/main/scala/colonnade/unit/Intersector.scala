@@ -174,8 +174,8 @@ final class Intersector(config: ColonnadeConfig) extends Module {
 
   io.nodesReadyNext     := traversal.io.readyNext
   io.trianglesReadyNext := triangles.readyNext
-  control.hasHit        := hitTable.io.hasHit
-  control.occlusions    := hitTable.io.occlusions
+  control.hasHit        := hitTable.io.hasHit(control.asked.bits)
+  control.occlusion     := hitTable.io.occlusions(control.asked.bits)
   hitTable.io.granted :<>= io.closestHit
 
   io.events.raysInBox         := io.entered.valid

@@ -2,7 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
-import colonnade.common.ContextTable
+import colonnade.common.{Choice, ContextTable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.numbers.Fixed
@@ -51,20 +51,16 @@ final class PathHits(config: ColonnadeConfig) extends Module {
   control.entered.bits  := ray.context
   private val misses = trace.rays.valid && !ray.enters
 
-  // Results
-  private val result     = io.results.bits
-  private val hasHit     = Reg(Vec(paths.array.contexts, Bool()))
-  private val occlusions = Reg(Vec(paths.array.contexts, Occlusion()))
-  when(misses) {
-    hasHit(ray.context)     := false.B
-    occlusions(ray.context) := Occlusion.none
-  }
-  when(io.results.valid) {
-    hasHit(result.context)     := result.hasHit
-    occlusions(result.context) := result.occlusion
-  }
-  control.hasHit     := hasHit
-  control.occlusions := occlusions
+  // Results. Rays that miss the box have a table of their own, so that each table has one writer
+  private val result   = io.results.bits
+  private val asked    = Choice(control.asked, control.askedNext)
+  private val entered  = new FlagTable(paths, Bool())
+  private val outcomes = new FlagTable(paths, UInt((1 + Occlusion.getWidth).W))
+  private val outcome  = Mux(entered.read(asked).asBool, outcomes.read(asked), false.B ## Occlusion.none.asUInt)
+  entered.write(trace.rays.fire, ray.context, ray.enters)
+  outcomes.write(io.results.valid, result.context, result.hasHit ## result.occlusion.asUInt)
+  control.hasHit    := outcome.head(1).asBool
+  control.occlusion := Occlusion.safe(outcome.tail(1))._1
   control.ended.foreach(_ := 0.U.asTypeOf(control.ended.head))
   control.ended(0).valid := misses
   control.ended(0).bits  := ray.context

@@ -77,23 +77,25 @@ final class RtController(config: ColonnadeConfig) extends Module {
   io.trace.isShadow  := isShadow
   io.trace.isPrimary := isPrimary
   private val ended = choose(isAt(ContextState.resolve), true.B)
-  io.trace.resolved := ended.now
+  io.trace.asked     := ended.now
+  io.trace.askedNext := ended.following
+  io.trace.resolved  := ended.now
   move(io.trace.entered.valid, io.trace.entered.bits, ContextState.traversing)
   io.trace.ended.foreach(ended => move(ended.valid, ended.bits, ContextState.resolve))
 
   // Resolve an ended ray
   private val resolved   = io.trace.resolved.bits
-  private val hasVisible = io.trace.hasHit(resolved) && !mayBeHidden(resolved)
+  private val hasVisible = io.trace.hasHit && !mayBeHidden(resolved)
   io.trace.shades   := io.trace.resolved.valid && !isShadow(resolved) && hasVisible
   io.trace.measured := 0.U.asTypeOf(io.trace.measured)
   private val afterTrace = Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
   private val lightsLeft =
-    shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusions(resolved))
+    shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusion)
   move(ended.now.valid, resolved, Mux(isShadow(resolved), afterLights(lightsLeft), afterHit))
   if (config.hasEnvironment) when(ended.now.valid) {
     mayBeHidden(resolved)     := false.B
-    isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit(resolved) && mayBeHidden(resolved)
+    isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit && mayBeHidden(resolved)
   }
 
   // Results of the shader

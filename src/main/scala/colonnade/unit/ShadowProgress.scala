@@ -1,9 +1,9 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, PriorityEncoder, Valid}
-import colonnade.common.{Choice, Context}
-import colonnade.config.{ArrayConfig, ColonnadeConfig}
+import chisel3.util.{log2Ceil, PriorityEncoder}
+import colonnade.common.Choice
+import colonnade.config.ColonnadeConfig
 import colonnade.shading.Occlusion
 
 /** What [[RtController]] knows of the shadow rays of each context. They follow the lights by their number.
@@ -48,30 +48,5 @@ private[unit] final class ShadowProgress(config: ColonnadeConfig) {
     results.zipWithIndex.map { case (result, light) =>
       Mux(needed(light), Occlusion.safe(result.read(choice))._1, Occlusion.none)
     }
-  }
-}
-
-/** Flags of each context, written by one writer and read with choices: registers; or, of many contexts, a memory for each
-  * reader, since a choice is then known a cycle before.
-  */
-private[unit] final class FlagTable(config: ColonnadeConfig, flags: UInt) {
-  private val contexts  = config.array.contexts
-  private val registers = Option.unless(ArrayConfig.isLarge(contexts))(Reg(Vec(contexts, flags)))
-  private val written   = Wire(Valid(flags))
-  private val writer    = Wire(Context(config))
-  registers.foreach(table => when(written.valid) { table(writer) := written.bits })
-
-  /** To be called once. */
-  def write(valid: Bool, context: UInt, value: UInt): Unit = {
-    written.valid := valid
-    written.bits  := value
-    writer        := context
-  }
-
-  /** The flags of the context that is chosen now. */
-  def read(choice: Choice): UInt = registers.map(_(choice.now.bits)).getOrElse {
-    val memory = SyncReadMem(contexts, flags)
-    when(written.valid) { memory.write(writer, written.bits) }
-    memory.read(choice.following.bits, choice.following.valid)
   }
 }

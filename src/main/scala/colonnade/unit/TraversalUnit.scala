@@ -88,6 +88,7 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   intersector.scene      := io.scene
   control.isShadow       := isShadow
   control.isPrimary      := VecInit.fill(contexts)(false.B)
+  control.askedNext      := 0.U.asTypeOf(control.askedNext)
   control.resolved       := 0.U.asTypeOf(control.resolved)
   control.measured       := 0.U.asTypeOf(control.measured)
   control.shades         := false.B
@@ -104,10 +105,12 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   intersector.closestHit.grantNext.valid := reads
   intersector.closestHit.grantNext.bits  := ended
   intersector.closestHit.context         := reader
+  control.asked.valid                    := result.valid
+  control.asked.bits                     := reader
   result.valid                           := RegNext(reads, false.B)
   result.bits.context                    := owners(reader)
-  result.bits.hasHit                     := control.hasHit(reader)
-  result.bits.occlusion                  := control.occlusions(reader)
+  result.bits.hasHit                     := control.hasHit
+  result.bits.occlusion                  := control.occlusion
   result.bits.hit                        := intersector.closestHit.hit
   queue.io.enq :<>= result
   io.results :<>= queue.io.deq

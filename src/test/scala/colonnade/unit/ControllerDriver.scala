@@ -101,6 +101,10 @@ private class ControllerDriver(
     val done     = shown(dut.io.pixel.done.valid, dut.io.pixel.done.bits, at(ContextState.done))
     val shadowed = shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow)
     val ended    = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
+    for (index <- resolved) {
+      dut.io.trace.hasHit.poke(contexts(index).hasHit)
+      dut.io.trace.occlusion.poke(contexts(index).occlusion)
+    }
     // The hit of an occlusion test is not read together with that of a surface
     val shades =
       resolved.exists(index => !contexts(index).isShadow && contexts(index).hasHit && !contexts(index).mayBeHidden)
@@ -186,8 +190,6 @@ private class ControllerDriver(
       context.state = ContextState.resolve
       context.hasHit = random.nextBoolean()
       context.occlusion = random.shuffle(Occlusion.all).head
-      dut.io.trace.hasHit(index).poke(context.hasHit)
-      dut.io.trace.occlusions(index).poke(context.occlusion)
     }
     for ((index, needs) <- events.shaded) change(Some(index)) { context =>
       context.isBackground = false
