@@ -1,12 +1,12 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{Decoupled, RegEnable}
+import chisel3.util.{log2Ceil, Decoupled, DecoupledIO, Fill, RegEnable}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameRegisters, FrameSettings, PixelPosition, PixelRect}
+import colonnade.formats.{FrameRegisters, FrameSettings, HalfPlane, PixelPosition}
 
 /** A square of pixels, named by its first pixel. */
-final class TestedSquare(config: ColonnadeConfig) extends Bundle {
+sealed class TestedSquare(config: ColonnadeConfig) extends Bundle {
   val first = new PixelPosition(config)
 
   /** A pixel of it may show the object; a pixel of it may show the object or the environment. */
@@ -14,86 +14,87 @@ final class TestedSquare(config: ColonnadeConfig) extends Bundle {
   val isForUnits  = Bool()
 }
 
-/** The window of pixels that show the environment, if the frame has one. */
-final class EnvironmentWindow(config: ColonnadeConfig) extends Bundle {
-  val enabled = Bool()
-  val rect    = new PixelRect(config.numbers.coordinateBits)
+/** A tile after its test. */
+final class TestedTile(config: ColonnadeConfig) extends TestedSquare(config) {
 
-  /** A square of `size` pixels and the window have pixels in common. */
-  def meets(first: PixelPosition, size: Int): Bool = enabled && EnvironmentWindow.meets(rect, first, size)
+  /** If it meets the object. */
+  val edgeValues = EdgeValues(config)
 }
 
-object EnvironmentWindow {
+/** The edge functions of the object's outline, x·`x` + y·`y` + `offset`, at the corner of a tile where each one is highest.
+  *
+  * They are not below 0, since the tile meets the object. They saturate above what one can fall by within the tile.
+  */
+object EdgeValues {
+  def apply(config: ColonnadeConfig): Vec[UInt] = Vec(FrameRegisters.outlineEdges, UInt(bits(config).W))
 
-  /** The window in the registers. */
-  def apply(config: ColonnadeConfig, registers: FrameRegisters): EnvironmentWindow = {
-    val window = WireInit(0.U.asTypeOf(new EnvironmentWindow(config)))
-    for (environment <- registers.environment) {
-      window.enabled := environment.enabled
-      window.rect    := environment.window
-    }
-    window
-  }
+  /** Of `size` − 1 steps of at most 2^(`normalBits` − 1) in both directions. */
+  def bits(config: ColonnadeConfig): Int = HalfPlane.normalBits + log2Ceil(config.frame.tileSize)
+}
 
-  /** A square of `size` pixels and a rectangle have pixels in common. */
-  def meets(rect: PixelRect, first: PixelPosition, size: Int): Bool = {
-    def spans(first: UInt, low: UInt, high: UInt): Bool = low < high && first < high && first +& size.U > low
-    spans(first.x, rect.x0, rect.x1) && spans(first.y, rect.y0, rect.y1)
-  }
+/** Two registered stages with a handshake; each one holds an item while the next one is not ready. */
+private[frame] final class TwoStages(in: DecoupledIO[Data], out: DecoupledIO[Data]) {
+  private val isInFirst  = RegInit(false.B)
+  private val isInSecond = RegInit(false.B)
+
+  /** The second stage takes the item of the first one; the first stage takes that of `in`. */
+  val second: Bool = !isInSecond || out.ready
+  val first:  Bool = !isInFirst || second
+  val isIdle: Bool = !isInFirst && !isInSecond
+
+  when(first) { isInFirst := in.valid }
+  when(second) { isInSecond := isInFirst }
+  in.ready  := first
+  out.valid := isInSecond
 }
 
 /** Ports of [[OutlineTest]]. */
 final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
-  val frame   = Input(new FrameSettings(config.numbers))
-  val window  = Input(new EnvironmentWindow(config))
-  val squares = Flipped(Decoupled(new PixelPosition(config)))
-  val tested  = Decoupled(new TestedSquare(config))
+  val frame  = Input(new FrameSettings(config.numbers))
+  val window = Input(new EnvironmentWindow(config))
 
-  /** No square is inside. */
+  /** The first pixels of tiles. */
+  val tiles  = Flipped(Decoupled(new PixelPosition(config)))
+  val tested = Decoupled(new TestedTile(config))
+
+  /** No tile is inside. */
   val isIdle = Output(Bool())
 }
 
-/** Tests squares of `size` pixels against the object's rectangle and outline. A square meets the object unless it is
-  * outside the rectangle or wholly outside the half-plane of one edge. Render units get the squares that meet the object
-  * or the environment's window.
+/** Tests tiles against the object's rectangle and outline. A tile meets the object unless it is outside the rectangle or
+  * wholly outside the half-plane of one edge. Render units get the tiles that meet the object or the environment's window.
   *
-  * Throughput: one square per cycle, in order. Latency: two cycles, for products and their sums.
+  * Throughput: one tile per cycle, in order. Latency: two cycles, for products and their sums.
   */
-final class OutlineTest(config: ColonnadeConfig, size: Int) extends Module {
+final class OutlineTest(config: ColonnadeConfig) extends Module {
   val io = IO(new OutlineTestIO(config))
 
-  private val rectangle = io.frame.objectRect
-  private val outline   = io.frame.objectOutline
-
-  // Handshake
-  private val isMultiplied = RegInit(false.B)
-  private val isTested     = RegInit(false.B)
-  private val adds         = !isTested || io.tested.ready
-  private val multiplies   = !isMultiplied || adds
-  when(multiplies) { isMultiplied := io.squares.valid }
-  when(adds) { isTested := isMultiplied }
-  io.squares.ready := multiplies
-  io.tested.valid  := isTested
-  io.isIdle        := !isMultiplied && !isTested
+  private val size    = config.frame.tileSize
+  private val outline = io.frame.objectOutline
+  private val stages  = new TwoStages(io.tiles, io.tested)
+  io.isIdle := stages.isIdle
 
   // Products of the corner that is farthest inside
-  private val square   = io.squares.bits
-  private val inRect   = EnvironmentWindow.meets(rectangle, square, size)
-  private val inWindow = io.window.meets(square, size)
+  private val tile     = io.tiles.bits
   private val products = outline.map { edge =>
-    Seq(edge.x -> square.x, edge.y -> square.y).map { case (normal, first) =>
+    Seq(edge.x -> tile.x, edge.y -> tile.y).map { case (normal, first) =>
       val furthest = Mux(normal > 0.S, first +& (size - 1).U, first)
-      RegEnable(normal * furthest.zext, multiplies)
+      RegEnable(normal * furthest.zext, stages.first)
     }
   }
-  private val multiplied = RegEnable(square, multiplies)
-  private val isInRect   = RegEnable(inRect, multiplies)
-  private val isInWindow = RegEnable(inWindow, multiplies)
+  private val multiplied = RegEnable(tile, stages.first)
+  private val isInRect   = RegEnable(EnvironmentWindow.meets(io.frame.objectRect, tile, size), stages.first)
+  private val isInWindow = RegEnable(io.window.meets(tile, size), stages.first)
 
   // Sums
-  private val isInside =
-    outline.zip(products).map { case (edge, Seq(ofX, ofY)) => (ofX +& ofY) +& edge.offset >= 0.S }.reduce(_ && _)
-  io.tested.bits.first       := RegEnable(multiplied, adds)
-  io.tested.bits.meetsObject := RegEnable(isInRect && isInside, adds)
-  io.tested.bits.isForUnits  := RegEnable((isInRect && isInside) || isInWindow, adds)
+  private val values   = outline.zip(products).map { case (edge, Seq(ofX, ofY)) => (ofX +& ofY) +& edge.offset }
+  private val isInside = values.map(_ >= 0.S).reduce(_ && _)
+  private val bits     = EdgeValues.bits(config)
+  io.tested.bits.first       := RegEnable(multiplied, stages.second)
+  io.tested.bits.meetsObject := RegEnable(isInRect && isInside, stages.second)
+  io.tested.bits.isForUnits  := RegEnable((isInRect && isInside) || isInWindow, stages.second)
+  for ((port, value) <- io.tested.bits.edgeValues.zip(values)) {
+    val isLarge = (value >> bits).asUInt.orR
+    port := RegEnable(Mux(isLarge, Fill(bits, true.B), value(bits - 1, 0)), stages.second)
+  }
 }

@@ -5,12 +5,21 @@ import chisel3.util.{log2Ceil, Decoupled, DecoupledIO}
 import colonnade.config.ColonnadeConfig
 
 /** The first pixel of a square of `frame.tileSize`, or of one of its quarters: [[TileDivider]]. */
-final class Tile(config: ColonnadeConfig) extends Bundle {
+sealed class Tile(config: ColonnadeConfig) extends Bundle {
   val x = UInt(config.numbers.coordinateBits.W)
   val y = UInt(config.numbers.coordinateBits.W)
 }
 
+/** A tile, or a quarter of one, that meets the object. */
+final class ObjectTile(config: ColonnadeConfig) extends Tile(config) {
+
+  /** Those of the whole tile. */
+  val edgeValues = EdgeValues(config)
+}
+
 object Tile {
+  def apply(config: ColonnadeConfig, kind: TileKind.Value): Tile =
+    if (kind == TileKind.OfObject) new ObjectTile(config) else new Tile(config)
 
   /** Levels of the Morton code of a pixel in its tile. */
   def pixelLevels(config: ColonnadeConfig): Int = log2Ceil(config.frame.tileSize)
@@ -38,7 +47,7 @@ object TileKind extends Enumeration {
 
 /** Tiles for a column, by kind. */
 final class ColumnTiles(config: ColonnadeConfig) extends Bundle {
-  val ofObject      = Decoupled(new Tile(config))
+  val ofObject      = Decoupled(new ObjectTile(config))
   val ofEnvironment = Option.when(config.hasEnvironment)(Decoupled(new Tile(config)))
   val ofBackground  = Decoupled(new Tile(config))
 

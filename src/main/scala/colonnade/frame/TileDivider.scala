@@ -11,8 +11,8 @@ final class TileDividerIO(config: ColonnadeConfig) extends Bundle {
 
   /** Off: tiles pass as they are. */
   val divides = Input(Bool())
-  val tiles   = Flipped(Decoupled(new Tile(config)))
-  val parts   = Decoupled(new Tile(config))
+  val tiles   = Flipped(Decoupled(new ObjectTile(config)))
+  val parts   = Decoupled(new ObjectTile(config))
 }
 
 /** Divides a tile into its quarters, in Morton order, without those outside the frame. So work that is much in few tiles is
@@ -30,6 +30,7 @@ final class TileDivider(config: ColonnadeConfig) extends Module {
   when(steps) { part := Mux(isLast, 0.U, part + 1.U) }
 
   io.parts.valid  := io.tiles.valid && isInside
+  io.parts.bits   := io.tiles.bits
   io.parts.bits.x := io.tiles.bits.x | part(0) << Tile.pixelLevels(config) - 1
   io.parts.bits.y := io.tiles.bits.y | part(1) << Tile.pixelLevels(config) - 1
   io.tiles.ready  := steps && isLast

@@ -1,13 +1,13 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{Cat, Decoupled, Queue}
+import chisel3.util.{Cat, Decoupled, DecoupledIO, Queue}
 import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.FrameSettings
 
 /** Ports of [[TileScheduler]]. */
-final class TileSchedulerIO(config: ColonnadeConfig) extends Bundle {
+final class TileSchedulerIO(config: ColonnadeConfig, kind: TileKind.Value) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 
   /** Where pixels show the environment. */
@@ -17,7 +17,7 @@ final class TileSchedulerIO(config: ColonnadeConfig) extends Bundle {
   val start = Input(Bool())
 
   /** Valid only where ready is set, see `Dispatcher`. */
-  val tiles = Vec(config.array.columns, Decoupled(new Tile(config)))
+  val tiles = Vec(config.array.columns, Decoupled(Tile(config, kind)))
 
   /** No tile is left. */
   val isIdle = Output(Bool())
@@ -33,25 +33,24 @@ final class TileSchedulerIO(config: ColonnadeConfig) extends Bundle {
 final class TileScheduler(config: ColonnadeConfig, kind: TileKind.Value) extends Module {
   import TileScheduler._
 
-  val io = IO(new TileSchedulerIO(config))
+  val io = IO(new TileSchedulerIO(config, kind))
 
   private val coordinateBits = config.numbers.coordinateBits
   private val pixelLevels    = Tile.pixelLevels(config)
   private val scan           = Module(new MortonScan(Tile.tileLevels(config)))
-  private val outline        = Module(new OutlineTest(config, config.frame.tileSize))
-  private val dispatch       = Module(new Dispatcher(new Tile(config), config.array.columns))
-  private val tiles          = Wire(Decoupled(new Tile(config)))
+  private val outline        = Module(new OutlineTest(config))
+  private val dispatch       = Module(new Dispatcher(Tile(config, kind), config.array.columns))
 
   scan.io.size.valid     := io.start
   scan.io.size.bits.wide := tilesIn(io.frame.pixelsWide)
   scan.io.size.bits.high := tilesIn(io.frame.pixelsHigh)
 
-  outline.io.frame          := io.frame
-  outline.io.window         := io.window
-  outline.io.squares.valid  := scan.io.cells.valid
-  outline.io.squares.bits.x := firstPixel(scan.io.cells.bits.x)
-  outline.io.squares.bits.y := firstPixel(scan.io.cells.bits.y)
-  scan.io.cells.ready       := outline.io.squares.ready
+  outline.io.frame        := io.frame
+  outline.io.window       := io.window
+  outline.io.tiles.valid  := scan.io.cells.valid
+  outline.io.tiles.bits.x := firstPixel(scan.io.cells.bits.x)
+  outline.io.tiles.bits.y := firstPixel(scan.io.cells.bits.y)
+  scan.io.cells.ready     := outline.io.tiles.ready
 
   private val tested     = outline.io.tested
   private val isSelected = kind match {
@@ -59,21 +58,29 @@ final class TileScheduler(config: ColonnadeConfig, kind: TileKind.Value) extends
     case TileKind.OfEnvironment => tested.bits.isForUnits && !tested.bits.meetsObject
     case TileKind.OfBackground  => !tested.bits.isForUnits
   }
-  tiles.valid  := tested.valid && isSelected
-  tiles.bits.x := tested.bits.first.x
-  tiles.bits.y := tested.bits.first.y
-  tested.ready := tiles.ready || !isSelected
 
-  private val parts = if (kind == TileKind.OfObject) {
+  private val parts: DecoupledIO[Tile] = if (kind == TileKind.OfObject) {
     val divider = Module(new TileDivider(config)).io
-    divider.frame   := io.frame
-    divider.divides := divides(io.window)
-    divider.tiles :<>= tiles
+    divider.frame                 := io.frame
+    divider.divides               := divides(io.window)
+    divider.tiles.bits.edgeValues := tested.bits.edgeValues
+    select(divider.tiles)
     divider.parts
-  } else tiles
+  } else {
+    val tiles = Wire(Decoupled(new Tile(config)))
+    select(tiles)
+    tiles
+  }
   dispatch.io.items <> Queue(parts, queueEntries)
   io.tiles <> dispatch.io.takers
   io.isIdle := scan.io.isIdle && outline.io.isIdle && !dispatch.io.items.valid
+
+  private def select(tiles: DecoupledIO[Tile]): Unit = {
+    tiles.valid  := tested.valid && isSelected
+    tiles.bits.x := tested.bits.first.x
+    tiles.bits.y := tested.bits.first.y
+    tested.ready := tiles.ready || !isSelected
+  }
 
   private def tilesIn(pixels: UInt): UInt = (pixels +& (config.frame.tileSize - 1).U) >> pixelLevels
 

@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{Decoupled, Queue}
+import chisel3.util.{Decoupled, Queue, RegEnable}
 import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
@@ -9,7 +9,7 @@ import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
 /** Ports of [[TileWalker]]. */
 final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
-  val tiles = Flipped(Decoupled(new Tile(config)))
+  val tiles = Flipped(Decoupled(new ObjectTile(config)))
 
   /** Pixels of another tile, which shows the environment only. */
   val environment = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
@@ -45,15 +45,19 @@ final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = N
   val io = IO(new TileWalkerIO(config))
 
   private val scan     = Module(new TileScan(config))
-  private val outline  = Module(new OutlineTest(config, size = 1))
+  private val outline  = Module(new PixelTest(config))
   private val dispatch = Module(new Dispatcher(new UnitPosition(config), config.array.rows))
 
-  scan.io.frame     := io.frame
-  scan.io.isDivided := TileScheduler.divides(io.window)
-  scan.io.tiles <> io.tiles
-  outline.io.frame  := io.frame
-  outline.io.window := io.window
-  outline.io.squares <> scan.io.positions
+  scan.io.frame        := io.frame
+  scan.io.isDivided    := TileScheduler.divides(io.window)
+  scan.io.tiles.valid  := io.tiles.valid
+  scan.io.tiles.bits.x := io.tiles.bits.x
+  scan.io.tiles.bits.y := io.tiles.bits.y
+  io.tiles.ready       := scan.io.tiles.ready
+  outline.io.frame     := io.frame
+  outline.io.window    := io.window
+  outline.io.pixels <> scan.io.positions
+  outline.io.edgeValues := RegEnable(io.tiles.bits.edgeValues, io.tiles.fire)
 
   private val tested   = outline.io.tested
   private val forUnits = tested.bits.isForUnits

@@ -17,16 +17,18 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     * `meets` is called with the flag of each pixel for the render units.
     */
   private def walk(
-      dut:     TileWalker,
-      size:    (Int, Int),
-      tiles:   Seq[(Int, Int)],
-      isReady: Int => Boolean,
-      meets:   ((Int, Int), Boolean) => Unit = (_, _) => ()
+      dut:      TileWalker,
+      size:     (Int, Int),
+      tileSize: Int,
+      tiles:    Seq[(Int, Int)],
+      isReady:  Int => Boolean,
+      edge:     (Int, Int, Int) = (0, 0, 0),
+      meets:    ((Int, Int), Boolean) => Unit = (_, _) => ()
   ): (Seq[(Int, (Int, Int))], Int) = {
+    val outline = Outline.within(size, edge)
     dut.io.frame.pixelsWide.poke(size._1)
     dut.io.frame.pixelsHigh.poke(size._2)
-    dut.io.frame.objectRect.x1.poke(size._1)
-    dut.io.frame.objectRect.y1.poke(size._2)
+    outline.poke(dut.io.frame)
     var waiting   = tiles
     var positions = Vector.empty[(Int, (Int, Int))]
     var cycles    = 0
@@ -35,6 +37,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       waiting.headOption.foreach { case (x, y) =>
         dut.io.tiles.bits.x.poke(x)
         dut.io.tiles.bits.y.poke(y)
+        outline.pokeValues(dut.io.tiles.bits.edgeValues, tileSize)(x, y)
       }
       for ((port, row) <- (dut.io.others +: dut.io.positions).zip(-1 until dut.io.positions.size)) {
         val ready = isReady(row)
@@ -63,7 +66,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       val tiles = Seq((0, 0), (tileSize, 0), (2 * tileSize, 3 * tileSize))
       test(new TileWalker(config(rows = 1, tileSize))) { dut =>
         dut.clock.setTimeout(0)
-        val (positions, cycles) = walk(dut, (640, 480), tiles, _ => true)
+        val (positions, cycles) = walk(dut, (640, 480), tileSize, tiles, _ => true)
         assert(positions.map(_._2) == tiles.flatMap(pixels((640, 480), _, tileSize)))
         assert(cycles == 3 * tileSize * tileSize + 4)
       }
@@ -72,7 +75,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "spread neighbours over the rows" in {
     test(new TileWalker(config(rows = 4, tileSize = 8))) { dut =>
-      val (positions, _) = walk(dut, (640, 480), Seq((8, 16)), _ => true)
+      val (positions, _) = walk(dut, (640, 480), 8, Seq((8, 16)), _ => true)
       assert(positions.map(_._1) == Seq.tabulate(64)(_ % 4))
     }
   }
@@ -82,10 +85,6 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       val random = new Random(3)
       test(new TileWalker(config(rows = 3, tileSize = 8, TestConfigs.withEnvironment(TestConfigs.environment)))) {
         dut =>
-          val edge = dut.io.frame.objectOutline(2)
-          edge.x.poke(3)
-          edge.y.poke(-2)
-          edge.offset.poke(-9)
           val window = dut.io.window
           window.enabled.poke(hasWindow)
           Seq(window.rect.x0, window.rect.y0, window.rect.x1, window.rect.y1).zip(Seq(2, 3, 12, 15)).foreach {
@@ -102,8 +101,10 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
             walk(
               dut,
               (640, 480),
+              tileSize = 8,
               tiles,
               row => random.nextInt(3 + 2 * row + 2) == 0,
+              edge = (3, -2, -9),
               (pixel, meets) => claims += pixel -> meets
             )
           val (others, units)     = positions.partition(_._1 < 0)
@@ -122,7 +123,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     val size   = (21, 10)
     val tiles  = Seq((0, 0), (8, 0), (16, 0), (0, 8), (8, 8), (16, 8))
     for (rows <- Seq(1, 3, 10)) test(new TileWalker(config(rows, tileSize = 8))) { dut =>
-      val (positions, _) = walk(dut, size, tiles, row => random.nextInt(5 + 20 * row.max(0)) == 0)
+      val (positions, _) = walk(dut, size, 8, tiles, row => random.nextInt(5 + 20 * row.max(0)) == 0)
       val expected       = tiles.flatMap(pixels(size, _, 8))
       assert(positions.map(_._2).sorted == expected.sorted)
     }
