@@ -46,7 +46,7 @@ def assert_same(frame: Frame, expected: Frame) -> None:
     assert [frame.counters[name] for name in EVENTS] == [expected.counters[name] for name in EVENTS]
 
 
-#: Rows, columns, banks, record buffers, cache: from one awaited line at a time to caches of some lines, in one to eight ways.
+#: Rows, columns, banks, record buffers, cache: from one awaited line at a time to caches of some lines and ways.
 SHAPES = {
     "one of everything": (1, 1, 1, 1, (1, 1, 1, 1, 1, 1, 4, False)),
     "two columns": (3, 2, 2, 2, (12, 3, 4, 20, 5, 8, 32, False)),
