@@ -30,7 +30,7 @@ private final class BoundedProof(proof: ProofSystem) {
 
   private def violationIn(cycle: Int): Option[String] = {
     val cycles = new Unrolling(proof.system, cycle)
-    cycles.search(any(proof.assertions.map(cycles.bit(_, cycle)))) { z3 =>
+    cycles.search(any(proof.assertions.map(cycles.bit(_, cycle))), holdingUntil(cycles, cycle - 1)) { z3 =>
       val violated = proof.assertions.filter(name => z3.getValue(cycles.bit(name, cycle)).contains(BigInt(1)))
       val trace    = writeTrace(cycle, z3, cycles).relativeTo(os.pwd)
       s"violated in cycle $cycle after the reset: ${violated.map(proof.describe).mkString(", ")}; see $trace"
@@ -40,7 +40,8 @@ private final class BoundedProof(proof: ProofSystem) {
   /** Why the proof says nothing, if it does not. */
   def emptiness(count: Int): Option[String] = {
     val cycles                                 = new Unrolling(proof.system, count)
-    def isPossible(condition: BVExpr): Boolean = cycles.search(condition)(_ => ()).nonEmpty
+    val holding                                = holdingUntil(cycles, count)
+    def isPossible(condition: BVExpr): Boolean = cycles.search(condition, holding)(_ => ()).nonEmpty
 
     if (!isPossible(BVLiteral(1, 1))) Some(s"the assumptions can't be kept for $count cycles")
     else
@@ -48,6 +49,10 @@ private final class BoundedProof(proof: ProofSystem) {
         .find(cover => !isPossible(any((1 to count).map(cycles.bit(cover, _)))))
         .map(cover => s"can't happen within $count cycles: ${proof.describe(cover)}")
   }
+
+  /** The assertions hold until the last of these cycles, which is known by then: so z3 need not find it out again. */
+  private def holdingUntil(cycles: Unrolling, last: Int): Seq[BVExpr] =
+    for (cycle <- 1 to last; name <- proof.assertions) yield BVNot(cycles.bit(name, cycle))
 
   private def any(bits: Seq[BVExpr]): BVExpr = bits.reduce(BVOr(_, _))
 

@@ -22,12 +22,16 @@ private[bounded] final class Unrolling(system: TransitionSystem, cycles: Int) {
 
   def at(symbol: BVSymbol, cycle: Int): BVSymbol = BVSymbol(nameAt(symbol.name, cycle), symbol.width)
 
-  /** What `found` makes of one way for the condition to come true, if there is one. */
-  def search[T](condition: BVExpr)(found: SolverContext => T): Option[T] = {
+  /** What `found` makes of one way for the condition to come true, if there is one.
+    *
+    * @param known what is known to be true
+    */
+  def search[T](condition: BVExpr, known: Seq[BVExpr])(found: SolverContext => T): Option[T] = {
     val z3 = Z3SMTLib.createContext()
     try {
       z3.setLogic("QF_BV")
       (0 to cycles).foreach(tell(z3, _))
+      known.foreach(z3.assert)
       z3.assert(condition)
       if (z3.check(produceModel = true).isSat) Some(found(z3)) else None
     } finally z3.close()
