@@ -210,6 +210,7 @@ SMALL_ARRAY = {
         "directView": False,
         "pathContexts": 0,
         "pipelined": False,
+        "shortPaths": False,
     },
     "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1, "cache": None},
 }

@@ -47,6 +47,12 @@ if TYPE_CHECKING:
     metavar="CYCLES",
     help="Cycles from a read of DRAM to its first data, with a cache.  [default: 100]",
 )
+@click.option(
+    "--dram-interval",
+    type=click.IntRange(1, 1000),
+    metavar="CYCLES",
+    help="Cycles from a beat of DRAM to the next one.  [default: 1]",
+)
 @click.option("--plot", type=FILE, metavar="FILE", help="Plot the utilisation of each stage as PNG.")
 @strict_option
 @json_option
@@ -59,6 +65,7 @@ def bench(
     reuse: bool,
     mirror: bool,
     dram_latency: int | None,
+    dram_interval: int | None,
     plot: Path | None,
     json_file: Path | None,
 ) -> None:
@@ -97,6 +104,7 @@ def bench(
             reuse=reuse,
             mirror=mirror,
             dram_latency=dram_latency,
+            dram_interval=dram_interval,
         )
         in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
         means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])

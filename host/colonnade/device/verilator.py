@@ -40,6 +40,7 @@ class Stalls:
         memory_burst: Longest stall of a bank, cycles; lengths are uniform from 1.
         check_interval: Cycles between checks of the coupling of the simulator's models.
         dram_latency: Cycles from a read to its first data, for designs with a cache.
+        dram_interval: Cycles from a beat of DRAM to the next one.
         dram_random: Percentage of cycles in which DRAM accepts or delivers nothing; reads then overtake each other.
         dram_errors: Beats of 1024 that DRAM answers with an error in the first frame.
         dram_silent: Reads of the first frame after which DRAM answers no more until the frame has ended; 0: all.
@@ -51,6 +52,7 @@ class Stalls:
     memory_burst: int = 32
     check_interval: int = 64
     dram_latency: int = 100
+    dram_interval: int = 1
     dram_random: int = 0
     dram_errors: int = 0
     dram_silent: int = 0
@@ -65,6 +67,7 @@ class Stalls:
         """Command-line options of the harness."""
         dram = [
             *("--dram", str(self.dram_latency), "--dram-random", str(self.dram_random)),
+            *("--dram-interval", str(self.dram_interval)),
             *("--dram-errors", str(self.dram_errors), "--dram-silent", str(self.dram_silent)),
         ]
         memory = ["--memory", str(self.memory_percent), "--burst", str(self.memory_burst)]

@@ -35,6 +35,7 @@ def measure_frame(
     *,
     reuse: bool = True,
     dram_latency: int | None = None,
+    dram_interval: int | None = None,
 ) -> dict[str, Any]:
     """Render a frame with the RTL.
 
@@ -46,6 +47,7 @@ def measure_frame(
         size: Width and height, pixels.
         reuse: Use the cached counters of the same Verilog, scene image, registers and memory.
         dram_latency: Cycles from a read of DRAM to its first data, for designs with a cache; None: those of `Stalls`.
+        dram_interval: Cycles from a beat of DRAM to the next one; None: that of `Stalls`.
 
     Returns:
         `colonnade.render.report.frame_report` with ``config_hash``, ``cycles_per_second`` and ``seconds``.
@@ -58,10 +60,13 @@ def measure_frame(
     image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
     registers = frame_registers(scene, image.header, manifest, *size)
     pack_seconds = time.perf_counter() - begun
-    stalls = Stalls() if dram_latency is None else Stalls(dram_latency=dram_latency)
+    memory = {"dram_latency": dram_latency, "dram_interval": dram_interval}
+    stalls = Stalls(**{name: cycles for name, cycles in memory.items() if cycles is not None})
     key = _key(design, image, registers)
     if manifest.config["columnBvhMemory"]["cache"] is not None:
         key["dramLatency"] = stalls.dram_latency
+        if stalls.dram_interval != 1:
+            key["dramInterval"] = stalls.dram_interval
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
     file = cache_directory(project_root()) / "measurements" / f"{name}.json"
     cached = cache.stored(file, key) if reuse else None

@@ -80,13 +80,15 @@ def cycles(
     size: Size,
     reuse: bool,
     dram_latency: int | None,
+    dram_interval: int | None = None,
 ) -> None:
     """Render a frame with the RTL and take its counters."""
     from colonnade.evaluation.bench import mesh_result
     from colonnade.evaluation.measure import measure_frame
 
     with _configuration(config) as path:
-        report = measure_frame(str(path), overrides, scene, mesh, size, reuse=reuse, dram_latency=dram_latency)
+        memory = {"dram_latency": dram_latency, "dram_interval": dram_interval}
+        report = measure_frame(str(path), overrides, scene, mesh, size, reuse=reuse, **memory)
     write_result(folder, mesh_result(report))
 
 

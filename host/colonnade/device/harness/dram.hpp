@@ -1,6 +1,6 @@
 // A model of DRAM behind the device's AXI4 read port, for designs with a cache (DRAM_BUS_BYTES).
 //
-// Reads take `latency` cycles and then deliver a beat per cycle, in the order of the reads: a pipe of fixed latency. With
+// Reads take `latency` cycles and then deliver a beat per cycle, or every `interval` cycles, in the order of the reads. With
 // `randomPercent`, addresses and beats are refused or withheld in that share of the cycles, and reads of different ids
 // overtake each other. A read beyond the scene is answered with DECERR. Two failures end with the first frame: with
 // `errorsPer1024`, so many of 1024 beats are answered with SLVERR; with `silentAfter`, reads are answered no more after so many.
@@ -13,7 +13,7 @@
 #include <vector>
 
 struct DramOptions {
-    unsigned latency = 100, randomPercent = 0, errorsPer1024 = 0, silentAfter = 0, seed = 1;
+    unsigned latency = 100, randomPercent = 0, errorsPer1024 = 0, silentAfter = 0, seed = 1, interval = 1;
 };
 
 #ifdef DRAM_BUS_BYTES
@@ -55,6 +55,7 @@ public:
         ++now_;
         if (top_.io_memory_r_valid && top_.io_memory_r_ready) {
             offers_ = false;
+            next_ = now_ + options_.interval - 1;
             if (++reads_[chosen_].sent == reads_[chosen_].beats) {
                 reads_.erase(reads_.begin() + static_cast<std::ptrdiff_t>(chosen_));
                 ++answered_;
@@ -84,6 +85,7 @@ private:
     /// Chooses the read whose next beat is offered: the oldest, or any that is the oldest of its id.
     void choose() {
         if (options_.silentAfter != 0 && answered_ >= options_.silentAfter) return;
+        if (now_ < next_) return;
         std::vector<std::size_t> candidates;
         bool isSeen[256] = {};
         for (std::size_t i = 0; i < reads_.size(); ++i) {
@@ -106,6 +108,6 @@ private:
     std::deque<Read> reads_;
     std::size_t chosen_ = 0;
     bool offers_ = false, fails_ = false;
-    std::uint64_t now_ = 0, answered_ = 0;
+    std::uint64_t now_ = 0, answered_ = 0, next_ = 0;
 };
 #endif

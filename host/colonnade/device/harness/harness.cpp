@@ -11,7 +11,7 @@
 //
 // Options: --stall PERCENT of cycles in which the pixel sink is not ready; --seed N; for designs with memory stalls:
 // --memory PERCENT of cycles in which each bank is stalled, --burst N, the longest stall in cycles;
-// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-random PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
+// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-interval N, --dram-random PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
 // --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
 // With WAVEFORM defined, --waveform FILE writes the signals of the frames as VCD; the time unit is a cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
@@ -348,7 +348,7 @@ int main(int argc, char** argv) try {
     Options options;
     const std::pair<const char*, unsigned*> named[] = {
         {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}, {"--check", &options.checkInterval},
-        {"--dram", &options.dram.latency}, {"--dram-random", &options.dram.randomPercent}, {"--dram-errors", &options.dram.errorsPer1024}, {"--dram-silent", &options.dram.silentAfter}};
+        {"--dram", &options.dram.latency}, {"--dram-interval", &options.dram.interval}, {"--dram-random", &options.dram.randomPercent}, {"--dram-errors", &options.dram.errorsPer1024}, {"--dram-silent", &options.dram.silentAfter}};
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });

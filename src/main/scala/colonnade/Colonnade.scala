@@ -77,11 +77,13 @@ final class Colonnade(
     isStale     := (isStale && !invalidate) || registers.io.invalidate.get || hasFailed
     memory.page := registers.io.frame.dram.get.page
     io.memory.get :<>= memory.axi
-    memory.invalidate := invalidate
+    // With short paths the caches forget a cycle later, still before the frame's first request
+    val forgets = if (config.units.shortPaths) RegNext(invalidate, false.B) else invalidate
+    memory.invalidate := forgets
     for (((column, requests), index) <- columns.zip(memory.requests).zipWithIndex) {
       requests :<>= column.io.lineRequests.get
       column.io.lines.get      := memory.lines(SharedCache.busOf(config, index))
-      column.io.invalidate.get := invalidate
+      column.io.invalidate.get := forgets
     }
     counters.io.dramReads.get   := memory.events.dramReads
     counters.io.memoryError.get := hasFailed

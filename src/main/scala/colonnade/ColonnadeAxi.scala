@@ -40,8 +40,10 @@ final class ColonnadeAxi(
 
   private val streamGuard = streamPins.map(_ => Module(new StreamGuard(shell.busBytes)))
 
-  // What a soft reset resets
-  private val clears = reset.asBool || control.io.reset
+  // What a soft reset resets. With short paths by a register, whose output reaches all of the device
+  private val clears =
+    if (config.units.shortPaths) RegNext(reset.asBool || control.io.resetNext, true.B)
+    else reset.asBool || control.io.reset
   private val device = withReset(clears)(Module(new Colonnade(config, renderUnit)))
   private val writer = withReset(clears)(Module(new FramebufferWriter(config, shell)))
   private val loader = withReset(clears)(Module(new ImageLoader(config, shell)))

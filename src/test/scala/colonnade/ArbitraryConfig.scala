@@ -37,7 +37,17 @@ object ArbitraryConfig {
     pathContexts  <- if (marches == 0) Gen.const(0) else Gen.chooseNum(0, UnitsConfig.mostPathContexts)
     triangleRows  <- if (pathContexts == 0) Gen.const(1) else Gen.chooseNum(1, UnitsConfig.mostTriangleRows)
     pipelined     <- flag
-  } yield UnitsConfig(boxLanes, triangleLanes, triangleRows, marches, directView, pathContexts, pipelined)
+    shortPaths    <- if (pathContexts == 0) flag else Gen.const(false)
+  } yield UnitsConfig(
+    boxLanes,
+    triangleLanes,
+    triangleRows,
+    marches,
+    directView,
+    pathContexts,
+    pipelined,
+    shortPaths
+  )
 
   private val memory = for {
     depth         <- Gen.chooseNum(16, 1 << 22, 17, 1024, 1 << 17)

@@ -31,10 +31,12 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     Seq.fill(config.columnBvhMemory.depth)(BigInt(new RecordFormats(config).recordBits, random))
   }
 
-  private def onBench(seed: Int)(body: ShellBench => Unit): Unit =
-    test(new ColonnadeAxi(config, shell, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) { dut =>
+  private def onBench(seed: Int, shortPaths: Boolean = false)(body: ShellBench => Unit): Unit = {
+    val built = if (shortPaths) TestConfigs.withShortPaths(config) else config
+    test(new ColonnadeAxi(built, shell, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) { dut =>
       body(new ShellBench(dut, config, shell, new Random(seed)))
     }
+  }
 
   private def expectPicture(bench: ShellBench, scene: Seq[BigInt]): Unit = {
     for (y <- 0 until h; x <- 0 until w) {
@@ -80,7 +82,11 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     assert(!bench.interrupt && host("interrupt.status") == 1)
   }
 
-  it should "load images and write frames, one after the other, and refuse images by name" in onBench(3) { bench =>
+  for (shortPaths <- Seq(false, true))
+    it should s"load images and write frames, one after the other, and refuse images by name, short paths $shortPaths" in
+      onBench(3, shortPaths)(loadsAndFrames)
+
+  private def loadsAndFrames(bench: ShellBench): Unit = {
     bench.size(w, h)
     for (seed <- 0 until 3) {
       val scene = records(seed)
@@ -126,9 +132,11 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     assert(bench.load(good).isEmpty)
   }
 
-  it should "refuse a misaligned framebuffer, end a frame whose writes fail, and recover by a soft reset" in onBench(
-    5
-  ) { bench =>
+  for (shortPaths <- Seq(false, true))
+    it should s"refuse a misaligned framebuffer, end a frame whose writes fail, and recover by a soft reset, short paths $shortPaths" in
+      onBench(5, shortPaths)(errorsAndResets)
+
+  private def errorsAndResets(bench: ShellBench): Unit = {
     val scene = records(1)
     bench.size(w, h)
     assert(bench.load(bench.image(scene)).isEmpty)

@@ -26,7 +26,8 @@ object TestConfigs {
       marches = 0,
       directView = false,
       pathContexts = 0,
-      pipelined = false
+      pipelined = false,
+      shortPaths = false
     ),
     ColumnBvhMemoryConfig(
       depth = 1024,
@@ -113,6 +114,9 @@ object TestConfigs {
       ))
     )
   )
+
+  def withShortPaths(config: ColonnadeConfig): ColonnadeConfig =
+    config.copy(units = config.units.copy(shortPaths = true))
 
   def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig =
     tiny.copy(precision = PrecisionConfig(mac, sqrt, div))

@@ -39,13 +39,18 @@ final class BurstWriter(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   private val row         = RegEnable(io.rows.bits, io.rows.fire)
   private val address     = RegEnable(addressOf(io.rows.bits), io.rows.fire)
   private val rowBeats    = RowBeats(config, shell, io.settings.format, row, address)
-  private val isInside    = io.settings.window.contains(address, rowBytes)
+  private val isInsideNow = io.settings.window.contains(address, rowBytes)
   private val isOffered   = RegInit(false.B) // the address is on the bus, and holds
-  private val isDropped   = hasRow && !isOffered && (io.drop || !isInside)
+  // With short paths a row waits a cycle while its address is compared
+  private val isChecked   = RegInit(false.B)
+  private val isInside    = if (config.units.shortPaths) RegNext(isInsideNow) else isInsideNow
+  private val mayLeave    = if (config.units.shortPaths) hasRow && isChecked else hasRow
+  private val isDropped   = mayLeave && !isOffered && (io.drop || !isInside)
   private val isAddressed = io.axi.aw.fire
   private val leaves      = isDropped || isAddressed
   io.rows.ready := !hasRow || leaves
   when(io.rows.ready) { hasRow := io.rows.valid }
+  isChecked    := hasRow && !leaves
   io.isOutside := isDropped && !io.drop
 
   private def addressOf(row: TileRow): UInt =
@@ -68,7 +73,7 @@ final class BurstWriter(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   }
 
   // The row's address goes out when its beats may follow
-  io.axi.aw.valid      := isOffered || (hasRow && !isDropped && (beats === 0.U || (isLast && io.axi.w.ready)))
+  io.axi.aw.valid      := isOffered || (mayLeave && !isDropped && (beats === 0.U || (isLast && io.axi.w.ready)))
   isOffered            := io.axi.aw.valid && !io.axi.aw.ready
   io.axi.aw.bits.id    := 0.U
   io.axi.aw.bits.addr  := address

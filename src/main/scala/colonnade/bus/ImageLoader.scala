@@ -32,7 +32,7 @@ final class ImageLoader(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   }
   private val state  = RegInit(State.idle)
   private val errors = RegInit(0.U.asTypeOf(new ImageError))
-  private val reader = Module(new ImageReader(shell))
+  private val reader = Module(new ImageReader(shell, config.units.shortPaths))
   private val word   = reader.io.words.bits
   private val takes  = reader.io.words.fire
 

@@ -29,7 +29,7 @@ final class ImageReaderIO(shell: ShellConfig) extends Bundle {
   * Up to four bursts are under way; each has a place in a queue before it is requested, so R never waits. One word per
   * cycle.
   */
-final class ImageReader(shell: ShellConfig) extends Module {
+final class ImageReader(shell: ShellConfig, shortPaths: Boolean = false) extends Module {
   import ImageReader._
 
   val io = IO(new ImageReaderIO(shell))
@@ -58,18 +58,19 @@ final class ImageReader(shell: ShellConfig) extends Module {
   }
 
   // Beats to words; while it stops, a beat is discarded as a whole
-  private val queue   = Module(new Queue(UInt((8 * bus).W), maxBursts * beats, useSyncReadMem = true))
-  private val ofBeat  = bus / 4
-  private val word    = RegInit(0.U(log2Ceil(burstBytes / 4).W))
-  private val lane    = if (ofBeat == 1) 0.U else word(log2Ceil(ofBeat) - 1, 0)
+  private val queue  = Module(new Queue(UInt((8 * bus).W), maxBursts * beats, useSyncReadMem = true))
+  private val queued = if (shortPaths) Queue(queue.io.deq, 2) else queue.io.deq // the memory's output is registered
+  private val ofBeat = bus / 4
+  private val word   = RegInit(0.U(log2Ceil(burstBytes / 4).W))
+  private val lane   = if (ofBeat == 1) 0.U else word(log2Ceil(ofBeat) - 1, 0)
   private val last    = word | Mux(io.stop, (ofBeat - 1).U, 0.U) // the word of this cycle, or of its beat
-  private val isTaken = queue.io.deq.valid && (io.words.ready || io.stop)
+  private val isTaken = queued.valid && (io.words.ready || io.stop)
   queue.io.enq.valid := io.axi.r.valid
   queue.io.enq.bits  := io.axi.r.bits.data
-  queue.io.deq.ready := isTaken && (io.stop || lane === (ofBeat - 1).U)
+  queued.ready       := isTaken && (io.stop || lane === (ofBeat - 1).U)
   io.axi.r.ready     := queue.io.enq.ready
-  io.words.valid     := queue.io.deq.valid && !io.stop
-  io.words.bits      := queue.io.deq.bits.asTypeOf(Vec(ofBeat, UInt(32.W)))(lane)
+  io.words.valid     := queued.valid && !io.stop
+  io.words.bits      := queued.bits.asTypeOf(Vec(ofBeat, UInt(32.W)))(lane)
   when(isTaken) { word := last + 1.U }
   used := used + io.axi.ar.fire - (isTaken && last.andR)
 

@@ -28,7 +28,7 @@ object PixelWord {
   def showsPhoto(word: UInt): Bool = if (word.getWidth > 8 * PixelFormat.maxBytes) word.head(1).asBool else false.B
 }
 
-/** Encodes pixels for the framebuffer, one per cycle, in two cycles. */
+/** Encodes pixels for the framebuffer, one per cycle, in two cycles; with `units.shortPaths` in five. */
 final class PixelEncoder(config: ColonnadeConfig) extends Module {
   val format = IO(Input(UInt(PixelFormat.getWidth.W)))
   val pixels = IO(Flipped(Decoupled(new Pixel(config))))
@@ -38,14 +38,18 @@ final class PixelEncoder(config: ColonnadeConfig) extends Module {
   /** With an environment: pixels that do not show the object become shadow ratios. */
   val composites = Option.when(config.hasEnvironment)(IO(Input(Bool())))
 
-  private val moves  = !out.valid || out.ready
-  private val valids = Seq.iterate(pixels.valid, SrgbEncoder.latency + 1)(valid => RegEnable(valid, false.B, moves))
-  private val pixel  = Seq.iterate(pixels.bits, SrgbEncoder.latency + 1)(pixel => RegEnable(pixel, moves)).last
+  // With short paths the search takes twice the cycles, and pixels leave by a queue
+  private val shortPaths = config.units.shortPaths
+  private val latency    = if (shortPaths) 2 * SrgbEncoder.latency else SrgbEncoder.latency
+  private val encoded    = if (shortPaths) Wire(chiselTypeOf(out)) else out
+  private val moves      = !encoded.valid || encoded.ready
+  private val valids     = Seq.iterate(pixels.valid, latency + 1)(valid => RegEnable(valid, false.B, moves))
+  private val pixel      = Seq.iterate(pixels.bits, latency + 1)(pixel => RegEnable(pixel, moves)).last
   pixels.ready := moves
 
   private val channels = Seq(pixels.bits.colour.r, pixels.bits.colour.g, pixels.bits.colour.b)
   private val codes    = channels.map { channel =>
-    val encoder = Module(new SrgbEncoder)
+    val encoder = Module(new SrgbEncoder(cycles = latency))
     encoder.linear := channel
     encoder.enable := moves
     encoder.code
@@ -56,12 +60,18 @@ final class PixelEncoder(config: ColonnadeConfig) extends Module {
   }
   private val word = PixelFormat.packed(format, codes, linear, pixel.isObject).pad(PixelWord.bits(config))
 
-  out.valid     := valids.last
-  out.bits.x    := pixel.x
-  out.bits.y    := pixel.y
-  out.bits.data := word
+  encoded.valid     := valids.last
+  encoded.bits.x    := pixel.x
+  encoded.bits.y    := pixel.y
+  encoded.bits.data := word
   for (ratio <- pixel.ratio) when(composites.get && !pixel.isObject) {
-    out.bits.data := PixelWord.ofRatio(Seq(ratio.r, ratio.g, ratio.b).map(_.natural))
+    encoded.bits.data := PixelWord.ofRatio(Seq(ratio.r, ratio.g, ratio.b).map(_.natural))
   }
-  isIdle := !valids.drop(1).reduce(_ || _)
+  private val isEncoding = valids.drop(1).reduce(_ || _)
+  if (shortPaths) {
+    out <> Queue(encoded, 2)
+    isIdle := !isEncoding && !out.valid
+  } else {
+    isIdle := !isEncoding
+  }
 }

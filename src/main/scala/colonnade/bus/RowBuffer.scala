@@ -22,7 +22,7 @@ final class TileRow(config: ColonnadeConfig, wordBits: Int = 8 * PixelFormat.max
 /** Gathers the pixels of a column, which come in any order, to rows of a tile: a write-combining buffer.
   *
   * A row leaves when it is whole, when another one needs its place, or at `flush`. A pixel enters per cycle; a row leaves
-  * in three.
+  * in three. With `units.shortPaths` a pixel enters every second cycle: in the first one it is compared with the rows.
   */
 final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   private val tileBits = log2Ceil(config.frame.tileSize)
@@ -41,12 +41,18 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
 
   // A pixel joins its row, or begins one
   private val tag     = (pixels.bits.x >> tileBits) ## pixels.bits.y
-  private val hits    = VecInit(valid.zip(tags).map { case (isValid, of) => isValid && of === tag })
+  private val matches = VecInit(tags.map(_ === tag))
+  private val isNew   = RegInit(true.B) // the pixel was not compared yet
+  private val mayJoin = if (config.units.shortPaths) !isNew else true.B
+  private val hits    = VecInit(
+    valid.zip(if (config.units.shortPaths) RegNext(matches) else matches).map { case (isValid, is) => isValid && is }
+  )
+  if (config.units.shortPaths) isNew := !pixels.valid || pixels.fire
   private val isHit   = hits.asUInt.orR
   private val hasFree = !valid.asUInt.andR
   private val row     = Mux(isHit, OHToUInt(hits), PriorityEncoder(~valid.asUInt))
   private val column  = UIntToOH(pixels.bits.x(tileBits - 1, 0), config.frame.tileSize)
-  pixels.ready := isHit || hasFree
+  pixels.ready := mayJoin && (isHit || hasFree)
   when(pixels.fire) {
     valid(row) := true.B
     tags(row)  := tag
@@ -58,9 +64,12 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
   private val isReading = RegInit(false.B)
   private val isOut     = RegInit(false.B)
   private val leaving   = Reg(chiselTypeOf(out.bits))
-  private val whole     = VecInit(valid.zip(masks).map { case (isValid, mask) => isValid && mask.andR }).asUInt
+  private val whole     = VecInit(valid.zip(masks).map { case (isValid, mask) =>
+    val isWhole = isValid && mask.andR
+    if (config.units.shortPaths) isValid && RegNext(isWhole, false.B) else isWhole
+  }).asUInt
   private val victim    = RegInit(0.U(log2Ceil(shell.rows).W))
-  private val isForced  = pixels.valid && !isHit && !hasFree
+  private val isForced  = pixels.valid && mayJoin && !isHit && !hasFree
   private val isFlushed = flush && !pixels.valid && valid.asUInt.orR
   private val evicted   = Mux(whole.orR, PriorityEncoder(whole), Mux(isForced, victim, PriorityEncoder(valid.asUInt)))
   private val evicts    = !isReading && !isOut && (whole.orR || isForced || isFlushed)

@@ -39,7 +39,10 @@ final class ShellControlIO extends Bundle {
   val loadError    = Input(Bool())
 
   /** Resets the device, the writer and the loader, and abandons their bursts, until the bus is idle. */
-  val reset     = Output(Bool())
+  val reset = Output(Bool())
+
+  /** `reset` in the next cycle. */
+  val resetNext = Output(Bool())
   val busIsIdle = Input(Bool())
 }
 
@@ -61,14 +64,17 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
   private val settings = Reg(new FramebufferSettings)
   private val resets   = RegInit(0.U(log2Ceil(resetCycles + 1).W))
 
-  private val rowBytesLog = log2Ceil(config.frame.tileSize).U +& PixelFormat.bytesLog(settings.format)
+  // With short paths the settings are checked as they are taken
+  private val takes       = WireInit(false.B)
+  private val checked     = if (config.units.shortPaths) io.settings else settings
+  private val rowBytesLog = log2Ceil(config.frame.tileSize).U +& PixelFormat.bytesLog(checked.format)
   private val rowMask     = ((1.U << rowBytesLog) - 1.U)(log2Ceil(config.frame.tileSize * PixelFormat.maxBytes) - 1, 0)
-  private val isLegal     = PixelFormat.isLegal(settings.format)
+  private val isLegal     = asTaken(PixelFormat.isLegal(checked.format))
   private val photoMask   = (config.frame.tileSize * PhotoCompositor.photoBytes - 1).U
-  private val photo       = settings.photo
-  private val hasBase     = if (shell.pixelStream) !settings.toStream else true.B
-  private val isAligned   = (!hasBase || !((settings.base | settings.stride) & rowMask).orR) &&
-    !(photo.isEnabled && ((photo.base | photo.stride) & photoMask).orR)
+  private val photo       = checked.photo
+  private val hasBase     = if (shell.pixelStream) !checked.toStream else true.B
+  private val isAligned   = asTaken((!hasBase || !((checked.base | checked.stride) & rowMask).orR) &&
+    !(photo.isEnabled && ((photo.base | photo.stride) & photoMask).orR))
   private val begins = state === State.begin
 
   private val frameDone = (state === State.flushing && io.writerIsIdle) || (begins && !io.start)
@@ -82,6 +88,7 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
         state    := State.begin
         isQueued := false.B
         settings := io.settings
+        takes    := true.B
       }.elsewhen(io.commands.load) { state := State.loading }
     }
     is(State.begin) {
@@ -125,12 +132,15 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
   io.load               := state === State.idle && io.commands.load
   io.flush              := state === State.flushing
   io.reset              := state === State.resetting
+  io.resetNext          := io.commands.reset || (state === State.resetting && !(resets === 0.U && io.busIsIdle))
   io.framebuffer        := settings
   io.errors             := lastFrame
   io.status.isRunning   := begins || state === State.running || state === State.flushing
   io.status.isQueued    := isQueued
   io.status.isLoading   := state === State.loading
   io.status.isResetting := state === State.resetting
+
+  private def asTaken(check: Bool): Bool = if (config.units.shortPaths) RegEnable(check, takes) else check
 
   private val hasError = Mux(loadDone, io.loadError, errors.asUInt.orR)
   io.events := ((frameDone || loadDone) && hasError) ## loadDone ## frameDone

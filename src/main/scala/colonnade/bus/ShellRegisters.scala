@@ -74,12 +74,14 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   require(ShellMap.deviceBase + 4 * deviceWords <= (1 << ShellMap.addressBits), "the device's registers fit")
 
   // Writes to the device wait while a frame runs
-  private val posted = withReset(reset.asBool || io.status.isResetting) {
-    Module(new Queue(new PostedWrite(config), 1 << log2Ceil(deviceWords), useSyncReadMem = true))
+  private val (posted, delivered) = withReset(reset.asBool || io.status.isResetting) {
+    val queue = Module(new Queue(new PostedWrite(config), 1 << log2Ceil(deviceWords), useSyncReadMem = true))
+    // With short paths the memory's output is registered
+    (queue, if (config.units.shortPaths) Queue(queue.io.deq, 2) else queue.io.deq)
   }
-  private val delivers = posted.io.deq.valid && !io.status.isRunning
-  posted.io.deq.ready := !io.status.isRunning
-  io.writesAreDone    := !posted.io.deq.valid
+  private val delivers = delivered.valid && !io.status.isRunning
+  delivered.ready  := !io.status.isRunning
+  io.writesAreDone := !posted.io.deq.valid && !delivered.valid
 
   io.access.request.ready := !isDevice || request.isWrite || (io.deviceIsFree && !delivers)
   private val accepts = io.access.request.fire
@@ -126,7 +128,9 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
     word := request.data
   }
 
-  io.commands := writtenBits("control", 3).asTypeOf(io.commands)
+  // With short paths a cycle later: before the answer
+  private val commands = writtenBits("control", 3)
+  io.commands := (if (config.units.shortPaths) RegNext(commands, 0.U) else commands).asTypeOf(io.commands)
 
   private val interrupts = Module(new InterruptController)
   interrupts.io.events := io.events
@@ -158,10 +162,10 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   posted.io.enq.valid        := writes && inDevice && deviceWritable
   posted.io.enq.bits.address := deviceWord
   posted.io.enq.bits.data    := request.data
-  io.device.address          := Mux(delivers, posted.io.deq.bits.address, deviceWord)
+  io.device.address          := Mux(delivers, delivered.bits.address, deviceWord)
   io.device.read             := accepts && !request.isWrite && inDevice
   io.device.write            := delivers
-  io.device.writeData        := posted.io.deq.bits.data
+  io.device.writeData        := delivered.bits.data
 
   // Answers
   private val constants = Map(

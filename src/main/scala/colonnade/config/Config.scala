@@ -86,6 +86,7 @@ final case class GeometryConfig(
   * @param directView    with shared marches: a pipeline of the column for directly seen pixels of an environment
   * @param pathContexts  pixels in flight in the path unit that a column has; 0: every render unit follows its own paths
   * @param pipelined     ray set-up, shading, bounces and colours are pipelines, for a path unit that serves a column
+  * @param shortPaths    registers in the traversal stack and around the record fetch, for FPGAs: some steps take a cycle more
   */
 final case class UnitsConfig(
     boxLanes:      Int,
@@ -94,7 +95,8 @@ final case class UnitsConfig(
     marches:       Int,
     directView:    Boolean,
     pathContexts:  Int,
-    pipelined:     Boolean
+    pipelined:     Boolean,
+    shortPaths:    Boolean
 ) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
   Require.within("units.triangleLanes", triangleLanes, 1, 4)
@@ -107,6 +109,7 @@ final case class UnitsConfig(
   Require.within("units.marches", marches, 0, UnitsConfig.mostMarches)
   Require("units.directView", !directView || marches > 0, "needs shared marches, units.marches from 1 on")
   Require.within("units.pathContexts", pathContexts, 0, UnitsConfig.mostPathContexts)
+  Require("units.shortPaths", !shortPaths || pathContexts == 0, "does not go with a path unit, units.pathContexts=0")
 }
 
 object UnitsConfig {

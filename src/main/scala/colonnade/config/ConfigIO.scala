@@ -61,7 +61,8 @@ object ConfigIO {
       "marches",
       "directView",
       "pathContexts",
-      "pipelined"
+      "pipelined",
+      "shortPaths"
     )
     val memory = root.section(
       "columnBvhMemory",
@@ -111,7 +112,8 @@ object ConfigIO {
         marches = units.int("marches"),
         directView = units.boolean("directView"),
         pathContexts = units.int("pathContexts"),
-        pipelined = units.boolean("pipelined")
+        pipelined = units.boolean("pipelined"),
+        shortPaths = units.boolean("shortPaths")
       ),
       columnBvhMemory = ColumnBvhMemoryConfig(
         depth = memory.int("depth"),
@@ -190,7 +192,8 @@ object ConfigIO {
         "marches"       -> units.marches,
         "directView"    -> units.directView,
         "pathContexts"  -> units.pathContexts,
-        "pipelined"     -> units.pipelined
+        "pipelined"     -> units.pipelined,
+        "shortPaths"    -> units.shortPaths
       ),
       "columnBvhMemory" -> ujson.Obj(
         "depth"         -> columnBvhMemory.depth,

@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{Decoupled, RegEnable}
+import chisel3.util.{Decoupled, Queue, RegEnable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition}
 
@@ -34,11 +34,18 @@ final class TileScan(config: ColonnadeConfig) extends Module {
   scan.io.size.bits.high := clipped(io.frame.pixelsHigh, io.tiles.bits.y)
   io.tiles.ready         := scan.io.size.ready
 
-  io.positions.valid  := scan.io.cells.valid
-  io.positions.bits.x := tile.x | scan.io.cells.bits.x
-  io.positions.bits.y := tile.y | scan.io.cells.bits.y
-  scan.io.cells.ready := io.positions.ready
-  io.isIdle           := scan.io.isIdle
+  // With short paths pixels wait in a queue
+  private val positions = if (config.units.shortPaths) Wire(chiselTypeOf(io.positions)) else io.positions
+  positions.valid     := scan.io.cells.valid
+  positions.bits.x    := tile.x | scan.io.cells.bits.x
+  positions.bits.y    := tile.y | scan.io.cells.bits.y
+  scan.io.cells.ready := positions.ready
+  if (config.units.shortPaths) {
+    io.positions <> Queue(positions, 2)
+    io.isIdle := scan.io.isIdle && !io.positions.valid
+  } else {
+    io.isIdle := scan.io.isIdle
+  }
 
   /** The size of a tile in one direction. */
   private def clipped(frame: UInt, first: UInt): UInt = {

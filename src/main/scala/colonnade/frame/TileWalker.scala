@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{Decoupled, Queue, RegEnable}
+import chisel3.util.{Decoupled, DecoupledIO, Queue, RegEnable}
 import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
@@ -79,6 +79,8 @@ final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = N
     mixer.positions
   }
 
-  io.positions.zip(dispatch.io.takers).foreach { case (position, taker) => position <> Queue(taker, 1, pipe = true) }
+  private def queued(taker: DecoupledIO[UnitPosition]): DecoupledIO[UnitPosition] =
+    if (config.units.shortPaths) Queue(taker, 2) else Queue(taker, 1, pipe = true)
+  io.positions.zip(dispatch.io.takers).foreach { case (position, taker) => position <> queued(taker) }
   io.isIdle := scan.io.isIdle && outline.io.isIdle && !io.positions.map(_.valid).reduce(_ || _)
 }

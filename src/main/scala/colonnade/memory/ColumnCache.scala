@@ -48,7 +48,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
 
   val io = IO(new ColumnCacheIO(config))
 
-  private val tags    = new TagStore(sets, ways, lineBits)
+  private val tags    = new TagStore(sets, ways, lineBits, config.units.shortPaths)
   private val records = SyncReadMem(sets * ways * Lines.records, Lines.stored(config))
 
   private final class AwaitedLine {
@@ -87,7 +87,9 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val hitWay = OHToUInt(hitOH)
   private val freeOH = PriorityEncoderOH(awaited.map(!_.isUsed))
   private val isMiss = accepted && !hitOH.orR
-  when(isHit) { tags.use(lineOf(address), hitWay) }
+  // With short paths the replacement sees a hit a cycle later
+  if (config.units.shortPaths) when(RegNext(isHit, false.B)) { tags.use(lineOf(RegNext(address)), RegNext(hitWay)) }
+  else when(isHit) { tags.use(lineOf(address), hitWay) }
   for ((entry, isFree) <- awaited.zip(freeOH)) {
     when(isMiss && !awaits && isFree) {
       entry.isUsed      := true.B
@@ -97,17 +99,20 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   }
   assert(!(isHit && awaits), "a line is held and awaited")
 
-  // Cycle a + 1: the line replaces another one, and is no longer awaited
-  private val victim = tags.victim(line)
-  when(taken) {
+  // Cycle a + 1: the line replaces another one, and is no longer awaited. With short paths the other one is found in this
+  // cycle, and replaced in the next one
+  private val shortPaths = config.units.shortPaths
+  private val victim     = if (shortPaths) RegNext(tags.victim(line)) else tags.victim(line)
+  private val replaces   = if (shortPaths) RegNext(taken, false.B) else taken
+  when(replaces) {
     tags.replace(line, victim, isKept = true.B)
     awaited.foreach(entry => when(entry.is(line)) { entry.isUsed := false.B })
   }
-  tags.access(Mux(taken, line, lineOf(request.bits)), victim, request.fire, taken)
+  tags.access(Mux(replaces, line, lineOf(request.bits)), victim, request.fire, replaces)
 
   // Cycles a + 3 to a + 6: its records
-  private val place      = RegEnable(tags.place(line, victim), taken) // valid from a + 2
-  private val placeNow   = RegNext(place)                             // valid from a + 3
+  private val place      = RegEnable(tags.place(line, victim), replaces)
+  private val placeNow   = if (shortPaths) place else RegNext(place) // valid from a + 3
   private val lineNow    = RegNext(RegEnable(line, taken))
   private val firstComes = RegNext(RegNext(taken, false.B), false.B)
   private val word       = RegInit(0.U(Lines.wordBits.W))
@@ -134,10 +139,16 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
 
   // Request awaited lines
   private val nextOH = PriorityEncoderOH(awaited.map(entry => entry.isUsed && !entry.isRequested))
-  io.request.valid := nextOH.reduce(_ || _)
-  io.request.bits  := Mux1H(nextOH, awaited.map(_.line))
+  // With short paths it is chosen in the cycle before
+  private val chosenOH = if (shortPaths) RegNext(VecInit(nextOH)) else nextOH
+  private val chosen   = Mux1H(nextOH, awaited.map(_.line))
+  io.request.valid := (
+    if (shortPaths) chosenOH.zip(awaited).map { case (is, entry) => is && entry.isUsed && !entry.isRequested }
+    else nextOH
+  ).reduce(_ || _)
+  io.request.bits := (if (shortPaths) RegNext(chosen) else chosen)
   when(io.request.fire) {
-    awaited.zip(nextOH).foreach { case (entry, isNext) => when(isNext) { entry.isRequested := true.B } }
+    awaited.zip(chosenOH).foreach { case (entry, isNext) => when(isNext) { entry.isRequested := true.B } }
   }
 
   when(io.invalidate) { tags.clear() }

@@ -34,6 +34,7 @@ final class DramReaderIO(config: ColonnadeConfig) extends Bundle {
   *
   * A line begins at a multiple of [[SceneLines.pitch]], so no burst crosses 4 KB. A bank gathers one line while
   * another one waits to be taken; until then, further data for the bank have to wait, and those of other banks behind them.
+  * Over a narrow bus a line comes so slowly that it waits where it was gathered.
   */
 final class DramReader(config: ColonnadeConfig) extends Module {
   private val banks     = config.columnBvhMemory.banks
@@ -82,8 +83,14 @@ final class DramReader(config: ColonnadeConfig) extends Module {
     line.bits.records := gathered.asUInt(Lines.records * new RecordFormats(config).recordBits - 1, 0)
       .asTypeOf(Vec(Lines.records, new RecordFormats(config).record))
       .map(Lines.withParity(config, _))
-    port :<>= Queue(line, 1, pipe = true)
+    port :<>= (if (beats > DramReader.mostBeats) line else Queue(line, 1, pipe = true))
     isFor && ready
   }
   io.axi.r.ready := accepts.reduce(_ || _)
+}
+
+private object DramReader {
+
+  /** Beats of a line that waits beside the next one. */
+  val mostBeats: Int = 16
 }

@@ -8,8 +8,10 @@ import chisel3.util.{log2Ceil, PriorityEncoder, UIntToOH}
   * @param sets     sets of the bank, a power of two
   * @param ways     ways of a set
   * @param lineBits width of the number of a line
+  * @param shortPaths
+  *   no set becomes valid in the cycle in which its tags are read for a comparison
   */
-private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int) {
+private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, shortPaths: Boolean) {
   private val setBits     = log2Ceil(sets)
   private val tagBits     = (lineBits - setBits).max(1)
   private val tags        = SyncReadMem(sets, Vec(ways, UInt(tagBits.W)))
@@ -17,22 +19,27 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int) {
   private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U(ways.W))))
   private val replacement = new Replacement(sets, ways)
 
+  /** With short paths the valid bits of a set are read with its tags. */
+  private val foundValid = Wire(UInt(ways.W))
+
   private def setOf(line: UInt): UInt = line.pad(setBits + 1)(setBits - 1, 0)
   private def tagOf(line: UInt): UInt = (line >> setBits).asUInt.pad(tagBits)(tagBits - 1, 0)
 
   /** Uses the port: writes the tag of a line, or else reads the tags of its set for the next cycle. Call it once. */
-  def access(line: UInt, way: UInt, isRead: Bool, isWrite: Bool): Unit =
-    found := tags.readWrite(
+  def access(line: UInt, way: UInt, isRead: Bool, isWrite: Bool): Unit = {
+    foundValid := RegNext(isValid(setOf(line)))
+    found      := tags.readWrite(
       setOf(line),
       VecInit(Seq.fill(ways)(tagOf(line))),
       UIntToOH(way, ways).asBools,
       isRead || isWrite,
       isWrite
     )
+  }
 
   /** The way that holds a line, one-hot; 0 if none does. The tags of its set were read in the cycle before. */
   def hitOH(line: UInt): UInt = VecInit(found.zipWithIndex.map { case (tag, way) =>
-    isValid(setOf(line))(way) && tag === tagOf(line)
+    (if (shortPaths) foundValid else isValid(setOf(line))) (way) && tag === tagOf(line)
   }).asUInt
 
   /** The way for a new line: an empty one, or the one to replace. */

@@ -20,10 +20,15 @@ object Normalise {
   def exponentBits(width: Int): Int = log2Ceil(width + 1)
 
   def apply(x: UInt, bits: Int): Normalised = {
-    val width         = x.getWidth
     val (zero, zeros) = countLeadingZeros(x)
-    val shifted       = shiftLeft(x, zeros)
-    val result        = Wire(new Normalised(bits, exponentBits(width)))
+    apply(x, zero, zeros, bits)
+  }
+
+  /** With the results of [[countLeadingZeros]]. */
+  def apply(x: UInt, zero: Bool, zeros: UInt, bits: Int): Normalised = {
+    val width   = x.getWidth
+    val shifted = shiftLeft(x, zeros)
+    val result  = Wire(new Normalised(bits, exponentBits(width)))
     result.mantissa := (if (bits <= width) shifted(width - 1, width - bits) else Cat(shifted, 0.U((bits - width).W)))
     result.exponent := Mux(zero, 0.U, width.U(exponentBits(width).W) - zeros)
     result

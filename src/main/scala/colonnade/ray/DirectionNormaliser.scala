@@ -1,7 +1,7 @@
 package colonnade.ray
 
 import chisel3._
-import chisel3.util.{Decoupled, RegEnable}
+import chisel3.util.{Decoupled, RegEnable, ShiftRegister}
 import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
@@ -54,12 +54,19 @@ final class DirectionNormaliserIO(config: ColonnadeConfig) extends Bundle {
 /** Finds a ray's dominant axis, permutes the ray to its own frame and normalises its direction.
   *
   * The components share one normaliser, then the axes rotate one step per cycle. Latency from the request to both
-  * results: 4 cycles for dominant axis z, 5 for x, 6 for y. The results are independent of each other; the next request
-  * is accepted in the cycle that takes the last of them. Source: docs/numbers.md, sections 2.1 and 2.2.
+  * results: 4 cycles for dominant axis z, 5 for x, 6 for y, with `units.shortPaths` one more. The results are
+  * independent of each other; the next request is accepted in the cycle that takes the last of them. Source:
+  * docs/numbers.md, sections 2.1 and 2.2.
   */
 final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
-  import DirectionNormaliser._
   private val numbers = config.numbers
+
+  // The steps. With short paths the leading zeros of a magnitude are counted in a cycle of their own
+  private val delay   = if (config.units.shortPaths) 1 else 0
+  private val idle    = 0.U(3.W)
+  private val first   = (1 + delay).U(3.W)
+  private val last    = (3 + delay).U(3.W)
+  private val settled = (4 + delay).U(3.W)
 
   val io = IO(new DirectionNormaliserIO(config))
 
@@ -69,8 +76,8 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
   private val hasMantissas = RegInit(false.B)
   private val hasRay       = RegInit(false.B)
 
-  private val measures   = io.request.fire || (step =/= idle && step < last)
-  private val normalises = step =/= idle && step <= last
+  private val measures   = io.request.fire || (step =/= idle && step < 3.U)
+  private val normalises = (if (delay == 0) step =/= idle else step >= first) && step <= last
   private val isLeft     = (!hasMantissas || io.mantissas.ready) && (!hasRay || io.ray.ready)
   private val isSettled  = step === settled && rotations === 0.U
   private val rotates    = step === settled && rotations =/= 0.U
@@ -83,7 +90,7 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
   when(io.ray.fire) { hasRay := false.B }
   when(isSettled && isLeft) { step := idle }
   when(io.request.fire) {
-    step         := first
+    step         := 1.U
     hasMantissas := true.B
     hasRay       := true.B
   }
@@ -100,10 +107,16 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
   private val largest  = Reg(UInt(numbers.directionBits.W))
 
   // The magnitude of the most negative component is as wide as the component.
-  private val isBetween  = step === idle || step === settled
-  private val measured   = Mux(isBetween, io.request.bits.dir.x, dir.head)
-  private val magnitude  = RegEnable(magnitudeOf(measured), measures)
-  private val isNegative = RegEnable(measured < 0.S, measures)
+  private val isBetween       = step === idle || step === settled
+  private val measured        = Mux(isBetween, io.request.bits.dir.x, dir.head)
+  private val counted         = RegEnable(magnitudeOf(measured), measures)
+  private val hasSign         = RegEnable(measured < 0.S, measures)
+  private val magnitude       = ShiftRegister(counted, delay)
+  private val isNegative      = ShiftRegister(hasSign, delay)
+  private val (isNull, zeros) = {
+    val (isNull, zeros) = Normalise.countLeadingZeros(counted)
+    (ShiftRegister(isNull, delay), ShiftRegister(zeros, delay))
+  }
   private val isDominant = step === first || magnitude > largest
 
   when(io.request.fire) {
@@ -111,13 +124,13 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
     dir.zip(io.request.bits.dir.axes.tail).foreach { case (to, from) => to := from }
   }.elsewhen(measures) { dir.head := dir.last }
   when(normalises || rotates) {
-    shift(directions, Mux(rotates, directions.head, Normalise(magnitude, numbers.mantissaBits)))
+    shift(directions, Mux(rotates, directions.head, Normalise(magnitude, isNull, zeros, numbers.mantissaBits)))
     shift(negative, Mux(rotates, negative.head, isNegative))
   }
   when(normalises && isDominant) {
     largest   := magnitude
     axis      := step - first
-    rotations := Mux(step === last, 0.U, step)
+    rotations := Mux(step === last, 0.U, step - delay.U)
   }
   when(rotates) {
     shift(origin, origin.head)
@@ -146,12 +159,4 @@ final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
     queue.zip(queue.tail).foreach { case (to, from) => to := from }
     queue.last := last
   }
-}
-
-/** The steps of a [[DirectionNormaliser]]. */
-private object DirectionNormaliser {
-  val idle    = 0.U(3.W)
-  val first   = 1.U(3.W)
-  val last    = 3.U(3.W)
-  val settled = 4.U(3.W)
 }

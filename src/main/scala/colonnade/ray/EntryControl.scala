@@ -30,6 +30,9 @@ final class EntryCommand(slices: Int) extends Bundle {
   val takesShear       = Bool()
   val shearSide        = UInt(1.W)
 
+  /** The side of the shear factor that is taken: `shearSide`, or that of the cycle before. */
+  val takenSide = UInt(1.W)
+
   /** Multiply the last distance by a reciprocal, or the entry distance by a slice of a shear factor. */
   val multipliesShear = Bool()
   val multiplySide    = UInt(1.W)
@@ -38,9 +41,12 @@ final class EntryCommand(slices: Int) extends Bundle {
   /** Scale the last product to a distance along the ray; one cycle later clip the entry or exit distance with it. */
   val scales    = Bool()
   val scalesFar = Bool()
-  val scaleSide = UInt(1.W)
   val limits    = Bool()
   val limitsFar = Bool()
+
+  /** The next cycle scales a shear factor; and the side of what it scales. */
+  val scalesShearNext = Bool()
+  val scaleSideNext   = UInt(1.W)
 
   /** Advance the first axis of the origin to the entry point, and rotate the axes. */
   val advancesAlong = Bool()
@@ -65,15 +71,18 @@ final class EntryControlIO(slices: Int) extends Bundle {
   *
   * The sides are pipelined: each cycle one plane starts distance, product, scaling and clipping. Their order is near x',
   * near y', far y', far x', so that the advance starts while the exit distance is still computed. The advance takes
-  * `slices` cycles per side; a ray that misses the box skips it.
+  * `slices` cycles per side; a ray that misses the box skips it. With `shortPaths` the operands of products and what was
+  * scaled are registered, and what follows comes later.
   */
-final class EntryControl(slices: Int) extends Module {
+final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Module {
   val io = IO(new EntryControlIO(slices))
 
   private val quotients = 3
-  private val decided   = 10
-  private val advance   = 8
-  private val last      = advance + 2 * slices
+  private val delay     = if (shortPaths) 1 else 0 // of products
+  private val scaling   = if (shortPaths) 1 else 0 // of what was scaled
+  private val decided   = 10 + delay + scaling
+  private val advance   = 8 + delay + scaling
+  private val last      = advance + 2 * slices + delay
   private val finished  = last + 1
 
   private val busy = RegInit(false.B)
@@ -81,16 +90,25 @@ final class EntryControl(slices: Int) extends Module {
 
   private def at(steps: Int*): Bool = busy && steps.map(step === _.U).reduce(_ || _)
 
+  /** At these steps, but when products and what was scaled are late. */
+  private def late(steps: Int*): Bool = at(steps.map(_ + delay + scaling): _*)
+
   private val waits = at(quotients) && !io.quotientsValid
 
+  // Registers of their own: the paths of `rayReady` and `quotientsReady` lead up to the tiles
+  private val isFinished = RegInit(false.B)
+  private val isTaking   = RegInit(false.B)
+
   io.busy           := busy
-  io.outputValid    := at(finished)
+  io.outputValid    := busy && isFinished
   io.rayReady       := !busy || (io.outputValid && io.outputReady)
-  io.quotientsReady := at(quotients + 1)
+  io.quotientsReady := busy && isTaking
 
   private val follows = Mux(at(decided) && !io.enters, finished.U, step + 1.U)
   private val next    = Mux(io.command.loads, 0.U, Mux(busy && !waits && !io.outputValid, follows, step))
-  step := next
+  step       := next
+  isFinished := next === finished.U
+  isTaking   := next === (quotients + 1).U
   when(io.outputValid && io.outputReady) { busy := false.B }
   when(io.command.loads) { busy := true.B }
 
@@ -112,16 +130,19 @@ final class EntryControl(slices: Int) extends Module {
   command.takesAlongNear   := at(2)
   command.takesAlongFar    := command.takesReciprocals
   command.takesReciprocals := at(quotients) && io.quotientsValid
-  command.takesShear       := command.takesReciprocals || at(quotients + 1)
-  command.shearSide        := at(quotients + 1).asUInt
-  command.multipliesShear  := shears
-  command.multiplySide     := side
-  command.slice            := slice
-  command.scales           := at(5, 6, 7, 8)
-  command.scalesFar        := at(7, 8)
-  command.scaleSide        := at(6, 7).asUInt
-  command.limits           := at(6, 7, 8, 9)
-  command.limitsFar        := at(8, 9)
-  command.advancesAlong    := at(advance)
-  command.advancesSide     := at(advance + slices, last)
+  command.takesShear       :=
+    (if (shortPaths) at(quotients + 1, quotients + 2) else command.takesReciprocals || at(quotients + 1))
+  command.shearSide       := at(quotients + 1).asUInt
+  command.takenSide       := at(quotients + 1 + scaling).asUInt
+  command.multipliesShear := shears
+  command.multiplySide    := side
+  command.slice           := slice
+  command.scales          := late(5, 6, 7, 8)
+  command.scalesFar       := late(7, 8)
+  command.scalesShearNext := next <= (quotients + 1).U
+  command.scaleSideNext   := (next === (quotients + 1).U || next === (6 + delay).U || next === (7 + delay).U).asUInt
+  command.limits          := late(6, 7, 8, 9)
+  command.limitsFar       := late(8, 9)
+  command.advancesAlong   := at(advance)
+  command.advancesSide    := at(advance + slices + delay, last)
 }

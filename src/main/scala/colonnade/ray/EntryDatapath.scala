@@ -73,9 +73,12 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   private val shearSlice   =
     MuxLookup(command.slice, sliceOf(slices - 1))((0 until slices - 1).map(i => i.U -> sliceOf(i)))
   private val multiplier = Mux(command.multipliesShear, shearSlice, onSide(reciprocal, command.multiplySide).zext)
-  private val carries    = command.multipliesShear && command.slice =/= 0.U
+  private val carries    = operand(command.multipliesShear && command.slice =/= 0.U)
   // An entry times a slice is one bit shorter than productBits; the carried part, shorter by a slice, adds no bit.
-  product := Rounding.narrow(multiplicand * multiplier +& Mux(carries, product >> sliceBits, 0.S), productBits)
+  product := Rounding.narrow(
+    operand(multiplicand) * operand(multiplier) +& Mux(carries, product >> sliceBits, 0.S),
+    productBits
+  )
   private val whole =
     if (slices == 1) product
     else {
@@ -84,24 +87,33 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
       Cat(product, low).asSInt
     }
 
-  // Scale a shear factor to the dominant component's exponent, or a product to units
+  // Scale a shear factor to the dominant component's exponent, or a product to units. The distance to shift by is ready
+  // one cycle early, for timing
   private val quotient =
     Cat(onSide(io.quotients.shear, command.shearSide), 0.U((numbers.shearFraction - numbers.shearDigits).W))
-  private val shiftRight = Mux(
-    command.takesShear,
-    onSide(ray.exponent, command.shearSide),
-    Mux(onSide(isTiny, command.scaleSide), 0.U, numbers.reciprocalFraction.U - onSide(ray.exponent, command.scaleSide))
-  )
-  private val scaled   = Rounding.floor(Mux(command.takesShear, quotient.zext, product), shiftRight)
-  private val isRising = !onSide(ray.orientation.negative, command.shearSide)
+  private val exponentNext = onSide(ray.exponent, command.scaleSideNext)
+  private val toUnits      =
+    Mux(onSide(isTiny, command.scaleSideNext), 0.U, numbers.reciprocalFraction.U - exponentNext)
+  private val scalesShear = RegNext(command.scalesShearNext)
+  private val shiftRight  = RegNext(Mux(command.scalesShearNext, exponentNext, toUnits))
+  private val scaled      = operand(Rounding.floor(Mux(scalesShear, quotient.zext, product), shiftRight))
+  private val isRising    = !onSide(ray.orientation.negative, command.takenSide)
   // At most 2^shearFraction, which occurs on a diagonal: one bit shorter than the format with its sign.
   private val slope = Rounding.narrow(scaled, numbers.gridBits)
 
-  // Entry and exit along the ray. All values below 0 are equivalent, so only the upper bound saturates exactly
-  private val unitsAlong = Rounding.saturate(scaled, distanceBits) +& command.scalesFar.asUInt.zext
-  private val crossing   = RegEnable(Rounding.saturate(unitsAlong, distanceBits), command.scales)
-  private val slack      = crossing >> numbers.entrySlackShift
-  private val bound      = Rounding.saturate(Mux(command.limitsFar, crossing +& slack, crossing -& slack), distanceBits)
+  // Entry and exit along the ray. All values below 0 are equivalent. The bits above are tested beside the sum, for timing
+  private val above    = (scaled >> (distanceBits - 1)).asUInt
+  private val isLarge  = !above(above.getWidth - 1) && above.orR
+  private val isSmall  = above(above.getWidth - 1) && !above.andR
+  private val units    = Rounding.narrow(scaled, distanceBits) +& command.scalesFar.asUInt.zext
+  private val isLonger = !units(distanceBits) && units(distanceBits - 1)
+  private val highest  = ((BigInt(1) << (distanceBits - 1)) - 1).S(distanceBits.W)
+  private val crossing = RegEnable(
+    Mux(isLarge || (isLonger && !isSmall), highest, Mux(isSmall, -highest, Rounding.narrow(units, distanceBits))),
+    command.scales
+  )
+  private val slack = crossing >> numbers.entrySlackShift
+  private val bound = Rounding.saturate(Mux(command.limitsFar, crossing +& slack, crossing -& slack), distanceBits)
 
   // Advance: the first axis moves, and comes in again as the last
   private val entrySteps = Rounding.floor(tEntry, -fraction)
@@ -130,7 +142,7 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
       to := Mux(tiny, one, from << (numbers.reciprocalFraction - numbers.reciprocalDigits))
     }
   }
-  when(command.takesShear) { shear(command.shearSide) := Mux(isRising, slope, 0.S -% slope) }
+  when(command.takesShear) { shear(command.takenSide) := Mux(isRising, slope, 0.S -% slope) }
   when(command.limits && !command.limitsFar && bound > tNear.zext) {
     tNear := Rounding.narrow(bound.asUInt, numbers.entryBits)
   }
@@ -157,6 +169,9 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   }
   output.tEntry := Fixed(formats.entry, tEntry)
   output.tMax   := Fixed(formats.grid, Rounding.narrow(tMax.zext, numbers.gridBits))
+
+  /** With short paths the multiplier's operands, and what was scaled, are registered. */
+  private def operand[T <: Data](value: T): T = if (config.units.shortPaths) RegEnable(value, true.B) else value
 
   private def onSide[T <: Data](values: Seq[T], side: UInt): T = Mux(side.asBool, values(1), values(0))
 

@@ -133,7 +133,9 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
     }
   }
 
-  io.angle.ready               := step === CosineStep.idle && squareRoot.io.radicand.ready
+  // The root is taken before the next angle comes: its own `ready` would add a path from the divider to the geometry
+  io.angle.ready := step === CosineStep.idle
+  assert(step =/= CosineStep.idle || squareRoot.io.radicand.ready, "a root is computed while no angle is")
   squareRoot.io.radicand.valid := io.angle.valid && step === CosineStep.idle && angle.isAcute
   squareRoot.io.radicand.bits  := Mux(exponent(0), mantissa, mantissa >> 1)
 

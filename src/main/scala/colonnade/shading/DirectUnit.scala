@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{is, switch, Decoupled, MuxLookup}
+import chisel3.util.{is, switch, Decoupled, MuxLookup, ShiftRegister}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.{Fixed, Rounding}
@@ -16,7 +16,7 @@ final class DirectUnitIO(config: ColonnadeConfig) extends Bundle {
   /** The light's intensity, constant while the unit works on it. */
   val colour = Input(Rgb(FrameRegisters.intensity))
 
-  /** To the multiplier, whose product comes in the cycle after it took them. */
+  /** To the multiplier, whose product comes `ShaderMultiplier.latency` cycles after it took them. */
   val operands = Decoupled(new MultiplierOperands(formats))
   val product  = Input(SInt(formats.productBits.W))
   val direct   = Decoupled(Rgb(FrameRegisters.intensity))
@@ -30,7 +30,8 @@ private object DirectStep extends ChiselEnum {
 
 /** The direct light of a point light on a surface, without shadows: docs/numbers.md, 5.8.
   *
-  * One light at a time: four products and three cycles, more while the multiplier is busy.
+  * One light at a time: four products and three cycles (five with a multiplier of two cycles), more while the
+  * multiplier is busy.
   */
 final class DirectUnit(config: ColonnadeConfig) extends Module {
   private val formats = new ShaderFormats(config.numbers)
@@ -51,9 +52,12 @@ final class DirectUnit(config: ColonnadeConfig) extends Module {
   io.operands.bits.wide   := brightness.zext.pad(formats.wideBits)
   io.operands.bits.narrow := Mux(isFalloff, falloff, channelColour).zext.pad(formats.narrowBits)
 
-  // A channel's product comes in the cycle after its operands
-  private val isArriving      = RegNext(io.operands.fire && step === DirectStep.scaleColour, false.B)
-  private val arrivingChannel = RegNext(channel)
+  // A product comes some cycles after its operands
+  private val latency    = ShaderMultiplier.latency(config)
+  private val hasArrived = if (latency == 1) true.B else ShiftRegister(io.operands.fire, latency, false.B, true.B)
+  private val isArriving =
+    ShiftRegister(io.operands.fire && step === DirectStep.scaleColour, latency, false.B, true.B)
+  private val arrivingChannel = ShiftRegister(channel, latency)
   private val scaledChannel   =
     Rounding.saturate(Rounding.floor(io.product.asUInt, config.numbers.cosineFraction), NumberFormats.lightBits)
   when(isArriving)(direct(arrivingChannel) := scaledChannel)
@@ -73,7 +77,7 @@ final class DirectUnit(config: ColonnadeConfig) extends Module {
         Rounding.floor(io.product.asUInt, NumberFormats.lightFraction),
         formats.brightnessBits
       )
-      step := DirectStep.scaleColour
+      when(hasArrived)(step := DirectStep.scaleColour)
     }
     is(DirectStep.scaleColour) {
       when(io.operands.fire) {
@@ -81,7 +85,9 @@ final class DirectUnit(config: ColonnadeConfig) extends Module {
         when(channel === 2.U)(step := DirectStep.awaitColour)
       }
     }
-    is(DirectStep.awaitColour)(step := DirectStep.done)
+    is(DirectStep.awaitColour) {
+      when(if (latency == 1) true.B else isArriving && arrivingChannel === 2.U)(step := DirectStep.done)
+    }
     is(DirectStep.done) {
       when(io.direct.fire)(step := DirectStep.idle)
     }

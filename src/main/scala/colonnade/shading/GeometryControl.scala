@@ -14,6 +14,7 @@ final class GeometryControl(formats: ShaderFormats) extends Bundle {
   val scaleShear    = Vec(2 * formats.shearDigits, Bool())
   val scaleOffset   = Bool()
   val square        = Bool()
+  val squareNormal  = Bool()
   val projectNormal = Bool()
   val normProduct   = Bool()
 
@@ -51,7 +52,8 @@ final class GeometryControl(formats: ShaderFormats) extends Bundle {
   val latchDot          = Bool()
 
   /** Signals that choose the multiplier's operands. */
-  def products: Seq[Bool] = weightNormal ++ scaleShear ++ Seq(scaleOffset, square, projectNormal, normProduct)
+  def products: Seq[Bool] =
+    weightNormal ++ scaleShear ++ Seq(scaleOffset, square, squareNormal, projectNormal, normProduct)
 
   /** Signals that choose the adder's operands. */
   def additions: Seq[Bool] = Seq(addShear, addDistance, addOffset, shiftInNormal, shiftInLight, measureLight)

@@ -78,10 +78,10 @@ final class GeometryDatapath(config: ColonnadeConfig) extends Module {
       val weight = Mux(io.isFlat, (if (vertex == 0) 1 else 0).S, weights(0).zext)
       isVertex -> (weight -> Mux(io.isFlat, geometricNormal(0), vertexNormal(vertex)))
     } ++ control.scaleShear.zip(shearDigits).map { case (isDigit, digit) => isDigit -> (distance -> digit) } ++ Seq(
-      control.scaleOffset   -> (io.offset.zext    -> geometricNormal(0)),
-      control.square        -> (scaled            -> scaled),
-      control.projectNormal -> (scaled            -> Rounding.narrow(normal(0), formats.narrowBits)),
-      control.normProduct   -> (normalLength.zext -> accumulator.io.mantissa.zext)
+      control.scaleOffset                      -> (io.offset.zext    -> geometricNormal(0)),
+      (control.square || control.squareNormal) -> (scaled            -> scaled),
+      control.projectNormal                    -> (scaled            -> Rounding.narrow(normal(0), formats.narrowBits)),
+      control.normProduct                      -> (normalLength.zext -> accumulator.io.mantissa.zext)
     )
   io.operands.valid       := choices.map(_._1).reduce(_ || _)
   io.operands.bits.wide   := Mux1H(choices.map { case (when, (wide, _)) => when -> wide.pad(formats.wideBits) })

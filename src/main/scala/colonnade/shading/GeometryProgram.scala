@@ -48,19 +48,24 @@ final class GeometryConditions {
   * adder      |       n and |n|   |           P +=       P +=   |  l = light - P   |l| |
   * shifter    |                                               | light <<  |n <<|   | l << | l << |
   * }}}
-  * The product of a step is accumulated in the next one. The sum is ready two steps after its last product, and its
-  * rounded value three steps after.
+  * The product of a step is accumulated `productLatency` steps later, here in the next one. The sum is ready a step after
+  * that, and its rounded value two steps after.
   */
-final class GeometryProgram(formats: ShaderFormats, control: GeometryControl, conditions: GeometryConditions) {
+final class GeometryProgram(
+    formats:        ShaderFormats,
+    control:        GeometryControl,
+    conditions:     GeometryConditions,
+    productLatency: Int = 1
+) {
   import GeometryLabel._
   import conditions._
 
-  private val sumLatency   = 2
-  private val roundLatency = 3
+  private val sumLatency   = productLatency + 1
+  private val roundLatency = productLatency + 2
   private val digits       = formats.shearDigits
 
   val program = new Microprogram[GeometryLabel](StepEncoding.Binary())
-  import program.{branch, raise}
+  import program.{branch, raise, raiseEarly}
 
   private def xyz(first: Int): Range = first until first + 3
 
@@ -119,7 +124,7 @@ final class GeometryProgram(formats: ShaderFormats, control: GeometryControl, co
   }
 
   private def normal(at: Overlap[GeometryLabel]): Unit = {
-    for (cycle <- weighted) at(cycle)(raise(control.weightNormal(cycle % 3)))
+    for (cycle <- weighted) at(cycle)(raiseEarly(control.weightNormal(cycle % 3)))
     weighted.grouped(3).foreach(sum(at, _))
     shiftInNormal.foreach(at(_)(raise(control.shiftInNormal)))
     at(shiftInNormal.head)(raise(control.startMeasure))
@@ -130,10 +135,10 @@ final class GeometryProgram(formats: ShaderFormats, control: GeometryControl, co
   }
 
   private def point(at: Overlap[GeometryLabel]): Unit = {
-    for ((cycle, digit) <- shear.flatten.zipWithIndex) at(cycle)(raise(control.scaleShear(digit)))
+    for ((cycle, digit) <- shear.flatten.zipWithIndex) at(cycle)(raiseEarly(control.scaleShear(digit)))
     for (cycles <- shear) {
       sum(at, cycles)
-      cycles.tail.foreach(cycle => at(cycle + 1)(raise(control.shiftAccumulator)))
+      cycles.tail.foreach(cycle => at(cycle + productLatency)(raise(control.shiftAccumulator)))
     }
     for (cycle <- addShear) {
       at(cycle - 1)(raise(control.roundShear))
@@ -142,7 +147,7 @@ final class GeometryProgram(formats: ShaderFormats, control: GeometryControl, co
     at(addDistance)(raise(control.addDistance))
     for ((cycle, rotation) <- unpermute.zipWithIndex) at(cycle)(raise(control.unpermute(rotation)))
     for (cycle <- scaleOffset) {
-      at(cycle)(raise(control.scaleOffset))
+      at(cycle)(raiseEarly(control.scaleOffset))
       sum(at, Seq(cycle))
     }
     addOffset.foreach(at(_)(raise(control.addOffset, isFirstLight)))
@@ -160,7 +165,7 @@ final class GeometryProgram(formats: ShaderFormats, control: GeometryControl, co
     // n·n
     scaleNormal.foreach { cycle =>
       at(cycle)(raise(control.scaleNormal, isFirstLight))
-      at(cycle + 1)(raise(control.square, isFirstLight))
+      at(cycle + 1)(raiseEarly(control.squareNormal))
     }
     sum(at, scaleNormal.map(_ + 1))
     at(scaleNormal.last + 1 + sumLatency)(raise(control.latchNormalLength, isFirstLight))
@@ -169,18 +174,18 @@ final class GeometryProgram(formats: ShaderFormats, control: GeometryControl, co
     for ((cycles, product) <- scaleLight.zip(Seq(control.projectNormal, control.square))) {
       cycles.foreach { cycle =>
         at(cycle)(raise(control.scaleLight))
-        at(cycle + 1)(raise(product))
+        at(cycle + 1)(raiseEarly(product))
       }
       sum(at, cycles.map(_ + 1))
     }
     at(scaleLight.head.last + 1 + sumLatency)(raise(control.latchDot))
-    at(normProduct)(raise(control.normProduct))
+    at(normProduct)(raiseEarly(control.normProduct))
     sum(at, Seq(normProduct))
   }
 
-  /** Sums up the products of these cycles, each one cycle later. */
+  /** Sums up the products of these cycles, each when it comes. */
   private def sum(at: Overlap[GeometryLabel], products: Seq[Int]): Unit = {
-    products.foreach(cycle => at(cycle + 1)(raise(control.accumulate)))
-    at(products.head + 1)(raise(control.startSum))
+    products.foreach(cycle => at(cycle + productLatency)(raise(control.accumulate)))
+    at(products.head + productLatency)(raise(control.startSum))
   }
 }

@@ -56,7 +56,8 @@ final class Shader(config: ColonnadeConfig) extends Module {
   private val geometry   = Module(new ShaderGeometry(config))
   private val cosine     = Module(new CosineUnit(config.numbers))
   private val direct     = Module(new DirectUnit(config))
-  private val multiplier = Module(new ShaderMultiplier(formats, config.geometry.cornerColours))
+  private val multiplier =
+    Module(new ShaderMultiplier(formats, config.geometry.cornerColours, ShaderMultiplier.latency(config)))
 
   // Geometry
   private val point    = geometry.io.result

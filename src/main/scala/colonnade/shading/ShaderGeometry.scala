@@ -46,7 +46,7 @@ final class ShaderGeometry(config: ColonnadeConfig) extends Module {
   private val datapath   = Module(new GeometryDatapath(config))
   private val control    = WireInit(0.U.asTypeOf(new GeometryControl(formats)))
   private val conditions = new GeometryConditions
-  private val sequence   = new GeometryProgram(formats, control, conditions)
+  private val sequence   = new GeometryProgram(formats, control, conditions, ShaderMultiplier.latency(config))
   val program: Microprogram[GeometryLabel] = sequence.program
 
   private val isIdle = program.isAt(GeometryLabel.Idle)
@@ -79,9 +79,11 @@ final class ShaderGeometry(config: ColonnadeConfig) extends Module {
   io.readyNext    := (isIdle && !io.request.valid && !isEnvironment) || (io.result.fire && isLast)
   io.result.valid := program.isAt(GeometryLabel.Done)
 
-  datapath.io.control       := control
-  datapath.io.request       := io.request.bits
-  datapath.io.isEnvironment := isEnvironment
+  datapath.io.control := control
+  // The program's signal comes early, without the condition
+  datapath.io.control.squareNormal := control.squareNormal && conditions.isFirstLight
+  datapath.io.request              := io.request.bits
+  datapath.io.isEnvironment        := isEnvironment
   datapath.io.environment.zip(io.environment).foreach { case (to, environment) => to := environment.bits }
   datapath.io.isFlat    := isFlat
   datapath.io.light     := io.lights(if (config.frame.lights == 1) 0.U else light)

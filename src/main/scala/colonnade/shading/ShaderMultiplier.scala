@@ -1,7 +1,8 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{Decoupled, Valid}
+import chisel3.util.{Decoupled, ShiftRegister, Valid}
+import colonnade.config.ColonnadeConfig
 
 /** Ports of [[ShaderMultiplier]]. */
 final class ShaderMultiplierIO(formats: ShaderFormats, hasCornerColours: Boolean) extends Bundle {
@@ -15,16 +16,16 @@ final class ShaderMultiplierIO(formats: ShaderFormats, hasCornerColours: Boolean
   /** Uses the cycles that both leave free. */
   val corners = if (hasCornerColours) Some(Flipped(Decoupled(new MultiplierOperands(formats)))) else None
 
-  /** Of the operands of the cycle before; valid for one cycle. */
+  /** Of the operands of `ShaderMultiplier.latency` cycles before; valid for one cycle. */
   val product = Output(SInt(formats.productBits.W))
 }
 
 /** The shader's only multiplier; exact products.
   *
-  * Latency one cycle, one product per cycle. The geometry's program leaves a third of its cycles free, and all cycles in
+  * Latency one or two cycles, one product per cycle. The geometry's program leaves a third of its cycles free, and all cycles in
   * which it waits for the cosine unit or the corner colours. So colours cannot starve.
   */
-final class ShaderMultiplier(formats: ShaderFormats, hasCornerColours: Boolean) extends Module {
+final class ShaderMultiplier(formats: ShaderFormats, hasCornerColours: Boolean, latency: Int = 1) extends Module {
   val io = IO(new ShaderMultiplierIO(formats, hasCornerColours))
 
   private val colour   = io.corners.map(corners => Mux(io.colour.valid, io.colour.bits, corners.bits))
@@ -32,5 +33,12 @@ final class ShaderMultiplier(formats: ShaderFormats, hasCornerColours: Boolean) 
 
   io.colour.ready := !io.geometry.valid
   io.corners.foreach(_.ready := !io.geometry.valid && !io.colour.valid)
-  io.product := RegNext(operands.wide * operands.narrow)
+  private val multiplied = ShiftRegister(operands, latency - 1)
+  io.product := RegNext(multiplied.wide * multiplied.narrow)
+}
+
+object ShaderMultiplier {
+
+  /** Cycles from operands to the product: with short paths the operands are registered. Corner colours do not wait. */
+  def latency(config: ColonnadeConfig): Int = if (config.units.shortPaths && !config.geometry.cornerColours) 2 else 1
 }

@@ -44,7 +44,7 @@ final class BoxDatapathIO(config: ColonnadeConfig, lanes: Int) extends Bundle {
 
 /** Slab test of one ray against `lanes` boxes in padded integers (docs/numbers.md, section 3), without control logic.
   *
-  * Latency [[BoxDatapath.latency]] cycles, throughput one set of boxes per cycle, no stalls. [[NodeStage]] multiplies
+  * Latency `BoxDatapath.latency` cycles, throughput one set of boxes per cycle, no stalls. [[NodeStage]] multiplies
   * the corner of the node; each lane has four short multipliers, because the dominant axis needs none. A box beyond
   * `tMax` has an empty interval. The registers of a lane hold while it has no child to test.
   */
@@ -85,27 +85,36 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
   )
 
   // Add the node's terms, and shift to the node's t
-  private val shifts = terms.shiftRight.map(
+  private val shortPaths   = config.units.shortPaths
+  private val intersection = BoxDatapath.latency(config) - 1
+  private val shiftRight   = terms.shiftRight.map(by => if (shortPaths) RegEnable(by, isValid(2)) else by)
+  private val shifts       = shiftRight.map(
     new SaturatingShift(_, numbers.nearBits - 1 + numbers.stepReach - numbers.nearFraction, numbers.nearBits)
   )
-  private def sides(products: Seq[Seq[UInt]], nodes: Vec[SInt]) = byLane(products, stage = 2) { (lane, isTested) =>
-    Seq.tabulate(2) { axis =>
-      val sum = Rounding.narrow(nodes(axis) +& lane(axis).zext, numbers.nodeBits + 1)
-      RegEnable(shifts(axis)((sum << (numbers.nearBits - 1)).asSInt), isTested)
+  private def sides(products: Seq[Seq[UInt]], nodes: Vec[SInt]) = {
+    val sums = byLane(products, stage = 2) { (lane, isTested) =>
+      Seq.tabulate(2) { axis =>
+        val sum = Rounding.narrow(nodes(axis) +& lane(axis).zext, numbers.nodeBits + 1)
+        if (shortPaths) RegEnable(sum, isTested) else sum
+      }
+    }
+    byLane(sums, stage = intersection - 1) { (lane, isTested) =>
+      Seq.tabulate(2)(axis => RegEnable(shifts(axis)((lane(axis) << (numbers.nearBits - 1)).asSInt), isTested))
     }
   }
   private val sideTNears = sides(nearProducts, terms.near)
   private val sideTFars  = sides(farProducts, terms.far)
-  private val zTNears    = byLane(nearZ, stage = 2)((z, isTested) => RegEnable(greatest(z, terms.origin), isTested))
-  private val zTFars     = byLane(farZ, stage = 2)((z, isTested) => RegEnable(least(z, terms.tMax), isTested))
+  private val zTNears    =
+    held(byLane(nearZ, stage = 2)((z, isTested) => RegEnable(greatest(z, terms.origin), isTested)))
+  private val zTFars = held(byLane(farZ, stage = 2)((z, isTested) => RegEnable(least(z, terms.tMax), isTested)))
 
   // Intersect the intervals of the three slabs
   for (lane <- 0 until lanes) {
     val interval = Wire(new BoxInterval(config))
-    interval.isOccupied := isTested(lane)(3)
+    interval.isOccupied := isTested(lane)(intersection)
     interval.tNear      := greatest(greatest(sideTNears(lane)(0), sideTNears(lane)(1)), zTNears(lane))
     interval.tFar       := least(least(sideTFars(lane)(0), sideTFars(lane)(1)), zTFars(lane))
-    io.intervals(lane)  := RegEnable(interval, isValid(3))
+    io.intervals(lane)  := RegEnable(interval, isValid(intersection))
   }
 
   // The node's own distance goes with its children
@@ -117,11 +126,15 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
 
   /** A flag in each stage: at the input, and after each register of the datapath but the last. */
   private def stages(flag: Bool): IndexedSeq[Bool] =
-    Iterator.iterate(flag)(RegNext(_, false.B)).take(BoxDatapath.latency).toIndexedSeq
+    Iterator.iterate(flag)(RegNext(_, false.B)).take(BoxDatapath.latency(config)).toIndexedSeq
 
   /** The operands of each lane, with the enable of its registers in a stage. */
   private def byLane[T, R](operands: Seq[T], stage: Int)(register: (T, Bool) => R): Seq[R] =
     operands.zip(isTested).map { case (lane, flags) => register(lane, flags(stage)) }
+
+  /** The third slab waits while the others are shifted. */
+  private def held(z: Seq[SInt]): Seq[SInt] =
+    if (shortPaths) byLane(z, stage = 3)((z, isTested) => RegEnable(z, isTested)) else z
 
   private def least(a: SInt, b: SInt): SInt = Mux(a < b, a, b)
 
@@ -130,6 +143,6 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
 
 object BoxDatapath {
 
-  /** Cycles from operands to intervals. */
-  val latency: Int = 4
+  /** Cycles from operands to intervals. With short paths the sums are registered before they are shifted. */
+  def latency(config: ColonnadeConfig): Int = if (config.units.shortPaths) 5 else 4
 }

@@ -36,8 +36,10 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   private val lanes = config.units.boxLanes
   private val beats = arity / lanes
 
+  private val latency = BoxDatapath.latency(config)
+
   /** Nodes in flight at full throughput, from the input to the output of the queue. */
-  private val queueDepth = (BoxDatapath.latency + 2 + beats + beats - 1) / beats
+  private val queueDepth = (latency + 2 + beats + beats - 1) / beats
 
   val io = IO(new BoxUnitIO(config))
 
@@ -50,10 +52,13 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   private val nextBeat     = Mux(io.in.fire || follows, Mux(beat === (beats - 1).U, 0.U, beat + 1.U), beat)
   private val inFlight     = RegInit(0.U(log2Ceil(queueDepth + 1).W))
   private val nextInFlight = inFlight + io.in.fire - io.out.fire
-  beat          := nextBeat
-  inFlight      := nextInFlight
-  io.in.ready   := inFlight =/= queueDepth.U && !follows
-  io.readyNext  := nextBeat === 0.U && nextInFlight =/= queueDepth.U
+  beat        := nextBeat
+  inFlight    := nextInFlight
+  io.in.ready := inFlight =/= queueDepth.U && !follows
+  // With short paths a result that leaves makes room a cycle later
+  private val mayEnter =
+    if (config.units.shortPaths) inFlight +& io.in.fire < queueDepth.U else nextInFlight =/= queueDepth.U
+  io.readyNext  := nextBeat === 0.U && mayEnter
   tags.in.valid := io.in.fire
   tags.in.bits  := NodeTag(config, io.in.bits)
   private val starts   = io.in.fire || follows
@@ -76,9 +81,9 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   }
 
   // Collect the node's children and sort them
-  private val ends      = ShiftRegister(endsNode, BoxDatapath.latency + 1, false.B, true.B)
-  private val isEntered = datapath.io.intervals.map(_.isEntered)
-  private val tNear     = datapath.io.intervals.map(_.tNear)
+  private val ends                                        = ShiftRegister(endsNode, latency + 1, false.B, true.B)
+  private val isEntered                                   = datapath.io.intervals.map(_.isEntered)
+  private val tNear                                       = datapath.io.intervals.map(_.tNear)
   private def allBeats[T <: Data](values: Seq[T]): Seq[T] =
     (0 until beats).reverse.flatMap(before => values.map(ShiftRegister(_, before)))
   sorted.io.enq.valid := ends

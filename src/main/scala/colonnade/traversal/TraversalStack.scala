@@ -1,7 +1,7 @@
 package colonnade.traversal
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
+import chisel3.util.{log2Ceil, Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Rounding
@@ -49,7 +49,8 @@ final class TraversalStackIO(config: ColonnadeConfig) extends Bundle {
   * gives one step. A context has at most one operation in flight, so its steps stay in order.
   *
   * Throughput: one operation per cycle, plus one cycle for each push beyond the first and each culled entry. Latency:
-  * one cycle after the last of these. A round-robin arbiter selects between results and resumptions.
+  * one cycle after the last of these. With `units.shortPaths` each read of an entry, and a step, take a cycle more. A
+  * round-robin arbiter selects between results and resumptions.
   */
 class TraversalStack(config: ColonnadeConfig) extends Module {
   private val arity      = config.geometry.arity
@@ -60,13 +61,20 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
 
   private val entries   = SyncReadMem(StackAddress.size(config), UInt(new StackEntry(config).getWidth.W))
   private val levels    = RegInit(VecInit.fill(contexts)(0.U.asTypeOf(StackLevel(config))))
-  private val stepQueue = Module(new Queue(new TraversalStep(config), TraversalStack.stepQueueDepth, flow = true))
+  private val stepQueue =
+    Module(new Queue(new TraversalStep(config), TraversalStack.stepQueueDepth, flow = !config.units.shortPaths))
+
+  // With short paths the entry that was read and its comparison are registered, in a cycle between the two of a pop
+  private val isReading = if (config.units.shortPaths) RegInit(false.B) else false.B
 
   // Second cycle of an operation: its result, or the entry that was read
   private val isSecondCycle = RegInit(false.B)
   private val operation     = Reg(new PendingOperation(config))
-  private val entry         = Wire(new StackEntry(config))
-  private val isDropped     = operation.isPop && entry.tNear.zext > operation.tMax
+  private val entryNow      = Wire(new StackEntry(config))
+  private val exceedsNow    = entryNow.tNear.zext > operation.tMax
+  private val entry         = if (config.units.shortPaths) RegEnable(entryNow, isReading) else entryNow
+  private val exceeds       = if (config.units.shortPaths) RegEnable(exceedsNow, isReading) else exceedsNow
+  private val isDropped     = operation.isPop && exceeds
   private val popsAgain     = isSecondCycle && isDropped && operation.level =/= 0.U
   stepQueue.io.enq.valid        := isSecondCycle && !popsAgain
   stepQueue.io.enq.bits.context := operation.context
@@ -78,8 +86,8 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   // Select an operation: pop again, continue the pushes of a result, or alternate between results and resumptions
   private val pushesDone    = RegInit(0.U(log2Ceil(arity).W))
   private val resumedLast   = RegInit(false.B)
-  private val hasSpace      = stepQueue.io.count +& isSecondCycle < TraversalStack.stepQueueDepth.U
-  private val starts        = hasSpace && !popsAgain && (io.results.valid || io.resume.valid)
+  private val hasSpace      = stepQueue.io.count +& (isSecondCycle || isReading) < TraversalStack.stepQueueDepth.U
+  private val starts        = hasSpace && !popsAgain && !isReading && (io.results.valid || io.resume.valid)
   private val selectsResult = io.results.valid && (!io.resume.valid || resumedLast || pushesDone =/= 0.U)
   private val count         = io.results.bits.count
   private val needsPush     = selectsResult && count > 1.U
@@ -109,10 +117,15 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   private val address     = Mux(popsAgain, operation.nextAddress, Mux(needsPop, freeAddress - 1.U, freeAddress))
   private val child       = io.results.bits.children(Rounding.narrow(count - 1.U - pushesDone, log2Ceil(arity)))
   private val reads       = pops || popsAgain
-  entry := entries.readWrite(address, StackEntry(config, child).asUInt, reads || pushes, pushes).asTypeOf(entry)
+  entryNow := entries.readWrite(address, StackEntry(config, child).asUInt, reads || pushes, pushes).asTypeOf(entryNow)
 
   // Start the second cycle
-  isSecondCycle := completes || popsAgain
+  if (config.units.shortPaths) {
+    isReading     := (completes && pops) || popsAgain
+    isSecondCycle := (completes && !pops) || isReading
+  } else {
+    isSecondCycle := completes || popsAgain
+  }
   when(popsAgain) {
     operation.level       := operation.level - 1.U
     operation.nextAddress := operation.nextAddress - 1.U
@@ -131,7 +144,7 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   when(io.clear)(deepest := 0.U).elsewhen(pushes && level >= deepest)(deepest := level + 1.U)
   io.deepest := deepest
   io.overflow := starts && needsPush && isFull
-  io.busy := isSecondCycle || stepQueue.io.deq.valid || pushesDone =/= 0.U
+  io.busy := isSecondCycle || isReading || stepQueue.io.deq.valid || pushesDone =/= 0.U
 
   private def element[T <: Data](all: Vec[T], context: UInt): T =
     if (contexts == 1) all.head else all(context)

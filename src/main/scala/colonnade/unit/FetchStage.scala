@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Valid}
+import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
@@ -42,6 +42,9 @@ final class FetchStageIO(config: ColonnadeConfig) extends Bundle {
   val traversalError = Output(Valid(Context(config)))
   val attributeError = Output(Valid(Context(config)))
   val events         = Output(new FetchEvents(config))
+
+  /** With short paths: no request waits. */
+  val isIdle = Option.when(config.units.shortPaths)(Output(Bool()))
 }
 
 /** Fetches records and joins each one with the ray of its context, which a table holds.
@@ -61,7 +64,10 @@ final class FetchStage(config: ColonnadeConfig) extends Module {
   recordFetch.io.broadcasts := io.broadcasts
   recordFetch.io.fetches    := io.fetches
   recordFetch.io.readyNext  := io.readyNext
-  io.requests :<>= recordFetch.io.requests
+  // With short paths requests wait in a queue, where they are not withdrawn
+  private val requests = if (config.units.shortPaths) Queue(recordFetch.io.requests, 2) else recordFetch.io.requests
+  io.requests :<>= requests
+  io.isIdle.foreach(_ := !requests.valid)
   io.waitsForTriangles.zip(recordFetch.io.waitsForTriangles).foreach { case (waits, record) => waits := record }
 
   private val rays = new RayTable(config)

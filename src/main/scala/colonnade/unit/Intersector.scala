@@ -1,14 +1,14 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Arbiter, Decoupled, Pipe, RegEnable, Valid}
+import chisel3.util.{log2Ceil, Arbiter, Decoupled, DecoupledIO, Pipe, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.HitDistance
 import colonnade.formats.{RecordFormats, SceneMap}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PreparedRay, RayFormats}
-import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanes, TriangleLanesIO}
+import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanes, TriangleLanesIO, TriangleResult}
 
 /** The closest hit of a ray that is to be shaded. */
 final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
@@ -130,8 +130,11 @@ final class Intersector(config: ColonnadeConfig) extends Module {
 
   // Test triangles: a result terminates an occluded shadow ray, or the ray resumes after its record.
   // The termination is registered, so that no path leads from the triangle unit through the hit table to the controller
-  private val result     = triangles.result
-  private val isShadow   = control.isShadow(result.bits.context)
+  private val result   = if (config.units.shortPaths) compared(Queue(triangles.result, 2)) else triangles.result
+  private val isShadow = {
+    val ofContext = control.isShadow(result.bits.context)
+    if (config.units.shortPaths) RegNext(ofContext) else ofContext
+  }
   private val isOccluded = isShadow && hitTable.io.hasHitNow
   private val resumes    = Module(new Arbiter(Context(config), 2))
   triangles.candidate :<>= io.triangles
@@ -189,6 +192,17 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   io.events.deepestStack      := traversal.io.deepest
   io.events.stackOverflow     := traversal.io.overflow
   io.events.illegalRecord     := traversal.io.illegal || (io.triangles.fire && !io.triangles.bits.record.isLegal)
+
+  /** A result stays a cycle while the hit table compares it. */
+  private def compared(offered: DecoupledIO[TriangleResult]): DecoupledIO[TriangleResult] = {
+    val result     = Wire(Decoupled(new TriangleResult(config)))
+    val isCompared = RegInit(false.B)
+    isCompared    := offered.valid && !offered.fire
+    result.valid  := offered.valid && isCompared
+    result.bits   := offered.bits
+    offered.ready := result.ready && isCompared
+    result
+  }
 
   private def drive(port: Valid[UInt], valid: Bool, context: UInt): Unit = {
     port.valid := valid

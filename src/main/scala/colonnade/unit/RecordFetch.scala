@@ -6,6 +6,7 @@ import chisel3.util.{
   Mux1H,
   MuxLookup,
   OHToUInt,
+  Pipe,
   PopCount,
   PriorityEncoder,
   PriorityEncoderOH,
@@ -80,12 +81,20 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val insists = if (hasCache) Some(Reg(Bool())) else None
   }
 
-  /** By bank: its broadcast has this address. Only the bank of the address can have it. */
+  /** With short paths broadcasts are registered, and compared in the cycle before. */
+  private val shortPaths = config.units.shortPaths
+  private val broadcasts = io.broadcasts.map { broadcast =>
+    if (shortPaths) Pipe(broadcast.valid, broadcast.bits) else broadcast
+  }
+
+  /** By bank: its broadcast has this address, which with short paths is that of the cycle before. Only the bank of the
+    * address can have it.
+    */
   private def comes(address: UInt): Seq[Bool] = {
     val banks     = io.broadcasts.indices.map(Banks.isIn(config, address, _))
     val inBank    = Mux1H(banks, io.broadcasts.map(broadcast => Banks.addressIn(config, broadcast.bits.address)))
     val isAddress = inBank === Banks.addressIn(config, address)
-    banks.map(_ && isAddress)
+    banks.map(_ && isAddress).map(is => if (shortPaths) RegNext(is) else is)
   }
 
   /** A broadcast that is a record. */
@@ -107,11 +116,22 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   private def isOwnRead(fetch: ContextFetch, index: Int): Bool = fetch.isIssued && fetch.buffer === index.U
 
   // Lookup: a new fetch compares with all buffers. Later only a fill or a new reservation changes what it finds.
+  // With short paths the result is used two cycles later, and a buffer that gets another address meanwhile does not match.
   // By port and buffer, then by context and buffer
   private val newAddresses = io.fetches.map(port => RegEnable(port.bits.address, port.valid))
-  private val portMatches  = newAddresses.map(address => buffers.map(_.address === address))
-  private val newMatches   = fetches.map { fetch =>
-    buffers.indices.map(index => Mux1H(fetch.cameFrom, portMatches.map(_(index))) && fetch.isPending && snooping)
+  private val isWritten    = if (shortPaths) Some(Wire(Vec(buffers.size, Bool()))) else None
+  private val portMatches  = newAddresses.map { address =>
+    buffers.zipWithIndex.map { case (buffer, index) =>
+      val isMatch = buffer.address === address
+      isWritten.fold(isMatch)(written => RegNext(isMatch && !written(index)))
+    }
+  }
+  private val newMatches = fetches.map { fetch =>
+    val from = if (shortPaths) RegNext(fetch.cameFrom) else fetch.cameFrom
+    buffers.indices.map { index =>
+      val isMatch = Mux1H(from, portMatches.map(_(index)))
+      isWritten.fold(isMatch)(written => RegNext(isMatch && !written(index))) && fetch.isPending && snooping
+    }
   }
   private val bufferHits = newMatches.map(_.zip(buffers).map { case (isMatch, buffer) =>
     isMatch && buffer.state === BufferState.full
@@ -127,11 +147,15 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
   // Fill: a broadcast goes to its reserved buffer, else (snooping) to an available one if a context waits for it.
   // `waiters` is by broadcast and context, `bufferFills` by broadcast and buffer
-  private val waiters = fetches.map(fetch => comes(fetch.address).map(_ && fetch.isPending)).transpose
+  // A fetch that is new misses a broadcast that came together with it
+  private val waiters = fetches.map { fetch =>
+    val waits = if (shortPaths) fetch.isPending && !fetch.cameFrom.reduce(_ || _) else fetch.isPending
+    comes(fetch.address).map(_ && waits)
+  }.transpose
   private val awaited =
     buffers.map(buffer => comes(buffer.address).map(_ && buffer.state === BufferState.reserved)).transpose
   private val (availableAfterFill, bufferFills) =
-    io.broadcasts.zip(waiters.zip(awaited)).foldLeft((isAvailable, Seq.empty[Seq[Bool]])) {
+    broadcasts.zip(waiters.zip(awaited)).foldLeft((isAvailable, Seq.empty[Seq[Bool]])) {
       case ((available, fills), (broadcast, (waits, awaits))) =>
         val isReserved = awaits.map(_ && (snooping || broadcast.bits.row === io.row))
         val isMissing  = waits.zip(bufferHits).map { case (waits, hits) => waits && !hits.reduce(_ || _) }
@@ -143,7 +167,7 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     }
 
   for ((buffer, fills) <- buffers.zip(bufferFills.transpose)) {
-    val broadcast = Mux1H(fills, io.broadcasts.map(_.bits))
+    val broadcast = Mux1H(fills, broadcasts.map(_.bits))
     when(fills.reduce(_ || _)) {
       buffer.state   := BufferState.full
       buffer.address := broadcast.address
@@ -176,16 +200,32 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     val isNow = buffers.zip(matches).map { case (buffer, isMatch) => isMatch && buffer.state =/= BufferState.empty }
     Mux(snooping, fetch.isExpected || isNow.reduce(_ || _), fetch.isIssued)
   }
-  private val missOH = PriorityEncoderOH(fetches.zip(isExpected).map { case (fetch, isExpected) =>
+  private def misses(fetch: ContextFetch, isExpected: Bool): Bool =
     fetch.isPending && !isExpected && !fetch.sleeps.getOrElse(false.B)
+  private val nextMissOH = PriorityEncoderOH(fetches.zip(isExpected).map { case (fetch, isExpected) =>
+    val isLookedUp =
+      if (shortPaths) !(fetch.cameFrom.reduce(_ || _) || RegNext(fetch.cameFrom.reduce(_ || _), false.B)) else true.B
+    isLookedUp && misses(fetch, isExpected)
   })
-  private val hasMiss = missOH.reduce(_ || _)
-  private val address = Mux1H(missOH, fetches.map(_.address))
-  private val allocOH = PriorityEncoderOH(availableAfterFill)
 
-  // A record that arrives in this cycle needs no request
-  private val isArriving = io.broadcasts.zip(comes(address)).map { case (broadcast, comes) => broadcast.valid && comes }
-  io.requests.valid        := hasMiss && allocOH.reduce(_ || _) && !(snooping && isArriving.reduce(_ || _))
+  // With short paths the context is chosen in the cycle before
+  private val missOH =
+    if (shortPaths) fetches.zip(nextMissOH).map { case (fetch, isNext) =>
+      RegNext(isNext, false.B) && misses(fetch, Mux(snooping, fetch.isExpected, fetch.isIssued))
+    }
+    else nextMissOH
+  private val hasMiss     = missOH.reduce(_ || _)
+  private val nextAddress = Mux1H(nextMissOH, fetches.map(_.address))
+  private val address     = if (shortPaths) RegNext(nextAddress) else nextAddress
+  private val allocOH     = PriorityEncoderOH(if (shortPaths) isAvailable else availableAfterFill)
+
+  // A record that arrives in this cycle needs no request; with short paths none is sent while any arrives
+  private val isBlocked =
+    if (shortPaths) (broadcasts ++ io.broadcasts).map(_.valid).reduce(_ || _)
+    else snooping && broadcasts.zip(
+      comes(address)
+    ).map { case (broadcast, comes) => broadcast.valid && comes }.reduce(_ || _)
+  io.requests.valid        := hasMiss && allocOH.reduce(_ || _) && !isBlocked
   io.requests.bits.address := address
   private val isAwaited = buffers.map(buffer => buffer.state === BufferState.reserved && buffer.address === address)
   assert(!(snooping && io.requests.valid && isAwaited.reduce(_ || _)), "a record is requested twice")
@@ -207,9 +247,12 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     }
   }
 
+  for ((written, (fills, isAllocated)) <- isWritten.toSeq.flatMap(_.zip(bufferFills.transpose.zip(allocOH))))
+    written := fills.reduce(_ || _) || (io.requests.fire && isAllocated)
+
   // A record that comes later frees its buffer, and its contexts sleep until it comes
   for {
-    (broadcast, (waits, awaits)) <- io.broadcasts.zip(waiters.zip(awaited))
+    (broadcast, (waits, awaits)) <- broadcasts.zip(waiters.zip(awaited))
     isLater                      <- broadcast.bits.isLater
   } {
     val isKept = buffers.zip(awaits).map { case (buffer, awaits) => awaits && buffer.isKept.get }.reduce(_ || _)
@@ -239,7 +282,10 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
 
   // Grant: the first ready context of each kind, then the kind with the highest priority whose unit will be ready.
   // The buffer may be replaced in the cycle of the response, because the record leaves it in that cycle
-  private val isReady     = fetches.zip(bufferHits).map { case (fetch, hits) => fetch.hasRecord || hits.reduce(_ || _) }
+  // With short paths a context that finds its record in a buffer is ready a cycle later
+  private val isReady = fetches.zip(bufferHits).map { case (fetch, hits) =>
+    if (shortPaths) fetch.hasRecord else fetch.hasRecord || hits.reduce(_ || _)
+  }
   private val firstOfKind = RecordKind.all.map { kind =>
     PriorityEncoderOH(fetches.zip(isReady).map { case (fetch, isReady) => isReady && fetch.kind === kind })
   }
@@ -254,7 +300,8 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
     firstOfKind.transpose.map(_.zip(grantKindOH).map { case (first, kind) => first && kind }.reduce(_ || _))
   private val grantBufferOH = buffers.indices.map { index =>
     fetches.zip(bufferHits).zip(grantOH).map { case ((fetch, hits), isGranted) =>
-      isGranted && Mux(fetch.hasRecord, fetch.buffer === index.U, PriorityEncoderOH(hits)(index))
+      val isHeld = fetch.buffer === index.U
+      isGranted && (if (shortPaths) isHeld else Mux(fetch.hasRecord, isHeld, PriorityEncoderOH(hits)(index)))
     }.reduce(_ || _)
   }
   io.grantNext.valid := grantKindOH.reduce(_ || _)

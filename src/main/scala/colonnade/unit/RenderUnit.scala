@@ -23,7 +23,7 @@ final class RenderUnit(config: ColonnadeConfig) extends RenderUnitModule(config)
   io.texture.zip(paths.texture).foreach { case (port, texture) => port <> texture }
   io.maps.zip(paths.maps).foreach { case (port, maps) => port <> maps }
   io.marches.zip(paths.marches).foreach { case (port, marches) => port :<>= marches }
-  io.isIdle := paths.isIdle
+  io.isIdle := paths.isIdle && fetch.isIdle.getOrElse(true.B)
 
   // Intersection: each record comes with the ray of its context
   trace.control :<>= intersector.control

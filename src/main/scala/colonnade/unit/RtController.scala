@@ -26,7 +26,7 @@ import scala.collection.mutable
 final class RtController(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
 
-  /** A choice of one of the contexts, or their number, takes a cycle. */
+  /** The number of contexts takes a cycle, and so does a choice of one of them; the latter with short paths, too. */
   private val isLarge = ArrayConfig.isLarge(contexts)
 
   val io = IO(new RtControllerIO(config))
@@ -222,9 +222,11 @@ final class RtController(config: ColonnadeConfig) extends Module {
 
   private def isAt(wanted: ContextState.Type): Seq[Bool] = state.map(_ === wanted)
 
-  /** The context that is served next, of those that wait for it. Of many contexts it is chosen one cycle early. */
+  /** The context that is served next, of those that wait for it. Of many contexts, and with short paths, it is chosen one
+    * cycle early.
+    */
   private def choose(claims: Seq[Bool], isServed: => Bool): Choice =
-    if (isLarge) First.registered(claims, isServed) else Choice(First(claims))
+    if (isLarge || config.units.shortPaths) First.registered(claims, isServed) else Choice(First(claims))
 
   private def count(claims: Seq[Bool], atReset: Int = 0): UInt = {
     val number = PopCount(claims)

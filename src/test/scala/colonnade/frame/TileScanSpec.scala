@@ -10,10 +10,11 @@ import scala.util.Random
 class TileScanSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "TileScan"
 
-  for (tileSize <- Seq(4, 8, 16))
-    it should s"give the pixels of clipped tiles of $tileSize, and of their quarters, once, in Morton order, under stalls" in {
-      val size = (2 * tileSize + 3, tileSize + 1)
-      test(new TileScan(TileScanSpec.config(tileSize))) { dut =>
+  for ((tileSize, shortPaths) <- Seq((4, false), (8, false), (8, true), (16, false)))
+    it should s"give the pixels of clipped tiles of $tileSize, short paths $shortPaths, and of their quarters, once, in Morton order, under stalls" in {
+      val size   = (2 * tileSize + 3, tileSize + 1)
+      val config = TileScanSpec.config(tileSize)
+      test(new TileScan(if (shortPaths) TestConfigs.withShortPaths(config) else config)) { dut =>
         dut.clock.setTimeout(0)
         dut.io.frame.pixelsWide.poke(size._1)
         dut.io.frame.pixelsHigh.poke(size._2)

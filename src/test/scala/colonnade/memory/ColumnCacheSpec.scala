@@ -14,11 +14,15 @@ import scala.util.Random
 class ColumnCacheSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "ColumnCache"
 
-  for ((banks, sets, ways, misses) <- Seq((1, 1, 1, 1), (2, 2, 2, 2), (2, 4, 1, 3), (4, 1, 4, 2), (1, 2, 3, 2)))
-    it should s"answer from $sets sets of $ways ways, $misses misses, as one of $banks banks" in {
-      val config = TestConfigs.withCache(banks = banks, sets = sets, ways = ways, misses = misses, parity = sets == 4)
+  for {
+    (banks, sets, ways, misses) <- Seq((1, 1, 1, 1), (2, 2, 2, 2), (2, 4, 1, 3), (4, 1, 4, 2), (1, 2, 3, 2))
+    shortPaths                  <- Seq(false, true)
+  }
+    it should s"answer from $sets sets of $ways ways, $misses misses, as one of $banks banks, short paths $shortPaths" in {
+      val cached = TestConfigs.withCache(banks = banks, sets = sets, ways = ways, misses = misses, parity = sets == 4)
+      val config = if (shortPaths) TestConfigs.withShortPaths(cached) else cached
       test(new ColumnCache(config)).withAnnotations(Simulation.verilator) { dut =>
-        new Surroundings(dut, config, new Random(7 * sets + ways)).run(6000)
+        new Surroundings(dut, config, new Random(7 * sets + ways)).run(9000)
       }
     }
 

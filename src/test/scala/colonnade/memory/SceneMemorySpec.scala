@@ -14,12 +14,13 @@ import scala.util.Random
 class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "SceneMemory"
 
-  for (
+  for {
     (columns, banks, sets, ways, bus) <-
-      Seq((1, 1, 1, 1, 64), (3, 2, 2, 2, 32), (3, 4, 1, 4, 16), (6, 2, 4, 1, 128), (2, 2, 2, 5, 64))
-  )
-    it should s"serve $columns columns from $banks banks of $sets sets of $ways ways over a bus of $bus bytes" in {
-      val config =
+      Seq((1, 1, 1, 1, 64), (3, 2, 2, 2, 32), (3, 4, 1, 4, 16), (6, 2, 4, 1, 128), (1, 2, 2, 2, 8), (2, 2, 2, 5, 64))
+    shortPaths <- if (columns == 3) Seq(false, true) else Seq(false)
+  }
+    it should s"serve $columns columns from $banks banks of $sets sets of $ways ways over a bus of $bus bytes, short paths $shortPaths" in {
+      val cached =
         TestConfigs.withCache(
           columns = columns,
           banks = banks,
@@ -28,6 +29,7 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
           bus = bus,
           parity = columns > 3
         )
+      val config = if (shortPaths) TestConfigs.withShortPaths(cached) else cached
       test(new SceneMemory(config)).withAnnotations(Simulation.verilator) { dut =>
         val dram = new Dram(dut, config, new Random(columns))
         dram.run(requests = 120)

@@ -29,9 +29,9 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     behavior of (if (pipelined) "RaySetupPipeline" else "RaySetup")
     val kind = if (pipelined) "pipelined" else "sequential"
 
-    (TestConfigs.formats :+ narrowTests).foreach { formats =>
+    formatsOf(pipelined).foreach { formats =>
       val name = s"$kind, ${formats.precision} with ${formats.geometry.vertexBits}-bit vertices and " +
-        s"${formats.numbers.gridBits}-bit triangle tests"
+        s"${formats.numbers.gridBits}-bit triangle tests" + (if (formats.units.shortPaths) ", short paths" else "")
       it should s"equal the model under random stalls, $name" taggedAs tag(formats, pipelined) in {
         val config = withPipeline(formats, pipelined)
         test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
@@ -118,8 +118,13 @@ object RaySetupSpec {
   private val narrowTests: ColonnadeConfig =
     TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(triangleBits = Some(24)))
 
+  private def formatsOf(pipelined: Boolean): Seq[ColonnadeConfig] =
+    TestConfigs.formats ++ (narrowTests +: Option.unless(pipelined)(shortPaths).toSeq)
+
+  private val shortPaths = TestConfigs.withShortPaths(narrowTests)
+
   private def tag(config: ColonnadeConfig, pipelined: Boolean): Tag =
-    if (config == narrowTests) Always else if (pipelined) Matrix else Always.ifExtreme(config)
+    if (config == narrowTests || config == shortPaths) Always else if (pipelined) Matrix else Always.ifExtreme(config)
 
   private def withPipeline(config: ColonnadeConfig, pipelined: Boolean): ColonnadeConfig =
     config.copy(units = config.units.copy(pipelined = pipelined))

@@ -64,7 +64,8 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for (
     config <-
-      TestConfigs.formats ++ TestConfigs.withColours ++ (TestConfigs.formats ++ TestConfigs.withColours).map(pipelined)
+      TestConfigs.formats ++ TestConfigs.withColours ++
+        (TestConfigs.formats ++ TestConfigs.withColours).map(pipelined) :+ TestConfigs.withShortPaths(TestConfigs.tiny)
   ) {
     val name = nameOf(config)
 
@@ -94,7 +95,8 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     s"${config.precision} and ${config.geometry.vertexBits}-bit vertices" +
       (if (config.geometry.cornerColours) " with corner colours" else "") +
       (if (config.geometry.texture.nonEmpty) " and textures" else "") +
-      (if (config.units.pipelined) " in a pipeline" else "")
+      (if (config.units.pipelined) " in a pipeline" else "") +
+      (if (config.units.shortPaths) " with short paths" else "")
 
   /** Every number at a limit of its range. */
   private def extremes(config: ColonnadeConfig, stimulus: ShaderStimulus): Seq[(LightCase, Seq[HitCase])] = {

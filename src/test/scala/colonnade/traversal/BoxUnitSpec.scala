@@ -19,7 +19,10 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def shape(config: ColonnadeConfig) =
     s"${config.precision}, arity ${config.geometry.arity}, ${config.units.boxLanes} lanes"
 
-  for ((config, i) <- (TestConfigs.formats ++ (binary +: laneVariants)).zipWithIndex)
+  for (
+    (config, i) <-
+      (TestConfigs.formats ++ (binary +: laneVariants) :+ TestConfigs.withShortPaths(TestConfigs.tiny)).zipWithIndex
+  )
     it should s"follow the model under random stalls, format $i (${shape(config)})" taggedAs
       (if (i < TestConfigs.formats.size) Always.ifExtreme(config) else Always) in
       test(new PackedBoxUnit(config)).withAnnotations(Simulation.verilator) { dut =>

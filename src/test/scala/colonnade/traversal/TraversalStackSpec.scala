@@ -17,11 +17,18 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
     columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(stackDepth = stackDepth)
   )
 
+  private def withShortPaths(config: ColonnadeConfig): ColonnadeConfig =
+    config.copy(units = config.units.copy(shortPaths = true))
+
   behavior of "TraversalStack"
 
-  for ((arity, stackDepth, contexts) <- Seq((4, 16, 4), (2, 5, 3), (4, 6, 8), (4, 4, 1)))
-    it should s"walk like the reference under random stalls, arity $arity, $stackDepth entries, $contexts contexts" in {
-      val shape = config(arity, stackDepth, contexts)
+  for {
+    (arity, stackDepth, contexts) <- Seq((4, 16, 4), (2, 5, 3), (4, 6, 8), (4, 4, 1))
+    shortPaths                    <- Seq(false, true)
+  }
+    it should s"walk like the reference under random stalls, arity $arity, $stackDepth entries, $contexts contexts, short paths $shortPaths" in {
+      val plain = config(arity, stackDepth, contexts)
+      val shape = if (shortPaths) withShortPaths(plain) else plain
       test(new TraversalStack(shape)) { dut =>
         for ((accepted, seed) <- Seq((1.0, 1), (0.4, 2))) {
           new StackDriver(dut, shape, seed).run(operations = 400, accepted)
@@ -29,11 +36,11 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
       }
     }
 
-  for ((arity, cycles) <- Seq((2, 11), (4, 10)))
-    it should s"neither lose, duplicate nor reorder entries, and cull only those beyond tMax, arity $arity" taggedAs Always.unless(
-      arity == 2
-    ) in {
-      val shape = config(arity, stackDepth = 4, contexts = 2)
+  for ((arity, cycles, shortPaths) <- Seq((2, 11, false), (2, 12, true), (4, 10, false)))
+    it should s"neither lose, duplicate nor reorder entries, and cull only those beyond tMax, arity $arity, short paths $shortPaths" taggedAs Always
+      .unless(arity == 2) in {
+      val plain = config(arity, stackDepth = 4, contexts = 2)
+      val shape = if (shortPaths) withShortPaths(plain) else plain
       prove(cycles) {
         new TraversalStackProof(
           shape.copy(
@@ -54,6 +61,18 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
       driver.setLimit(0, 50)
       val waited = driver.resume(0)
       assert(waited == 1 + 6, "six entries lie above the first that counts")
+    }
+  }
+
+  it should "pop an entry every two cycles with short paths" in {
+    val shape = withShortPaths(config(arity = 4, stackDepth = 16, contexts = 2))
+    test(new TraversalStack(shape)) { dut =>
+      val driver = new StackDriver(dut, shape, seed = 1)
+      for (round <- 0 until 3)
+        driver.send(0, Seq.tabulate(4)(i => Child(isLeaf = false, 10 * round + i, if (round == 0) 5 else 100)))
+      driver.setLimit(0, 50)
+      val waited = driver.resume(0)
+      assert(waited == 1 + 1 + 2 * 6 + 1, "six entries lie above the first that counts; the step takes a cycle more")
     }
   }
 

@@ -23,6 +23,11 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       test(new HitTable(shape))(dut => new HitTableDriver(dut, shape, seed = contexts).run(cycles = 600))
     }
 
+  it should "hold the least hit with short paths" in {
+    val shape = TestConfigs.withShortPaths(config(contexts = 4, TestConfigs.formats.head))
+    test(new HitTable(shape))(dut => new HitTableDriver(dut, shape, seed = 9).run(cycles = 400))
+  }
+
   it should "prefer the smaller id of two hits at the same distance, whichever comes first" in
     test(new HitTable(TestConfigs.tiny)) { dut =>
       for (ids <- Seq(Seq(7, 3, 5), Seq(3, 5, 7), Seq(5, 7, 3))) {
@@ -184,7 +189,6 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     val trace = traces(context).get
     traces(context) = Some(trace.copy(results = trace.results :+ result))
     val bits = dut.io.result.bits
-    dut.io.result.valid.poke(true)
     bits.context.poke(context)
     bits.isHit.poke(result.isHit)
     bits.hit.t.pokeRaw(result.t)
@@ -193,6 +197,14 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     bits.hit.backSide.poke(result.backSide)
     bits.isTransmissive.poke(result.isTransmissive)
     dut.io.isShadow.poke(trace.isShadow)
+    if (config.units.shortPaths) {
+      // The result is compared in the cycle before; a start comes with the result itself
+      val starts = dut.io.start.valid.peekBoolean()
+      dut.io.start.valid.poke(false)
+      dut.clock.step()
+      dut.io.start.valid.poke(starts)
+    }
+    dut.io.result.valid.poke(true)
     dut.io.hasHitNow.expect(traces(context).get.hits.nonEmpty, s"context $context, ${traces(context).get}")
   }
 

@@ -109,6 +109,7 @@ class RenderUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     "one light, no bounces",
     Matrix
   )
+  render(TestConfigs.tiny.copy(units = TestConfigs.tiny.units.copy(shortPaths = true)), "with short paths")
   render(TestConfigs.withEnvironment(TestConfigs.environment), "with an environment")
   render(
     TestConfigs.withPrecision(16, 16, 32).copy(
