@@ -73,15 +73,17 @@ class Colonnade(LiteXModule):  # type: ignore[misc]
         for name in (folder / "filelist.f").read_text().split():
             platform.add_source(str((folder / name).resolve()), "systemverilog")
 
-    def attach(self, soc: Any, name: str, origin: int, *, scene_on_bus: bool = True) -> None:
+    def attach(self, soc: Any, name: str, origin: int, *, masters_on_bus: bool = True) -> None:
         """Put the registers at ``origin``, where the processor does not cache, and connect masters and interrupt.
 
-        Without ``scene_on_bus`` the caller connects :attr:`scene`, for example to a port of the memory's controller.
+        Without ``masters_on_bus`` the caller connects :attr:`memory` and :attr:`scene`, for example to ports of the
+        memory's controller.
         """
         soc.bus.add_slave(name, self.registers, SoCRegion(origin=origin, size=REGISTER_BYTES, cached=False))
-        soc.bus.add_master(name=name, master=self.memory)
-        if self.scene is not None and scene_on_bus:
-            soc.bus.add_master(name=f"{name}_scene", master=self.scene)
+        if masters_on_bus:
+            soc.bus.add_master(name=name, master=self.memory)
+            if self.scene is not None:
+                soc.bus.add_master(name=f"{name}_scene", master=self.scene)
         if soc.irq.enabled:
             soc.irq.add(name, use_loc_if_exists=True)
 

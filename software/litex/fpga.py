@@ -29,8 +29,8 @@ NAME = "colonnade_ulx3s"
 class SoC(SoCCore):  # type: ignore[misc]
     """VexRiscv, ROM with LiteX's BIOS, SDRAM, timer, serial port, Colonnade.
 
-    Colonnade reads records by a port of its own of the SDRAM's controller. No cache lies between the bus and the SDRAM;
-    the processor's own one writes through.
+    Each of Colonnade's masters has a port of its own of the SDRAM's controller. No cache lies between the bus and the
+    SDRAM; the processor's own one writes through.
     """
 
     def __init__(self, design: Path, frequency: float) -> None:
@@ -47,10 +47,12 @@ class SoC(SoCCore):  # type: ignore[misc]
             controller_settings=ControllerSettings(cmd_buffer_buffered=True),
         )  # fmt: skip
         self.colonnade = Colonnade(platform, design)
-        self.colonnade.attach(self, "colonnade", REGISTERS, scene_on_bus=False)
-        port = self.sdram.crossbar.get_port(data_width=self.colonnade.scene.data_width)
+        self.colonnade.attach(self, "colonnade", REGISTERS, masters_on_bus=False)
         origin = self.bus.regions["main_ram"].origin
-        self.scene_port = LiteDRAMAXI2Native(self.colonnade.scene, port, base_address=origin)
+        for name in ("memory", "scene"):
+            master = getattr(self.colonnade, name)
+            port = self.sdram.crossbar.get_port(data_width=master.data_width)
+            self.add_module(f"{name}_port", LiteDRAMAXI2Native(master, port, base_address=origin))
 
 
 def main() -> None:

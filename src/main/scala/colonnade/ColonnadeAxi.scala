@@ -61,18 +61,34 @@ final class ColonnadeAxi(
   control.io.settings            := registers.io.framebuffer
   control.io.writesAreDone       := registers.io.writesAreDone
 
-  // The device's register port: the host's, or the start of a frame
+  // The device's register port: the host's, or the start of a frame. With short paths a cycle later
   private val start = RegisterMap(config).find(_.name == "control.start").get
-  device.io.register <> registers.io.device
+  private val port  = Wire(chiselTypeOf(registers.io.device))
+  port <> registers.io.device
   when(control.io.start) {
-    device.io.register.write     := true.B
-    device.io.register.address   := start.address.U
-    device.io.register.writeData := 1.U
+    port.write     := true.B
+    port.address   := start.address.U
+    port.writeData := 1.U
   }
+  port.readData := device.io.register.readData
+  private val isStarting =
+    if (config.units.shortPaths) {
+      device.io.register.write     := RegNext(port.write, false.B)
+      device.io.register.read      := RegNext(port.read, false.B)
+      device.io.register.address   := RegNext(port.address)
+      device.io.register.writeData := RegNext(port.writeData)
+      RegNext(control.io.start, false.B)
+    } else {
+      device.io.register.write     := port.write
+      device.io.register.read      := port.read
+      device.io.register.address   := port.address
+      device.io.register.writeData := port.writeData
+      false.B
+    }
   device.io.memoryHolds.foreach(_ := 0.U)
 
   // Frames
-  control.io.deviceDone   := device.io.done
+  control.io.deviceDone   := device.io.done && !isStarting
   control.io.writerIsIdle := writer.io.isIdle && writeGuard.io.isIdle && streamGuard.fold(true.B)(_.isIdle)
   control.io.writerErrors := writer.io.errors
   writer.io.clearErrors   := control.io.clearErrors

@@ -81,12 +81,13 @@ object ArbitraryConfig {
     sharedMisses <- Gen.chooseNum(1, 16)
     busBytes     <- Gen.oneOf(4, 8, 16, 32, 64, 128)
     parity       <- Gen.oneOf(true, false)
+    shared = if (busBytes == 4) sharedSets % 2 else 1
   } yield SceneCacheConfig(
     sets * ways * banks,
     ways,
     misses * banks,
-    sharedSets * sharedWays * banks,
-    sharedWays,
+    shared * sharedSets * sharedWays * banks,
+    shared * sharedWays,
     sharedMisses * banks,
     busBytes,
     parity

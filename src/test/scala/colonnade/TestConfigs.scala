@@ -96,7 +96,8 @@ object TestConfigs {
       misses:  Int = 2,
       depth:   Int = 256,
       bus:     Int = 32,
-      parity:  Boolean = false
+      parity:  Boolean = false,
+      shared:  Boolean = true
   ): ColonnadeConfig = tiny.copy(
     array = tiny.array.copy(rows = rows, columns = columns),
     columnBvhMemory = tiny.columnBvhMemory.copy(
@@ -106,8 +107,8 @@ object TestConfigs {
         lines = sets * ways * banks,
         ways = ways,
         misses = misses * banks,
-        sharedLines = 2 * sets * ways * banks,
-        sharedWays = ways,
+        sharedLines = if (shared) 2 * sets * ways * banks else 0,
+        sharedWays = if (shared) ways else 0,
         sharedMisses = 2 * misses * banks,
         busBytes = bus,
         parity = parity

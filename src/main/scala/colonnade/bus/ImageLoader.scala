@@ -60,10 +60,14 @@ final class ImageLoader(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   private val record = Reg(Vec(widest, UInt(32.W)))
 
   private val isAligned = !(io.settings.base | io.settings.bytes)(log2Ceil(ImageReader.burstBytes) - 1, 0).orR
-  private val isInside  = io.settings.window.contains(io.settings.base, io.settings.bytes)
-  private val isEmpty   = io.settings.bytes === 0.U
-  private val canRead   = isAligned && isInside && !isEmpty
-  private val isShort   = reader.io.isIdle && !reader.io.words.valid // no word will come
+  private val isInside  = {
+    // With short paths that of the cycle before: nobody writes a setting in the cycle before `start`
+    val contains = io.settings.window.contains(io.settings.base, io.settings.bytes)
+    if (config.units.shortPaths) RegNext(contains) else contains
+  }
+  private val isEmpty = io.settings.bytes === 0.U
+  private val canRead = isAligned && isInside && !isEmpty
+  private val isShort = reader.io.isIdle && !reader.io.words.valid // no word will come
 
   reader.io.start       := io.start && canRead
   reader.io.base        := io.settings.base

@@ -54,9 +54,18 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
   private val column  = UIntToOH(pixels.bits.x(tileBits - 1, 0), config.frame.tileSize)
   pixels.ready := mayJoin && (isHit || hasFree)
   when(pixels.fire) {
-    valid(row) := true.B
-    tags(row)  := tag
-    masks(row) := Mux(isHit, masks(row), 0.U) | column
+    if (config.units.shortPaths) {
+      for ((isRow, index) <- Mux(isHit, hits.asUInt, PriorityEncoderOH(~valid.asUInt)).asBools.zipWithIndex)
+        when(isRow) {
+          valid(index) := true.B
+          tags(index)  := tag
+          masks(index) := Mux(isHit, masks(index), 0.U) | column
+        }
+    } else {
+      valid(row) := true.B
+      tags(row)  := tag
+      masks(row) := Mux(isHit, masks(row), 0.U) | column
+    }
     data.write(row, VecInit.fill(config.frame.tileSize)(pixels.bits.data), column.asBools)
   }
 
@@ -68,19 +77,22 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
     val isWhole = isValid && mask.andR
     if (config.units.shortPaths) isValid && RegNext(isWhole, false.B) else isWhole
   }).asUInt
-  private val victim    = RegInit(0.U(log2Ceil(shell.rows).W))
-  private val isForced  = pixels.valid && mayJoin && !isHit && !hasFree
-  private val isFlushed = flush && !pixels.valid && valid.asUInt.orR
-  private val evicted   = Mux(whole.orR, PriorityEncoder(whole), Mux(isForced, victim, PriorityEncoder(valid.asUInt)))
-  private val evicts    = !isReading && !isOut && (whole.orR || isForced || isFlushed)
-  private val read      = data.read(evicted, evicts)
+  private val victim = RegInit(0.U(log2Ceil(shell.rows).W))
+  // With short paths rows are chosen in the cycle before: no other one leaves then
+  private val isForced  = before(pixels.valid && mayJoin && !isHit && !hasFree)
+  private val hasWhole  = before(whole.orR)
+  private val isFlushed = flush && !pixels.valid && before(valid.asUInt.orR)
+  private val evicted   =
+    Mux(hasWhole, chosen(whole), Mux(isForced, victim, chosen(valid.asUInt)))
+  private val evicts = !isReading && !isOut && (hasWhole || isForced || isFlushed)
+  private val read   = data.read(evicted, evicts)
   isReading := evicts
   when(evicts) {
     valid(evicted) := false.B
     leaving.tile   := tags(evicted) >> pixels.bits.y.getWidth
     leaving.y      := tags(evicted)
     leaving.mask   := masks(evicted)
-    when(!whole.orR) { victim := victim + 1.U }
+    when(!hasWhole) { victim := victim + 1.U }
   }
   when(isReading) {
     leaving.pixels := read
@@ -90,4 +102,11 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
   out.valid := isOut
   out.bits  := leaving
   isIdle    := !valid.asUInt.orR && !isReading && !isOut
+
+  private def before(value: Bool): Bool = if (config.units.shortPaths) RegNext(value, false.B) else value
+
+  private def chosen(rows: UInt): UInt = {
+    val first = PriorityEncoder(rows)
+    if (config.units.shortPaths) RegNext(first) else first
+  }
 }

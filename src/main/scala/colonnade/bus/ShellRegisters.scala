@@ -61,11 +61,14 @@ final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
 /** The registers of [[ShellMap]], and the way to those of the device. What is written there while a frame runs waits for
   * its end; all of the device's registers fit.
   *
-  * A request is answered in the next cycle. The answer is an error, and a write has no effect, if the address has no
+  * A request is answered in the next cycle, with `units.shortPaths` a cycle later. The answer is an error, and a write has no effect, if the address has no
   * register, the register cannot be written or not now, some bytes of the word are not written, or the value does not fit.
   */
 final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   val io = IO(new ShellRegistersIO(config))
+
+  // With short paths the device's register port is registered
+  private val answerCycles = if (config.units.shortPaths) 2 else 1
 
   private val request     = io.access.request.bits
   private val isDevice    = request.address >= (ShellMap.deviceBase / 4).U
@@ -188,11 +191,13 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
       .getOrElse(constants(register.name).U(AxiLite.dataBits.W))
   } yield (!isDevice && request.address === (register.address / 4 + word).U) -> data.pad(AxiLite.dataBits)
 
-  private val wasDevice = RegNext(inDevice)
-  private val data      = RegNext(Mux1H(readable))
+  private val wasDevice = answered(inDevice)
+  private val data      = answered(Mux1H(readable))
   private val mayRead   = inDevice || VecInit(readable.map(_._1)).asUInt.orR
   private val isWrite   = VecInit(writable.map(_._2)).asUInt.orR || (inDevice && deviceWritable)
-  io.access.response.valid        := RegNext(accepts, false.B)
+  io.access.response.valid        := ShiftRegister(accepts, answerCycles, false.B, true.B)
   io.access.response.bits.data    := Mux(wasDevice, io.device.readData, data)
-  io.access.response.bits.isError := RegNext(Mux(request.isWrite, !(isWrite && request.isWhole), !mayRead))
+  io.access.response.bits.isError := answered(Mux(request.isWrite, !(isWrite && request.isWhole), !mayRead))
+
+  private def answered[T <: Data](value: T): T = ShiftRegister(value, answerCycles)
 }

@@ -6,9 +6,9 @@ package colonnade.config
   * @param lines        lines of a column's cache
   * @param ways         its associativity
   * @param misses       lines that it can await at a time
-  * @param sharedLines  lines of the shared cache
-  * @param sharedWays   its associativity
-  * @param sharedMisses lines that it can await from DRAM at a time
+  * @param sharedLines  lines of the shared cache; 0: there is none
+  * @param sharedWays   its associativity; 0 without one
+  * @param sharedMisses lines that are awaited from DRAM at a time
   * @param busBytes     width of the DRAM port
   * @param parity       each record in a cache has a parity bit
   */
@@ -23,10 +23,18 @@ final case class SceneCacheConfig(
     parity:       Boolean
 ) {
   Require.within("columnBvhMemory.cache.ways", ways, 1, 16)
-  Require.within("columnBvhMemory.cache.sharedWays", sharedWays, 1, 16)
+  Require.within(
+    "columnBvhMemory.cache.sharedWays",
+    sharedWays,
+    if (hasSharedCache) 1 else 0,
+    if (hasSharedCache) 16 else 0
+  )
   Require.within("columnBvhMemory.cache.misses", misses, 1, 64)
   Require.within("columnBvhMemory.cache.sharedMisses", sharedMisses, 1, 256)
   Require.oneOf("columnBvhMemory.cache.busBytes", busBytes, Seq(4, 8, 16, 32, 64, 128))
+  Require("columnBvhMemory.cache.sharedLines", hasSharedCache || busBytes == 4, "must not be 0, unless busBytes is 4")
+
+  def hasSharedCache: Boolean = sharedLines != 0
 
   /** Sets of a bank of the column's cache. */
   def sets(banks: Int): Int = lines / (banks * ways)
@@ -38,7 +46,7 @@ final case class SceneCacheConfig(
   private[config] def check(memory: ColumnBvhMemoryConfig): Unit = {
     import memory.banks
     powerOfTwoSets("lines", lines, ways, banks)
-    powerOfTwoSets("sharedLines", sharedLines, sharedWays, banks)
+    if (hasSharedCache) powerOfTwoSets("sharedLines", sharedLines, sharedWays, banks)
     multiple("misses", misses, banks)
     multiple("sharedMisses", sharedMisses, banks)
     Require(

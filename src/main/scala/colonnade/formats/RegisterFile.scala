@@ -1,7 +1,7 @@
 package colonnade.formats
 
 import chisel3._
-import chisel3.util.{log2Ceil, Cat}
+import chisel3.util.{log2Ceil, Cat, UIntToOH}
 import colonnade.config.ColonnadeConfig
 
 /** The host's port to the registers: one word per cycle. */
@@ -38,6 +38,9 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   val io = IO(new RegisterFileIO(config))
 
   private val registers = RegisterMap(config)
+
+  // With short paths settings are read from a memory: registers all over the device need no way back
+  private val hasCopies = config.units.shortPaths
   private val writes    = io.register.write && !io.device.status.busy
 
   // Settings: one hardware register per number, combined to the bundle by its layout.
@@ -64,16 +67,35 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
     r -> io.device.asUInt(field.end - 1, field.offset)
   }
   private val words = (for {
-    (r, value) <- settings ++ observed
+    (r, value) <- if (hasCopies) observed else settings ++ observed
     word       <- 0 until r.words
   } yield r.address + word -> wordOf(value, word)).toMap
 
   // A multiplexer tree over the bits of the address: synthesis may turn an OR over all words into a chain
-  private val readData = Reg(UInt(RegisterMap.dataBits.W))
-  private val shown    =
-    VecInit(Seq.tabulate(1 << io.register.address.getWidth)(words.getOrElse(_, 0.U(readData.getWidth.W))))
+  private val readData  = Reg(UInt(RegisterMap.dataBits.W))
+  private val addresses = 1 << io.register.address.getWidth
+  private val shown     = VecInit(Seq.tabulate(addresses)(words.getOrElse(_, 0.U(readData.getWidth.W))))
   when(io.register.read)(readData := shown(io.register.address))
-  io.register.readData := readData
+  io.register.readData := (if (hasCopies) copyOf(readData) else readData)
+
+  /** What was read from the registers, or the copy of a setting that was read in the cycle before. */
+  private def copyOf(readData: UInt): UInt = {
+    val masks = settings.flatMap { case (r, _) =>
+      (0 until r.words).map(word => r.address + word -> ((BigInt(1) << wordBits(r, word)) - 1))
+    }.toMap.withDefaultValue(BigInt(0))
+    val copies    = SyncReadMem(addresses, UInt(RegisterMap.dataBits.W))
+    val isSetting = masks.keys.map(address => BigInt(1) << address).sum.U(addresses.W)
+    val isWritten = RegInit(0.U(addresses.W))
+    val mask      = VecInit(Seq.tabulate(addresses)(masks(_).U(RegisterMap.dataBits.W)))
+    val isCopy    = RegNext(io.register.read && isWritten(io.register.address), false.B)
+    val copy      = copies.read(io.register.address, io.register.read)
+    when(writes) {
+      copies.write(io.register.address, io.register.writeData & mask(io.register.address))
+      isWritten := isWritten | (UIntToOH(io.register.address, addresses) & isSetting)
+    }
+    when(isCopy) { readData := copy }
+    Mux(isCopy, copy, readData)
+  }
 
   private def least(a: UInt, b: UInt): UInt = Mux(a < b, a, b)
 
@@ -82,8 +104,11 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
     value((low + RegisterMap.dataBits).min(value.getWidth) - 1, low).pad(RegisterMap.dataBits)
   }
 
+  private def wordBits(register: Register, word: Int): Int =
+    (register.width - word * RegisterMap.dataBits).min(RegisterMap.dataBits)
+
   private def storage(register: Register): UInt = Cat((0 until register.words).reverse.map { word =>
-    val bits  = (register.width - word * RegisterMap.dataBits).min(RegisterMap.dataBits)
+    val bits  = wordBits(register, word)
     val value = RegInit(0.U(bits.W)).suggestName(s"${register.name.replaceAll("[.\\[]", "_").replace("]", "")}_$word")
     when(writes && io.register.address === (register.address + word).U) {
       value := io.register.writeData(bits - 1, 0)

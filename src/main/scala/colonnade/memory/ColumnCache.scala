@@ -78,32 +78,38 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val accepted  = RegNext(request.fire, false.B)
   private val address   = RegEnable(request.bits, request.fire)
   private val freeCount = PopCount(awaited.map(!_.isUsed))
-  request.ready := blocked === 0.U && freeCount > accepted.asUInt
+  // With short paths a line that misses is entered a cycle after its comparison
+  private val shortPaths = config.units.shortPaths
+  private val missed     = WireInit(false.B) // it is entered in this cycle
+  private val missedLine = RegNext(lineOf(address))
+  request.ready := blocked === 0.U && freeCount > accepted +& missed
 
   // Cycle c + 1: compare. A line is never both held and awaited
   private val hitOH  = tags.hitOH(lineOf(address))
   private val isHit  = accepted && hitOH.orR
-  private val awaits = awaited.map(_.is(lineOf(address))).reduce(_ || _)
+  private val awaits =
+    awaited.map(_.is(lineOf(address))).reduce(_ || _) || (missed && missedLine === lineOf(address))
   private val hitWay = OHToUInt(hitOH)
   private val freeOH = PriorityEncoderOH(awaited.map(!_.isUsed))
   private val isMiss = accepted && !hitOH.orR
   // With short paths the replacement sees a hit a cycle later
   if (config.units.shortPaths) when(RegNext(isHit, false.B)) { tags.use(lineOf(RegNext(address)), RegNext(hitWay)) }
   else when(isHit) { tags.use(lineOf(address), hitWay) }
+  private val enters = isMiss && !awaits
+  if (shortPaths) missed := RegNext(enters, false.B)
   for ((entry, isFree) <- awaited.zip(freeOH)) {
-    when(isMiss && !awaits && isFree) {
+    when((if (shortPaths) missed else enters) && isFree) {
       entry.isUsed      := true.B
       entry.isRequested := false.B
-      entry.line        := lineOf(address)
+      entry.line        := (if (shortPaths) missedLine else lineOf(address))
     }
   }
   assert(!(isHit && awaits), "a line is held and awaited")
 
   // Cycle a + 1: the line replaces another one, and is no longer awaited. With short paths the other one is found in this
   // cycle, and replaced in the next one
-  private val shortPaths = config.units.shortPaths
-  private val victim     = if (shortPaths) RegNext(tags.victim(line)) else tags.victim(line)
-  private val replaces   = if (shortPaths) RegNext(taken, false.B) else taken
+  private val victim   = if (shortPaths) RegNext(tags.victim(line)) else tags.victim(line)
+  private val replaces = if (shortPaths) RegNext(taken, false.B) else taken
   when(replaces) {
     tags.replace(line, victim, isKept = true.B)
     awaited.foreach(entry => when(entry.is(line)) { entry.isUsed := false.B })

@@ -37,29 +37,12 @@ final class DramReaderIO(config: ColonnadeConfig) extends Bundle {
   * Over a narrow bus a line comes so slowly that it waits where it was gathered.
   */
 final class DramReader(config: ColonnadeConfig) extends Module {
-  private val banks     = config.columnBvhMemory.banks
-  private val busBytes  = config.columnBvhMemory.cache.get.busBytes
-  private val beats     = (SceneLines.bytes(config) + busBytes - 1) / busBytes
-  private val bankBits  = log2Ceil(banks)
-  private val pitchBits = log2Ceil(SceneLines.pitch(config))
+  private val busBytes = config.columnBvhMemory.cache.get.busBytes
+  private val beats    = DramReader.beats(config)
 
   val io = IO(new DramReaderIO(config))
 
-  // Addresses
-  private val arbiter = Module(new RoundRobin(banks))
-  private val address = Wire(Decoupled(new AxiAddress(DramPort.idBits(config))))
-  private val bank    = OHToUInt(arbiter.io.grant)
-  private val line    = Mux1H(arbiter.io.grant, io.reads.map(_.bits))
-  arbiter.io.requests := VecInit(io.reads.map(_.valid)).asUInt
-  arbiter.io.isTaken  := address.fire
-  io.reads.zip(arbiter.io.grant.asBools).foreach { case (read, isGranted) => read.ready := isGranted && address.ready }
-  address.valid      := arbiter.io.requests.orR
-  address.bits.id    := bank
-  address.bits.addr  := io.base + ((line ## bank.pad(bankBits)(bankBits - 1, 0)) << pitchBits)
-  address.bits.len   := (beats - 1).U
-  address.bits.size  := Axi.size(busBytes)
-  address.bits.burst := Axi.incr
-  io.axi.ar :<>= Queue(address, 2)
+  io.axi.ar :<>= DramReader.addresses(config, io.base, io.reads)
 
   // Data
   private val data    = io.axi.r.bits
@@ -90,6 +73,31 @@ final class DramReader(config: ColonnadeConfig) extends Module {
 }
 
 private object DramReader {
+
+  /** Bursts for the lines that are read, which their banks request in turn. */
+  def addresses(config: ColonnadeConfig, base: UInt, reads: Seq[DecoupledIO[UInt]]): DecoupledIO[AxiAddress] = {
+    val arbiter  = Module(new RoundRobin(reads.size))
+    val address  = Wire(Decoupled(new AxiAddress(DramPort.idBits(config))))
+    val bank     = OHToUInt(arbiter.io.grant)
+    val bankBits = log2Ceil(reads.size)
+    val line     = Mux1H(arbiter.io.grant, reads.map(_.bits))
+    arbiter.io.requests := VecInit(reads.map(_.valid)).asUInt
+    arbiter.io.isTaken  := address.fire
+    reads.zip(arbiter.io.grant.asBools).foreach { case (read, isGranted) => read.ready := isGranted && address.ready }
+    address.valid      := arbiter.io.requests.orR
+    address.bits.id    := bank
+    address.bits.addr  := base + ((line ## bank.pad(bankBits)(bankBits - 1, 0)) << log2Ceil(SceneLines.pitch(config)))
+    address.bits.len   := (beats(config) - 1).U
+    address.bits.size  := Axi.size(config.columnBvhMemory.cache.get.busBytes)
+    address.bits.burst := Axi.incr
+    Queue(address, 2)
+  }
+
+  /** Beats of a line. */
+  def beats(config: ColonnadeConfig): Int = {
+    val busBytes = config.columnBvhMemory.cache.get.busBytes
+    (SceneLines.bytes(config) + busBytes - 1) / busBytes
+  }
 
   /** Beats of a line that waits beside the next one. */
   val mostBeats: Int = 16

@@ -35,25 +35,42 @@ final class SceneMemoryEvents(config: ColonnadeConfig) extends Bundle {
   val error = Bool()
 }
 
-/** The shared cache and its DRAM port. A reset of the columns does not reset it: reads that are in flight end, and a column
-  * ignores lines that it does not await.
+/** The shared cache, or a [[LineForwarder]] without one, and the DRAM port. A reset of the columns does not reset it: reads
+  * that are in flight end, and a column ignores lines that it does not await.
   */
 final class SceneMemory(config: ColonnadeConfig) extends Module {
   val io = IO(new SceneMemoryIO(config))
 
-  private val caches = Seq.fill(config.columnBvhMemory.banks)(Module(new SharedCache(config)))
-  private val dram   = Module(new DramReader(config))
+  private val banks = config.columnBvhMemory.banks
+  private val base  = io.page ## 0.U(SceneInDram.pageLog.W)
 
-  dram.io.base := io.page ## 0.U(SceneInDram.pageLog.W)
-  io.axi :<>= dram.io.axi
-  for ((cache, bank) <- caches.zipWithIndex) {
-    cache.io.requests.zip(io.requests).foreach { case (request, column) => request :<>= column(bank) }
-    dram.io.reads(bank) :<>= cache.io.reads
-    cache.io.data :<>= dram.io.lines(bank)
-    cache.io.invalidate := io.invalidate
-    io.lines.zip(cache.io.lines).foreach { case (bus, lines) => bus(bank) := lines }
+  if (config.columnBvhMemory.cache.get.hasSharedCache) {
+    val caches = Seq.fill(banks)(Module(new SharedCache(config)))
+    val dram   = Module(new DramReader(config))
+    dram.io.base := base
+    io.axi :<>= dram.io.axi
+    for ((cache, bank) <- caches.zipWithIndex) {
+      cache.io.requests.zip(io.requests).foreach { case (request, column) => request :<>= column(bank) }
+      dram.io.reads(bank) :<>= cache.io.reads
+      cache.io.data :<>= dram.io.lines(bank)
+      cache.io.invalidate := io.invalidate
+      io.lines.zip(cache.io.lines).foreach { case (bus, lines) => bus(bank) := lines }
+    }
+    io.isIdle           := caches.map(_.io.isIdle).reduce(_ && _)
+    io.events.dramReads := RegNext(PopCount(dram.io.reads.map(_.fire)))
+    io.events.error     := RegNext(dram.io.lines.map(line => line.fire && line.bits.isError).reduce(_ || _), false.B)
+  } else {
+    val forwarders = Seq.fill(banks)(Module(new LineForwarder(config)))
+    io.axi.ar :<>= DramReader.addresses(config, base, forwarders.map(_.io.reads))
+    for ((forwarder, bank) <- forwarders.zipWithIndex) {
+      forwarder.io.requests.zip(io.requests).foreach { case (request, column) => request :<>= column(bank) }
+      forwarder.io.beats.valid := io.axi.r.valid && io.axi.r.bits.id === bank.U
+      forwarder.io.beats.bits  := io.axi.r.bits
+      io.lines.foreach(bus => bus(bank) := forwarder.io.lines)
+    }
+    io.axi.r.ready      := forwarders.map(_.io.beats.fire).reduce(_ || _)
+    io.isIdle           := forwarders.map(_.io.isIdle).reduce(_ && _)
+    io.events.dramReads := RegNext(PopCount(forwarders.map(_.io.reads.fire)))
+    io.events.error     := RegNext(forwarders.map(_.io.error).reduce(_ || _), false.B)
   }
-  io.isIdle           := caches.map(_.io.isIdle).reduce(_ && _)
-  io.events.dramReads := RegNext(PopCount(dram.io.reads.map(_.fire)))
-  io.events.error     := RegNext(dram.io.lines.map(line => line.fire && line.bits.isError).reduce(_ || _), false.B)
 }

@@ -41,6 +41,9 @@ final class EntryCommand(slices: Int) extends Bundle {
   /** Scale the last product to a distance along the ray; one cycle later clip the entry or exit distance with it. */
   val scales    = Bool()
   val scalesFar = Bool()
+
+  /** What is scaled limits the exit. */
+  val boundsFar = Bool()
   val limits    = Bool()
   val limitsFar = Bool()
 
@@ -80,8 +83,10 @@ final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Modul
   private val quotients = 3
   private val delay     = if (shortPaths) 1 else 0 // of products
   private val scaling   = if (shortPaths) 1 else 0 // of what was scaled
-  private val decided   = 10 + delay + scaling
-  private val advance   = 8 + delay + scaling
+  private val limiting  = if (shortPaths) 1 else 0 // of what limits entry and exit
+  private val deciding  = if (shortPaths) 1 else 0 // of whether the ray enters
+  private val decided   = 10 + delay + scaling + limiting + deciding
+  private val advance   = 8 + delay + scaling + limiting
   private val last      = advance + 2 * slices + delay
   private val finished  = last + 1
 
@@ -104,7 +109,8 @@ final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Modul
   io.rayReady       := !busy || (io.outputValid && io.outputReady)
   io.quotientsReady := busy && isTaking
 
-  private val follows = Mux(at(decided) && !io.enters, finished.U, step + 1.U)
+  private val enters  = if (shortPaths) RegNext(io.enters) else io.enters
+  private val follows = Mux(at(decided) && !enters, finished.U, step + 1.U)
   private val next    = Mux(io.command.loads, 0.U, Mux(busy && !waits && !io.outputValid, follows, step))
   step       := next
   isFinished := next === finished.U
@@ -141,8 +147,9 @@ final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Modul
   command.scalesFar       := late(7, 8)
   command.scalesShearNext := next <= (quotients + 1).U
   command.scaleSideNext   := (next === (quotients + 1).U || next === (6 + delay).U || next === (7 + delay).U).asUInt
-  command.limits          := late(6, 7, 8, 9)
-  command.limitsFar       := late(8, 9)
+  command.boundsFar       := late(8, 9)
+  command.limits          := late(Seq(6, 7, 8, 9).map(_ + limiting): _*)
+  command.limitsFar       := late(Seq(8, 9).map(_ + limiting): _*)
   command.advancesAlong   := at(advance)
   command.advancesSide    := at(advance + slices + delay, last)
 }

@@ -113,7 +113,8 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
     command.scales
   )
   private val slack = crossing >> numbers.entrySlackShift
-  private val bound = Rounding.saturate(Mux(command.limitsFar, crossing +& slack, crossing -& slack), distanceBits)
+  private val bound =
+    operand(Rounding.saturate(Mux(command.boundsFar, crossing +& slack, crossing -& slack), distanceBits))
 
   // Advance: the first axis moves, and comes in again as the last
   private val entrySteps = Rounding.floor(tEntry, -fraction)
@@ -170,7 +171,7 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   output.tEntry := Fixed(formats.entry, tEntry)
   output.tMax   := Fixed(formats.grid, Rounding.narrow(tMax.zext, numbers.gridBits))
 
-  /** With short paths the multiplier's operands, and what was scaled, are registered. */
+  /** With short paths the multiplier's operands, what was scaled, and what limits entry and exit are registered. */
   private def operand[T <: Data](value: T): T = if (config.units.shortPaths) RegEnable(value, true.B) else value
 
   private def onSide[T <: Data](values: Seq[T], side: UInt): T = Mux(side.asBool, values(1), values(0))

@@ -145,8 +145,10 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   control.ended(2)         := Pipe(result.fire && result.bits.isLast && isOccluded, result.bits.context)
 
   // A record with an illegal address is skipped
-  resumes.io.in(0).valid := io.fetchError.valid
-  resumes.io.in(0).bits  := io.fetchError.bits
+  private val skipped =
+    if (config.units.shortPaths) Pipe(io.fetchError.valid, io.fetchError.bits) else WireInit(io.fetchError)
+  resumes.io.in(0).valid := skipped.valid
+  resumes.io.in(0).bits  := skipped.bits
   resumes.io.in(1).valid := result.valid && result.bits.isLast && !isOccluded
   resumes.io.in(1).bits  := result.bits.context
   traversal.io.resume :<>= resumes.io.out
