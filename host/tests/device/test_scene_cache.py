@@ -46,11 +46,12 @@ def assert_same(frame: Frame, expected: Frame) -> None:
     assert [frame.counters[name] for name in EVENTS] == [expected.counters[name] for name in EVENTS]
 
 
-#: Rows, columns, banks, record buffers, cache: from one awaited line at a time to caches of some lines and ways.
+#: Rows, columns, banks, record buffers, cache: from one awaited line at a time to caches of some lines and ways, and no shared one.
 SHAPES = {
     "one of everything": (1, 1, 1, 1, (1, 1, 1, 1, 1, 1, 4, False)),
     "two columns": (3, 2, 2, 2, (12, 3, 4, 20, 5, 8, 32, False)),
     "four banks and two buses": (1, 5, 4, 3, (16, 4, 16, 32, 8, 16, 128, True)),
+    "no shared cache": (2, 3, 2, 2, (8, 2, 4, 0, 0, 8, 4, True)),
 }
 
 

@@ -1,7 +1,7 @@
 package colonnade
 
 import chisel3._
-import chisel3.util.Mux1H
+import chisel3.util.{DecoupledIO, Mux1H, Queue}
 import colonnade.axi.AxiPins
 import colonnade.bus._
 import colonnade.config.{ColonnadeConfig, ShellConfig}
@@ -87,15 +87,25 @@ final class ColonnadeAxi(
     }
   device.io.memoryHolds.foreach(_ := 0.U)
 
+  // With short paths queues lie between the writer and its guard
+  private def written[T <: Data](channel: DecoupledIO[T]): DecoupledIO[T] =
+    if (config.units.shortPaths) withReset(clears)(Queue(channel, 2)) else channel
+  private val isWriting =
+    if (config.units.shortPaths) writeGuard.io.inner.aw.valid || writeGuard.io.inner.w.valid else false.B
+
   // Frames
   control.io.deviceDone   := device.io.done && !isStarting
-  control.io.writerIsIdle := writer.io.isIdle && writeGuard.io.isIdle && streamGuard.fold(true.B)(_.isIdle)
+  control.io.writerIsIdle := writer.io.isIdle && !isWriting && writeGuard.io.isIdle && streamGuard.fold(true.B)(
+    _.isIdle
+  )
   control.io.writerErrors := writer.io.errors
   writer.io.clearErrors   := control.io.clearErrors
   writer.io.flush         := control.io.flush
   writer.io.settings      := control.io.framebuffer
   writer.io.pixels.zip(device.io.pixels).foreach { case (sink, pixels) => sink :<>= pixels }
-  writeGuard.io.inner :<>= writer.io.axi
+  writeGuard.io.inner.aw :<>= written(writer.io.axi.aw)
+  writeGuard.io.inner.w :<>= written(writer.io.axi.w)
+  writer.io.axi.b :<>= writeGuard.io.inner.b
   for (pins <- streamPins; guard <- streamGuard) {
     guard.inner :<>= writer.io.stream.get
     guard.abandon := control.io.reset

@@ -1,7 +1,7 @@
 package colonnade.memory
 
 import chisel3._
-import chisel3.util.{log2Ceil, PriorityEncoder, UIntToOH}
+import chisel3.util.{log2Ceil, Fill, PriorityEncoder, UIntToOH}
 
 /** Which lines one bank of a cache holds, and where: a memory of tags with a single port, valid bits and the replacement.
   *
@@ -9,15 +9,20 @@ import chisel3.util.{log2Ceil, PriorityEncoder, UIntToOH}
   * @param ways     ways of a set
   * @param lineBits width of the number of a line
   * @param shortPaths
-  *   no set becomes valid in the cycle in which its tags are read for a comparison
+  *   valid bits and the replacement lie in memories, with a flag for each set that it was written; tags are read before a
+  *   register, not behind one; no set becomes valid in the cycle in which its tags are read for a comparison
   */
 private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, shortPaths: Boolean) {
   private val setBits     = log2Ceil(sets)
   private val tagBits     = (lineBits - setBits).max(1)
-  private val tags        = SyncReadMem(sets, Vec(ways, UInt(tagBits.W)))
+  private val tags        = Option.unless(shortPaths)(SyncReadMem(sets, Vec(ways, UInt(tagBits.W))))
+  private val earlyTags   = Option.when(shortPaths)(Mem(sets, Vec(ways, UInt(tagBits.W))))
   private val found       = Wire(Vec(ways, UInt(tagBits.W)))
-  private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U(ways.W))))
-  private val replacement = new Replacement(sets, ways)
+  private val replacement = new Replacement(sets, ways, shortPaths)
+
+  /** By set: a bit for each way, or with short paths whether `validMemory` has them. */
+  private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U((if (shortPaths) 1 else ways).W))))
+  private val validMemory = Option.when(shortPaths)(Mem(sets, UInt(ways.W)))
 
   /** With short paths the valid bits of a set are read with its tags. */
   private val foundValid = Wire(UInt(ways.W))
@@ -25,26 +30,31 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, shortP
   private def setOf(line: UInt): UInt = line.pad(setBits + 1)(setBits - 1, 0)
   private def tagOf(line: UInt): UInt = (line >> setBits).asUInt.pad(tagBits)(tagBits - 1, 0)
 
+  private def validOf(line: UInt): UInt = {
+    val bits = isValid(setOf(line))
+    validMemory.fold(bits)(memory => Fill(ways, bits) & memory(setOf(line)))
+  }
+
   /** Uses the port: writes the tag of a line, or else reads the tags of its set for the next cycle. Call it once. */
   def access(line: UInt, way: UInt, isRead: Bool, isWrite: Bool): Unit = {
-    foundValid := RegNext(isValid(setOf(line)))
-    found      := tags.readWrite(
-      setOf(line),
-      VecInit(Seq.fill(ways)(tagOf(line))),
-      UIntToOH(way, ways).asBools,
-      isRead || isWrite,
-      isWrite
-    )
+    foundValid := RegNext(validOf(line))
+    val written = VecInit(Seq.fill(ways)(tagOf(line)))
+    val mask    = UIntToOH(way, ways).asBools
+    for (memory <- tags) found := memory.readWrite(setOf(line), written, mask, isRead || isWrite, isWrite)
+    for (memory <- earlyTags) {
+      found := RegNext(memory(setOf(line)))
+      when(isWrite) { memory.write(setOf(line), written, mask) }
+    }
   }
 
   /** The way that holds a line, one-hot; 0 if none does. The tags of its set were read in the cycle before. */
   def hitOH(line: UInt): UInt = VecInit(found.zipWithIndex.map { case (tag, way) =>
-    (if (shortPaths) foundValid else isValid(setOf(line))) (way) && tag === tagOf(line)
+    (if (shortPaths) foundValid else validOf(line)) (way) && tag === tagOf(line)
   }).asUInt
 
   /** The way for a new line: an empty one, or the one to replace. */
   def victim(line: UInt): UInt = {
-    val free = ~isValid(setOf(line))
+    val free = ~validOf(line)
     Mux(free.orR, PriorityEncoder(free), replacement.victim(setOf(line)))
   }
 
@@ -53,8 +63,10 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, shortP
 
   /** From the next cycle the way holds the line, or nothing. */
   def replace(line: UInt, way: UInt, isKept: Bool): Unit = {
-    val rest = isValid(setOf(line)) & ~UIntToOH(way, ways)
-    isValid(setOf(line)) := Mux(isKept, rest | UIntToOH(way, ways), rest)
+    val rest = validOf(line) & ~UIntToOH(way, ways)
+    val bits = Mux(isKept, rest | UIntToOH(way, ways), rest)
+    validMemory.foreach(_.write(setOf(line), bits))
+    isValid(setOf(line)) := (if (shortPaths) 1.U else bits)
     replacement.use(setOf(line), way)
   }
 

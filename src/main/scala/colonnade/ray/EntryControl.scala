@@ -81,13 +81,14 @@ final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Modul
   val io = IO(new EntryControlIO(slices))
 
   private val quotients = 3
-  private val delay     = if (shortPaths) 1 else 0 // of products
+  private val delay     = if (shortPaths) 2 else 0 // of products
   private val scaling   = if (shortPaths) 1 else 0 // of what was scaled
   private val limiting  = if (shortPaths) 1 else 0 // of what limits entry and exit
+  private val rounding  = if (shortPaths) 1 else 0 // of what moves the origin sideways
   private val deciding  = if (shortPaths) 1 else 0 // of whether the ray enters
   private val decided   = 10 + delay + scaling + limiting + deciding
   private val advance   = 8 + delay + scaling + limiting
-  private val last      = advance + 2 * slices + delay
+  private val last      = advance + 2 * slices + delay + rounding
   private val finished  = last + 1
 
   private val busy = RegInit(false.B)
@@ -151,5 +152,5 @@ final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Modul
   command.limits          := late(Seq(6, 7, 8, 9).map(_ + limiting): _*)
   command.limitsFar       := late(Seq(8, 9).map(_ + limiting): _*)
   command.advancesAlong   := at(advance)
-  command.advancesSide    := at(advance + slices + delay, last)
+  command.advancesSide    := at(last - slices, last)
 }

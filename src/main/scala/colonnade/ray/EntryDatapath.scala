@@ -73,10 +73,10 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   private val shearSlice   =
     MuxLookup(command.slice, sliceOf(slices - 1))((0 until slices - 1).map(i => i.U -> sliceOf(i)))
   private val multiplier = Mux(command.multipliesShear, shearSlice, onSide(reciprocal, command.multiplySide).zext)
-  private val carries    = operand(command.multipliesShear && command.slice =/= 0.U)
+  private val carries    = operand(operand(command.multipliesShear && command.slice =/= 0.U))
   // An entry times a slice is one bit shorter than productBits; the carried part, shorter by a slice, adds no bit.
   product := Rounding.narrow(
-    operand(multiplicand) * operand(multiplier) +& Mux(carries, product >> sliceBits, 0.S),
+    operand(operand(multiplicand) * operand(multiplier)) +& Mux(carries, product >> sliceBits, 0.S),
     productBits
   )
   private val whole =
@@ -118,7 +118,7 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
 
   // Advance: the first axis moves, and comes in again as the last
   private val entrySteps = Rounding.floor(tEntry, -fraction)
-  private val sideways   = Rounding.nearestEven(whole, numbers.vertexBits + 1)
+  private val sideways   = operand(Rounding.nearestEven(whole, numbers.vertexBits + 1))
   private val along      = Mux(ray.orientation.negative(2), 0.S -& entrySteps.zext, entrySteps.zext)
   private val moved      = origin.head +& Mux(command.advancesAlong, along, sideways)
   private val half       = BigInt(1) << (numbers.vertexBits - 1 + fraction)
@@ -171,7 +171,9 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   output.tEntry := Fixed(formats.entry, tEntry)
   output.tMax   := Fixed(formats.grid, Rounding.narrow(tMax.zext, numbers.gridBits))
 
-  /** With short paths the multiplier's operands, what was scaled, and what limits entry and exit are registered. */
+  /** With short paths a register: of the multiplier's operands and product, what was scaled, what limits entry and exit,
+    * and what moves the origin.
+    */
   private def operand[T <: Data](value: T): T = if (config.units.shortPaths) RegEnable(value, true.B) else value
 
   private def onSide[T <: Data](values: Seq[T], side: UInt): T = Mux(side.asBool, values(1), values(0))
