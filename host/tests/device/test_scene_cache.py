@@ -79,6 +79,18 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
     assert_same(second, expected)
 
 
+def test_frames_of_the_preset_for_fpgas() -> None:
+    """Its short paths change no pixel and no counter of events, with the slow memory of a board."""
+    design = design_for("fpga")
+    image = pack(load_mesh("torus"), design.manifest)
+    scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")
+    registers = frame_registers(scene, image.header, design.manifest, 100, 75)
+    expected = render_model(design.manifest, image, registers)
+    for stalls in (Stalls(dram_latency=15, dram_interval=2), Stalls(percent=20, seed=3, dram_latency=40)):
+        for frame in render_rtl(design, image, [registers, registers], stalls).frames:
+            assert_same(frame, expected)
+
+
 def test_a_scene_that_fits_is_read_once() -> None:
     """A line that the shared cache holds is never read again, whatever else happens while it is looked up."""
     design = design_with(1, 5, 1, 2, (4, 1, 4, 1024, 16, 8, 32, False))

@@ -25,7 +25,7 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
 final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new BackgroundWalkerIO(config))
 
-  private val scan      = Module(new TileScan(config))
+  private val scan      = Module(new TileScan(config, isQueued = config.units.shortPaths))
   private val positions = Module(new Arbiter(new PixelPosition(config), io.others.size + 1))
   scan.io.frame     := io.frame
   scan.io.isDivided := false.B

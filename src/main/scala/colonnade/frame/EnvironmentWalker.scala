@@ -28,7 +28,7 @@ final class EnvironmentWalkerIO(config: ColonnadeConfig) extends Bundle {
 final class EnvironmentWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentWalkerIO(config))
 
-  private val scan = Module(new TileScan(config))
+  private val scan = Module(new TileScan(config, isQueued = config.units.shortPaths))
   scan.io.frame     := io.frame
   scan.io.isDivided := false.B
   scan.io.tiles <> io.tiles

@@ -22,8 +22,11 @@ final class TileScanIO(config: ColonnadeConfig) extends Bundle {
   *
   * Throughput: one pixel per cycle. The next tile is accepted with the last pixel of the current one, so tiles follow each
   * other without a gap.
+  *
+  * @param isQueued
+  *   pixels wait in a queue: then those of a tile may leave after the next tile is accepted
   */
-final class TileScan(config: ColonnadeConfig) extends Module {
+final class TileScan(config: ColonnadeConfig, isQueued: Boolean) extends Module {
   val io = IO(new TileScanIO(config))
 
   private val scan = Module(new MortonScan(Tile.pixelLevels(config)))
@@ -34,13 +37,12 @@ final class TileScan(config: ColonnadeConfig) extends Module {
   scan.io.size.bits.high := clipped(io.frame.pixelsHigh, io.tiles.bits.y)
   io.tiles.ready         := scan.io.size.ready
 
-  // With short paths pixels wait in a queue
-  private val positions = if (config.units.shortPaths) Wire(chiselTypeOf(io.positions)) else io.positions
+  private val positions = if (isQueued) Wire(chiselTypeOf(io.positions)) else io.positions
   positions.valid     := scan.io.cells.valid
   positions.bits.x    := tile.x | scan.io.cells.bits.x
   positions.bits.y    := tile.y | scan.io.cells.bits.y
   scan.io.cells.ready := positions.ready
-  if (config.units.shortPaths) {
+  if (isQueued) {
     io.positions <> Queue(positions, 2)
     io.isIdle := scan.io.isIdle && !io.positions.valid
   } else {

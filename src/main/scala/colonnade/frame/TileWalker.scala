@@ -44,7 +44,7 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
 final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = None) extends Module {
   val io = IO(new TileWalkerIO(config))
 
-  private val scan     = Module(new TileScan(config))
+  private val scan     = Module(new TileScan(config, isQueued = false)) // its tile is that of `edgeValues`
   private val outline  = Module(new PixelTest(config))
   private val dispatch = Module(new Dispatcher(new UnitPosition(config), config.array.rows))
 
@@ -59,7 +59,7 @@ final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = N
   outline.io.pixels <> scan.io.positions
   outline.io.edgeValues := RegEnable(io.tiles.bits.edgeValues, io.tiles.fire)
 
-  private val tested   = outline.io.tested
+  private val tested   = if (config.units.shortPaths) Queue(outline.io.tested, 2) else outline.io.tested
   private val forUnits = tested.bits.isForUnits
   private val taken    = Wire(Decoupled(new UnitPosition(config)))
   taken.valid  := tested.valid && forUnits
@@ -82,5 +82,5 @@ final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = N
   private def queued(taker: DecoupledIO[UnitPosition]): DecoupledIO[UnitPosition] =
     if (config.units.shortPaths) Queue(taker, 2) else Queue(taker, 1, pipe = true)
   io.positions.zip(dispatch.io.takers).foreach { case (position, taker) => position <> queued(taker) }
-  io.isIdle := scan.io.isIdle && outline.io.isIdle && !io.positions.map(_.valid).reduce(_ || _)
+  io.isIdle := scan.io.isIdle && outline.io.isIdle && !tested.valid && !io.positions.map(_.valid).reduce(_ || _)
 }

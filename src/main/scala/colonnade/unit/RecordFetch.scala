@@ -191,9 +191,11 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
       fetch.buffer    := PriorityEncoder(fills)
     }
   }
-  io.snoopHits := PopCount(fetches.zip(contextFills).map { case (fetch, fills) =>
+  // With short paths they are counted a cycle later
+  private val snoopHits = VecInit(fetches.zip(contextFills).map { case (fetch, fills) =>
     fills.reduce(_ || _) && !fetch.isIssued
   })
+  io.snoopHits := PopCount(if (shortPaths) RegNext(snoopHits) else snoopHits)
 
   // Miss: request the record of the first context whose record no buffer holds or awaits
   private val isExpected = fetches.zip(newMatches).map { case (fetch, matches) =>

@@ -80,10 +80,14 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  for ((hasWindow, claim) <- Seq(false -> "sort out the pixels", true -> "give units the room's window, too,"))
-    it should s"$claim outside the outline, whichever unit is ready" in {
+  for {
+    (hasWindow, claim) <- Seq(false -> "sort out the pixels", true -> "give units the room's window, too,")
+    shortPaths         <- Seq(false, true)
+  }
+    it should s"$claim outside the outline, whichever unit is ready, short paths $shortPaths" in {
       val random = new Random(3)
-      test(new TileWalker(config(rows = 3, tileSize = 8, TestConfigs.withEnvironment(TestConfigs.environment)))) {
+      val plain  = config(rows = 3, tileSize = 8, TestConfigs.withEnvironment(TestConfigs.environment))
+      test(new TileWalker(if (shortPaths) TestConfigs.withShortPaths(plain) else plain)) {
         dut =>
           val window = dut.io.window
           window.enabled.poke(hasWindow)
