@@ -46,8 +46,8 @@ def assert_same(frame: Frame, expected: Frame) -> None:
     assert [frame.counters[name] for name in EVENTS] == [expected.counters[name] for name in EVENTS]
 
 
-#: Rows, columns, banks, record buffers, cache: from one awaited line at a time to caches of some lines and ways. The last
-#: has no shared cache.
+#: Rows, columns, banks, record buffers, cache: from one awaited line at a time to caches of some lines and ways. In the
+#: last one there is no shared cache.
 SHAPES = {
     "one of everything": (1, 1, 1, 1, (1, 1, 1, 1, 1, 1, 4, False)),
     "two columns": (3, 2, 2, 2, (12, 3, 4, 20, 5, 8, 32, False)),
