@@ -16,7 +16,7 @@ import chisel3.util.{log2Ceil, Valid}
 private[memory] final class Replacement(sets: Int, ways: Int, inMemory: Boolean = false) {
   private val wayBits = log2Ceil(ways.max(2))
 
-  /** Node n lies between the ways n and n + 1. A set bit leads to the upper half. */
+  // Node n of a tree lies between the ways n and n + 1. A set bit leads to the upper half
   private val treeBits  = (ways - 1).max(1)
   private val registers = Option.unless(inMemory)(RegInit(VecInit(Seq.fill(sets)(0.U(treeBits.W)))))
   private val memory    = Option.when(inMemory)(Mem(sets, UInt(treeBits.W)))
