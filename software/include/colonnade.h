@@ -1,8 +1,8 @@
 /* Driver of the Colonnade device in its AXI4 shell: docs/driver.md.
  *
  * It allocates nothing, uses no floating point, and keeps no state but what it is given. Pointers are those of the caller,
- * and are not kept beyond the call, but for `bus` and `design` of `colonnade_probe`. It makes no access that the shell
- * would refuse. */
+ * and are not kept beyond the call, but for `bus` and `design` of `colonnade_probe`. What a call fills is filled when it
+ * returns COLONNADE_OK, and unchanged otherwise. It makes no access that the shell would refuse. */
 #ifndef COLONNADE_H
 #define COLONNADE_H
 
@@ -24,10 +24,11 @@ enum colonnade_error {
     COLONNADE_TRUNCATED,       /* a file is shorter or longer than it says */
     COLONNADE_TOO_LARGE,       /* an image or a framebuffer leaves its window, or a frame is larger than the device's */
     COLONNADE_MISALIGNED,      /* an address, a size or a stride is no multiple of what it has to be */
-    COLONNADE_BAD_REGISTER,    /* a frame file sets a word that is no frame register */
+    COLONNADE_BAD_REGISTER,    /* a frame sets a word that is no frame register, or more words than there are */
     COLONNADE_BAD_FORMAT,      /* a framebuffer's format is none of enum colonnade_format */
     COLONNADE_NO_FRAME,        /* a start without colonnade_set_frame before it */
-    COLONNADE_BUSY,            /* not now: a frame is queued, an image is loading, or a reset is under way */
+    COLONNADE_BUSY,            /* not now: a frame is queued, an image is loading, a reset is under way, or the shell
+                                  * cannot take all registers before the frame that runs has ended */
     COLONNADE_TIMEOUT,         /* the event has not come */
     COLONNADE_BUS_RESPONSE,    /* the memory answered with an error */
     COLONNADE_BAD_SECTION,     /* an image has a section for a memory that the device lacks, or one that is too long */
@@ -61,6 +62,7 @@ struct colonnade_design {
     uint32_t counters;        /* byte address of the first counter, each in two words */
     uint32_t counter_count;
     uint32_t tile_size;       /* pixels */
+    uint32_t posted_writes;   /* writes to the device's registers that the shell takes while a frame runs */
     uint32_t scene_page;      /* byte address of `dram.page` and of `control.invalidate`; 0 if no scene lies in DRAM */
     uint32_t invalidate;
 };
@@ -71,6 +73,7 @@ struct colonnade {
     uint32_t capabilities;
     uint32_t max_width, max_height;
     uint32_t width, height; /* of the frame that is set; 0: none */
+    uint32_t space;         /* writes to the device's registers that the shell still takes while this frame runs */
     bool has_scene;
     uint64_t scene; /* address of the records in DRAM */
 };
@@ -110,7 +113,8 @@ struct colonnade_photo {
     struct colonnade_window window;
 };
 
-/* Finds out whether the device is the one of the design, and fills `device`. Touches nothing but read-only registers. */
+/* Finds out whether the device is the one of the design, and fills `device`. Touches nothing but read-only registers.
+ * While a frame runs that another program has started, registers of the device cannot be set: COLONNADE_BUSY. */
 enum colonnade_error colonnade_probe(struct colonnade *device, const struct colonnade_bus *bus,
                                      const struct colonnade_design *design);
 
@@ -120,7 +124,7 @@ enum colonnade_error colonnade_check_image(const struct colonnade_design *design
 /* Loads an image and waits for its end, `attempts` polls or waits at most. Acknowledges imageDone and error. */
 enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
 
-/* Reads a frame file of `bytes` bytes; `frame` points into it. */
+/* Reads a frame file of `bytes` bytes, and fills `frame`, which points into it. */
 enum colonnade_error colonnade_open_frame(const struct colonnade_design *design, const void *data, size_t bytes,
                                           struct colonnade_frame *frame);
 
@@ -128,7 +132,8 @@ enum colonnade_error colonnade_open_frame(const struct colonnade_design *design,
  * set or started from now on. Call it again, also with the same address, when the records have changed. */
 enum colonnade_error colonnade_set_scene(struct colonnade *device, uint64_t address);
 
-/* Writes the registers of a frame, also while another one runs. */
+/* Writes the registers of a frame that colonnade_open_frame has filled, also while another one runs: at least once, and
+ * again as long as the shell has space for a whole set. Writes all registers or, with an error, none. */
 enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct colonnade_frame *frame);
 
 /* Chooses the photo that frames show where the object is not, from the next start on; NULL: none. Call it after
@@ -144,10 +149,10 @@ enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, u
 /* Whether the last frame that ended is valid, and if not, why: its framebuffer's errors first, then the device's. */
 enum colonnade_error colonnade_result(struct colonnade *device);
 
-/* Clears events in `interrupt.status`. */
+/* Clears events in `interrupt.status`; other bits are left out. */
 void colonnade_acknowledge(struct colonnade *device, uint32_t events);
 
-/* Chooses the events that raise the interrupt. */
+/* Chooses the events that raise the interrupt; other bits are left out. */
 void colonnade_enable_interrupts(struct colonnade *device, uint32_t events);
 
 /* Resets the device in any state; the frame registers are 0 then. */

@@ -5,6 +5,7 @@
 #define REGISTER(name) ((uint32_t)offsetof(colonnade_shell_t, name))
 
 enum { IDENTITY = 0x434C4E44, DEVICE_BASE = 0x8000, IMAGE_ALIGNMENT = 128, PAGE_LOG = 12 };
+enum { EVENTS = COLONNADE_FRAME_DONE | COLONNADE_IMAGE_DONE | COLONNADE_ERROR };
 
 static uint32_t get(const struct colonnade *device, uint32_t address) {
     return device->bus->read(device->bus->context, address);
@@ -27,15 +28,17 @@ static bool contains(const struct colonnade_window *window, uint64_t address, ui
 
 enum colonnade_error colonnade_probe(struct colonnade *device, const struct colonnade_bus *bus,
                                      const struct colonnade_design *design) {
-    *device = (struct colonnade){.bus = bus, .design = design};
-    if (get(device, REGISTER(identity)) != IDENTITY) return COLONNADE_NO_DEVICE;
-    if (get(device, REGISTER(version)) >> COLONNADE_SHELL__VERSION__MAJOR_bp != 1) return COLONNADE_UNKNOWN_VERSION;
+    /* No space: what another program has written during a frame that runs is not known */
+    struct colonnade found = {.bus = bus, .design = design};
+    if (get(&found, REGISTER(identity)) != IDENTITY) return COLONNADE_NO_DEVICE;
+    if (get(&found, REGISTER(version)) >> COLONNADE_SHELL__VERSION__MAJOR_bp != 1) return COLONNADE_UNKNOWN_VERSION;
     for (uint32_t i = 0; i < 8; ++i)
-        if (get(device, REGISTER(formatHash_0) + 4 * i) != design->format_hash[i]) return COLONNADE_OTHER_FORMAT;
-    device->capabilities = get(device, REGISTER(capabilities));
-    uint32_t size = get(device, REGISTER(frameSize));
-    device->max_width = size & COLONNADE_SHELL__FRAMESIZE__WIDTH_bm;
-    device->max_height = size >> COLONNADE_SHELL__FRAMESIZE__HEIGHT_bp;
+        if (get(&found, REGISTER(formatHash_0) + 4 * i) != design->format_hash[i]) return COLONNADE_OTHER_FORMAT;
+    found.capabilities = get(&found, REGISTER(capabilities));
+    uint32_t size = get(&found, REGISTER(frameSize));
+    found.max_width = size & COLONNADE_SHELL__FRAMESIZE__WIDTH_bm;
+    found.max_height = size >> COLONNADE_SHELL__FRAMESIZE__HEIGHT_bp;
+    *device = found;
     return COLONNADE_OK;
 }
 
@@ -75,9 +78,14 @@ static uint32_t word(const uint8_t *at) {
     return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
-/* Registers and framebuffer may change now, and the next frame may be started. */
-static bool takes_a_frame(const struct colonnade *device) {
-    return (get(device, REGISTER(status)) & ~(uint32_t)COLONNADE_SHELL__STATUS__ISRUNNING_bm) == 0;
+/* Whether registers and framebuffer may change now, and the next frame may be started. If so, makes sure of `writes` writes
+ * to the device: while a frame runs they wait in a queue, which is empty when a frame begins. */
+static bool takes_a_frame(struct colonnade *device, uint32_t writes) {
+    uint32_t status = get(device, REGISTER(status));
+    if (status == 0) return true;
+    if (status != COLONNADE_SHELL__STATUS__ISRUNNING_bm || writes > device->space) return false;
+    device->space -= writes;
+    return true;
 }
 
 enum colonnade_error colonnade_set_scene(struct colonnade *device, uint64_t address) {
@@ -85,7 +93,7 @@ enum colonnade_error colonnade_set_scene(struct colonnade *device, uint64_t addr
     if (design->scene_page == 0) return COLONNADE_NO_SCENE;
     if (address % (1u << PAGE_LOG) != 0) return COLONNADE_MISALIGNED;
     if (address >> 40 != 0) return COLONNADE_TOO_LARGE;
-    if (!takes_a_frame(device)) return COLONNADE_BUSY;
+    if (!takes_a_frame(device, 2)) return COLONNADE_BUSY;
     device->scene = address;
     device->has_scene = true;
     set(device, design->scene_page, (uint32_t)(address >> PAGE_LOG));
@@ -94,12 +102,14 @@ enum colonnade_error colonnade_set_scene(struct colonnade *device, uint64_t addr
 }
 
 enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct colonnade_frame *frame) {
+    const struct colonnade_design *design = device->design;
     if (frame->width > device->max_width || frame->height > device->max_height) return COLONNADE_TOO_LARGE;
-    if (!takes_a_frame(device)) return COLONNADE_BUSY;
+    if (frame->count > (design->device_end - design->frame_registers) / 4) return COLONNADE_BAD_REGISTER;
+    if (!takes_a_frame(device, frame->count + device->has_scene)) return COLONNADE_BUSY;
     for (size_t i = 0; i < frame->count; ++i)
         set(device, DEVICE_BASE + 4 * word(frame->writes + 8 * i), word(frame->writes + 8 * i + 4));
     /* The file has page 0 */
-    if (device->has_scene) set(device, device->design->scene_page, (uint32_t)(device->scene >> PAGE_LOG));
+    if (device->has_scene) set(device, design->scene_page, (uint32_t)(device->scene >> PAGE_LOG));
     device->width = frame->width;
     device->height = frame->height;
     return COLONNADE_OK;
@@ -118,7 +128,7 @@ enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct 
                       (device->capabilities & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0;
     if (!composites) return photo == NULL ? COLONNADE_OK : COLONNADE_NO_PHOTO;
     if (photo == NULL) {
-        if (!takes_a_frame(device)) return COLONNADE_BUSY;
+        if (!takes_a_frame(device, 0)) return COLONNADE_BUSY;
         set(device, REGISTER(photo_enabled), 0);
         return COLONNADE_OK;
     }
@@ -128,7 +138,7 @@ enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct 
     uint64_t bytes;
     if (!frame_bytes(device, photo->stride, 4, &bytes) || !contains(&photo->window, photo->base, bytes))
         return COLONNADE_TOO_LARGE;
-    if (!takes_a_frame(device)) return COLONNADE_BUSY;
+    if (!takes_a_frame(device, 0)) return COLONNADE_BUSY;
     set_wide(device, REGISTER(photo_base_low), photo->base);
     set_wide(device, REGISTER(photo_windowBase_low), photo->window.base);
     set_wide(device, REGISTER(photo_windowEnd_low), photo->window.end);
@@ -148,7 +158,7 @@ enum colonnade_error colonnade_start(struct colonnade *device, const struct colo
     if (!frame_bytes(device, framebuffer->stride, pixel_bytes[framebuffer->format], &bytes) ||
         !contains(&framebuffer->window, framebuffer->base, bytes))
         return COLONNADE_TOO_LARGE;
-    if (!takes_a_frame(device)) return COLONNADE_BUSY;
+    if (!takes_a_frame(device, 0)) return COLONNADE_BUSY;
     set_wide(device, REGISTER(framebuffer_base_low), framebuffer->base);
     set_wide(device, REGISTER(framebuffer_windowBase_low), framebuffer->window.base);
     set_wide(device, REGISTER(framebuffer_windowEnd_low), framebuffer->window.end);
@@ -156,6 +166,7 @@ enum colonnade_error colonnade_start(struct colonnade *device, const struct colo
     set(device, REGISTER(framebuffer_format), (uint32_t)framebuffer->format);
     __sync_synchronize();
     set(device, REGISTER(control), COLONNADE_SHELL__CONTROL__START_bm);
+    device->space = device->design->posted_writes;
     return COLONNADE_OK;
 }
 
@@ -182,11 +193,11 @@ enum colonnade_error colonnade_result(struct colonnade *device) {
 }
 
 void colonnade_acknowledge(struct colonnade *device, uint32_t events) {
-    set(device, REGISTER(interrupt_status), events);
+    set(device, REGISTER(interrupt_status), events & EVENTS);
 }
 
 void colonnade_enable_interrupts(struct colonnade *device, uint32_t events) {
-    set(device, REGISTER(interrupt_enable), events);
+    set(device, REGISTER(interrupt_enable), events & EVENTS);
 }
 
 enum colonnade_error colonnade_reset(struct colonnade *device, uint32_t attempts) {

@@ -38,15 +38,15 @@ enum colonnade_error colonnade_open_frame(const struct colonnade_design *design,
     const uint8_t *at = data;
     enum colonnade_error error = check_header(design, at, bytes, FRAME_HEADER_BYTES, "CLNDFRAM", COLONNADE_NOT_A_FRAME);
     if (error != COLONNADE_OK) return error;
-    frame->width = word(at, 12);
-    frame->height = word(at, 13);
-    frame->count = word(at, 14);
-    frame->writes = at + FRAME_HEADER_BYTES;
-    if (frame->count != (bytes - FRAME_HEADER_BYTES) / 8 || bytes % 8 != 0) return COLONNADE_TRUNCATED;
-    for (size_t i = 0; i < frame->count; ++i) {
-        uint32_t index = word(frame->writes, 2 * i);
-        if (index >= (design->device_end - DEVICE_BASE) / 4 || index < (design->frame_registers - DEVICE_BASE) / 4)
-            return COLONNADE_BAD_REGISTER;
+    const uint8_t *writes = at + FRAME_HEADER_BYTES;
+    const uint32_t count = word(at, 14);
+    const uint32_t first = (design->frame_registers - DEVICE_BASE) / 4, end = (design->device_end - DEVICE_BASE) / 4;
+    if (count != (bytes - FRAME_HEADER_BYTES) / 8 || bytes % 8 != 0) return COLONNADE_TRUNCATED;
+    if (count > end - first) return COLONNADE_BAD_REGISTER;
+    for (size_t i = 0; i < count; ++i) {
+        uint32_t index = word(writes, 2 * i);
+        if (index < first || index >= end) return COLONNADE_BAD_REGISTER;
     }
+    *frame = (struct colonnade_frame){writes, count, word(at, 12), word(at, 13)};
     return COLONNADE_OK;
 }

@@ -120,6 +120,10 @@ int main(int argc, char **argv) {
     /* A soft reset in the middle of a frame; then the device lacks a frame, and takes one again */
     struct colonnade_framebuffer last = {place, columns * 4, COLONNADE_XRGB8888, {place, place + 4 * columns * frame.height}};
     expect(colonnade_start(&device, &last), COLONNADE_OK, "start before a reset");
+    uint32_t sets = 0; /* while it runs: as many as fit, none in part */
+    while (colonnade_set_frame(&device, &frame) == COLONNADE_OK) ++sets;
+    const uint32_t words = frame.count + (colonnade_design.scene_page != 0);
+    if (sets != colonnade_design.posted_writes / words) fail("the shell has space for other many sets of registers");
     expect(colonnade_start(&device, &last), COLONNADE_OK, "start of a queued frame");
     expect(colonnade_set_frame(&device, &frame), COLONNADE_BUSY, "a third frame");
     expect(colonnade_reset(&device, ATTEMPTS), COLONNADE_OK, "reset");

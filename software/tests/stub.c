@@ -1,11 +1,12 @@
-/* The driver against an array of registers: every error that it can name, and that it makes no access beyond it.
- * Prints nothing and returns 0, or the line that failed. Run it under the address sanitizer. */
+/* The driver against shell.c: every error that it can name, and no access that the shell refuses.
+ * Prints nothing and returns 0, or the line that failed. Run it under the address sanitizer.
+ *
+ * usage: stub TEST */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "colonnade.h"
-#include "colonnade_shell.h"
+#include "shell.h"
 
 #define CHECK(condition) \
     do { \
@@ -14,7 +15,6 @@
             exit(1); \
         } \
     } while (0)
-#define AT(name) (offsetof(colonnade_shell_t, name) / 4)
 
 static const struct colonnade_design design = {
     .format_hash = {1, 2, 3, 4, 5, 6, 7, 0xFFFFFFFF},
@@ -25,33 +25,8 @@ static const struct colonnade_design design = {
     .counters = 0x8010,
     .counter_count = 2,
     .tile_size = 16,
+    .posted_writes = 5, /* less than a device has, for short tests */
 };
-
-/* The shell's registers, and those of the device behind them; a command is answered by `outcome`. */
-struct stub {
-    uint32_t shell[sizeof(colonnade_shell_t) / 4];
-    uint32_t device[12];
-    uint32_t outcome, writes;
-};
-
-static uint32_t *place(struct stub *stub, uint32_t address) {
-    if (address >= 0x8000) {
-        CHECK(address < design.device_end);
-        return &stub->device[(address - 0x8000) / 4];
-    }
-    CHECK(address % 4 == 0 && address < sizeof stub->shell);
-    return &stub->shell[address / 4];
-}
-
-static uint32_t stub_read(void *context, uint32_t address) { return *place(context, address); }
-
-static void stub_write(void *context, uint32_t address, uint32_t value) {
-    struct stub *stub = context;
-    ++stub->writes;
-    if (address == 4 * AT(control)) stub->shell[AT(interrupt_status)] |= stub->outcome;
-    else if (address == 4 * AT(interrupt_status)) stub->shell[AT(interrupt_status)] &= ~value;
-    else *place(stub, address) = value;
-}
 
 static void put(uint8_t *bytes, size_t word, uint32_t value) {
     for (size_t i = 0; i < 4; ++i) bytes[4 * word + i] = (uint8_t)(value >> (8 * i));
@@ -76,22 +51,31 @@ static uint8_t *cut(const uint8_t *file, size_t bytes) {
     return copy;
 }
 
-static void test_probe(struct stub *stub, const struct colonnade_bus *bus) {
-    struct colonnade device;
-    CHECK(colonnade_probe(&device, bus, &design) == COLONNADE_NO_DEVICE);
-    stub->shell[AT(identity)] = 0x434C4E44;
-    stub->shell[AT(version)] = 0x00020000;
-    CHECK(colonnade_probe(&device, bus, &design) == COLONNADE_UNKNOWN_VERSION);
-    stub->shell[AT(version)] = 0x00010007;
-    for (size_t i = 0; i < 7; ++i) stub->shell[AT(formatHash_0) + i] = design.format_hash[i];
-    CHECK(colonnade_probe(&device, bus, &design) == COLONNADE_OTHER_FORMAT);
-    stub->shell[AT(formatHash_7)] = design.format_hash[7];
-    stub->shell[AT(frameSize)] = 480u << 16 | 640u;
-    CHECK(colonnade_probe(&device, bus, &design) == COLONNADE_OK && stub->writes == 0);
-    CHECK(device.max_width == 640 && device.max_height == 480);
+static const struct colonnade_bus *bus_of(struct shell *shell) {
+    static struct colonnade_bus bus;
+    bus = (struct colonnade_bus){shell_read, shell_write, NULL, shell};
+    return &bus;
 }
 
-static void test_images(struct stub *stub, struct colonnade *device) {
+/* A probe that fails leaves `device` alone. */
+static void test_probe(struct shell *shell, struct colonnade *device) {
+    const struct colonnade before = *device;
+    shell->registers[AT(identity)] = 0;
+    CHECK(colonnade_probe(device, bus_of(shell), &design) == COLONNADE_NO_DEVICE);
+    shell->registers[AT(identity)] = 0x434C4E44;
+    shell->registers[AT(version)] = 0x00020000;
+    CHECK(colonnade_probe(device, bus_of(shell), &design) == COLONNADE_UNKNOWN_VERSION);
+    shell->registers[AT(version)] = 0x00010007;
+    shell->registers[AT(formatHash_7)] = 0;
+    CHECK(colonnade_probe(device, bus_of(shell), &design) == COLONNADE_OTHER_FORMAT);
+    CHECK(device->max_width == before.max_width && device->design == before.design && device->bus == before.bus);
+    shell->registers[AT(formatHash_7)] = design.format_hash[7];
+    shell->registers[AT(frameSize)] = 240u << 16 | 320u;
+    CHECK(colonnade_probe(device, bus_of(shell), &design) == COLONNADE_OK && shell->writes == 0);
+    CHECK(device->max_width == 320 && device->max_height == 240);
+}
+
+static void test_images(struct shell *shell, struct colonnade *device) {
     uint8_t *file = make_file("CLNDLOAD", 256);
     struct colonnade_image image = {file, 256, 0x10000000080, {0x10000000080, 0x10000000180}};
     CHECK(colonnade_load(device, &image, 3) == COLONNADE_TOO_LARGE); /* beyond 40 bits */
@@ -121,27 +105,27 @@ static void test_images(struct stub *stub, struct colonnade *device) {
     put(file, 11, 0);
     CHECK(colonnade_load(device, &image, 3) == COLONNADE_OTHER_FORMAT);
     put(file, 11, design.format_hash[7]);
-    stub->shell[AT(status)] = 4;
-    CHECK(colonnade_load(device, &image, 3) == COLONNADE_BUSY && stub->writes == 0);
-    stub->shell[AT(status)] = 0;
-    stub->outcome = 0;
+    shell->registers[AT(status)] = 4;
+    CHECK(colonnade_load(device, &image, 3) == COLONNADE_BUSY && shell->writes == 0);
+    shell->registers[AT(status)] = 0;
+    shell->outcome = 0;
     CHECK(colonnade_load(device, &image, 3) == COLONNADE_TIMEOUT);
-    stub->outcome = COLONNADE_IMAGE_DONE | COLONNADE_ERROR;
+    shell->outcome = COLONNADE_IMAGE_DONE | COLONNADE_ERROR;
     static const enum colonnade_error errors[] = {
         COLONNADE_TOO_LARGE,    COLONNADE_BUS_RESPONSE, COLONNADE_MISALIGNED, COLONNADE_NOT_AN_IMAGE,
         COLONNADE_OTHER_FORMAT, COLONNADE_BAD_SECTION,  COLONNADE_BAD_LENGTH,
     };
     for (size_t bit = 0; bit < 7; ++bit) {
-        stub->shell[AT(image_errors)] = 1u << bit;
+        shell->registers[AT(image_errors)] = 1u << bit;
         CHECK(colonnade_load(device, &image, 3) == errors[bit]);
     }
-    stub->shell[AT(image_errors)] = 0;
-    CHECK(colonnade_load(device, &image, 3) == COLONNADE_OK && stub->shell[AT(interrupt_status)] == 0);
-    CHECK(stub->shell[AT(image_base_low)] == 4096 && stub->shell[AT(image_bytes)] == 256);
+    shell->registers[AT(image_errors)] = 0;
+    CHECK(colonnade_load(device, &image, 3) == COLONNADE_OK && shell->registers[AT(interrupt_status)] == 0);
+    CHECK(shell->registers[AT(image_base_low)] == 4096 && shell->registers[AT(image_bytes)] == 256);
     free(file);
 }
 
-static void test_frames(struct stub *stub, struct colonnade *device) {
+static void test_frames(struct shell *shell, struct colonnade *device) {
     struct colonnade_frame frame;
     struct colonnade_framebuffer framebuffer = {0x100000000, 64, COLONNADE_XRGB8888, {0x100000000, 0x100000000 + 128}};
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_NO_FRAME);
@@ -178,14 +162,17 @@ static void test_frames(struct stub *stub, struct colonnade *device) {
     frame.width = 641;
     CHECK(colonnade_set_frame(device, &frame) == COLONNADE_TOO_LARGE);
     frame.width = 10;
-    stub->shell[AT(status)] = 3;
+    frame.count = 5;
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_BAD_REGISTER);
+    frame.count = 2;
+    shell->registers[AT(status)] = 3;
     CHECK(colonnade_set_frame(device, &frame) == COLONNADE_BUSY);
-    stub->shell[AT(status)] = 1;
-    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK && stub->device[8] == 99 && stub->device[11] == 77);
+    shell->registers[AT(status)] = 0;
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK && shell->device[8] == 99 && shell->device[11] == 77);
 
-    stub->outcome = COLONNADE_FRAME_DONE;
+    shell->outcome = COLONNADE_FRAME_DONE;
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_OK);
-    CHECK(stub->shell[AT(framebuffer_base_high)] == 1 && stub->shell[AT(framebuffer_stride)] == 64);
+    CHECK(shell->registers[AT(framebuffer_base_high)] == 1 && shell->registers[AT(framebuffer_stride)] == 64);
     framebuffer.window.end -= 1;
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_TOO_LARGE);
     framebuffer.window = (struct colonnade_window){0, UINT64_MAX};
@@ -202,33 +189,33 @@ static void test_frames(struct stub *stub, struct colonnade *device) {
     framebuffer.format = (enum colonnade_format)3;
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_BAD_FORMAT);
     framebuffer.format = COLONNADE_XRGB8888;
-    stub->shell[AT(status)] = 3;
+    shell->registers[AT(status)] = 3;
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_BUSY);
-    stub->shell[AT(status)] = 0;
+    shell->registers[AT(status)] = 0;
 
     static const enum colonnade_error errors[] = {COLONNADE_TOO_LARGE,  COLONNADE_BUS_RESPONSE, COLONNADE_MISALIGNED,
                                                   COLONNADE_BAD_FORMAT, COLONNADE_TOO_LARGE,    COLONNADE_BUS_RESPONSE};
     for (size_t bit = 0; bit < 6; ++bit) {
-        stub->shell[AT(framebuffer_errors)] = 1u << bit;
+        shell->registers[AT(framebuffer_errors)] = 1u << bit;
         CHECK(colonnade_result(device) == errors[bit]);
     }
-    stub->shell[AT(framebuffer_errors)] = 0;
+    shell->registers[AT(framebuffer_errors)] = 0;
     CHECK(colonnade_result(device) == COLONNADE_OK);
-    stub->device[3] = 1;
+    shell->device[3] = 1;
     CHECK(colonnade_result(device) == COLONNADE_FRAME_INVALID && colonnade_device_errors(device) == 4);
-    stub->device[6] = 5;
-    stub->device[7] = 6;
+    shell->device[6] = 5;
+    shell->device[7] = 6;
     CHECK(colonnade_counter(device, 1) == 0x600000005 && colonnade_counter(device, 2) == 0);
-    stub->shell[AT(status)] = 8;
+    shell->registers[AT(status)] = 8;
     CHECK(colonnade_reset(device, 3) == COLONNADE_TIMEOUT);
-    stub->shell[AT(status)] = 0;
+    shell->registers[AT(status)] = 0;
     CHECK(colonnade_reset(device, 3) == COLONNADE_OK);
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_NO_FRAME);
     free(file);
 }
 
 /* A scene on chip; then one in DRAM, whose page every frame gets. */
-static void test_scenes(struct stub *stub, struct colonnade *device) {
+static void test_scenes(struct shell *shell, struct colonnade *device) {
     static const uint8_t writes[8] = {8}; /* page 0 */
     const struct colonnade_frame frame = {writes, 1, 10, 2};
     const struct colonnade_framebuffer framebuffer = {4096, 64, COLONNADE_XRGB8888, {4096, 4096 + 128}};
@@ -236,34 +223,30 @@ static void test_scenes(struct stub *stub, struct colonnade *device) {
     struct colonnade_design in_dram = design;
     in_dram.scene_page = 0x8020;
     in_dram.invalidate = 0x8000;
-    device->design = &in_dram;
-    stub->shell[AT(status)] = 1;
+    device->design = shell->design = &in_dram;
     CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK);
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_NO_SCENE);
     CHECK(colonnade_set_scene(device, 2048) == COLONNADE_MISALIGNED);
     CHECK(colonnade_set_scene(device, 1ull << 40) == COLONNADE_TOO_LARGE);
-    stub->shell[AT(status)] = 2;
+    shell->registers[AT(status)] = 2;
     CHECK(colonnade_set_scene(device, 4096) == COLONNADE_BUSY);
-    stub->shell[AT(status)] = 1;
+    shell->registers[AT(status)] = 0;
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_NO_SCENE);
     CHECK(colonnade_set_scene(device, (1ull << 40) - 4096) == COLONNADE_OK);
-    CHECK(stub->device[8] == 0xFFFFFFF && stub->device[0] == 1);
-    stub->device[8] = 0;
-    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK && stub->device[8] == 0xFFFFFFF);
+    CHECK(shell->device[8] == 0xFFFFFFF && shell->device[0] == 1);
+    shell->device[8] = 0;
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK && shell->device[8] == 0xFFFFFFF);
     CHECK(colonnade_start(device, &framebuffer) == COLONNADE_OK);
-    stub->shell[AT(status)] = 0;
-    device->design = &design;
-    device->has_scene = false;
 }
 
-static void test_photos(struct stub *stub, struct colonnade *device) {
+static void test_photos(struct shell *shell, struct colonnade *device) {
     struct colonnade_photo photo = {4096, 64, {4096, 4096 + 2 * 64}};
-    device->width = device->height = 0;
-    stub->shell[AT(version)] = 0x00010000;
+    shell->registers[AT(version)] = 0x00010000;
     CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO && colonnade_set_photo(device, NULL) == COLONNADE_OK);
-    stub->shell[AT(version)] = 0x00010001;
+    shell->registers[AT(version)] = 0x00010001;
     CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO && colonnade_set_photo(device, NULL) == COLONNADE_OK);
-    device->capabilities = COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm;
+    shell->registers[AT(capabilities)] = COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm;
+    CHECK(colonnade_probe(device, bus_of(shell), &design) == COLONNADE_OK);
     CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_FRAME);
     device->width = 10;
     device->height = 2;
@@ -273,31 +256,120 @@ static void test_photos(struct stub *stub, struct colonnade *device) {
     photo.base += 4;
     CHECK(colonnade_set_photo(device, &photo) == COLONNADE_MISALIGNED);
     photo.base -= 4;
-    stub->shell[AT(status)] = 2;
+    shell->registers[AT(status)] = 2;
     CHECK(colonnade_set_photo(device, &photo) == COLONNADE_BUSY && colonnade_set_photo(device, NULL) == COLONNADE_BUSY);
-    stub->shell[AT(status)] = 1;
-    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_OK && stub->shell[AT(photo_enabled)] == 1);
-    CHECK(stub->shell[AT(photo_base_low)] == 4096 && stub->shell[AT(photo_stride)] == 64);
-    CHECK(colonnade_set_photo(device, NULL) == COLONNADE_OK && stub->shell[AT(photo_enabled)] == 0);
+    shell->registers[AT(status)] = 1;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_OK && shell->registers[AT(photo_enabled)] == 1);
+    CHECK(shell->registers[AT(photo_base_low)] == 4096 && shell->registers[AT(photo_stride)] == 64);
+    CHECK(colonnade_set_photo(device, NULL) == COLONNADE_OK && shell->registers[AT(photo_enabled)] == 0);
 }
 
-int main(void) {
-    struct stub *stub = calloc(1, sizeof *stub);
-    CHECK(stub != NULL);
-    const struct colonnade_bus bus = {stub_read, stub_write, NULL, stub};
-    struct colonnade device;
-    test_probe(stub, &bus);
-    CHECK(colonnade_probe(&device, &bus, &design) == COLONNADE_OK);
-    test_images(stub, &device);
-    test_frames(stub, &device);
-    test_photos(stub, &device);
-    test_scenes(stub, &device);
+/* While a frame runs the shell queues so many writes: `busy` comes before one of them is refused, and before half a set. */
+static void test_posted_writes(struct shell *shell, struct colonnade *device) {
+    static const uint8_t writes[16] = {8, 0, 0, 0, 1, 0, 0, 0, 11, 0, 0, 0, 2};
+    const struct colonnade_frame frame = {writes, 2, 10, 2};
+    const struct colonnade_framebuffer framebuffer = {4096, 64, COLONNADE_XRGB8888, {4096, 4096 + 128}};
+    const struct colonnade_bus *bus = device->bus;
+    shell->is_scripted = false;
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK && colonnade_start(device, &framebuffer) == COLONNADE_OK);
+    shell_step(shell, 0); /* the frame begins */
+    CHECK(shell->registers[AT(status)] == 1);
+    for (int set = 0; set < 2; ++set) CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK);
+    uint32_t count = shell->writes;
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_BUSY && shell->writes == count);
+    CHECK(shell->posted == 4);
+
+    /* The queued frame begins with an empty queue */
+    CHECK(colonnade_start(device, &framebuffer) == COLONNADE_OK);
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_BUSY);
+    shell_step(shell, 1);
+    CHECK(shell->registers[AT(status)] == 2 && colonnade_set_frame(device, &frame) == COLONNADE_BUSY);
+    for (int word = 0; word < 4; ++word) shell_step(shell, 0);
+    CHECK(shell->registers[AT(status)] == 1 && shell->posted == 0);
+    for (int set = 0; set < 2; ++set) CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK);
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_BUSY);
+
+    /* Another program cannot know what has been written since the start of the frame that runs */
+    count = shell->writes;
+    CHECK(colonnade_probe(device, bus, &design) == COLONNADE_OK);
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_BUSY && shell->writes == count);
+    shell_step(shell, 1);
+    CHECK(colonnade_set_frame(device, &frame) == COLONNADE_OK);
+}
+
+/* A frame file is bounded: as many writes as there are registers of a frame. */
+static void test_long_frame_files(struct shell *shell, struct colonnade *device) {
+    (void)shell, (void)device;
+    struct colonnade_frame frame;
+    for (uint32_t count = 4; count <= 1000; count += 996) {
+        uint8_t *file = make_file("CLNDFRAM", 64 + 8 * count);
+        put(file, 14, count);
+        for (uint32_t i = 0; i < count; ++i) put(file, 16 + 2 * i, 8 + i % 4);
+        CHECK(colonnade_open_frame(&design, file, 64 + 8 * count, &frame) ==
+              (count == 4 ? COLONNADE_OK : COLONNADE_BAD_REGISTER));
+        free(file);
+    }
+}
+
+/* The caller's frame is filled on success only: it may be the last good one. */
+static void test_refused_frame_files(struct shell *shell, struct colonnade *device) {
+    (void)shell, (void)device;
+    const uint8_t last = 0;
+    struct colonnade_frame frame = {&last, 1, 2, 3};
+    uint8_t *file = make_file("CLNDFRAM", 64 + 8);
+    put(file, 12, 10);
+    put(file, 13, 2);
+    put(file, 14, 2);
+    CHECK(colonnade_open_frame(&design, file, 72, &frame) == COLONNADE_TRUNCATED);
+    put(file, 14, 1);
+    put(file, 16, 0x3FFFFFFF);
+    CHECK(colonnade_open_frame(&design, file, 72, &frame) == COLONNADE_BAD_REGISTER);
+    CHECK(frame.writes == &last && frame.count == 1 && frame.width == 2 && frame.height == 3);
+    free(file);
+}
+
+/* The shell refuses a value with other bits. */
+static void test_events(struct shell *shell, struct colonnade *device) {
+    shell->registers[AT(interrupt_status)] = 7;
+    colonnade_enable_interrupts(device, UINT32_MAX);
+    colonnade_acknowledge(device, 0xFFFFFFFD);
+    CHECK(shell->registers[AT(interrupt_enable)] == 7 && shell->registers[AT(interrupt_status)] == 2);
+}
+
+static void test_names(struct shell *shell, struct colonnade *device) {
+    (void)shell, (void)device;
     for (int error = COLONNADE_OK; error <= COLONNADE_NO_SCENE; ++error)
         CHECK(strcmp(colonnade_error_name((enum colonnade_error)error), "unknown") != 0);
     CHECK(strcmp(colonnade_error_name((enum colonnade_error)(COLONNADE_NO_SCENE + 1)), "unknown") == 0);
     uint32_t word = 3;
     colonnade_mmio_write(&word, 0, 4);
     CHECK(colonnade_mmio_read(&word, 0) == 4);
-    free(stub);
+}
+
+int main(int argc, char **argv) {
+    static const struct {
+        const char *name;
+        void (*run)(struct shell *shell, struct colonnade *device);
+    } tests[] = {
+        {"probe", test_probe},   {"images", test_images},
+        {"frames", test_frames}, {"photos", test_photos},
+        {"scenes", test_scenes}, {"posted writes", test_posted_writes},
+        {"events", test_events}, {"long frame files", test_long_frame_files},
+        {"names", test_names},   {"refused frame files", test_refused_frame_files},
+    };
+    struct shell *shell = calloc(1, sizeof *shell);
+    CHECK(argc == 2 && shell != NULL);
+    *shell = (struct shell){.design = &design, .is_scripted = true};
+    shell->registers[AT(identity)] = 0x434C4E44;
+    shell->registers[AT(version)] = 0x00010002;
+    shell->registers[AT(frameSize)] = 480u << 16 | 640u;
+    for (size_t i = 0; i < 8; ++i) shell->registers[AT(formatHash_0) + i] = design.format_hash[i];
+    struct colonnade device;
+    CHECK(colonnade_probe(&device, bus_of(shell), &design) == COLONNADE_OK);
+    size_t test = 0;
+    while (test < sizeof tests / sizeof *tests && strcmp(tests[test].name, argv[1]) != 0) ++test;
+    CHECK(test < sizeof tests / sizeof *tests);
+    tests[test].run(shell, &device);
+    free(shell);
     return 0;
 }

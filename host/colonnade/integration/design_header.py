@@ -35,6 +35,7 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
         f"    .counters = {_place(table, manifest, counters)},",
         f"    .counter_count = {len(counters)},",
         f"    .tile_size = {manifest.config['frame']['tileSize']},",
+        f"    .posted_writes = {table.posted_writes},",
         *_scene_in_dram(table, manifest),
         "};",
         "",

@@ -76,11 +76,13 @@ class RegisterTable:
 
     Attributes:
         version: Of the shell's registers: major in the high half, minor in the low one.
+        posted_writes: Writes to the device's registers that the shell takes while a frame runs.
         shell: The shell's block, the same in every design.
         device: The device's block.
     """
 
     version: int
+    posted_writes: int
     shell: RegisterBlock
     device: RegisterBlock
 
@@ -88,7 +90,8 @@ class RegisterTable:
 def register_table(design: GeneratedDesign) -> RegisterTable:
     """The registers of a design that was generated with its shell."""
     shell = read_shell(design.dir)
-    return RegisterTable(int(shell["version"]), shell_block(shell), _device_block(design.manifest, shell))
+    device = _device_block(design.manifest, shell)
+    return RegisterTable(int(shell["version"]), int(shell["postedWrites"]), shell_block(shell), device)
 
 
 def read_shell(folder: Path) -> dict[str, Any]:

@@ -52,9 +52,19 @@ def compile_c(sources: list[Path], program: Path, *options: str) -> Path:
     return program
 
 
-def test_every_error_has_its_name(tmp_path: Path) -> None:
-    program = compile_c([SOFTWARE / "tests" / "stub.c", *DRIVER], tmp_path / "stub")
-    done = subprocess.run([program], capture_output=True, text=True)
+@pytest.fixture(scope="module")
+def stub(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    tests = SOFTWARE / "tests"
+    return compile_c([tests / "stub.c", tests / "shell.c", *DRIVER], tmp_path_factory.mktemp("stub") / "stub")
+
+
+#: Every error has its name, and no access is made that the shell refuses.
+TESTS = ("probe", "images", "frames", "photos", "scenes", "names", "events", "posted writes", "long frame files")
+
+
+@pytest.mark.parametrize("test", (*TESTS, "refused frame files"))
+def test_the_driver_against_a_shell_that_refuses(stub: Path, test: str) -> None:
+    done = subprocess.run([stub, test], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
 

@@ -1,6 +1,7 @@
 package colonnade.bus
 
 import chisel3.Bundle
+import chisel3.util.log2Ceil
 import colonnade.axi.AxiLite
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{Access, Field, Json, Layout, Manifest, RegisterMap}
@@ -120,10 +121,11 @@ object ShellMap {
   /** `shell.json`, for drivers and test benches. */
   def json(config: ColonnadeConfig, shell: ShellConfig): String = Json.pretty(
     ujson.Obj(
-      "version"    -> version.toInt,
-      "busBytes"   -> shell.busBytes,
-      "deviceBase" -> deviceBase,
-      "registers"  -> ujson.Arr.from(registers.map { register =>
+      "version"      -> version.toInt,
+      "busBytes"     -> shell.busBytes,
+      "deviceBase"   -> deviceBase,
+      "postedWrites" -> postedWrites(config),
+      "registers"    -> ujson.Arr.from(registers.map { register =>
         ujson.Obj(
           "name"        -> register.name,
           "address"     -> register.address,
@@ -140,6 +142,9 @@ object ShellMap {
       "imageErrors"       -> ujson.Arr.from(ImageError.names)
     )
   )
+
+  /** Writes to the device's registers that the shell takes while a frame runs: at least its words. */
+  def postedWrites(config: ColonnadeConfig): Int = 1 << log2Ceil(RegisterMap.size(RegisterMap(config)))
 
   /** Words of the device's registers that may be written, without `control.start`: the shell starts frames. */
   def writableWords(config: ColonnadeConfig): Seq[Int] =

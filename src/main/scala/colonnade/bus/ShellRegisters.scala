@@ -78,7 +78,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
 
   // Writes to the device wait while a frame runs
   private val (posted, delivered) = withReset(reset.asBool || io.status.isResetting) {
-    val queue = Module(new Queue(new PostedWrite(config), 1 << log2Ceil(deviceWords), useSyncReadMem = true))
+    val queue = Module(new Queue(new PostedWrite(config), ShellMap.postedWrites(config), useSyncReadMem = true))
     // With short paths the memory's output is registered
     (queue, if (config.units.shortPaths) Queue(queue.io.deq, 2) else queue.io.deq)
   }
