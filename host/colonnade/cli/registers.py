@@ -28,7 +28,13 @@ def _address(context: click.Context, parameter: click.Parameter, value: str) -> 
 @click.option(
     "--base", callback=_address, default="0", metavar="ADDRESS", help="Where the device is, for SVD and device tree."
 )
-@click.option("--interrupt", type=click.IntRange(0), default=0, metavar="N", help="Its interrupt, for the device tree.")
+@click.option(
+    "--interrupt",
+    type=click.IntRange(0, 2**32 - 1),
+    default=0,
+    metavar="N",
+    help="Its interrupt, for the device tree: a cell of 32 bits.",
+)
 @click.option("--shell-header", type=FILE, metavar="FILE", help="Write only the C header of the shell's registers.")
 def registers(
     config: str,

@@ -7,11 +7,14 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from systemrdl import RDLCompiler
 
+from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_manifest_for
+from colonnade.integration.device_tree import device_tree
 from colonnade.integration.files import shell_header, write_registers
 from colonnade.integration.register_table import RegisterTable, register_table
 
@@ -86,6 +89,19 @@ def test_all_files_are_there(folder: Path) -> None:
     assert (folder / "html" / "index.html").is_file()
     assert ET.parse(folder / "colonnade.xml").getroot().tag.endswith("component")
     assert f"colonnade@{BASE:x}" in (folder / "colonnade.dtsi").read_text()
+
+
+@pytest.mark.parametrize("interrupt", ["4294967296", "999999999999999999999999999999", "-1"])
+def test_an_interrupt_beyond_a_cell_of_a_device_tree_is_refused(interrupt: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(cli, ["registers", "--interrupt", interrupt, "--output", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert f"{interrupt} is not in the range 0<=x<=4294967295" in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_numbers_of_a_device_tree_fit_their_cells(table: RegisterTable) -> None:
+    assert "reg = <0x90000000 0x10000>;" in device_tree(table, BASE, 5)
+    assert "reg = <0x12 0x90000000 0x10000>;" in device_tree(table, 0x12 << 32 | BASE, 2**32 - 1)
 
 
 def test_the_shell_is_the_same_in_every_design(design: GeneratedDesign) -> None:
