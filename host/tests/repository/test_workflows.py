@@ -1,0 +1,49 @@
+"""Continuous integration runs only actions and containers that are named by their content, with few permissions."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.y*ml"))
+
+_USES = re.compile(r"^\s*-?\s*uses:\s*(\S+)(.*)$", re.MULTILINE)
+_CONTAINER = re.compile(r"^\s*(?:container|image):\s*(\S+)", re.MULTILINE)
+_PERMISSION = re.compile(r"^ +([a-z-]+): write$", re.MULTILINE)
+
+
+def unpinned(workflow: str) -> list[str]:
+    """The actions that name no commit and version, and the containers that name no digest."""
+    actions = [
+        action
+        for action, comment in _USES.findall(workflow)
+        if not (re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", action) and re.fullmatch(r" # v\d+\.\d+\.\d+", comment))
+    ]
+    containers = _CONTAINER.findall(workflow)
+    return actions + [image for image in containers if not re.fullmatch(r"[\w./:-]+@sha256:[0-9a-f]{64}", image)]
+
+
+@pytest.mark.parametrize("file", WORKFLOWS, ids=lambda file: file.name)
+def test_actions_and_containers_are_pinned(file: Path) -> None:
+    assert unpinned(file.read_text()) == []
+
+
+def test_an_unpinned_action_is_found() -> None:
+    commit, digest = "0" * 40, "0" * 64
+    assert unpinned(f"  - uses: a/b@{commit} # v1.2.3\n    container: debian:x@sha256:{digest}\n") == []
+    assert unpinned(f"  - uses: a/b@v4\n  - uses: a/c@{commit}\n    container: debian:12\n") == [
+        "a/b@v4",
+        f"a/c@{commit}",
+        "debian:12",
+    ]
+
+
+@pytest.mark.parametrize("file", WORKFLOWS, ids=lambda file: file.name)
+def test_jobs_read_the_repository_and_write_only_pages(file: Path) -> None:
+    text = file.read_text()
+    assert re.search(r"^permissions:\n  contents: read\n(?=\S|\n)", text, re.MULTILINE)
+    assert set(_PERMISSION.findall(text)) <= {"pages", "id-token"}
+    assert text.count("persist-credentials: false") == text.count("uses: actions/checkout@")
