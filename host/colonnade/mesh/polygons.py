@@ -1,6 +1,7 @@
 """Splits polygons into triangles. Concave ones are split by ear clipping, so that no triangle leaves its polygon.
 
-This is our own code because trimesh splits all polygons as fans, and no library that we use clips ears in 3D.
+This is our own code because trimesh splits all polygons as fans, and because choices in numpy's float64 are the same on
+every machine, unlike those of a compiled library with fused multiply-add.
 """
 
 from __future__ import annotations
@@ -18,6 +19,10 @@ MAX_CORNERS = 2000
 
 #: A corner turns by no more than the rounding of its coordinates, radians.
 _STRAIGHT = 1e-9
+#: Tests for ears of a polygon, at most, for each of its corners.
+_TESTS = 20
+#: What stands in the way of a corner that is cut off as an ear: nothing, not known yet, or its own angle.
+_EAR, _UNKNOWN, _NOT_CONVEX = -1, -2, -3
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,9 @@ def triangulate(points: Floats, sizes: Indices) -> Triangles:
                 [np.stack([turned[:, 0], turned[:, k], turned[:, k + 1]], 1) for k in range(1, size - 1)], 1
             )
             for row in np.flatnonzero(needs_clipping):
-                fans[row] = outline[row][_clip_ears(points[outline[row]])]
+                ears, is_crossed = _clip_ears(points[outline[row]])
+                fans[row] = outline[row][ears]
+                crossed += int(is_crossed and not crosses[row])
         corners.append(fans.reshape(-1, 3))
         polygons.append(np.repeat(chosen, size - 2))
     if not corners:
@@ -104,54 +111,83 @@ def _fan_corners(outlines: Floats) -> tuple[Indices, npt.NDArray[np.bool_], npt.
     return np.zeros(count, dtype=np.int64), is_bent.any(axis=1) | crosses, crosses
 
 
-def _clip_ears(outline: Floats) -> Indices:
-    """Split one polygon, float64 [size, 3], into triangles, int64 [size - 2, 3].
+def _clip_ears(outline: Floats) -> tuple[Indices, bool]:
+    """Split one polygon, float64 [size, 3], into triangles, int64 [size - 2, 3], and say whether it crosses itself.
 
-    An ear is a convex corner whose triangle contains no other corner; it is cut off, until a triangle remains. An
-    outline that crosses itself may have no ear, then any corner is cut off.
+    An ear is a convex corner whose triangle contains no other corner; it is cut off, until a triangle remains. A corner
+    is tested again only when a neighbour or the corner in its way has gone, so a simple polygon takes some tests for
+    each corner. An outline that crosses itself may have no ear, then any corner is cut off; after too many tests the
+    rest becomes a fan.
     """
-    if len(outline) > MAX_CORNERS:
-        raise UserError(f"a concave polygon has {len(outline):,} corners: split it, {MAX_CORNERS:,} are supported")
+    count = len(outline)
+    if count > MAX_CORNERS:
+        raise UserError(f"a concave polygon has {count:,} corners: split it, {MAX_CORNERS:,} are supported")
     flat = _flattened(outline)
-    remaining = list(range(len(outline)))
+    before, after = [count - 1, *range(count - 1)], [*range(1, count), 0]
+    obstacles = [_UNKNOWN] * count
+    remains = np.ones(count, dtype=np.bool_)
     triangles: list[tuple[int, int, int]] = []
-    at = 0
-    while len(remaining) > 3:
-        count = len(remaining)
-        ears = (k % count for k in range(at, at + count) if _is_ear(flat, _corner(remaining, k % count), remaining))
-        k = next(ears, at % count)
-        triangles.append(_corner(remaining, k))
-        del remaining[k]
-        at = k + 1  # not the next one, which makes slivers around one corner
-    triangles.append(_corner(remaining, 1))
-    return np.array(triangles, dtype=np.int64)
+    at, tests, crosses = 0, 0, False
+    while count > 3:
+        for _ in range(count):
+            obstacle = obstacles[at]
+            if obstacle == _UNKNOWN or (obstacle >= 0 and not remains[obstacle]):
+                obstacle = obstacles[at] = _obstacle(flat, (before[at], at, after[at]), remains)
+                tests += 1
+            if obstacle == _EAR:
+                break
+            at = after[at]
+        else:
+            crosses = crosses or _has_area(flat[remains])
+        if tests > _TESTS * len(outline):
+            crosses = True
+            break
+        low, high = before[at], after[at]
+        triangles.append((low, at, high))
+        remains[at] = False
+        after[low], before[high] = high, low
+        obstacles[low] = obstacles[high] = _UNKNOWN
+        at = after[high]  # not the next one, which makes slivers around one corner
+        count -= 1
+    first = int(remains.argmax())
+    at = after[first]
+    while len(triangles) < len(outline) - 2:
+        triangles.append((first, at, after[at]))
+        at = after[at]
+    return np.array(triangles, dtype=np.int64), crosses
 
 
-def _corner(remaining: list[int], k: int) -> tuple[int, int, int]:
-    """A corner of what remains of a polygon, between its neighbours."""
-    return remaining[k - 1], remaining[k], remaining[(k + 1) % len(remaining)]
+def _has_area(flat: Floats) -> bool:
+    """Whether a polygon, float64 [size, 2], has more area than rounding leaves."""
+    relative = flat - flat[0]
+    area = _area(np.zeros(2), relative[:-1], relative[1:]).sum()
+    return abs(float(area)) > _STRAIGHT * float(np.abs(relative).max()) ** 2
 
 
 def _flattened(outline: Floats) -> Floats:
-    """A polygon's corners in its plane, counter-clockwise, float64 [size, 2]."""
+    """A polygon's corners in its plane, counter-clockwise, float64 [size, 2]; exact for integers of up to 25 bits."""
     relative = outline - outline[0]
-    relative = relative / max(float(np.abs(relative).max()), 1e-300)
+    relative = np.ldexp(relative, -int(np.frexp(np.abs(relative).max())[1]))
     normal = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
     axis = int(np.abs(normal).argmax())
     plane = relative[:, [(axis + 1) % 3, (axis + 2) % 3]]
     return np.asarray(plane if normal[axis] >= 0 else plane * (-1.0, 1.0), dtype=np.float64)
 
 
-def _is_ear(flat: Floats, ear: tuple[int, int, int], remaining: list[int]) -> bool:
-    """Whether a corner is convex, and its triangle holds no other corner, not even on the cut."""
+def _obstacle(flat: Floats, ear: tuple[int, int, int], remains: npt.NDArray[np.bool_]) -> int:
+    """`_EAR` if a corner is convex, and its triangle holds no other corner, not even on the cut.
+
+    Else `_NOT_CONVEX`, or the corner in the triangle that is farthest from the cut: it is concave in a simple polygon,
+    so that it remains for long.
+    """
     a, b, c = flat[list(ear)]
     if _area(a, b, c) <= _STRAIGHT * float(np.linalg.norm(b - a) * np.linalg.norm(c - b)):
-        return False
-    others = flat[[index for index in remaining if index not in ear]]
-    same = ((others == a) | (others == c)).all(axis=1) | (others == b).all(axis=1)
-    others = others[~same]
-    inside = (_area(a, b, others) >= 0) & (_area(b, c, others) >= 0) & (_area(c, a, others) >= 0)
-    return not bool(inside.any())
+        return _NOT_CONVEX
+    depth = _area(c, a, flat)
+    inside = (depth >= 0) & (_area(a, b, flat) >= 0) & (_area(b, c, flat) >= 0) & remains
+    found = np.flatnonzero(inside)
+    found = found[~(flat[found][:, None] == flat[list(ear)]).all(axis=2).any(axis=1)]
+    return int(found[depth[found].argmax()]) if len(found) else _EAR
 
 
 def _area(a: Floats, b: Floats, c: Floats) -> npt.NDArray[np.float64]:

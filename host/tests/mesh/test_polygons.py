@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
+from colonnade.mesh import polygons
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.polygons import MAX_CORNERS, triangulate
 
@@ -60,6 +62,84 @@ def test_a_star_shaped_polygon_is_covered_once(radii: list[float], tilt: float, 
     found = areas(flat[:, :1] * across + flat[:, 1:] * up, np.cross(across, up))
     assert found.min() >= -1e-9 * stretch
     assert found.sum() == pytest.approx(shoelace(flat), rel=1e-9)
+
+
+def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> int:
+    """Twice the signed area of a triangle of whole numbers."""
+    return int((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+
+def meet(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> bool:
+    """Whether two line segments have a common point."""
+
+    def holds(low: np.ndarray, high: np.ndarray, point: np.ndarray) -> bool:
+        return turn(low, high, point) == 0 and bool(((point - low) * (point - high) <= 0).all())
+
+    if turn(a, b, c) * turn(a, b, d) < 0 and turn(c, d, a) * turn(c, d, b) < 0:
+        return True
+    return holds(a, b, c) or holds(a, b, d) or holds(c, d, a) or holds(c, d, b)
+
+
+def untangled(points: list[tuple[int, int]]) -> np.ndarray | None:
+    """The points in the order of a counter-clockwise polygon that does not touch itself; None: not found."""
+    flat, size = np.array(points), len(points)
+    pairs = [(i, j) for i, j in combinations(range(size), 2) if 1 < j - i < size - 1]
+    for _ in range(50):
+        crossing = [(i, j) for i, j in pairs if meet(flat[i], flat[i + 1], flat[j], flat[(j + 1) % size])]
+        if not crossing:
+            spikes = [turn(flat[k - 2], flat[k - 1], flat[k]) == 0 for k in range(size)]
+            folds = [(flat[k - 2] - flat[k - 1]) @ (flat[k] - flat[k - 1]) > 0 for k in range(size)]
+            if any(spike and fold for spike, fold in zip(spikes, folds, strict=True)):
+                return None
+            return flat if shoelace(flat) > 0 else flat[::-1]
+        i, j = crossing[0]
+        flat[i + 1 : j + 1] = flat[i + 1 : j + 1][::-1]
+    return None
+
+
+@given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 7)), min_size=5, max_size=13, unique=True))
+@settings(deadline=None, max_examples=150)
+def test_a_simple_polygon_is_covered_exactly_once(points: list[tuple[int, int]]) -> None:
+    """Areas are positive, their sum is the polygon's, every corner is used, and the border is the polygon's."""
+    flat = untangled(points)
+    assume(flat is not None)
+    assert flat is not None
+    split = triangulate(np.column_stack([flat, 0 * flat[:, 0]]).astype(np.float64), np.array([len(flat)]))
+    doubled = [turn(*flat[corners]) for corners in split.corners]
+    assert min(doubled) > 0 and sum(doubled) == 2 * shoelace(flat) and split.crossed == 0
+    edges = [(int(c[k]), int(c[(k + 1) % 3])) for c in split.corners for k in range(3)]
+    border = {edge for edge in edges if edge[::-1] not in edges}
+    assert border == {(k, (k + 1) % len(flat)) for k in range(len(flat))} and len(set(edges)) == len(edges)
+
+
+def test_a_corner_level_with_one_neighbour_and_above_the_other_is_in_the_way() -> None:
+    """(6, 6) shares a coordinate with each end of the cut from (6, 1) to (4, 6), and lies beyond it."""
+    flat = np.array([(0, 0), (3, 0), (6, 1), (7, 7), (4, 6), (4, 5), (6, 6), (4, 1), (2, 1)], dtype=np.float64)
+    found = areas(np.column_stack([flat, np.zeros(9)]), np.array([0.0, 0, 1]))
+    assert found.min() >= 0 and found.sum() == shoelace(flat)
+
+
+def test_a_polygon_of_many_corners_takes_few_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A star that winds 95 times around its centre; and a comb, whose teeth all hold other corners."""
+    tests = 0
+    plain = polygons._obstacle
+
+    def counted(*values: object) -> int:
+        nonlocal tests
+        tests += 1
+        return plain(*values)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(polygons, "_obstacle", counted)
+    number = np.arange(600)
+    radius = 1.0 + number % 2
+    star = np.stack([radius * np.cos(number), radius * np.sin(number), 0 * radius], axis=1)
+    assert triangulate(star, np.array([600])).crossed == 1
+    assert tests <= 20 * 600 + 1
+    tests, number = 0, np.arange(MAX_CORNERS)
+    comb = np.column_stack([number, 100.0 * (number % 2), 0 * number])
+    comb[-2:, :2] = [(MAX_CORNERS, 101), (0, 101)]
+    assert areas(comb, np.array([0.0, 0, 1])).sum() == shoelace(comb[:, :2])
+    assert tests <= 4 * MAX_CORNERS
 
 
 def test_straight_corners_stay_corners_of_triangles_with_area() -> None:
