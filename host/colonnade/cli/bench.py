@@ -11,11 +11,14 @@ import click
 
 from colonnade.cli.options import (
     FILE,
+    MESH,
     configuration_options,
     echo,
+    echo_lines,
     finish,
     json_option,
     require_outputs,
+    require_suffix,
     size_option,
     strict_option,
 )
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Measure rays per cycle of the benchmark meshes.")
 @configuration_options
-@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Render only this mesh. Repeatable.")
+@click.option("--mesh", "meshes", multiple=True, type=MESH, metavar="MESH", help="Render only this mesh. Repeatable.")
 @size_option("Frame size in pixels.  [default: that of the benchmark scene]")
 @click.option(
     "--jobs",
@@ -80,6 +83,7 @@ def bench(
     from colonnade.common.frame_size import parse_size
 
     pixels = parse_size(size) if size is not None else None
+    require_suffix("--plot", plot, ".png")
     require_outputs(plot, json_file)
 
     from colonnade.common import progress
@@ -122,7 +126,7 @@ def bench(
         plot_stages(report, plot)
     report["mirror"] = None
     if mirror and int(manifest_for(config, overrides, terminal).manifest.config["frame"]["maxBounces"]) > 0:
-        echo("\nAs mirrors, with one reflection:")
+        echo_lines("\nAs mirrors, with one reflection:")
         report["mirror"] = measured(mirror=True)
     finish(report, json_file)
 

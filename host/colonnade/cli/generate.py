@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import FILE, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, configuration_options, echo, echo_lines, finish, json_option, require_outputs
 from colonnade.common.errors import UserError
 
 
@@ -51,7 +51,7 @@ def generate(
     terminal = progress.for_terminal()
     if print_manifest or output is None:
         design = generator.manifest_for(config, overrides, terminal)
-        echo((design.dir / "manifest.json").read_text().rstrip("\n"))
+        echo_lines((design.dir / "manifest.json").read_text().rstrip("\n"))
     else:
         design = generator.generate(
             config, overrides, output, manifest_only, black_box_memories, terminal, bus_bytes, pixel_stream

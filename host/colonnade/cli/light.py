@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import FILE, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, echo, echo_lines, finish, json_option, require_outputs
 
 
 @click.command(short_help="Fit lights to the photo of a room.")
@@ -30,7 +30,7 @@ def light(room: Path, count: int, output: Path | None, json_file: Path | None) -
     require_outputs(json_file, folders=[output])
 
     from colonnade.common import progress
-    from colonnade.common.atomic_files import make_folder
+    from colonnade.common.atomic_files import made_folder
     from colonnade.common.image_io import write_png
     from colonnade.environment.fitted_lights import fitted_lights
     from colonnade.environment.light_fit import comparison_picture, relit_psnr
@@ -53,9 +53,9 @@ def light(room: Path, count: int, output: Path | None, json_file: Path | None) -
         f" {fit.ambient_psnr:.1f} dB, the default light of scenes {before:.1f} dB."
     )
     echo(f"# Reflections show the photo with lights of {colours.headroom:.2f}x, too dark in {colours.clamped:.1%}.")
-    echo(scene_text(fit.lights))
+    echo_lines(scene_text(fit.lights))
     if output is not None:
-        make_folder(output)
-        write_png(output / "light.png", comparison_picture(environment, fit.lights))
+        with made_folder(output):
+            write_png(output / "light.png", comparison_picture(environment, fit.lights))
     report = asdict(fit) | {"default_psnr": before, "headroom": colours.headroom, "clamped": colours.clamped}
     finish(report, json_file)

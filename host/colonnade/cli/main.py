@@ -25,7 +25,7 @@ from colonnade.cli.registers import registers
 from colonnade.cli.render import render
 from colonnade.cli.study import study
 from colonnade.cli.verify import verify
-from colonnade.common import ledger, notes
+from colonnade.common import ledger, machine_limits, notes
 from colonnade.common.errors import UserError, reason_of
 from colonnade.common.processes import guarded
 from colonnade.common.terminal_text import one_line
@@ -60,6 +60,11 @@ class OneLineErrors(click.Group):
             _fail("interrupted", 130)
         except Exception as error:
             _fail(*_unexpected(error))
+        except BaseException as error:
+            # A package in Rust that failed raises no Exception
+            if type(error).__name__ != "PanicException":
+                raise
+            _fail(*_unexpected(error))
         sys.exit(status if isinstance(status, int) else 0)
 
     def resolve_command(
@@ -68,14 +73,16 @@ class OneLineErrors(click.Group):
         """Find the command; a former one is an error that names what replaces it."""
         if args[0] in REPLACED:
             ctx.fail(f"there is no {args[0]} any more: use {REPLACED[args[0]]}")
-        return super().resolve_command(ctx, args)
+        name, command, rest = super().resolve_command(ctx, args)
+        machine_limits.check(name or "")
+        return name, command, rest
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The commands in the order in which a user needs them, not alphabetically."""
         return list(self.commands)
 
 
-def _unexpected(error: Exception) -> tuple[str, int]:
+def _unexpected(error: BaseException) -> tuple[str, int]:
     """Message and exit status for an error that no command handles: a limit of the machine, or a bug."""
     if os.environ.get(DEBUG, "0") not in ("", "0"):
         traceback.print_exception(error)
@@ -89,6 +96,8 @@ def _unexpected(error: Exception) -> tuple[str, int]:
     if isinstance(error, UnicodeError):
         return f"the input is not UTF-8 text: {error}", WRONG_INPUT
     description = f"{type(error).__name__}: {error}".rstrip(": ")
+    if not isinstance(error, RuntimeError) and (limit := machine_limits.reached(1, str(error))) is not None:
+        return f"this machine's limit of {limit} is reached: {description}", WRONG_INPUT
     return f"{description} (internal error; {DEBUG}=1 prints the traceback)", BUG
 
 

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from colonnade.common.errors import UserError
 from colonnade.common.terminal_text import plain
 
 if TYPE_CHECKING:
     _NumberType = click.ParamType[float]
+    _TextType = click.ParamType[str]
 else:
-    _NumberType = click.ParamType
+    _NumberType = _TextType = click.ParamType
 
 
 class PositiveNumber(_NumberType):
@@ -63,11 +65,31 @@ def size_option(text: str) -> Callable[[Command], Command]:
     return click.option("--size", metavar="WxH", help=text)
 
 
+class MeshName(_TextType):
+    """The name or the file of a mesh. Scenes are UTF-8 text, and so are their meshes' names."""
+
+    name = "mesh"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Check the name."""
+        text = str(value)
+        if not text:
+            self.fail("name a mesh or a file", param, ctx)
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            self.fail(f"{text} is not UTF-8: rename the file", param, ctx)
+        return text
+
+
+MESH = MeshName()
+
+
 def mesh_option(command: Command) -> Command:
     """Add ``--mesh``, which replaces the scene's mesh."""
-    return click.option("--mesh", metavar="MESH", help="Replace the scene's mesh by this one: a name or a file.")(
-        command
-    )
+    return click.option(
+        "--mesh", type=MESH, metavar="MESH", help="Replace the scene's mesh by this one: a name or a file."
+    )(command)
 
 
 def strict_option(command: Command) -> Command:
@@ -121,9 +143,22 @@ def require_outputs(*paths: Path | None, folders: Sequence[Path | None] = ()) ->
             check_folder(folder)
 
 
+def require_suffix(option: str, path: Path | None, *suffixes: str) -> None:
+    """Refuse a file name that promises another format than the one that is written; a name may have no suffix."""
+    if path is not None and path.suffix and path.suffix.lower() not in suffixes:
+        formats = " or ".join(suffix[1:].upper() for suffix in suffixes)
+        raise UserError(f"{option} {path} is written as {formats}: end its name in {' or '.join(suffixes)}")
+
+
 def echo(text: str, err: bool = False) -> None:
-    """Print a line. Control characters, which files and arguments may contain, are escaped."""
+    """Print a line. Control characters and line ends, which files and arguments may contain, are escaped."""
     click.echo(plain(text), err=err)
+
+
+def echo_lines(text: str) -> None:
+    """Print a text of several lines. It holds nothing from files and arguments that could start a line."""
+    for line in text.split("\n"):
+        echo(line)
 
 
 def finish(report: Mapping[str, Any], json_file: Path | None) -> None:

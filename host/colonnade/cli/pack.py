@@ -94,21 +94,22 @@ def pack(
         room = lit_room(described, maps, surface.extent, max_lights(manifest), False, terminal)
         environment = encoded(room, manifest)
         image = pack_scene(room.scene, surface, manifest, environment)
+        # Everything is encoded before anything is written: a refusal leaves no file
+        others: list[tuple[str, Path, bytes]] = []
+        if device_image is not None:
+            others.append(("for a bus", device_image, encode_device_image(image, manifest)))
+        if dram_image is not None:
+            others.append(("for DRAM", dram_image, encode_dram_image(image, manifest)))
+        if frame_file is not None:
+            width, height = pixels or (described.frame.width, described.frame.height)
+            registers = frame_registers(room.scene, image.header, manifest, width, height, environment)
+            others.append(("a frame", frame_file, encode_frame_file(registers, manifest)))
     image.save(output)
     echo(f"packed      {file}")
-    if device_image is not None:
-        with replacing(device_image) as stream:
-            stream.write(encode_device_image(image, manifest))
-        echo(f"for a bus   {device_image}")
-    if dram_image is not None:
-        with replacing(dram_image) as stream:
-            stream.write(encode_dram_image(image, manifest))
-        echo(f"for DRAM    {dram_image}")
-    if frame_file is not None:
-        width, height = pixels or (described.frame.width, described.frame.height)
-        registers = frame_registers(room.scene, image.header, manifest, width, height, environment)
-        with replacing(frame_file) as stream:
-            stream.write(encode_frame_file(registers, manifest))
-        echo(f"a frame     {frame_file}, {width}x{height}")
+    for title, path, content in others:
+        with replacing(path) as stream:
+            stream.write(content)
+        size_of_frame = f", {width}x{height}" if path == frame_file else ""
+        echo(f"{title:<11} {path}{size_of_frame}")
     print_report(image.header, manifest, echo)
     finish({"file": str(file), **describe(image), "use": memory_use(image.header, manifest)}, json_file)

@@ -16,6 +16,7 @@ from colonnade.cli.options import (
     json_option,
     mesh_option,
     require_outputs,
+    require_suffix,
     size_option,
     strict_option,
 )
@@ -87,6 +88,7 @@ def render(
 ) -> None:
     """Render SCENE, a TOML file, and print its rays, cycles and seconds. With --frames the object or a light moves."""
     from colonnade.common.frame_size import parse_size
+    from colonnade.common.input_files import require_regular
     from colonnade.render.sequence import numbered, picture_files
 
     pixels = parse_size(size) if size is not None else None
@@ -95,7 +97,13 @@ def render(
     if frames is not None:
         pictures = picture_files(output, frames) if output is not None else []
         hits_files = numbered(hits_file, frames) if hits_file is not None else []
+    else:
+        require_suffix("--output", output, ".png")
+    require_suffix("--hits", hits_file, ".npz")
+    require_suffix("--waveform", waveform, ".vcd")
     require_outputs(*pictures, *hits_files, waveform, json_file)
+    if truth is not None:
+        require_regular(truth, "the room's geometry")
 
     from colonnade.common.hits import write_hits
     from colonnade.common.image_io import encode_srgb, write_png, write_webp

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
-from colonnade.cli.options import FILE, dists_option, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, dists_option, echo_lines, finish, json_option, require_outputs
 
 
 @click.command(short_help="Measure reconstructed rooms, or AR frames in them.")
@@ -54,50 +55,48 @@ def study(
     require_outputs(json_file, folders=[output])
 
     from colonnade.common import progress
-    from colonnade.common.atomic_files import make_folder
-
-    if output is not None:
-        make_folder(output)
+    from colonnade.common.atomic_files import made_folder
 
     report: dict[str, Any]
-    if occlusion:
-        from colonnade.evaluation.studies import occlusion as study_of_occlusion
+    with nullcontext() if output is None else made_folder(output):
+        if occlusion:
+            from colonnade.evaluation.studies import occlusion as study_of_occlusion
 
-        results = study_of_occlusion.study(progress.for_terminal(), output)
-        echo(study_of_occlusion.table(results))
-        report = {name: asdict(value) for name, value in results.items()}
-    elif frames:
-        from colonnade.evaluation.studies import ar_losses
+            results = study_of_occlusion.study(progress.for_terminal(), output)
+            echo_lines(study_of_occlusion.table(results))
+            report = {name: asdict(value) for name, value in results.items()}
+        elif frames:
+            from colonnade.evaluation.studies import ar_losses
 
-        terminal = progress.for_terminal()
-        with terminal.step("measuring frames"):
-            by_frame = ar_losses.study_frames(rooms, not no_dists, terminal, output)
-        echo(ar_losses.table(by_frame))
-        report = {
-            frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
-            for frame, by_loss in by_frame.items()
-        }
-    elif seeds is not None:
-        from colonnade.evaluation.studies import unseen_rooms
+            terminal = progress.for_terminal()
+            with terminal.step("measuring frames"):
+                by_frame = ar_losses.study_frames(rooms, not no_dists, terminal, output)
+            echo_lines(ar_losses.table(by_frame))
+            report = {
+                frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
+                for frame, by_loss in by_frame.items()
+            }
+        elif seeds is not None:
+            from colonnade.evaluation.studies import unseen_rooms
 
-        rooms_of_seeds = unseen_rooms.study_seeds(
-            unseen_rooms.parse_seeds(seeds), not no_dists, progress.for_terminal()
-        )
-        echo(unseen_rooms.table(rooms_of_seeds))
-        report = {str(seed): asdict(value) for seed, value in rooms_of_seeds.items()}
-    elif light:
-        from colonnade.evaluation.studies import room_light
+            rooms_of_seeds = unseen_rooms.study_seeds(
+                unseen_rooms.parse_seeds(seeds), not no_dists, progress.for_terminal()
+            )
+            echo_lines(unseen_rooms.table(rooms_of_seeds))
+            report = {str(seed): asdict(value) for seed, value in rooms_of_seeds.items()}
+        elif light:
+            from colonnade.evaluation.studies import room_light
 
-        terminal = progress.for_terminal()
-        with terminal.step("measuring the light"):
-            qualities = room_light.study_light(rooms, terminal, output)
-        echo(room_light.table(qualities))
-        report = {name: asdict(value) for name, value in qualities.items()}
-    else:
-        from colonnade.evaluation.studies import environment_accuracy
+            terminal = progress.for_terminal()
+            with terminal.step("measuring the light"):
+                qualities = room_light.study_light(rooms, terminal, output)
+            echo_lines(room_light.table(qualities))
+            report = {name: asdict(value) for name, value in qualities.items()}
+        else:
+            from colonnade.evaluation.studies import environment_accuracy
 
-        with progress.for_terminal().step("measuring the rooms"):
-            reports = environment_accuracy.study_rooms(rooms)
-        echo(environment_accuracy.table(reports))
-        report = {name: asdict(value) for name, value in reports.items()}
+            with progress.for_terminal().step("measuring the rooms"):
+                reports = environment_accuracy.study_rooms(rooms)
+            echo_lines(environment_accuracy.table(reports))
+            report = {name: asdict(value) for name, value in reports.items()}
     finish(report, json_file)

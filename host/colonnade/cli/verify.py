@@ -9,6 +9,7 @@ import click
 
 from colonnade.cli.options import (
     FILE,
+    MESH,
     configuration_options,
     echo,
     finish,
@@ -21,7 +22,7 @@ from colonnade.cli.options import (
 
 @click.command(short_help="Compare the RTL with its model, and the model with Embree.")
 @configuration_options
-@click.option("--mesh", "meshes", multiple=True, metavar="MESH", help="Render only this mesh. Repeatable.")
+@click.option("--mesh", "meshes", multiple=True, type=MESH, metavar="MESH", help="Render only this mesh. Repeatable.")
 @click.option(
     "--scene",
     type=FILE,

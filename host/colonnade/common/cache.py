@@ -79,6 +79,7 @@ def entry(
             if not (_is_known(folder) and is_usable(folder)):
                 if os.path.lexists(folder):
                     progress.note(f"the cached {what} was damaged and is built again")
+                temporary.remove_abandoned(".", folder.parent)
                 with temporary.temporary_folder(f".{folder.name}.", folder.parent) as content:
                     _fill(content, make, folder)
                     temporary.replace(content, folder)

@@ -21,7 +21,7 @@ def locked(path: Path, what: str, progress: Progress = QUIET) -> Iterator[None]:
         progress: Shows that this process waits.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(path, mode=0o666)
+    lock = FileLock(path, mode=_mode(path.parent))
     try:
         lock.acquire(timeout=0)
     except Timeout:
@@ -31,3 +31,9 @@ def locked(path: Path, what: str, progress: Progress = QUIET) -> Iterator[None]:
         yield
     finally:
         lock.release()
+
+
+def _mode(folder: Path) -> int:
+    """Permission bits of a lock in a folder: who may write there may hold it, since a holder stops all others."""
+    writers = folder.stat().st_mode & 0o222
+    return 0o600 | writers | writers << 1

@@ -1,12 +1,14 @@
 """Starts child programs, and ends all of them on a signal.
 
-Each program runs in its own process group, so that its children end with it. SIGINT, SIGTERM and SIGHUP raise
-`Interrupted` in the main thread; `guarded` then ends every program, removes temporary files and exits.
+Each program runs in its own process group, so that its children end with it. SIGINT, SIGTERM, SIGHUP and SIGXCPU raise
+`Interrupted` in the main thread; `guarded` then ends every program, removes temporary files and exits. On Linux a
+program also ends when this process is killed.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import signal
 import subprocess
@@ -17,6 +19,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, NoReturn
 
+from colonnade.common import machine_limits
+from colonnade.common.errors import UserError
+
 #: Seconds between SIGTERM and SIGKILL.
 GRACE = 0.5
 
@@ -26,9 +31,18 @@ CLEANUP_SECONDS = 0.7
 #: Seconds in which further signals are ignored, because `timeout` and terminals may send several.
 REPEAT_SECONDS = 3.0
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
+
+_WORDS = {
+    signal.SIGINT: "interrupted",
+    signal.SIGXCPU: "this machine's limit of processor time is reached: raise ulimit -t",
+}
 
 _Stream = int | IO[str] | None
+
+#: Linux: the signal that a process receives when its parent ends.
+_PR_SET_PDEATHSIG = 1
+_libc = ctypes.CDLL(None) if sys.platform == "linux" else None
 
 
 class Interrupted(BaseException):
@@ -125,9 +139,16 @@ def run(
     stdout: _Stream = subprocess.PIPE,
     stderr: _Stream = subprocess.PIPE,
 ) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end, like `subprocess.run`; captures its output as text unless redirected."""
+    """Run a program to its end, like `subprocess.run`; captures its output as text unless redirected.
+
+    Raises:
+        UserError: A limit of this machine ended the program.
+    """
     with started(command, cwd=cwd, env=env, stdout=stdout, stderr=stderr) as process:
         output, errors = process.communicate()
+    limit = machine_limits.reached(process.returncode, f"{output or ''}{errors or ''}")
+    if limit is not None:
+        raise UserError(f"{Path(str(command[0])).name} reached this machine's limit of {limit}")
     return subprocess.CompletedProcess(list(map(str, command)), process.returncode, output, errors)
 
 
@@ -142,6 +163,15 @@ def _start(
     # Under the lock, so that ending a group finds all of its programs
     with _lock:
         _refuse_ended(group)
+        parent = os.getpid()
+
+        def end_with_parent() -> None:
+            # In the new process. The kernel does not tell of a parent that ended before
+            if _libc is not None:
+                _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+            if os.getppid() != parent:
+                os._exit(1)
+
         process = subprocess.Popen(
             list(map(str, command)),
             cwd=cwd,
@@ -152,6 +182,7 @@ def _start(
             text=True,
             errors="replace",
             start_new_session=True,
+            preexec_fn=end_with_parent,
         )
         _running[process] = group
         return process
@@ -255,6 +286,5 @@ def _leave(number: int) -> NoReturn:
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
     with contextlib.suppress(OSError, ValueError):
-        word = "interrupted" if number == signal.SIGINT else "terminated"
-        print(f"colonnade: error: {word}", file=sys.stderr, flush=True)
+        print(f"colonnade: error: {_WORDS.get(signal.Signals(number), 'terminated')}", file=sys.stderr, flush=True)
     os._exit(128 + number)

@@ -1,4 +1,4 @@
-"""Makes text from files and arguments safe for a terminal: no control characters, limited length."""
+"""Makes text from files and arguments safe for a terminal: one line, no control characters, limited length."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from colonnade.common.limits import MAX_MESSAGE, MAX_WORD
 
 
 def plain(text: str) -> str:
-    """Escape all characters but printable ones and line ends, e.g. ESC as ``\\x1b``."""
+    """Escape all characters but printable ones, e.g. ESC as ``\\x1b``: a name in a line cannot start another one."""
     if text.isprintable():
         return text
-    return "".join(char if char.isprintable() or char == "\n" else _escaped(char) for char in text)
+    return "".join(char if char.isprintable() else _escaped(char) for char in text)
 
 
 def one_line(text: str) -> str:

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from colonnade.common import cache, processes
+from colonnade.common import cache, machine_limits, processes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.config_name import ConfigurationSource, find_configuration
@@ -34,7 +34,7 @@ DESIGN = "design"
 CLASSPATH = "classpath.json"
 
 #: Most of the generator's code runs once. The optimising compiler of Java would take longer than it saves.
-JAVA_OPTIONS = ("-XX:TieredStopAtLevel=1",)
+JAVA_OPTIONS = ("-XX:TieredStopAtLevel=1", "-XX:ErrorFile=/dev/null")
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
@@ -194,6 +194,8 @@ def _compile(root: Path, log: Path, progress: Progress) -> list[str]:
         command = [str(root / "tools" / "sbt"), "compile", "export Runtime/fullClasspath"]
         status = processes.run(command, stdout=stream, stderr=subprocess.STDOUT).returncode
     lines = _ANSI.sub("", log.read_text(errors="replace")).splitlines()
+    if (limit := machine_limits.reached(status, "\n".join(lines))) is not None:
+        raise UserError(f"compiling the generator reached this machine's limit of {limit} (full log: {log})")
     if status != 0:
         errors = [line.removeprefix("[error]").strip() for line in lines if line.startswith("[error]")]
         first = errors[0] if errors else (lines[-1] if lines else f"sbt ended with status {status}")

@@ -10,6 +10,7 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 from colonnade.scene.model import Camera, Vector
 from colonnade.scene.object_pose import Pose
 from colonnade.scene.samples import Point
@@ -104,13 +105,12 @@ def environment_camera(environment: Environment, width: int, height: int) -> Wor
 
 def camera_axes(toward: Floats, up: Vector) -> tuple[Floats, Floats, Floats]:
     """Unit vectors right, up and towards the viewer; another axis replaces an ``up`` parallel to the view."""
-    back = toward / np.linalg.norm(toward)
+    back = unit_vectors(toward)
     for candidate in (up, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)):
-        right = np.cross(candidate, back)
-        length = float(np.linalg.norm(right))
-        if length > 1e-9 * float(np.linalg.norm(candidate)):
+        right = np.cross(unit_vectors(np.array(candidate)), back)
+        if float(np.linalg.norm(right)) > 1e-9:
             break
-    right = right / length
+    right = unit_vectors(right)
     return right, np.cross(back, right), back
 
 

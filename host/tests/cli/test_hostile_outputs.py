@@ -10,7 +10,7 @@ from pathlib import Path
 import hostile
 import pytest
 from click.testing import CliRunner
-from hostile import PACK, RENDER, Case, fifo, hard_link_to, link_to, read_only
+from hostile import PACK, RENDER, SCENE, Case, fifo, hard_link_to, link_to, read_only
 
 from colonnade.cli.main import cli
 from colonnade.design.design_folder import MARKER, TITLE, check_replaceable, write_marker
@@ -65,25 +65,25 @@ CASES |= {
     "in-proc": Case(f"{RENDER} --output /proc/f.png", "/proc"),
     "long-path": Case(f"{RENDER} --output {'d/' * 3000}f.png", "File name too long"),
     # An input of the same command
-    "scene": Case(f"{RENDER} --output s.toml", "would replace s.toml"),
+    "scene": Case(f"{RENDER.replace('s.toml', 's.png')} --output s.png", "would replace s.png", {"s.png": SCENE}),
     "scene-as-json": Case(f"{RENDER} --json s.toml", "would replace s.toml"),
-    "scene-as-hits": Case(f"{RENDER} --hits s.toml", "would replace s.toml"),
-    "scene-other-spelling": Case(f"{RENDER} --output p/../s.toml", "would replace s.toml"),
+    "scene-as-hits": Case(f"{RENDER} --hits h", "would replace s.toml", {"h": hard_link_to("s.toml")}),
+    "scene-other-spelling": Case(f"{RENDER} --json p/../s.toml", "would replace s.toml"),
     "scene-by-hard-link": Case(f"{RENDER} --output l.png", "would replace s.toml", {"l.png": hard_link_to("s.toml")}),
     "scene-through-link": Case(
-        "render l.toml --config tiny --backend model --size 8x8 --output s.toml",
+        "render l.toml --config tiny --backend model --size 8x8 --json s.toml",
         "would replace l.toml",
         {"l.toml": link_to("s.toml")},
     ),
     "scene-is-json": Case(f"{PACK} --output q --json s.toml", "would replace s.toml"),
-    "mesh": Case(f"{RENDER} --mesh tri.obj --output tri.obj", "would replace tri.obj"),
+    "mesh": Case(f"{RENDER} --mesh tri.obj --json tri.obj", "would replace tri.obj"),
     "mesh-of-the-scene": Case(
         "render x.toml --config tiny --backend model --size 8x8 --json tri.obj",
         "would replace tri.obj",
         {"x.toml": '[mesh]\npath = "tri.obj"\n'},
     ),
     "materials": Case(
-        f"{RENDER} --mesh m.obj --output m.mtl",
+        f"{RENDER} --mesh m.obj --json m.mtl",
         "would replace",
         {"m.obj": "mtllib m.mtl\n" + hostile.TRIANGLE, "m.mtl": "newmtl a\nKd 1 0 0\n"},
     ),
@@ -106,7 +106,16 @@ CASES |= {
         f"{RENDER} --output a.png --json l.png", "two outputs", {"l.png": hard_link_to("a.png")}
     ),
     "json-is-a-frame": Case(f"{RENDER} --frames 3 --output f.png --json f_0001.png", "two outputs"),
-    "hits-are-frames": Case(f"{RENDER} --frames 3 --output f.png --hits f.png", "two outputs"),
+    "hits-are-json": Case(f"{RENDER} --json f.npz --hits f.npz", "two outputs"),
+    "picture-as-jpeg": Case(f"{RENDER} --output o.jpg", "o.jpg is written as PNG: end its name in .png"),
+    "picture-as-webp": Case(f"{RENDER} --output o.webp", "o.webp is written as PNG"),
+    "hits-as-png": Case(f"{RENDER} --hits h.png", "h.png is written as NPZ: end its name in .npz"),
+    "waveform-as-png": Case(f"{RENDER} --waveform w.png", "w.png is written as VCD"),
+    "plot-as-pdf": Case("bench --plot p.pdf", "p.pdf is written as PNG"),
+    "truth-is-a-pipe": Case(f"{RENDER} --background room --truth t.ply", "t.ply: it is a pipe", {"t.ply": fifo}),
+    "frame-too-large-after-packing": Case(
+        f"{PACK} --output q --frame-file f --size 99999x9", "99999", {"q": lambda path: path.mkdir()}
+    ),
     "frame-is-a-pipe": Case(f"{RENDER} --frames 3 --output f.png", "a pipe", {"f_0002.png": fifo}),
     "json-is-plot": Case("bench --plot f --json f", "two outputs"),
     "json-is-image": Case(f"{PACK} --output q.image --json q.image", "two outputs"),

@@ -17,9 +17,11 @@ from click.testing import CliRunner
 from hostile import PACK, RENDER
 
 from colonnade.cli.main import DEBUG, cli
-from colonnade.common import atomic_files, image_io
+from colonnade.common import atomic_files, image_io, processes
+from colonnade.common.errors import UserError
 
 SECONDS = 30
+LIVING = Path(__file__).resolve().parents[3] / "scenes" / "rooms" / "living"
 IS_ROOT = os.geteuid() == 0
 
 
@@ -54,6 +56,8 @@ FULL = {
     "pack": f"{PACK} --mesh sphere:2000 --output disk/q",
     "generate": "generate --config tiny --manifest-only --output disk/d",
     "json": "inspect p --json disk/r.json",
+    "light": f"light {LIVING} --lights 0 --output disk/d",
+    "maps": "inspect --background room --no-dists --output disk/d",
 }
 
 
@@ -67,7 +71,9 @@ def test_full_disk_is_one_line_and_leaves_nothing(folder: Path, arguments: str) 
         before = hostile.snapshot(folder)
         done = colonnade(folder, arguments)
         assert done.returncode == 2
-        hostile.one_error_line(done.stderr, "o space left on ")
+        notes, _, error = done.stderr.rstrip("\n").rpartition("\n")
+        assert "error" not in notes
+        hostile.one_error_line(f"{error}\n", "o space left on ")
         assert hostile.snapshot(folder) == before
 
 
@@ -153,18 +159,24 @@ def test_arguments_may_be_invalid_utf_8(folder: Path) -> None:
     hostile.one_error_line(done.stderr, "\\xff\\x1b[31m.toml")
 
 
+class PanicException(BaseException):
+    """As packages in Rust raise it."""
+
+
 ESCAPED = {
     "memory": (MemoryError(), 2, "out of memory"),
     "recursion": (RecursionError("maximum depth"), 2, "nested too deeply"),
     "system": (OSError(5, "Input/output error", "a\x1b[31m"), 2, "a\\x1b[31m: Input/output error"),
     "text": (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid"), 2, "UTF-8"),
+    "loader": (ImportError("x.so: failed to map segment from shared object"), 2, "ulimit -v"),
+    "rust": (PanicException("no file handle"), 1, f"PanicException: no file handle (internal error; {DEBUG}=1"),
     "bug": (KeyError("rows"), 1, f"{DEBUG}=1 prints the traceback"),
 }
 
 
 @pytest.mark.parametrize(("error", "status", "says"), ESCAPED.values(), ids=list(ESCAPED))
 def test_an_unexpected_exception_is_one_line(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, error: Exception, status: int, says: str
+    folder: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, status: int, says: str
 ) -> None:
     def broken(path: Path) -> None:
         raise error
@@ -179,3 +191,51 @@ def test_an_unexpected_exception_is_one_line(
     monkeypatch.setenv(DEBUG, "1")
     with hostile.inside(folder):
         assert "Traceback" in CliRunner().invoke(cli, ["compare", "a.png", "b.png"]).stderr
+
+
+LIMITS = {
+    "files": ("-n 16", "inspect p", "allows 16 open files, a command needs 64: raise ulimit -n"),
+    "memory": ("-v 500000", "inspect p", "allows 488 MB of address space, colonnade inspect needs 2,048"),
+    "explorer": ("-v 4000000", "explore s.toml --output o", "colonnade explore needs 16,384: raise ulimit -v"),
+}
+
+
+@pytest.mark.parametrize(("limit", "arguments", "says"), LIMITS.values(), ids=list(LIMITS))
+def test_a_limit_of_the_machine_is_named(folder: Path, limit: str, arguments: str, says: str) -> None:
+    done = colonnade(folder, arguments, before=["bash", "-c", f'ulimit {limit}; exec "$@"', "bash"])
+    assert done.returncode == 2
+    hostile.one_error_line(done.stderr, says)
+
+
+@pytest.mark.parametrize(
+    ("script", "says"),
+    [
+        ("echo 'There is insufficient memory for the Java Runtime'; exit 1", "memory or address space"),
+        ("kill -XCPU $$", "processor time"),
+    ],
+)
+def test_a_program_that_reaches_a_limit_is_no_internal_error(script: str, says: str) -> None:
+    with pytest.raises(UserError, match=f"sh reached this machine's limit of {says}"):
+        processes.run(["sh", "-c", script])
+
+
+def test_a_mesh_needs_a_name_in_utf_8(folder: Path) -> None:
+    with hostile.inside(folder):
+        for name, says in (("", "name a mesh or a file"), ("\udcff.obj", "\\xff.obj is not UTF-8: rename the file")):
+            done = CliRunner().invoke(cli, [*RENDER.split(), "--mesh", name])
+            assert done.exit_code == 2, done.output
+            hostile.one_error_line(done.stderr, says)
+
+
+def test_a_name_with_a_line_end_starts_no_line(folder: Path) -> None:
+    """Neither a note on a mesh nor the text that is meant for a scene file."""
+    name = "a\nb.obj"
+    (folder / name).write_text(hostile.TRIANGLE + "usemtl none\nl 1 2\n")
+    shutil.copytree(LIVING, folder / "r\n[light]\nx")
+    with hostile.inside(folder):
+        done = CliRunner().invoke(cli, [*RENDER.split(), "--mesh", name])
+        assert done.exit_code == 0, done.output
+        assert all(line.startswith("colonnade: ") for line in done.stderr.splitlines()), done.stderr
+        done = CliRunner().invoke(cli, ["light", "r\n[light]\nx", "--lights", "0"])
+    assert done.exit_code == 0, done.output
+    assert done.stdout.splitlines().count("[light]") == 1 and "\\n[light]\\nx" in done.stdout

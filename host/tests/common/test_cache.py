@@ -15,6 +15,7 @@ import pytest
 
 from colonnade.common import cache
 from colonnade.common.errors import UserError
+from colonnade.common.locks import locked
 
 KEY = {"design": "d0", "registers": {"frame.width": 8}}
 CONTENT = {"cycles": 1234, "counters": {"hits": 5}}
@@ -207,3 +208,21 @@ def test_a_measurement_that_cannot_be_stored_is_one_line(tmp_path: Path, capsys:
     (tmp_path / "file").write_text("")
     cache.store(tmp_path / "file" / "k.json", KEY, CONTENT)
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_leftovers_of_killed_processes_go_whatever_their_key(tmp_path: Path, made: list[Path]) -> None:
+    left = tmp_path / ".k9.abc"
+    (left / "content").mkdir(parents=True)
+    (left / "lock").touch()
+    foreign = tmp_path / ".other"
+    foreign.mkdir()
+    (foreign / "file").touch()
+    get(tmp_path / "k0", made)
+    assert not left.exists() and foreign.exists()
+
+
+@pytest.mark.parametrize(("folder_mode", "lock_mode"), [(0o755, 0o600), (0o775, 0o660), (0o777, 0o666)])
+def test_only_who_may_write_a_cache_may_hold_its_locks(tmp_path: Path, folder_mode: int, lock_mode: int) -> None:
+    tmp_path.chmod(folder_mode)
+    with locked(tmp_path / "lock", "entry"):
+        assert (tmp_path / "lock").stat().st_mode & 0o777 == lock_mode

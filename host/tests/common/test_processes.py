@@ -73,7 +73,7 @@ def begun() -> Iterator[list[subprocess.Popen[str]]]:
         process.kill()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU])
 @pytest.mark.parametrize(("kind", "programs"), [("pool", 4), ("alone", 2), ("busy", 0)])
 def test_a_signal_to_the_parent_ends_everything(
     kind: str, programs: int, number: signal.Signals, tmp_path: Path, begun: list[subprocess.Popen[str]]
@@ -95,7 +95,7 @@ def test_a_signal_to_the_parent_ends_everything(
     # It takes at most 1.3 seconds on an idle machine
     assert time.monotonic() - at < 4.0
     assert process.returncode == 128 + number
-    assert said == f"colonnade: error: {'interrupted' if number == signal.SIGINT else 'terminated'}\n"
+    assert said == f"colonnade: error: {processes._WORDS.get(number, 'terminated')}\n"
     assert not [pid for pid in below if is_running(pid)]
     assert list(tmp_path.iterdir()) == []
 
@@ -172,3 +172,15 @@ def test_a_program_ends_when_its_block_fails() -> None:
     with pytest.raises(KeyError), processes.started(["sleep", "61"]) as process:
         raise KeyError
     assert process.returncode == -signal.SIGTERM
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells programs of their parent's end")
+def test_programs_end_when_their_parent_is_killed(tmp_path: Path, begun: list[subprocess.Popen[str]]) -> None:
+    code = "from colonnade.common import processes; processes.run(['sleep', '61'])"
+    process = subprocess.Popen([sys.executable, "-c", code], text=True)
+    begun.append(process)
+    wait_for(lambda: len(children(process.pid)) == 1)
+    (below,) = children(process.pid)
+    time.sleep(0.1)
+    process.kill()
+    wait_for(lambda: not is_running(below))

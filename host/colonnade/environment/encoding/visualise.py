@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common.atomic_files import make_folder, replacing
+from colonnade.common.atomic_files import made_folder, replacing
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.encoding.image import AttributeImage
 from colonnade.environment.encoding.planes import PlaneProjection
@@ -45,10 +45,10 @@ def write_pictures(folder: Path, pictures: dict[str, NDArray[np.uint8]]) -> None
     """Write each picture as ``NAME.png`` into ``folder``, which is created."""
     from PIL import Image
 
-    make_folder(folder)
-    for name, picture in pictures.items():
-        with replacing(folder / f"{name}.png") as stream:
-            Image.fromarray(picture).save(stream, format="PNG")
+    with made_folder(folder):
+        for name, picture in pictures.items():
+            with replacing(folder / f"{name}.png") as stream:
+                Image.fromarray(picture).save(stream, format="PNG")
 
 
 def _levels(values: NDArray[np.float64]) -> NDArray[np.uint8]:

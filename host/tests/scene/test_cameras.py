@@ -1,0 +1,16 @@
+"""Cameras at the ends of the range of floating-point numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from colonnade.scene.cameras import camera_axes
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("length", [5e-324, 1e-320, 1e-200, 1.0, 1e12])
+def test_the_length_of_a_direction_does_not_matter(length: float) -> None:
+    """Neither the view's nor that of up."""
+    axes = np.stack(camera_axes(np.array([length, 0.0, 0.0]), (0.0, length, 0.0)))
+    assert axes.tolist() == [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
