@@ -60,7 +60,8 @@ class Table:
     def print(self, *values: object) -> None:
         """Print a row: a value for each column."""
         if not self._is_begun:
-            self._echo(self.heading())
+            for line in self.heading().split("\n"):
+                self._echo(line)
         self._is_begun = True
         self._echo(_joined(column.cell(value) for column, value in zip(self._columns, values, strict=True)))
 

@@ -153,7 +153,7 @@ CASES = {
     "gltf-buffer-absolute": Case(GLTF, "outside", of_gltf(buffers=buffer("/etc/hostname"))),
     "gltf-buffer-named-300": Case(GLTF, "x.gltf", of_gltf(buffers=buffer("b" * 300))),
     "gltf-buffer-is-output": Case(
-        f"{GLTF} --output b.bin", "would replace", of_gltf(buffers=buffer("b.bin")) | {"b.bin": b"\0" * 42}
+        f"{GLTF} --json b.bin", "would replace", of_gltf(buffers=buffer("b.bin")) | {"b.bin": b"\0" * 42}
     ),
     "gltf-index": Case(
         GLTF,

@@ -25,7 +25,7 @@ def test_columns_are_aligned_with_titles_and_groups() -> None:
     assert not lines, "no heading without a row"
     table.print("cube", 1234, 0.5, None)
     table.print("torus", 5, 12.0, 0.125)
-    assert "\n".join(lines).split("\n") == [
+    assert lines == [
         "                 rays",
         "mesh     cycles  in box    all",
         "cube      1,234    0.50      -",
