@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from colonnade.common.errors import UserError
+from colonnade.common.input_files import read_input
+from colonnade.common.limits import MAX_LIBERTY_BYTES
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.config_name import find_configuration
 from colonnade.design.frame_limits import check_size
@@ -235,7 +237,7 @@ def _job(kind: str, title: str, identity: Mapping[str, Any], arguments: Mapping[
 def _frames(file: StudyFile) -> list[Frame]:
     workload = file.study.workload
     meshes: dict[str, Mesh] = {}
-    found = []
+    found: list[Frame] = []
     for name in workload.scenes:
         try:
             scene = load_scene(file.path.parent / name)
@@ -257,6 +259,9 @@ def _frames(file: StudyFile) -> list[Frame]:
             stem = Path(name).stem
             title = f"{stem}, {source}" if both else stem if source is None else source
             mesh = replace(meshes[key], name=source or meshes[key].name)
+            if any(title == frame.name for frame in found):
+                where = ("workload", "scenes", name) if source is None else ("workload", "meshes", source)
+                raise file.error(where, f"two frames are named {title}: rename a scene's file, or name a mesh once")
             found.append(frame_of(title, own, mesh, source))
     return found
 
@@ -266,4 +271,9 @@ def _library(file: StudyFile, name: str, given: Mapping[str, Sequence[str]]) -> 
     if name not in given:
         advice = f"--library {name}=FILE names its liberty files"
         raise file.error(("libraries", name), f"the library {name} has no files: {advice}")
-    return {path.name: path.read_bytes() for path in find_liberties(given[name])}
+    found: dict[str, bytes] = {}
+    for path in find_liberties(given[name]):
+        # Files of two folders may share a name
+        own = path.name if path.name not in found else f"{len(found)}-{path.name}"
+        found[own] = read_input(path, "the liberty", MAX_LIBERTY_BYTES)
+    return found

@@ -6,7 +6,6 @@ import contextlib
 import csv
 import io
 import json
-import re
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from colonnade import __version__
 from colonnade.common import processes
 from colonnade.common.atomic_files import make_folder, replacing, write_json
 from colonnade.common.errors import UserError, reason_of
+from colonnade.common.file_names import FileNames
 from colonnade.design.toolchain import project_root
 from colonnade.explore import figures, render_index
 from colonnade.explore.jobs import Job
@@ -146,12 +146,13 @@ class Results:
         outcomes: Mapping[str, Outcome],
     ) -> None:
         """Copy the pictures of all results, and name them in the study."""
+        names = FileNames()
 
         def copy(job: Job | None, name: str) -> str | None:
             outcome = outcomes.get(job.key) if job else None
             if not isinstance(outcome, Path):
                 return None
-            relative = f"{PICTURES}/{_file_name(name)}.png"
+            relative = f"{PICTURES}/{names.of(name)}.png"
             make_folder((self._folder / relative).parent)
             with replacing(self._folder / relative) as stream:
                 stream.write((outcome / PICTURE).read_bytes())
@@ -181,10 +182,6 @@ def table(study: Mapping[str, Any]) -> str:
         own = [point["figures"].get(key) for key in keys]
         writer.writerow([point["name"], *values, point["config_hash"], point["on_front"], *own, reasons])
     return text.getvalue()
-
-
-def _file_name(name: str) -> str:
-    return re.sub(r"[^\w=.-]+", "_", name)
 
 
 def _commit() -> tuple[str | None, bool]:

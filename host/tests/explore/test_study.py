@@ -141,3 +141,14 @@ def test_scenes_of_several_samples_are_refused(tmp_path: Path, text: str) -> Non
     (tmp_path / "object.toml").write_text(f'mesh.name = "cube"\n{text}\n')
     with pytest.raises(UserError, match=rf"object\.toml: a study renders one sample a pixel: leave out {text[:5]}"):
         Plan(study(tmp_path, STUDY), {})
+
+
+def test_two_frames_of_one_name_are_refused(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "s.toml").write_text('mesh.name = "cube"\n')
+    alone = STUDY.replace('meshes = ["cube"]\n', "").replace('["object.toml"]', '["a/s.toml", "b/s.toml"]')
+    with pytest.raises(UserError, match=r"study\.toml:15: two frames are named s: rename a scene's file"):
+        Plan(study(tmp_path, alone), {})
+    with pytest.raises(UserError, match=r":16: two frames are named cube"):
+        Plan(study(tmp_path, STUDY.replace("object", "a/s").replace('["cube"]', '["cube", "cube"]')), {})

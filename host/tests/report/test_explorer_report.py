@@ -281,4 +281,4 @@ def test_plots_of_any_study_have_names_of_their_own(tmp_path: Path, change: Chan
     paths = write_plots(tmp_path)
     assert paths
     assert len(set(paths)) == len(paths)
-    assert all(re.fullmatch(r"[A-Za-z0-9._-]+", path.name) and path.is_file() for path in paths)
+    assert all(re.fullmatch(r"[A-Za-z0-9=._-]+", path.name) and path.is_file() for path in paths)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 import itertools
-import re
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ from typing import Any
 import vl_convert
 
 from colonnade.common.atomic_files import make_folder, replacing
+from colonnade.common.file_names import FileNames
 from colonnade.report.explorer.charts import INK, Spec
 from colonnade.report.explorer.rows import LEVELS
 from colonnade.report.explorer.sections import Chart, bar_charts, scatter_axes, scatter_chart
@@ -21,9 +20,6 @@ from colonnade.report.explorer.study import Study, objectives
 #: Width of a plot, CSS pixels, and how many pixels of a PNG each is.
 WIDTH = 760
 SCALE = 2.0
-
-#: Characters of a file name; equal names are numbered.
-MAX_NAME = 100
 
 
 def write_all(study: Study, folder: Path) -> list[Path]:
@@ -41,11 +37,9 @@ def write_all(study: Study, folder: Path) -> list[Path]:
 
 def plots(study: Study) -> Iterator[tuple[str, Spec]]:
     """File name and specification of each plot."""
-    count: Counter[str] = Counter()
+    names = FileNames()
     for name, spec in _all(study):
-        file = re.sub(r"[^A-Za-z0-9._-]+", "-", name)[:MAX_NAME]
-        count[file] += 1
-        yield file if count[file] == 1 else f"{file}.{count[file]}", spec
+        yield names.of(name), spec
 
 
 def _all(study: Study) -> Iterator[tuple[str, Spec]]:
