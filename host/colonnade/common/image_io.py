@@ -20,10 +20,20 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from PIL.Image import Image as PillowImage
 
-#: Formats that are read; Pillow decodes them without external programs.
-FORMATS = ("PNG", "JPEG", "WEBP")
+#: Formats that are read, with the bytes that they begin with; Pillow decodes them without external programs.
+FORMATS = {"PNG": b"\x89PNG", "JPEG": b"\xff\xd8\xff", "WEBP": b"RIFF"}
+#: A format of textures, which has no such bytes: the suffix of the file's name decides.
+TARGA = "TGA"
 #: Duration of an animation frame.
 FRAME_MILLISECONDS = 50
+
+
+class UnknownFormat(UserError):
+    """A picture has none of the formats that are read."""
+
+
+class TooManyPixels(UserError):
+    """A picture has more than `MAX_PIXELS`."""
 
 
 def encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -75,19 +85,20 @@ def opened_picture(path: Path, missing: str | None = None) -> Iterator[PillowIma
     Raises:
         UserError: The file has another format, too many pixels, or cannot be decoded.
     """
-    with _opened(read_input(path, "the picture", MAX_PICTURE_BYTES, missing), str(path)) as picture:
+    with opened_bytes(read_input(path, "the picture", MAX_PICTURE_BYTES, missing), str(path)) as picture:
         yield picture
 
 
 @contextlib.contextmanager
-def _opened(data: bytes, name: str) -> Iterator[PillowImage]:
+def opened_bytes(data: bytes, name: str, formats: Iterable[str] = FORMATS) -> Iterator[PillowImage]:
+    """As `opened_picture`, of a picture's bytes; ``name`` names it in messages."""
     from PIL import Image, UnidentifiedImageError
 
-    too_large = UserError(f"{name} has too many pixels: a picture may have {MAX_PIXELS:,}")
+    too_large = TooManyPixels(f"{name} has too many pixels: a picture may have {MAX_PIXELS:,}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with Image.open(io.BytesIO(data), formats=FORMATS) as picture:
+            with Image.open(io.BytesIO(data), formats=tuple(formats)) as picture:
                 if picture.width * picture.height > MAX_PIXELS:
                     raise too_large
                 yield picture
@@ -96,7 +107,9 @@ def _opened(data: bytes, name: str) -> Iterator[PillowImage]:
     except Image.DecompressionBombError:
         raise too_large from None
     except UnidentifiedImageError:
-        raise UserError(f"{name} is not a readable picture: give a PNG, JPEG or WebP file") from None
+        if any(data.startswith(first) for first in FORMATS.values()) or TARGA in formats:
+            raise UserError(f"{name} is not a readable picture: it is truncated or damaged") from None
+        raise UnknownFormat(f"{name} is not a readable picture: give a PNG, JPEG or WebP file") from None
     except Exception as error:  # decoders raise many types on invalid data
         raise UserError(f"{name} is not a readable picture: {type(error).__name__}: {error}") from None
 
@@ -104,16 +117,11 @@ def _opened(data: bytes, name: str) -> Iterator[PillowImage]:
 def read_picture(path: Path) -> NDArray[np.uint8]:
     """Read a picture of 8 or 16 bits per channel as 8-bit sRGB, uint8 [height, width, 3]; alpha is dropped."""
     with opened_picture(path, f"no picture {path}: check the path") as picture:
-        return _rgb(picture)
+        return rgb_pixels(picture)
 
 
-def decoded_picture(data: bytes, name: str) -> NDArray[np.uint8]:
-    """As `read_picture`, of a picture's bytes; ``name`` names it in messages."""
-    with _opened(data, name) as picture:
-        return _rgb(picture)
-
-
-def _rgb(picture: PillowImage) -> NDArray[np.uint8]:
+def rgb_pixels(picture: PillowImage) -> NDArray[np.uint8]:
+    """The pixels of a picture as 8-bit sRGB, uint8 [height, width, 3]."""
     import numpy as np
 
     if picture.mode.startswith("I"):  # 16-bit grey, which Pillow's convert would clip at 255

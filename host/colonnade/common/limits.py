@@ -10,6 +10,9 @@ MAX_DIGITS = 40
 MAX_TEXT = 4096
 #: Pixels of an input picture: twice the largest frame.
 MAX_PIXELS = 2 * 4096 * 4096
+#: Pixels of all textures of a mesh in its files; and those that are kept, 128 for each texel of the texture memory.
+MAX_TEXTURE_PIXELS = 1 << 29
+KEPT_TEXTURE_PIXELS = 1 << 25
 #: Frames of one command.
 MAX_FRAMES = 10_000
 #: Samples of a pixel.

@@ -64,6 +64,7 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
         losses.update(gltf_losses(material))
         losses.update((extension_loss(name), 1) for name in unused_extensions(material))
     _count_other(document, losses)
+    textures.reader.count_losses()
     if not parts:
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     surface = joined([part for part, _ in parts])
@@ -79,7 +80,7 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
         materials=materials,
         face_materials=face_materials,
         colours=colours,
-        textures=tuple(textures.textures),
+        textures=tuple(textures.reader.textures),
     )
 
 

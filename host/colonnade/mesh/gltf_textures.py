@@ -15,7 +15,8 @@ from colonnade.mesh import losses as lost
 from colonnade.mesh.gltf_document import GltfDocument
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.resolver import References
-from colonnade.mesh.texture import Texture, Wrap, read_texture
+from colonnade.mesh.texture import Wrap
+from colonnade.mesh.texture_reader import TextureReader
 
 _WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 #: Extensions of a texture whose pictures have formats that are read, or not.
@@ -27,7 +28,7 @@ class TextureUse:
     """The use of a texture by a material.
 
     Attributes:
-        texture: Index in `GltfTextures.textures`.
+        texture: Index in `TextureReader.textures`.
         coordinates: Name of the positions in a primitive, ``TEXCOORD_0``.
         matrix: Transform of the positions, float64 [2, 3].
     """
@@ -48,7 +49,7 @@ class GltfTextures:
         self._document, self._references, self._losses = document, references, losses
         self._uses: dict[int, TextureUse | None] = {}
         self._read: dict[tuple[int, Wrap, Wrap], int | None] = {}
-        self.textures: list[Texture] = []
+        self.reader = TextureReader(losses)
 
     @property
     def uses(self) -> Mapping[int, TextureUse | None]:
@@ -104,9 +105,7 @@ class GltfTextures:
             data = found
         else:
             raise self._document.error(f"{name} has no picture: export it again")
-        texture = read_texture(data, name, (wrap_u, wrap_v), self._losses)
-        self.textures += [] if texture is None else [texture]
-        return None if texture is None else len(self.textures) - 1
+        return self.reader.read(data, name, (wrap_u, wrap_v))
 
     def _matrix(self, transform: Mapping[str, Any]) -> Floats:
         """A KHR_texture_transform: scale, then rotation, then offset."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from colonnade.common.limits import KEPT_TEXTURE_PIXELS, MAX_PIXELS
+
 
 @dataclass(frozen=True)
 class Loss:
@@ -29,7 +31,13 @@ TEXTURES = Loss.of("texture", "not shown", "only textures of the base colour are
 TEXTURE_OBJ = Loss.of("texture map", "not shown", "only map_Kd is")
 NO_PICTURES = Loss.of("picture of a texture", "missing", "surfaces have their base colour", "pictures of textures")
 PICTURE_FORMATS = Loss.of(
-    "picture of a texture", "not readable", "pictures must be PNG, JPEG or WebP", "pictures of textures"
+    "picture of a texture", "not readable", "pictures must be PNG, JPEG, WebP or TGA", "pictures of textures"
+)
+DAMAGED_PICTURES = Loss.of(
+    "picture of a texture", "truncated or damaged", "surfaces have their base colour", "pictures of textures"
+)
+LARGE_PICTURES = Loss.of(
+    "picture of a texture", "too large", f"a picture may have {MAX_PIXELS:,} pixels", "pictures of textures"
 )
 NO_POSITIONS = Loss.of(
     "face of a textured material", "untextured", "it has no texture coordinates", "faces of a textured material"
@@ -88,6 +96,13 @@ MIXED = Loss.of(
     "closed part with mixed winding", "repaired", "all faces point outward", "closed parts with mixed winding"
 )
 INVERTED = Loss.of("inside-out closed part", "turned outward", "the faces are reversed")
+
+
+def shrunk_textures(factor: int) -> Loss:
+    """The loss of textures that are kept at a fraction of their width and height."""
+    return Loss.of(
+        "texture", f"kept at 1/{factor} of the width and height", f"a mesh holds {KEPT_TEXTURE_PIXELS:,} pixels"
+    )
 
 
 def extension_loss(name: str) -> Loss:

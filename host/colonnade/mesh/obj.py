@@ -224,7 +224,8 @@ def _materials(
             losses.update(mtl_losses(defined[name]))
         elif name and defined:
             losses.add(lost.UNKNOWN_MATERIALS)
-    return tuple(materials), used, maps, tuple(textures.textures)
+    textures.reader.count_losses()
+    return tuple(materials), used, maps, tuple(textures.reader.textures)
 
 
 def parse_mtl(data: bytes) -> dict[str, dict[str, list[str]]]:

@@ -13,7 +13,8 @@ from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.resolver import References
-from colonnade.mesh.texture import Texture, Wrap, read_texture
+from colonnade.mesh.texture import Wrap
+from colonnade.mesh.texture_reader import TextureReader
 
 #: Options of a map, and their largest number of values.
 _OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-clamp": 1, "-blendu": 1, "-blendv": 1, "-cc": 1, "-mm": 2, "-bm": 1}
@@ -36,7 +37,7 @@ class MtlTextures:
     def __init__(self, references: References, losses: Losses) -> None:
         self._references, self._losses = references, losses
         self._read: dict[tuple[str, bool], int | None] = {}
-        self.textures: list[Texture] = []
+        self.reader = TextureReader(losses)
 
     def textured(self, material: MeshMaterial, entries: Mapping[str, Any]) -> tuple[MeshMaterial, TextureMap | None]:
         """The material with the texture of its ``map_Kd``, if that is there; a colour Kd of black counts as white.
@@ -63,9 +64,7 @@ class MtlTextures:
             self._losses.add(lost.NO_PICTURES)
             return None
         wrap: tuple[Wrap, Wrap] = ("clamp", "clamp") if described.is_clamped else ("repeat", "repeat")
-        texture = read_texture(data, described.name, wrap, self._losses)
-        self.textures += [] if texture is None else [texture]
-        return None if texture is None else len(self.textures) - 1
+        return self.reader.read(data, described.name, wrap)
 
     def _parsed(self, words: Sequence[str]) -> TextureMap:
         found, at = TextureMap(""), 0

@@ -5,32 +5,24 @@ u goes to the right and v down, from the picture's upper left corner, as in glTF
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from colonnade.common.errors import UserError
-from colonnade.common.image_io import decoded_picture
+from colonnade.common.image_io import encode_srgb
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
-from colonnade.mesh.losses import PICTURE_FORMATS, Losses
 
 #: What lies beyond the picture: it repeats, it repeats mirrored, or its border goes on.
 Wrap = Literal["repeat", "mirror", "clamp"]
 
 #: Linear value of each code of 8 bits.
 _LINEAR = linear_from_srgb(np.arange(256) / 255.0)
-
-
-def read_texture(data: bytes, name: str, wrap: tuple[Wrap, Wrap], losses: Losses) -> Texture | None:
-    """The texture of a picture's bytes; None, and a loss, if they are no PNG, JPEG or WebP picture."""
-    try:
-        return Texture(name, decoded_picture(data, name), wrap)
-    except UserError:
-        losses.add(PICTURE_FORMATS)
-        return None
+#: The same as whole numbers of 16 bits, and the code of each of these.
+_LEVELS = np.rint(_LINEAR * 65535).astype(np.int64)
+_CODES = encode_srgb(np.arange(65536) / 65535)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +47,19 @@ class Texture:
     @property
     def mean(self) -> Floats:
         """Mean linear colour, float64 [3]."""
-        return np.asarray(_LINEAR[self.pixels].mean(axis=(0, 1)))
+        sums = np.sum([_LINEAR[row].sum(axis=0) for row in self.pixels], axis=0)
+        return np.asarray(sums / (self.size[0] * self.size[1]))
+
+    def halved(self) -> Texture:
+        """The texture with half the pixels along each axis, the linear means of 2 by 2; a last odd one is kept."""
+        width, height = (-(-length // 2) for length in self.size)
+        right = np.minimum(2 * np.arange(width) + 1, self.size[0] - 1)
+        pixels = np.empty((height, width, 3), np.uint8)
+        for row in range(height):
+            sums = np.take(_LEVELS, self.pixels[2 * row : 2 * row + 2]).sum(axis=0)
+            count = 2 * min(2, self.size[1] - 2 * row)
+            pixels[row] = np.take(_CODES, (sums[::2] + sums[right]) // count)
+        return replace(self, pixels=pixels)
 
     def colours(self, positions: Floats) -> Floats:
         """Linear colours at positions, float64 [n, 2], bilinear between the pixels' centres, float64 [n, 3]."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import io
 import json
+import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from colonnade.common import notes
+from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import MeshMaterial
@@ -144,9 +147,55 @@ def test_colours_are_bilinear_and_linear() -> None:
     np.testing.assert_allclose(grey.mean, linear_from_srgb(np.full(3, 128 / 255)))
 
 
+def painted(folder: Path, *pictures: bytes, suffix: str = "png") -> Path:
+    """An OBJ file with a triangle for each picture."""
+    for number, picture in enumerate(pictures):
+        (folder / f"{number}.{suffix}").write_bytes(picture)
+    numbers = range(len(pictures))
+    (folder / "a.mtl").write_text("".join(f"newmtl {n}\nKd 1 1 1\nmap_Kd {n}.{suffix}\n" for n in numbers))
+    faces = "".join(f"usemtl {n}\nf {n % 2 + 1}/1 {n % 2 + 2}/2 {n % 2 + 3}/3\n" for n in numbers)
+    (folder / "a.obj").write_text(f"mtllib a.mtl\n{SQUARE}{faces}")
+    return folder / "a.obj"
+
+
+def test_the_textures_of_a_mesh_are_kept_within_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond it all are halved, to linear means; far beyond it the mesh is refused."""
+    file = painted(tmp_path, png(np.tile(FOUR, (2, 2, 1))), png(np.tile(FOUR, (2, 2, 1))[:3, :3]))
+    monkeypatch.setattr("colonnade.mesh.texture_reader.KEPT_TEXTURE_PIXELS", 24)
+    mesh = load_mesh(file)
+    assert [texture.size for texture in mesh.textures] == [(2, 2), (2, 2)]
+    np.testing.assert_array_equal(mesh.textures[0].pixels, np.full((2, 2, 3), 188))
+    np.testing.assert_array_equal(mesh.textures[1].pixels[1, 1], FOUR[0, 0])
+    assert [note.partition(": ")[2] for note in mesh.notes] == [
+        "2 textures are kept at 1/2 of the width and height: a mesh holds 33,554,432 pixels"
+    ]
+    monkeypatch.setattr("colonnade.mesh.texture_reader.MAX_TEXTURE_PIXELS", 24)
+    with pytest.raises(UserError, match="its textures have more than 24 pixels, the most of a mesh"):
+        load_mesh(file)
+
+
+def test_the_note_on_a_picture_says_what_is_wrong_with_it(tmp_path: Path) -> None:
+    random = np.random.default_rng(1).integers(0, 256, (20, 20, 3), dtype=np.uint8)
+    header = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sIIBBBBB", 13, b"IHDR", 8192, 8192, 8, 2, 0, 0, 0)
+    large = header + struct.pack(">I", zlib.crc32(header[12:])) + struct.pack(">I4sI", 0, b"IDAT", zlib.crc32(b"IDAT"))
+    mesh = load_mesh(painted(tmp_path, png(random)[:-400], large, b"GIF89a"))
+    assert mesh.textures == () and [note.partition(": ")[2] for note in mesh.notes] == [
+        "1 picture of a texture is truncated or damaged: surfaces have their base colour",
+        "1 picture of a texture is too large: a picture may have 33,554,432 pixels",
+        "1 picture of a texture is not readable: pictures must be PNG, JPEG, WebP or TGA",
+    ]
+    assert "truncated" in load_mesh(painted(tmp_path, png(random)[:20])).notes[0]
+
+
+def test_a_targa_picture_is_read(tmp_path: Path) -> None:
+    stream = io.BytesIO()
+    Image.fromarray(FOUR).save(stream, "TGA")
+    mesh = load_mesh(painted(tmp_path, stream.getvalue(), suffix="tga"))
+    assert mesh.notes == ()
+    np.testing.assert_array_equal(mesh.textures[0].pixels, FOUR)
+
+
 @pytest.mark.parametrize("missing", ["images", "textures"])
 def test_a_texture_that_does_not_exist_is_refused(tmp_path: Path, missing: str) -> None:
-    from colonnade.common.errors import UserError
-
     with pytest.raises(UserError, match=rf"{missing}\[0\] is used, but does not exist"):
         load_mesh(gltf(tmp_path, **{missing: []}))
