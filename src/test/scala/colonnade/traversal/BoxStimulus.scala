@@ -95,6 +95,36 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
     pairs.flatMap { case (from, to) => Seq(from, to) }
   }
 
+  /** Children one behind the other along a ray that runs through them; in most cases the last slots are the nearest. */
+  def alongRay(count: Int): Seq[BoxCase] = Seq.fill(count) {
+    val any   = one()
+    val shift = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits))
+    val most  = (BigInt(1) << numbers.boxBits) - 1
+    val arity = config.geometry.arity
+    val cuts  = Seq.fill(2 * arity)(below(most + 1)).sorted.grouped(2).map(pair => (pair.head, pair.last)).toSeq
+    val along = if (any.negative.last) cuts else cuts.reverse // from the farthest to the nearest
+    val boxes =
+      (if (random.nextInt(4) == 0) random.shuffle(along) else along).map(Seq.fill(3)((BigInt(0), most)).updated(
+        any.axis,
+        _
+      ))
+    val origin = shift.map(_ => below(cube / 2))
+    val sides  = Seq(1, 2).map(next => (any.axis + next) % 3).map(a => origin(a) + below((most << shift(a)) + 1))
+    val before = (BigInt(1) << numbers.boxPadLog) + below(cube / 8)
+    val start  = origin(any.axis)
+    val behind = if (any.negative.last) start + (most << shift(any.axis)) + before else start - before
+    any.copy(
+      boxOrigin = sides :+ behind.max(lowest).min(highest),
+      exponent = Seq.fill(2)((numbers.reciprocalFraction - random.nextInt(5)).max(0)),
+      tMax = farthest,
+      origin = origin,
+      shift = shift,
+      kinds = Seq.fill(arity)(1 + random.nextInt(2)),
+      low = boxes.map(_.map(_._1)),
+      high = boxes.map(_.map(_._2))
+    )
+  }
+
   private def below(bound: BigInt): BigInt = BigInt(bound.bitLength + 8, random) % bound
 
   private def one(): BoxCase = {
@@ -164,6 +194,13 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
 }
 
 object BoxStimulus {
+
+  /** How many of the cases enter a child later than one of a higher slot, by the model. */
+  def falling(config: ColonnadeConfig, cases: Seq[BoxCase]): Int =
+    Model.answers(config, cases.map(_.words), "box").count { answer =>
+      val children = Seq.tabulate(answer(1).toInt)(i => (answer(2 + 2 * i), answer(3 + 2 * i)))
+      children.zip(children.drop(1)).exists { case ((slot, t), (nextSlot, nextT)) => slot > nextSlot && t < nextT }
+    }
 
   /** The unit's inputs and expected results, as fields of [[BoxCandidate]] and [[BoxResult]]. */
   def solved(config: ColonnadeConfig, cases: Seq[BoxCase]): Seq[(Map[String, BigInt], Map[String, BigInt])] = {

@@ -28,6 +28,9 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       test(new PackedBoxUnit(config)).withAnnotations(Simulation.verilator) { dut =>
         val cases = new BoxStimulus(config, seed = 100 + i)
         compare(dut, config, cases.atBoundaries(20), offered = 1, accepted = 1)
+        val ordered = cases.alongRay(40)
+        assert(BoxStimulus.falling(config, ordered) > 30, "of 40 cases whose nearest child is not the first one")
+        compare(dut, config, ordered, offered = 1, accepted = 0.8)
         for ((offered, accepted) <- Seq((0.4, 1.0), (0.8, 0.3))) compare(dut, config, cases(60), offered, accepted)
       }
 
