@@ -58,8 +58,8 @@ final class EntryStages(config: ColonnadeConfig) extends Module {
   private val pad        = (BigInt(1) << numbers.boxPadLog).U
   private val lows       = PermutedFrame(io.bounds.low, axis).map(_.zext -& pad.zext)
   private val highs      = PermutedFrame(io.bounds.high, axis).map(_.zext +& pad.zext)
-  private val widthBits  = NumberFormats.bitLength((1L << numbers.vertexBits) + (2L << numbers.boxPadLog))
-  private val widths     = highs.zip(lows).map { case (high, low) => (high -& low).asUInt(widthBits - 1, 0) }
+  private val widthBits  = NumberFormats.bitLength((1L << numbers.vertexBits) + (2L << numbers.boxPadLog)) + 1
+  private val widths     = highs.zip(lows).map { case (high, low) => Rounding.narrow(high -& low, widthBits) }
   private val nears      = planeDistances(lows, highs)
   private val fars       = planeDistances(highs, lows)
   private val tNearAlong = load(positive(nears.last), stages.planes)
@@ -68,15 +68,16 @@ final class EntryStages(config: ColonnadeConfig) extends Module {
     load(fars.last.asUInt(entryBits - 1, 0), stages.planes)
   )
 
-  // The sides have a second pad, for the error of their slopes. Far planes follow from near ones and the box's width
+  // The sides have a second pad, for the error of their slopes. Far planes follow from near ones and the box's width, which
+  // is negative at inverted bounds
   private val slopePad = tNearAlong >> numbers.vertexBits
   private val products = Seq.tabulate(2) { side =>
     val near   = load(nears(side), stages.planes) -& slopePad.zext
-    val width  = load(widths(side), stages.planes) +& (slopePad << 1)
+    val width  = load(widths(side), stages.planes) +& (slopePad << 1).zext
     val factor = io.reciprocals(side)
     (
       load(load(Rounding.narrow(near, distanceBits), stages.distances) * factor.zext, stages.products),
-      load(load(width, stages.distances) * factor, stages.products)
+      load(load(width, stages.distances) * factor.zext, stages.products)
     )
   }
 
@@ -88,7 +89,7 @@ final class EntryStages(config: ColonnadeConfig) extends Module {
     load(t - (t >> slack), stages.limits)
   }
   private val tFars = products.zip(drops).map { case ((near, width), drop) =>
-    widenedExit(Rounding.narrow(near +& width.zext, near.getWidth) >> drop)
+    widenedExit(Rounding.narrow(near +& width, near.getWidth) >> drop)
   }
 
   // The latest entry, before the earliest exit

@@ -32,13 +32,18 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     formatsOf(pipelined).foreach { formats =>
       val name = s"$kind, ${formats.precision} with ${formats.geometry.vertexBits}-bit vertices and " +
         s"${formats.numbers.gridBits}-bit triangle tests" + (if (formats.units.shortPaths) ", short paths" else "")
-      it should s"equal the model under random stalls, $name" taggedAs tag(formats, pipelined) in {
+      it should s"equal the model under random stalls, also at inverted bounds, $name" taggedAs tag(
+        formats,
+        pipelined
+      ) in {
         val config = withPipeline(formats, pipelined)
         test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
           val random = new Random(2)
-          val cases  = new SetupStimulus(config, random).all(raysPerBox = if (pipelined) 40 else 14)
+          val boxes  = new SetupStimulus(config, random)
+          val cases  = boxes.all(raysPerBox = if (pipelined) 40 else 14)
           val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
           cases.zip(rates).foreach { case (box, rate) => run(setup, box, box.answers(config), random, rate) }
+          boxes.inverted(raysPerBox = 6).foreach(box => run(setup, box, box.answers(config), random, Rates(1, 1)))
         }
       }
     }

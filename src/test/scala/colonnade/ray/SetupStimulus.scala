@@ -24,9 +24,31 @@ final class SetupStimulus(config: ColonnadeConfig, random: Random) {
   private val fraction = numbers.gridFraction
   private val cube     = BigInt(1) << numbers.vertexBits
 
-  def all(raysPerBox: Int): Seq[SetupCase] = boxes.map { case (low, high) =>
-    SetupCase(low, high, extremes(low, high) ++ Seq.fill(raysPerBox)(ray(low, high)))
+  def all(raysPerBox: Int): Seq[SetupCase] = boxes.map { case (low, high) => aimed(low, high, raysPerBox) }
+
+  /** Boxes whose low plane is above the high one, on one axis or on all: by as much as possible, by as much as the pads
+    * make up for, and by one unit more.
+    */
+  def inverted(raysPerBox: Int): Seq[SetupCase] = {
+    val whole  = Seq.tabulate(3)(axis => (Seq.fill(3)(BigInt(0)).updated(axis, cube - 1), axis))
+    val most   = whole.map { case (low, axis) => (low, Seq.fill(3)(cube - 1).updated(axis, BigInt(0))) }
+    val pads   = BigInt(2) << numbers.boxPadLog
+    val slight = Seq(pads, pads + 1).map { by =>
+      val axis = random.nextInt(3)
+      (
+        Seq.fill(3)(BigInt(0)).updated(axis, (cube / 2 + by).min(cube - 1)),
+        Seq.fill(3)(cube - 1).updated(axis, cube / 2)
+      )
+    }
+    val any = Seq.fill(3)(Seq.fill(2)(BigInt(numbers.vertexBits, random)).sorted)
+    (most ++ slight :+ ((any.map(_.last), any.map(_.head)))).map { case (low, high) =>
+      val ordered = low.zip(high).map { case (l, h) => Seq(l, h).sorted }
+      aimed(ordered.map(_.head), ordered.map(_.last), raysPerBox).copy(low = low, high = high)
+    }
   }
+
+  private def aimed(low: Seq[BigInt], high: Seq[BigInt], rays: Int): SetupCase =
+    SetupCase(low, high, extremes(low, high) ++ Seq.fill(rays)(ray(low, high)))
 
   private def boxes: Seq[(Seq[BigInt], Seq[BigInt])] = {
     val whole = (Seq.fill(3)(BigInt(0)), Seq.fill(3)(cube - 1))
