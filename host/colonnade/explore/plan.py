@@ -23,7 +23,7 @@ from colonnade.explore.points import Point, config_of
 from colonnade.explore.schedule import Outcome
 from colonnade.explore.study import StudyFile
 from colonnade.mesh.mesh import Mesh
-from colonnade.ppa.library.liberty_files import find_liberties
+from colonnade.ppa.library.one_library import library_files
 from colonnade.render.lit_room import scene_room
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
@@ -272,7 +272,11 @@ def _library(file: StudyFile, name: str, given: Mapping[str, Sequence[str]]) -> 
         advice = f"--library {name}=FILE names its liberty files"
         raise file.error(("libraries", name), f"the library {name} has no files: {advice}")
     found: dict[str, bytes] = {}
-    for path in find_liberties(given[name]):
+    try:
+        paths = library_files(given[name])
+    except UserError as error:
+        raise file.error(("libraries", name), f"the library {name}: {error}") from None
+    for path in paths:
         # Files of two folders may share a name
         own = path.name if path.name not in found else f"{len(found)}-{path.name}"
         found[own] = read_input(path, "the liberty", MAX_LIBERTY_BYTES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -81,7 +82,7 @@ def measure(
     return {
         "config": design.manifest.config,
         "config_hash": design.manifest.config_hash,
-        "technology": _describe(tech),
+        "technology": _describe(tech) | {"files": cells_of_files(tech, netlists)},
         "units": units,
         "memories": {memory.name: memories.describe(memory) for memory in boxes},
         "flop_tables": [{**asdict(table), "bits": table.bits} for table in hierarchy.tables()],
@@ -199,6 +200,19 @@ def _levels(units: Mapping[str, Mapping[str, Any]], rows: int, columns: int, box
         }
         below, bits_below, area_below, memory_below = logic, bits, um2, memory_um2
     return levels
+
+
+def cells_of_files(tech: Technology, netlists: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The liberty files: usable cells, how many of them the units use, and how often; each unit counts once."""
+    if tech.library is None:
+        return []
+    kinds = Counter(cell["type"] for netlist in netlists.values() for cell in netlist["cells"].values())
+    found = []
+    for file, source in zip(tech.library.files, tech.sources, strict=True):
+        own = [cell for cell, origin in tech.library.origins.items() if origin == file]
+        used = [kinds[cell] for cell in own if cell in kinds]
+        found.append({"file": source.name, "cells": len(own), "used": len(used), "instances": sum(used)})
+    return found
 
 
 def _describe(tech: Technology) -> dict[str, Any]:

@@ -131,10 +131,11 @@ _SPELLINGS = {"inverter": ("!A", "A'"), "nand": ("!(A&B)", "(A&B)'", "!A|!B", "!
 
 @dataclass(frozen=True)
 class Library:
-    """The cells of all given liberty files."""
+    """The cells of all given liberty files, and the file of each cell."""
 
     files: tuple[Path, ...]
     cells: dict[str, Cell] = field(repr=False)
+    origins: dict[str, Path] = field(repr=False, default_factory=dict)
 
     @property
     def nand2(self) -> Cell:

@@ -15,11 +15,14 @@ from colonnade.ppa.library.liberty_syntax import Group, groups, parsing, tokens
 def load(paths: Sequence[Path]) -> Library:
     """Read the library of some pruned files."""
     cells: dict[str, Cell] = {}
+    origins: dict[str, Path] = {}
     for path in paths:
         with parsing(path):
             top = next(groups(tokens(path.read_text("latin-1"))))
-            cells.update(Reader(top).cells())
-    return Library(tuple(paths), cells)
+            own = dict(Reader(top).cells())
+        cells |= own
+        origins |= dict.fromkeys(own, path)
+    return Library(tuple(paths), cells, origins)
 
 
 class Reader:

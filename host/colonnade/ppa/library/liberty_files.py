@@ -61,8 +61,12 @@ def find_liberties(names: Sequence[str]) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def _text(path: Path) -> str:
-    """The text of a file, unpacked if it is a .gz file."""
+def library_text(path: Path) -> str:
+    """The text of a liberty file, unpacked if it is a .gz file.
+
+    Raises:
+        UserError: The file cannot be read, or has no library.
+    """
     data = read_input(path, "the liberty", MAX_LIBERTY_BYTES)
     if path.suffix == ".gz":
         try:
@@ -72,7 +76,10 @@ def _text(path: Path) -> str:
             raise UserError(f"{path} cannot be unpacked: {error}") from None
         if len(data) > MAX_LIBERTY_BYTES:
             raise UserError(f"{path} is too large: the limit is {MAX_LIBERTY_BYTES:,} bytes unpacked")
-    return data.decode("latin-1")
+    text = data.decode("latin-1")
+    if not re.search(r"\blibrary\s*\(", text):
+        raise UserError(f"{path} is not a liberty file: it has no library group")
+    return text
 
 
 def pruned(path: Path, dropped: re.Pattern[str] = FOR_TIMING) -> str:
@@ -81,9 +88,7 @@ def pruned(path: Path, dropped: re.Pattern[str] = FOR_TIMING) -> str:
     Raises:
         UserError: The file is not a liberty file, or is truncated.
     """
-    text = _text(path)
-    if not re.search(r"\blibrary\s*\(", text):
-        raise UserError(f"{path} is not a liberty file: it has no library group")
+    text = library_text(path)
     if text.rfind("/*") > text.rfind("*/"):
         raise UserError(f"{path} is truncated or not a liberty file: a comment does not end")
     parts: list[str] = []

@@ -30,6 +30,7 @@ from colonnade.common.temporary import temporary_folder
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.ppa.library import liberty, liberty_files, liberty_syntax
 from colonnade.ppa.library.cells import Library
+from colonnade.ppa.library.one_library import library_files
 from colonnade.ppa.netlist.hierarchy import Hierarchy
 
 #: Large registers that dfflibmap would prefer to smaller ones because their output is not inverted.
@@ -78,7 +79,7 @@ class Technology:
         library: The cells of the pruned files; None: Yosys's generic gates.
         digest: Digest of the pruned files.
         delay: Target delay of abc, ns.
-        sources: The original files.
+        sources: The original files, in the order of the library's.
     """
 
     library: Library | None
@@ -131,9 +132,8 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
         return Technology(None, "", None)
     folder = cache_directory(project_root()) / "liberty"
     folder.mkdir(parents=True, exist_ok=True)
-    pruned = []
-    sources = liberty_files.find_liberties(liberties)
-    for path in sources:
+    pruned: list[tuple[Path, Path]] = []
+    for path in library_files(liberties):
         text = liberty_files.pruned(path).encode("latin-1")
         # The name becomes part of the scripts of Yosys and OpenSTA
         stem = re.sub(r"[^A-Za-z0-9_-]", "_", path.name.split(".")[0])[:100]
@@ -141,11 +141,12 @@ def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
         if not copy.is_file() or copy.read_bytes() != text:
             with replacing(copy) as stream:
                 stream.write(text)
-        pruned.append(copy)
+        pruned.append((copy, path))
     # abc loses the cells of a small file that it reads before a large one
-    pruned.sort(key=lambda copy: (-copy.stat().st_size, copy.name))
-    library = liberty.load(pruned)
-    digest = " ".join(copy.name for copy in pruned)
+    pruned.sort(key=lambda pair: (-pair[0].stat().st_size, pair[0].name))
+    copies, sources = zip(*pruned, strict=True)
+    library = liberty.load(copies)
+    digest = " ".join(copy.name for copy in copies)
     with liberty_syntax.parsing(sources[0]):
         target = delay or round(TARGET_FO4 * library.fo4, 4)
     return Technology(library, digest, target, sources)

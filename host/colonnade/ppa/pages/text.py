@@ -106,6 +106,9 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
     yield f"kGE: {used['gates']}. Memories: {_rates()}; their kGE are area at {CHIP_NODE}."
     if used["liberty"]:
         yield f"Library: {', '.join(used['liberty'])}; FO4 is {used['fo4_ns'] * 1e3:.1f} ps: {used['fo4']}."
+        for file in used.get("files", ()):
+            cells, instances = f"{file['used']:,} of {file['cells']:,} cells", f"{file['instances']:,} times"
+            yield f"The units use {cells} of {file['file']}, {instances}."
         yield f"Delays: {used['timing']}; target {used['delay_target_ns']:g} ns."
     yield f"At {CHIP_NODE}: gate count × {chip['um2_per_gate']} µm², without gaps; scaled, not synthesised."
 
