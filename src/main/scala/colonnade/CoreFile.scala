@@ -35,5 +35,19 @@ object CoreFile {
        |      verilator:
        |        mode: lint-only
        |        verilator_options: [-Wno-fatal]
+       |  sim:
+       |    <<: *default
+       |    flow: sim
+       |    flow_options:
+       |      tool: icarus
+       |      iverilog_options: [-g2012]
+       |      timescale: 1ns/1ps
+       |  synth:
+       |    <<: *default
+       |    flow: generic
+       |    flow_options:
+       |      tool: yosys
+       |      arch: ecp5
+       |      output_format: json
        |""".stripMargin
 }

@@ -1,0 +1,44 @@
+"""The benches of ``examples/`` as a user runs them: their frames are the model's, loaded through the bus or not."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from colonnade.design import toolchain
+from colonnade.design.generator import GeneratedDesign, shell_design_for
+from colonnade.device.simulator_build import build_environment
+
+EXAMPLES = toolchain.project_root() / "examples"
+OVERRIDE = "array.columns=2"
+
+
+@pytest.fixture(scope="module")
+def design() -> GeneratedDesign:
+    return shell_design_for("tiny", (OVERRIDE,), bus_bytes=16)
+
+
+@pytest.fixture(scope="module")
+def output(design: GeneratedDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the examples, with the design that is in the cache."""
+    folder = tmp_path_factory.mktemp("examples")
+    shutil.copytree(design.dir, folder / "design")
+    return folder
+
+
+@pytest.mark.parametrize("bench", ["verilator", "cocotb"])
+def test_the_frame_of_an_example_is_that_of_the_model(bench: str, output: Path) -> None:
+    if bench == "cocotb" and shutil.which("iverilog") is None:
+        pytest.skip("no iverilog: apt-get install iverilog")
+    settings = {"OUT": output, "CONFIG": f"tiny --set {OVERRIDE}", "MESH": "sphere:0", "SIZE": "16x8"}
+    settings["VERILATOR_FLAGS"] = "-MAKEFLAGS OPT_FAST=-O0 -MAKEFLAGS OPT_GLOBAL=-O0 --output-split 0 --noassert"
+    command = ["make", "-C", EXAMPLES, bench, *(f"{name}={value}" for name, value in settings.items())]
+    for backdoor in ("", "1"):
+        arguments = [*command, f"BACKDOOR={backdoor}"]
+        done = subprocess.run(arguments, capture_output=True, text=True, env=build_environment())
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert ("load: " in done.stdout) is not bool(backdoor)
+        assert "0 of 128 pixels differ from model.png" in done.stdout
