@@ -40,7 +40,7 @@ bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where
 soc: setup ## a LiteX SoC in the simulator: boots, renders by the driver, compares the framebuffer with the model's
 	@tools/soc
 
-check: setup ## formatters, linters, types, locks, golden manifests
+check: setup ## formatters, linters, types, layers, derived files
 	@tools/check
 
 docs: setup ## the documentation site in out/site; fails on a broken link

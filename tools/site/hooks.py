@@ -37,6 +37,8 @@ _COPIED = (
     ("COLONNADE_SCALADOC", "scala", "Hardware by stage", "Scaladoc"),
     ("COLONNADE_REGISTERS", "registers", "Integration", "Register pages"),
 )
+#: Weight in the search of pages that hold many words and explain few; that of a guide is 1, a word in a title counts 1000 times.
+_SEARCH_WEIGHTS = {"api/": 1e-4, "changelog.md": 0.1, "hardening.md": 0.3}
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _ITEM = re.compile(r"^([-*+]|\d+\.) ")
@@ -76,7 +78,13 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Point links at the site's pages, and separate lists and tables from the paragraph before them."""
+    """Point links at the site's pages, and separate lists and tables from the paragraph before them.
+
+    The search finds the guides first, then the docstrings of packages.
+    """
+    for start, weight in _SEARCH_WEIGHTS.items():
+        if page.file.src_uri.startswith(start):
+            page.meta["search"] = {"boost": weight}
     origin = {place: source for source, place in _ROOT_PAGES.items()}.get(page.file.src_uri)
     source = origin or f"docs/{page.file.src_uri}"
     lines: list[str] = []

@@ -61,11 +61,13 @@ def registers(
 
     if output is not None:
         check_replaceable(output)
-    design = generator.shell_manifest_for(config, overrides, bus_bytes, progress.for_terminal())
+    terminal = progress.for_terminal()
+    design = generator.shell_manifest_for(config, overrides, bus_bytes, terminal)
     if shell_header is not None:
         with replacing(shell_header) as stream:
             stream.write(files.shell_header(design).encode())
         return
     assert output is not None
-    files.write_registers(design, output, base, interrupt)
+    with terminal.step("describing the registers"):
+        files.write_registers(design, output, base, interrupt)
     echo(f"{output}: {len(listed(output))} files, format {design.manifest.format_hash[:12]}")

@@ -14,7 +14,7 @@ class ProgramGraphsSpec extends AnyFlatSpec {
 
   it should "be the graphs in docs/diagrams/programs" in {
     for ((name, graph) <- ProgramGraphs(ConfigIO.load("small")))
-      withClue(s"$name has changed; run tools/program-graphs: ") {
+      withClue(s"$name has changed; run tools/regenerate: ") {
         assert(Files.readString(inDocs(name)) == graph)
         val hash = MessageDigest.getInstance("SHA-256").digest(graph.getBytes(UTF_8)).map(byte => f"$byte%02x").mkString
         assert(Files.readString(inDocs(name.replace(".dot", ".svg"))).contains(s"$name, sha256 $hash "))

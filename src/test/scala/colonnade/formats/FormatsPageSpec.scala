@@ -11,7 +11,7 @@ class FormatsPageSpec extends AnyFlatSpec with Matchers {
 
   it should "equal the page in docs" in {
     val current = Files.readString(Paths.get("docs", "formats.md"))
-    withClue("write it anew: colonnade.Generate --config small --formats-page docs/formats.md: ") {
+    withClue("out of date; run tools/regenerate: ") {
       assert(current == FormatsPage(ConfigIO.load("small")))
     }
   }
