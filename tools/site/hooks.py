@@ -37,7 +37,7 @@ _COPIED = (
     ("COLONNADE_SCALADOC", "scala", "Hardware by stage", "Scaladoc"),
     ("COLONNADE_REGISTERS", "registers", "Integration", "Register pages"),
 )
-#: Weight in the search of pages that hold many words and explain few; that of a guide is 1, a word in a title counts 1000 times.
+#: Weight in the search of pages that hold many words and explain few. A guide has 1; words of a title count 1000 times.
 _SEARCH_WEIGHTS = {"api/": 1e-4, "changelog.md": 0.1, "hardening.md": 0.3}
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 _FENCE = re.compile(r"^\s*(```|~~~)")
