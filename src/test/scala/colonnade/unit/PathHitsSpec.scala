@@ -1,0 +1,278 @@
+package colonnade.unit
+
+import chisel3._
+import chiseltest._
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.RecordFormats
+import colonnade.ray.TracedRay
+import colonnade.shading.Occlusion
+import colonnade.traversal.TriangleHit
+import colonnade.{Simulation, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.collection.mutable
+import scala.util.Random
+
+/** Each hit that is shaded comes with its own ray, details and attributes, however rays, results and records overtake each
+  * other.
+  */
+class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  behavior of "PathHits"
+
+  for (contexts <- Seq(5, 40))
+    it should s"join hits with rays and attributes, $contexts contexts" in {
+      val tiny   = TestConfigs.tiny
+      val config = tiny.copy(units = tiny.units.copy(pathContexts = contexts))
+      test(new PathHitsHarness(config)).withAnnotations(Simulation.verilator) { dut =>
+        val driver = new PathHitsDriver(dut, config, new Random(contexts))
+        driver.run(traces = 1500)
+        driver.shaded should be > 400
+        driver.refused should be > 40
+      }
+    }
+}
+
+/** Random bits for rays and hits, and those that are expected and found, as integers. */
+private class PathHitsHarness(config: ColonnadeConfig) extends Module {
+  private val unit = Module(new PathHits(config))
+
+  val io         = IO(chiselTypeOf(unit.io))
+  val ray        = IO(Input(chiselTypeOf(unit.io.rays.bits.ray.asUInt)))
+  val hit        = IO(Input(chiselTypeOf(unit.io.results.bits.hit.asUInt)))
+  val id         = IO(Input(chiselTypeOf(unit.io.results.bits.hit.id)))
+  val forHit     = IO(Output(UInt()))
+  val details    = IO(Output(UInt()))
+  val t          = IO(Output(SInt()))
+  val foundRay   = IO(Output(UInt()))
+  val foundHit   = IO(Output(UInt()))
+  val foundFace  = IO(Output(UInt()))
+  private val of = ray.asTypeOf(new TracedRay(config.numbers))
+  private val at = Wire(new TriangleHit(config))
+  io :<>= unit.io
+  unit.io.trace.rays.bits.ray := of
+  at                          := hit.asTypeOf(at)
+  at.id                       := id
+  unit.io.results.bits.hit    := at
+  forHit                      := of.forTriangles.asUInt
+  details                     := at.asUInt
+  t                           := at.t.integer
+  foundRay                    := unit.io.trace.hits.bits.ray.asUInt
+  foundHit                    := unit.io.trace.hits.bits.hit.asUInt
+  foundFace                   := unit.io.trace.hits.bits.face.asUInt
+}
+
+/** Takes each context round: a ray, its result, its resolution, and its attributes if it is shaded. */
+private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, random: Random) extends Matchers {
+  private val trace    = dut.io.trace
+  private val contexts = config.units.pathContexts
+  private val formats  = new RecordFormats(config)
+  private val faceBits = formats.attributes.faces.head.getWidth
+
+  private object State extends Enumeration { val idle, offered, traced, ended, shading = Value }
+  import State._
+
+  private final class Trace {
+    var state               = idle
+    var ray, details        = BigInt(0)
+    var tEntry, t           = BigInt(0)
+    var id                  = 0
+    var hasHit, isPrimary   = false
+    var occlusion           = Occlusion.none
+    var endedAt, resolvedAt = -1
+  }
+  private val all                  = Seq.fill(contexts)(new Trace)
+  private val records              = mutable.Map.empty[Int, BigInt]
+  private val awaited              = mutable.ArrayBuffer.empty[Int]
+  private var offer                = Option.empty[Int]
+  private var following            = Option.empty[Int]
+  private var readyBefore          = false
+  private var measuredBefore       = Option.empty[Int]
+  private var (cycle, done, quiet) = (0, 0, 0)
+
+  /** Hits that were shaded, and hits whose attributes have an illegal address. */
+  var (shaded, refused) = (0, 0)
+
+  private val (attributeBase, recordCount) = (16, 24)
+
+  private def chance(times: Int): Boolean = random.nextInt(times) == 0
+
+  private def one(of: Seq[Int]): Option[Int] = Option.when(of.nonEmpty)(of(random.nextInt(of.size)))
+
+  private def in(states: State.Value): Seq[Int] = all.indices.filter(all(_).state == states)
+
+  def run(traces: Int): Unit = {
+    dut.clock.setTimeout(0)
+    dut.io.scene.recordCount.poke(recordCount)
+    dut.io.scene.attributeBase.poke(attributeBase)
+    dut.io.scene.triangleBase.poke(8)
+    dut.io.start.poke(true)
+    dut.clock.step()
+    dut.io.start.poke(false)
+    while (done < traces) {
+      quiet should be < 300
+      step()
+    }
+  }
+
+  private def step(): Unit = {
+    offerRay()
+    val result   = offerResult()
+    val resolved = resolve()
+    answerRequests()
+    trace.hits.ready.poke(readyBefore)
+    readyBefore = !chance(3)
+    trace.hitsReadyNext.poke(readyBefore)
+
+    quiet += 1
+    takeRay()
+    result.foreach { context =>
+      trace.control.ended(1).valid.expect(true)
+      trace.control.ended(1).bits.expect(context)
+      all(context).state = ended
+      all(context).endedAt = cycle
+    }
+    resolved.foreach(checkOutcome)
+    checkMeasured()
+    takeShaded()
+    dut.clock.step()
+    cycle += 1
+  }
+
+  private def offerRay(): Unit = {
+    if (offer.isEmpty && chance(2)) offer = one(in(idle))
+    trace.rays.valid.poke(offer.nonEmpty)
+    dut.io.rays.ready.poke(!chance(3))
+    for (context <- offer; now = all(context) if now.state == idle) {
+      now.state = offered
+      now.tEntry = BigInt(config.numbers.entryBits, random)
+      trace.rays.bits.context.poke(context)
+      trace.rays.bits.enters.poke(!chance(4))
+      trace.rays.bits.tEntry.raw.asInstanceOf[UInt].poke(now.tEntry)
+      dut.ray.poke(BigInt(dut.ray.getWidth, random))
+      now.ray = dut.forHit.peekInt()
+    }
+  }
+
+  private def takeRay(): Unit = for (context <- offer if trace.rays.ready.peekBoolean()) {
+    val now    = all(context)
+    val enters = trace.rays.bits.enters.peekBoolean()
+    dut.io.rays.valid.expect(enters)
+    trace.control.entered.valid.expect(enters)
+    trace.control.ended(0).valid.expect(!enters)
+    (if (enters) dut.io.rays.bits.context else trace.control.ended(0).bits).expect(context)
+    now.hasHit = false
+    now.occlusion = Occlusion.none
+    now.state = if (enters) traced else ended
+    now.endedAt = cycle
+    offer = None
+  }
+
+  private def offerResult(): Option[Int] = {
+    val context = if (chance(3)) one(in(traced)) else None
+    val result  = dut.io.results
+    result.valid.poke(context.nonEmpty)
+    for (context <- context; now = all(context)) {
+      now.hasHit = !chance(3)
+      now.occlusion = Occlusion.all(random.nextInt(3))
+      now.id = random.nextInt(2 * (recordCount - attributeBase) + 3)
+      result.bits.context.poke(context)
+      result.bits.hasHit.poke(now.hasHit)
+      result.bits.occlusion.poke(now.occlusion)
+      // t is never negative
+      dut.hit.poke(BigInt(dut.hit.getWidth - 1, random))
+      dut.id.poke(now.id)
+      now.details = dut.details.peekInt()
+      now.t = dut.t.peekInt()
+    }
+    context
+  }
+
+  /** Resolves the context that was announced, and announces the next one. */
+  private def resolve(): Option[Int] = {
+    val control = trace.control
+    val now     = following
+    following =
+      if (chance(2)) one(in(ended).filter(other => all(other).endedAt < cycle && !now.contains(other))) else None
+    control.asked.valid.poke(now.nonEmpty)
+    control.asked.bits.poke(now.getOrElse(0))
+    control.askedNext.valid.poke(following.nonEmpty)
+    control.askedNext.bits.poke(following.getOrElse(0))
+    control.resolved.valid.poke(now.nonEmpty)
+    control.resolved.bits.poke(now.getOrElse(0))
+    val shades = now.filter(all(_).hasHit)
+    control.shades.poke(shades.nonEmpty)
+    for (context <- now; other = all(context)) {
+      other.isPrimary = random.nextBoolean()
+      control.isPrimary(context).poke(other.isPrimary)
+      other.resolvedAt = cycle
+      if (shades.isEmpty) retire(other)
+      else other.state = shading
+    }
+    trace.hasSurface.valid.expect(shades.nonEmpty)
+    now
+  }
+
+  private def checkOutcome(context: Int): Unit = {
+    trace.control.hasHit.expect(all(context).hasHit)
+    trace.control.occlusion.expect(all(context).occlusion)
+  }
+
+  /** In the cycle after its resolution the hit's distance is known. */
+  private def checkMeasured(): Unit = {
+    val measured = trace.surfaceHit
+    measured.valid.expect(measuredBefore.nonEmpty)
+    for (context <- measuredBefore; now = all(context)) {
+      measured.bits.context.expect(context)
+      measured.bits.isPrimary.expect(now.isPrimary)
+      measured.bits.id.expect(now.id)
+      val steps = if (config.numbers.gridFraction >= 0) now.tEntry << config.numbers.gridFraction
+      else now.tEntry >> -config.numbers.gridFraction
+      measured.bits.distance.get.expect(steps + now.t)
+    }
+    measuredBefore = all.indices.find(index => all(index).state == shading && all(index).resolvedAt == cycle)
+  }
+
+  /** Broadcasts requested records, in any order. */
+  private def answerRequests(): Unit = {
+    val banks    = dut.io.broadcasts
+    val answered = if (chance(2)) one(awaited.toSeq) else None
+    banks.foreach(_.valid.poke(false))
+    for (address <- answered; broadcast = banks(address % banks.size)) {
+      awaited -= address
+      broadcast.valid.poke(true)
+      broadcast.bits.address.poke(address)
+      broadcast.bits.record.poke(records.getOrElseUpdate(address, BigInt(formats.recordBits, random)))
+      broadcast.bits.row.poke(config.array.rows)
+    }
+    dut.io.requests.ready.poke(!chance(3))
+    if (dut.io.requests.ready.peekBoolean() && dut.io.requests.valid.peekBoolean())
+      awaited += dut.io.requests.bits.address.peekInt().toInt
+  }
+
+  private def takeShaded(): Unit = {
+    if (trace.attributeError.valid.peekBoolean()) {
+      val now = all(trace.attributeError.bits.peekInt().toInt)
+      now.state shouldBe shading
+      attributeBase + now.id / 2 should be >= recordCount
+      refused += 1
+      retire(now)
+    }
+    if (trace.hits.valid.peekBoolean()) {
+      val now = all(trace.hits.bits.context.peekInt().toInt)
+      now.state shouldBe shading
+      val faces = records(attributeBase + now.id / 2)
+      dut.foundRay.expect(now.ray)
+      dut.foundHit.expect(now.details)
+      dut.foundFace.expect((faces >> (faceBits * (now.id % 2))) & ((BigInt(1) << faceBits) - 1))
+      shaded += 1
+      retire(now)
+    }
+  }
+
+  private def retire(now: Trace): Unit = {
+    now.state = idle
+    done += 1
+    quiet = 0
+  }
+}
