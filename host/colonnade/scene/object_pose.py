@@ -11,6 +11,7 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 from colonnade.scene.model import Placement, Scene, Transform, Vector, interpolate
 from colonnade.scene.standing import Footprint, free_place, surface_point
 
@@ -133,7 +134,7 @@ def _placement(scene: Scene, environment: Environment | None) -> Placement | Non
 
 def rotation_about(axis: Vector, degrees: float) -> Floats:
     """Rotation about an axis through the origin by Rodrigues' formula, float64 [3, 3] for column vectors."""
-    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    x, y, z = unit_vectors(np.array(axis))
     angle, cross_product = math.radians(degrees), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(
         np.eye(3) + math.sin(angle) * cross_product + (1 - math.cos(angle)) * cross_product @ cross_product
