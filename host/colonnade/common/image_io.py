@@ -120,6 +120,16 @@ def read_picture(path: Path) -> NDArray[np.uint8]:
         return rgb_pixels(picture)
 
 
+def alpha_pixels(picture: PillowImage) -> NDArray[np.uint8] | None:
+    """The alpha of a picture, uint8 [height, width]; None if it is opaque."""
+    import numpy as np
+
+    if not picture.has_transparency_data:
+        return None
+    alpha = np.asarray(picture.convert("RGBA").getchannel("A"))
+    return alpha if (alpha < 255).any() else None
+
+
 def rgb_pixels(picture: PillowImage) -> NDArray[np.uint8]:
     """The pixels of a picture as 8-bit sRGB, uint8 [height, width, 3]."""
     import numpy as np

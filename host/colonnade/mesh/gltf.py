@@ -59,19 +59,23 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
             if part is not None:
                 parts.append(part)
                 used.add(int(part[1]))
+    found = list(materials)
     for index in sorted(used - {len(materials) - 1}):
         material = document.entry("materials", index)
         losses.update(gltf_losses(material))
         losses.update((extension_loss(name), 1) for name in unused_extensions(material))
+        found[index] = replace(found[index], emission=textures.emission(index, found[index].emission))
     _count_other(document, losses)
     textures.reader.count_losses()
     if not parts:
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     surface = joined([part for part, _ in parts])
-    materials, numbers = _textured(materials, parts, textures)
+    materials, numbers = _textured(tuple(found), parts, textures)
     face_materials = np.concatenate(
         [np.full(len(part.faces), number) for (part, _), number in zip(parts, numbers, strict=True)]
     )
+    two_sided = [bool(material.get("doubleSided", False)) for material in document.json.get("materials", [])] + [True]
+    single_sided = np.concatenate([np.full(len(part.faces), not two_sided[number]) for part, number in parts])
     colours = surface.colours
     if colours is not None:
         colours = colours * np.array([material.albedo for material in materials])[face_materials][:, None]
@@ -81,6 +85,7 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
         face_materials=face_materials,
         colours=colours,
         textures=tuple(textures.reader.textures),
+        single_sided=single_sided,
     )
 
 

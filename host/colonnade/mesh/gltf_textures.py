@@ -14,11 +14,14 @@ from colonnade.common.types import Floats
 from colonnade.mesh import losses as lost
 from colonnade.mesh.gltf_document import GltfDocument
 from colonnade.mesh.losses import Losses
+from colonnade.mesh.materials import Vector, gltf_surface
 from colonnade.mesh.resolver import References
 from colonnade.mesh.texture import Wrap
 from colonnade.mesh.texture_reader import TextureReader
 
 _WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
+#: Filter of a sampler without interpolation.
+_NEAREST = 9728
 #: Extensions of a texture whose pictures have formats that are read, or not.
 _WEBP, _UNREAD = "EXT_texture_webp", ("KHR_texture_basisu", "EXT_texture_avif")
 
@@ -48,7 +51,7 @@ class GltfTextures:
     def __init__(self, document: GltfDocument, references: References, losses: Losses) -> None:
         self._document, self._references, self._losses = document, references, losses
         self._uses: dict[int, TextureUse | None] = {}
-        self._read: dict[tuple[int, Wrap, Wrap], int | None] = {}
+        self._read: dict[tuple[int, Wrap, Wrap, bool], int | None] = {}
         self.reader = TextureReader(losses)
 
     @property
@@ -68,10 +71,27 @@ class GltfTextures:
         Raises:
             UserError: The texture does not exist, or its transform is not valid.
         """
-        surface = material.get("pbrMetallicRoughness")
-        info = surface.get("baseColorTexture") if isinstance(surface, Mapping) else None
+        info = gltf_surface(material).get("baseColorTexture")
         if not isinstance(info, Mapping):
             return None
+        index = self._index_of(info)
+        transform = info.get("extensions", {}).get("KHR_texture_transform", {})
+        coordinates = f"TEXCOORD_{transform.get('texCoord', info.get('texCoord', 0))}"
+        return None if index is None else TextureUse(index, coordinates, self._matrix(transform))
+
+    def emission(self, number: int, factor: Vector) -> Vector:
+        """The emission of a material: the mean of its texture times a factor."""
+        info = self._document.entry("materials", number).get("emissiveTexture")
+        if not isinstance(info, Mapping) or not any(factor):
+            return factor
+        index = self._index_of(info)
+        if index is None:
+            return factor
+        red, green, blue = (self.reader.textures[index].mean * factor).tolist()
+        return red, green, blue
+
+    def _index_of(self, info: Mapping[str, Any]) -> int | None:
+        """The index in `TextureReader.textures` of a reference to a texture; None if there is no picture."""
         entry = self._document.entry("textures", info.get("index"))
         extensions = entry.get("extensions", {})
         source = entry.get("source")
@@ -82,15 +102,12 @@ class GltfTextures:
             return None
         sampler = self._document.entry("samplers", entry["sampler"]) if "sampler" in entry else {}
         wrap_u, wrap_v = (_WRAPS.get(sampler.get(key, 10497), "repeat") for key in ("wrapS", "wrapT"))
-        key = (int(source), wrap_u, wrap_v)
+        key = (int(source), wrap_u, wrap_v, sampler.get("magFilter") == _NEAREST)
         if key not in self._read:
             self._read[key] = self._texture(*key)
-        index = self._read[key]
-        transform = info.get("extensions", {}).get("KHR_texture_transform", {})
-        coordinates = f"TEXCOORD_{transform.get('texCoord', info.get('texCoord', 0))}"
-        return None if index is None else TextureUse(index, coordinates, self._matrix(transform))
+        return self._read[key]
 
-    def _texture(self, source: int, wrap_u: Wrap, wrap_v: Wrap) -> int | None:
+    def _texture(self, source: int, wrap_u: Wrap, wrap_v: Wrap, is_nearest: bool) -> int | None:
         image = self._document.entry("images", source)
         name, uri = f"image {source}", image.get("uri")
         if "bufferView" in image:
@@ -105,7 +122,7 @@ class GltfTextures:
             data = found
         else:
             raise self._document.error(f"{name} has no picture: export it again")
-        return self.reader.read(data, name, (wrap_u, wrap_v))
+        return self.reader.read(data, name, (wrap_u, wrap_v), is_nearest)
 
     def _matrix(self, transform: Mapping[str, Any]) -> Floats:
         """A KHR_texture_transform: scale, then rotation, then offset."""

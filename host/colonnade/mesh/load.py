@@ -17,16 +17,18 @@ import numpy.typing as npt
 from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import is_file, require_regular
-from colonnade.common.types import Floats
+from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import catalog, primitives, teapot
 from colonnade.mesh import losses as lost
+from colonnade.mesh.coverage import without_alpha
 from colonnade.mesh.formats import SUFFIXES, read_surface
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.normals import corner_normals
 from colonnade.mesh.palette import MAX_MATERIALS, coloured_materials, corner_coloured_materials
+from colonnade.mesh.swatches import with_swatches
 from colonnade.mesh.texture import Texture
 from colonnade.mesh.topology import Faces, drop_faces, merge_rows, subdivide, subdivide_corners
 from colonnade.mesh.winding import find_winding
@@ -103,7 +105,11 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         raise error if str(path) in str(error) else UserError(f"mesh {path}: {error}") from None
     except Exception as error:  # readers raise many types on invalid data
         raise UserError(f"{path} cannot be read as a mesh: {type(error).__name__}: {error}") from None
-    surface, losses = file.surface, file.losses
+    losses = file.losses
+    try:
+        surface = with_swatches(without_alpha(file.surface, losses))
+    except UserError as error:
+        raise UserError(f"mesh {path}: {error}") from None
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     materials, face_materials, colours = surface.materials, surface.material_index, surface.colours
     positions = surface.positions
@@ -134,6 +140,8 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         colours=colours,
         textures=surface.textures,
         positions=positions,
+        single_sided=None if surface.single_sided is None else np.repeat(surface.single_sided, 4**subdivisions),
+        sources=None if surface.source_faces is None or subdivisions else (surface.source_faces, surface.source_count),
     )
 
 
@@ -150,6 +158,8 @@ def clean_mesh(
     colours: Floats | None = None,
     textures: tuple[Texture, ...] = (),
     positions: Floats | None = None,
+    single_sided: npt.NDArray[np.bool_] | None = None,
+    sources: tuple[Indices, int] | None = None,
 ) -> Mesh:
     """Clean raw vertices and faces.
 
@@ -166,6 +176,8 @@ def clean_mesh(
         colours: Corner colours, float64 [m, 3, 3]; see `Mesh.corner_colours`.
         textures: The textures of the materials.
         positions: Positions of the corners in them, float64 [m, 3, 2]; see `Mesh.corner_positions`.
+        single_sided: Faces whose back viewers do not show, bool [m]; None: none.
+        sources: The face of the file that each is a part of, int64 [m], and their number; None: themselves.
 
     Raises:
         UserError: A vertex is not finite, the size is out of range, or no face has an area.
@@ -178,7 +190,7 @@ def clean_mesh(
     if not np.isfinite(vertices[used]).all():
         bad = int(used[np.flatnonzero(~np.isfinite(vertices[used]).all(axis=1))[0]])
         raise UserError(f"{label}: vertex {bad} is not a finite number: repair the file")
-    source_count = len(faces)
+    source_faces, source_count = (np.arange(len(faces)), len(faces)) if sources is None else sources
     vertices = vertices[used]
     if np.abs(vertices).max() > 1e100:
         raise UserError(f"{label} has coordinates beyond 1e100: scale it down")
@@ -195,6 +207,8 @@ def clean_mesh(
     vertices, faces = merged[used], renumbered.reshape(-1, 3).astype(np.int32)
     normals, colours, positions = (None if values is None else values[keep] for values in (normals, colours, positions))
     winding = find_winding(vertices, faces)
+    if single_sided is not None:
+        losses.add(lost.BACKS, int((single_sided[keep] & winding.is_open).sum()))
     if winding.reversed.any():
         losses.add(lost.MIXED, winding.mixed)
         losses.add(lost.INVERTED, winding.inverted)
@@ -212,7 +226,7 @@ def clean_mesh(
         corner_normals=shading.normals,
         materials=materials,
         face_materials=np.zeros(len(faces), dtype=np.uint8) if face_materials is None else face_materials[keep],
-        source_faces=keep.astype(np.int32),
+        source_faces=source_faces[keep].astype(np.int32),
         source_count=source_count,
         name=name,
         notes=losses.lines(label),

@@ -28,6 +28,14 @@ class Loss:
 
 
 TEXTURES = Loss.of("texture", "not shown", "only textures of the base colour are")
+#: Textures of glTF materials by their key.
+MAPS = {
+    "normalTexture": Loss.of("normal map", "not shown", "surfaces have the normals of their corners"),
+    "metallicRoughnessTexture": Loss.of("metallic-roughness map", "not shown", "the surface is diffuse"),
+    "specularGlossinessTexture": Loss.of("specular-glossiness map", "not shown", "the surface is diffuse"),
+    "occlusionTexture": Loss.of("occlusion map", "not shown", "ambient light reaches all surfaces"),
+    "emissiveTexture": Loss.of("emission map", "not shown", "the surface emits its mean"),
+}
 TEXTURE_OBJ = Loss.of("texture map", "not shown", "only map_Kd is")
 NO_PICTURES = Loss.of("picture of a texture", "missing", "surfaces have their base colour", "pictures of textures")
 PICTURE_FORMATS = Loss.of(
@@ -54,12 +62,17 @@ MORPHS = Loss.of("morph target", "not applied", "its mesh has its base shape")
 LINES = Loss.of("line primitive", "not shown", "only faces are rendered")
 POINTS = Loss.of("point primitive", "not shown", "only faces are rendered")
 CURVES = Loss.of("free-form curve or surface", "not shown", "only faces are rendered", "free-form curves and surfaces")
-BLENDED = Loss.of("partly transparent material", "opaque", "only transmission above 1/2 is glass")
-MASKED = Loss.of("material with an alpha mask", "not cut out", "its faces are whole", "materials with an alpha mask")
+BLENDED = Loss.of(
+    "partly transparent material",
+    "not blended",
+    "from alpha 1/2 on it is opaque, else a tinted pane or not shown",
+)
+COARSE_CUTS = Loss.of("alpha mask", "cut coarsely", "its outline has more detail than the mesh may have faces")
 EMISSION = Loss.of(
     "emissive mirror or glass", "not emitting", "only diffuse surfaces do", "emissive mirrors or glasses"
 )
-ROUGH_MIRROR = Loss.of("rough metal", "a perfect mirror", "roughness is not rendered")
+ROUGH_MIRROR = Loss.of("slightly rough metal", "a perfect mirror", "roughness is not rendered")
+ROUGH_METAL = Loss.of("rough metal", "diffuse", "blurred reflections are not rendered")
 ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "roughness is not rendered", "rough glasses")
 PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror", "1/2 and above is a mirror")
 PARTLY_GLASS = Loss.of("partly transmissive material", "rounded to opaque or glass", "above 1/2 is glass")
@@ -68,6 +81,11 @@ NO_MATERIALS = Loss.of("file of materials", "missing", "faces have the default m
 UNKNOWN_MATERIALS = Loss.of("material name", "not defined", "faces have the default material")
 GROUPS = Loss.of("smoothing group", "not used", "edges are smooth up to the crease angle")
 SCENES = Loss.of("further scene", "not shown", "only the default scene is rendered")
+BACKS = Loss(
+    "face of an open single-sided surface is shown from behind",
+    "faces of open single-sided surfaces are shown from behind",
+    "viewers show their front only",
+)
 SHORT_FACES = Loss.of(
     "face of fewer than three corners", "left out", "it has no area", "faces of fewer than three corners"
 )

@@ -5,10 +5,12 @@
 | albedo | base colour factor, linear | `Kd`, taken as linear; for glass `Tf` if given |
 | mirror | metallic factor of at least ½, without a texture | `Pm` of at least ½, or `illum` 3 or 5 |
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
+| alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
 | index of refraction | `KHR_materials_ior` | `Ni` |
 | emission of a diffuse surface | emissive factor times `KHR_materials_emissive_strength`, at most 1 | `Ke`, at most 1 |
 
-The readers add base-colour textures. What a material holds beyond this is counted as lost.
+Metal rougher than `MIRROR_ROUGHNESS` is diffuse. The readers add base-colour textures.
+What a material holds beyond this is counted as lost.
 """
 
 from __future__ import annotations
@@ -32,10 +34,32 @@ GLASS_IOR = 1.5
 
 #: Roughness up to which a mirror or glass counts as smooth, and below which a diffuse surface counts as glossy.
 _SMOOTH, _GLOSSY = 0.1, 0.5
+#: Roughness up to which a metal is nearer to a mirror than to a diffuse surface of its colour (docs/shading.md).
+MIRROR_ROUGHNESS = 0.35
 #: Extensions of glTF materials that are used.
-_USED_EXTENSIONS = ("KHR_materials_transmission", "KHR_materials_ior", "KHR_materials_emissive_strength")
+_USED_EXTENSIONS = (
+    "KHR_materials_transmission",
+    "KHR_materials_ior",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_pbrSpecularGlossiness",
+)
 #: No emission.
 _DARK = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Alpha:
+    """The transparency of a material, before `colonnade.mesh.coverage` has cut it away.
+
+    Attributes:
+        factor: Factor of the texture's alpha, 0 to 1.
+        cutoff: Alpha from which on the surface is shown.
+        blends: The file asks for blending.
+    """
+
+    factor: float = 1.0
+    cutoff: float = 0.5
+    blends: bool = False
 
 
 @dataclass(frozen=True)
@@ -49,6 +73,7 @@ class MeshMaterial:
         has_corner_colours: The surface has the colours of `colonnade.mesh.mesh.Mesh.corner_colours`, times `albedo`.
         texture: The surface has the colours of this one of `colonnade.mesh.mesh.Mesh.textures`, times `albedo`.
         emission: Linear, 0 to 1: the light that a diffuse surface emits towards the eye.
+        alpha: Transparency of the file's material; a loaded mesh has none.
     """
 
     kind: str = "diffuse"
@@ -57,26 +82,49 @@ class MeshMaterial:
     has_corner_colours: bool = False
     texture: int | None = None
     emission: Vector = (0.0, 0.0, 0.0)
+    alpha: Alpha | None = None
 
 
 #: Material of meshes without one.
 PLAIN = MeshMaterial()
 
 
+def gltf_surface(material: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The metallic-roughness values of a material from a glTF file's JSON, also of one with specular-glossiness."""
+    surface = material.get("pbrMetallicRoughness")
+    older = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
+    if isinstance(older, Mapping):
+        found = {"metallicFactor": 0.0, "roughnessFactor": 1.0 - _number(older.get("glossinessFactor"), 1.0)}
+        named = (("diffuseFactor", "baseColorFactor"), ("diffuseTexture", "baseColorTexture"))
+        return found | {name: older[old] for old, name in named if old in older}
+    return {"metallicFactor": 0.0} if surface is None else surface
+
+
 def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
     """Convert a material from a glTF file's JSON."""
-    surface = material.get("pbrMetallicRoughness")
-    extensions = material.get("extensions", {})
+    surface, extensions = gltf_surface(material), material.get("extensions", {})
     transmission = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0)
     ior = _number(extensions.get("KHR_materials_ior", {}).get("ior"), GLASS_IOR)
-    surface = {"metallicFactor": 0.0} if surface is None else surface
     colour = _colour(surface.get("baseColorFactor", (1.0, 1.0, 1.0)), (1.0, 1.0, 1.0))
     metallic = _number(surface.get("metallicFactor"), 1.0) if "metallicRoughnessTexture" not in surface else 0.0
+    roughness = _number(surface.get("roughnessFactor"), 1.0)
+    alpha = _gltf_alpha(material, surface)
     if _number(transmission, 0.0) > 0.5:
-        return MeshMaterial("glass", colour, _ior(ior))
-    if metallic >= 0.5:
-        return MeshMaterial("mirror", colour)
-    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material))
+        share = alpha.factor if alpha is not None and alpha.blends else 1.0
+        red, green, blue = (1.0 - share + share * value for value in colour)
+        return MeshMaterial("glass", (red, green, blue), _ior(ior))
+    if metallic >= 0.5 and roughness <= MIRROR_ROUGHNESS:
+        return MeshMaterial("mirror", colour, alpha=alpha)
+    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha)
+
+
+def _gltf_alpha(material: Mapping[str, Any], surface: Mapping[str, Any]) -> Alpha | None:
+    mode, colour = material.get("alphaMode", "OPAQUE"), surface.get("baseColorFactor")
+    if mode not in ("MASK", "BLEND"):
+        return None
+    factor = _number(colour[3], 1.0) if isinstance(colour, Sequence) and len(colour) > 3 else 1.0
+    cutoff = _number(material.get("alphaCutoff"), 0.5) if mode == "MASK" else 0.5
+    return Alpha(min(max(factor, 0.0), 1.0), min(max(cutoff, 0.0), 2.0), mode == "BLEND")
 
 
 def _gltf_emission(material: Mapping[str, Any]) -> Vector:
@@ -97,9 +145,11 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
     model = first("illum", 2.0)
     if first("d", 1.0) < 0.5 or first("tr", 0.0) > 0.5 or model in (4.0, 6.0, 7.0, 9.0):
         return MeshMaterial("glass", _colour(entries.get("tf"), colour), _ior(first("ni", GLASS_IOR)))
-    if first("pm", 0.0) >= 0.5 or model in (3.0, 5.0):
-        return MeshMaterial("mirror", colour)
-    return MeshMaterial("diffuse", colour, emission=_colour(entries.get("ke"), _DARK))
+    alpha = Alpha(min(first("d", 1.0), 1.0 - first("tr", 0.0))) if "map_d" in entries else None
+    is_metal = first("pm", 0.0) >= 0.5 or model in (3.0, 5.0)
+    if is_metal and first("pr", 0.0) <= MIRROR_ROUGHNESS:
+        return MeshMaterial("mirror", colour, alpha=alpha)
+    return MeshMaterial("diffuse", colour, emission=_colour(entries.get("ke"), _DARK), alpha=alpha)
 
 
 def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
@@ -107,16 +157,11 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
 
     The texture of the base colour is not counted.
     """
-    shown, surface = from_gltf(material).kind, material.get("pbrMetallicRoughness")
-    surface = {"metallicFactor": 0.0, "roughnessFactor": 1.0} if surface is None else surface
-    extensions = material.get("extensions", {})
-    textures = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
-    found = [(lost.TEXTURES, len(textures) - ("baseColorTexture" in surface))]
-    mode, colour = material.get("alphaMode", "OPAQUE"), surface.get("baseColorFactor", ())
-    if mode == "MASK":
-        found.append((lost.MASKED, 1))
-    elif mode == "BLEND" and shown != "glass" and (len(colour) < 4 or _number(colour[3], 1.0) < 1 or textures):
-        found.append((lost.BLENDED, 1))
+    shown, surface, extensions = from_gltf(material).kind, gltf_surface(material), material.get("extensions", {})
+    maps = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
+    found = [
+        (lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in ("baseColorTexture", "diffuseTexture")
+    ]
     if any(_colour(material.get("emissiveFactor"), _DARK)) and shown != "diffuse":
         found.append((lost.EMISSION, 1))
     transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
@@ -125,7 +170,8 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         found.append((lost.PARTLY_GLASS, 1))
     elif 0.0 < metallic < 1.0:
         found.append((lost.PARTLY_METAL, 1))
-    return [*found, *_roughness_losses(shown, roughness)]
+    is_metal = metallic >= 0.5 and "metallicRoughnessTexture" not in surface and transmission <= 0.5
+    return [*found, *_roughness_losses(shown, roughness, is_metal)]
 
 
 def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
@@ -139,7 +185,8 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     maps = [
         key
         for key in entries
-        if (key.startswith("map_") and key != "map_kd") or key in ("bump", "disp", "decal", "refl", "norm")
+        if (key.startswith("map_") and key not in ("map_kd", "map_d"))
+        or key in ("bump", "disp", "decal", "refl", "norm")
     ]
     found = [(lost.TEXTURE_OBJ, len(maps))]
     if any(_colour(entries.get("ke"), _DARK)) and shown != "diffuse":
@@ -150,11 +197,14 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     if shown == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
         found.append((lost.HIGHLIGHTS, 1))
     if "pr" in entries:
-        found += _roughness_losses(shown, first("pr", 0.0))
+        is_metal = first("pm", 0.0) >= 0.5 or first("illum", 2.0) in (3.0, 5.0)
+        found += _roughness_losses(shown, first("pr", 0.0), is_metal)
     return found
 
 
-def _roughness_losses(shown: str, roughness: float) -> list[tuple[Loss, int]]:
+def _roughness_losses(shown: str, roughness: float, is_metal: bool) -> list[tuple[Loss, int]]:
+    if shown == "diffuse" and is_metal:
+        return [(lost.ROUGH_METAL, 1)]
     if shown == "diffuse":
         return [(lost.HIGHLIGHTS, 1)] if roughness < _GLOSSY else []
     if roughness <= _SMOOTH:

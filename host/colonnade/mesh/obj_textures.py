@@ -1,4 +1,4 @@
-"""The textures of MTL files: ``map_Kd`` with its options ``-s``, ``-o`` and ``-clamp``."""
+"""The textures of MTL files: ``map_Kd`` and ``map_d`` with the options ``-s``, ``-o`` and ``-clamp``."""
 
 from __future__ import annotations
 
@@ -36,29 +36,52 @@ class MtlTextures:
 
     def __init__(self, references: References, losses: Losses) -> None:
         self._references, self._losses = references, losses
-        self._read: dict[tuple[str, bool], int | None] = {}
+        self._read: dict[tuple[TextureMap | None, TextureMap | None], int | None] = {}
         self.reader = TextureReader(losses)
 
     def textured(self, material: MeshMaterial, entries: Mapping[str, Any]) -> tuple[MeshMaterial, TextureMap | None]:
-        """The material with the texture of its ``map_Kd``, if that is there; a colour Kd of black counts as white.
+        """The material with the texture of its maps, if they are there; a colour Kd of black counts as white.
 
         Raises:
             UserError: The picture is no regular file, or is outside the folder.
         """
-        words = entries.get("map_kd")
-        if not words:
+        colour, alpha = (
+            self._parsed(words) if (words := entries.get(keyword)) else None for keyword in ("map_kd", "map_d")
+        )
+        # One position of a corner serves both
+        places = colour if colour is not None else alpha
+        if places is None:
             return material, None
-        described = self._parsed(words)
-        key = (described.name, described.is_clamped)
+        key = colour, alpha
         if key not in self._read:
-            self._read[key] = self._texture(described)
+            self._read[key] = self._texture(colour, alpha)
         index = self._read[key]
         if index is None:
-            return material, None
+            return replace(material, alpha=None), None
         albedo = material.albedo if any(material.albedo) else (1.0, 1.0, 1.0)
-        return replace(material, albedo=albedo, texture=index), described
+        return replace(material, albedo=albedo if colour is not None else material.albedo, texture=index), places
 
-    def _texture(self, described: TextureMap) -> int | None:
+    def _texture(self, colour: TextureMap | None, alpha: TextureMap | None) -> int | None:
+        index = None if colour is None else self._picture(colour)
+        number = None if alpha is None else self._picture(alpha)
+        textures = self.reader.textures
+        if number is None:
+            if index is not None:
+                textures[index] = replace(textures[index], alpha=None)
+            return index
+        mask = textures[number]
+        values = mask.pixels.max(axis=2) if mask.alpha is None else mask.alpha
+        if index is None:
+            index = number
+            textures[index] = replace(mask, pixels=np.full_like(mask.pixels, 255))
+        rows, columns = (
+            np.arange(count) * of // count
+            for count, of in zip(textures[index].pixels.shape[:2], values.shape, strict=True)
+        )
+        textures[index] = replace(textures[index], alpha=values[np.ix_(rows, columns)])
+        return index
+
+    def _picture(self, described: TextureMap) -> int | None:
         data = self._references.picture(described.name)
         if data is None:
             self._losses.add(lost.NO_PICTURES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -89,6 +90,34 @@ def corner_coloured_materials(
     coloured = [replace(material, albedo=(1.0, 1.0, 1.0), has_corner_colours=True) for material in materials]
     index = face_materials + np.where(has_colour, len(materials), 0)
     return (*_used([*materials, *coloured], index), np.where(has_colour[:, None, None], colours, 0.0))
+
+
+def table_entries(materials: Sequence[MeshMaterial]) -> tuple[tuple[MeshMaterial, ...], Indices]:
+    """The entries of a device's table for materials, and the entry of each, int64 [k].
+
+    Textured materials that differ in texture and albedo share one: the atlas holds both.
+    """
+    textured = [
+        material if material.texture is None else replace(material, albedo=(1.0, 1.0, 1.0), texture=0)
+        for material in materials
+    ]
+    entries = list(dict.fromkeys(textured))
+    return tuple(entries), np.array([entries.index(material) for material in textured], dtype=np.int64)
+
+
+def with_corner_albedo(mesh: Mesh) -> Mesh:
+    """The mesh with the plain colours of its materials at the corners of their faces, where they take no materials."""
+    albedo = np.array([material.albedo for material in mesh.materials])[mesh.face_materials]
+    is_plain = [material.texture is None and not material.has_corner_colours for material in mesh.materials]
+    colours = np.repeat(albedo[:, None], 3, axis=1) * np.array(is_plain)[mesh.face_materials][:, None, None]
+    if mesh.corner_colours is not None:
+        colours += mesh.corner_colours * ~np.array(is_plain)[mesh.face_materials][:, None, None]
+    coloured = [
+        replace(material, albedo=(1.0, 1.0, 1.0), has_corner_colours=True) if plain else material
+        for material, plain in zip(mesh.materials, is_plain, strict=True)
+    ]
+    materials, index = _used(coloured, mesh.face_materials.astype(np.int64))
+    return replace(mesh, materials=materials, face_materials=index.astype(np.uint8), corner_colours=colours)
 
 
 def with_face_colours(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:

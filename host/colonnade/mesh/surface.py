@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh.losses import CROSSED, SHORT_FACES, Losses
@@ -28,6 +29,9 @@ class RawSurface:
             without, float64 [m, 3, 3]; None: none.
         textures: Textures of the materials.
         positions: Positions (u, v) of the corners in them, 0 on faces without, float64 [m, 3, 2]; None: none.
+        source_faces: The face of the file that each is a part of, int64 [m]; None: themselves.
+        source_count: Faces of the file, if `source_faces` is given.
+        single_sided: Faces whose back viewers do not show, bool [m]; None: none.
     """
 
     vertices: Floats
@@ -38,6 +42,9 @@ class RawSurface:
     colours: Floats | None = None
     textures: tuple[Texture, ...] = ()
     positions: Floats | None = None
+    source_faces: Indices | None = None
+    source_count: int = 0
+    single_sided: npt.NDArray[np.bool_] | None = None
 
     @property
     def material_index(self) -> Indices:

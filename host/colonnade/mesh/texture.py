@@ -33,16 +33,25 @@ class Texture:
         name: Name for messages.
         pixels: uint8 [height, width, 3], sRGB.
         wrap: What lies beyond the picture, along u and v.
+        alpha: uint8 [height, width]; None: all of it is opaque.
+        is_nearest: A position shows its pixel, without a filter.
     """
 
     name: str
     pixels: npt.NDArray[np.uint8]
     wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
+    alpha: npt.NDArray[np.uint8] | None = None
+    is_nearest: bool = False
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height, pixels."""
         return self.pixels.shape[1], self.pixels.shape[0]
+
+    @property
+    def linear(self) -> Floats:
+        """Linear colours of the pixels, float64 [height, width, 3]."""
+        return np.asarray(_LINEAR[self.pixels])
 
     @property
     def mean(self) -> Floats:
@@ -59,22 +68,41 @@ class Texture:
             sums = np.take(_LEVELS, self.pixels[2 * row : 2 * row + 2]).sum(axis=0)
             count = 2 * min(2, self.size[1] - 2 * row)
             pixels[row] = np.take(_CODES, (sums[::2] + sums[right]) // count)
-        return replace(self, pixels=pixels)
+        alpha = None
+        if self.alpha is not None:
+            padded = np.pad(self.alpha, ((0, self.size[1] % 2), (0, self.size[0] % 2)), mode="edge")
+            alpha = padded.reshape(height, 2, width, 2).mean(axis=(1, 3)).astype(np.uint8)
+        return replace(self, pixels=pixels, alpha=alpha)
 
     def colours(self, positions: Floats) -> Floats:
-        """Linear colours at positions, float64 [n, 2], bilinear between the pixels' centres, float64 [n, 3]."""
+        """Linear colours at positions, float64 [n, 2]: bilinear between the pixels' centres, float64 [n, 3]."""
+        return self._filtered(positions, self.pixels, _LINEAR)
+
+    def alphas(self, positions: Floats) -> Floats:
+        """Alpha at positions, float64 [n, 2], filtered as the colours, 0 to 1, float64 [n]."""
+        if self.alpha is None:
+            return np.ones(len(positions))
+        return self._filtered(positions, self.alpha, np.arange(256) / 255.0)
+
+    def _filtered(self, positions: Floats, pixels: npt.NDArray[np.uint8], values: Floats) -> Floats:
+        """The pixels' values at positions, float64 [n, ...]."""
         width, height = self.size
-        at = positions * (width, height) - 0.5
+        at = positions * (width, height) - (0.0 if self.is_nearest else 0.5)
         low = np.floor(at)
         far = at - low
         column, row = (low[:, axis].astype(np.int64) for axis in range(2))
+        if self.is_nearest:
+            return np.asarray(
+                values[pixels[_wrapped(row, height, self.wrap[1]), _wrapped(column, width, self.wrap[0])]]
+            )
         columns = [_wrapped(column + step, width, self.wrap[0]) for step in range(2)]
         rows = [_wrapped(row + step, height, self.wrap[1]) for step in range(2)]
-        colours = np.zeros((len(positions), 3))
+        found = np.zeros((len(positions), *pixels.shape[2:]))
         for x, share_x in ((0, 1 - far[:, 0]), (1, far[:, 0])):
             for y, share_y in ((0, 1 - far[:, 1]), (1, far[:, 1])):
-                colours += (share_x * share_y)[:, None] * _LINEAR[self.pixels[rows[y], columns[x]]]
-        return colours
+                share = (share_x * share_y).reshape(-1, *(1 for _ in pixels.shape[2:]))
+                found += share * values[pixels[rows[y], columns[x]]]
+        return found
 
 
 def _wrapped(index: Indices, count: int, wrap: Wrap) -> Indices:

@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from colonnade.common.errors import UserError
-from colonnade.common.image_io import FORMATS, TARGA, TooManyPixels, UnknownFormat, opened_bytes, rgb_pixels
+from colonnade.common.image_io import (
+    FORMATS,
+    TARGA,
+    TooManyPixels,
+    UnknownFormat,
+    alpha_pixels,
+    opened_bytes,
+    rgb_pixels,
+)
 from colonnade.common.limits import KEPT_TEXTURE_PIXELS, MAX_TEXTURE_PIXELS
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
@@ -25,7 +33,7 @@ class TextureReader:
         self._pixels, self._halvings = 0, 0
         self.textures: list[Texture] = []
 
-    def read(self, data: bytes, name: str, wrap: tuple[Wrap, Wrap]) -> int | None:
+    def read(self, data: bytes, name: str, wrap: tuple[Wrap, Wrap], is_nearest: bool = False) -> int | None:
         """Add the texture of a picture's bytes: its index in `textures`; None, and a loss, if it is not readable.
 
         Raises:
@@ -40,7 +48,7 @@ class TextureReader:
                 self._pixels += picture.width * picture.height
                 if self._pixels > MAX_TEXTURE_PIXELS:
                     raise refused
-                texture = Texture(name, rgb_pixels(picture), wrap)
+                texture = Texture(name, rgb_pixels(picture), wrap, alpha_pixels(picture), is_nearest)
         except UserError as error:
             if error is refused:
                 raise

@@ -26,11 +26,13 @@ class Winding:
         reversed: Faces to reverse, bool [m].
         mixed: Closed parts whose faces disagreed.
         inverted: Closed parts whose faces agreed, but pointed inward.
+        is_open: Faces of open parts, bool [m].
     """
 
     reversed: npt.NDArray[np.bool_]
-    mixed: int = 0
-    inverted: int = 0
+    mixed: int
+    inverted: int
+    is_open: npt.NDArray[np.bool_]
 
 
 def find_winding(vertices: Floats, faces: Faces) -> Winding:
@@ -86,7 +88,7 @@ def find_winding(vertices: Floats, faces: Faces) -> Winding:
     if alike.any():
         inward[alike] &= ~_is_cavity(vertices, faces, part, np.flatnonzero(repairable), np.flatnonzero(alike))
     is_reversed ^= inward[part]
-    return Winding(is_reversed, int(mixed.sum()), int((inward & ~mixed).sum()))
+    return Winding(is_reversed, int(mixed.sum()), int((inward & ~mixed).sum()), ~closed[part])
 
 
 def _closed_parts(keys: Indices, part: Indices) -> npt.NDArray[np.bool_]:

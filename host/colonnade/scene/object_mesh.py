@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 from colonnade.common import notes
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.palette import reduced, with_face_colours, without_emission, without_textures
+from colonnade.mesh.palette import (
+    reduced,
+    table_entries,
+    with_corner_albedo,
+    with_face_colours,
+    without_emission,
+    without_textures,
+)
 from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Scene
 from colonnade.scene.view import with_overrides
@@ -60,8 +67,8 @@ def object_mesh(scene: Scene, environment: Environment | None = None, corner_col
 def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     """The mesh with what a device has, and notes of what it lacks.
 
-    Of more diffuse colours than the material table holds, similar ones are merged, after the scene's values have
-    overridden those of the mesh.
+    Of more colours than the material table holds, after the scene's values have overridden those of the mesh, plain
+    ones move to the corners of faces, or else similar ones are merged.
     """
     if not features.textures:
         mesh, lines = without_textures(mesh)
@@ -72,8 +79,13 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     if not features.corner_colours:
         mesh, lines = with_face_colours(mesh)
         notes.report(lines)
-    if len(mesh.materials) <= features.materials:
+    if len(table_entries(mesh.materials)[0]) <= features.materials:
         return mesh
-    mesh, line = reduced(replace(mesh, materials=with_overrides(mesh.materials, scene.material)), features.materials)
+    mesh = replace(mesh, materials=with_overrides(mesh.materials, scene.material))
+    if features.corner_colours and len(table_entries(mesh.materials)[0]) > features.materials:
+        mesh = with_corner_albedo(mesh)
+    if len(table_entries(mesh.materials)[0]) <= features.materials:
+        return mesh
+    mesh, line = reduced(mesh, features.materials)
     notes.report([] if line is None else [line])
     return mesh

@@ -1,7 +1,8 @@
 """The atlas: the base-colour textures of a mesh in one square picture, for the texture memory (docs/textures.md).
 
 Each textured material has a region of the atlas: the part of its texture that faces use, with repeats, resampled and
-multiplied by the material's albedo. Regions begin at tiles and share one scale, of at most 1.
+multiplied by the material's albedo. Regions begin at tiles and share one scale. Where there is space it is above 1, and
+small regions are enlarged further: a tile holds two or four colours.
 """
 
 from __future__ import annotations
@@ -24,6 +25,10 @@ TILE = 16
 _MAX_SAMPLES = 8
 #: Texels around the faces that count as shown: positions are rounded.
 _MARGIN = 2
+#: Scales that are tried first. Above 1 the filter of the texture smooths it, and a tile holds fewer colours.
+_SCALES = (16.0, 8.0, 4.0, 2.0, 1.0)
+#: Regions of fewer pixels along both axes are enlarged further, if the scale of the others stays so large.
+_SMALL, _LEAST = 64, 0.9
 #: Steps in the search for the scale.
 _STEPS = 24
 
@@ -52,7 +57,7 @@ class Atlas:
         colours: Linear, float64 [edge, edge, 3].
         positions: Positions of the corners of the mesh's faces, texels from the upper left corner, 0 on faces without a
             texture, float64 [m, 3, 2].
-        scale: Texels of the atlas for each pixel of a texture, along an axis.
+        scale: Texels of the atlas for each pixel of a texture that is not enlarged, along an axis.
         source_bytes: Size of the textures, three bytes a pixel.
     """
 
@@ -93,11 +98,11 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
         raise UserError(
             f"mesh {mesh.name} has {len(textured):,} textured materials: use at most {(edge // TILE) ** 2:,}"
         )
-    scale, corners = _placed(np.array(pixels), edge)
+    scale, corners, gains = _enlarged(np.array(pixels), edge)
     colours = np.zeros((edge, edge, 3))
     positions = np.zeros_like(mesh.corner_positions)
     for index, number in enumerate(textured):
-        size = _size(pixels[index] * scale, edge)
+        size = _size(pixels[index] * gains[index] * scale, edge)
         region = Region(lows[index], highs[index], corners[index], (int(size[0]), int(size[1])))
         factor = np.array(materials[number].albedo) / (headroom if materials[number].kind == "diffuse" else 1.0)
         tile = _resampled(textures[index], region, pixels[index]) * factor
@@ -170,14 +175,27 @@ def _size(pixels: Floats, edge: int) -> npt.NDArray[np.int64]:
     return np.clip(np.ceil(pixels - 1e-6), 1, edge).astype(np.int64)
 
 
+def _enlarged(pixels: Floats, edge: int) -> tuple[float, list[tuple[int, int]], Floats]:
+    """As `_placed`, with small regions enlarged where that costs the others little, and by how much each is."""
+    scale, corners = _placed(pixels, edge)
+    is_small = (pixels <= _SMALL).all(axis=1)
+    for whole in _SCALES if is_small.any() else ():
+        gains = np.where(is_small, max(whole / scale, 1.0), 1.0)
+        found, places = _placed(pixels * gains[:, None], edge)
+        if found >= _LEAST * scale:
+            return found, places, gains
+    return scale, corners, np.ones(len(pixels))
+
+
 def _placed(pixels: Floats, edge: int) -> tuple[float, list[tuple[int, int]]]:
-    """The largest scale, up to 1, at which regions of so many pixels, float64 [n, 2], fit; and their corners."""
-    whole = _shelves(pixels, edge)
-    if whole is not None:
-        return 1.0, whole
-    low, high = 0.0, 1.0
-    best = _shelves(pixels * low, edge)
-    for _ in range(_STEPS):
+    """The largest of scales up to `_SCALES` at which regions of pixels, float64 [n, 2], fit; and their corners."""
+    low, high, best = 0.0, 1.0, _shelves(pixels * 0.0, edge)
+    for whole in _SCALES:
+        corners = _shelves(pixels * whole, edge)
+        if corners is not None:
+            low, high, best = whole, 2 * whole, corners
+            break
+    for _ in range(_STEPS if low < _SCALES[0] else 0):
         middle = (low + high) / 2
         corners = _shelves(pixels * middle, edge)
         if corners is None:

@@ -8,7 +8,7 @@ The sections are nodes, triangles and attributes, in this order. Addresses in no
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from colonnade.common.vectors import unit_vectors
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.palette import TEXTURE_SETTINGS
+from colonnade.mesh.palette import TEXTURE_SETTINGS, table_entries
 from colonnade.mesh.topology import drop_faces, merge_rows
 from colonnade.scene_image.atlas import Atlas, make_atlas, position_codes
 from colonnade.scene_image.bvh import LEAF, NODE, Bvh, build_bvh
@@ -120,7 +120,11 @@ def pack(
     sections.append(_triangle_records(corners, leaf_first, leaf_count, is_clear[bvh.order], manifest))
     atlas = _atlas(mesh, manifest, materials, headroom)
     colours = _corner_colours(mesh, manifest, materials, headroom, atlas)
-    sections.append(_attribute_records(mesh, quantised, bvh.order, corner_order, manifest, faces_per_record, colours))
+    entries, index = table_entries(materials)
+    indexed = replace(mesh, face_materials=index.astype(np.uint8)[mesh.face_materials])
+    sections.append(
+        _attribute_records(indexed, quantised, bvh.order, corner_order, manifest, faces_per_record, colours)
+    )
     header = ImageHeader(
         format_hash=manifest.format_hash,
         mesh=mesh.name,
@@ -136,7 +140,7 @@ def pack(
         largest_triangle=int(np.ptp(corners, axis=1).max()),
         frame=quantised.frame,
         extent=mesh.extent,
-        materials=tuple(materials),
+        materials=entries,
         tree=bvh.statistics if manifest.bvh else None,
         parts=mesh.parts,
     )

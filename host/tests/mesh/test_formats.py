@@ -228,14 +228,13 @@ def test_what_a_gltf_file_loses_is_named(tmp_path: Path) -> None:
         "1 picture of a texture is missing: surfaces have their base colour",
         "1 line primitive is not shown: only faces are rendered",
         "1 point primitive is not shown: only faces are rendered",
-        "1 texture is not shown: only textures of the base colour are",
-        "1 partly transparent material is opaque: only transmission above 1/2 is glass",
-        "1 emissive mirror or glass is not emitting: only diffuse surfaces do",
-        "1 rough metal is a perfect mirror: roughness is not rendered",
+        "1 normal map is not shown: surfaces have the normals of their corners",
+        "1 rough metal is diffuse: blurred reflections are not rendered",
         "1 use of the extension KHR_materials_clearcoat is ignored: not supported",
         "2 cameras are not used: the scene file has the camera",
         "1 animation is not played: nodes stand as the file places them",
         "3 lights are not used: the scene file has the lights",
+        "1 face of an open single-sided surface is shown from behind: viewers show their front only",
     ]
 
 
@@ -250,7 +249,7 @@ def test_what_an_obj_file_loses_is_named(tmp_path: Path) -> None:
         "1 file of materials is missing: faces have the default material",
         "1 picture of a texture is missing: surfaces have their base colour",
         "1 texture map is not shown: only map_Kd is",
-        "1 partly transparent material is opaque: only transmission above 1/2 is glass",
+        "1 partly transparent material is not blended: from alpha 1/2 on it is opaque, else a tinted pane or not shown",
         "1 glossy material is diffuse: highlights are not rendered",
         "1 material name is not defined: faces have the default material",
         "1 face of fewer than three corners is left out: it has no area",

@@ -17,8 +17,10 @@ from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, from_mtl
 def test_gltf_materials() -> None:
     surface = {"baseColorFactor": [0.5, 0.25, 0.125, 1.0], "metallicFactor": 0.2}
     assert from_gltf({"pbrMetallicRoughness": surface}) == MeshMaterial("diffuse", (0.5, 0.25, 0.125))
-    assert from_gltf({"pbrMetallicRoughness": surface | {"metallicFactor": 0.5}}).kind == "mirror"
-    assert from_gltf({"pbrMetallicRoughness": {}}).kind == "mirror"  # glTF is metallic by default
+    assert (
+        from_gltf({"pbrMetallicRoughness": surface | {"metallicFactor": 0.5, "roughnessFactor": 0.2}}).kind == "mirror"
+    )
+    assert from_gltf({"pbrMetallicRoughness": {}}).kind == "diffuse"  # glTF is rough metal by default
     assert from_gltf({}).kind == "diffuse"
     textured = surface | {"metallicFactor": 1.0, "metallicRoughnessTexture": {"index": 0}}
     assert from_gltf({"pbrMetallicRoughness": textured}).kind == "diffuse"
@@ -40,7 +42,9 @@ def test_mtl_materials() -> None:
 def test_a_glb_file_keeps_its_materials_apart(tmp_path: Path) -> None:
     parts = []
     for shape, metallic in ((trimesh.creation.icosphere(1), 0.9), (trimesh.creation.box(), 0.0)):
-        material = PBRMaterial(baseColorFactor=[0.2, 0.4, 0.6, 1.0], metallicFactor=metallic, name="same")
+        material = PBRMaterial(
+            baseColorFactor=[0.2, 0.4, 0.6, 1.0], metallicFactor=metallic, roughnessFactor=0.1, name="same"
+        )
         shape.visual = trimesh.visual.TextureVisuals(material=material)
         parts.append(shape)
     trimesh.Scene(parts).export(tmp_path / "two.glb")

@@ -10,7 +10,9 @@ import pytest
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.palette import MAX_MATERIALS, clustered, coloured_materials, reduced
+from colonnade.mesh.palette import MAX_MATERIALS, clustered, coloured_materials, reduced, table_entries
+from colonnade.scene.model import MeshSource, Scene
+from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 
 
 def coloured(colours: np.ndarray, *others: MeshMaterial) -> Mesh:
@@ -77,3 +79,20 @@ def test_clusters_are_no_more_than_asked_for(count: int) -> None:
     colours = np.random.default_rng(2).uniform(size=(100, 3))
     centres, nearest = clustered(colours, np.ones(100, dtype=np.int64), count)
     assert len(centres) == count and nearest.max() < count
+
+
+def test_textures_and_their_tints_take_one_entry_of_the_table() -> None:
+    tints = [MeshMaterial(albedo=(0.1 * k, 0.5, 0.5), texture=k) for k in range(9)]
+    others = [MeshMaterial("mirror", texture=3), MeshMaterial(albedo=(0.1, 0.5, 0.5))]
+    entries, index = table_entries([*tints, *others])
+    assert len(entries) == 3 and index.tolist() == [0] * 9 + [1, 2]
+
+
+def test_a_full_table_moves_plain_colours_to_corners() -> None:
+    colours = np.random.default_rng(3).uniform(size=(60, 3))
+    mesh = coloured(colours, MeshMaterial("glass"))
+    shown = with_materials(Scene(MeshSource(name="sphere:2")), mesh, SurfaceFeatures(8, corner_colours=True))
+    assert len(shown.materials) == 2 and shown.corner_colours is not None
+    expected = np.array([mesh.materials[number].albedo for number in mesh.face_materials])
+    np.testing.assert_array_equal(shown.corner_colours, np.repeat(expected[:, None], 3, axis=1))
+    assert [shown.materials[number].kind for number in shown.face_materials[:2]] == ["glass", "diffuse"]

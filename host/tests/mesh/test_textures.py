@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 import io
-import json
 import struct
 import zlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from textured_files import FOUR, gltf, png
 
 from colonnade.common import notes
 from colonnade.common.errors import UserError
@@ -26,15 +24,7 @@ from colonnade.scene.model import Material, MeshSource, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 from colonnade.scene.view import with_overrides
 
-#: Red, green, blue, white, from the upper left corner on.
-FOUR = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
-
-
-def png(pixels: np.ndarray) -> bytes:
-    stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, "PNG")
-    return stream.getvalue()
 
 
 def obj(folder: Path, faces: str, material: str = "map_Kd a.png") -> Path:
@@ -65,31 +55,6 @@ def test_faces_without_positions_have_the_plain_colour(tmp_path: Path) -> None:
     found = [mesh.materials[index] for index in mesh.face_materials]
     assert [material.texture for material in found] == [0, None]
     assert mesh.notes[0].endswith("1 face of a textured material is untextured: it has no texture coordinates")
-
-
-def gltf(folder: Path, **changes: Any) -> Path:
-    """A triangle with a texture that a buffer holds."""
-    picture = png(FOUR)
-    arrays = [np.eye(3, dtype=np.float32), np.array([(0, 0), (1, 0), (0, 1)], np.float32)]
-    data = b"".join(array.tobytes() for array in arrays) + picture
-    document = {
-        "asset": {"version": "2.0"},
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}],
-        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0}}],
-        "textures": [{"source": 0, "sampler": 0}],
-        "samplers": [{"wrapS": 33648, "wrapT": 33071}],
-        "images": [{"bufferView": 2, "mimeType": "image/png"}],
-        "accessors": [{"bufferView": i, "componentType": 5126, "count": 3, "type": f"VEC{3 - i}"} for i in range(2)],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": 36},
-            {"buffer": 0, "byteOffset": 36, "byteLength": 24},
-            {"buffer": 0, "byteOffset": 60, "byteLength": len(picture)},
-        ],
-        "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
-    }
-    (folder / "a.gltf").write_text(json.dumps(document | changes))
-    return folder / "a.gltf"
 
 
 def test_a_gltf_texture_is_embedded_and_wraps_as_its_sampler_says(tmp_path: Path) -> None:
@@ -166,7 +131,7 @@ def test_the_textures_of_a_mesh_are_kept_within_a_bound(tmp_path: Path, monkeypa
     assert [texture.size for texture in mesh.textures] == [(2, 2), (2, 2)]
     np.testing.assert_array_equal(mesh.textures[0].pixels, np.full((2, 2, 3), 188))
     np.testing.assert_array_equal(mesh.textures[1].pixels[1, 1], FOUR[0, 0])
-    assert [note.partition(": ")[2] for note in mesh.notes] == [
+    assert [note.partition(": ")[2] for note in mesh.notes[:1]] == [
         "2 textures are kept at 1/2 of the width and height: a mesh holds 33,554,432 pixels"
     ]
     monkeypatch.setattr("colonnade.mesh.texture_reader.MAX_TEXTURE_PIXELS", 24)
@@ -199,3 +164,23 @@ def test_a_targa_picture_is_read(tmp_path: Path) -> None:
 def test_a_texture_that_does_not_exist_is_refused(tmp_path: Path, missing: str) -> None:
     with pytest.raises(UserError, match=rf"{missing}\[0\] is used, but does not exist"):
         load_mesh(gltf(tmp_path, **{missing: []}))
+
+
+def test_a_surface_emits_the_mean_of_its_emission_map(tmp_path: Path) -> None:
+    surface = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    glowing = {"pbrMetallicRoughness": surface, "emissiveFactor": [1, 0.5, 1], "emissiveTexture": {"index": 0}}
+    mesh = load_mesh(gltf(tmp_path, materials=[glowing | {"doubleSided": True}]))
+    np.testing.assert_allclose(mesh.materials[0].emission, (0.5, 0.25, 0.5))
+    assert "1 emission map is not shown: the surface emits its mean" in mesh.notes[0]
+
+
+def test_specular_glossiness_gives_the_base_colour(tmp_path: Path) -> None:
+    values = {"diffuseFactor": [0.5, 1, 1, 1], "diffuseTexture": {"index": 0}, "glossinessFactor": 0.2}
+    material = {"extensions": {"KHR_materials_pbrSpecularGlossiness": values}, "doubleSided": True}
+    mesh = load_mesh(gltf(tmp_path, materials=[material]))
+    assert mesh.materials[0] == MeshMaterial(albedo=(0.5, 1.0, 1.0), texture=0) and mesh.notes == ()
+
+
+def test_open_single_sided_faces_are_noted(tmp_path: Path) -> None:
+    mesh = load_mesh(gltf(tmp_path, materials=[{"pbrMetallicRoughness": {"metallicFactor": 0}}]))
+    assert "1 face of an open single-sided surface is shown from behind: viewers show" in mesh.notes[0]

@@ -26,7 +26,7 @@ from colonnade.environment.encoding.vectors import VectorSpace
 
 #: Alternating rounds of choosing modes and updating the palette.
 _ROUNDS = 6
-#: The last of these rounds, in which tiles share words.
+#: The last of these rounds, in which tiles share words: most of the time.
 _SHARED_ROUNDS = 2
 #: Candidate palette entries of a tile.
 _CANDIDATES = 32
@@ -57,9 +57,13 @@ class _Choices:
 
 
 def encode_two_level(
-    vectors: NDArray[np.float64], space: VectorSpace, layout: AttributeLayout, rounds: int = _ROUNDS
+    vectors: NDArray[np.float64],
+    space: VectorSpace,
+    layout: AttributeLayout,
+    rounds: int = _ROUNDS,
+    shared_rounds: int = _SHARED_ROUNDS,
 ) -> TwoLevelMap:
-    """Encode ``vectors``, float64 [height, width, 3]."""
+    """Encode ``vectors``, float64 [height, width, 3]; tiles share words in the last ``shared_rounds`` rounds."""
     pixels = TilePixels(space.to_points(vectors), layout)
     flat = pixels.points.reshape(-1, 3)
     weights = pixels.weights.ravel()
@@ -69,7 +73,7 @@ def encode_two_level(
         palette = space.to_points(space.vectors(words))
         last = completed_rounds == rounds - 1
         choices = _choices(pixels, palette, rounds=2 if last else 1)
-        is_shared = rounds - completed_rounds <= _SHARED_ROUNDS
+        is_shared = rounds - completed_rounds <= shared_rounds
         parts = (_shared if is_shared else _own)(pixels, palette, choices)
         if not last:
             index = _indices(pixels, parts)

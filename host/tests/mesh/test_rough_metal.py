@@ -1,0 +1,75 @@
+"""The roughness from which on a metal is shown as diffuse: where both are equally far from its blurred reflection."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colonnade.mesh.materials import MIRROR_ROUGHNESS, from_gltf, from_mtl
+
+ROUGHNESS = np.arange(0.1, 0.75, 0.05)
+
+
+def surroundings(seed: int, directions: np.ndarray) -> np.ndarray:
+    """The light from directions [..., 3]: 40 patches of walls, and a lamp of 10 degrees' radius."""
+    random = np.random.default_rng(seed)
+    centres = random.normal(size=(41, 3))
+    centres /= np.linalg.norm(centres, axis=1)[:, None]
+    walls = random.uniform(0.05, 0.9, 40)[(directions @ centres[:40].T).argmax(axis=-1)]
+    return np.where(directions @ centres[40] > np.cos(np.radians(10)), 8.0, walls)
+
+
+def srgb(values: np.ndarray) -> np.ndarray:
+    return np.clip(values, 0, 1) ** (1 / 2.2)
+
+
+def errors(seed: int, samples: int = 400, points: int = 150) -> np.ndarray:
+    """Mean squared errors of a mirror and of a diffuse surface on a sphere of a GGX metal, by roughness: [2, n]."""
+    random = np.random.default_rng(seed)
+    place = random.uniform(-0.99, 0.99, (4 * points, 2))
+    place = place[(place**2).sum(axis=1) < 0.98][:points]
+    normal = np.column_stack([place, np.sqrt(1 - (place**2).sum(axis=1))])
+    eye = np.array([0.0, 0.0, 1.0])
+    tangent = np.cross(normal, (0.36, 0.48, 0.8))
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
+    one, two = random.random((2, points, samples))
+
+    def around(cosine: np.ndarray) -> np.ndarray:
+        sine, angle = np.sqrt(1 - cosine**2), 2 * np.pi * two
+        local = np.stack([sine * np.cos(angle), sine * np.sin(angle), cosine], axis=-1)
+        return np.asarray(np.einsum("nsi,nij->nsj", local, frame))
+
+    mirror = surroundings(seed, 2 * normal[:, 2:] * normal - eye)
+    diffuse = surroundings(seed, around(np.sqrt(one))).mean(axis=1)
+    found = []
+    for alpha in ROUGHNESS**2:
+        cosine = np.sqrt((1 - one) / (1 + (alpha**2 - 1) * one))
+        half = around(cosine)
+        towards = 2 * half[..., 2:] * half - eye
+        to_light, to_eye = np.einsum("nsj,nj->ns", towards, normal), normal[:, 2:]
+
+        def shown(c: np.ndarray, alpha: float = alpha) -> np.ndarray:
+            return np.asarray(2 * c / (c + np.sqrt(alpha**2 + (1 - alpha**2) * c**2)))
+
+        visible = (to_light > 0) & (half[..., 2] > 0)
+        weight = shown(np.maximum(to_light, 1e-6)) * shown(to_eye) * half[..., 2] / (to_eye * cosine)
+        metal = (surroundings(seed, towards) * np.where(visible, weight, 0)).mean(axis=1)
+        found.append([((srgb(one_of) - srgb(metal)) ** 2).mean() for one_of in (mirror, diffuse)])
+    return np.array(found).T
+
+
+def test_a_metal_is_a_mirror_up_to_where_diffuse_is_nearer() -> None:
+    mirror, diffuse = np.mean([errors(seed) for seed in range(8)], axis=0)
+    for roughness, *both in zip(ROUGHNESS, mirror, diffuse, strict=True):
+        print(f"roughness {roughness:.2f}: mirror, diffuse ", *(f"{-10 * np.log10(one):.1f} dB" for one in both))
+    crossing = np.interp(0.0, np.log(mirror / diffuse), ROUGHNESS)
+    print(f"equal at {crossing:.2f}")
+    assert abs(crossing - MIRROR_ROUGHNESS) < 0.05
+
+
+def test_rough_metal_is_diffuse_and_noted() -> None:
+    for roughness, kind in ((0.0, "mirror"), (0.35, "mirror"), (0.36, "diffuse"), (1.0, "diffuse")):
+        surface = {"baseColorFactor": [1.0, 0.8, 0.3, 1.0], "roughnessFactor": roughness}
+        found = from_gltf({"pbrMetallicRoughness": surface})
+        assert (found.kind, found.albedo) == (kind, (1.0, 0.8, 0.3))
+        assert from_mtl({"pm": ["1"], "pr": [str(roughness)]}).kind == kind
