@@ -6,6 +6,7 @@ leaves out.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from colonnade.mesh.losses import Losses, extension_loss
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, gltf_losses, unused_extensions
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, joined
+from colonnade.mesh.texture import MAX_POSITION
 
 #: Required extensions that are read, or whose loss is reported.
 _KNOWN_EXTENSIONS = (
@@ -36,6 +38,9 @@ _KNOWN_EXTENSIONS = (
 )
 #: Extensions that compress the mesh.
 _COMPRESSION = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+
+#: Largest magnitude of a transform's element, in the scene.
+_MAX_TRANSFORM = 1e100
 
 _POINTS, _LINE_MODES, _TRIANGLES, _STRIP, _FAN = 0, (1, 2, 3), 4, 5, 6
 
@@ -149,6 +154,8 @@ def _nodes(document: GltfDocument, losses: Losses) -> Iterator[tuple[Mapping[str
         index, parent = pending.pop()
         node = document.entry("nodes", index)
         matrix = parent @ _local(document, index, node)
+        if not (np.abs(matrix) < _MAX_TRANSFORM).all():
+            raise document.error(f"the transform of node {index} is not finite, or too large: export it again")
         pending += [(child, matrix) for child in reversed(node.get("children", []))]
         if "mesh" in node:
             losses.add(lost.SKINS, "skin" in node)
@@ -162,7 +169,7 @@ def _local(document: GltfDocument, index: int, node: Mapping[str, Any]) -> Float
             matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
         else:
             x, y, z, w = np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64)
-            length = float(np.sqrt(x * x + y * y + z * z + w * w)) or 1.0
+            length = math.hypot(x, y, z, w) or 1.0
             x, y, z, w = x / length, y / length, z / length, w / length
             rotation = np.array(
                 [
@@ -176,8 +183,6 @@ def _local(document: GltfDocument, index: int, node: Mapping[str, Any]) -> Float
             matrix[:3, 3] = np.array(node.get("translation", (0.0, 0.0, 0.0)), dtype=np.float64).reshape(3)
     except (ValueError, TypeError):
         raise document.error(f"the transform of node {index} is not valid: export it again") from None
-    if not np.isfinite(matrix).all():
-        raise document.error(f"the transform of node {index} is not finite: export it again")
     return matrix
 
 
@@ -217,6 +222,10 @@ def _primitive(
     corners = _corners(document, primitive, count)
     faces = _faces(corners, mode)
     colours = attribute("COLOR_0", 3)
+    if colours is not None:
+        if not np.isfinite(colours).all():
+            raise document.error("a primitive has a COLOR_0 that is not a finite number: export it again")
+        losses.add(lost.CLIPPED_COLOURS, int(((colours < 0) | (colours > 1)).any(axis=1).sum()))
     if "COLOR_0" in attributes and document.array(attributes["COLOR_0"]).shape[1] == 4:
         alpha = attribute("COLOR_0", 4)
         losses.add(lost.ALPHA, 0 if alpha is None else int((alpha[:, 3] < 1.0).sum()))
@@ -235,6 +244,10 @@ def _primitive(
         document.entry("materials", material)
     use = textures.use_of(int(material)) if material != default else None
     places = None if use is None else attribute(use.coordinates, 2)
+    if places is not None and not (np.abs(places) <= MAX_POSITION).all():
+        raise document.error(
+            f"a primitive has texture coordinates beyond {MAX_POSITION:,.0f}, or not finite: export it again"
+        )
     if use is not None:
         losses.add(lost.NO_POSITIONS, len(faces) if places is None else 0)
     shows_colours = colours is not None and not (colours == 1.0).all()

@@ -98,11 +98,14 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
     if path.stat().st_size == 0:
         raise UserError(f"mesh file {path} is empty")
     try:
-        file = read_surface(path)
+        with np.errstate(all="ignore"):  # of numbers that are refused or noted
+            file = read_surface(path)
     except (ImportError, MemoryError):
         raise
     except UserError as error:
         raise error if str(path) in str(error) else UserError(f"mesh {path}: {error}") from None
+    except (ValueError, IndexError) as error:  # of a number or a list that is not one
+        raise UserError(f"{path} cannot be read as a mesh: a value is not valid: {error}") from None
     except Exception as error:  # readers raise many types on invalid data
         raise UserError(f"{path} cannot be read as a mesh: {type(error).__name__}: {error}") from None
     losses = file.losses

@@ -77,6 +77,10 @@ ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "roughness is not render
 PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror", "1/2 and above is a mirror")
 PARTLY_GLASS = Loss.of("partly transmissive material", "rounded to opaque or glass", "above 1/2 is glass")
 HIGHLIGHTS = Loss.of("glossy material", "diffuse", "highlights are not rendered")
+NEGATIVE_SHININESS = Loss.of(
+    "material's negative Ns", "taken as 0", "highlights are not rendered", "materials' negative Ns"
+)
+CLIPPED_COLOURS = Loss.of("colour of a vertex", "clipped", "colours are from 0 to 1", "colours of vertices")
 NO_MATERIALS = Loss.of("file of materials", "missing", "faces have the default material", "files of materials")
 UNKNOWN_MATERIALS = Loss.of("material name", "not defined", "faces have the default material")
 GROUPS = Loss.of("smoothing group", "not used", "edges are smooth up to the crease angle")

@@ -23,7 +23,7 @@ from colonnade.mesh.materials import PLAIN, MeshMaterial, from_mtl, mtl_losses
 from colonnade.mesh.obj_textures import MtlTextures, TextureMap, positions_of
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, from_polygons
-from colonnade.mesh.texture import Texture
+from colonnade.mesh.texture import MAX_POSITION, Texture
 
 #: Statements of curves, surfaces and their parameter space.
 _CURVES = ("curv", "curv2", "surf")
@@ -119,16 +119,18 @@ def _placed(
 ) -> tuple[tuple[MeshMaterial, ...], Indices, Floats]:
     """Materials, the material of each polygon, and the positions of the corners in the textures.
 
-    A polygon with a corner without a position shows no texture.
+    A polygon with a corner without a position, or with one beyond `MAX_POSITION`, shows no texture.
     """
     owner = np.repeat(np.arange(len(sizes)), sizes)
-    lacks = np.bincount(owner, corner_positions < 0, len(sizes)) > 0
+    rows = _rows([f"{line} 0" for line in file.positions], 2)[:, :2]  # v is 0 unless given
+    values = np.concatenate([rows, np.zeros((1, 2))])[corner_positions]
+    positions = positions_of(values, maps, used[owner])
+    is_known = (corner_positions >= 0) & (np.abs(positions) <= MAX_POSITION).all(axis=1)
+    lacks = np.bincount(owner, ~is_known, len(sizes)) > 0
     is_textured = np.array([material.texture is not None for material in materials])[used]
     losses.add(lost.NO_POSITIONS, int((is_textured & lacks).sum()))
     plain = tuple(replace(material, texture=None) for material in materials)
-    rows = np.nan_to_num(_rows(file.positions, 2)[:, :2])
-    values = np.concatenate([rows, np.zeros((1, 2))])[corner_positions]
-    positions = positions_of(values, maps, used[owner])
+    positions = np.where(is_known[:, None], positions, 0.0)
     return (*materials, *plain), used + np.where(lacks, len(materials), 0), positions
 
 
@@ -186,8 +188,9 @@ def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices, 
             if abs(worst) > count and given:
                 raise UserError(f"mesh {path}: a face names {one} {worst}, but the file has {count:,} {several}")
     corners = np.array(vertices, dtype=np.int64)
+    beyond = 1 << 40  # indices of positions are not checked
     corner_normals, corner_positions = (
-        np.array([0 if index is None else index for index in indices], dtype=np.int64)
+        np.array([0 if index is None else max(-beyond, min(index, beyond)) for index in indices], dtype=np.int64)
         for indices in (normals, positions)
     )
     before = np.repeat(np.array(file.counts, dtype=np.int64).reshape(-1, 3), sizes, axis=0)
@@ -222,6 +225,7 @@ def _materials(
         if name in defined:
             materials[index], maps[index] = textures.textured(from_mtl(defined[name]), defined[name])
             losses.update(mtl_losses(defined[name]))
+            losses.add(lost.NEGATIVE_SHININESS, any(word.startswith("-") for word in defined[name].get("ns", [])))
         elif name and defined:
             losses.add(lost.UNKNOWN_MATERIALS)
     textures.reader.count_losses()

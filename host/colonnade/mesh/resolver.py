@@ -66,14 +66,14 @@ class References:
 
 
 def _checked_mtl(data: bytes, path: Path) -> bytes:
-    """Refuse an MTL file with a number that is negative or not finite."""
+    """Refuse an MTL file with a number that is negative or not finite; Ns may be negative."""
     for line in _NUMBERS.finditer(data):
         for word in line[2].split():
             try:
                 number = float(word)
             except ValueError:
                 break
-            if not math.isfinite(number) or number < 0:
+            if not math.isfinite(number) or (number < 0 and line[1].lower() != b"ns"):
                 row = data.count(b"\n", 0, line.start()) + 1
                 text = line[0].decode("latin-1").strip()
                 raise UserError(f"{path}, line {row}: {text}: a material's numbers must be finite and not negative")

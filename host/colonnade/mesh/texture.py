@@ -18,6 +18,9 @@ from colonnade.common.types import Floats, Indices
 #: What lies beyond the picture: it repeats, it repeats mirrored, or its border goes on.
 Wrap = Literal["repeat", "mirror", "clamp"]
 
+#: Largest magnitude of a position: beyond it float32 holds no fractions of a picture.
+MAX_POSITION = 1e6
+
 #: Linear value of each code of 8 bits.
 _LINEAR = linear_from_srgb(np.arange(256) / 255.0)
 #: The same as whole numbers of 16 bits, and the code of each of these.

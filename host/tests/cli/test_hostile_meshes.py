@@ -163,7 +163,9 @@ CASES = {
     "gltf-view": Case(
         GLTF, "too short for 30 elements", of_gltf(accessors=[ACCESSORS[0] | {"count": 30}, ACCESSORS[1]])
     ),
-    "gltf-offset": Case(GLTF, "too short", of_gltf(accessors=[ACCESSORS[0] | {"byteOffset": -12}, ACCESSORS[1]])),
+    "gltf-offset": Case(
+        GLTF, "not a whole number from 0 on", of_gltf(accessors=[ACCESSORS[0] | {"byteOffset": -12}, ACCESSORS[1]])
+    ),
     "gltf-stride": Case(GLTF, "x.gltf", of_gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": -12}] * 2)),
     "gltf-draco": Case(
         GLTF,

@@ -1,0 +1,116 @@
+"""Values in mesh files that no exporter should write: refused or noted in plain words, without warnings."""
+
+from __future__ import annotations
+
+import copy
+import json
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colonnade.common.errors import UserError
+from colonnade.mesh.load import load_mesh
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+ODD = [None, True, -1, 1, 99, 1e300, 2**40, "x", [], {}, [[]], [{}], [None], [1e300] * 3, [0, 0, 0, 1e300], {"a": 1}]
+
+
+def document(folder: Path, colours: list[list[float]] | None = None, **node: Any) -> dict[str, Any]:
+    """A triangle with colours, whose material has a base-colour texture."""
+    arrays = [np.eye(3), np.eye(3) if colours is None else np.array(colours), np.eye(3)[:, :2]]
+    data = b"".join(array.astype("<f4").tobytes() for array in arrays)
+    (folder / "a.bin").write_bytes(data)
+    attributes = {"POSITION": 0, "COLOR_0": 1, "TEXCOORD_0": 2}
+    return {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, **node}],
+        "meshes": [{"primitives": [{"attributes": attributes, "material": 0}]}],
+        "materials": [
+            {"emissiveFactor": [0, 0, 0], "extensions": {}, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+        ],
+        "textures": [{"source": 0}],
+        "images": [{"uri": "none.png"}],
+        "accessors": [
+            {"bufferView": k, "componentType": 5126, "count": 3, "type": "VEC2" if k == 2 else "VEC3"} for k in range(3)
+        ],
+        "bufferViews": [{"buffer": 0, "byteOffset": 36 * k, "byteLength": 24 if k == 2 else 36} for k in range(3)],
+        "buffers": [{"byteLength": len(data), "uri": "a.bin"}],
+    }
+
+
+def loaded(folder: Path, content: dict[str, Any]) -> tuple[str, ...]:
+    """The notes of a glTF document; warnings are errors."""
+    (folder / "a.gltf").write_text(json.dumps(content))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return load_mesh(folder / "a.gltf").notes
+
+
+@pytest.mark.parametrize(
+    "node",
+    [
+        {"rotation": [1e300, 0, 0, 1e300]},
+        {"scale": [1e200, 1, 1]},
+        {"matrix": [1e300] * 16},
+        {"translation": [1e300] * 3},
+    ],
+)
+def test_huge_transforms_are_refused_or_normalised_without_warnings(tmp_path: Path, node: dict[str, Any]) -> None:
+    if "rotation" in node:
+        assert loaded(tmp_path, document(tmp_path, **node))
+    else:
+        with pytest.raises(UserError, match="the transform of node 0 is not finite, or too large"):
+            loaded(tmp_path, document(tmp_path, **node))
+
+
+def test_colours_that_are_not_colours_are_refused_or_noted(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="a COLOR_0 that is not a finite number"):
+        loaded(tmp_path, document(tmp_path, [[np.nan, 0, 0]] * 3))
+    notes = loaded(tmp_path, document(tmp_path, [[1e30, 0, 0], [-1, 0, 0], [0, 0, 0]]))
+    assert any("2 colours of vertices are clipped: colours are from 0 to 1" in note for note in notes)
+
+
+def test_a_negative_emission_is_refused(tmp_path: Path) -> None:
+    content = document(tmp_path)
+    content["materials"][0]["emissiveFactor"] = [-1, 0, 0]
+    with pytest.raises(UserError, match="material 0 has a factor that is negative"):
+        loaded(tmp_path, content)
+
+
+@given(st.data())
+@settings(deadline=None, max_examples=200)
+def test_odd_types_in_gltf_are_refused_in_plain_words(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    folder = tmp_path_factory.mktemp("odd")
+    content = document(folder)
+    place: Any = content
+    while True:
+        key = data.draw(st.sampled_from(sorted(place) if isinstance(place, dict) else list(range(len(place)))))
+        if not isinstance(place[key], dict | list) or not place[key] or data.draw(st.integers(0, 4)) == 0:
+            break
+        place = place[key]
+    place[key] = copy.deepcopy(data.draw(st.sampled_from(ODD)))
+    try:
+        loaded(folder, content)
+    except UserError as error:
+        assert "Error:" not in str(error) and "Warning" not in str(error)
+
+
+def test_texture_positions_of_one_number_and_of_huge_indices(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(f"{TRIANGLE}vt 0.5\nf 1/1 2/1 3/{'9' * 20}\n")
+    assert len(load_mesh(tmp_path / "a.obj").faces) == 1
+
+
+def test_a_negative_shininess_is_noted(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl a\nKd 0.25 0.5 0.75\nNs -1.96\n")
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\nusemtl a\n{TRIANGLE}f 1 2 3\n")
+    mesh = load_mesh(tmp_path / "a.obj")
+    assert mesh.materials[0].albedo == (0.25, 0.5, 0.75)
+    assert mesh.notes[0].endswith("1 material's negative Ns is taken as 0: highlights are not rendered")
