@@ -9,21 +9,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.errors import UserError
-from colonnade.common.types import Floats, Indices
+from colonnade.common.types import Floats
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
 
 #: Least upward part of a surface's normal on which an object may stand, and of one that is chosen for it.
 _STANDABLE, _LEVEL = 0.7, 0.9
-#: The place nearest to this one is chosen: shares of the width and the height of the maps.
+#: The best place for the foot in the picture: shares of its width and its height.
 _PREFERRED = (0.5, 0.7)
+#: Heights of the object in the picture that cost nothing, as shares of the picture's height; and the cost of each half
+#: or double of them, in heights of the picture between the foot and the preferred place.
+_LEAST_SHARE, _LARGEST_SHARE, _SIZE_COST = 0.25, 0.6, 0.4
 #: Columns of the grid of pixels that are considered.
 _COLUMNS = 96
 #: Height differences up to this one are noise of the maps, metres, and as a share of the object's radius.
 _NOISE, _NOISE_SHARE = 0.015, 0.1
-#: Share of the room's points over a place, or before it, that may be in the way, and height of the free space, metres.
+#: Share of the room's points over a place that may be in the way, and height of the free space, metres.
 _BLOCKED, _HEADROOM = 0.02, 1.2
+#: Shares of the object that the room may hide; the second one only where no place keeps the first.
+_HIDDEN = (0.02, 0.1)
+#: Free pixels between the object and the picture's edge, as a share of the picture's height.
+_MARGIN = 0.04
 
 
 @dataclass(frozen=True)
@@ -67,7 +74,10 @@ def surface_point(pixel: tuple[float, float], environment: Environment, key: str
 def free_place(
     environment: Environment, footprint: Footprint, taken: Sequence[tuple[Floats, float]] = ()
 ) -> tuple[float, float] | None:
-    """The pixel nearest to the preferred one on whose surface a cylinder stands, whole, free and in full view.
+    """The best pixel on whose surface a cylinder stands: whole on a level surface, free, in view, large enough.
+
+    The places are tried by the distance of their pixels from the preferred one, and by the size of the object in the
+    picture. The first one is taken where the room hides next to nothing of the object; without one, a tenth at most.
 
     Args:
         environment: The room.
@@ -81,10 +91,9 @@ def free_place(
     points = seen @ rotation.T + origin
     is_level = environment.normals[::step, ::step].reshape(-1, 3) @ rotation[1] >= _LEVEL
     pixels = np.stack([u.ravel(), v.ravel()], axis=1)
-    size = np.array([environment.width, environment.height])
-    distance = np.linalg.norm((pixels / size - _PREFERRED) * (size / size[1]), axis=1)
     noise = max(_NOISE, _NOISE_SHARE * footprint.radius)
-    for place in np.argsort(distance, kind="stable"):
+    second = None
+    for place in np.argsort(_costs(environment, footprint, pixels, seen[:, 2]), kind="stable"):
         foot = points[place]
         if not is_level[place] or any(
             np.hypot(*(foot - other)[[0, 2]]) < footprint.radius + radius for other, radius in taken
@@ -94,22 +103,33 @@ def free_place(
         rise = points[across, 1] - foot[1]
         if np.mean((rise > noise) & (rise < max(footprint.height, _HEADROOM))) > _BLOCKED:
             continue
-        if _is_supported(environment, footprint.radius, foot, noise) and _is_in_view(
-            environment, footprint, foot, noise
-        ):
-            return float(pixels[place, 0]), float(pixels[place, 1])
-    return None
+        hidden = _hidden_share(environment, footprint, foot, noise)
+        if hidden > _HIDDEN[1] or not _is_supported(environment, footprint.radius, foot, noise):
+            continue
+        found = float(pixels[place, 0]), float(pixels[place, 1])
+        if hidden <= _HIDDEN[0]:
+            return found
+        second = second or found
+    return second
 
 
-def _pixels(environment: Environment, seen: Floats) -> tuple[Indices, Indices] | None:
-    """The pixels u and v of points [n, 3] in the camera's space; None if one is out of view."""
+def _costs(environment: Environment, footprint: Footprint, pixels: Floats, depths: Floats) -> Floats:
+    """The cost of each place: pixels [n, 2] at depths [n]."""
+    size = np.array([environment.width, environment.height])
+    distance = np.linalg.norm((pixels / size - _PREFERRED) * (size / size[1]), axis=1)
+    share = max(footprint.height, 2 * footprint.radius) * environment.fy / depths / environment.height
+    small, large = np.log2(_LEAST_SHARE / share), np.log2(share / _LARGEST_SHARE)
+    return np.asarray(distance + _SIZE_COST * np.maximum(0.0, np.maximum(small, large)))
+
+
+def _projected(environment: Environment, seen: Floats) -> Floats | None:
+    """The pixels of points [n, 3] in the camera's space, float64 [n, 2]; None if one is out of view."""
     if seen[:, 2].min() <= 0:
         return None
-    u = np.floor(seen[:, 0] / seen[:, 2] * environment.fx + environment.cx).astype(np.int64)
-    v = np.floor(seen[:, 1] / seen[:, 2] * environment.fy + environment.cy).astype(np.int64)
-    if min(u.min(), v.min()) < 0 or u.max() >= environment.width or v.max() >= environment.height:
-        return None
-    return u, v
+    focal, centre = np.array([environment.fx, environment.fy]), np.array([environment.cx, environment.cy])
+    pixels = seen[:, :2] / seen[:, 2:] * focal + centre
+    size = np.array([environment.width, environment.height])
+    return np.asarray(pixels) if (pixels >= 0).all() and (pixels < size).all() else None
 
 
 def _is_supported(environment: Environment, radius: float, foot: Floats, noise: float) -> bool:
@@ -118,11 +138,10 @@ def _is_supported(environment: Environment, radius: float, foot: Floats, noise: 
     angle = np.arange(16) * np.pi / 8
     ring = np.stack([np.cos(angle), np.zeros(16), np.sin(angle)], axis=1)
     disc = foot + radius * np.concatenate([0.5 * ring, ring])
-    seen = (disc - origin) @ rotation
-    pixels = _pixels(environment, seen)
+    pixels = _projected(environment, (disc - origin) @ rotation)
     if pixels is None:
         return False
-    u, v = pixels
+    u, v = np.floor(pixels).astype(np.int64).T
     direction = np.stack(
         [(u + 0.5 - environment.cx) / environment.fx, (v + 0.5 - environment.cy) / environment.fy, np.ones(len(u))],
         axis=1,
@@ -131,14 +150,22 @@ def _is_supported(environment: Environment, radius: float, foot: Floats, noise: 
     return bool((np.abs(found[:, 1] - foot[1]) <= noise).all())
 
 
-def _is_in_view(environment: Environment, footprint: Footprint, foot: Floats, noise: float) -> bool:
-    """Whether an upright section through a cylinder, across the view, lies in the frame with nothing before it."""
+def _hidden_share(environment: Environment, footprint: Footprint, foot: Floats, noise: float) -> float:
+    """The share of a cylinder's pixels before which the room lies; 1 if it is not whole in the picture.
+
+    The cylinder stands for its upright section across the view, from a tenth of its height on, since the surface
+    before its foot is no obstacle. Every pixel counts, so that thin things do.
+    """
     rotation, origin = environment.camera_to_world[:, :3], environment.camera_to_world[:, 3]
-    across, up = np.meshgrid(np.linspace(-1, 1, 7) * footprint.radius, np.linspace(0.1, 1, 7) * footprint.height)
-    upright = foot - origin + up.reshape(-1, 1) * (0.0, 1.0, 0.0)
-    seen = (upright + across.reshape(-1, 1) * rotation[:, 0]) @ rotation
-    pixels = _pixels(environment, seen)
+    across, up = np.meshgrid((-footprint.radius, footprint.radius), (0.1 * footprint.height, footprint.height))
+    section = foot - origin + up.reshape(-1, 1) * (0.0, 1.0, 0.0) + across.reshape(-1, 1) * rotation[:, 0]
+    seen = section @ rotation
+    pixels = _projected(environment, seen)
     if pixels is None:
-        return False
-    u, v = pixels
-    return bool(np.mean(environment.depth[v, u] < seen[:, 2] - noise) <= _BLOCKED)
+        return 1.0
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    margin = _MARGIN * environment.height
+    if (low < margin).any() or (high > np.array([environment.width, environment.height]) - margin).any():
+        return 1.0
+    (u0, v0), (u1, v1) = np.floor(low).astype(int), np.floor(high).astype(int) + 1
+    return float(np.mean(environment.depth[v0:v1, u0:u1] < seen[:, 2].min() - noise))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from colonnade.evaluation.studies.attic_paints import boards, plaster, rings, spiral
 from colonnade.evaluation.studies.synthetic_attic import (
+    FOCAL,
     Part,
     SyntheticRoom,
     box,
@@ -34,6 +35,8 @@ class Furnished:
         foot: Where it stands: the middle of its lowest level, world space, metres.
         eye, target: The camera's position, and a point in the middle of its picture.
         turn: Of the object about the vertical, degrees.
+        focal: Focal length in picture widths.
+        shell: Makes floor, walls and ceiling.
     """
 
     furniture: Callable[[], list[Part]]
@@ -43,11 +46,13 @@ class Furnished:
     eye: Vector = (0.3, 1.2, 1.75)
     target: Vector = (0.0, 0.3, -0.4)
     turn: float = 25.0
+    focal: float = FOCAL
+    shell: Callable[[], list[Part]] = field(default_factory=lambda: _shell)
 
     def room(self, name: str, width: int = 640, height: int = 480) -> SyntheticRoom:
         """Render the room's maps."""
-        camera = camera_at(np.array(self.eye), np.array(self.target), width, height)
-        return synthetic_room(name, [*_shell(), *self.furniture()], camera, width, height)
+        camera = camera_at(np.array(self.eye), np.array(self.target), width, height, self.focal)
+        return synthetic_room(name, [*self.shell(), *self.furniture()], camera, width, height)
 
 
 def _shell() -> list[Part]:

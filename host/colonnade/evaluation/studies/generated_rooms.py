@@ -45,7 +45,7 @@ OVERLAP = 0.05
 
 def generated_room(seed: int, width: int = 640, height: int = 480) -> SyntheticRoom:
     """Render the maps of the room of a seed."""
-    plan = _Plan(seed)
+    plan = Plan(seed)
     eye = np.array([plan.uniform(-0.25, 0.25) * plan.width, plan.uniform(1.25, 1.7), plan.length / 2 - 0.3])
     target = np.array([plan.uniform(-0.2, 0.2) * plan.width, plan.uniform(0.35, 0.9), eye[2] - plan.uniform(3.0, 4.5)])
     focal = 0.5 / np.tan(np.radians(plan.uniform(*LENSES)) / 2)
@@ -55,7 +55,7 @@ def generated_room(seed: int, width: int = 640, height: int = 480) -> SyntheticR
     return synthetic_room(f"seed-{seed}", parts, camera, width, height, lamp)
 
 
-class _Plan:
+class Plan:
     """The choices of a seed. The room is centred; the camera stands at its front and looks along -z."""
 
     def __init__(self, seed: int) -> None:
