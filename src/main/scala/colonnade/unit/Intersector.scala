@@ -193,7 +193,9 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   io.events.contextsTriangles := Occupancy(config, Seq(io.triangles.fire), Seq(result.fire && result.bits.isLast))
   io.events.deepestStack      := traversal.io.deepest
   io.events.stackOverflow     := traversal.io.overflow
-  io.events.illegalRecord     := traversal.io.illegal || (io.triangles.fire && !io.triangles.bits.record.isLegal)
+  // Behind a register, since shared triangle units take a record by a combinational path through the column
+  private val isIllegal = RegNext(io.triangles.fire && !io.triangles.bits.record.isLegal, false.B)
+  io.events.illegalRecord := traversal.io.illegal || isIllegal
 
   /** A result stays a cycle while the hit table compares it. */
   private def compared(offered: DecoupledIO[TriangleResult]): DecoupledIO[TriangleResult] = {
