@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     "kinds",
     multiple=True,
     metavar="KIND",
-    help="Kind of corruption: records, registers or maps. Repeatable.  [default: all]",
+    help="Kind of corruption: records, registers, both or maps. Repeatable.  [default: all]",
 )
 @json_option
 @click.pass_context

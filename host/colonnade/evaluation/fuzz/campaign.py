@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from colonnade.common.errors import UserError
 from colonnade.common.framebuffer import Frame
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import GeneratedDesign
@@ -17,6 +18,7 @@ from colonnade.device.simulator_build import build_simulator
 from colonnade.evaluation.fuzz.cases import Case, legal_cases
 from colonnade.evaluation.fuzz.compare import differences
 from colonnade.evaluation.fuzz.corruption import KINDS, Kind, corrupt_case
+from colonnade.evaluation.fuzz.dram import as_read, with_failed_reads
 from colonnade.evaluation.fuzz.environments import environment_cases
 from colonnade.evaluation.fuzz.simulator import SimulatedFrame, run_cases
 
@@ -54,10 +56,10 @@ class _Planned:
 
 
 class _Campaign:
-    def __init__(self, design: GeneratedDesign, progress: Progress) -> None:
+    def __init__(self, design: GeneratedDesign, cases: tuple[Case, ...], progress: Progress) -> None:
         self.manifest: Manifest = design.manifest
         self.program = build_simulator(design, progress)
-        self.cases = legal_cases(self.manifest) + environment_cases(self.manifest)
+        self.cases = cases
         self.rows = max(len(case.image.records) for case in self.cases)
         self._expected: dict[str, Frame] = {}
         self.legal_failures = 0
@@ -66,7 +68,9 @@ class _Campaign:
         return _Planned(seed, kind, *corrupt_case(seed, kind, self.cases, self.manifest))
 
     def model(self, case: Case) -> Frame:
-        return model_frame(loaded_model(self.manifest, case.image), case.registers)
+        read = as_read(case, self.manifest)
+        frame = model_frame(loaded_model(self.manifest, read.image), read.registers)
+        return with_failed_reads(frame, case, self.manifest)
 
     def expected(self, legal: Case) -> Frame:
         if legal.name not in self._expected:
@@ -128,14 +132,20 @@ def fuzz(
 
     Returns:
         ``{"seed", "frames", "kinds": {name: {outcome: frames}}, "legal_failures", "disagreements", "seconds"}``
+
+    Raises:
+        UserError: The design has nothing of these kinds.
     """
     begun = time.perf_counter()
-    campaign = _Campaign(design, progress)
+    cases = legal_cases(design.manifest) + environment_cases(design.manifest)
     selected = [
         kind
         for name, kind in KINDS.items()
-        if (not kinds or name in kinds) and any(kind.applies(case) for case in campaign.cases)
+        if (not kinds or name in kinds) and any(kind.applies(case) for case in cases)
     ]
+    if not selected:
+        raise UserError(f"the design has no {' or '.join(kinds)} to corrupt: it has neither rooms nor textures")
+    campaign = _Campaign(design, cases, progress)
     counts = {kind.name: Counter[str]() for kind in selected}
     failed: list[Disagreement] = []
     with progress.step("rendering corrupt frames") as report:

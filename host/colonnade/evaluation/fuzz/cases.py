@@ -18,7 +18,7 @@ from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
 #: Width and height of a legal frame, pixels.
-SIZE = (16, 12)
+SIZE = (12, 9)
 
 #: Far more cycles than a legal frame of this size takes.
 WATCHDOG_CYCLES = 400_000
@@ -52,7 +52,10 @@ def legal_cases(manifest: Manifest) -> tuple[Case, ...]:
 def _scenes(manifest: Manifest) -> Iterator[tuple[str, Scene]]:
     frame = manifest.config["frame"]
     cube, sphere = Scene(MeshSource(name="cube"), background=SKY), Scene(MeshSource(name="sphere:1"), background=SKY)
+    # Narrower than the object's cube, so that its bounds can be inverted one by one
+    torus = Scene(MeshSource(name="torus:3"), background=SKY)
     yield "cube", cube
+    yield "torus", torus
     yield "sphere", replace(sphere, light=Light(falloff=2.0))
     yield "inside", replace(sphere, camera=Camera(position=(0.1, 0.2, 0.3), target=(1.0, 0.5, 0.0)))
     if int(frame["lights"]) > 1:

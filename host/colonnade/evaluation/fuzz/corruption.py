@@ -32,11 +32,19 @@ class Kind:
     applies: Callable[[Case], bool] = lambda case: True
 
 
+def corrupt_both(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
+    """Corrupt records and registers."""
+    case, records = corrupt_records(random, case, manifest)
+    case, registers = corrupt_registers(random, case, manifest)
+    return case, f"{records}; {registers}"
+
+
 KINDS = {
     kind.name: kind
     for kind in (
         Kind("records", corrupt_records),
         Kind("registers", corrupt_registers),
+        Kind("both", corrupt_both),
         Kind("maps", corrupt_maps, lambda case: bool(case.image.attributes)),
     )
 }

@@ -12,7 +12,7 @@ from colonnade.common.types import Bytes
 from colonnade.design.manifest import Field, Manifest, value_range
 from colonnade.design.toolchain import project_root
 from colonnade.environment.encoded import EncodedEnvironment
-from colonnade.evaluation.fuzz.cases import SIZE, Case
+from colonnade.evaluation.fuzz.cases import Case
 from colonnade.evaluation.fuzz.records import write_field
 from colonnade.evaluation.fuzz.values import random_value
 from colonnade.mesh.load import load_mesh
@@ -26,8 +26,8 @@ from colonnade.scene_image.packer import pack
 #: About a hundred times the cycles of a legal frame, since corrupt rays may take all of their march steps.
 WATCHDOG_CYCLES = 8_000_000
 
-#: Width and height of the project's rooms, pixels.
-_ROOM_SIZE = (640, 480)
+#: Width and height of the project's rooms, and of a legal frame in one, pixels.
+_ROOM_SIZE, _SIZE = (640, 480), (16, 12)
 
 
 def environment_cases(manifest: Manifest) -> tuple[Case, ...]:
@@ -52,7 +52,7 @@ def environment_cases(manifest: Manifest) -> tuple[Case, ...]:
         # All cases share the same arrays, so that the simulator loads them once
         maps = maps or image.attributes
         posed = replace(scene, material=material, paths=Paths(bounces=2))
-        registers = frame_registers(posed, image.header, manifest, *SIZE, environment)
+        registers = frame_registers(posed, image.header, manifest, *_SIZE, environment)
         registers |= {"frame.watchdogCycles": WATCHDOG_CYCLES}
         cases.append(Case(f"{material.kind} in a room", replace(image, attributes=maps), registers))
     return tuple(cases)

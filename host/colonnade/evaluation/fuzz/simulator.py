@@ -12,6 +12,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.device.harness_job import frame_commands, parse_output, read_frame
 from colonnade.device.verilator import run_program
 from colonnade.evaluation.fuzz.cases import Case
+from colonnade.evaluation.fuzz.dram import PAGE
 from colonnade.scene_image.file import SceneImage
 
 
@@ -62,9 +63,16 @@ def _write_job(folder: Path, manifest: Manifest, cases: Sequence[Case], rows: in
     empty.write_bytes(bytes(depth * record_bytes))
     lines = [f"load {empty.name} {record_bytes} 0"]
     loaded: dict[str, object] = {}
+    # Caches hold the records of the frame before
+    invalidate = manifest.registers.get("control.invalidate")
     pixel_files: list[Path] = []
     for number, case in enumerate(cases):
-        lines += _loads(folder, f"{number}", manifest, case.image, rows, loaded)
+        loads = _loads(folder, f"{number}", manifest, case.image, rows, loaded)
+        page = case.registers.get(PAGE)
+        if invalidate is not None and (loads or loaded.get(PAGE) != page):
+            loads.append(f"write {invalidate.address} 1")
+        loaded[PAGE] = page
+        lines += loads
         pixel_files.append(folder / f"pixels{number}")
         lines += frame_commands(manifest, case.registers, pixel_files[-1].name)
     job = folder / "job"
