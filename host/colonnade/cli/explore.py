@@ -53,10 +53,13 @@ def explore(
     from colonnade.explore.explore import explore as run_study
     from colonnade.explore.points import grid_size
     from colonnade.explore.results import check_output
+    from colonnade.explore.runners import check_address
     from colonnade.explore.study import load_study
 
     if scheduler is not None and jobs is not None:
         raise click.UsageError("--jobs is for this machine, the cluster has its own", click.get_current_context())
+    if scheduler is not None:
+        check_address(scheduler)
     check_output(output)
     file = load_study(study)
     terminal = progress.for_terminal()

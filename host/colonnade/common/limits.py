@@ -19,7 +19,7 @@ MAX_FRAMES = 10_000
 MAX_SAMPLES = 1024
 #: Pixels of a frame that is recorded as a waveform; each takes on the order of 100 kB.
 MAX_WAVEFORM_PIXELS = 4096
-#: Points of a study's grid.
+#: Points of a study.
 MAX_DESIGNS = 1_000
 
 #: Bytes of a scene, a configuration or a room's ``meta.json``.

@@ -124,7 +124,7 @@ class Exploration:
             schedule.run([job for jobs in batch if jobs for job in jobs.all()], finished)
             return [None if jobs is None else self._figures(jobs, schedule) for jobs in batch]
 
-        return search_front(self.file, self._columns, evaluate)
+        return search_front(self.file, self._columns, evaluate, self._progress)
 
     def _figures(self, jobs: PointJobs, schedule: Schedule) -> Mapping[str, float | None]:
         entry = jobs.entry(self.plan, schedule.outcomes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -55,12 +56,17 @@ def points_of(file: StudyFile) -> list[Point]:
         for key in point.set:
             if not key.strip():
                 raise file.error(("point", "set"), "a field without a name")
-    if grid_size(file) > MAX_DESIGNS and study.combine == "grid":
-        raise file.error(("axes",), f"the grid has more than {MAX_DESIGNS:,} points: vary fewer values, or search")
+    values = sum(len(axis) for axis in study.axes.values())
+    # A search checks each value once, whatever its budget
+    of_axes = {"grid": grid_size(file), "one-by-one": 1 + values, "search": values, "list": 0}[study.combine]
+    if len(study.point) + of_axes > MAX_DESIGNS:
+        where = ("axes",) if of_axes > len(study.point) else ("point",)
+        advice = "vary fewer values, or search" if study.combine == "grid" else "give fewer"
+        raise file.error(where, f"the study has more than {MAX_DESIGNS:,} points: {advice}")
     points = [point_of(file, point.set, point.name) for point in study.point]
     points += [point_of(file, values) for values in _combinations(file)]
     names = [point.name for point in points]
-    twice = next((name for name in names if names.count(name) > 1), None)
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
         raise file.error(("axes",), f"two points are named {twice}")
     if study.baseline is not None and study.baseline not in names:

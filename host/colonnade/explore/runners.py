@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import os
+import re
 import shutil
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -17,6 +18,9 @@ from colonnade.explore.jobs import Content, Job, JobFailed
 
 #: Seconds to wait for the scheduler's answer.
 CONNECT_SECONDS = 5
+
+#: Addresses that Dask's clients accept.
+_ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?[^\s/]+:\d{1,5}/?", re.ASCII)
 
 #: Retries of a job whose worker was lost.
 RETRIES = 2
@@ -80,6 +84,16 @@ class LocalRunner:
         self._group.end()
 
 
+def check_address(address: str) -> None:
+    """Refuse what is no address of a scheduler, before work begins.
+
+    Raises:
+        UserError: The address has another form.
+    """
+    if not _ADDRESS.fullmatch(address):
+        raise UserError(f"--scheduler {address!r} is no address of a Dask scheduler: give one such as tcp://HOST:8786")
+
+
 class ClusterRunner:
     """Runs jobs on the workers of a Dask scheduler. A job whose worker is lost moves to another one.
 
@@ -92,10 +106,16 @@ class ClusterRunner:
     def __init__(self, address: str) -> None:
         from distributed import Client
 
+        check_address(address)
+        self._client = Client.__new__(Client)
         try:
-            self._client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as error:
-            raise UserError(f"no Dask scheduler at {address}: {error or 'no answer'}") from None
+            Client.__init__(self._client, address, timeout=CONNECT_SECONDS, set_as_default=False)
+        except (OSError, TimeoutError, ValueError, TypeError, RuntimeError, ImportError) as error:
+            # Dask closes a client that got no answer, and leaves others to their finaliser, which waits and prints
+            if self._client.status != "closed":
+                self._client.status = "newly-created"
+            reason = " ".join(str(error).split()) or "no answer"
+            raise UserError(f"no Dask scheduler at {address}: {reason}") from None
         self._executors: dict[tuple[tuple[str, int], ...], Any] = {}
         self.parallel = max(1, sum(worker["nthreads"] for worker in self._workers().values()))
 

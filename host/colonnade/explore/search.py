@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+from colonnade.common.progress import QUIET, Progress
 from colonnade.explore.figures import Column
 from colonnade.explore.study import FieldValue, Search, StudyFile, value_text
 
-_CONDITION = re.compile(r"\s*([\w.]+)\s*(>=|<=)\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*")
+_CONDITION = re.compile(r"\s*([\w.]+)\s*(>=|<=)\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?)\s*")
 
 
 def parse_condition(text: str) -> tuple[str, str, float] | None:
     """The figure, operator and number of a constraint; None if it is malformed."""
     match = _CONDITION.fullmatch(text)
-    return (match[1], match[2], float(match[3])) if match else None
+    if match is None or not math.isfinite(float(match[3])):
+        return None
+    return match[1], match[2], float(match[3])
 
 
 def check_search(file: StudyFile, columns: Sequence[Column]) -> None:
@@ -33,7 +37,9 @@ def check_search(file: StudyFile, columns: Sequence[Column]) -> None:
     for text in search.constraints if search else ():
         condition = parse_condition(text)
         if condition is None:
-            raise file.error(("search", "constraints", text), f"{text} is not of the form figure >= number")
+            raise file.error(
+                ("search", "constraints", text), f"{text} is not of the form figure >= number, e.g. psnr_min >= 50"
+            )
         if condition[0] not in directed:
             raise file.error(
                 ("search", "constraints", text),
@@ -45,7 +51,9 @@ def check_search(file: StudyFile, columns: Sequence[Column]) -> None:
 Evaluate = Callable[[Sequence[Mapping[str, FieldValue]]], Sequence[Mapping[str, float | None] | None]]
 
 
-def search_front(file: StudyFile, columns: Sequence[Column], evaluate: Evaluate) -> Iterator[int]:
+def search_front(
+    file: StudyFile, columns: Sequence[Column], evaluate: Evaluate, progress: Progress = QUIET
+) -> Iterator[int]:
     """Evaluate points chosen by a sampler, in batches; yields the number of points evaluated so far.
 
     The first batch begins with the first value of every axis, then the points of ``search.start``.
@@ -57,8 +65,12 @@ def search_front(file: StudyFile, columns: Sequence[Column], evaluate: Evaluate)
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     search = file.study.search
     assert search is not None
+    # More would propose points that the budget or the grid does not have
+    batch = min(search.batch, search.budget, math.prod(len(values) for values in file.study.axes.values()))
+    if batch < search.batch and search.batch != _DEFAULT_BATCH:
+        progress.note(f"the search takes batches of {batch} points, not {search.batch:,}: it has no more to evaluate")
     signs = {column.key: -1.0 if column.better == "higher" else 1.0 for column in columns}
-    study = optuna.create_study(directions=["minimize"] * len(search.objectives), sampler=_sampler(search))
+    study = optuna.create_study(directions=["minimize"] * len(search.objectives), sampler=_sampler(search, batch))
     for start in ({}, *search.start):
         study.enqueue_trial({key: axis.index(start.get(key, axis[0])) for key, axis in file.study.axes.items()})
     known: dict[tuple[str, ...], Mapping[str, float | None] | None] = {}
@@ -66,16 +78,20 @@ def search_front(file: StudyFile, columns: Sequence[Column], evaluate: Evaluate)
     while len(known) < search.budget and idle < _IDLE_BATCHES:
         trials: list[tuple[Any, dict[str, FieldValue]]] = []
         fresh: list[dict[str, FieldValue]] = []
-        while len(trials) < search.batch:
-            trial = study.ask()
-            values = {
-                key: axis[trial.suggest_categorical(key, list(range(len(axis))))]
-                for key, axis in file.study.axes.items()
-            }
-            trials.append((trial, values))
-            name = _name(values)
-            if name not in known and name not in map(_name, fresh) and len(known) + len(fresh) < search.budget:
-                fresh.append(values)
+        new: set[tuple[str, ...]] = set()
+        with progress.step("choosing points") as report:
+            while len(trials) < batch:
+                trial = study.ask()
+                values = {
+                    key: axis[trial.suggest_categorical(key, list(range(len(axis))))]
+                    for key, axis in file.study.axes.items()
+                }
+                trials.append((trial, values))
+                name = _name(values)
+                if name not in known and name not in new and len(known) + len(fresh) < search.budget:
+                    fresh.append(values)
+                    new.add(name)
+                report(len(trials) / batch)
         known |= dict(zip(map(_name, fresh), evaluate(fresh), strict=True))
         idle = 0 if fresh else idle + 1
         for trial, values in trials:
@@ -92,16 +108,18 @@ def search_front(file: StudyFile, columns: Sequence[Column], evaluate: Evaluate)
         yield len(known)
 
 
+_DEFAULT_BATCH = Search.__dataclass_fields__["batch"].default
+
 #: Batches without a new point after which a search ends.
 _IDLE_BATCHES = 10
 
 
-def _sampler(search: Search) -> Any:
+def _sampler(search: Search, batch: int) -> Any:
     import optuna
 
     if search.sampler == "tpe":
-        return optuna.samplers.TPESampler(seed=search.seed, n_startup_trials=search.batch)
-    return optuna.samplers.NSGAIISampler(population_size=search.batch, seed=search.seed)
+        return optuna.samplers.TPESampler(seed=search.seed, n_startup_trials=batch)
+    return optuna.samplers.NSGAIISampler(population_size=max(2, batch), seed=search.seed)
 
 
 def _violation(figures: Mapping[str, float | None], text: str) -> float:

@@ -7,38 +7,68 @@ fields of `Study`; an unknown key is refused.
 from __future__ import annotations
 
 import dataclasses
+import datetime
 import json
+import math
 import re
 import sys
-from collections.abc import Mapping
+import unicodedata
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from annotated_types import Ge, Gt, Interval, MinLen
-from pydantic import ConfigDict, Strict, StrictBool, TypeAdapter, ValidationError
+from annotated_types import Ge, Gt, Interval, Le, MinLen
+from pydantic import BeforeValidator, ConfigDict, PlainValidator, Strict, StrictBool, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 from pydantic_core import ErrorDetails
 
 from colonnade.common.errors import UserError
+from colonnade.common.frame_size import parse_size
 from colonnade.common.input_files import check_values, read_input
-from colonnade.common.limits import MAX_DEPTH
+from colonnade.common.limits import MAX_DEPTH, MAX_DESIGNS
+from colonnade.common.terminal_text import one_line
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
+#: The fastest clock for power, MHz.
+MAX_CLOCK = 1e6
+
 _STRICT = ConfigDict(extra="forbid")
 
+
+def _field_value(value: Any) -> Any:
+    """Refuse what is no value of a configuration field."""
+    if isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float) and math.isfinite(value):
+        return value
+    if isinstance(value, dict):
+        return value
+    raise ValueError(f"must be a number, true or false, text in quotes, or a table, not {_shown(value)}")
+
+
+def _frame_size(value: Any) -> Any:
+    """The size of a frame: ``[96, 72]``, or ``"96x72"`` as on the command line."""
+    try:
+        return parse_size(value) if isinstance(value, str) else value
+    except UserError as error:
+        raise ValueError(str(error)) from None
+
+
 #: A value of a configuration field: a number, a Boolean, text such as a precision, or a whole section.
-FieldValue = bool | int | float | str | dict[str, Any] | None
+FieldValue = Annotated[bool | int | float | str | dict[str, Any] | None, PlainValidator(_field_value)]
 
 #: The way in which the axes combine.
 Combination = Literal["grid", "one-by-one", "list", "search"]
 
 _Count = Annotated[int, Strict(), Ge(1)]
 _Names = tuple[Annotated[str, MinLen(1)], ...]
+_Size = Annotated[tuple[_Count, _Count], BeforeValidator(_frame_size)]
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -74,12 +104,12 @@ class Workload:
     Attributes:
         scenes: Scene files, relative to the study.
         meshes: Names or files; empty: the mesh of each scene.
-        size: Width and height, pixels.
+        size: Width and height in pixels, ``[640, 480]`` or ``"640x480"``.
     """
 
     scenes: Annotated[_Names, MinLen(1)]
     meshes: _Names = ()
-    size: tuple[_Count, _Count] = (640, 480)
+    size: _Size = (640, 480)
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -117,9 +147,9 @@ class Power:
     """
 
     meshes: _Names = ()
-    size: tuple[_Count, _Count] | None = None
+    size: _Size | None = None
     cycles: _Count = 4000
-    clock: Annotated[float, Gt(0)] = 200.0
+    clock: Annotated[float, Gt(0), Le(MAX_CLOCK)] = 200.0
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -137,7 +167,7 @@ class Search:
             leaves out has its first value.
     """
 
-    budget: _Count
+    budget: Annotated[int, Strict(), Interval(ge=1, le=MAX_DESIGNS)]
     objectives: Annotated[_Names, MinLen(2)]
     constraints: _Names = ()
     sampler: Literal["nsga2", "tpe"] = "nsga2"
@@ -196,6 +226,12 @@ class Study:
             return 'combine: no [axes]; use combine = "list" for [[point]] tables alone'
         if not any((self.quality, self.cycles, self.area, self.power)):
             return "nothing is measured: give [quality], [cycles], [area] or [power]"
+        for key, names in (("libraries", self.libraries), ("objectives", self.objectives)):
+            twice = [name for name, count in Counter(names).items() if count > 1]
+            if twice:
+                return f"{key}: {twice[0]} is named twice"
+        if self.search is not None and len(self.search.start) >= self.search.budget:
+            return "search.start: the budget ends before these points and the first one: give fewer, or a larger budget"
         for values in self.search.start if self.search else ():
             for key, value in values.items():
                 if value not in self.axes.get(key, ()):
@@ -244,9 +280,14 @@ def load_study(path: Path) -> StudyFile:
         data = tomllib.loads(text)
     except RecursionError:
         raise UserError(f"study {path} is nested too deeply: {MAX_DEPTH} levels at most") from None
+    except UnicodeDecodeError:
+        raise UserError(f"study {path} is not TOML: save it as UTF-8 text") from None
     except ValueError as error:
         raise UserError(f"study {path} is not TOML: {error}") from None
     check_values(data, f"study {path}")
+    for where, problem in _unusable(data, ()):
+        line = line_of(text, where)
+        raise UserError(f"{path}{'' if line is None else f':{line}'}: {one_line('.'.join(where))}: {problem}")
     try:
         study = _SCHEMA.validate_python(data)
     except ValidationError as error:
@@ -255,23 +296,90 @@ def load_study(path: Path) -> StudyFile:
         first = next((each for each in found if each["type"] == "unexpected_keyword_argument"), found[0])
         where = tuple(str(part) for part in first["loc"] if isinstance(part, str) and not part[:1].isupper())
         message = _message(first, where)
-        if first["type"] == "value_error":
+        if first["type"] == "value_error" and not where:
             where = tuple(message.partition(":")[0].split("."))
         line = line_of(text, where)
         raise UserError(f"{path}{'' if line is None else f':{line}'}: {message}") from None
     return StudyFile(study, path, text)
 
 
+def _unusable(value: Any, where: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Keys and values below `where` that no study can have, each with what to do."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if not key.strip() or "=" in key or _control(key):
+                yield (*where, key), "a key must be a name without = and control characters"
+            yield from _unusable(inner, (*where, key))
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _unusable(inner, where)
+    elif isinstance(value, datetime.date | datetime.time):
+        yield where, f"a date or time is no value: write a number, or {value} in quotes"
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield where, f"{value} is no value: write a finite number"
+    elif isinstance(value, str) and (
+        found := _control(value if where != ("description",) else " ".join(value.split()))
+    ):
+        yield where, f"the text holds the control character U+{ord(found):04X}: leave it out"
+
+
+def _control(text: str) -> str | None:
+    """The first character of a text that tables and plots cannot show: control characters, separators of lines."""
+    for character in text:
+        is_none = ord(character) & 0xFFFE == 0xFFFE or 0xFDD0 <= ord(character) <= 0xFDEF
+        if is_none or unicodedata.category(character) in ("Cc", "Zl", "Zp"):
+            return character
+    return None
+
+
+#: What a value must be, by the type of pydantic's error.
+_WANTED = {
+    "string_type": "text in quotes",
+    "string_too_short": "text that is not empty",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "tuple_type": "a list in brackets",
+    "mapping_type": "a table",
+    "dict_type": "a table",
+    "dataclass_type": "a table",
+}
+
+
 def _message(error: ErrorDetails, where: tuple[str, ...]) -> str:
-    name, text = ".".join(where), error["msg"]
-    if error["type"] == "unexpected_keyword_argument":
-        return f"unknown key {name}; known here: {', '.join(_keys(where[:-1]))}"
-    if error["type"] == "value_error":
-        return str(error["ctx"]["error"])
-    if error["type"] in ("missing_argument", "missing"):
+    name, kind, context = ".".join(where), error["type"], error.get("ctx", {})
+    if kind == "unexpected_keyword_argument":
+        return f"unknown key {one_line(name)}; known here: {', '.join(_keys(where[:-1]))}"
+    if kind == "value_error":
+        return f"{name}: {context['error']}" if where else str(context["error"])
+    if kind in ("missing_argument", "missing"):
         is_key = isinstance(error["loc"][-1], str)
-        return f"the key {name} is missing" if is_key else f"{name}: too few values"
-    return f"{name}: {text[:1].lower()}{text[1:]}"
+        return f"the key {name} is missing: add it" if is_key else f"{name}: too few values: give one more"
+    if kind == "too_short":
+        least = context["min_length"]
+        return f"{name}: too few values: give at least {least}"
+    if kind == "too_long":
+        return f"{name}: too many values: give {context['max_length']}"
+    wanted = _WANTED.get(kind)
+    if wanted is None:
+        # Numbers out of range, and words of a list
+        text = error["msg"].removeprefix("Input should be ")
+        wanted = f"{text[:1].lower()}{text[1:]}"
+    return f"{name}: must be {wanted}, not {_shown(error['input'])}"
+
+
+def _shown(value: Any) -> str:
+    """A value in a message."""
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return one_line(text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}…")
+
+
+#: Characters of a value in a message.
+_MAX_SHOWN = 60
 
 
 def _keys(table: tuple[str, ...]) -> list[str]:

@@ -209,6 +209,20 @@ def test_a_scheduler_that_is_not_there_is_one_line(study: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "address", ["", "x://", "x://h:1", "inproc://", "tcp://", "127.0.0.1", "tcp://h:1 x", "tls://127.0.0.1:9"]
+)
+def test_what_is_no_address_of_a_scheduler_is_one_line(study: Path, address: str) -> None:
+    options = ["--output", str(study.parent / "out"), "--scheduler", address]
+    # In a process of its own, whose end shows what Dask's finalisers print
+    done = subprocess.run(
+        [*command(study)[:4], str(study), *options], capture_output=True, text=True, timeout=SECONDS, check=False
+    )
+    assert done.returncode == 2
+    hostile.one_error_line(done.stderr, "scheduler")
+    assert not (study.parent / "out").exists()
+
+
+@pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda out: out.write_text("x"), "is a file"),

@@ -167,6 +167,12 @@ def test_a_search_is_reproducible_and_beats_chance(file: StudyFile) -> None:
     assert math.prod((8, 8, 8)) > 8 * len(found)
 
 
+def test_a_batch_is_no_larger_than_what_is_left_to_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "batch.toml").write_text(SEARCH.replace("batch = 10", "batch = 100_000"))
+    assert len(evaluated(load_study(tmp_path / "batch.toml"))) <= 60
+    assert capsys.readouterr().err.count("takes batches of 60 points, not 100,000: it has no more to evaluate") == 1
+
+
 def test_a_search_begins_with_the_points_of_start(tmp_path: Path) -> None:
     start = 'start = [{ "array.rows" = 3 }, { "array.columns" = 5, "array.contexts" = 8 }]'
     (tmp_path / "start.toml").write_text(SEARCH.replace("seed = 2", f"seed = 2\n{start}"))

@@ -7,9 +7,12 @@ from pathlib import Path
 import pytest
 
 from colonnade.common.errors import UserError
+from colonnade.common.limits import MAX_DESIGNS
 from colonnade.design.toolchain import project_root
+from colonnade.explore.figures import columns
 from colonnade.explore.plan import Plan
 from colonnade.explore.points import grid_size, manifests_of, point_of, points_of
+from colonnade.explore.search import check_search
 from colonnade.explore.study import StudyFile, line_of, load_study
 
 STUDY = """title = "Try"
@@ -152,3 +155,78 @@ def test_two_frames_of_one_name_are_refused(tmp_path: Path) -> None:
         Plan(study(tmp_path, alone), {})
     with pytest.raises(UserError, match=r":16: two frames are named cube"):
         Plan(study(tmp_path, STUDY.replace("object", "a/s").replace('["cube"]', '["cube", "cube"]')), {})
+
+
+@pytest.mark.parametrize("size", ["[32, 24]", '"32x24"', '"32X24"'])
+def test_sizes_are_those_of_the_command_line_or_two_numbers(tmp_path: Path, size: str) -> None:
+    power = f'libraries = ["l"]\n{STUDY.replace("[32, 24]", size)}[power]\nsize = {size}\n'
+    found = study(tmp_path, power).study
+    assert found.workload.size == (32, 24)
+    assert found.power is not None and found.power.size == (32, 24)
+
+
+def repeated(count: int, combine: str) -> str:
+    """A study of `count` values in one axis."""
+    values = ", ".join(map(str, range(count)))
+    search = '[search]\nbudget = 9\nobjectives = ["psnr_min", "flip"]\n' if combine == "search" else ""
+    axes = "" if combine == "list" else f'[axes]\n"array.contexts" = [{values}]\n'
+    points = "".join(f'[[point]]\nname = "{i}"\n' for i in range(count)) if combine == "list" else ""
+    return f'title = "t"\ncombine = "{combine}"\n{axes}{points}[workload]\nscenes = ["s.toml"]\n[quality]\n{search}'
+
+
+@pytest.mark.parametrize("combine", ["grid", "one-by-one", "list", "search"])
+def test_every_way_of_making_points_has_the_same_limit(tmp_path: Path, combine: str) -> None:
+    fits = MAX_DESIGNS - (combine == "one-by-one")
+    points_of(study(tmp_path, repeated(fits, combine)))
+    for count in (fits + 1, 9_000):
+        with pytest.raises(UserError, match=r"study\.toml:[34]: the study has more than 1,000 points: "):
+            points_of(study(tmp_path, repeated(count, combine)))
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("constraints = [ 'psnr_min >= 1.2.3' ]", ":21: psnr_min >= 1.2.3 is not of the form figure >= number"),
+        ("constraints = [ 'psnr_min >= ...' ]", "is not of the form"),
+        ("constraints = [ 'psnr_min >= 1e999' ]", "is not of the form"),
+        ("start = [{ precision = 1979-05-27 }]", ":21: search.start.precision: a date or time is no value: write"),
+        ("budget = 1001", ":21: search.budget: must be less than or equal to 1000, not 1001"),
+        ("budget = 1\nstart = [{}]", ":22: search.start: the budget ends before these points"),
+    ],
+)
+def test_what_a_search_cannot_take_is_one_line(tmp_path: Path, line: str, message: str) -> None:
+    head = "" if "budget" in line else "budget = 5\n"
+    search = f'[search]\n{line}\nobjectives = ["psnr_min", "flip"]\n{head}'
+    text = STUDY.replace('baseline = "32b32s64d"\n', '#\ncombine = "search"\n')
+    text = text.replace("[quality]\n", f"{search}[quality]\n")
+    kinds = ("quality", "baseline", "cycles", "area", "power")
+    with pytest.raises(UserError) as error:
+        check_search(study(tmp_path, text), columns(dict.fromkeys(kinds, True), ()))
+    assert message in str(error.value) and "\n" not in str(error.value)
+
+
+#: Values that a key may wrongly have.
+ODD = (
+    *("true", "-1", "0", "1" + 39 * "0", "0.5", "nan", "-inf", '""', '"\\u0000"', '"a\\nb"', '"\\u001b[31m"'),
+    *('"\\u2028"', "1979-05-27", "07:32:00", "[]", "[[]]", "[1]", '["x"]', "[{}]", "[{ a = 1979-05-27 }]", "{}"),
+    *('{ "" = 1 }', '"x=1"'),
+)
+
+
+def test_odd_values_are_refused_in_a_line_with_file_and_key(tmp_path: Path) -> None:
+    """Each key with each odd value: refused with the key, or a legal study; a date or control character never is."""
+    lines = (STUDY + '[power]\nclock = 1.0\ncycles = 5\n[[point]]\nname = "p"\nset = { a = 1 }\n').splitlines()
+    lines.insert(2, 'libraries = ["l"]')
+    for number, line in enumerate(lines):
+        key, equals, _ = line.partition(" = ")
+        for value in ODD if equals and line.count("[") == line.count("]") else ():
+            text = "\n".join([*lines[:number], f"{key} = {value}", *lines[number + 1 :]])
+            try:
+                study(tmp_path, text)
+            except UserError as error:
+                message = str(error)
+                assert message.startswith(f"{tmp_path / 'study.toml'}:") or "study " in message
+                assert message.isprintable() and ": " in message
+                assert not any(word in message for word in ("item", "validation", "instance", "Input", "Traceback"))
+            else:
+                assert not any(bad in value for bad in ("1979", "07:32", "\\u", "nan", "inf")), (key, value)
