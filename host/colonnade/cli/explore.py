@@ -51,8 +51,8 @@ def explore(
     from colonnade.common.parallel import processors
     from colonnade.explore.explore import Exploration, report_of
     from colonnade.explore.explore import explore as run_study
+    from colonnade.explore.output import check_output
     from colonnade.explore.points import grid_size
-    from colonnade.explore.results import check_output
     from colonnade.explore.runners import check_address
     from colonnade.explore.study import load_study
 

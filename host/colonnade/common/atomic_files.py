@@ -131,10 +131,15 @@ def _mode(path: Path) -> int:
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write ``content`` as indented JSON; numpy numbers become Python numbers."""
-    text = json.dumps(content, indent=2, default=_plain, allow_nan=False) + "\n"
+    """Write ``content`` as `json_bytes`."""
+    data = json_bytes(content)
     with replacing(path) as stream:
-        stream.write(text.encode())
+        stream.write(data)
+
+
+def json_bytes(content: Mapping[str, Any]) -> bytes:
+    """``content`` as indented JSON; numpy numbers become Python numbers."""
+    return (json.dumps(content, indent=2, default=_plain, allow_nan=False) + "\n").encode()
 
 
 def _plain(value: Any) -> Any:

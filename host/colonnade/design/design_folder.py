@@ -36,7 +36,7 @@ def check_replaceable(output: Path) -> None:
     try:
         status = output.lstat()
     except (FileNotFoundError, NotADirectoryError):
-        _check_parent(output)
+        check_parent(output)
         return
     except (OSError, ValueError) as error:
         reason = reason_of(error) if isinstance(error, OSError) else "this is not a file name"
@@ -46,7 +46,7 @@ def check_replaceable(output: Path) -> None:
     with contextlib.suppress(OSError):
         if output.samefile(Path.cwd()):
             raise UserError(f"{output} is the working directory, which cannot be replaced: name a folder in it")
-    _check_parent(output)
+    check_parent(output)
     try:
         refusal = _why_not_ours(output)
     except OSError as error:
@@ -94,7 +94,7 @@ def replace_folder(source: Path, output: Path) -> None:
         raise UserError(f"cannot write {output}: {reason_of(error)}") from None
 
 
-def _check_parent(output: Path) -> None:
+def check_parent(output: Path) -> None:
     """The nearest existing parent of the output must be a writable folder."""
     parent = output.absolute().parent
     while not parent.exists() and parent != parent.parent:

@@ -13,9 +13,10 @@ from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.explore import figures
 from colonnade.explore.jobs import Job
+from colonnade.explore.output import REPORT
 from colonnade.explore.plan import Plan, PointJobs
 from colonnade.explore.points import Point, config_of, grid_size, manifests_of, point_of, points_of
-from colonnade.explore.results import REPORT, Results
+from colonnade.explore.results import Results
 from colonnade.explore.runners import ClusterRunner, LocalRunner, Runner
 from colonnade.explore.schedule import Outcome, Schedule
 from colonnade.explore.search import check_search, search_front
@@ -97,10 +98,7 @@ class Exploration:
         results.write_pictures(content, self.points, references, schedule.outcomes)
         results.write(content)
         with self._progress.step("writing the report"):
-            from colonnade.report.explorer import write_plots, write_report
-
-            write_plots(output)
-            write_report(output)
+            results.write_report()
         return content
 
     def _search(self, schedule: Schedule, finished: Callable[[Job, Outcome], None]) -> Any:

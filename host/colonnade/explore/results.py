@@ -13,44 +13,19 @@ from typing import Any
 
 from colonnade import __version__
 from colonnade.common import processes
-from colonnade.common.atomic_files import make_folder, replacing, write_json
-from colonnade.common.errors import UserError, reason_of
+from colonnade.common.atomic_files import json_bytes
 from colonnade.common.file_names import FileNames
+from colonnade.common.terminal_text import plain
 from colonnade.design.toolchain import project_root
 from colonnade.explore import figures, render_index
 from colonnade.explore.jobs import Job
+from colonnade.explore.output import PICTURES, STUDY, TABLE, Output
 from colonnade.explore.plan import Plan, PointJobs
 from colonnade.explore.schedule import Outcome, Tally
 from colonnade.explore.work import PICTURE
 
 #: Version of ``study.json``.
 VERSION = 1
-
-#: The files of an output folder, and its folders.
-STUDY, TABLE, REPORT, PICTURES, PLOTS = "study.json", "points.csv", "report.html", "pictures", "plots"
-
-
-def check_output(folder: Path) -> None:
-    """Refuse a folder that holds anything but an earlier study.
-
-    Raises:
-        UserError: It is not a folder, or not one that a study may fill.
-    """
-    try:
-        inside = {path.name for path in folder.iterdir()}
-    except FileNotFoundError:
-        return
-    except NotADirectoryError:
-        raise UserError(f"{folder} is a file: --output names a folder") from None
-    except OSError as error:
-        raise UserError(f"cannot read {folder}: {reason_of(error)}") from None
-    if not inside:
-        return
-    version: Any = None
-    with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
-        version = json.loads((folder / STUDY).read_text())["version"]
-    if version != VERSION:
-        raise UserError(f"{folder} holds other files than those of a study: name another --output, or delete it first")
 
 
 class Results:
@@ -61,7 +36,7 @@ class Results:
         self._folder = folder
         self._command = command
         self._commit, self._is_modified = _commit()
-        make_folder(folder)
+        self._output = Output(folder)
 
     def study(
         self,
@@ -134,9 +109,15 @@ class Results:
 
     def write(self, study: Mapping[str, Any]) -> None:
         """Write ``study.json`` and ``points.csv``."""
-        write_json(self._folder / STUDY, study)
-        with replacing(self._folder / TABLE) as stream:
-            stream.write(table(study).encode())
+        self._output.write(self._folder / STUDY, json_bytes(study))
+        self._output.write(self._folder / TABLE, table(study).encode())
+
+    def write_report(self) -> None:
+        """Write charts and report of the study that is in the folder."""
+        from colonnade.report.explorer import write_plots, write_report
+
+        write_plots(self._folder, self._output.write)
+        write_report(self._folder, self._output.write)
 
     def write_pictures(
         self,
@@ -153,9 +134,7 @@ class Results:
             if not isinstance(outcome, Path):
                 return None
             relative = f"{PICTURES}/{names.of(name)}.png"
-            make_folder((self._folder / relative).parent)
-            with replacing(self._folder / relative) as stream:
-                stream.write((outcome / PICTURE).read_bytes())
+            self._output.write(self._folder / relative, (outcome / PICTURE).read_bytes())
             return relative
 
         for workload in study["workloads"]:
@@ -167,21 +146,31 @@ class Results:
 
 
 def table(study: Mapping[str, Any]) -> str:
-    """The points as CSV: a line of comment with the command and commit, then a row for each point."""
+    """The points as CSV: a line of comment with the command and commit, then a row for each point.
+
+    Text that a spreadsheet would take for a formula has an apostrophe before it, as in the download of the report.
+    """
     text = io.StringIO()
     modified = " with changes" if study["is_modified"] else ""
-    text.write(f"# {study['command']} (commit {study['commit'] or 'unknown'}{modified})\n")
+    command = "\\n".join(plain(study["command"]).splitlines())
+    text.write(f"# {command} (commit {study['commit'] or 'unknown'}{modified})\n")
     writer = csv.writer(text, lineterminator="\n")
     keys = [column["key"] for column in study["columns"]]
-    writer.writerow(["name", *study["axes"], "config_hash", "on_front", *keys, "failures"])
+    heads = ["name", *study["axes"], "config_hash", "on_front", *keys, "failures"]
+    writer.writerow([_literal(head) for head in heads])
     for point in study["points"]:
         values = [
             json.dumps(v) if isinstance(v := point["values"].get(axis), dict | list) else v for axis in study["axes"]
         ]
         reasons = "; ".join(f"{failure['measure']}: {failure['reason']}" for failure in point["failures"])
         own = [point["figures"].get(key) for key in keys]
-        writer.writerow([point["name"], *values, point["config_hash"], point["on_front"], *own, reasons])
+        row = [point["name"], *values, point["config_hash"], point["on_front"], *own, reasons]
+        writer.writerow([_literal(value) for value in row])
     return text.getvalue()
+
+
+def _literal(value: Any) -> Any:
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 def _commit() -> tuple[str | None, bool]:

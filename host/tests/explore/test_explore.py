@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,12 @@ import pytest
 from click.testing import CliRunner
 
 from colonnade.cli.main import cli
+from colonnade.common import ledger
+from colonnade.common.errors import UserError
+from colonnade.common.input_files import read_input
 from colonnade.explore.explore import Exploration
 from colonnade.explore.jobs import entry_of
+from colonnade.explore.output import Output, check_output
 from colonnade.explore.study import load_study
 
 STUDY = """title = "Try <b>"
@@ -222,12 +226,70 @@ def test_what_is_no_address_of_a_scheduler_is_one_line(study: Path, address: str
     assert not (study.parent / "out").exists()
 
 
+def filled(out: Path, change: Callable[[], object]) -> None:
+    """The output folder of an earlier study, and a change in it."""
+    output = Output(out)
+    for name in ("study.json", "points.csv", "report.html", "pictures/a.png", "plots/a.svg"):
+        output.write(out / name, name.encode())
+    change()
+
+
+def relinked(path: Path) -> None:
+    """Move a file or folder out of its folder, and put a link in its place."""
+    path.rename(path.parent.parent / "moved")
+    path.symlink_to(path.parent.parent / "moved")
+
+
+def test_an_earlier_study_is_continued_also_after_a_kill(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    filled(out, lambda: None)
+    # Killed between the line of a file and the file, within a line, and within a file
+    with (out / ".colonnade.sha256").open("a") as marker:
+        marker.write(f"{64 * '0'}  points.csv\n{64 * '0'}  pictu")
+    (out / ".colonnade.abc").write_text("half")
+    (out / "plots" / "a.svg").unlink()
+    check_output(out)
+    Output(out).write(out / "points.csv", b"new")
+    check_output(out)
+
+
+def test_an_output_never_replaces_an_input(tmp_path: Path) -> None:
+    with ledger.opened():
+        filled(tmp_path / "out", lambda: None)
+    with ledger.opened():
+        read_input(tmp_path / "out" / "points.csv", "the mesh")
+        before = hostile.snapshot(tmp_path)
+        with pytest.raises(UserError, match=r"the output .*points\.csv would replace .*which this command reads"):
+            Output(tmp_path / "out")
+        assert hostile.snapshot(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", [300 * "x", "x" + 40 * f"/{100 * 'y'}"])
+def test_names_that_are_too_long_are_refused_before_the_first_job(study: Path, name: str) -> None:
+    result = CliRunner().invoke(cli, ["explore", str(study), "--output", str(study.parent / name)])
+    assert result.exit_code == 2
+    hostile.one_error_line(result.stderr, "File name too long")
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda out: out.write_text("x"), "is a file"),
-        (lambda out: (out.mkdir(), (out / "thesis.txt").write_text("x")), "holds other files"),
-        (lambda out: (out.mkdir(), (out / "study.json").write_text("{}")), "holds other files"),
+        (lambda out: out.symlink_to("elsewhere"), "is a symbolic link: --output names a folder"),
+        (lambda out: (out.mkdir(), (out / "thesis.txt").write_text("x")), "holds files, but no .colonnade.sha256"),
+        (lambda out: (out.mkdir(), (out / "study.json").write_text('{"version": 1}')), "but no .colonnade.sha256"),
+        (lambda out: filled(out, lambda: (out / "thesis.txt").write_text("x")), "holds thesis.txt, which colonnade"),
+        (lambda out: filled(out, lambda: (out / "points.csv").write_text("x")), "points.csv, which was changed after"),
+        (
+            lambda out: filled(out, lambda: relinked(out / "report.html")),
+            "holds report.html, which colonnade",
+        ),
+        (
+            lambda out: filled(out, lambda: relinked(out / "pictures")),
+            "holds pictures, which colonnade",
+        ),
+        (lambda out: filled(out, lambda: relinked(out / ".colonnade.sha256")), "but no .colonnade.sha256"),
+        (lambda out: filled(out, lambda: (out / "plots" / "more").mkdir()), "holds plots/more, which colonnade"),
     ],
 )
 def test_other_peoples_folders_are_refused(study: Path, make: Any, message: str) -> None:

@@ -9,7 +9,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.explore.jobs import KINDS, Job
 from colonnade.explore.plan import Plan, PointJobs
 from colonnade.explore.points import Point
-from colonnade.explore.results import Results
+from colonnade.explore.results import Results, table
 from colonnade.explore.schedule import Outcome
 from colonnade.explore.work import PICTURE
 
@@ -44,3 +44,20 @@ def test_each_picture_has_a_file_of_its_own(tmp_path: Path) -> None:
         shown |= {f"{name} of {workload}": entry["workloads"][workload]["picture"] for workload in workloads}
     assert {name: (folder / path).read_text() for name, path in shown.items()} == {name: name for name in shown}
     assert len({path.casefold() for path in shown.values()}) == len(shown) == (len(NAMES) + 1) * len(workloads)
+
+
+def test_a_table_holds_no_formulas_and_one_line_of_comment() -> None:
+    evil = "=cmd|' /C calc'!A0"
+    point = {"name": evil, "values": {"precision": "+1", "array.contexts": -1}, "config_hash": "c", "on_front": False}
+    failure = {"measure": "area", "reason": "@x"}
+    study = {
+        "command": "colonnade explore 'a\nb.toml'",
+        "commit": "c",
+        "is_modified": False,
+        "axes": ["precision", "array.contexts"],
+        "columns": [{"key": "psnr_min"}],
+        "points": [point | {"figures": {"psnr_min": -2.5}, "failures": [failure]}],
+    }
+    lines = table(study).splitlines()
+    assert lines[0] == "# colonnade explore 'a\\nb.toml' (commit c)"
+    assert lines[2] == f"'{evil},'+1,-1,c,False,-2.5,area: @x"

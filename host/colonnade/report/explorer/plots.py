@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import vl_convert
 
-from colonnade.common.atomic_files import make_folder, replacing
 from colonnade.common.file_names import FileNames
 from colonnade.report.explorer.charts import INK, Spec
 from colonnade.report.explorer.rows import LEVELS
@@ -22,16 +21,14 @@ WIDTH = 760
 SCALE = 2.0
 
 
-def write_all(study: Study, folder: Path) -> list[Path]:
+def write_all(study: Study, folder: Path, write: Callable[[Path, bytes], None]) -> list[Path]:
     """Write a plot for each pair of objectives and for each library, level and workload; returns the paths."""
-    make_folder(folder)
     paths = []
     for name, spec in plots(study):
         svg = vl_convert.vegalite_to_svg(_static(spec))
         for suffix, data in ((".svg", svg.encode()), (".png", vl_convert.svg_to_png(svg, scale=SCALE))):
             paths.append(folder / (name + suffix))
-            with replacing(paths[-1]) as stream:
-                stream.write(data)
+            write(paths[-1], data)
     return paths
 
 
