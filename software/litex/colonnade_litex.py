@@ -27,10 +27,10 @@ _LITE = {
     "r": ("valid", "ready", "data", "resp"),
 }
 _FULL = {
-    "aw": ("valid", "ready", "addr", "id", "len", "size", "burst"),
+    "aw": ("valid", "ready", "addr", "id", "len", "size", "burst", "prot"),
     "w": ("valid", "ready", "data", "strb", "last"),
     "b": ("valid", "ready", "resp", "id"),
-    "ar": ("valid", "ready", "addr", "id", "len", "size", "burst"),
+    "ar": ("valid", "ready", "addr", "id", "len", "size", "burst", "prot"),
     "r": ("valid", "ready", "data", "resp", "id", "last"),
 }
 

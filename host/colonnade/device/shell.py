@@ -32,11 +32,13 @@ class Bus:
     Attributes:
         latency: Cycles from a read or the end of a write to its answer.
         stall: Percentage of cycles in which a channel does not move, 0 to 99.
+        order: When the address and the data of a write are taken, a number of `WriteOrder` of the testbench, 0 to 4.
         seed: Random seed of the stalls, and of the registers' values at power-up.
     """
 
     latency: int = 1
     stall: int = 0
+    order: int = 0
     seed: int = 1
 
 
@@ -136,7 +138,7 @@ def render_shell(
             lines += _frame(shell, design, {**values, **scene}, code, place)
             lines.append(f"dump frame{index} {place[0]} {place[1] * place[2]}")
         (folder / "job").write_text("\n".join(lines) + "\n")
-        options = {"bus": shell.bus_bytes, "memory": end, "latency": bus.latency, "stall": bus.stall, "seed": bus.seed}
+        options = {"bus": shell.bus_bytes, "memory": end, "latency": bus.latency, "stall": bus.stall, "order": bus.order, "seed": bus.seed}
         arguments = [text for name, value in options.items() for text in (f"--{name}", str(value))]
         with progress.step("rendering through the bus") as report:
             output = run_program([str(program), *arguments, "job"], folder, report)

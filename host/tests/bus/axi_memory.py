@@ -15,6 +15,8 @@ from cocotbext.axi.axi_channels import AxiARSink, AxiAWSink, AxiBSource, AxiRSou
 
 UNWRITTEN = 0xA5
 OKAY, SLVERR, DECERR = 0, 2, 3
+#: When the address and the data of a write are taken; AXI4 allows all of these.
+WRITE_ORDERS = ("any", "data first", "address first")
 
 
 def stalls(percent: int, seed: int) -> Iterator[bool]:
@@ -51,6 +53,8 @@ class AxiMemory:
         self.transfers = self.failed = self.overtaken = 0
         self._dut, self._stall = dut, stall
         self._random = random.Random(seed)
+        self._order = WRITE_ORDERS[seed % len(WRITE_ORDERS)]
+        self._is_writing = False
         bus = AxiBus.from_prefix(dut, "m_axi")
         cocotb.start_soon(
             self._write(*self._channels((AxiAWSink, bus.write.aw), (AxiWSink, bus.write.w), (AxiBSource, bus.write.b)))
@@ -76,9 +80,23 @@ class AxiMemory:
         self.failed += 1
         return self._random.choice((SLVERR, DECERR))
 
-    async def _write(self, addresses: Any, data: Any, answers: Any) -> None:
+    async def _reorder(self, addresses: Any, data: Any) -> None:
+        """Take addresses only when data wait, data only when an address waits, or both at any time."""
+        if self._order == "any":
+            return
+        waiting = addresses if self._order == "data first" else data
+        waiting.clear_pause_generator()
         while True:
+            await RisingEdge(self._dut.clock)
+            has_other = not data.empty() if waiting is addresses else self._is_writing or not addresses.empty()
+            waiting.pause = not has_other
+
+    async def _write(self, addresses: Any, data: Any, answers: Any) -> None:
+        cocotb.start_soon(self._reorder(addresses, data))
+        while True:
+            self._is_writing = False
             burst = await addresses.recv()
+            self._is_writing = True
             lanes = len(data.bus.wstrb)
             response = self._answer()
             for beat in range(int(burst.awlen) + 1):

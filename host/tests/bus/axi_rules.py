@@ -49,7 +49,7 @@ class Channel:
 
 
 #: Fields of the channels that a master drives, and of those that a slave drives.
-MASTER = {"aw": ("addr", "id", "len", "size", "burst"), "w": ("data", "strb", "last")}
+MASTER = {"aw": ("addr", "id", "len", "size", "burst", "prot"), "w": ("data", "strb", "last")}
 MASTER["ar"] = MASTER["aw"]
 SLAVE_LITE = {"b": ("resp",), "r": ("data", "resp")}
 
@@ -64,17 +64,21 @@ async def watch_master(dut: Any, port: str, channels: str, windows: list[range])
         windows: All transfers lie in one of these ranges of byte addresses; a list that may change meanwhile.
     """
     watched = {name: Channel(dut, port, name, MASTER[name]) for name in channels.split()}
-    beats: deque[int] = deque()  # of the writes whose data are to follow
+    beats: deque[int] = deque()  # of the writes whose address has been offered, and whose data are to follow
     while True:
         await RisingEdge(dut.clock)
         if str(dut.reset.value) != "0":
             continue
         for name, channel in watched.items():
+            was_offered = channel.offered is not None
             taken = channel.sample()
+            if name == "aw" and not was_offered and (offered := taken or channel.offered) is not None:
+                beats.append(int(offered["len"], 2) + 1)
+            if name == "w" and (taken or channel.offered) is not None:
+                assert beats, "data are offered before their address"
             if taken is None:
                 continue
             if name == "w":
-                assert beats, "data come before their address"
                 beats[0] -= 1
                 assert taken["last"] == str(int(beats[0] == 0)), f"wlast is {taken['last']}, {beats[0]} beats to come"
                 if beats[0] == 0:
@@ -82,10 +86,8 @@ async def watch_master(dut: Any, port: str, channels: str, windows: list[range])
                 continue
             address, size, count = (int(taken[field], 2) for field in ("addr", "size", "len"))
             end = address + (count + 1 << size)
-            assert taken["burst"] == "01" and address // 4096 == (end - 1) // 4096, f"an illegal burst: {taken}"
+            assert taken["burst"] == "01" and taken["prot"] == "010" and address // 4096 == (end - 1) // 4096, f"an illegal burst: {taken}"
             assert any(window.start <= address and end <= window.stop for window in windows), f"outside: {taken}"
-            if name == "aw":
-                beats.append(count + 1)
 
 
 async def watch_slave(dut: Any, port: str) -> None:

@@ -39,7 +39,11 @@ def assert_bytes(frame: ShellFrame, expected: np.ndarray, pixel_bytes: int) -> N
     assert (frame.lines[:, used:] == UNWRITTEN).all()
 
 
-@pytest.mark.parametrize("bus", [Bus(), Bus(latency=60, stall=30, seed=2)], ids=["fast", "slow"])
+@pytest.mark.parametrize(
+    "bus",
+    [Bus(), *(Bus(latency=60, stall=30, order=order, seed=2 + order) for order in range(5))],
+    ids=["fast", "any order", "address after data valid", "data after address", "together", "address after last beat"],
+)
 def test_frames_in_memory_are_those_of_the_model(design: GeneratedDesign, bus: Bus) -> None:
     manifest = design.manifest
     image = pack(load_mesh("torus"), manifest)

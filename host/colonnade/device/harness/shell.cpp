@@ -10,7 +10,7 @@
 //   fail BEATS                 so many of 1024 beats of the scene's reads are answered with an error from now on
 //
 // Options: --bus BYTES of the data bus; --memory BYTES of memory, from address 0; --latency CYCLES of an answer; --stall
-// PERCENT of cycles in which a channel does not move; --seed N of stalls and of the state at power-up. An access beyond the memory, an answer with an error, or a
+// PERCENT of cycles in which a channel does not move; --order N of a write's address and data (WriteOrder); --seed N of stalls and of the state at power-up. An access beyond the memory, an answer with an error, or a
 // broken rule of AXI ends the run. Exit status 0, or 3 on an error.
 #include <cstdint>
 #include <fstream>

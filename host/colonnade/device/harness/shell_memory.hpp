@@ -52,11 +52,15 @@ struct Scene {
 };
 #endif
 
+/// When a memory takes the address and the data of a write; AXI4 allows all of these.
+enum class WriteOrder : unsigned { any, addressAfterDataValid, dataAfterAddress, together, addressAfterLastBeat, count };
+
 /// The memory behind m_axi, whose answers come in order, and behind m_axi_scene.
 class Memory {
 public:
     Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options)
-        : top_(top), bus_(options["--bus"]), latency_(options["--latency"]), stall_(options["--stall"]), random_(options["--seed"]),
+        : top_(top), bus_(options["--bus"]), latency_(options["--latency"]), stall_(options["--stall"]),
+          order_(static_cast<WriteOrder>(options["--order"] % static_cast<unsigned>(WriteOrder::count))), random_(options["--seed"]),
           bytes_(options["--memory"], 0xA5), scene_(top, {latency_, stall_, 0, 0, options["--seed"]}, bytes_) {}
 
     std::uint8_t* range(std::uint64_t address, std::uint64_t size) {
@@ -67,8 +71,7 @@ public:
     /// Sets the inputs for this cycle. What is offered stays.
     void offer() {
         ++now_;
-        top_.m_axi_awready = moves();
-        top_.m_axi_wready = moves();
+        offerWrites();
         top_.m_axi_arready = moves();
         top_.m_axi_bvalid = top_.m_axi_bvalid ? 1 : !answers_.empty() && answers_.front() <= now_ && moves();
         top_.m_axi_rvalid = top_.m_axi_rvalid ? 1 : !reads_.empty() && reads_.front().due <= now_ && moves();
@@ -83,9 +86,11 @@ public:
 
     /// Takes the transfers of this cycle; afterwards `offer` may change what was taken.
     void take() {
+        checkOrder();
         if (top_.m_axi_awvalid && top_.m_axi_awready) writes_.push_back(burst(top_.m_axi_awaddr, top_.m_axi_awlen));
         if (top_.m_axi_arvalid && top_.m_axi_arready) reads_.push_back(burst(top_.m_axi_araddr, top_.m_axi_arlen));
-        if (top_.m_axi_wvalid && top_.m_axi_wready) write();
+        if (top_.m_axi_wvalid && top_.m_axi_wready) takeBeat();
+        while (!writes_.empty() && !beats_.empty()) write();
         if (top_.m_axi_bvalid && top_.m_axi_bready) {
             answers_.pop_front();
             takenB_ = true;
@@ -113,6 +118,11 @@ private:
         unsigned beats, done;
     };
 
+    struct Beat {
+        std::uint8_t data[128] = {}, strobes[16] = {};
+        bool isLast = false;
+    };
+
     bool moves() { return stall_ == 0 || random_() % 100 >= stall_; }
 
     Burst burst(std::uint64_t address, unsigned length) {
@@ -122,18 +132,52 @@ private:
         return {first, now_ + latency_, length + 1, 0};
     }
 
+    void offerWrites() {
+        const bool hasAddress = top_.m_axi_awvalid, hasData = top_.m_axi_wvalid;
+        bool takesAddress = moves(), takesData = moves();
+        switch (order_) {
+        case WriteOrder::addressAfterDataValid: takesAddress &= hasData || !beats_.empty(); break;
+        case WriteOrder::dataAfterAddress: takesData &= !writes_.empty(); break;
+        case WriteOrder::together:
+            takesData = takesAddress && (hasAddress || !writes_.empty());
+            takesAddress &= hasData;
+            break;
+        case WriteOrder::addressAfterLastBeat: takesAddress &= wholeBursts_ > 0; break;
+        default: break;
+        }
+        top_.m_axi_awready = takesAddress;
+        top_.m_axi_wready = takesData;
+    }
+
+    /// No data are offered before their address is.
+    void checkOrder() {
+        if (top_.m_axi_awvalid && !isAnnounced_) ++announced_;
+        isAnnounced_ = top_.m_axi_awvalid && !top_.m_axi_awready;
+        if (!top_.m_axi_wvalid) return;
+        if (isFirstBeat_) ++begun_;
+        isFirstBeat_ = top_.m_axi_wready && top_.m_axi_wlast;
+        if (begun_ > announced_) throw std::runtime_error("data are offered before their address");
+    }
+
+    void takeBeat() {
+        Beat beat;
+        std::memcpy(beat.data, &top_.m_axi_wdata, bus_);
+        std::memcpy(beat.strobes, &top_.m_axi_wstrb, (bus_ + 7) / 8);
+        beat.isLast = top_.m_axi_wlast;
+        wholeBursts_ += beat.isLast;
+        beats_.push_back(beat);
+    }
+
     void write() {
-        if (writes_.empty()) throw std::runtime_error("data come before their address");
         Burst& burst = writes_.front();
-        std::uint8_t data[128];
-        std::memcpy(data, &top_.m_axi_wdata, bus_);
-        std::uint8_t strobes[16] = {};
-        std::memcpy(strobes, &top_.m_axi_wstrb, (bus_ + 7) / 8);
+        const Beat beat = beats_.front();
+        beats_.pop_front();
+        wholeBursts_ -= beat.isLast;
         std::uint8_t* to = range(burst.address + burst.done * bus_, bus_);
         for (unsigned i = 0; i < bus_; ++i)
-            if (strobes[i / 8] >> i % 8 & 1) to[i] = data[i];
+            if (beat.strobes[i / 8] >> i % 8 & 1) to[i] = beat.data[i];
         ++burst.done;
-        if ((top_.m_axi_wlast != 0) != (burst.done == burst.beats)) throw std::runtime_error("a burst does not end with its last beat");
+        if (beat.isLast != (burst.done == burst.beats)) throw std::runtime_error("a burst does not end with its last beat");
         if (burst.done < burst.beats) return;
         writes_.pop_front();
         answers_.push_back(now_ + latency_);
@@ -141,11 +185,14 @@ private:
 
     VColonnadeAxi& top_;
     unsigned bus_, latency_, stall_;
+    WriteOrder order_;
     std::mt19937 random_;
     std::vector<std::uint8_t> bytes_;
     Scene scene_;
     std::deque<Burst> writes_, reads_;
+    std::deque<Beat> beats_;        // without their address
+    unsigned wholeBursts_ = 0;      // of them
     std::deque<std::uint64_t> answers_;
-    std::uint64_t now_ = 0;
-    bool takenB_ = false, takenR_ = false;
+    std::uint64_t now_ = 0, announced_ = 0, begun_ = 0; // addresses that were offered, bursts whose data were
+    bool isAnnounced_ = false, isFirstBeat_ = true, takenB_ = false, takenR_ = false;
 };

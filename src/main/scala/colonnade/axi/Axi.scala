@@ -12,6 +12,9 @@ object Axi {
   /** `burst` of incrementing addresses; the ports use no other kind. */
   val incr: UInt = 1.U(2.W)
 
+  /** `prot` of all accesses: data, unprivileged and non-secure. */
+  val protection: UInt = 2.U(3.W)
+
   /** Answers (`resp`): success, and an error of the addressed device. */
   val okay:       UInt = 0.U(2.W)
   val slaveError: UInt = 2.U(2.W)

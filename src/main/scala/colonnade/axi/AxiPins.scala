@@ -14,12 +14,16 @@ final case class AxiChannels(driven: Seq[(String, Bundle)], received: Seq[(Strin
 final class AxiPins(channels: => AxiChannels, isMaster: Boolean) extends Record {
   private val all = channels.driven.map((_, true)) ++ channels.received.map((_, false))
 
+  /** Channels of addresses, of whose protection a master of this project knows nothing: it is a constant. */
+  private def isUnprotected(payload: Bundle): Boolean = payload.isInstanceOf[AxiAddress]
+
   val elements: SeqMap[String, Data] = SeqMap(all.flatMap { case ((channel, payload), isDriven) =>
     val isOutput                        = isDriven == isMaster
     def sent[T <: Data](data:     T): T = if (isOutput) Output(data) else Input(data)
     def answered[T <: Data](data: T): T = if (isOutput) Input(data) else Output(data)
     Seq(s"${channel}valid" -> sent(Bool()), s"${channel}ready" -> answered(Bool())) ++
-      payload.elements.toSeq.reverse.map { case (field, data) => s"$channel$field" -> sent(data.cloneType) }
+      payload.elements.toSeq.reverse.map { case (field, data) => s"$channel$field" -> sent(data.cloneType) } ++
+      Option.when(isUnprotected(payload))(s"${channel}prot" -> sent(UInt(3.W)))
   }: _*)
 
   /** Connects a channel that leaves at these pins. */
@@ -27,6 +31,7 @@ final class AxiPins(channels: => AxiChannels, isMaster: Boolean) extends Record 
     pin(s"${channel}valid") := source.valid
     source.ready            := bit(s"${channel}ready")
     source.bits.elements.foreach { case (field, data) => pin(s"$channel$field") := data }
+    if (isUnprotected(source.bits)) pin(s"${channel}prot") := Axi.protection
   }
 
   /** Connects a channel that comes in at these pins. */

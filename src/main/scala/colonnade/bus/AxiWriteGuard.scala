@@ -22,7 +22,7 @@ final class AxiWriteGuardIO(idBits: Int, busBytes: Int) extends Bundle {
 /** Ends the write bursts of a master that is reset: their remaining beats write no bytes, and their answers are taken.
   *
   * It outlives the reset of the master, so the bus always sees whole bursts, and valid signals that hold. A beat passes in
-  * one cycle. At most [[AxiWriteGuard.maxBursts]] bursts wait for their answers.
+  * one cycle. Data are offered from the second cycle after their address on, whether it has been accepted or not. At most [[AxiWriteGuard.maxBursts]] bursts wait for their answers.
   */
 final class AxiWriteGuard(idBits: Int, busBytes: Int) extends Module {
   val io = IO(new AxiWriteGuardIO(idBits, busBytes))
@@ -31,15 +31,17 @@ final class AxiWriteGuard(idBits: Int, busBytes: Int) extends Module {
   private val aw     = Module(new Queue(io.axi.aw.bits.cloneType, 2))
   private val w      = Module(new Queue(io.axi.w.bits.cloneType, 2))
 
-  // Data follow their address: beats that are owed for each address that has left, in order
-  private val owed  = Module(new Queue(UInt(8.W), AxiWriteGuard.maxBursts))
-  private val beats = RegInit(0.U(8.W))
+  // Beats that are owed for each address that has been offered, in order. They do not wait until it is accepted: a memory
+  // may wait for them first (AXI4, A3.3.1).
+  private val owed        = Module(new Queue(UInt(8.W), AxiWriteGuard.maxBursts))
+  private val beats       = RegInit(0.U(8.W))
+  private val isAnnounced = RegNext(io.axi.aw.valid && !io.axi.aw.ready, false.B)
 
   private val canStart = bursts =/= AxiWriteGuard.maxBursts.U && !io.abandon
   aw.io.enq.valid   := io.inner.aw.valid && canStart
   aw.io.enq.bits    := io.inner.aw.bits
   io.inner.aw.ready := aw.io.enq.ready && canStart
-  owed.io.enq.valid := io.axi.aw.fire // never more than `maxBursts`
+  owed.io.enq.valid := io.axi.aw.valid && !isAnnounced // never more than `maxBursts`
   owed.io.enq.bits  := io.axi.aw.bits.len
 
   private val isLast = beats === owed.io.deq.bits

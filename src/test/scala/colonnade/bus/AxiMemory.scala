@@ -6,12 +6,24 @@ import org.scalatest.Assertions._
 import scala.collection.mutable
 import scala.util.Random
 
+/** When a memory takes the address and the data of a write; AXI4 allows all of these. */
+object WriteOrder extends Enumeration {
+  val any, addressAfterDataValid, dataAfterAddress, together, addressAfterLastBeat = Value
+}
+
 /** A memory at the pins of an AXI4 master, with random stalls and latencies. Checks that each valid holds with its payload
-  * until it is accepted, that bursts end with `last` and cross no 4 KB.
+  * until it is accepted, that no data are offered before their address, that bursts end with `last` and cross no 4 KB.
   *
   * @param stall percentage of cycles in which a channel does not move
+  * @param order of the writes
   */
-class AxiMemory(pins: AxiPins, busBytes: Int, random: Random, stall: Int = 50) extends PinAccess(pins) {
+class AxiMemory(
+    pins:     AxiPins,
+    busBytes: Int,
+    random:   Random,
+    stall:    Int = 50,
+    order:    WriteOrder.Value = WriteOrder.any
+) extends PinAccess(pins) {
   val bytes    = mutable.Map.empty[BigInt, Int]
   val written  = mutable.Set.empty[BigInt]
   val read     = mutable.Set.empty[BigInt]
@@ -27,6 +39,7 @@ class AxiMemory(pins: AxiPins, busBytes: Int, random: Random, stall: Int = 50) e
   val bursts = mutable.ArrayBuffer.empty[Int]
 
   private val writes  = mutable.Queue.empty[Burst] // addresses whose data are not complete
+  private val data    = mutable.Queue.empty[Beat]  // without their address
   private val answers = mutable.Queue.empty[Burst]
   private val reads   = mutable.Queue.empty[Burst]
   private val held    = mutable.Map.empty[String, Seq[BigInt]]
@@ -34,6 +47,11 @@ class AxiMemory(pins: AxiPins, busBytes: Int, random: Random, stall: Int = 50) e
   private var sent    = 0                          // of the first read
   private var offered = Set.empty[String]
   private var now     = 0
+
+  private var announced   = 0     // addresses that have been offered
+  private var isAnnounced = false // the one that is offered now is among them
+  private var begunBursts = 0     // of data that have been offered
+  private var isFirstBeat = true
 
   private def moves(): Boolean = random.nextInt(100) >= stall
 
@@ -45,12 +63,12 @@ class AxiMemory(pins: AxiPins, busBytes: Int, random: Random, stall: Int = 50) e
       bytes(address + 4 * index + byte) = ((word >> (8 * byte)) & 255).toInt
     }
 
-  def isIdle: Boolean = writes.isEmpty && answers.isEmpty && reads.isEmpty
+  def isIdle: Boolean = writes.isEmpty && data.isEmpty && answers.isEmpty && reads.isEmpty
 
   /** One cycle of the memory: pokes and peeks the pins; the caller steps the clock. */
   def cycle(): Unit = {
-    for (channel <- Seq("aw", "w", "ar") if has(s"${channel}valid"))
-      poke(s"${channel}ready", if (moves() && !isSilent) 1 else 0)
+    for ((channel, isReady) <- readies if has(s"${channel}valid"))
+      poke(s"${channel}ready", if (isReady && !isSilent) 1 else 0)
     offer("b", answers.headOption) { burst => poke("bresp", response(burst.address)) }
     offer("r", reads.headOption) { burst =>
       val at = burst.address / busBytes * busBytes + sent * busBytes
@@ -59,8 +77,10 @@ class AxiMemory(pins: AxiPins, busBytes: Int, random: Random, stall: Int = 50) e
       poke("rlast", if (sent == burst.beats - 1) 1 else 0)
     }
     for (channel <- Seq("aw", "w", "ar") if has(s"${channel}valid")) watch(channel)
+    if (has("awvalid")) checkOrder()
     if (fires("aw")) writes.enqueue(burst("aw"))
-    if (fires("w")) write()
+    if (fires("w")) data.enqueue(Beat(peek("wdata"), peek("wstrb"), peek("wlast") == 1))
+    while (writes.nonEmpty && data.nonEmpty) write(data.dequeue())
     if (fires("ar")) {
       val next = burst("ar")
       reads.enqueue(next)
@@ -77,6 +97,33 @@ class AxiMemory(pins: AxiPins, busBytes: Int, random: Random, stall: Int = 50) e
     now += 1
   }
 
+  /** Which channels the memory takes from in this cycle. */
+  private def readies: Map[String, Boolean] = {
+    def offers(channel: String) = has(s"${channel}valid") && isHigh(s"${channel}valid")
+    val (aw, w)                 = order match {
+      case WriteOrder.any                   => (moves(), moves())
+      case WriteOrder.addressAfterDataValid => (moves() && (offers("w") || data.nonEmpty), moves())
+      case WriteOrder.dataAfterAddress      => (moves(), moves() && writes.nonEmpty)
+      case WriteOrder.addressAfterLastBeat  => (moves() && data.exists(_.isLast), moves())
+      case WriteOrder.together              =>
+        val both = moves()
+        (both && offers("w"), both && (offers("aw") || writes.nonEmpty))
+    }
+    Map("aw" -> aw, "w" -> w, "ar" -> moves())
+  }
+
+  /** No data are offered before their address is. */
+  private def checkOrder(): Unit = {
+    if (isHigh("awvalid") && !isAnnounced) announced += 1
+    isAnnounced = isHigh("awvalid") && !fires("aw")
+    if (isHigh("wvalid")) {
+      if (isFirstBeat) begunBursts += 1
+      isFirstBeat = false
+      assert(begunBursts <= announced, "data before their address")
+      if (fires("w") && peek("wlast") == 1) isFirstBeat = true
+    }
+  }
+
   private def fires(channel: String): Boolean =
     has(s"${channel}valid") && isHigh(s"${channel}valid") && isHigh(s"${channel}ready")
 
@@ -89,17 +136,14 @@ class AxiMemory(pins: AxiPins, busBytes: Int, random: Random, stall: Int = 50) e
     Burst(address, beats, now + random.nextInt(maxDelay + 1))
   }
 
-  private def write(): Unit = {
-    assert(writes.nonEmpty, "data without an address")
-    val first   = writes.head.address / busBytes * busBytes + beat * busBytes
-    val strobes = peek("wstrb")
-    val data    = peek("wdata")
-    for (i <- 0 until busBytes if strobes.testBit(i)) {
-      bytes(first + i) = ((data >> (8 * i)) & 255).toInt
+  private def write(taken: Beat): Unit = {
+    val first = writes.head.address / busBytes * busBytes + beat * busBytes
+    for (i <- 0 until busBytes if taken.strobes.testBit(i)) {
+      bytes(first + i) = ((taken.data >> (8 * i)) & 255).toInt
       written += first + i
     }
     beat += 1
-    assert((peek("wlast") == 1) == (beat == writes.head.beats), "last")
+    assert(taken.isLast == (beat == writes.head.beats), "last")
     if (beat == writes.head.beats) {
       beat = 0
       answers.enqueue(writes.dequeue().copy(due = now + 1 + random.nextInt(maxDelay + 1)))
@@ -125,6 +169,9 @@ class AxiMemory(pins: AxiPins, busBytes: Int, random: Random, stall: Int = 50) e
     if (peek(s"${channel}valid") == 1 && peek(s"${channel}ready") == 0) held(channel) = now
   }
 }
+
+/** A beat of a write. */
+private final case class Beat(data: BigInt, strobes: BigInt, isLast: Boolean)
 
 /** A burst, answered from cycle `due` on. */
 private final case class Burst(address: BigInt, beats: Int, due: Int)

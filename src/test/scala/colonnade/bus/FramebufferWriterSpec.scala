@@ -21,7 +21,12 @@ private class GuardedWriter(config: ColonnadeConfig, shell: ShellConfig) extends
   val responseError = IO(Output(Bool()))
   val pins          = IO(AxiPins.readsAndWrites(BurstWriter.idBits, shell.busBytes)).suggestName("m_axi")
 
-  private val writer = Module(new FramebufferWriter(config, shell))
+  /** The guard ends its bursts; the writer is reset. */
+  val abandon     = IO(Input(Bool()))
+  val clears      = IO(Input(Bool()))
+  val guardIsIdle = IO(Output(Bool()))
+
+  private val writer = withReset(reset.asBool || clears)(Module(new FramebufferWriter(config, shell)))
   private val guard  = Module(new AxiWriteGuard(BurstWriter.idBits, shell.busBytes))
   writer.io.settings    := settings
   writer.io.clearErrors := start
@@ -31,7 +36,8 @@ private class GuardedWriter(config: ColonnadeConfig, shell: ShellConfig) extends
   windowError   := writer.io.errors.window
   responseError := writer.io.errors.response
   guard.io.inner :<>= writer.io.axi
-  guard.io.abandon := false.B
+  guard.io.abandon := abandon
+  guardIsIdle      := guard.io.isIdle
   Seq("aw" -> guard.io.axi.aw, "w" -> guard.io.axi.w).foreach { case (channel, stream) => pins.drive(channel, stream) }
   pins.receive("b", guard.io.axi.b)
   for ((name, pin) <- pins.elements if name.startsWith("ar") && name != "arready" || name == "rready")
@@ -55,8 +61,14 @@ class FramebufferWriterSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  private class Bench(dut: GuardedWriter, config: ColonnadeConfig, shell: ShellConfig, val random: Random) {
-    val memory = new AxiMemory(dut.pins, shell.busBytes, random)
+  private class Bench(
+      dut:        GuardedWriter,
+      config:     ColonnadeConfig,
+      shell:      ShellConfig,
+      val random: Random,
+      order:      WriteOrder.Value = WriteOrder.any
+  ) {
+    val memory = new AxiMemory(dut.pins, shell.busBytes, random, order = order)
     val tile   = config.frame.tileSize
     dut.clock.setTimeout(0)
     dut.pixels.foreach(_.valid.poke(false))
@@ -77,6 +89,30 @@ class FramebufferWriterSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.settings.format.poke(format)
       dut.settings.window.base.poke(window._1)
       dut.settings.window.end.poke(window._2)
+    }
+
+    /** Ends the guard's bursts in the middle of a frame; the master is reset meanwhile. */
+    def abandon(cycles: Int): Unit = {
+      def offer(isValid: Boolean): Unit = dut.pixels.zipWithIndex.foreach { case (port, index) =>
+        port.valid.poke(isValid)
+        port.bits.x.poke(index)
+        port.bits.y.poke(random.nextInt(16))
+      }
+      for (_ <- 0 until cycles) { offer(random.nextBoolean()); cycle() }
+      offer(false)
+      dut.abandon.poke(true)
+      cycle()
+      dut.clears.poke(true)
+      cycle()
+      dut.clears.poke(false)
+      var waited = 0
+      while (!dut.guardIsIdle.peekBoolean()) {
+        cycle()
+        waited += 1
+        assert(waited < 20000, "a reset does not end")
+      }
+      assert(memory.isIdle)
+      dut.abandon.poke(false)
     }
 
     def frame(shots: Seq[Shot]): Unit = {
@@ -151,6 +187,19 @@ class FramebufferWriterSpec extends AnyFlatSpec with ChiselScalatestTester {
           assert(bench.memory.written.size == shots.size * bytes)
           assert(!dut.windowError.peekBoolean() && !dut.responseError.peekBoolean())
         }
+      }
+    }
+
+  for (order <- WriteOrder.values)
+    it should s"write to a memory that takes addresses and data in the order $order, and end abandoned bursts" in {
+      val (configuration, shell) = (config(2, 8), ShellConfig(8))
+      test(new GuardedWriter(configuration, shell)).withAnnotations(Simulation.verilator) { dut =>
+        val bench = new Bench(dut, configuration, shell, new Random(order.id), order)
+        bench.settings(0x1000, 64, 0, (0x1000, 0x1000 + 64 * 24))
+        val shots = bench.shots(16, 24)
+        bench.frame(bench.mixed(shots))
+        for (shot <- shots) assert(bench.memory.dump(0x1000 + 64 * shot.y + 4 * shot.x, 4) == encoded(shot, 0))
+        for (_ <- 0 until 20) bench.abandon(bench.random.nextInt(60))
       }
     }
 

@@ -26,6 +26,14 @@ class AxiWriteGuardProof(busBytes: Int) extends Module {
     "idle when all is answered"
   )
 
+  // Data are offered soon, even if no address is ever accepted
+  private val waits   = RegInit(0.U(2.W))
+  private val hasData = inner.w.valid || abandon
+  waits := Mux(guard.io.axi.aw.valid && !aw && hasData && !guard.io.axi.w.valid && !w, waits + 1.U, 0.U)
+  private val offersNothing = RegInit(true.B) // no beat since the first address
+  when(guard.io.axi.w.valid)(offersNothing := false.B)
+  assert(!(offersNothing && waits === 3.U), "data do not wait until their address is accepted")
+
   // While it abandons, nothing enters, and no byte of what follows is written
   private val wasAbandoning = RegNext(abandon && !guard.io.axi.w.valid, false.B)
   assert(!abandon || !(inner.aw.ready || inner.w.ready || inner.b.valid), "nothing enters")
