@@ -5,11 +5,13 @@ namespace nb = nanobind;
 
 void bind_environment(nb::module_& module);
 void bind_bvh(nb::module_& module);
+void bind_fixed_order(nb::module_& module);
 void bind_model(nb::module_& module);
 
 NB_MODULE(_core, module) {
-  module.doc() = "BVH builder and bit-exact model of the device.";
+  module.doc() = "BVH builder, bit-exact model of the device, arithmetic in a fixed order.";
   bind_environment(module);
   bind_bvh(module);
+  bind_fixed_order(module);
   bind_model(module);
 }

@@ -17,7 +17,7 @@ from colonnade.environment.lights import RoomLight, RoomLights
 from colonnade.environment.model import Environment
 
 #: Sources that determine a fit, beside this file.
-_SOURCES = ("light_fit.py", "lights.py")
+_SOURCES = ("light_fit.py", "lights.py", "../common/fixed_order.py", "../common/srgb.py")
 
 
 def fitted_lights(environment: Environment, count: int = DEFAULT_LIGHTS, folder: Path | None = None) -> LightFit:

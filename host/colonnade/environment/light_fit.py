@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, nnls
 
+from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
@@ -41,6 +41,8 @@ _MIN_HEIGHT = 0.3
 #: Refined starts for each further light.
 _STARTS = 4
 _EVALUATIONS = 50
+#: Damping of the refinement: the first, and that from which on it has no better step; the least share of a gain.
+_FIRST_DAMPING, _LAST_DAMPING, _CONVERGED = 1e-3, 1e9, 1e-8
 #: Step of numeric derivatives, metres.
 _STEP = 1e-4
 #: Least ambient light, as a share of the best ambient light without point lights: shadows that are drawn are not darker
@@ -161,48 +163,78 @@ def _starts(samples: Samples, lights: RoomLights, positions: Floats) -> list[Roo
     model = samples.albedo * irradiance(samples.points, samples.normals, lights)
     relative = _residuals(samples, lights) / _OUTLIER
     # Weights of soft-L1, and the slope that makes linear differences those of the picture
-    weights = _slope(samples, model) * (1 + relative**2) ** -0.25
+    weights = _slope(samples, model) / np.sqrt(np.sqrt(1 + relative**2))
     known = [np.ones(len(samples.points))]
     known += [exposure(samples.points, samples.normals, light.position, light.falloff) for light in lights.lights]
-    scored = []
-    for position, falloff in itertools.product(positions, _FALLOFFS):
-        columns = np.stack([*known, exposure(samples.points, samples.normals, position, falloff)], axis=1)
-        intensities, cost = _non_negative(samples, weights, columns)
-        new = RoomLight(position, intensities[-1], falloff)
-        old = [
-            RoomLight(light.position, colour, light.falloff)
-            for light, colour in zip(lights.lights, intensities[1:-1], strict=True)
-        ]
-        scored.append((cost, RoomLights(intensities[0], (*old, new))))
-    scored.sort(key=lambda pair: pair[0])
+    tried = list(itertools.product(positions, _FALLOFFS))
+    new = [exposure(samples.points, samples.normals, position, falloff) for position, falloff in tried]
+    intensities, costs = _non_negative(samples, weights, np.stack(known, axis=1), np.stack(new, axis=1))
     chosen: list[RoomLights] = []
-    for _, start in scored:
-        new = start.lights[-1]
+    for index in np.argsort(costs, kind="stable"):
+        (position, falloff), colours = tried[index], intensities[index]
         if all(
-            np.linalg.norm(new.position - other.lights[-1].position) > 1.0 or new.falloff != other.lights[-1].falloff
+            fixed_order.dot(offset := position - other.lights[-1].position, offset) > 1.0
+            or falloff != other.lights[-1].falloff
             for other in chosen
         ):
-            chosen.append(start)
+            old = [
+                RoomLight(light.position, colour, light.falloff)
+                for light, colour in zip(lights.lights, colours[1:-1], strict=True)
+            ]
+            chosen.append(RoomLights(colours[0], (*old, RoomLight(position, colours[-1], falloff))))
         if len(chosen) == _STARTS:
             break
     return chosen
 
 
-def _non_negative(samples: Samples, weights: Floats, columns: Floats) -> tuple[Floats, float]:
-    """Intensities >= 0 of each channel, float64 [k, 3], for columns of exposure [n, k], and the weighted cost."""
-    scaled = weights * samples.albedo
-    target = weights * linear_from_srgb(samples.photo)
-    intensities, cost = np.zeros((columns.shape[1], 3)), 0.0
+def _non_negative(samples: Samples, weights: Floats, known: Floats, new: Floats) -> tuple[Floats, Floats]:
+    """Intensities >= 0 of some lights together with each of many others, and the weighted costs.
+
+    Args:
+        samples: n samples.
+        weights: float64 [n, 3].
+        known: Exposures by k lights, float64 [n, k].
+        new: Exposures by m other lights, float64 [n, m].
+
+    Returns:
+        Intensities, float64 [m, k + 1, 3], and costs up to a constant, float64 [m].
+    """
+    k, m = known.shape[1], new.shape[1]
+    intensities, costs = np.zeros((m, k + 1, 3)), np.zeros(m)
     for channel in range(3):
-        system = columns * scaled[:, channel, None]
-        # The same problem with k rows: |R x - Q'b|² differs from |A x - b|² by a constant.
-        gram, moment = system.T @ system, system.T @ target[:, channel]
-        gram = gram + np.eye(len(gram)) * (1e-9 * np.trace(gram) + 1e-12)
-        upper = np.linalg.cholesky(gram).T
-        solution, _ = nnls(upper, np.linalg.solve(upper.T, moment))
-        intensities[:, channel] = solution.clip(max=_MAX_INTENSITY)
-        cost += float(target[:, channel] @ target[:, channel] - 2 * moment @ solution + solution @ gram @ solution)
-    return intensities, cost
+        scale = (weights * samples.albedo)[:, channel, None]
+        target = weights[:, channel, None] * linear_from_srgb(samples.photo[:, channel, None])
+        old, added = known * scale, new * scale
+        gram, moment = np.empty((m, k + 1, k + 1)), np.empty((m, k + 1))
+        gram[:, :k, :k] = fixed_order.product(old.T, old)
+        gram[:, :k, k] = gram[:, k, :k] = fixed_order.product(added.T, old)
+        gram[:, k, k] = (added**2).sum(axis=0)
+        moment[:, :k] = fixed_order.product(old.T, target)[:, 0]
+        moment[:, k] = fixed_order.product(added.T, target)[:, 0]
+        trace = np.trace(gram, axis1=1, axis2=2)
+        gram += np.eye(k + 1) * (1e-9 * trace + 1e-12)[:, None, None]
+        solution = _non_negative_solution(gram, moment)
+        intensities[:, :, channel] = solution.clip(max=_MAX_INTENSITY)
+        change = fixed_order.product(gram, solution[..., None])[..., 0]
+        costs += fixed_order.dot(solution, change - 2 * moment)
+    return intensities, costs
+
+
+def _non_negative_solution(gram: Floats, moment: Floats) -> Floats:
+    """Minima of x'Gx - 2 m'x with x >= 0, for G [n, k, k] and m [n, k], float64 [n, k].
+
+    A minimum is the free minimum of some of its variables while the others are 0, so all such sets are tried.
+    """
+    count, k = moment.shape
+    best, least = np.zeros((count, k)), np.zeros(count)
+    for size in range(1, k + 1):
+        for some in itertools.combinations(range(k), size):
+            tried = np.zeros((count, k))
+            tried[:, some] = fixed_order.solve(gram[:, some][:, :, some], moment[:, some])
+            value = -fixed_order.dot(moment, tried)
+            better = (tried >= 0).all(axis=1) & (value < least)
+            best[better], least[better] = tried[better], value[better]
+    return best
 
 
 def _residuals(samples: Samples, lights: RoomLights) -> Floats:
@@ -213,7 +245,7 @@ def _residuals(samples: Samples, lights: RoomLights) -> Floats:
 
 def _slope(samples: Samples, model: Floats) -> Floats:
     """Derivative of sRGB at linear colours, 0 for unused channels, float64 [n, 3]; finite at 0."""
-    slope = np.where(model > 0.0031308, 1.055 / 2.4 * model.clip(min=0.0031308) ** (1 / 2.4 - 1), 12.92)
+    slope = np.where(model > 0.0031308, 1.055 / 2.4 / fixed_order.power(model.clip(min=0.0031308), 1 - 1 / 2.4), 12.92)
     return np.asarray(np.where(samples.usable, slope, 0.0))
 
 
@@ -224,7 +256,10 @@ def _cost(samples: Samples, lights: RoomLights) -> float:
 
 
 def _refined(samples: Samples, start: RoomLights, floor: Floats | None = None) -> RoomLights:
-    """Refine all values of some lights by robust least squares; ``floor`` is the least ambient light."""
+    """Refine all values of some lights by robust least squares; ``floor`` is the least ambient light.
+
+    This is the Levenberg-Marquardt method within bounds; a library's would depend on the processor (`fixed_order`).
+    """
     layout = _Layout(tuple(light.falloff is not None for light in start.lights))
     low, high = [*(np.zeros(3) if floor is None else floor)], [_MAX_INTENSITY] * 3
     for light in start.lights:
@@ -233,18 +268,34 @@ def _refined(samples: Samples, start: RoomLights, floor: Floats | None = None) -
         if light.falloff is not None:
             low.append(_FALLOFF_RANGE[0])
             high.append(_FALLOFF_RANGE[1])
-    begin = np.clip(layout.pack(start), np.array(low) + 1e-6, np.array(high) - 1e-6)
-    found = least_squares(
-        lambda values: _residuals(samples, layout.unpack(values)).ravel(),
-        begin,
-        jac=lambda values: _jacobian(samples, layout.unpack(values)),
-        bounds=(low, high),
-        loss="soft_l1",
-        f_scale=_OUTLIER,
-        x_scale=np.maximum(np.abs(begin), 0.1),
-        max_nfev=_EVALUATIONS,
-    )
-    return layout.unpack(found.x)
+    lower, upper = np.array(low), np.array(high)
+    values = np.clip(layout.pack(start), lower, upper)
+    cost, damping = _cost(samples, layout.unpack(values)), _FIRST_DAMPING
+    for _ in range(_EVALUATIONS):
+        lights = layout.unpack(values)
+        residuals, slopes = _residuals(samples, lights).ravel(), _jacobian(samples, lights)
+        # Derivatives of the soft-L1 cost: its slope is r / root, its curvature root^-3
+        root = np.sqrt(1 + (residuals / _OUTLIER) ** 2)
+        gradient = fixed_order.product(slopes.T, residuals / root)
+        normal = fixed_order.product((slopes / (root * root * root)[:, None]).T, slopes)
+        held = ((values <= lower) & (gradient > 0)) | ((values >= upper) & (gradient < 0))
+        free = np.flatnonzero(~held)
+        normal, diagonal = normal[np.ix_(free, free)], np.diag(np.diag(normal)[free] + 1e-9)
+        while damping < _LAST_DAMPING:
+            tried = values.copy()
+            tried[free] -= fixed_order.solve(normal + damping * diagonal, gradient[free])
+            tried = np.clip(tried, lower, upper)
+            new_cost = _cost(samples, layout.unpack(tried))
+            if new_cost < cost:
+                break
+            damping *= 4
+        else:
+            break
+        is_last = cost - new_cost < _CONVERGED * cost
+        values, cost, damping = tried, new_cost, damping / 4
+        if is_last:
+            break
+    return layout.unpack(values)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.environment.model import Environment
 
@@ -60,8 +61,8 @@ def exposure(points: Floats, normals: Floats, position: Floats, falloff: float |
         falloff: Distance of that intensity, metres; None for constant intensity.
     """
     to_light = position - points
-    squared = np.einsum("...i,...i->...", to_light, to_light).clip(min=1e-12)
-    cosine = np.einsum("...i,...i->...", normals, to_light).clip(min=0.0) / np.sqrt(squared)
+    squared = fixed_order.dot(to_light, to_light).clip(min=1e-12)
+    cosine = fixed_order.dot(normals, to_light).clip(min=0.0) / np.sqrt(squared)
     if falloff is None:
         return np.asarray(cosine)
     return np.asarray(cosine * np.minimum(falloff**2 / squared, MAX_FALLOFF))
@@ -70,4 +71,8 @@ def exposure(points: Floats, normals: Floats, position: Floats, falloff: float |
 def world_surface(environment: Environment) -> tuple[Floats, Floats]:
     """Points and unit normals of the room's pixels in world space, float64 [height, width, 3] each."""
     rotation, eye = environment.camera_to_world[:, :3], environment.camera_to_world[:, 3]
-    return environment.points() @ rotation.T + eye, environment.normals @ rotation.T
+    turned = rotation.T
+    return (
+        fixed_order.product(environment.points(), turned) + eye,
+        fixed_order.product(environment.normals, turned),
+    )

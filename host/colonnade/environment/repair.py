@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 
 #: Largest difference of a normal's length from 1 that rounding explains.
@@ -48,7 +49,7 @@ def repair_normals(
         lengths = np.linalg.norm(normals, axis=2)
         notes.append(f"{np.count_nonzero(bad):,} normals were not unit vectors and were replaced by their neighbours'")
     normals = normals / lengths[..., np.newaxis]
-    away = np.einsum("yxc,yxc->yx", normals, directions) > 0.1 * np.linalg.norm(directions, axis=2)
+    away = fixed_order.dot(normals, directions) > 0.1 * np.linalg.norm(directions, axis=2)
     if away.mean() > _MAX_FACING_AWAY:
         raise UserError(
             f"{file}: {np.count_nonzero(away):,} of {away.size:,} normals face away from the camera: they must be in"

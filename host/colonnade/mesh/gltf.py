@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
@@ -153,7 +154,7 @@ def _nodes(document: GltfDocument, losses: Losses) -> Iterator[tuple[Mapping[str
     while pending:
         index, parent = pending.pop()
         node = document.entry("nodes", index)
-        matrix = parent @ _local(document, index, node)
+        matrix = fixed_order.product(parent, _local(document, index, node))
         if not (np.abs(matrix) < _MAX_TRANSFORM).all():
             raise document.error(f"the transform of node {index} is not finite, or too large: export it again")
         pending += [(child, matrix) for child in reversed(node.get("children", []))]
@@ -231,13 +232,13 @@ def _primitive(
         losses.add(lost.ALPHA, 0 if alpha is None else int((alpha[:, 3] < 1.0).sum()))
     normals = attribute("NORMAL", 3)
     linear = matrix[:3, :3]
-    determinant = float(np.linalg.det(linear))
+    # The cofactors are the inverse transpose but for a factor, and exist for flat transforms too
+    x, y, z = linear.T
+    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
+    is_mirrored = float(fixed_order.dot(x, cofactors[0])) < 0
     if normals is not None:
-        # The cofactors are the inverse transpose but for a factor, and exist for flat transforms too
-        x, y, z = linear.T
-        cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
-        normals = unit_vectors(unit_vectors(normals) @ cofactors * (-1.0 if determinant < 0 else 1.0))
-    if determinant < 0:
+        normals = unit_vectors(fixed_order.product(unit_vectors(normals), cofactors) * (-1.0 if is_mirrored else 1.0))
+    if is_mirrored:
         faces = faces[:, ::-1]
     material = primitive.get("material", default)
     if material != default or "material" in primitive:
@@ -256,7 +257,7 @@ def _primitive(
         shows_colours = False
     return (
         RawSurface(
-            vertices=positions @ linear.T + matrix[:3, 3],
+            vertices=fixed_order.product(positions, linear.T) + matrix[:3, 3],
             faces=faces,
             normals=None if normals is None else normals[faces],
             colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,

@@ -10,6 +10,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.mesh import losses as lost
 from colonnade.mesh.gltf_document import GltfDocument
@@ -42,7 +43,7 @@ class TextureUse:
 
     def positions(self, values: Floats) -> Floats:
         """Positions in the texture of those of a file, float64 [n, 2]."""
-        return values @ self.matrix[:, :2].T + self.matrix[:, 2]
+        return fixed_order.product(values, self.matrix[:, :2].T) + self.matrix[:, 2]
 
 
 class GltfTextures:

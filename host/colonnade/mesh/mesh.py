@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.mesh import primitives
 from colonnade.mesh.materials import MeshMaterial
@@ -98,6 +99,6 @@ class Mesh:
         directions = np.unique(points, axis=0)
         outermost: set[int] = set()
         for direction in directions[directions[:, 0] >= 0]:
-            height = self.vertices @ direction
+            height = fixed_order.product(self.vertices, direction)
             outermost |= {int(height.argmax()), int(height.argmin())}
         return Extent(self.vertices.min(axis=0), self.vertices.max(axis=0), self.vertices[sorted(outermost)])

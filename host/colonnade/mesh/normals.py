@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh.topology import Faces, edge_keys
@@ -55,8 +56,8 @@ def corner_normals(vertices: Floats, faces: Faces, authored: Floats | None, crea
     lengths = np.abs(authored).max(axis=2)  # not a number for a normal that is none
     given: npt.NDArray[np.bool_] = np.isfinite(lengths) & (lengths > 0)
     normals = unit_vectors(np.where(given[:, :, None], authored, 0.0))
-    heights = np.einsum("mcx,mx->mc", normals, face_normals(vertices, faces))
-    is_flipped = given.all(axis=1) & (heights < 0).all(axis=1)
+    heights = fixed_order.dot(normals, face_normals(vertices, faces)[:, None])
+    is_flipped = np.asarray(given.all(axis=1) & (heights < 0).all(axis=1))
     normals[is_flipped] *= -1.0
     is_back = given & (heights < 0) & ~is_flipped[:, None]
     if (is_back | ~given).any():
@@ -83,8 +84,8 @@ def crease_normals(vertices: Floats, faces: Faces, crease: float) -> Floats:
     sides = np.roll(corners, -1, axis=1) - corners
     normals = unit_vectors(np.cross(sides[:, 0], -sides[:, 2]))
     sides = unit_vectors(sides)
-    cosine = -np.einsum("mcx,mcx->mc", sides, np.roll(sides, 1, axis=1))
-    weighted = (np.arccos(np.clip(cosine, -1.0, 1.0))[:, :, None] * normals[:, None, :]).reshape(-1, 3)
+    cosine = -fixed_order.dot(sides, np.roll(sides, 1, axis=1))
+    weighted = (fixed_order.arccos(np.clip(cosine, -1.0, 1.0))[:, :, None] * normals[:, None, :]).reshape(-1, 3)
 
     one, other = _smooth_links(faces, normals, crease)
     shape = (faces.size, faces.size)
@@ -108,7 +109,7 @@ def _smooth_links(faces: Faces, normals: Floats, crease: float) -> tuple[npt.NDA
         if len(same) == 0:
             break
         one, other = order[same], order[same + step]
-        smooth = np.einsum("nx,nx->n", normals[one // 3], normals[other // 3]) >= limit
+        smooth = fixed_order.dot(normals[one // 3], normals[other // 3]) >= limit
         one, other = one[smooth], other[smooth]
         flat = faces.reshape(-1)
         one_end, other_end = _next(one), _next(other)

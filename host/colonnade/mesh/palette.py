@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -202,7 +203,7 @@ def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
         ]
     line = (
         f"mesh {mesh.name}: {len(materials)} materials become {len(found)}, their colours off by"
-        f" {255 * (squares / len(index)) ** 0.5:.1f}/255 on average: frame.materials is {count}"
+        f" {255 * math.sqrt(squares / len(index)):.1f}/255 on average: frame.materials is {count}"
     )
     return replace(mesh, materials=tuple(found), face_materials=table[index]), line
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
 
@@ -89,8 +90,8 @@ def _turns(outlines: Floats) -> Floats:
     normal = normal / np.where(length > 0, length, 1.0)
     after = np.roll(outlines, -1, axis=1) - outlines
     before = np.roll(after, 1, axis=1)
-    across = np.einsum("psx,px->ps", np.cross(before, after), normal)
-    return np.asarray(np.arctan2(across, np.einsum("psx,psx->ps", before, after)), dtype=np.float64)
+    across = fixed_order.dot(np.cross(before, after), normal[:, None])
+    return fixed_order.arctan2(across, fixed_order.dot(before, after))
 
 
 def _fan_corners(outlines: Floats) -> tuple[Indices, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -181,7 +182,8 @@ def _obstacle(flat: Floats, ear: tuple[int, int, int], remains: npt.NDArray[np.b
     so that it remains for long.
     """
     a, b, c = flat[list(ear)]
-    if _area(a, b, c) <= _STRAIGHT * float(np.linalg.norm(b - a) * np.linalg.norm(c - b)):
+    sides = np.array([b - a, c - b])
+    if _area(a, b, c) <= _STRAIGHT * np.sqrt(fixed_order.dot(sides, sides)).prod():
         return _NOT_CONVEX
     depth = _area(c, a, flat)
     inside = (depth >= 0) & (_area(a, b, flat) >= 0) & (_area(b, c, flat) >= 0) & remains

@@ -7,10 +7,13 @@ the same when a library changes, as tests and benchmarks compare exact counters.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
+
+from colonnade.common import fixed_order
 
 Geometry = tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]
 
@@ -22,8 +25,8 @@ def sphere(size: int = 4) -> Geometry:
         size: Up to 10, the subdivision level, f = 2^size. Above 10, the number of triangles, rounded to a
             near 20·f².
     """
-    frequency = 2**size if size <= 10 else max(1, round((size / 20) ** 0.5))
-    golden = (1 + 5**0.5) / 2
+    frequency = 2**size if size <= 10 else max(1, round(math.sqrt(size / 20)))
+    golden = (1 + math.sqrt(5)) / 2
     corners = np.array(
         [
             [-1, golden, 0], [1, golden, 0], [-1, -golden, 0], [1, -golden, 0],
@@ -69,8 +72,8 @@ def torus(size: int = 48) -> Geometry:
     u = 2 * np.pi * np.arange(size) / size
     v = 2 * np.pi * np.arange(across) / across
     u, v = (angle.reshape(-1) for angle in np.meshgrid(u, v, indexing="ij"))
-    radius = 0.7 + 0.3 * np.cos(v)
-    vertices = np.stack([radius * np.cos(u), 0.3 * np.sin(v), radius * np.sin(u)], axis=1)
+    radius = 0.7 + 0.3 * fixed_order.cos(v)
+    vertices = np.stack([radius * fixed_order.cos(u), 0.3 * fixed_order.sin(v), radius * fixed_order.sin(u)], axis=1)
     i, j = (index.reshape(-1) for index in np.meshgrid(np.arange(size), np.arange(across), indexing="ij"))
     a, b = i * across + j, i * across + (j + 1) % across
     c, d = (i + 1) % size * across + (j + 1) % across, (i + 1) % size * across + j
@@ -90,7 +93,8 @@ def cone(size: int = 64) -> Geometry:
 def _turned(profile: list[tuple[float, float]], size: int) -> Geometry:
     """A surface of revolution about y from two rings (radius, height), the lower first, closed by fans."""
     angle = 2 * np.pi * np.arange(size) / size
-    rings = [np.stack([r * np.cos(angle), np.full(size, h), r * np.sin(angle)], axis=1) for r, h in profile]
+    cos, sin = fixed_order.cos(angle), fixed_order.sin(angle)
+    rings = [np.stack([r * cos, np.full(size, h), r * sin], axis=1) for r, h in profile]
     centres = np.array([[0.0, h, 0.0] for _, h in profile])
     low = np.arange(size)
     low_next, high, high_next = np.roll(low, -1), low + size, np.roll(low, -1) + size

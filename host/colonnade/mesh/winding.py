@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh.topology import Faces, edge_keys
 
@@ -112,7 +113,7 @@ def _volumes(vertices: Floats, faces: Faces, is_reversed: npt.NDArray[np.bool_],
     size = np.maximum(np.bincount(part, minlength=parts), 1)
     centre = np.stack([np.bincount(part, corners[:, 0, axis], parts) / size for axis in range(3)], axis=1)
     corners -= centre[part][:, None, :]
-    volume = np.einsum("mx,mx->m", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    volume = fixed_order.dot(corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
     return np.bincount(part, np.where(is_reversed, -volume, volume), parts).astype(np.float64)
 
 
@@ -141,11 +142,6 @@ def _winding_number(point: Floats, corners: Floats) -> int:
     """How often a closed surface, triangles float64 [m, 3, 3], goes around a point, without its sign."""
     a, b, c = np.moveaxis(corners - point, 1, 0)
     la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-    triple = np.einsum("mx,mx->m", a, np.cross(b, c))
-    rest = (
-        la * lb * lc
-        + np.einsum("mx,mx->m", a, b) * lc
-        + np.einsum("mx,mx->m", b, c) * la
-        + np.einsum("mx,mx->m", c, a) * lb
-    )
-    return abs(round(float(np.arctan2(triple, rest).sum() / (2 * np.pi))))
+    triple = fixed_order.dot(a, np.cross(b, c))
+    rest = la * lb * lc + fixed_order.dot(a, b) * lc + fixed_order.dot(b, c) * la + fixed_order.dot(c, a) * lb
+    return abs(round(float(fixed_order.arctan2(triple, rest).sum() / (2 * np.pi))))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
@@ -84,7 +85,10 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
             [mesh.faces + first for mesh, first in zip(meshes, first_vertices[:-1], strict=True)]
         ).astype(np.int32),
         corner_normals=np.concatenate(
-            [mesh.corner_normals @ pose.rotation.T for mesh, pose in zip(meshes, poses, strict=True)]
+            [
+                fixed_order.product(mesh.corner_normals, pose.rotation.T)
+                for mesh, pose in zip(meshes, poses, strict=True)
+            ]
         ),
         materials=tuple(materials),
         face_materials=np.concatenate(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
@@ -36,15 +36,15 @@ class Pose:
 
     def to_world(self, points: Floats) -> Floats:
         """Transform points [..., 3] from mesh space to world space."""
-        return np.asarray(points @ self.rotation.T * self.scale + self.translate, dtype=np.float64)
+        return np.asarray(fixed_order.product(points, self.rotation.T) * self.scale + self.translate, dtype=np.float64)
 
     def to_mesh(self, point: Floats) -> Floats:
         """Transform points [..., 3] from world space to mesh space."""
-        return np.asarray((point - self.translate) / self.scale @ self.rotation, dtype=np.float64)
+        return np.asarray(fixed_order.product((point - self.translate) / self.scale, self.rotation), dtype=np.float64)
 
     def from_view(self, camera_to_world: Floats) -> Floats:
         """Transform from a camera's view space to mesh space, float64 [3, 4]."""
-        linear = self.rotation.T @ camera_to_world[:, :3] / self.scale
+        linear = fixed_order.product(self.rotation.T, camera_to_world[:, :3]) / self.scale
         return np.column_stack([linear, self.to_mesh(camera_to_world[:, 3])])
 
 
@@ -64,11 +64,9 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
             raise UserError("motion.stand_at is for an object that stands in a room: give motion.translate")
         start, scale = scene.transform.translate, scene.transform.scale
         moved = start if motion.translate is None else interpolate(start, motion.translate, progress)
-        turned = (
-            rotation_about((0.0, 1.0, 0.0) if environment is not None else scene.camera.up, motion.turn * progress)
-            @ rotation
-        )
-        return Pose(turned, scale, np.array(moved) + scale * (rotation - turned) @ extent.centre)
+        axis = (0.0, 1.0, 0.0) if environment is not None else scene.camera.up
+        turned = fixed_order.product(rotation_about(axis, motion.turn * progress), rotation)
+        return Pose(turned, scale, np.array(moved) + fixed_order.product(scale * (rotation - turned), extent.centre))
     if motion.translate is not None:
         raise UserError("motion.translate is for an object that does not stand in a room: give motion.stand_at")
     assert placement.stand_at is not None
@@ -111,15 +109,17 @@ def chosen(
 
 def footprint_of(placement: Placement, rotation: Floats, extent: Extent) -> Footprint:
     """The upright cylinder around a standing mesh, whatever its turn."""
-    outline = (extent.outline - extent.centre) @ rotation.T * (placement.size / extent.edge)
-    return Footprint(float(np.hypot(outline[:, 0], outline[:, 2]).max()), float(np.ptp(outline[:, 1])))
+    outline = fixed_order.product(extent.outline - extent.centre, rotation.T) * (placement.size / extent.edge)
+    across = outline[:, [0, 2]]
+    radius = float(np.sqrt(fixed_order.dot(across, across)).max())
+    return Footprint(radius, float(np.ptp(outline[:, 1])))
 
 
 def standing_pose(placement: Placement, rotation: Floats, extent: Extent, point: Floats, turn: float = 0.0) -> Pose:
     """The pose of a mesh that stands on a point, turned by more degrees about the vertical."""
-    turned = rotation_matrix(Transform(rotate=(0.0, placement.turn + turn, 0.0))) @ rotation
-    outline = extent.outline @ turned.T
-    foot = extent.centre @ turned.T
+    turned = fixed_order.product(rotation_matrix(Transform(rotate=(0.0, placement.turn + turn, 0.0))), rotation)
+    outline = fixed_order.product(extent.outline, turned.T)
+    foot = fixed_order.product(turned, extent.centre)
     foot[1] = outline[:, 1].min()
     scale = placement.size / extent.edge
     return Pose(turned, scale, point - foot * scale)
@@ -135,16 +135,16 @@ def _placement(scene: Scene, environment: Environment | None) -> Placement | Non
 def rotation_about(axis: Vector, degrees: float) -> Floats:
     """Rotation about an axis through the origin by Rodrigues' formula, float64 [3, 3] for column vectors."""
     x, y, z = unit_vectors(np.array(axis))
-    angle, cross_product = math.radians(degrees), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(
-        np.eye(3) + math.sin(angle) * cross_product + (1 - math.cos(angle)) * cross_product @ cross_product
-    )
+    angle, cross_product = np.radians(degrees), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    twice = fixed_order.product(cross_product, cross_product)
+    return np.asarray(np.eye(3) + fixed_order.sin(angle) * cross_product + (1 - fixed_order.cos(angle)) * twice)
 
 
 def rotation_matrix(transform: Transform) -> Floats:
     """Rotation about x, then y, then z: float64 [3, 3] for column vectors."""
-    x, y, z = np.radians(transform.rotate)
-    about_x = [[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]]
-    about_y = [[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]]
-    about_z = [[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]]
-    return np.asarray(np.array(about_z) @ np.array(about_y) @ np.array(about_x), dtype=np.float64)
+    angles = np.radians(transform.rotate)
+    (cx, cy, cz), (sx, sy, sz) = fixed_order.cos(angles), fixed_order.sin(angles)
+    about_x = np.array([[1.0, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1.0, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1.0]])
+    return np.asarray(fixed_order.product(fixed_order.product(about_z, about_y), about_x), dtype=np.float64)

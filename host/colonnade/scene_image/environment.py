@@ -45,7 +45,7 @@ def tiles_beyond_heap(image: SceneImage) -> dict[str, int]:
         descriptors, heap = words.get(f"{name}.descriptors"), words.get(f"{name}.heap")
         if descriptors is None or heap is None:
             continue
-        low = descriptors[:, :2].astype(np.int64) @ np.array([1, 256])
+        low = descriptors[:, 0].astype(np.int64) | descriptors[:, 1].astype(np.int64) << 8
         lengths = np.zeros(8, dtype=np.int64)
         lengths[: len(modes)] = [mode.words for mode in modes]
         length, pointer = lengths[low & 7], (low >> 3) & ((1 << POINTER_BITS) - 1)

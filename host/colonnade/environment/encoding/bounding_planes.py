@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.plane_fit import refit_planes, sample_pixels
 from colonnade.environment.encoding.planes import PlaneProjection, pack_planes, unpack_planes
@@ -62,11 +63,11 @@ def choose_bounding_planes(
         owner = np.where(on_plane, 0, 1).astype(np.intp)
         plane = refit_planes(samples, np.stack([planes[k], wall]), owner)[0]
         q = projection.dual_vectors(plane[np.newaxis])[0]
-        beyond = (points @ q - 1.0) / np.linalg.norm(q) > _TOLERANCE
+        beyond = (fixed_order.product(points, q) - 1.0) / np.sqrt(fixed_order.dot(q, q)) > _TOLERANCE
         if beyond.mean() > _MAX_BEYOND:
             continue
         directions = projection.normals(np.stack([*chosen[1:], plane]))
-        if (directions[:-1] @ directions[-1] > _SAME_DIRECTION).any():
+        if (fixed_order.product(directions[:-1], directions[-1]) > _SAME_DIRECTION).any():
             continue
         chosen.append(plane)
         colours.append(albedo[on_plane].mean(axis=0))
@@ -77,7 +78,8 @@ def _inliers(
     errors: NDArray[np.float32], normals: NDArray[np.float64], directions: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Whether each sample is near each plane and has its normal: bool [samples, planes]."""
-    inliers: NDArray[np.bool_] = (errors < _INLIER_DISTANCE) & (normals @ directions.T > _SAME_DIRECTION)
+    is_parallel = fixed_order.product(normals, directions.T) > _SAME_DIRECTION
+    inliers: NDArray[np.bool_] = (errors < _INLIER_DISTANCE) & is_parallel
     return inliers
 
 

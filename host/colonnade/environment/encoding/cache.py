@@ -47,7 +47,9 @@ def _key(environment: Environment, layout: AttributeLayout) -> str:
 def encoder_sources() -> bytes:
     """Digest of the encoders' source files."""
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
+    here = Path(__file__).parent
+    common = [here.parents[1] / "common" / name for name in ("fixed_order.py", "srgb.py")]
+    for file in [*sorted(here.glob("*.py")), *common]:
         digest.update(file.read_bytes())
     return digest.digest()
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.tiles import inside_mask, split_tiles, sum_cells
 
@@ -91,7 +92,7 @@ class TilePixels:
         sums = self.cells(cells)
         centred = (entries - self.means[which][:, np.newaxis]).astype(np.float32)
         lengths = (centred * centred).sum(axis=2)
-        costs: NDArray[np.float32] = sums.sums[which] @ (centred.transpose(0, 2, 1) * np.float32(-2))
+        costs: NDArray[np.float32] = fixed_order.product(sums.sums[which], centred.transpose(0, 2, 1) * np.float32(-2))
         costs += sums.weights[which][..., np.newaxis] * lengths[:, np.newaxis, :]
         costs += sums.squares[which][..., np.newaxis]
         return costs

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
+
 #: Points per batch of distance computations.
 _POINTS = 8192
 
@@ -21,7 +23,7 @@ def nearest(points: NDArray[np.float64], entries: NDArray[np.float64]) -> tuple[
     squares = (p * p).sum(axis=1)
     for first in range(0, len(points), _POINTS):
         x = points[first : first + _POINTS].astype(np.float32)
-        costs = squares - 2.0 * (x @ p.T)
+        costs = squares - 2.0 * fixed_order.product(x, p.T)
         index[first : first + _POINTS] = costs.argmin(axis=1)
     difference = points - entries[index]
     distance[:] = (difference * difference).sum(axis=1)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.environment.encoding.planes import PlaneProjection
 from colonnade.environment.model import Environment
 
@@ -42,7 +43,7 @@ class Samples:
         basis: float64 [n, 3], factors of A, B and C.
         w: float64 [n], depth_unit / z.
         metres: float64 [n], error along the view ray per unit of w, first order.
-        scaled: float32 [n, 4]: ``scaled @ (A, B, C, -1)`` is the signed error in metres.
+        scaled: float32 [n, 4]: its product with (A, B, C, -1) is the signed error in metres.
     """
 
     basis: NDArray[np.float64]
@@ -59,7 +60,7 @@ class Samples:
     def errors(self, planes: NDArray[np.float64]) -> NDArray[np.float32]:
         """Unsaturated errors of the pixels on planes [k, 3], metres along the view ray: float32 [n, k]."""
         factors = np.concatenate([planes, np.full((len(planes), 1), -1.0)], axis=1).astype(np.float32)
-        difference: NDArray[np.float32] = self.scaled @ factors.T
+        difference = fixed_order.product(self.scaled, factors.T)
         return np.abs(difference, out=difference)
 
     def part(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Samples:
@@ -109,10 +110,10 @@ def refit_planes(samples: Samples, planes: NDArray[np.float64], owner: NDArray[n
                 break
             root = own.metres[near] / np.sqrt(np.maximum(error[near], FINE))
             equations = own.basis[near] * root[:, np.newaxis]
-            normal = equations.T @ equations
-            normal += 1e-9 * np.trace(normal) * np.eye(3)
-            change = own.w[near] - own.basis[near] @ result[k]
-            result[k] = result[k] + np.linalg.solve(normal, equations.T @ (root * change))
+            normal = fixed_order.product(equations.T, equations)
+            normal = normal + 1e-9 * np.trace(normal) * np.eye(3)
+            change = own.w[near] - fixed_order.product(own.basis[near], result[k])
+            result[k] = result[k] + fixed_order.solve(normal, fixed_order.product(equations.T, root * change))
     return result
 
 
@@ -128,7 +129,7 @@ def _candidates(environment: Environment, projection: PlaneProjection) -> NDArra
     normals = environment.normals[rows, columns]
     distance = np.linalg.norm(points, axis=1)
     # Tilt surfaces seen edge-on towards the camera: their planes would pass through it
-    facing = np.einsum("nc,nc->n", normals, points) / distance
+    facing = fixed_order.dot(normals, points) / distance
     tilt = np.maximum(facing + 0.05, 0.0)
     normals = normals - tilt[:, np.newaxis] * points / distance[:, np.newaxis]
     planes = projection.planes(normals, points)
@@ -139,12 +140,11 @@ def _candidates(environment: Environment, projection: PlaneProjection) -> NDArra
     near_columns = np.clip(columns[:, np.newaxis] + right, 0, environment.width - 1)
     basis = projection.basis()[near_rows, near_columns]
     w = projection.depth_unit / environment.depth[near_rows, near_columns]
-    change = w - np.einsum("nkc,nc->nk", basis, planes)
+    change = w - fixed_order.dot(basis, planes[:, np.newaxis])
     weight = (np.abs(change) < _NEAR * w).astype(np.float64)
-    matrix = np.einsum("nk,nkc,nkd->ncd", weight, basis, basis)
-    matrix += 1e-9 * np.eye(3)
-    right_side = np.einsum("nk,nkc,nk->nc", weight, basis, change)
-    step = np.linalg.solve(matrix, right_side[..., np.newaxis])[..., 0]
+    weighted = (weight[..., np.newaxis] * basis).transpose(0, 2, 1)
+    matrix = fixed_order.product(weighted, basis) + 1e-9 * np.eye(3)
+    step = fixed_order.solve(matrix, fixed_order.product(weighted, change[..., np.newaxis])[..., 0])
     enough = (weight.sum(axis=1) > 30)[:, np.newaxis]
     local: NDArray[np.float64] = planes + np.where(enough, step, 0.0)
     return local

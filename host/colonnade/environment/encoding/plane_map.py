@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.environment.encoding.layout import POINTER_BITS, AttributeLayout
 from colonnade.environment.encoding.planes import PlaneProjection, unpack_planes
 
@@ -118,7 +119,7 @@ class PlaneMap:
     def inverse_depth(self, layout: AttributeLayout, projection: PlaneProjection) -> NDArray[np.float64]:
         """w of each pixel's centre on its plane, float64 [height, width]."""
         planes = unpack_planes(self.planes)[self.ids(layout)]
-        w: NDArray[np.float64] = np.einsum("yxc,yxc->yx", planes, projection.basis())
+        w: NDArray[np.float64] = fixed_order.dot(planes, projection.basis())
         return w
 
     def depth(self, layout: AttributeLayout, projection: PlaneProjection) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.environment.model import Environment
 
 FIELD_BITS = 20
@@ -91,7 +92,7 @@ class PlaneProjection:
 
     def planes(self, normals: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Planes A, B, C, float64 [n, 3], through view-space points with these normals, float64 [n, 3] each."""
-        offset = np.einsum("nc,nc->n", normals, points)
+        offset = fixed_order.dot(normals, points)
         a, b, c = (normals * (self.depth_unit / offset)[:, np.newaxis]).T
         a, b = a / self.fx, b / self.fy
         c = c + a * (self.width / 2 - self.cx) + b * (self.height / 2 - self.cy)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.environment.encoding.layout import BLOCKS_PER_TILE_EDGE, LABEL_BITS, AttributeLayout
 from colonnade.environment.encoding.tiles import inside_mask, split_tiles, sum_cells
 from colonnade.environment.encoding.vectors import VectorSpace
@@ -82,7 +83,8 @@ def encode_slic(vectors: NDArray[np.float64], space: VectorSpace, layout: Attrib
         seeds = space.to_points(space.vectors(space.words(space.from_points(seeds))))
         # Costs [tiles, blocks, 9] without the term that is equal for all seeds
         near = seeds[neighbours]
-        costs = weights[..., np.newaxis] * (near**2).sum(axis=2)[:, np.newaxis] - 2.0 * sums @ near.transpose(0, 2, 1)
+        costs = weights[..., np.newaxis] * (near**2).sum(axis=2)[:, np.newaxis]
+        costs -= 2.0 * fixed_order.product(sums, near.transpose(0, 2, 1))
         distance = ((positions[:, :, np.newaxis] - centres[neighbours][:, np.newaxis]) ** 2).sum(axis=3)
         costs += compactness * weights[..., np.newaxis] * distance
         costs = np.where(allowed[:, np.newaxis], costs, np.inf)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,6 @@ def sum_cells(tiles: NDArray[Any], cells: int) -> NDArray[Any]:
 
 def expand_cells(cells: NDArray[Any], size: int) -> NDArray[Any]:
     """Copy each cell's value to its pixels: [tiles, cells * cells, ...] to [tiles, size, size, ...]."""
-    edge_cells = round(cells.shape[1] ** 0.5)
+    edge_cells = math.isqrt(cells.shape[1])
     grid = cells.reshape(cells.shape[0], edge_cells, edge_cells, *cells.shape[2:])
     return grid.repeat(size // edge_cells, axis=1).repeat(size // edge_cells, axis=2)

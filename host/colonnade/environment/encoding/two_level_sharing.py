@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.environment.encoding.cell_errors import TilePixels
 from colonnade.environment.encoding.sharing import Users
 from colonnade.environment.encoding.subdivision import Subdivided
@@ -36,12 +37,14 @@ def errors_with(
     for first in range(0, tiles, _TILES):
         part = slice(first, min(first + _TILES, tiles))
         costs = pixels.cell_costs(cells, palette[candidates[part]], part)
-        totals = own @ costs.transpose(1, 0, 2).reshape(cells * cells, -1)
+        totals = fixed_order.product(own, costs.transpose(1, 0, 2).reshape(cells * cells, -1))
         errors[:, part] = totals.reshape(2, count, *costs.shape[::2]).min(axis=3).sum(axis=0)
     sums = pixels.cells(cells)
     moments = np.concatenate([sums.squares[..., np.newaxis], sums.sums, sums.weights[..., np.newaxis]], axis=2)
+    by_cell = moments.transpose(1, 0, 2).reshape(cells * cells, -1)
     for entries, inside in zip(words.members.T[2:], regions[2:], strict=True):
-        square, first_moment, weight = np.split(np.tensordot(inside, moments, axes=(1, 1)), [1, 4], axis=2)
+        inner = fixed_order.product(inside, by_cell).reshape(count, tiles, -1)
+        square, first_moment, weight = np.split(inner, [1, 4], axis=2)
         entry = (palette[entries, np.newaxis] - pixels.means).astype(np.float32)
         errors += square[..., 0] + (entry * (entry * weight - 2 * first_moment)).sum(axis=2)
     return errors
@@ -64,6 +67,6 @@ def _with_entries(
     members, taken = words.members[users.rows].copy(), words.taken[users.rows]
     costs = pixels.cell_costs(words.mode.cells, palette[candidates[users.tiles]], users.tiles)
     for entry in range(2):
-        best = np.einsum("tcn,tc->tn", costs, (taken == entry).astype(np.float32)).argmin(axis=1)
+        best = (costs * (taken == entry)[..., np.newaxis]).sum(axis=1).argmin(axis=1)
         members[:, entry] = candidates[users.tiles, best]
     return Subdivided(words.number, words.mode, users.tiles, members, taken)

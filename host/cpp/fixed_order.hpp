@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Arithmetic with equal bits on every processor: IEEE additions, multiplications, divisions and square roots alone, in
+/// a fixed order, never contracted into fused operations (CMakeLists.txt). Libraries of linear algebra and of
+/// elementary functions choose their order, and so their rounding, by the processor.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+
+namespace colonnade::fixed_order {
+
+/// Product of matrices: out [rows, columns] = a [rows, inner] · b [inner, columns], all row-major. Each element is summed
+/// by ascending inner index. Elements of a block are summed side by side, which does not change any sum.
+template <class T>
+inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows, std::size_t inner, std::size_t columns) {
+    constexpr std::size_t lanes = 32 / sizeof(T), down = 4, across = 2 * lanes;
+    typedef T Lanes __attribute__((vector_size(32)));
+    const auto load = [](const T* from) __attribute__((always_inline)) {
+        Lanes values;
+        std::memcpy(&values, from, sizeof values);
+        return values;
+    };
+    const std::size_t wholeRows = rows - rows % down, wholeColumns = columns - columns % across;
+    for (std::size_t column = 0; column < wholeColumns; column += across)
+        for (std::size_t row = 0; row < wholeRows; row += down) {
+            Lanes sums[down][2] = {};
+            for (std::size_t k = 0; k < inner; ++k) {
+                const Lanes left = load(b + k * columns + column), right = load(b + k * columns + column + lanes);
+                for (std::size_t i = 0; i < down; ++i) {
+                    const T factor = a[(row + i) * inner + k];
+                    sums[i][0] += factor * left;
+                    sums[i][1] += factor * right;
+                }
+            }
+            for (std::size_t i = 0; i < down; ++i) std::memcpy(out + (row + i) * columns + column, sums[i], sizeof sums[i]);
+        }
+    for (std::size_t row = 0; row < rows; ++row)
+        for (std::size_t column = row < wholeRows ? wholeColumns : 0; column < columns; ++column) {
+            T sum = 0;
+            for (std::size_t k = 0; k < inner; ++k) sum += a[row * inner + k] * b[k * columns + column];
+            out[row * columns + column] = sum;
+        }
+}
+
+/// Natural logarithm of a positive number; relative error below 2^-50.
+inline double log(double x) {
+    int exponent;
+    double mantissa = std::frexp(x, &exponent);
+    if (mantissa < 0.70710678118654752) {
+        mantissa *= 2;
+        exponent -= 1;
+    }
+    // log m = 2 artanh s
+    const double s = (mantissa - 1) / (mantissa + 1), square = s * s;
+    double series = 0;
+    for (int power = 23; power >= 1; power -= 2) series = series * square + 1.0 / power;
+    return exponent * 0.69314718055994531 + 2 * s * series;
+}
+
+/// Exponential; relative error below 2^-48 for |x| < 64.
+inline double exp(double x) {
+    if (!(x > -745)) return 0;
+    if (x > 709) return HUGE_VAL;
+    const double whole = std::floor(x * 1.4426950408889634 + 0.5);
+    // ln 2 in two parts, so that the product with a small integer is exact
+    const double rest = (x - whole * 0.693147180369123816490) - whole * 1.90821492927058770002e-10;
+    double series = 1;
+    for (int term = 15; term >= 1; --term) series = series * rest / term + 1;
+    return std::ldexp(series, static_cast<int>(whole));
+}
+
+/// x to the power y for x >= 0; relative error below 2^-45 for results from 2^-64 to 2^64.
+inline double power(double x, double y) { return x > 0 ? exp(y * log(x)) : (y == 0 ? 1 : 0); }
+
+/// Angle of the vector (x, y), -pi to pi; error below 2^-50.
+inline double arctan2(double y, double x) {
+    const double pi = 3.14159265358979324, acrossX = std::fabs(x), acrossY = std::fabs(y), longer = std::max(acrossX, acrossY);
+    if (!(longer > 0)) return 0;
+    double tangent = std::min(acrossX, acrossY) / longer;
+    // Halve the angle twice: tan(a/2) = t / (1 + sqrt(1 + t²))
+    for (int halving = 0; halving < 2; ++halving) tangent /= 1 + std::sqrt(1 + tangent * tangent);
+    const double square = tangent * tangent;
+    double series = 0;
+    for (int term = 25; term >= 1; term -= 2) series = 1.0 / term - square * series;
+    double angle = 4 * tangent * series;
+    if (acrossY > acrossX) angle = pi / 2 - angle;
+    if (x < 0) angle = pi - angle;
+    return y < 0 ? -angle : angle;
+}
+
+/// Arc cosine of -1 to 1.
+inline double arccos(double x) { return 2 * arctan2(std::sqrt(1 - x), std::sqrt(1 + x)); }
+
+/// Cosine of the angle x - quarters · pi/2; error below 2^-50 for |x| < 2^20.
+inline double cosine(double x, int quarters) {
+    const double turns = std::floor(x * 0.63661977236758134 + 0.5);
+    const double rest = (x - turns * 1.57079632673412561417) - turns * 6.07710050650619224932e-11;
+    const int quarter = static_cast<int>(static_cast<long long>(turns) - quarters) & 3;
+    const double square = rest * rest;
+    double even = 0, odd = 0;
+    for (int term = 18; term >= 2; term -= 2) {
+        even = (1 - even) * square / (term * (term - 1));
+        odd = (1 - odd) * square / (term * (term + 1));
+    }
+    const double cosRest = 1 - even, sinRest = rest * (1 - odd);
+    const double values[4] = {cosRest, -sinRest, -cosRest, sinRest};
+    return values[quarter];
+}
+
+} // namespace colonnade::fixed_order
