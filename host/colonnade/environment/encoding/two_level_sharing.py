@@ -43,7 +43,7 @@ def errors_with(
     moments = np.concatenate([sums.squares[..., np.newaxis], sums.sums, sums.weights[..., np.newaxis]], axis=2)
     by_cell = moments.transpose(1, 0, 2).reshape(cells * cells, -1)
     for entries, inside in zip(words.members.T[2:], regions[2:], strict=True):
-        inner = fixed_order.product(inside, by_cell).reshape(count, tiles, -1)
+        inner = fixed_order.product(inside, by_cell).reshape(count, tiles, moments.shape[2])
         square, first_moment, weight = np.split(inner, [1, 4], axis=2)
         entry = (palette[entries, np.newaxis] - pixels.means).astype(np.float32)
         errors += square[..., 0] + (entry * (entry * weight - 2 * first_moment)).sum(axis=2)
