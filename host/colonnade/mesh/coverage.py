@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
@@ -57,7 +58,7 @@ class _Pieces:
     def positions(self, surface: RawSurface) -> Floats:
         """Positions in their textures, float64 [k, 3, 2]."""
         assert surface.positions is not None
-        found: Floats = self.weights @ surface.positions[self.owners]
+        found: Floats = fixed_order.product(self.weights, surface.positions[self.owners])
         return found
 
 
@@ -121,7 +122,7 @@ def _panes(
     """Of faces that are not opaque, those that can be seen, their alpha and the colour of their texture."""
     if texture is None or surface.positions is None or not len(faces):
         return faces, np.full(len(faces), factor), np.ones((len(faces), 3))
-    at = (_weights(4) @ surface.positions[faces]).reshape(-1, 2)
+    at = fixed_order.product(_weights(4), surface.positions[faces]).reshape(-1, 2)
     alpha = texture.alphas(at).reshape(len(faces), -1) * factor
     colours = (texture.colours(at).reshape(len(faces), -1, 3) * alpha[..., None]).sum(axis=1)
     mean = alpha.mean(axis=1)
@@ -174,7 +175,7 @@ class _Cut:
         smallest = float(np.ptp(surface.vertices, axis=0).max()) * _SMALLEST
         mixed, shown = _Pieces(faces, np.repeat(np.eye(3)[None], len(faces), axis=0)), []
         while True:
-            own = mixed.weights @ corners[mixed.owners]
+            own = fixed_order.product(mixed.weights, corners[mixed.owners])
             edges = np.linalg.norm(own - np.roll(own, -1, axis=1), axis=2).max(axis=1)
             texels = np.ptp(mixed.positions(surface) * self._texture.size, axis=1).max(axis=1)
             can_split = (edges > smallest) & (texels > 1.0)
@@ -220,12 +221,13 @@ class _Cut:
         kinds = np.where(hides & shows, 0, np.where(shows, 1, -1)).astype(np.int8)
         # The box of a face is larger than the face: look at its own texels
         extent = np.ptp(positions * self._texture.size, axis=1).max(axis=1)
-        steps = np.clip(2 ** np.ceil(np.log2(np.maximum(extent, 1.0))), 2, _STEPS).astype(np.int64)
+        fraction, exponent = np.frexp(np.maximum(extent, 1.0))
+        steps = np.clip(2 ** (exponent - (fraction == 0.5)).astype(np.int64), 2, _STEPS)  # the next power of two
         for count in np.unique(steps[kinds == 0]):
             weights = _weights(int(count))
             asked = np.flatnonzero((kinds == 0) & (steps == count))
             for chunk in np.array_split(asked, -(-len(asked) * len(weights) // _SAMPLES) or 1):
-                at = weights @ positions[chunk]
+                at = fixed_order.product(weights, positions[chunk])
                 alpha = self._texture.alphas(at.reshape(-1, 2)).reshape(len(chunk), -1)
                 shown = (alpha >= self._least).mean(axis=1)
                 is_sure = extent[chunk] <= 2 * count
@@ -270,12 +272,12 @@ def _split(surface: RawSurface, pieces: _Pieces) -> RawSurface:
     owners, weights = pieces.owners, pieces.weights
 
     def interpolated(values: Floats | None) -> Floats | None:
-        return None if values is None else weights @ values[owners]
+        return None if values is None else fixed_order.product(weights, values[owners])
 
     # Corners that are kept keep their vertex
     kept = weights.max(axis=2) == 1.0
     corner = np.take_along_axis(surface.faces[owners], weights.argmax(axis=2), axis=1)
-    own = weights @ surface.vertices[surface.faces[owners]]
+    own = fixed_order.product(weights, surface.vertices[surface.faces[owners]])
     faces = np.where(kept, corner, 0)
     faces[~kept] = len(surface.vertices) + np.arange(int((~kept).sum()))
     return replace(
