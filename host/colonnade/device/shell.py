@@ -138,7 +138,14 @@ def render_shell(
             lines += _frame(shell, design, {**values, **scene}, code, place)
             lines.append(f"dump frame{index} {place[0]} {place[1] * place[2]}")
         (folder / "job").write_text("\n".join(lines) + "\n")
-        options = {"bus": shell.bus_bytes, "memory": end, "latency": bus.latency, "stall": bus.stall, "order": bus.order, "seed": bus.seed}
+        options = {
+            "bus": shell.bus_bytes,
+            "memory": end,
+            "latency": bus.latency,
+            "stall": bus.stall,
+            "order": bus.order,
+            "seed": bus.seed,
+        }
         arguments = [text for name, value in options.items() for text in (f"--{name}", str(value))]
         with progress.step("rendering through the bus") as report:
             output = run_program([str(program), *arguments, "job"], folder, report)

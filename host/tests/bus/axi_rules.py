@@ -86,7 +86,9 @@ async def watch_master(dut: Any, port: str, channels: str, windows: list[range])
                 continue
             address, size, count = (int(taken[field], 2) for field in ("addr", "size", "len"))
             end = address + (count + 1 << size)
-            assert taken["burst"] == "01" and taken["prot"] == "010" and address // 4096 == (end - 1) // 4096, f"an illegal burst: {taken}"
+            assert taken["burst"] == "01" and taken["prot"] == "010" and address // 4096 == (end - 1) // 4096, (
+                f"an illegal burst: {taken}"
+            )
             assert any(window.start <= address and end <= window.stop for window in windows), f"outside: {taken}"
 
 
