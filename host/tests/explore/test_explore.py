@@ -73,7 +73,9 @@ def forget(exploration: Exploration) -> None:
 
 
 def command(study: Path, *more: str) -> list[str]:
-    return [sys.executable, "-m", "colonnade", "explore", str(study), "--output", str(study.parent / "out"), *more]
+    # Not `python -m colonnade`: it would import the sources of the current folder, which lack the compiled extension.
+    program = str(Path(sys.executable).with_name("colonnade"))
+    return [program, "explore", str(study), "--output", str(study.parent / "out"), *more]
 
 
 def explored(study: Path, *more: str) -> tuple[dict[str, Any], str]:

@@ -94,7 +94,12 @@ def gltf(folder: Path, colours: list[list[float]]) -> Path:
                 ]
             }
         ],
-        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1.0, 1.0], "roughnessFactor": 0}}],
+        "materials": [
+            {
+                "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1.0, 1.0], "roughnessFactor": 0},
+                "doubleSided": True,
+            }
+        ],
         "accessors": [{"bufferView": i, "componentType": 5126, "count": 3, "type": "VEC3"} for i in range(3)],
         "bufferViews": [{"buffer": 0, "byteOffset": 36 * i, "byteLength": 36} for i in range(3)],
         "buffers": [{"byteLength": 108, "uri": "data:;base64," + base64.b64encode(data).decode()}],
