@@ -19,6 +19,7 @@ from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
 from colonnade.mesh.gltf_document import GltfDocument
+from colonnade.mesh.gltf_draco import DRACO, DracoPrimitives, PrimitiveArrays
 from colonnade.mesh.gltf_textures import GltfTextures
 from colonnade.mesh.losses import Losses, extension_loss
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, gltf_losses, unused_extensions
@@ -28,6 +29,7 @@ from colonnade.mesh.texture import MAX_POSITION
 
 #: Required extensions that are read, or whose loss is reported.
 _KNOWN_EXTENSIONS = (
+    DRACO,
     "KHR_mesh_quantization",
     "KHR_materials_transmission",
     "KHR_materials_ior",
@@ -37,8 +39,8 @@ _KNOWN_EXTENSIONS = (
     "EXT_texture_webp",
     "EXT_texture_avif",
 )
-#: Extensions that compress the mesh.
-_COMPRESSION = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+#: Extensions that compress the mesh, and are not supported.
+_COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 #: Largest magnitude of a transform's element, in the scene.
 _MAX_TRANSFORM = 1e100
@@ -56,12 +58,13 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     _check_extensions(document)
     materials = (*(from_gltf(material) for material in document.json.get("materials", [])), PLAIN)
     textures = GltfTextures(document, references, losses)
+    compressed = DracoPrimitives(document)
     used: set[int] = set()
     parts = []
     for node, matrix in _nodes(document, losses):
         mesh = document.entry("meshes", node["mesh"])
         for primitive in mesh.get("primitives", []):
-            part = _primitive(document, primitive, matrix, len(materials) - 1, losses, textures)
+            part = _primitive(document, primitive, matrix, len(materials) - 1, losses, textures, compressed)
             if part is not None:
                 parts.append(part)
                 used.add(int(part[1]))
@@ -194,6 +197,7 @@ def _primitive(
     default: int,
     losses: Losses,
     textures: GltfTextures,
+    compressed: DracoPrimitives,
 ) -> tuple[RawSurface, int] | None:
     """The triangles of a primitive in the scene's space, and their material; None for points and lines."""
     mode, attributes = primitive.get("mode", _TRIANGLES), primitive.get("attributes", {})
@@ -205,29 +209,30 @@ def _primitive(
     for name in primitive.get("extensions", {}):
         if name in _COMPRESSION and "bufferView" not in document.entry("accessors", attributes.get("POSITION")):
             raise document.error(f"its meshes are compressed ({name}): export it without compression")
-        losses.add(extension_loss(name), name not in _COMPRESSION)
+        losses.add(extension_loss(name), name not in (DRACO, *_COMPRESSION))
     if "POSITION" not in attributes:
         raise document.error("a primitive has no positions")
     losses.add(lost.MORPHS, len(primitive.get("targets", [])))
-    positions = document.array(attributes["POSITION"]).astype(np.float64)
+    arrays = compressed.arrays(primitive)
+    positions = arrays.attribute("POSITION").astype(np.float64)
     count = len(positions)
 
     def attribute(name: str, width: int) -> Floats | None:
         if name not in attributes:
             return None
-        values = document.array(attributes[name])
+        values = arrays.attribute(name)
         if len(values) != count or values.shape[1] < width or positions.shape[1] != 3:
             raise document.error(f"a primitive has {len(values):,} of {name} for {count:,} positions")
         return np.asarray(values[:, :width], dtype=np.float64)
 
-    corners = _corners(document, primitive, count)
-    faces = _faces(corners, mode)
+    corners = _corners(document, arrays, count)
+    faces = _faces(corners, mode if arrays.mesh is None else _TRIANGLES)
     colours = attribute("COLOR_0", 3)
     if colours is not None:
         if not np.isfinite(colours).all():
             raise document.error("a primitive has a COLOR_0 that is not a finite number: export it again")
         losses.add(lost.CLIPPED_COLOURS, int(((colours < 0) | (colours > 1)).any(axis=1).sum()))
-    if "COLOR_0" in attributes and document.array(attributes["COLOR_0"]).shape[1] == 4:
+    if "COLOR_0" in attributes and arrays.attribute("COLOR_0").shape[1] == 4:
         alpha = attribute("COLOR_0", 4)
         losses.add(lost.ALPHA, 0 if alpha is None else int((alpha[:, 3] < 1.0).sum()))
     normals = attribute("NORMAL", 3)
@@ -267,11 +272,11 @@ def _primitive(
     )
 
 
-def _corners(document: GltfDocument, primitive: Mapping[str, Any], count: int) -> Indices:
+def _corners(document: GltfDocument, arrays: PrimitiveArrays, count: int) -> Indices:
     """The vertices of a primitive in order, int64 [k]."""
-    if "indices" not in primitive:
+    values = arrays.indices()
+    if values is None:
         return np.arange(count, dtype=np.int64)
-    values = document.array(primitive["indices"])
     if values.shape[1] != 1 or values.dtype.kind not in "iu":
         raise document.error("the indices of a primitive are not whole numbers")
     corners = values[:, 0].astype(np.int64)

@@ -76,10 +76,7 @@ class GltfDocument:
 
     def array(self, index: Any) -> npt.NDArray[Any]:
         """The elements of an accessor, [count, components]; normalised integers as float64."""
-        accessor = self.entry("accessors", index)
-        kind, width = _COMPONENTS.get(accessor.get("componentType", 0)), _WIDTHS.get(accessor.get("type", ""))
-        if kind is None or width is None:
-            raise self.error(f"accessor {index} has an unknown type")
+        accessor, kind, width = self._typed(index)
         count = int(accessor["count"])
         if "bufferView" in accessor:
             values = self._view(accessor["bufferView"], accessor.get("byteOffset", 0), kind, count, width)
@@ -89,9 +86,24 @@ class GltfDocument:
             raise self.error(f"accessor {index} has no data, as of a compressed mesh: export it without compression")
         if "sparse" in accessor:
             values = self._with_sparse(values, accessor["sparse"], kind)
-        if accessor.get("normalized") and kind != "<f4":
-            return np.maximum(values / np.iinfo(kind).max, -1.0)
-        return values
+        return _scaled(values, kind) if accessor.get("normalized") else values
+
+    def decoded(self, index: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """The elements of a compressed accessor, as of `array`, from those of a decoder."""
+        accessor, kind, width = self._typed(index)
+        if values.shape[1] != width:
+            raise self.error(f"accessor {index} has {width} components, its compressed data {values.shape[1]}")
+        # Draco's decoder normalises signed integers itself
+        is_scaled = values.dtype.kind == "f" and bool((np.abs(values) <= 1.0).all())
+        return _scaled(values, kind) if accessor.get("normalized") and not is_scaled else values
+
+    def _typed(self, index: Any) -> tuple[Mapping[str, Any], str, int]:
+        """An accessor, the type of its components as of numpy, and their number."""
+        accessor = self.entry("accessors", index)
+        kind, width = _COMPONENTS.get(accessor.get("componentType", 0)), _WIDTHS.get(accessor.get("type", ""))
+        if kind is None or width is None:
+            raise self.error(f"accessor {index} has an unknown type")
+        return accessor, kind, width
 
     def _with_sparse(self, values: npt.NDArray[Any], sparse: Mapping[str, Any], kind: str) -> npt.NDArray[Any]:
         count = int(sparse["count"])
@@ -156,3 +168,8 @@ class GltfDocument:
         if content is None:
             raise self.error(f"its buffer {uri} is missing: copy it beside the mesh")
         return content
+
+
+def _scaled(values: npt.NDArray[Any], kind: str) -> npt.NDArray[Any]:
+    """Normalised integers of a type as float64, -1 to 1; floats as they are."""
+    return values if kind == "<f4" else np.maximum(values / np.iinfo(kind).max, -1.0)

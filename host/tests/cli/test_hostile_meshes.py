@@ -58,6 +58,16 @@ def of_gltf(**changes: Any) -> dict[str, Content]:
     return {"x.gltf": json.dumps(gltf(**changes))}
 
 
+ACCESSORS = gltf()["accessors"]
+
+
+def of_draco(**extension: Any) -> dict[str, Content]:
+    """A document whose triangle is said to be compressed."""
+    primitive = gltf()["meshes"][0]["primitives"][0] | {"extensions": {"KHR_draco_mesh_compression": extension}}
+    accessors = [{key: accessor[key] for key in ("componentType", "count", "type")} for accessor in ACCESSORS]
+    return of_gltf(meshes=[{"primitives": [primitive]}], accessors=accessors)
+
+
 def glb(document: bytes, claimed: int | None = None) -> bytes:
     document += b" " * (-len(document) % 4)
     chunk = struct.pack("<I", len(document) if claimed is None else claimed) + b"JSON" + document
@@ -68,7 +78,6 @@ def buffer(name: str) -> list[dict[str, Any]]:
     return [{"byteLength": 42, "uri": name}]
 
 
-ACCESSORS = gltf()["accessors"]
 CASES = {
     "obj-index-0": Case(OBJ, "names vertex 0", {"x.obj": f"{POINTS}f 0 1 2\n"}),
     "obj-index-0-with-normal": Case(OBJ, "names vertex 0", {"x.obj": f"{POINTS}vn 0 0 1\nf 0//1 1//1 2//1\n"}),
@@ -167,11 +176,15 @@ CASES = {
         GLTF, "not a whole number from 0 on", of_gltf(accessors=[ACCESSORS[0] | {"byteOffset": -12}, ACCESSORS[1]])
     ),
     "gltf-stride": Case(GLTF, "x.gltf", of_gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": -12}] * 2)),
-    "gltf-draco": Case(
+    "gltf-meshopt": Case(
         GLTF,
-        "compressed (it requires the glTF extension KHR_draco_mesh_compression)",
-        of_gltf(extensionsRequired=["KHR_draco_mesh_compression"]),
+        "compressed (it requires the glTF extension EXT_meshopt_compression)",
+        of_gltf(extensionsRequired=["EXT_meshopt_compression"]),
     ),
+    "gltf-draco": Case(GLTF, "x.gltf: its Draco data are damaged", of_draco(bufferView=0, attributes={"POSITION": 0})),
+    "gltf-draco-no-attributes": Case(GLTF, "Draco use has no attributes", of_draco(bufferView=0)),
+    "gltf-draco-no-view": Case(GLTF, "bufferViews[None] is used", of_draco(attributes={})),
+    "gltf-draco-view": Case(GLTF, "bufferViews[9] is used", of_draco(bufferView=9, attributes={})),
     "gltf-extension": Case(
         GLTF, "requires the glTF extension ACME_x, which is not supported", of_gltf(extensionsRequired=["ACME_x"])
     ),

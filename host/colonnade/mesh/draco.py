@@ -1,0 +1,118 @@
+"""Decodes Draco streams in a process of its own.
+
+The decoder is C++, and a stream of a few bytes may ask for any memory and time, or end the process. So this one has
+limits of both in proportion to the streams, and what ends it is one line of an error. The module is also its program.
+"""
+
+from __future__ import annotations
+
+import io
+import resource
+import struct
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.errors import UserError
+
+#: Memory of the process beside its libraries, bytes, and more for each byte of the streams. A vertex with a normal, a
+#: texture coordinate and a colour takes 120 bytes, of 4 to 20 in the stream.
+_MEMORY, _MEMORY_OF_A_BYTE = 1 << 29, 500
+#: Its processor time, seconds, and bytes of the streams for one more. It decodes 30 MB in a second.
+_SECONDS, _BYTES_OF_A_SECOND = 5, 1 << 20
+
+#: Exit status of the process if the decoder refuses a stream.
+_DAMAGED = 3
+
+
+@dataclass(frozen=True)
+class DracoMesh:
+    """The content of a stream.
+
+    Attributes:
+        faces: Triangles, uint32 [m, 3].
+        attributes: The attributes of the vertices by their unique id, [n, components]: float32; uint8 and uint32 if
+            the stream has unsigned integers.
+    """
+
+    faces: npt.NDArray[np.uint32]
+    attributes: Mapping[int, npt.NDArray[Any]]
+
+
+def decode_draco(streams: Sequence[bytes]) -> list[DracoMesh]:
+    """The meshes of Draco streams, all of one process.
+
+    Raises:
+        UserError: A stream is damaged, holds no triangles, or asks for more than the limits.
+    """
+    size = sum(map(len, streams))
+    memory, seconds = _MEMORY + _MEMORY_OF_A_BYTE * size, _SECONDS + size // _BYTES_OF_A_SECOND
+    done = subprocess.run(
+        [sys.executable, "-I", "-m", "colonnade.mesh.draco", str(memory), str(seconds)],
+        input=b"".join(struct.pack("<Q", len(stream)) + stream for stream in streams),
+        capture_output=True,
+        check=False,
+    )
+    if done.returncode == _DAMAGED or done.returncode < 0:
+        raise UserError(
+            f"its Draco data are damaged, or take more than {memory >> 20:,} MiB or {seconds} s to decode:"
+            " export it without compression"
+        )
+    if done.returncode != 0:
+        reason = (done.stderr.decode("utf-8", "replace").splitlines() or ["no reason given"])[-1]
+        raise UserError(f"the decoder for Draco does not start: {reason}: install Colonnade again")
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
+        found: list[dict[str, npt.NDArray[Any]]] = [{} for _ in streams]
+        for name in arrays.files:
+            number, key = name.split()
+            found[int(number)][key] = arrays[name]
+    return [DracoMesh(each.pop("faces"), {int(key): values for key, values in each.items()}) for each in found]
+
+
+def _limit(memory: int, seconds: int) -> None:
+    """Limit this process, where the system can; memory is beside what it has now."""
+    pages = Path("/proc/self/statm")
+    own = int(pages.read_text().split()[0]) * resource.getpagesize() if pages.exists() else 0
+    for kind, limit in (
+        (resource.RLIMIT_AS, own + memory),
+        (resource.RLIMIT_CPU, seconds),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        with suppress(OSError, ValueError):
+            resource.setrlimit(kind, (limit, limit))
+
+
+def _main() -> None:
+    """Decode the streams of standard input, each after its length, to an NPZ file on standard output."""
+    import DracoPy
+
+    memory, seconds = map(int, sys.argv[1:])
+    data = sys.stdin.buffer.read()
+    _limit(memory, seconds)
+    try:
+        arrays: dict[str, npt.NDArray[Any]] = {}
+        at = number = 0
+        while at < len(data):
+            (size,) = struct.unpack_from("<Q", data, at)
+            mesh = DracoPy.decode(data[at + 8 : at + 8 + size])
+            arrays[f"{number} faces"] = mesh.faces
+            for attribute in mesh.attributes:
+                if attribute["data"] is not None:
+                    arrays[f"{number} {attribute['unique_id']}"] = attribute["data"]
+            at, number = at + 8 + size, number + 1
+        np.savez(sys.stdout.buffer, **arrays)  # type: ignore[arg-type]
+    except Exception:  # of many types, and MemoryError
+        sys.exit(_DAMAGED)
+
+
+if __name__ == "__main__":
+    _main()
