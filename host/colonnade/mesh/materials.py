@@ -2,12 +2,12 @@
 
 | | glTF | MTL |
 |---|---|---|
-| albedo | base colour factor, linear | `Kd`, taken as linear; for glass `Tf` if given |
+| albedo | base colour factor, linear | `Kd`, sRGB but of Blender; for glass `Tf` if given |
 | mirror | metallic factor of at least ½, without a texture | `Pm` of at least ½, or `illum` 3 or 5 |
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
 | index of refraction | `KHR_materials_ior` | `Ni` |
-| emission of a diffuse surface | emissive factor times `KHR_materials_emissive_strength`, at most 1 | `Ke`, at most 1 |
+| emission of a diffuse surface | emissive factor times `KHR_materials_emissive_strength`, at most 1 | `Ke`, as `Kd` |
 
 Metal rougher than `MIRROR_ROUGHNESS` is diffuse. The readers add base-colour textures.
 What a material holds beyond this is counted as lost.
@@ -135,7 +135,7 @@ def _gltf_emission(material: Mapping[str, Any]) -> Vector:
 
 
 def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
-    """Convert a material of an MTL file, given its values by lower-case keyword, as lists or numbers."""
+    """Convert a material of an MTL file, given its values by lower-case keyword as `parse_mtl` does."""
 
     def first(key: str, default: float) -> float:
         value = entries.get(key)

@@ -27,6 +27,8 @@ from colonnade.mesh.texture import MAX_POSITION, Texture
 
 #: Statements of curves, surfaces and their parameter space.
 _CURVES = ("curv", "curv2", "surf")
+#: Keywords of colours in MTL files; the filter `Tf` is a share of the light.
+_COLOURS = ("kd", "ke")
 #: Corners that all have a position and a normal.
 _COMPLETE = re.compile(r"[^\s/]+/[^\s/]+/[^\s/]+(?: [^\s/]+/[^\s/]+/[^\s/]+)*")
 
@@ -232,14 +234,31 @@ def _materials(
     return tuple(materials), used, maps, tuple(textures.reader.textures)
 
 
-def parse_mtl(data: bytes) -> dict[str, dict[str, list[str]]]:
-    """The materials of an MTL file by name: the words after each keyword, in lower case."""
-    materials: dict[str, dict[str, list[str]]] = {}
-    current: dict[str, list[str]] = {}
+def parse_mtl(data: bytes) -> dict[str, dict[str, Sequence[Any]]]:
+    """The materials of an MTL file by name: the words after each keyword, in lower case; of `_COLOURS` linear numbers.
+
+    The format leaves the space of its colours open. Viewers take them as sRGB: three.js' MTLLoader and F3D decode them,
+    Babylon.js, Godot and those of OpenGL's fixed colours show them as they are. Blender reads and writes linear ones,
+    so those of a file that begins with its name are linear.
+    """
+    materials: dict[str, dict[str, Sequence[Any]]] = {}
+    current: dict[str, Sequence[Any]] = {}
+    is_linear = re.match(rb"\s*#\s*Blender\b", data) is not None
     for line in re.sub(r"#[^\r\n]*", "", data.decode("utf-8", "replace")).splitlines():
         keyword, *words = line.split() or [""]
         if keyword.lower() == "newmtl":
             current = materials.setdefault(" ".join(words), {})
+        elif keyword.lower() in _COLOURS and not is_linear:
+            current[keyword.lower()] = _linear(words)
         elif keyword:
             current[keyword.lower()] = words
     return materials
+
+
+def _linear(words: Sequence[str]) -> Sequence[Any]:
+    """Linear numbers of sRGB ones, from 0 to 1; the words if they are none."""
+    try:
+        values = np.array(words[:3], dtype=np.float64)
+    except ValueError:
+        return words
+    return linear_from_srgb(np.clip(values, 0.0, 1.0)).tolist() if np.isfinite(values).all() else words

@@ -205,7 +205,7 @@ def test_textures_are_read_as_pictures_only(folder: Any) -> None:
     """A texture may be a pipe, or a picture for which Pillow starts another program."""
     hostile.make(folder / "x.obj", f"mtllib x.mtl\nusemtl a\n{TRIANGLE}")
     hostile.make(folder / "y.obj", f"mtllib y.mtl\nusemtl a\n{TRIANGLE}")
-    hostile.make(folder / "y.mtl", "newmtl a\nKd 0.25 0.5 0.75\nmap_Kd x.eps\n")
+    hostile.make(folder / "y.mtl", "# Blender\nnewmtl a\nKd 0.25 0.5 0.75\nmap_Kd x.eps\n")
     hostile.make(folder / "x.eps", "%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n")
     hostile.make(folder / "x.mtl", "newmtl a\nKd 0.25 0.5 0.75\nmap_Kd pipe.png\n")
     hostile.make(folder / "pipe.png", fifo)

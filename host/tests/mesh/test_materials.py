@@ -10,6 +10,7 @@ import trimesh
 from trimesh.visual.material import PBRMaterial
 
 from colonnade.common.errors import UserError
+from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, from_mtl
 
@@ -67,6 +68,21 @@ def test_an_obj_file_keeps_its_materials_apart(tmp_path: Path) -> None:
     assert sorted(kinds, key=str) == sorted(
         [MeshMaterial("diffuse", (1.0, 0.0, 0.0))] + 2 * [MeshMaterial("glass", (0.0, 1.0, 1.0), 1.4)], key=str
     )
+
+
+@pytest.mark.parametrize(
+    ("head", "is_linear"),
+    [("", False), ("# Blender 4.2.0 MTL File: 'a.blend'\n", True), ("# Blenderer\n", False), ("\n#Blender\n", True)],
+)
+def test_colours_of_mtl_files_are_srgb_but_of_blender(tmp_path: Path, head: str, is_linear: bool) -> None:
+    """Most viewers take Kd as sRGB; Blender writes and reads linear colours."""
+    (tmp_path / "m.mtl").write_text(f"{head}newmtl a\nKd 0.5 0.25 2\nKe 0.5 0 0\nTf 0.5 0.5 0.5\nnewmtl b\nKd x 1 1\n")
+    (tmp_path / "m.obj").write_text(
+        "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 4\n"
+    )
+    found = {material.albedo: material.emission for material in load_mesh(tmp_path / "m.obj").materials}
+    half, quarter = (0.5, 0.25) if is_linear else linear_from_srgb(np.array([0.5, 0.25])).tolist()
+    assert found == {(half, quarter, 1.0): (half, 0.0, 0.0), (0.8, 1.0, 1.0): (0.0, 0.0, 0.0)}
 
 
 def test_files_without_materials_have_the_default(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
+from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.load import load_mesh
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -112,5 +113,5 @@ def test_a_negative_shininess_is_noted(tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text("newmtl a\nKd 0.25 0.5 0.75\nNs -1.96\n")
     (tmp_path / "a.obj").write_text(f"mtllib a.mtl\nusemtl a\n{TRIANGLE}f 1 2 3\n")
     mesh = load_mesh(tmp_path / "a.obj")
-    assert mesh.materials[0].albedo == (0.25, 0.5, 0.75)
+    assert mesh.materials[0].albedo == pytest.approx(linear_from_srgb(np.array([0.25, 0.5, 0.75])))
     assert mesh.notes[0].endswith("1 material's negative Ns is taken as 0: highlights are not rendered")

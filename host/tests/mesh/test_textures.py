@@ -29,7 +29,7 @@ SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 
 def obj(folder: Path, faces: str, material: str = "map_Kd a.png") -> Path:
     (folder / "a.png").write_bytes(png(FOUR))
-    (folder / "a.mtl").write_text(f"newmtl a\nKd 0.5 1 1\n{material}\n")
+    (folder / "a.mtl").write_text(f"# Blender\nnewmtl a\nKd 0.5 1 1\n{material}\n")
     (folder / "a.obj").write_text(f"mtllib a.mtl\nusemtl a\n{SQUARE}{faces}\n")
     return folder / "a.obj"
 

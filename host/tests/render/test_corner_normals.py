@@ -78,7 +78,9 @@ def on_a_floor(file: Path, name: str, kind: str) -> Path:
     file.write_text("\n".join(lines))
     materials = {"mirror": "Kd .9 .9 .9\nillum 3", "glass": "Kd .9 .9 .9\nd 0\nNi 1.5", "plain": "Kd .8 .8 .8"}
     materials |= {"light": "Kd .85 .85 .8", "dark": "Kd .7 .2 .15"}
-    (file.parent / "a.mtl").write_text("".join(f"newmtl {name}\n{text}\n" for name, text in materials.items()))
+    (file.parent / "a.mtl").write_text(
+        "# Blender: linear colours\n" + "".join(f"newmtl {name}\n{text}\n" for name, text in materials.items())
+    )
     return file
 
 
