@@ -43,7 +43,7 @@ def read_surface(path: Path) -> MeshFile:
     elif kind == ".ply":
         from colonnade.mesh.ply import read_ply
 
-        surface = read_ply(content, path, losses)
+        surface = read_ply(content, path, references, losses)
     elif kind == ".off":
         from colonnade.mesh.off import read_off
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from colonnade.common.limits import KEPT_TEXTURE_PIXELS, MAX_PIXELS
@@ -105,6 +105,7 @@ COLOURS = Loss(
     "a face has one colour, the mean of its corners",
 )
 ALPHA = Loss.of("partly transparent vertex", "opaque", "transparency is not rendered", "partly transparent vertices")
+FACE_ALPHA = Loss.of("partly transparent face", "opaque", "transparency is not rendered")
 FLIPPED = Loss(
     "face has normals that point to its back", "faces have normals that point to their back", "they are negated"
 )
@@ -125,6 +126,11 @@ def shrunk_textures(factor: int) -> Loss:
     return Loss.of(
         "texture", f"kept at 1/{factor} of the width and height", f"a mesh holds {KEPT_TEXTURE_PIXELS:,} pixels"
     )
+
+
+def unread_properties(names: Sequence[str], has_more: bool) -> Loss:
+    """The loss of properties of a PLY file, of which some are named."""
+    return Loss.of("property", "not read", ", ".join(names) + (" …" if has_more else ""), "properties")
 
 
 def extension_loss(name: str) -> Loss:

@@ -93,9 +93,6 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
     positions = None
     if textures:
         materials, used, positions = _placed(file, materials, used, maps, sizes, corner_positions, losses)
-        if vertex_colours is not None:
-            is_textured = np.array([material.texture is not None for material in materials])[used]
-            losses.add(lost.TEXTURED_COLOURS, int(is_textured.sum()))
     return from_polygons(
         vertices,
         corners,

@@ -1,4 +1,7 @@
-"""Reads PLY files: polygons and triangle strips with normals and colours of vertices, and colours of faces.
+"""Reads PLY files: polygons and triangle strips with normals, colours and textures.
+
+The format names no properties; those that are read are the ones that MeshLab, Blender, Assimp, trimesh and scanners
+write. Colours are sRGB, as bytes or from 0 to 1.
 
 This is our own code because trimesh reads neither strips nor the normals of all files, and splits concave polygons
 wrongly.
@@ -17,15 +20,28 @@ from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
+from colonnade.mesh.materials import PLAIN
 from colonnade.mesh.ply_elements import AsciiReader, BinaryReader, Columns, Element, ListColumn, read_header
+from colonnade.mesh.ply_textures import textured_polygons
+from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, from_polygons
 
-_COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+#: Names of a colour and its alpha.
+_COLOURS = (
+    ("red", "green", "blue", "alpha"),
+    ("r", "g", "b", "a"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
+    ("color_0", "color_1", "color_2", "color_3"),
+)
+#: Values of a scan that no picture shows.
+_MEASURES = ("confidence", "intensity", "quality")
+#: Properties that a note names.
+_NAMED = 8
 #: Names of the list of a face's vertices.
 _CORNERS = ("vertex_indices", "vertex_index")
 
 
-def read_ply(data: bytes, path: Path, losses: Losses) -> RawSurface:
+def read_ply(data: bytes, path: Path, references: References, losses: Losses) -> RawSurface:
     """Read a PLY file, ASCII or binary.
 
     Raises:
@@ -59,11 +75,21 @@ def read_ply(data: bytes, path: Path, losses: Losses) -> RawSurface:
             " numbered from 0"
         )
     losses.add(lost.LINES, content["edge"][0].rows if "edge" in content else 0)
-    alpha = vertex.get("alpha")
-    opaque = 255.0 if any(one.kind == "u1" for one in content["vertex"][0].properties if one.name == "alpha") else 1.0
-    losses.add(lost.ALPHA, int((alpha < opaque).sum()) if isinstance(alpha, np.ndarray) else 0)
-    textures = set(re.findall(rb"(?m)^comment[ \t]+TextureFile[ \t]+(\S.*)$", data[: len(data) - len(body)]))
-    losses.add(lost.TEXTURES, len(textures))
+    losses.add(lost.ALPHA, _transparent(*content["vertex"]))
+    losses.add(lost.FACE_ALPHA, 0 if face_element is None else _transparent(face_element, face))
+    names = re.findall(rb"(?m)^comment[ \t]+TextureFile[ \t]+(\S.*)$", data[: len(data) - len(body)])
+    textured = textured_polygons(
+        [name.decode("utf-8", "replace").strip() for name in names], flat, sizes, vertex, face, references, losses
+    )
+    read = {"x", "y", "z", "nx", "ny", "nz", *_CORNERS, *_MEASURES, *(textured.read if textured else ())}
+    unread = [
+        f"{name}.{one.name}"
+        for name, (element, columns) in content.items()
+        for one in element.properties
+        if element.rows and name != "edge" and one.name not in read | set(_colour_names(columns) or ())
+    ]
+    if unread:
+        losses.add(lost.unread_properties(unread[:_NAMED], len(unread) > _NAMED), len(unread))
     return from_polygons(
         vertices,
         flat,
@@ -72,6 +98,10 @@ def read_ply(data: bytes, path: Path, losses: Losses) -> RawSurface:
         corner_normals=None if normals is None else normals[flat],
         vertex_colours=_colours(*content["vertex"]),
         polygon_colours=polygon_colours,
+        materials=(PLAIN,) if textured is None else textured.materials,
+        polygon_materials=None if textured is None else textured.polygon_materials,
+        textures=() if textured is None else textured.textures,
+        corner_positions=None if textured is None else textured.corner_positions,
     )
 
 
@@ -87,15 +117,31 @@ def _stacked(columns: Columns, names: Sequence[str]) -> Floats | None:
     return np.stack([columns[name] for name in names], axis=1)
 
 
+def _colour_names(columns: Columns) -> tuple[str, ...] | None:
+    """The names of an element's colour and alpha; None without a colour."""
+    return next((names for names in _COLOURS if _stacked(columns, names[:3]) is not None), None)
+
+
+def _white(element: Element, name: str) -> float:
+    """The largest value of a property of colours."""
+    kind = next(one.kind for one in element.properties if one.name == name)
+    return {"u1": 255.0, "u2": 65535.0}.get(kind, 1.0 if kind.startswith("f") else 255.0)
+
+
 def _colours(element: Element, columns: Columns) -> Floats | None:
-    """Linear colours [rows, 3] of an element, from sRGB as bytes or from 0 to 1; None without."""
-    for names in _COLOURS:
-        colours = _stacked(columns, names)
-        if colours is not None and len(colours):
-            kind = next(one.kind for one in element.properties if one.name == names[0])
-            white = {"u1": 255.0, "u2": 65535.0}.get(kind, 1.0 if kind.startswith("f") else 255.0)
-            return linear_from_srgb(np.clip(np.nan_to_num(colours) / white, 0.0, 1.0))
-    return None
+    """Linear colours [rows, 3] of an element; None without."""
+    names = _colour_names(columns)
+    colours = None if names is None else _stacked(columns, names[:3])
+    if names is None or colours is None or not len(colours):
+        return None
+    return linear_from_srgb(np.clip(np.nan_to_num(colours) / _white(element, names[0]), 0.0, 1.0))
+
+
+def _transparent(element: Element, columns: Columns) -> int:
+    """Rows of an element with an alpha below that of an opaque one."""
+    names = _colour_names(columns)
+    alpha = None if names is None else columns.get(names[3])
+    return int((alpha < _white(element, names[3])).sum()) if names and isinstance(alpha, np.ndarray) else 0
 
 
 def _unrolled(strips: ListColumn) -> list[tuple[int, int, int]]:

@@ -115,7 +115,7 @@ class AsciiReader:
         if element.rows * max(1, len(properties)) > len(words) - self._at and properties:
             raise _truncated(self._path, element)
         if not lists:
-            table = self._take(element.rows * len(properties), element).reshape(element.rows, -1)
+            table = self._take(element.rows * len(properties), element).reshape(element.rows, len(properties))
             return {one.name: table[:, column] for column, one in enumerate(properties)}
         values: dict[str, list[bytes]] = {one.name: [] for one in properties}
         sizes: dict[str, list[int]] = {one.name: [] for one in lists}

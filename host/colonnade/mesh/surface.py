@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.types import Floats, Indices
-from colonnade.mesh.losses import CROSSED, SHORT_FACES, Losses
+from colonnade.mesh.losses import CROSSED, SHORT_FACES, TEXTURED_COLOURS, Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.polygons import triangulate
 from colonnade.mesh.texture import Texture
@@ -76,7 +76,7 @@ def from_polygons(
         corner_normals: float64 [k, 3], 0 for none.
         materials: The materials.
         polygon_materials: int64 [p].
-        vertex_colours: float64 [n, 3], linear.
+        vertex_colours: float64 [n, 3], linear; not for polygons with a texture.
         polygon_colours: float64 [p, 3], linear, NaN for none; before `vertex_colours`.
         textures: Textures of the materials.
         corner_positions: Positions in them, float64 [k, 2].
@@ -88,6 +88,11 @@ def from_polygons(
     colours = None if vertex_colours is None else vertex_colours[faces]
     if polygon_colours is not None:
         colours = np.repeat(polygon_colours[split.polygons][:, None], 3, axis=1)
+    if colours is not None and textures and polygon_materials is not None:
+        is_textured = np.array([material.texture is not None for material in materials])[polygon_materials]
+        hidden = is_textured[split.polygons]
+        losses.add(TEXTURED_COLOURS, int((hidden & (colours != 1.0).any(axis=(1, 2))).sum()))
+        colours = None if hidden.all() else np.where(hidden[:, None, None], np.nan, colours)
     return RawSurface(
         vertices=vertices,
         faces=faces,

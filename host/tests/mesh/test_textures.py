@@ -184,3 +184,92 @@ def test_specular_glossiness_gives_the_base_colour(tmp_path: Path) -> None:
 def test_open_single_sided_faces_are_noted(tmp_path: Path) -> None:
     mesh = load_mesh(gltf(tmp_path, materials=[{"pbrMetallicRoughness": {"metallicFactor": 0}}]))
     assert "1 face of an open single-sided surface is shown from behind: viewers show" in mesh.notes[0]
+
+
+PLY_SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+
+
+def ply(
+    folder: Path, header: str, vertices: list[str], faces: list[str], comment: str = "TextureFile a b.png "
+) -> Path:
+    """A PLY file of `PLY_SQUARE`, with further properties after `x y z` and after the corners."""
+    (folder / "a b.png").write_bytes(png(FOUR))
+    of_vertex, of_face = header.split("|")
+    lines = ["ply", "format ascii 1.0", f"comment {comment}", "element vertex 4"]
+    lines += [f"property float {name}" for name in "x y z".split()]
+    lines += [f"property {words}" for words in of_vertex.split(";") if words]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    lines += [f"property {words}" for words in of_face.split(";") if words]
+    rows = [f"{x} {y} 0 {more}" for (x, y), more in zip(PLY_SQUARE, vertices, strict=True)]
+    (folder / "a.ply").write_text("\n".join([*lines, "end_header", *rows, *faces]) + "\n")
+    return folder / "a.ply"
+
+
+@pytest.mark.parametrize("names", ["s t", "u v", "texture_u texture_v"])
+def test_positions_of_the_vertices_of_ply(tmp_path: Path, names: str) -> None:
+    """The names of Blender, Assimp and MeshLab; v goes up."""
+    header = ";".join(f"float {name}" for name in names.split()) + "|"
+    mesh = load_mesh(ply(tmp_path, header, ["0 0", "1 0", "1 1", "0 1"], ["4 0 1 2 3"]))
+    assert mesh.materials == (MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=0),) and mesh.notes == ()
+    assert mesh.corner_positions is not None
+    np.testing.assert_allclose(mesh.corner_positions, mesh.vertices[mesh.faces][..., :2] * (1, -1) + (0, 1))
+    np.testing.assert_array_equal(mesh.textures[0].pixels, FOUR)
+
+
+def test_positions_of_the_corners_of_ply(tmp_path: Path) -> None:
+    """MeshLab's form: a list of a face, and the number of its picture; one that does not fit shows none."""
+    (tmp_path / "c.png").write_bytes(png(FOUR[::-1]))
+    faces = ["3 0 1 2 6 0 0 1 0 1 1 1", "3 0 2 3 6 0 0 1 1 0 1 0", "3 0 1 3 2 0 0 0", "3 1 2 3 6 0 0 1 1 0 1 7"]
+    header = "|list uchar float texcoord;int texnumber"
+    mesh = load_mesh(ply(tmp_path, header, [""] * 4, faces, "TextureFile a b.png\ncomment TextureFile c.png"))
+    textures = [mesh.materials[index].texture for index in mesh.face_materials]
+    pixels = [None if texture is None else mesh.textures[texture].pixels[0, 0, 0] for texture in textures]
+    assert pixels == [0, 255, None, None]
+    assert mesh.notes[0].endswith("1 face of a textured material is untextured: it has no texture coordinates")
+    assert mesh.corner_positions is not None
+    np.testing.assert_allclose(mesh.corner_positions[0], mesh.vertices[mesh.faces[0]][:, :2] * (1, -1) + (0, 1))
+
+
+@pytest.mark.parametrize("corner_colours", [True, False])
+def test_a_texture_of_ply_is_shown_before_colours(tmp_path: Path, corner_colours: bool) -> None:
+    header = "float s;float t;uchar red;uchar green;uchar blue;uchar alpha|"
+    rows = ["0 0 255 0 0 255", "1 0 255 255 255 255", "1 1 255 255 255 9", "0 1 255 255 255 255"]
+    mesh = load_mesh(ply(tmp_path, header, rows, ["3 0 1 2"]), corner_colours=corner_colours)
+    assert mesh.materials == (MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=0),) and mesh.corner_colours is None
+    assert [note.partition(": ")[2] for note in mesh.notes] == [
+        "1 partly transparent vertex is opaque: transparency is not rendered",
+        "1 colour of a textured face is not shown: its texture is",
+    ]
+
+
+def test_a_picture_of_ply_that_is_missing_is_noted(tmp_path: Path) -> None:
+    mesh = load_mesh(ply(tmp_path, "float s;float t|", ["0 0"] * 4, ["3 0 1 2"], "TextureFile ../none.png"))
+    assert mesh.notes[0].endswith("1 picture of a texture is missing: surfaces have their base colour")
+    assert mesh.materials == (MeshMaterial(),)
+
+
+@pytest.mark.parametrize(
+    "names", ["r g b a", "color_0 color_1 color_2 color_3", "diffuse_red diffuse_green diffuse_blue x_"]
+)
+def test_colours_of_ply_have_several_names(tmp_path: Path, names: str) -> None:
+    header = ";".join(f"uchar {name}" for name in names.split()) + "|"
+    mesh = load_mesh(ply(tmp_path, header, ["255 0 0 255"] * 4, ["3 0 1 2"], ""), corner_colours=True)
+    assert mesh.corner_colours is not None
+    np.testing.assert_allclose(mesh.corner_colours, np.full((1, 3, 3), (1.0, 0.0, 0.0)))
+
+
+def test_properties_of_ply_that_are_not_read_are_named(tmp_path: Path) -> None:
+    """But not the measures of a scan. Positions without a picture show nothing either."""
+    header = "float confidence;float s;float t|uchar flags"
+    mesh = load_mesh(ply(tmp_path, header, ["1 0 0"] * 4, ["3 0 1 2 0"], "none"))
+    assert mesh.notes[0].endswith("3 properties are not read: vertex.s, vertex.t, face.flags")
+    many = ";".join(f"float p{number}" for number in range(20))
+    mesh = load_mesh(ply(tmp_path, f"{many}|", ["0 " * 20] * 4, ["3 0 1 2"], "none"))
+    assert mesh.notes[0].endswith("20 properties are not read: " + ", ".join(f"vertex.p{n}" for n in range(8)) + " …")
+
+
+def test_an_element_of_ply_without_rows_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "a.ply"
+    file.write_text("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n")
+    with pytest.raises(UserError, match="its vertices lack x, y or z"):
+        load_mesh(file)
