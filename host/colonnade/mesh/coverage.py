@@ -2,6 +2,7 @@
 
 A face whose texels are all below the cutoff is dropped. One with texels on both sides is split into four, the largest
 first, until its pieces are as small as a texel or the mesh has `_FACES`; what is then left is cut along a line.
+The alpha of corners multiplies that of the texture. Without one it is linear on a face, so the line is exact.
 Of blended materials the cutoff is 1/2, and faces that are thinner everywhere become tinted panes without refraction.
 """
 
@@ -80,12 +81,14 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
         if material.alpha is None or not len(faces):
             continue
         texture = None if material.texture is None else surface.textures[material.texture]
-        if texture is None or texture.alpha is None:
+        has_mask = texture is not None and texture.alpha is not None
+        has_corners = surface.alphas is not None and bool((surface.alphas[faces] < 1.0).any())
+        if not has_mask and not has_corners:
             shown, thin = _uniform(material.alpha, faces, losses)
             whole.append(shown)
             panes.append(_panes(surface, texture, material.alpha.factor, thin))
             continue
-        cut = _Cut(surface, texture, material.alpha)
+        cut = _Cut(surface, texture if has_mask else None, material.alpha, has_corners)
         inside, mixed, outside = cut.sorted(faces)
         whole.append(inside)
         if len(mixed):
@@ -95,8 +98,9 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
         if material.alpha.blends:
             panes.append(_panes(surface, texture, material.alpha.factor, outside))
             losses.add(lost.BLENDED, int(cut.is_blended(faces)))
-        materials[number] = replace(materials[number], texture=len(textures))
-        textures.append(cut.filled())
+        if has_mask:
+            materials[number] = replace(materials[number], texture=len(textures))
+            textures.append(cut.filled())
     surface = replace(surface, materials=tuple(materials), textures=tuple(textures))
     surface, thin = _with_panes(surface, panes)
     kept = np.sort(np.concatenate([*whole, thin]))
@@ -120,14 +124,18 @@ def _panes(
     surface: RawSurface, texture: Texture | None, factor: float, faces: Indices
 ) -> tuple[Indices, Floats, Floats]:
     """Of faces that are not opaque, those that can be seen, their alpha and the colour of their texture."""
-    if texture is None or surface.positions is None or not len(faces):
-        return faces, np.full(len(faces), factor), np.ones((len(faces), 3))
-    at = fixed_order.product(_weights(4), surface.positions[faces]).reshape(-1, 2)
-    alpha = texture.alphas(at).reshape(len(faces), -1) * factor
-    colours = (texture.colours(at).reshape(len(faces), -1, 3) * alpha[..., None]).sum(axis=1)
+    weights = _weights(4)
+    alpha, colours = np.full((len(faces), len(weights)), factor), np.ones((len(faces), 3))
+    if surface.alphas is not None:
+        alpha *= fixed_order.product(weights, surface.alphas[faces][..., None])[..., 0]
+    if texture is not None and surface.positions is not None and len(faces):
+        at = fixed_order.product(weights, surface.positions[faces]).reshape(-1, 2)
+        alpha *= texture.alphas(at).reshape(len(faces), -1)
+        shown = texture.colours(at).reshape(len(faces), -1, 3) * alpha[..., None]
+        colours = shown.sum(axis=1) / np.maximum(alpha.sum(axis=1, keepdims=True), 1e-12)
     mean = alpha.mean(axis=1)
     seen = mean >= _THIN
-    return faces[seen], mean[seen], colours[seen] / alpha[seen].sum(axis=1, keepdims=True)
+    return faces[seen], mean[seen], colours[seen]
 
 
 def _with_panes(surface: RawSurface, panes: list[tuple[Indices, Floats, Floats]]) -> tuple[RawSurface, Indices]:
@@ -153,15 +161,17 @@ def _with_panes(surface: RawSurface, panes: list[tuple[Indices, Floats, Floats]]
 
 
 class _Cut:
-    """The cut of a material's faces by the alpha of its texture."""
+    """The cut of a material's faces by the alpha of its texture, if that has one, times that of their corners."""
 
-    def __init__(self, surface: RawSurface, texture: Texture, alpha: Alpha) -> None:
-        assert texture.alpha is not None
+    def __init__(self, surface: RawSurface, texture: Texture | None, alpha: Alpha, has_corners: bool) -> None:
         self._surface, self._texture, self._alpha = surface, texture, alpha
-        #: Least alpha of the texture that is shown.
+        self._corners = surface.alphas if has_corners else None
+        #: Least product of both that is shown.
         self._least = alpha.cutoff / max(alpha.factor, 1e-6)
-        self._opaque = unfolded(texture.alpha >= self._least * 255.0, texture.wrap)
-        self._marked = [PixelCounts(marks, texture) for marks in (~self._opaque, self._opaque)]
+        if texture is not None:
+            assert texture.alpha is not None
+            self._opaque = unfolded(texture.alpha >= self._least * 255.0, texture.wrap)
+            self._marked = [PixelCounts(marks, texture) for marks in (~self._opaque, self._opaque)]
 
     def sorted(self, faces: Indices) -> tuple[Indices, Indices, Indices]:
         """Faces that are shown, those on both sides of the cutoff, and those that are hidden."""
@@ -177,7 +187,7 @@ class _Cut:
         while True:
             own = fixed_order.product(mixed.weights, corners[mixed.owners])
             edges = np.linalg.norm(own - np.roll(own, -1, axis=1), axis=2).max(axis=1)
-            texels = np.ptp(mixed.positions(surface) * self._texture.size, axis=1).max(axis=1)
+            texels = self._texels(mixed)
             can_split = (edges > smallest) & (texels > 1.0)
             # Pieces of about the same size at a time, the largest of them within the budget
             chosen = np.flatnonzero(can_split & (edges > 0.5 * edges[can_split].max(initial=0.0)))
@@ -196,7 +206,13 @@ class _Cut:
         return _Pieces.joined(*shown, self._cut_straight(mixed))
 
     def is_blended(self, faces: Indices) -> bool:
-        """Whether faces show texels that are neither opaque nor invisible."""
+        """Whether faces show texels, or points between their corners, that are neither opaque nor invisible."""
+        if self._corners is not None:
+            alphas = self._corners[faces] * self._alpha.factor
+            if ((alphas.max(axis=1) > 0.01) & (alphas.min(axis=1) < 0.99)).any():
+                return True
+        if self._texture is None:
+            return False
         assert self._surface.positions is not None and self._texture.alpha is not None
         alpha = unfolded(self._texture.alpha, self._texture.wrap) * self._alpha.factor
         counts = PixelCounts((alpha > 2.0) & (alpha < 253.0), self._texture)
@@ -206,6 +222,7 @@ class _Cut:
         """The texture with the nearest shown colour where it is hidden, so that filters find no other."""
         from scipy.ndimage import distance_transform_edt
 
+        assert self._texture is not None
         height, width = self._texture.pixels.shape[:2]
         shown = self._opaque[:height, :width]
         if not shown.any():
@@ -213,31 +230,49 @@ class _Cut:
         rows, columns = distance_transform_edt(~shown, return_distances=False, return_indices=True)
         return replace(self._texture, pixels=self._texture.pixels[rows, columns], alpha=None)
 
+    def _alphas(self, pieces: _Pieces, weights: Floats) -> Floats:
+        """Alpha at points of pieces, by the weights of their corners, without the factor, float64 [k, n]."""
+        found = np.ones((len(pieces.owners), len(weights)))
+        if self._texture is not None:
+            at = fixed_order.product(weights, pieces.positions(self._surface))
+            found *= self._texture.alphas(at.reshape(-1, 2)).reshape(found.shape)
+        if self._corners is not None:
+            own = fixed_order.product(pieces.weights, self._corners[pieces.owners][..., None])
+            found *= fixed_order.product(weights, own)[..., 0]
+        return found
+
+    def _texels(self, pieces: _Pieces) -> Floats:
+        """Texels of the texture along the longer side of each piece, float64 [k]."""
+        if self._texture is None:
+            return np.zeros(len(pieces.owners))
+        return np.asarray(np.ptp(pieces.positions(self._surface) * self._texture.size, axis=1).max(axis=1))
+
     def _kinds(self, pieces: _Pieces) -> npt.NDArray[np.int8]:
         """1 for pieces that are shown, -1 for those that are hidden, 0 for others, int8 [k]."""
-        positions = pieces.positions(self._surface)
-        first, last = pixel_boxes(positions, self._texture)
-        hides, shows = (marked.within(first, last) > 0 for marked in self._marked)
-        kinds = np.where(hides & shows, 0, np.where(shows, 1, -1)).astype(np.int8)
+        if self._texture is None:
+            shown = self._alphas(pieces, np.eye(3)) >= self._least
+            return np.where(shown.all(axis=1), 1, np.where(shown.any(axis=1), 0, -1)).astype(np.int8)
+        kinds = np.zeros(len(pieces.owners), dtype=np.int8)
+        if self._corners is None:
+            first, last = pixel_boxes(pieces.positions(self._surface), self._texture)
+            hides, shows = (marked.within(first, last) > 0 for marked in self._marked)
+            kinds = np.where(hides & shows, 0, np.where(shows, 1, -1)).astype(np.int8)
         # The box of a face is larger than the face: look at its own texels
-        extent = np.ptp(positions * self._texture.size, axis=1).max(axis=1)
+        extent = self._texels(pieces)
         fraction, exponent = np.frexp(np.maximum(extent, 1.0))
         steps = np.clip(2 ** (exponent - (fraction == 0.5)).astype(np.int64), 2, _STEPS)  # the next power of two
         for count in np.unique(steps[kinds == 0]):
             weights = _weights(int(count))
             asked = np.flatnonzero((kinds == 0) & (steps == count))
             for chunk in np.array_split(asked, -(-len(asked) * len(weights) // _SAMPLES) or 1):
-                at = fixed_order.product(weights, positions[chunk])
-                alpha = self._texture.alphas(at.reshape(-1, 2)).reshape(len(chunk), -1)
-                shown = (alpha >= self._least).mean(axis=1)
+                shown = (self._alphas(pieces[chunk], weights) >= self._least).mean(axis=1)
                 is_sure = extent[chunk] <= 2 * count
                 kinds[chunk] = np.where(is_sure & (shown == 1), 1, np.where(is_sure & (shown == 0), -1, 0))
         return kinds
 
     def _cut_straight(self, pieces: _Pieces) -> _Pieces:
         """The shown side of pieces, cut where the alpha of their corners crosses the cutoff."""
-        positions = pieces.positions(self._surface)
-        above = self._texture.alphas(positions.reshape(-1, 2)).reshape(-1, 3) - self._least
+        above = self._alphas(pieces, np.eye(3)) - self._least
         shown = above >= 0
         count = shown.sum(axis=1)
         found = [pieces[count == 3]]
@@ -291,4 +326,5 @@ def _split(surface: RawSurface, pieces: _Pieces) -> RawSurface:
         source_faces=owners,
         single_sided=None if surface.single_sided is None else surface.single_sided[owners],
         source_count=len(surface.faces),
+        alphas=None,
     )

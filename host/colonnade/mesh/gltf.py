@@ -227,14 +227,13 @@ def _primitive(
 
     corners = _corners(document, arrays, count)
     faces = _faces(corners, mode if arrays.mesh is None else _TRIANGLES)
-    colours = attribute("COLOR_0", 3)
+    width = arrays.attribute("COLOR_0").shape[1] if "COLOR_0" in attributes else 0
+    colours, alphas = attribute("COLOR_0", max(width, 3)), None
     if colours is not None:
         if not np.isfinite(colours).all():
             raise document.error("a primitive has a COLOR_0 that is not a finite number: export it again")
         losses.add(lost.CLIPPED_COLOURS, int(((colours < 0) | (colours > 1)).any(axis=1).sum()))
-    if "COLOR_0" in attributes and arrays.attribute("COLOR_0").shape[1] == 4:
-        alpha = attribute("COLOR_0", 4)
-        losses.add(lost.ALPHA, 0 if alpha is None else int((alpha[:, 3] < 1.0).sum()))
+        colours, alphas = colours[:, :3], np.clip(colours[:, 3], 0.0, 1.0) if width == 4 else None
     normals = attribute("NORMAL", 3)
     linear = matrix[:3, :3]
     # The cofactors are the inverse transpose but for a factor, and exist for flat transforms too
@@ -246,8 +245,11 @@ def _primitive(
     if is_mirrored:
         faces = faces[:, ::-1]
     material = primitive.get("material", default)
+    has_alpha = False
     if material != default or "material" in primitive:
-        document.entry("materials", material)
+        has_alpha = from_gltf(document.entry("materials", material)).alpha is not None
+    if alphas is not None and not has_alpha:
+        losses.add(lost.ALPHA, int((alphas < 1.0).sum()))
     use = textures.use_of(int(material)) if material != default else None
     places = None if use is None else attribute(use.coordinates, 2)
     if places is not None and not (np.abs(places) <= MAX_POSITION).all():
@@ -267,6 +269,7 @@ def _primitive(
             normals=None if normals is None else normals[faces],
             colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
             positions=None if places is None or use is None else use.positions(places)[faces],
+            alphas=None if alphas is None else alphas[faces],
         ),
         int(material),
     )

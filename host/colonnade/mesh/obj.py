@@ -81,7 +81,7 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
     """
     text = re.sub(r"\\\r?\n", " ", data.decode("utf-8", "replace")).replace("\t", " ")
     file = _Statements(re.sub(r"#[^\r\n]*", "", text))
-    vertices, vertex_colours = _vertices(file.vertices)
+    vertices, vertex_colours = _vertices(file.vertices, losses)
     normals = _rows(file.normals, 3)[:, :3]
     sizes, corners, corner_normals, corner_positions = _corners(file, path)
     losses.add(lost.POINTS, file.losses.get("p", 0))
@@ -144,11 +144,12 @@ def _rows(lines: Sequence[str], columns: int) -> Floats:
     return np.array(list(map(float, chain.from_iterable(rows))), dtype=np.float64).reshape(-1, shortest)
 
 
-def _vertices(lines: Sequence[str]) -> tuple[Floats, Floats | None]:
+def _vertices(lines: Sequence[str], losses: Losses) -> tuple[Floats, Floats | None]:
     """Positions [n, 3] and, if all vertices have them, linear colours [n, 3]."""
     values = _rows(lines, 3)
     if values.shape[1] < 6:
         return values[:, :3], None
+    losses.add(lost.ALPHA, int((values[:, 6] < 1.0).sum()) if values.shape[1] > 6 else 0)
     return values[:, :3], linear_from_srgb(np.clip(np.nan_to_num(values[:, 3:6]), 0.0, 1.0))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats
+from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.surface import RawSurface, from_polygons
 
@@ -58,6 +59,12 @@ def read_off(data: bytes, path: Path, losses: Losses) -> RawSurface:
         raise UserError(f"mesh {path}: a face names vertex {worst[0]}, but the file has {vertex_count:,} vertices")
     flat = np.array(corners, dtype=np.int64)
     colours = [_colour(row[1 + size :]) for size, row in zip(sizes, polygons, strict=True)]
+    if has_colours:
+        alphas = np.array([float(row[columns]) if len(row) > columns else np.inf for row in rows])
+        losses.add(lost.ALPHA, int((alphas < _white(values[:, columns - 3 :])).sum()))
+    losses.add(
+        lost.FACE_ALPHA, sum(_is_transparent(row[1 + size :]) for size, row in zip(sizes, polygons, strict=True))
+    )
     return from_polygons(
         values[:, :3],
         flat,
@@ -79,7 +86,17 @@ def _colour(words: list[str]) -> tuple[float, float, float]:
     return red, green, blue
 
 
+def _is_transparent(words: list[str]) -> bool:
+    """Whether the fourth number after a face's corners is below that of an opaque face."""
+    return len(words) > 3 and float(words[3]) < (255.0 if all("." not in word for word in words[:3]) else 1.0)
+
+
+def _white(colours: Floats) -> float:
+    """The largest value of colours without a type: that of bytes, or 1."""
+    return 255.0 if bool((colours > 1.0).any()) else 1.0
+
+
 def _linear(colours: Floats, is_whole: bool | None = None) -> Floats:
     """Colours from sRGB: bytes if they are whole numbers, else from 0 to 1."""
-    white = 255.0 if (bool((colours > 1.0).any()) if is_whole is None else is_whole) else 1.0
+    white = _white(colours) if is_whole is None else 255.0 if is_whole else 1.0
     return linear_from_srgb(np.clip(np.nan_to_num(colours) / white, 0.0, 1.0))

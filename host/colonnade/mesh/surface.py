@@ -32,6 +32,7 @@ class RawSurface:
         source_faces: The face of the file that each is a part of, int64 [m]; None: themselves.
         source_count: Faces of the file, if `source_faces` is given.
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
+        alphas: Alpha of the corners, which counts for materials with one, 0 to 1, float64 [m, 3]; None: all are opaque.
     """
 
     vertices: Floats
@@ -45,6 +46,7 @@ class RawSurface:
     source_faces: Indices | None = None
     source_count: int = 0
     single_sided: npt.NDArray[np.bool_] | None = None
+    alphas: Floats | None = None
 
     @property
     def material_index(self) -> Indices:
@@ -125,4 +127,5 @@ def joined(parts: Sequence[RawSurface]) -> RawSurface:
         colours=filled("colours", (3, 3), np.nan),
         textures=parts[0].textures,
         positions=filled("positions", (3, 2), 0.0),
+        alphas=filled("alphas", (3,), 1.0),
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import json
 from pathlib import Path
 from typing import Any
 
@@ -112,3 +114,66 @@ def test_map_d_cuts_too(tmp_path: Path) -> None:
     assert area(whole) == pytest.approx(1.0)
     grey = np.repeat(disc(128)[..., 3:], 3, axis=2)
     assert area(square(tmp_path, grey, "map_d a.png\n")) == pytest.approx(np.pi * 0.4**2, rel=0.01)
+
+
+def painted(folder: Path, alphas: list[float], picture: np.ndarray | None = None, **material: Any) -> Mesh:
+    """The triangle of the unit points, green, with an alpha at each corner; as of `masked` with a picture."""
+    path = gltf(folder, np.full((2, 2, 3), 255, np.uint8) if picture is None else picture)
+    document = json.loads(path.read_text())
+    colours = np.array([(0.0, 1.0, 0.0, alpha) for alpha in alphas], np.float32).tobytes()
+    document["buffers"].append({"byteLength": 48, "uri": "data:;base64," + base64.b64encode(colours).decode()})
+    document["bufferViews"].append({"buffer": 1, "byteLength": 48})
+    document["accessors"].append({"bufferView": 3, "componentType": 5126, "count": 3, "type": "VEC4"})
+    document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 2
+    if picture is None:
+        del document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+    document["materials"][0] |= material
+    path.write_text(json.dumps(document))
+    return load_mesh(path, corner_colours=True)
+
+
+def test_alpha_of_vertices_cuts_a_mask_along_a_line(tmp_path: Path) -> None:
+    """With 1, 0 and 0 at the corners, alpha 1/2 is half way: a quarter of the area, as one triangle."""
+    whole = np.sqrt(3) / 2
+    quarter = painted(tmp_path, [1, 0, 0], alphaMode="MASK")
+    assert area(quarter) == pytest.approx(whole / 4) and len(quarter.faces) == 1 and quarter.notes == ()
+    assert area(painted(tmp_path, [0, 1, 1], alphaMode="MASK")) == pytest.approx(whole * 3 / 4)
+    assert area(painted(tmp_path, [1, 0, 0], alphaMode="MASK", alphaCutoff=0.9)) == pytest.approx(whole / 100)
+    assert area(painted(tmp_path, [0.6, 0.7, 1], alphaMode="MASK")) == pytest.approx(whole)
+    with pytest.raises(UserError, match="all its faces are transparent"):
+        painted(tmp_path, [0.1, 0.2, 0.4], alphaMode="MASK")
+
+
+def test_alpha_of_vertices_is_blended_as_that_of_a_texture(tmp_path: Path) -> None:
+    line = "1 partly transparent material is not blended"
+    pane = painted(tmp_path, [0.1, 0.2, 0.3], alphaMode="BLEND")
+    assert pane.materials[0].kind == "glass" and line in pane.notes[0]
+    np.testing.assert_allclose(pane.materials[0].albedo, (0.8, 1.0, 0.8), atol=1e-3)
+    cut = painted(tmp_path, [1, 0, 0], alphaMode="BLEND")
+    assert cut.materials[0].kind == "diffuse" and line in cut.notes[0]
+    assert painted(tmp_path, [1, 1, 1], alphaMode="BLEND").notes == ()
+    # The format ignores it without a mode, and it is noted
+    opaque = painted(tmp_path, [1, 0, 0])
+    assert len(opaque.faces) == 1 and "2 partly transparent vertices are opaque" in opaque.notes[0]
+
+
+def test_alpha_of_vertices_multiplies_that_of_the_texture(tmp_path: Path) -> None:
+    """A picture of alpha 0.8 with 1, 0, 0 at the corners: shown where the weight of the first is 5/8."""
+    picture = np.full((64, 64, 4), (255, 255, 255, 204), np.uint8)
+    picture[::2, ::2] = (0, 0, 255, 204)
+    mesh = painted(tmp_path, [1, 0, 0], picture, alphaMode="MASK")
+    assert area(mesh) == pytest.approx(np.sqrt(3) / 2 * (3 / 8) ** 2, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("a.obj", "v 0 0 0 1 0 0 1\nv 1 0 0 1 0 0 0.5\nv 0 1 0 1 0 0 0\nf 1 2 3\n", "2 partly transparent vertices"),
+        ("a.off", "COFF\n3 1 0\n0 0 0 9 9 9 255\n1 0 0 9 9 9 128\n0 1 0 9 9 9 0\n3 0 1 2\n", "2 partly transparent v"),
+        ("b.off", "COFF\n3 1 0\n0 0 0 0 0 1 1\n1 0 0 0 0 1 1\n0 1 0 0 0 1 0\n3 0 1 2\n", "1 partly transparent vertex"),
+        ("c.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 200 9 9 20\n", "1 partly transparent face is opaque"),
+    ],
+)
+def test_alpha_of_formats_without_a_mode_is_noted(tmp_path: Path, name: str, content: str, says: str) -> None:
+    (tmp_path / name).write_text(content)
+    assert says in load_mesh(tmp_path / name, corner_colours=True).notes[0]
