@@ -1,12 +1,13 @@
-"""Reads STL files with trimesh, after a check that they are whole."""
+"""Reads STL files, after a check that they are whole.
+
+This is our own code because trimesh prints a traceback for a facet normal that is no number, as some programs write.
+"""
 
 from __future__ import annotations
 
-import io
 import re
 import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,30 +25,28 @@ def read_stl(data: bytes, path: Path, losses: Losses) -> RawSurface:
     Raises:
         UserError: The file is invalid or truncated.
     """
-    import trimesh
-
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= _HEADER else 0
     is_binary = len(data) >= _HEADER and len(data) == _HEADER + _FACET * count
     if not is_binary and data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:4096].lower():
-        kind = "stl_ascii"
         facets, corners = (len(re.findall(word, data)) for word in (rb"(?i)\bfacet\s+normal\b", rb"(?i)\bvertex\b"))
         if corners != 3 * facets or len(re.findall(rb"(?i)\bendsolid\b", data)) == 0:
             raise UserError(
                 f"mesh {path} is truncated: it begins {facets:,} facets and has {corners:,} of their vertices, and"
                 f" {'no' if b'endsolid' not in data.lower() else 'an'} endsolid"
             )
+        words = re.findall(rb"(?i)\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
+        if len(words) != corners:
+            raise UserError(f"mesh {path}: a vertex has fewer than 3 numbers")
+        vertices = np.array(words).astype(np.float64).reshape(-1, 3)
     else:
-        kind = "stl"
         if len(data) < _HEADER:
             raise UserError(f"mesh {path} is truncated: a binary STL file has {_HEADER} bytes and its facets")
         present = (len(data) - _HEADER) // _FACET
         if present < count:
             raise UserError(f"mesh {path} is truncated: its header states {count:,} facets, it holds {present:,}")
-        data = data[: _HEADER + _FACET * count]
         records = np.frombuffer(data, np.uint8, _FACET * count, _HEADER).reshape(-1, _FACET)
         losses.add(FACET_COLOURS, int(records[:, 48:].any(axis=1).sum()))
         if count == 0:
             raise UserError(f"mesh {path} has no faces: its header states none")
-    loaded: Any = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False)
-    vertices = np.asarray(loaded.vertices, dtype=np.float64)
-    return RawSurface(vertices, np.asarray(loaded.faces, dtype=np.int64))
+        vertices = np.ascontiguousarray(records[:, 12:48]).view("<f4").reshape(-1, 3).astype(np.float64)
+    return RawSurface(vertices, np.arange(len(vertices), dtype=np.int64).reshape(-1, 3))

@@ -115,3 +115,16 @@ def test_a_negative_shininess_is_noted(tmp_path: Path) -> None:
     mesh = load_mesh(tmp_path / "a.obj")
     assert mesh.materials[0].albedo == pytest.approx(linear_from_srgb(np.array([0.25, 0.5, 0.75])))
     assert mesh.notes[0].endswith("1 material's negative Ns is taken as 0: highlights are not rendered")
+
+
+@pytest.mark.parametrize("normal", ["-nan(ind) 0 0", "-1.#IND 0 0", "0 0"])
+def test_normals_of_stl_that_are_no_numbers_print_nothing(
+    tmp_path: Path, normal: str, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    """Normals of STL are not used; some programs write these for facets without area."""
+    corners = "".join(f"vertex {corner}\n" for corner in ("0 0 0", "1 0 0", "0 1e0 0"))
+    facet = f"facet normal {normal}\nouter loop\n{corners}endloop\nendfacet\n"
+    (tmp_path / "a.stl").write_text(f"solid a\n{facet}endsolid a\nsolid b\n{facet.replace('1e0', '-1')}endsolid b\n")
+    mesh = load_mesh(tmp_path / "a.stl")
+    assert len(mesh.faces) == 2 and mesh.notes == ()
+    assert caplog.records == [] and capfd.readouterr().err == ""
