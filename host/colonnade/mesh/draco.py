@@ -22,9 +22,9 @@ import numpy.typing as npt
 
 from colonnade.common.errors import UserError
 
-#: Memory of the process beside its libraries, bytes, and more for each byte of the streams. A vertex with a normal, a
-#: texture coordinate and a colour takes 120 bytes, of 4 to 20 in the stream.
-_MEMORY, _MEMORY_OF_A_BYTE = 1 << 29, 500
+#: Memory of the process beside its libraries, bytes, more for each byte of the streams, and the most. A vertex with a
+#: normal, a texture coordinate and a colour takes 120 bytes, of 4 to 20 in the stream.
+_MEMORY, _MEMORY_OF_A_BYTE, _MOST_MEMORY = 1 << 29, 500, 1 << 33
 #: Its processor time, seconds, and bytes of the streams for one more. It decodes 30 MB in a second.
 _SECONDS, _BYTES_OF_A_SECOND = 5, 1 << 20
 
@@ -53,7 +53,8 @@ def decode_draco(streams: Sequence[bytes]) -> list[DracoMesh]:
         UserError: A stream is damaged, holds no triangles, or asks for more than the limits.
     """
     size = sum(map(len, streams))
-    memory, seconds = _MEMORY + _MEMORY_OF_A_BYTE * size, _SECONDS + size // _BYTES_OF_A_SECOND
+    memory = min(_MEMORY + _MEMORY_OF_A_BYTE * size, _MOST_MEMORY)
+    seconds = _SECONDS + size // _BYTES_OF_A_SECOND
     done = subprocess.run(
         [sys.executable, "-I", "-m", "colonnade.mesh.draco", str(memory), str(seconds)],
         input=b"".join(struct.pack("<Q", len(stream)) + stream for stream in streams),

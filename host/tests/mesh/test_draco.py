@@ -212,6 +212,13 @@ def test_a_hostile_stream_is_refused(tmp_path: Path, stream: bytes, says: str) -
     assert "\n" not in str(raised.value) and "a.gltf" in str(raised.value)
 
 
+def test_the_limits_grow_with_the_streams_up_to_a_most() -> None:
+    with pytest.raises(UserError, match="more than 1,012 MiB or 6 s"):
+        draco.decode_draco([bytes(1 << 20)])
+    with pytest.raises(UserError, match="more than 8,192 MiB or 21 s"):
+        draco.decode_draco([bytes(1 << 20)] * 16)
+
+
 def test_the_process_ends_at_its_limit_of_time() -> None:
     program = "from colonnade.mesh.draco import _limit\n_limit(1 << 28, 1)\nwhile True: pass"
     assert subprocess.run([sys.executable, "-I", "-c", program], check=False).returncode < 0
