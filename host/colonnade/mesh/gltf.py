@@ -252,6 +252,8 @@ def _primitive(
         losses.add(lost.ALPHA, int((alphas < 1.0).sum()))
     use = textures.use_of(int(material)) if material != default else None
     places = None if use is None else attribute(use.coordinates, 2)
+    if places is not None and use is not None:
+        places = use.positions(places)
     if places is not None and not (np.abs(places) <= MAX_POSITION).all():
         raise document.error(
             f"a primitive has texture coordinates beyond {MAX_POSITION:,.0f}, or not finite: export it again"
@@ -268,7 +270,7 @@ def _primitive(
             faces=faces,
             normals=None if normals is None else normals[faces],
             colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
-            positions=None if places is None or use is None else use.positions(places)[faces],
+            positions=None if places is None else places[faces],
             alphas=None if alphas is None else alphas[faces],
         ),
         int(material),

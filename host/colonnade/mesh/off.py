@@ -50,9 +50,10 @@ def read_off(data: bytes, path: Path, losses: Losses) -> RawSurface:
         raise UserError(f"mesh {path}: a vertex has fewer than {columns} numbers")
     values = np.array([[float(word) for word in row[:columns]] for row in rows], dtype=np.float64).reshape(-1, columns)
     polygons = lines[first + vertex_count : first + vertex_count + face_count]
-    sizes = np.array([int(row[0]) for row in polygons], dtype=np.int64)
-    if any(not 0 <= size < len(row) for size, row in zip(sizes, polygons, strict=True)):
+    counts_of_faces = [int(row[0]) for row in polygons]
+    if any(not 0 <= size < len(row) for size, row in zip(counts_of_faces, polygons, strict=True)):
         raise UserError(f"mesh {path}: a face has fewer corners than it states")
+    sizes = np.array(counts_of_faces, dtype=np.int64)
     corners = [int(word) for size, row in zip(sizes, polygons, strict=True) for word in row[1 : 1 + size]]
     worst = [index for index in (min(corners, default=0), max(corners, default=-1)) if not 0 <= index < vertex_count]
     if corners and worst:

@@ -134,6 +134,9 @@ CASES = {
     "off-index": Case(
         OFF, "names vertex 9, but the file has 3", {"x.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"}
     ),
+    "off-size": Case(
+        OFF, "fewer corners than it states", {"x.off": f"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n{'9' * 20} 0 1 2\n"}
+    ),
     "off-count": Case(OFF, "x.off", {"x.off": f"OFF\n{10**12} {10**12} 0\n0 0 0\n"}),
     "off-noise": Case(OFF, "x.off", {"x.off": "OFF\n\x1b[31m\n"}),
     "gltf-deep": Case(GLTF, "nested too deeply", {"x.gltf": "[" * 100_000}),

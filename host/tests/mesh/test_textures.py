@@ -273,3 +273,13 @@ def test_an_element_of_ply_without_rows_is_read(tmp_path: Path) -> None:
     file.write_text("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n")
     with pytest.raises(UserError, match="its vertices lack x, y or z"):
         load_mesh(file)
+
+
+@pytest.mark.parametrize("transform", [{"scale": [1e300, 1]}, {"offset": [0, -1e300]}])
+def test_a_huge_transform_of_a_texture_is_refused(tmp_path: Path, transform: dict[str, list[float]]) -> None:
+    """Also with an alpha, whose cut counts pixels by whole numbers."""
+    info = {"index": 0, "extensions": {"KHR_texture_transform": transform}}
+    material = {"pbrMetallicRoughness": {"baseColorTexture": info}, "alphaMode": "MASK"}
+    picture = np.dstack([FOUR, np.full((2, 2), 100, np.uint8)])
+    with pytest.raises(UserError, match="texture coordinates beyond 1,000,000"):
+        load_mesh(gltf(tmp_path, picture, materials=[material]))
