@@ -148,6 +148,8 @@ def _vertices(lines: Sequence[str], losses: Losses) -> tuple[Floats, Floats | No
     """Positions [n, 3] and, if all vertices have them, linear colours [n, 3]."""
     values = _rows(lines, 3)
     if values.shape[1] < 6:
+        coloured = sum(line.count(" ") >= 5 and len(line.split()) >= 6 for line in lines)
+        losses.add(lost.SOME_COLOURS, coloured)
         return values[:, :3], None
     losses.add(lost.ALPHA, int((values[:, 6] < 1.0).sum()) if values.shape[1] > 6 else 0)
     return values[:, :3], linear_from_srgb(np.clip(np.nan_to_num(values[:, 3:6]), 0.0, 1.0))

@@ -256,6 +256,12 @@ def test_what_an_obj_file_loses_is_named(tmp_path: Path) -> None:
     ]
 
 
+def test_colours_of_some_vertices_are_noted(tmp_path: Path) -> None:
+    lines = "v 0 0 0 1 0 0\nv  1  0  0\nv 0 1 0 1 0 0 1\nf 1 2 3\n"
+    mesh = load_mesh(written(tmp_path / "a.obj", lines))
+    assert lost(mesh) == ["2 colours of vertices are not shown: not all vertices have one"]
+
+
 def test_a_plain_file_loses_nothing(tmp_path: Path) -> None:
     written(tmp_path / "a.mtl", "newmtl a\nKa 0 0 0\nKd 1 0 0\nKs 0 0 0\nd 1\nillum 2\n")
     mesh = load_mesh(written(tmp_path / "a.obj", f"mtllib a.mtl\n{OBJ_POINTS}usemtl a\ns off\nf 1 2 4 3\n"))
