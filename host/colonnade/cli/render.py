@@ -57,7 +57,8 @@ if TYPE_CHECKING:
     "--samples",
     type=click.IntRange(min=1, max=MAX_SAMPLES),
     metavar="N",
-    help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene]",
+    help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene; if it names none, 4 in"
+    " the photo of a room, otherwise 1]",
 )
 @click.option("--output", type=FILE, metavar="FILE", help="Write a PNG picture, or with --frames a .webp animation.")
 @click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances as .npz.")

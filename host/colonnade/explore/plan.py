@@ -241,8 +241,9 @@ def _frames(file: StudyFile) -> list[Frame]:
     for name in workload.scenes:
         try:
             scene = load_scene(file.path.parent / name)
-            if scene.blurs or scene.frame.samples > 1:
-                key = "frame.samples" if scene.frame.samples > 1 else scene.blurs[0]
+            samples = scene.frame.samples or 1
+            if scene.blurs or samples > 1:
+                key = "frame.samples" if samples > 1 else scene.blurs[0]
                 raise UserError(f"scene {name}: a study renders one sample a pixel: leave out {key}")
         except UserError as error:
             raise file.error(("workload", "scenes", name), str(error)) from None

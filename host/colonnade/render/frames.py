@@ -29,10 +29,14 @@ from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.parser import load_scene
+from colonnade.scene.samples import PHOTO_SAMPLES
 from colonnade.scene.view import View, make_view, with_overrides
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.inspect import coarse_line
 from colonnade.scene_image.packer import pack
+
+#: Names the default to who has not chosen.
+_DEFAULT_SAMPLES = f"{PHOTO_SAMPLES} samples a pixel, the default in a room: --samples 1 takes a quarter of the time"
 
 
 def render(request: RenderRequest, progress: Progress = QUIET) -> RenderResult:
@@ -56,6 +60,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         scene = scene.with_environment(request.background)
     if request.mesh is not None:
         scene = scene.with_mesh(request.mesh)
+    has_default = _has_default_samples(scene, request)
     scene = with_requested_samples(scene, request)
     width, height = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
@@ -73,7 +78,10 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         from colonnade.render.reference_frames import ReferenceOptions, reference_frames
 
         options = ReferenceOptions(exposure, request.relit, request.truth)
-        yield from reference_frames(poses, manifest, (width, height), progress, options)
+        for index, result in enumerate(reference_frames(poses, manifest, (width, height), progress, options)):
+            if has_default and index == 0:
+                progress.note(_DEFAULT_SAMPLES)
+            yield result
         return
     if request.truth is not None:
         raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
@@ -94,6 +102,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         image = pack_scene(scene, mesh, manifest, environment)
         if (line := coarse_line(image.header)) is not None:
             progress.note(line)
+        if has_default:
+            progress.note(_DEFAULT_SAMPLES)
         poses = [scene.at(pose.motion_progress) for pose in poses]
         passes = [pose.passes(exposure) for pose in poses]
         shows_environment = request.relit or environment is None or environment.environment.photo is None
@@ -129,21 +139,32 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         yield result
 
 
+def _has_default_samples(scene: Scene, request: RenderRequest) -> bool:
+    """Whether neither scene nor request names samples, and an object in a photo gets several."""
+    is_named = request.samples is not None or scene.frame.samples is not None
+    single = request.relit or request.hits or request.waveform is not None
+    return scene.background.room is not None and not is_named and not single
+
+
 def with_requested_samples(scene: Scene, request: RenderRequest) -> Scene:
-    """The scene with the samples of the request.
+    """The scene with the samples of the request, or with its own ones.
+
+    If neither names them, an object in a photo has `PHOTO_SAMPLES`. Other frames have one.
 
     Raises:
         UserError: The request needs the rays of a single pass, or one sample hides what the scene asks for.
     """
     if request.samples is not None:
         scene = scene.with_samples(request.samples)
-    elif scene.blurs and scene.frame.samples == 1:
+    elif _has_default_samples(scene, request):
+        scene = scene.with_samples(PHOTO_SAMPLES)
+    elif scene.blurs and (scene.frame.samples or 1) == 1:
         raise UserError(
             f"{scene.blurs[0]} shows only with several samples: give frame.samples or --samples;"
             " --samples 1 renders the middle"
         )
     for what, is_used in (("hits are", request.hits), ("a waveform is", request.waveform is not None)):
-        if is_used and scene.frame.samples > 1:
+        if is_used and (scene.frame.samples or 1) > 1:
             raise UserError(f"{what} of one sample a pixel, this frame has {scene.frame.samples}: give --samples 1")
     return scene
 

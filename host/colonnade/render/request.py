@@ -22,7 +22,7 @@ class RenderRequest:
         backend: ``rtl``: the generated Verilog in a simulator; ``model``: its bit-exact model; ``reference``: Embree.
         size: (width, height), pixels; None: that of the scene.
         frames: Number of frames, from 1. The first shows the scene at rest.
-        samples: Samples of a pixel, from 1; None: as many as the scene says.
+        samples: Samples of a pixel, from 1; None: those of the scene, or a default.
         mesh: Name or file of a mesh that replaces the scene's.
         background: Folder of a room that replaces the scene's background.
         hits: Whether the caller needs hit triangles; the configuration must then have them.

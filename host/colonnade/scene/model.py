@@ -306,11 +306,11 @@ class Background:
 
 @dataclass(frozen=True, config=_STRICT)
 class FrameSize:
-    """Default size of the frame, pixels, and the samples of each pixel."""
+    """Default size of the frame, pixels, and the samples of each pixel; None: `colonnade.render.frames` chooses."""
 
     width: Annotated[int, Strict(), Ge(1)] = 640
     height: Annotated[int, Strict(), Ge(1)] = 480
-    samples: Annotated[int, Strict(), Interval(ge=1, le=MAX_SAMPLES)] = 1
+    samples: Annotated[int, Strict(), Interval(ge=1, le=MAX_SAMPLES)] | None = None
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -359,7 +359,7 @@ class Scene:
         """
         return [
             replace(self, sample=sample, motion_progress=min(1.0, self.motion_progress + sample.time * exposure))
-            for sample in samples_of_frame(self.frame.samples, len(self.lights))
+            for sample in samples_of_frame(self.frame.samples or 1, len(self.lights))
         ]
 
     @property

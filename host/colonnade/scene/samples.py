@@ -34,6 +34,8 @@ class Sample:
         return self.lights[index] if index < len(self.lights) else (0.0, 0.0)
 
 
+#: Samples of a pixel in the photo of a room, unless the scene or the command names others.
+PHOTO_SAMPLES = 4
 #: The middle of everything.
 CENTRE = Sample()
 

@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def frame(folder: Path, text: str, backend: str = "model", **options: object) -> RenderResult:
     (folder / "scene.toml").write_text(text)
-    return render(RenderRequest(folder / "scene.toml", "small", ROOM, backend, SIZE, **options))
+    return render(RenderRequest(folder / "scene.toml", "small", ROOM, backend, SIZE, **{"samples": 1, **options}))
 
 
 def decibels(one: RenderResult, other: RenderResult, mask: np.ndarray | None = None) -> float:

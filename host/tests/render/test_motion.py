@@ -74,7 +74,7 @@ def same(one: RenderResult, other: RenderResult) -> bool:
 
 
 def in_environment(file: Path, backend: str, frames: int) -> list[RenderResult]:
-    return list(render_frames(RenderRequest(file, "small", ROOM, backend, (96, 72), frames)))
+    return list(render_frames(RenderRequest(file, "small", ROOM, backend, (96, 72), frames, samples=1)))
 
 
 @pytest.mark.parametrize("backend", ["model", "reference"])
@@ -92,7 +92,7 @@ def test_without_a_motion_the_object_turns_once(folder: Path) -> None:
     frames = in_environment(scene_file(folder, standing()), "model", 4)
     for index, frame in enumerate(frames):
         turned = scene_file(folder, standing(10.0 + 90.0 * index))
-        assert same(frame, render(RenderRequest(turned, "small", ROOM, "model", (96, 72))))
+        assert same(frame, render(RenderRequest(turned, "small", ROOM, "model", (96, 72), samples=1)))
 
 
 def test_one_frame_is_the_plain_one(folder: Path) -> None:
