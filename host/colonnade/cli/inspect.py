@@ -26,13 +26,6 @@ from colonnade.cli.options import FILE, dists_option, echo, finish, json_option,
     help="Encoding of the room's albedo and normal maps.",
 )
 @click.option(
-    "--plane-cells",
-    type=click.Choice(["8", "16"]),
-    default="8",
-    show_default=True,
-    help="Maximum number of cells along a tile's edge in the plane map.",
-)
-@click.option(
     "--output", type=FILE, metavar="DIR", help="Write pictures of the room's maps: source, decoded, difference."
 )
 @dists_option
@@ -43,7 +36,6 @@ def inspect(
     overrides: tuple[str, ...],
     background: Path | None,
     encoding: str,
-    plane_cells: str,
     output: Path | None,
     no_dists: bool,
     json_file: Path | None,
@@ -63,7 +55,7 @@ def inspect(
         raise click.UsageError("--output needs --background", context)
     require_outputs(json_file, folders=[output])
     if background is not None:
-        _inspect_environment(background, encoding, int(plane_cells), output, not no_dists, json_file)
+        _inspect_environment(background, encoding, output, not no_dists, json_file)
     elif directory is not None:
         _inspect_image(directory, config, overrides, json_file)
 
@@ -83,7 +75,7 @@ def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ..
 
 
 def _inspect_environment(
-    background: Path, encoding: str, plane_cells: int, output: Path | None, with_dists: bool, json_file: Path | None
+    background: Path, encoding: str, output: Path | None, with_dists: bool, json_file: Path | None
 ) -> None:
     from colonnade.common import progress
     from colonnade.environment.encoding.cache import encoded_environment
@@ -96,9 +88,7 @@ def _inspect_environment(
     for note in environment.notes:
         echo(f"colonnade: note: {environment.name}: {note}", err=True)
     with progress.for_terminal().step("encoding the room"):
-        image = encoded_environment(
-            environment, AttributeLayout(environment.width, environment.height, encoding, plane_cells=plane_cells)
-        )
+        image = encoded_environment(environment, AttributeLayout(environment.width, environment.height, encoding))
         report = measure(environment, image, with_dists)
     for line in report_lines(report):
         echo(line)

@@ -15,7 +15,11 @@ from colonnade.cli.options import FILE, dists_option, echo_lines, finish, json_o
 @click.command(short_help="Measure reconstructed rooms, or AR frames in them.")
 @click.argument("rooms", type=FILE, nargs=-1)
 @click.option("--frames", is_flag=True, help="Measure frames with objects instead of rays from probe spheres.")
-@click.option("--occlusion", is_flag=True, help="Measure objects behind furniture in synthetic rooms, without ROOMS.")
+@click.option(
+    "--occlusion",
+    is_flag=True,
+    help="Measure objects behind furniture in synthetic rooms, without ROOMS; with --rooms, behind thin things.",
+)
 @click.option("--light", is_flag=True, help="Measure relit rooms and mirrors against the photo.")
 @click.option("--rooms", "seeds", metavar="SEEDS", help="Measure generated rooms, such as 0-9,100, without ROOMS.")
 @dists_option
@@ -36,14 +40,15 @@ def study(
     By default the command traces rays from mirror, matt and glass spheres, and prints the share that finds the correct
     point: with planes of the full maps, and with those of the attribute memory. With --frames it prints the loss from
     encoding, reconstruction and fixed-point arithmetic. The loss is PSNR, FLIP and DISTS of frame, object and shadow.
-    With --occlusion it prints the share of an object's pixels that correctly show the object, or the room before it.
+    With --occlusion it prints the share of an object's pixels that correctly show the object, or the room before it:
+    behind furniture, or with --rooms behind a stool, a plant or a lamp in rooms that a seed generates.
     With --light it prints the PSNR of relit rooms and of a mirror against the photo, for default and for fitted lights.
     With --rooms it measures rays and encoded maps in rooms that a seed generates, and counts why rays are wrong.
     Tables are in Markdown.
     """
     context = click.get_current_context()
     generated = seeds is not None
-    if frames + occlusion + light + generated > 1:
+    if frames + occlusion + light > 1 or (generated and (frames or light)):
         raise click.UsageError("give one of --frames, --occlusion, --light and --rooms", context)
     if output is not None and not (frames or occlusion or light):
         raise click.UsageError("--output needs --frames, --occlusion or --light", context)
@@ -56,13 +61,15 @@ def study(
 
     from colonnade.common import progress
     from colonnade.common.atomic_files import made_folder
+    from colonnade.evaluation.studies.unseen_rooms import parse_seeds
 
     report: dict[str, Any]
     with nullcontext() if output is None else made_folder(output):
         if occlusion:
             from colonnade.evaluation.studies import occlusion as study_of_occlusion
 
-            results = study_of_occlusion.study(progress.for_terminal(), output)
+            chosen = None if seeds is None else parse_seeds(seeds)
+            results = study_of_occlusion.study(progress.for_terminal(), output, chosen)
             echo_lines(study_of_occlusion.table(results))
             report = {name: asdict(value) for name, value in results.items()}
         elif frames:
@@ -79,9 +86,7 @@ def study(
         elif seeds is not None:
             from colonnade.evaluation.studies import unseen_rooms
 
-            rooms_of_seeds = unseen_rooms.study_seeds(
-                unseen_rooms.parse_seeds(seeds), not no_dists, progress.for_terminal()
-            )
+            rooms_of_seeds = unseen_rooms.study_seeds(parse_seeds(seeds), not no_dists, progress.for_terminal())
             echo_lines(unseen_rooms.table(rooms_of_seeds))
             report = {str(seed): asdict(value) for seed, value in rooms_of_seeds.items()}
         elif light:

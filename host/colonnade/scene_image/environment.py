@@ -41,7 +41,7 @@ def tiles_beyond_heap(image: SceneImage) -> dict[str, int]:
     """
     words = {section.memory: section.words for section in image.attributes}
     counts = {}
-    for name, modes in (("albedo", MODES), ("normals", MODES), ("planes", PLANE_MODES[:5])):
+    for name, modes in (("albedo", MODES), ("normals", MODES), ("planes", PLANE_MODES)):
         descriptors, heap = words.get(f"{name}.descriptors"), words.get(f"{name}.heap")
         if descriptors is None or heap is None:
             continue

@@ -169,10 +169,10 @@ private:
         int mode, pointer;
 
         /// Number of ids of a tile; 1 for an illegal mode.
-        int count() const { return mode == 0 || mode > 4 ? 1 : mode < 3 ? 2 : 4; }
+        int count() const { return mode == 0 || mode == 7 ? 1 : mode < 3 || mode == 5 ? 2 : 4; }
     };
 
-    int cellLog(const Descriptor& tile) const { return sizes_.tileLog - (tile.mode % 2 ? 2 : 3); }
+    int cellLog(const Descriptor& tile) const { return sizes_.tileLog - (tile.mode > 4 ? 4 : tile.mode % 2 ? 2 : 3); }
 
     AttributeSizes sizes_;
     std::vector<Descriptor> descriptors_;

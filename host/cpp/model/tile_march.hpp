@@ -8,7 +8,7 @@ namespace colonnade {
 class TileMarch : protected MapGeometry {
 public:
     /// Largest number of march steps; after that the ray hits the bounding planes.
-    static constexpr int maxSteps = 128;
+    static constexpr int maxSteps = 512;
 
     TileMarch(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers, image.sizes()), image_(image) {}
 

@@ -273,7 +273,7 @@ def test_inspect_shows_the_loss_of_encoding(environment: Path, tmp_path: Path) -
     assert result.exit_code == 0, result.output
     assert "16,384 bytes" in result.output
     figures = json.loads(report.read_text())
-    assert figures["bytes"] == {"albedo": 16384, "normals": 16384, "planes": 8192}
+    assert figures["bytes"] == {"albedo": 16384, "normals": 16384, "planes": 12288}
     assert figures["albedo"]["dists"] is None
     assert figures["planes"]["median_cm"] < 0.1
     kinds = ("before", "after", "difference")

@@ -152,11 +152,12 @@ void run(const std::string& job, std::map<std::string, unsigned>& options) {
 } // namespace
 
 int main(int argc, char** argv) try {
-    std::map<std::string, unsigned> options{{"--bus", 0}, {"--memory", 0}, {"--latency", 1}, {"--stall", 0}, {"--seed", 1}};
+    std::map<std::string, unsigned> options{{"--bus", 0}, {"--memory", 0}, {"--latency", 1}, {"--stall", 0}, {"--order", 0}, {"--seed", 1}};
     std::string job;
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
-        if (options.count(argument) == 0) job = argument;
+        if (argument.rfind("--", 0) != 0) job = argument;
+        else if (options.count(argument) == 0) throw std::runtime_error("unknown option: " + argument);
         else if (++i < argc) options[argument] = static_cast<unsigned>(std::stoul(argv[i]));
         else throw std::runtime_error(argument + " needs a number");
     }

@@ -36,7 +36,7 @@ BLOCKS_PER_TILE_EDGE = 4
 
 
 #: Fields that are fixed in the hardware, and so not in its configuration.
-HOST_ONLY = ("field_bits", "plane_cells")
+HOST_ONLY = ("field_bits",)
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,6 @@ class AttributeLayout:
         map_bytes: Bytes of the albedo map, and of the normal map.
         planes: Entries of the plane table, 2 to 128; the last plane is infinitely far away.
         plane_bytes: Bytes of the plane table, the plane map and the bounding planes.
-        plane_cells: Largest number of cells on a tile's edge in the plane map, 8 or 16.
         bounding_planes: Number of bounding planes, for rays that leave the view.
 
     Raises:
@@ -66,8 +65,7 @@ class AttributeLayout:
     field_bits: int = 12
     map_bytes: int = 16384
     planes: int = 128
-    plane_bytes: int = 8192
-    plane_cells: int = 8
+    plane_bytes: int = 12288
     bounding_planes: int = 8
 
     def __post_init__(self) -> None:
@@ -84,10 +82,6 @@ class AttributeLayout:
         within("bounding_planes", 1, 16)
         if self.tile_size not in (8, 16, 32):
             raise UserError(f"background layout: tile_size is {self.tile_size}, it must be 8, 16 or 32")
-        if self.plane_cells not in (8, 16) or self.plane_cells > self.tile_size:
-            raise UserError(
-                f"background layout: plane_cells is {self.plane_cells}, it must be 8, or 16 in larger tiles"
-            )
         if self.encoding not in ("twoLevel", "slic"):
             raise UserError(f"background layout: encoding is {self.encoding!r}, it must be twoLevel or slic")
         if self.encoding == "twoLevel":

@@ -28,6 +28,8 @@ from colonnade.environment.model import Environment
 _MAX_ERROR = 0.5
 #: Cells on a tile's edge in the search for candidates.
 _COARSE = 8
+#: Most cells on a tile's edge.
+_FINEST = max(mode.cells for mode in PLANE_MODES)
 #: Alternating rounds of choosing ids and refitting planes.
 _ROUNDS = 3
 #: Candidate planes of a tile.
@@ -99,7 +101,7 @@ def _choices(pixels: Samples, planes: NDArray[np.float64], layout: AttributeLayo
     """Choose the candidate planes of each tile greedily."""
     inside = inside_mask(layout).astype(np.float32)
     index = split_tiles(np.arange(len(pixels.w)).reshape(layout.height, layout.width), layout)
-    finest, tried = layout.plane_cells, min(_CANDIDATES, len(planes))
+    finest, tried = min(_FINEST, layout.tile_size), min(_CANDIDATES, len(planes))
     candidates = np.empty((layout.tiles, tried), np.intp)
     costs = np.empty((layout.tiles, finest * finest, tried), np.float32)
     for first in range(0, layout.tiles, 16):

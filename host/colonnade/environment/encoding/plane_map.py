@@ -12,7 +12,7 @@ A descriptor, low bit first: mode (3), plane id or pointer (13).
 | 5 | 2 | 16x16 | 1 of ids, 16 of mask |
 | 6 | 4 | 16x16 | 2 of ids, 32 of mask |
 
-Cells and masks are ordered as in the two-level map. Modes 5 and 6 require `plane_cells` 16.
+Cells and masks are ordered as in the two-level map. Mode 7 is read as mode 0.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ The frames are also compared with those of the reference in the rooms' real geom
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from colonnade.common.image_io import encode_srgb, write_png
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.evaluation.studies.furnished_rooms import FURNISHED, Furnished
+from colonnade.evaluation.studies.thin_furniture import behind_thin_things, kind_of
 from colonnade.quality.image_metrics import psnr
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Scene, Transform
 
@@ -190,12 +191,15 @@ def _in_view(made: SyntheticRoom) -> Floats:
     return np.asarray((made.surface.vertices - to_world[:, 3]) @ to_world[:, :3])
 
 
-def study(progress: Progress = QUIET, output: Path | None = None) -> dict[str, OcclusionResult]:
-    """Measure all cases of `FURNISHED`; ``output`` is a folder for the pictures."""
+def study(
+    progress: Progress = QUIET, output: Path | None = None, seeds: Iterable[int] | None = None
+) -> dict[str, OcclusionResult]:
+    """Measure the cases of `FURNISHED`, or of `thin_furniture` by seed; ``output`` is a folder for the pictures."""
     from colonnade.mesh.load import load_mesh
 
+    thin = None if seeds is None else {f"{kind_of(seed)} {seed}": behind_thin_things(seed) for seed in seeds}
     results = {}
-    for name, case in FURNISHED.items():
+    for name, case in (FURNISHED if thin is None else thin).items():
         picture = None if output is None else output / f"{name}.png"
         with progress.step(f"measuring the {name}"):
             results[name] = measure(case, case.room(name), load_mesh(case.mesh), output=picture)

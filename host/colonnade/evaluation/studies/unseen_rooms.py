@@ -33,7 +33,7 @@ from colonnade.evaluation.studies.visible_surface import VisibleSurface
 #: behind another one. *early*: it hit another visible surface.
 CAUSES = ("maps", "planes", "way", "steps", "left", "hidden", "early")
 #: Most steps of the device's march.
-MAX_STEPS = 128
+MAX_STEPS = 512
 #: Largest seed, and most seeds of a table.
 MAX_SEED, MAX_ROOMS = 999_999, 1000
 

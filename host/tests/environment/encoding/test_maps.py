@@ -43,7 +43,7 @@ def noise(layout: AttributeLayout, seed: int = 0) -> NDArray[np.float64]:
 def test_sizes_at_640x480(encoding: str, map_bytes: int, heap: int) -> None:
     layout = AttributeLayout(encoding=encoding)
     assert (layout.tiles, layout.heap_words, layout.map_memory_bytes) == (1200, heap, map_bytes)
-    assert layout.plane_memory_bytes == 8192
+    assert layout.plane_memory_bytes == 12288
 
 
 @pytest.mark.parametrize("encoding", ["twoLevel", "slic"])

@@ -8,6 +8,7 @@ import numpy as np
 
 from colonnade.evaluation.studies.furnished_rooms import FURNISHED
 from colonnade.evaluation.studies.occlusion import measure, standing, table, true_occlusion
+from colonnade.evaluation.studies.thin_furniture import REPORT, behind_thin_things
 from colonnade.mesh.load import load_mesh
 from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.render import render_reference
@@ -26,6 +27,14 @@ def test_furniture_hides_the_object_behind_it() -> None:
     np.testing.assert_allclose(result.without + result.hidden, 1.0)
     assert result.agrees >= 0.98 and result.psnr > 40 and result.object_psnr > 25
     assert "chest" in table({"chest": result})
+
+
+def test_thin_things_hide_the_object_behind_them() -> None:
+    """Cells of one pixel hold stems, leaves and rungs."""
+    for seed in REPORT[:2]:
+        case = replace(behind_thin_things(seed), mesh="teapot:4")
+        result = measure(case, case.room("thin", *SIZE), load_mesh(case.mesh))
+        assert result.pixels > 200 and result.right >= 0.98 > result.without
 
 
 def test_the_reference_hides_what_furniture_hides() -> None:

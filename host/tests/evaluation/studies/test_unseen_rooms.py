@@ -74,6 +74,8 @@ def test_the_command_refuses_other_rooms_and_bad_seeds() -> None:
     for words, message in (
         (["--rooms", "0", "room"], "--rooms has its own rooms"),
         (["--rooms", "0", "--light"], "give one of"),
+        (["--rooms", "0", "--occlusion", "room"], "has its own rooms"),
+        (["--rooms", "0-", "--occlusion"], "is no seed"),
         (["--rooms", "0-"], "is no seed"),
     ):
         result = runner.invoke(cli, ["study", *words])
@@ -86,7 +88,7 @@ def test_a_room_is_measured() -> None:
     assert report.kind == "lean-to" and report.rays > 1000 and report.dists is None
     assert min(report.full, report.planes, report.device, report.true) > 0.9
     np.testing.assert_allclose(report.device + sum(report.causes.values()), 1.0)
-    assert report.bytes == {"albedo": 16384, "normals": 16384, "planes": 8192}
+    assert report.bytes == {"albedo": 16384, "normals": 16384, "planes": 12288}
     lines = table({3: report, 4: replace(report, device=0.5)}).splitlines()
     assert lines[2].startswith("| 3 | lean-to |") and lines[-1].startswith("| worst |") and "**50.0**" in lines[-1]
 

@@ -103,7 +103,7 @@ object ArbitraryConfig {
     planes         <- Gen.oneOf(16, 128, 256)
     boundingPlanes <- Gen.chooseNum(2, 16)
     mapHeap        <- Gen.chooseNum(66, 16384)
-    planeHeap      <- Gen.chooseNum(20, 16384)
+    planeHeap      <- Gen.chooseNum(68, 16384)
     columnsPerCopy <- Gen.chooseNum(1, 4)
   } yield {
     def parts(size: Int, edge: Int) = (size + edge - 1) / edge

@@ -71,7 +71,7 @@ object TestConfigs {
 
   /** Small maps, maps of the presets' size and maps of odd sizes, in both encodings. */
   val environments: Seq[ColonnadeConfig] = {
-    val large = environment.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 8192)
+    val large = environment.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 12288)
     val odd   = environment.copy(
       width = 331,
       height = 97,

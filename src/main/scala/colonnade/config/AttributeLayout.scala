@@ -61,7 +61,7 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends 
       planeBytes,
       descriptors + table + bounding,
       s"$tiles tile descriptors take $descriptors bytes, $planes planes $table and $boundingPlanes bounding planes $bounding",
-      largestTile = 2 + 2 * (1 << 6) / heapWordBits
+      largestTile = 2 + 2 * (1 << 8) / heapWordBits
     )
   }
 

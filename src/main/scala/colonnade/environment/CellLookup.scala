@@ -13,7 +13,7 @@ final class CellLookupIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   val cells = Flipped(new AttributeChannel(new CellRequest(layout), new CellResponse(layout), tagBits))
 }
 
-/** Looks up the planes of a pixel's tile, or the plane of its cell; see `PlaneDescriptor`. A mode beyond 4 counts as 0.
+/** Looks up the planes of a pixel's tile, or the plane of its cell; see `PlaneDescriptor`. Mode 7 counts as 0.
   *
   * A tile has consecutive words: two plane ids per word, then the cells' mask. A tile's ids are read word by word. For a
   * cell its mask is read first, and then the word with the id that the mask selects. So each request takes two cycles at
@@ -48,7 +48,7 @@ final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   private val tile     = tiles.io.tile.bits
   private val kind     = TileKind(tile.descriptor.mode)
   private val isCell   = !kind.isFlat && !tile.sideband.wholeTile
-  private val cell     = Mux(kind.isFine, tile.cell(3), tile.cell(2))
+  private val cell     = Mux(kind.isFinest, tile.cell(4), Mux(kind.isFine, tile.cell(3), tile.cell(2)))
   private val isSecond = RegInit(false.B)
   private val isLast   = isSecond || !(isCell || kind.hasFour)
   private val maskWord = Mux(kind.hasFour, (cell >> 3) +& 2.U, (cell >> 4) +& 1.U)
@@ -76,7 +76,7 @@ final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   resp.tag             := read.bits.sideband.tag
   resp.isIllegal       := Mux(wasCell, illegalMask, heap.isIllegal)
   resp.content.count   := count
-  resp.content.cellLog := layout.tileLog.U - Mux(from.isFlat, 0.U, Mux(from.isFine, 3.U, 2.U))
+  resp.content.cellLog := layout.tileLog.U - Mux(from.isFlat, 0.U, Mux(from.isFinest, 4.U, Mux(from.isFine, 3.U, 2.U)))
   resp.content.ids     := VecInit(Seq(first(7, 0), first(15, 8), heap.word(7, 0), heap.word(15, 8)).zipWithIndex.map {
     case (id, i) => Mux(count > i.U, id, 0.U)
   })
@@ -94,16 +94,20 @@ private final class TileKind extends Bundle {
   /** The tile has four planes, not two. */
   val hasFour = Bool()
 
-  /** A cell's edge is an eighth of the tile's, not a quarter. */
+  /** A cell's edge is a sixteenth of the tile's. */
+  val isFinest = Bool()
+
+  /** Otherwise, an eighth, not a quarter. */
   val isFine = Bool()
 }
 
 private object TileKind {
   def apply(mode: UInt): TileKind = {
     val kind = Wire(new TileKind)
-    kind.isFlat  := mode === 0.U || mode > 4.U
-    kind.hasFour := mode === 3.U || mode === 4.U
-    kind.isFine  := !mode(0)
+    kind.isFlat   := mode === 0.U || mode === 7.U
+    kind.hasFour  := mode === 3.U || mode === 4.U || mode === 6.U
+    kind.isFinest := mode > 4.U
+    kind.isFine   := !mode(0)
     kind
   }
 }

@@ -21,12 +21,15 @@ final class CellProgram(
   private val isSecondAxis = Reg(Bool())
   private val firstEdge    = Reg(SInt(combineBits.W))
 
-  /** A tile has 8 or 4 cells along each edge. */
-  private val isFine = stepper.tile.cellLog === (layout.tileLog - 3).U
+  /** A value by the log2 of a tile's cells along each edge: 2, 3 or 4. */
+  private def byCells(value: Int => UInt): UInt = {
+    def has(log: Int): Bool = stepper.tile.cellLog === (layout.tileLog - log).U
+    Mux(has(4), value(4), Mux(has(3), value(3), value(2)))
+  }
 
-  private def width(axis: UInt): UInt = Mux(isFine, dda.stride(axis) >> 3, dda.stride(axis) >> 2)
+  private def width(axis: UInt): UInt = byCells(dda.stride(axis) >> _)
 
-  private val isInside = stepper.cell.map(cell => cell < Mux(isFine, 8.U, 4.U)).reduce(_ && _)
+  private val isInside = stepper.cell.map(_ < byCells(log => (1 << log).U)).reduce(_ && _)
 
   /** Steps from `Cells` on. */
   def describe(): Unit = {
@@ -67,14 +70,11 @@ final class CellProgram(
     step(FirstCell) {
       val inTile = Seq(hitPixel.x, hitPixel.y).map(_(layout.tileLog - 1, 0))
       set(m.axis, 0.U)
-      for (a <- 0 to 1) {
-        val cell = Mux(isFine, inTile(a) >> (layout.tileLog - 3), inTile(a) >> (layout.tileLog - 2))
-        set(stepper.cell(a), cell)
-      }
+      for (a <- 0 to 1) set(stepper.cell(a), byCells(log => inTile(a) >> (layout.tileLog - log)))
     }
     step(CellEdge) {
       val cell = stepper.cell(m.axis(0))
-      val last = Mux(isFine, 7.U, 3.U)
+      val last = byCells(log => ((1 << log) - 1).U)
       // To the last cell, last - cell, without a carry before the multiplier
       m.multiply(width(m.axis(0)).zext, (cell ^ Mux(dda.isNegative(m.axis(0)), 0.U, last)).zext)
     }

@@ -1,5 +1,6 @@
 package colonnade.environment
 
+import chisel3.util.log2Ceil
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 
 /** Widths of the march; f is `shadeBits`.
@@ -30,8 +31,11 @@ final class MarchFormats(config: ColonnadeConfig) {
 
   /** Log2 of a share of w: a ray that is behind a surface by less is on it. */
   val nearLog:  Int = 8
-  val maxSteps: Int = 128
-  val stepBits: Int = 8
+
+  /** A ray that crosses tiles and cells this often ends. A map of the finest cells has 31 on the longest way through a tile.
+    */
+  val maxSteps: Int = 512
+  val stepBits: Int = log2Ceil(maxSteps + 1)
 
   /** Digits of a factor that is wider than the multiplier; unsigned, except for the highest. */
   val digitBits: Int = 21

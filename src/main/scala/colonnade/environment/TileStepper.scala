@@ -36,8 +36,8 @@ final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
   /** The planes of the current tile. */
   val tile: CellResponse = Reg(new CellResponse(layout))
 
-  /** The current cell of the tile. */
-  val cell: Vec[UInt] = Reg(Vec(2, UInt(4.W)))
+  /** The current cell of the tile, or 16 or 31 beside it. */
+  val cell: Vec[UInt] = Reg(Vec(2, UInt(5.W)))
 
   /** The interval without guard bits. */
   val enter: UInt = tEnter(distanceBits - 1, guardBits)

@@ -37,7 +37,8 @@ final class NormalEntry extends Bundle {
   *
   * Mode 0: the whole tile lies in the plane `pointer`. Modes 1 and 2: two planes, for cells of a quarter or an eighth of
   * the tile's edge; the heap word `pointer` holds their ids (0 in the low byte), the mask follows. Modes 3 and 4: four
-  * planes, for the same cells; two words of ids, then the mask.
+  * planes, for the same cells; two words of ids, then the mask. Modes 5 and 6: two and four planes, for cells of a
+  * sixteenth of the tile's edge.
   */
 final class PlaneDescriptor extends Bundle {
   val pointer = UInt(AttributeLayout.pointerBits.W)

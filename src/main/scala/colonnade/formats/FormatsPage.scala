@@ -47,9 +47,9 @@ object FormatsPage {
       "An entry of a palette, or a seed: a unit vector in view space (x to the right, y down, z forward).",
       table(new NormalEntry),
       "### Tile of the plane map",
-      """Mode 0, and any beyond 4: all of the tile lies in the plane `pointer`. Modes 1 and 2: in two planes, for cells of 1/4 or 1/8
-        |of the tile's edge; the heap word `pointer` holds their ids, the first in its low byte, and the mask follows. Modes 3 and
-        |4: in four planes, for the same cells; two words of ids, then the mask. Masks are as above.""".stripMargin,
+      """Mode 0, and 7: all of the tile lies in the plane `pointer`. Modes 1, 2 and 5: in two planes, for cells of 1/4, 1/8 or 1/16 of
+        |the tile's edge; the heap word `pointer` holds their ids, the first in its low byte, and the mask follows. Modes 3, 4 and
+        |6: in four planes, for the same cells; two words of ids, then the mask. Masks are as above.""".stripMargin,
       table(new PlaneDescriptor),
       "### Plane",
       """At the pixel (u, v) the inverse depth is w = (a · (u − width/2) + b · (v − height/2)) / 1024 + c, with each coefficient times

@@ -145,7 +145,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     ) shouldBe ".mapBytes is 1417; it must be at least 1418: 50 tile descriptors take 200 bytes " +
       "and 256 palette entries 1152, the finest tile 66"
     refused("mapBytes=17737") should startWith(".mapBytes is 17737; it must be at most 17736: 50 tile descriptors")
-    refused("planeBytes=1287") should startWith(".planeBytes is 1287; it must be at least 1288: 50 tile descriptors")
+    refused("planeBytes=1335") should startWith(".planeBytes is 1335; it must be at least 1336: 50 tile descriptors")
     refused("encoding=slic", "mapBytes=566") shouldBe ".mapBytes is 566; it must be at least 567: " +
       "50 seeds take 225 bytes and the labels of blocks 342"
     refused("tileSize=24") shouldBe ".tileSize is 24; it must be one of 16, 32"

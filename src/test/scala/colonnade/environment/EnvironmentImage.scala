@@ -54,7 +54,7 @@ final class EnvironmentImage(config: ColonnadeConfig, random: Random, illegal: D
 
   private def planeDescriptor(): BigInt = {
     val mode    = random.nextInt(8)
-    val words   = Map(1 -> 2, 2 -> 5, 3 -> 4, 4 -> 10).get(mode)
+    val words   = Map(1 -> 2, 2 -> 5, 3 -> 4, 4 -> 10, 5 -> 17, 6 -> 34).get(mode)
     val pointer = words.filterNot(_ => isIllegal()).fold(randomPointer())(count =>
       random.nextInt(layout.planeHeapWords - count + 1)
     )

@@ -26,9 +26,9 @@ class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       val config = tiny.copy(units = tiny.units.copy(pathContexts = contexts))
       test(new PathHitsHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         val driver = new PathHitsDriver(dut, config, new Random(contexts))
-        driver.run(traces = 1500)
-        driver.shaded should be > 400
-        driver.refused should be > 40
+        driver.run(traces = 600)
+        driver.shaded should be > 160
+        driver.refused should be > 16
       }
     }
 }
