@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import importlib.util
 import os
@@ -94,6 +95,30 @@ def check_address(address: str) -> None:
         raise UserError(f"--scheduler {address!r} is no address of a Dask scheduler: give one such as tcp://HOST:8786")
 
 
+def _check_scheduler(address: str) -> None:
+    """Ask a scheduler who it is. Dask's client waits without end for a server of another kind, and prints tracebacks.
+
+    Raises:
+        UserError: Nothing answers in time, or it is no scheduler.
+    """
+    from distributed.core import rpc
+    from distributed.security import Security
+
+    async def kind() -> str:
+        async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
+            return str((await server.identity())["type"])
+
+    try:
+        found = asyncio.run(asyncio.wait_for(kind(), CONNECT_SECONDS))
+    except asyncio.TimeoutError:
+        found = f"no answer within {CONNECT_SECONDS} s"
+    except Exception as error:
+        # What a server of another kind sends is read as lengths and types of Dask's messages
+        found = " ".join(str(error).split()) or type(error).__name__
+    if found != "Scheduler":
+        raise UserError(f"no Dask scheduler at {address}: {found}")
+
+
 class ClusterRunner:
     """Runs jobs on the workers of a Dask scheduler. A job whose worker is lost moves to another one.
 
@@ -107,15 +132,8 @@ class ClusterRunner:
         from distributed import Client
 
         check_address(address)
-        self._client = Client.__new__(Client)
-        try:
-            Client.__init__(self._client, address, timeout=CONNECT_SECONDS, set_as_default=False)
-        except (OSError, TimeoutError, ValueError, TypeError, RuntimeError, ImportError) as error:
-            # Dask closes a client that got no answer, and leaves others to their finaliser, which waits and prints
-            if self._client.status != "closed":
-                self._client.status = "newly-created"
-            reason = " ".join(str(error).split()) or "no answer"
-            raise UserError(f"no Dask scheduler at {address}: {reason}") from None
+        _check_scheduler(address)
+        self._client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
         self._executors: dict[tuple[tuple[str, int], ...], Any] = {}
         self.parallel = max(1, sum(worker["nthreads"] for worker in self._workers().values()))
 

@@ -8,8 +8,10 @@ import os
 import random
 import shutil
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,6 +25,7 @@ from colonnade.cli.main import cli
 from colonnade.common import ledger
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import read_input
+from colonnade.explore import runners
 from colonnade.explore.explore import Exploration
 from colonnade.explore.jobs import entry_of
 from colonnade.explore.output import Output, check_output
@@ -226,6 +229,29 @@ def test_what_is_no_address_of_a_scheduler_is_one_line(study: Path, address: str
     assert done.returncode == 2
     hostile.one_error_line(done.stderr, "scheduler")
     assert not (study.parent / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "answer", [b"", b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n"], ids=["silent", "web"]
+)
+def test_a_server_of_another_kind_is_one_line(study: Path, answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runners, "CONNECT_SECONDS", 0.5)
+    connections = []
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            with contextlib.suppress(OSError):
+                while True:
+                    connections.append(server.accept()[0])
+                    connections[-1].sendall(answer)
+
+        threading.Thread(target=serve, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(UserError, match=f"no Dask scheduler at {address}: "):
+            runners.ClusterRunner(address)
+        server.shutdown(socket.SHUT_RDWR)
+    for connection in connections:
+        connection.close()
 
 
 def filled(out: Path, change: Callable[[], object]) -> None:
