@@ -20,6 +20,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "sequences.hpp"
 #include "shell_memory.hpp"
 
 namespace {
@@ -152,7 +153,7 @@ void run(const std::string& job, std::map<std::string, unsigned>& options) {
 } // namespace
 
 int main(int argc, char** argv) try {
-    std::map<std::string, unsigned> options{{"--bus", 0}, {"--memory", 0}, {"--latency", 1}, {"--stall", 0}, {"--order", 0}, {"--seed", 1}};
+    std::map<std::string, unsigned> options{{"--bus", 0}, {"--memory", 0}, {"--latency", 1}, {"--stall", 0}, {"--order", 0}, {"--seed", 1}, {"--sequences", 0}};
     std::string job;
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
@@ -163,6 +164,7 @@ int main(int argc, char** argv) try {
     }
     Verilated::randReset(2);
     Verilated::randSeed(static_cast<int>(options["--seed"]));
+    if (options["--sequences"] != 0) return runSequences(job, options);
     run(job, options);
     return 0;
 } catch (const std::exception& problem) {
