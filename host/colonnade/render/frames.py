@@ -102,8 +102,6 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         image = pack_scene(scene, mesh, manifest, environment)
         if (line := coarse_line(image.header)) is not None:
             progress.note(line)
-        if has_default:
-            progress.note(_DEFAULT_SAMPLES)
         poses = [scene.at(pose.motion_progress) for pose in poses]
         passes = [pose.passes(exposure) for pose in poses]
         shows_environment = request.relit or environment is None or environment.environment.photo is None
@@ -114,6 +112,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
             ]
             for of_frame in passes
         ]
+        if has_default:
+            progress.note(_DEFAULT_SAMPLES)
     packed = time.perf_counter() - begun
     seen = None if environment is None else environment.environment
     if request.backend == "rtl":
