@@ -27,11 +27,13 @@ lazy val colonnade = (project in file("."))
       "-language:reflectiveCalls",
       "-Ymacro-annotations"
     ),
-    // The presets, so that they are found from any directory.
+    // The presets and the list of their names, so that they are found from any directory.
     Compile / resourceGenerators += Def.task {
       val presets = (baseDirectory.value / "configs" * "*.json").get()
       val target  = (Compile / resourceManaged).value / "colonnade" / "configs"
-      presets.map { preset =>
+      val names   = target / "names"
+      IO.writeLines(names, presets.map(_.getName.stripSuffix(".json")).sorted)
+      names +: presets.map { preset =>
         IO.copyFile(preset, target / preset.getName)
         target / preset.getName
       }

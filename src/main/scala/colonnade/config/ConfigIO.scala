@@ -9,8 +9,8 @@ import java.nio.file.{Files, InvalidPathException, Path, Paths}
   */
 object ConfigIO {
 
-  /** The presets, by name. */
-  val presets: Seq[String] = Seq("tiny", "small", "edge", "lean")
+  /** The names of the presets: the files of `configs`. */
+  lazy val presets: Seq[String] = resource("names").linesIterator.toSeq
 
   /** Maximum size of a configuration file. */
   private val mostBytes = 1 << 20
@@ -325,8 +325,11 @@ object ConfigIO {
 
   private def text(path: Path): String = Files.readString(path, UTF_8)
 
-  private def presetText(name: String): String = {
-    val resource = s"/colonnade/configs/$name.json"
+  private def presetText(name: String): String = resource(s"$name.json")
+
+  /** A file that the build puts beside the classes. */
+  private def resource(name: String): String = {
+    val resource = s"/colonnade/configs/$name"
     val stream   = Option(getClass.getResourceAsStream(resource))
       .getOrElse(throw new IllegalStateException(s"$resource is missing from the build"))
     try new String(stream.readAllBytes(), UTF_8)

@@ -30,7 +30,7 @@ final class MarchFormats(config: ColonnadeConfig) {
   val distanceBits: Int = alongBits + guardBits
 
   /** Log2 of a share of w: a ray that is behind a surface by less is on it. */
-  val nearLog:  Int = 8
+  val nearLog: Int = 8
 
   /** A ray that crosses tiles and cells this often ends. A map of the finest cells has 31 on the longest way through a tile.
     */

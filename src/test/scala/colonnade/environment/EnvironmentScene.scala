@@ -60,12 +60,12 @@ final class EnvironmentScene(config: ColonnadeConfig, random: Random) {
         for (y <- 0 until cells; x <- 0 until cells)
           yield idAt((column * cells + x) * edge + edge / 2, (row * cells + y) * edge + edge / 2)
       }
-      val size   = random.nextInt(3)
-      val cells  = idsOf(4 << size)
-      val ids    = random.shuffle(cells.distinct).take(4)
-      val count  = if (ids.size == 1 && random.nextInt(6) != 0) 1 else if (ids.size <= 2) 2 else 4
-      val bits   = count / 2
-      val words  = bits + (cells.size * bits + 15) / 16
+      val size  = random.nextInt(3)
+      val cells = idsOf(4 << size)
+      val ids   = random.shuffle(cells.distinct).take(4)
+      val count = if (ids.size == 1 && random.nextInt(6) != 0) 1 else if (ids.size <= 2) 2 else 4
+      val bits  = count / 2
+      val words = bits + (cells.size * bits + 15) / 16
       if (count == 1 || heap.size + words > layout.planeHeapWords) descriptor(0, ids.head)
       else {
         val named   = ids.padTo(count, ids.last)
@@ -73,7 +73,7 @@ final class EnvironmentScene(config: ColonnadeConfig, random: Random) {
         heap ++= named.grouped(2).map(two => BigInt(two(0) | two(1) << 8))
         val mask = cells.zipWithIndex.map { case (id, i) => BigInt(named.indexOf(id).max(0)) << (i * bits) }.sum
         heap ++= Seq.tabulate((cells.size * bits + 15) / 16)(i => (mask >> (16 * i)) & 0xffff)
-        descriptor((if (count == 4) Seq(3, 4, 6) else Seq(1, 2, 5))(size), pointer)
+        descriptor((if (count == 4) Seq(3, 4, 6) else Seq(1, 2, 5)) (size), pointer)
       }
     }
     val table = surfaces.map(surface => new Packed(new Plane).pack(word(surface)))
