@@ -37,7 +37,7 @@ class SequenceResult:
     """What sequences have shown.
 
     Attributes:
-        sequences: How many were run.
+        sequences: How many were run: all, or those up to the tenth that broke a rule.
         ended: Those whose abuse has ended.
         exact: Those whose frame is the model's.
         violations: Rules of AXI or of the shell that were broken, each time.

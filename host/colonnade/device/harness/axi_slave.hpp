@@ -43,7 +43,7 @@ struct Slaves {
     std::mt19937_64 random;
     std::vector<std::uint8_t> memory;
     Windows readable, writable;
-    std::uint64_t bursts = 0, accesses = 0;
+    std::uint64_t bursts = 0, accesses = 0, writtenBeats = 0; // beats that write a byte
 
     std::uint64_t below(std::uint64_t end) { return random() % end; }
     bool moves(Silent channel) {
@@ -107,6 +107,7 @@ public:
     void takeBeat(const WriteBeat& beat) {
         beats_.push_back(beat);
         wholeBursts_ += beat.isLast;
+        slaves_.writtenBeats += beat.strobes != decltype(beat.strobes){};
         match();
     }
 
