@@ -146,7 +146,8 @@ def _covered(positions: Floats, edge: int) -> npt.NDArray[np.bool_]:
     mask = Image.new("1", (edge, edge))
     draw = ImageDraw.Draw(mask)
     for corners in positions.reshape(-1, 6).tolist():
-        draw.polygon(corners, fill=1, outline=1)
+        draw.polygon(corners, fill=1)
+        draw.line([*corners, *corners[:2]], fill=1)  # a polygon of less than a texel has gaps, with or without outline
     covered: npt.NDArray[np.bool_] = binary_dilation(np.asarray(mask), np.ones((3, 3)), _MARGIN)
     return covered
 

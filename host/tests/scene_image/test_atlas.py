@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
@@ -46,6 +46,7 @@ def textured(textures: tuple[Texture, ...], positions: np.ndarray) -> Mesh:
 
 
 @settings(max_examples=25, deadline=None)
+@example(3, 2539)  # a face less than a texel wide
 @given(st.integers(1, 6), st.integers(0, 2**32 - 1))
 def test_a_point_of_a_face_finds_the_colour_of_its_texture(count: int, seed: int) -> None:
     """Of textures of any size, wrap and number of repeats, times the albedo."""
