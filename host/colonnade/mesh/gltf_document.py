@@ -84,9 +84,7 @@ class GltfDocument:
             values = np.zeros((count, width), dtype=kind)
         else:
             raise self.error(f"accessor {index} has no data, as of a compressed mesh: export it without compression")
-        if "sparse" in accessor:
-            values = self._with_sparse(values, accessor["sparse"], kind)
-        return _scaled(values, kind) if accessor.get("normalized") else values
+        return self._changed(_scaled(values, kind) if accessor.get("normalized") else values, accessor, kind)
 
     def decoded(self, index: Any, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """The elements of a compressed accessor, as of `array`, from those of a decoder."""
@@ -95,7 +93,8 @@ class GltfDocument:
             raise self.error(f"accessor {index} has {width} components, its compressed data {values.shape[1]}")
         # Draco's decoder normalises signed integers itself
         is_scaled = values.dtype.kind == "f" and bool((np.abs(values) <= 1.0).all())
-        return _scaled(values, kind) if accessor.get("normalized") and not is_scaled else values
+        values = _scaled(values, kind) if accessor.get("normalized") and not is_scaled else values
+        return self._changed(values, accessor, kind)
 
     def _typed(self, index: Any) -> tuple[Mapping[str, Any], str, int]:
         """An accessor, the type of its components as of numpy, and their number."""
@@ -105,16 +104,19 @@ class GltfDocument:
             raise self.error(f"accessor {index} has an unknown type")
         return accessor, kind, width
 
-    def _with_sparse(self, values: npt.NDArray[Any], sparse: Mapping[str, Any], kind: str) -> npt.NDArray[Any]:
-        count = int(sparse["count"])
-        rows, changes = sparse["indices"], sparse["values"]
+    def _changed(self, values: npt.NDArray[Any], accessor: Mapping[str, Any], kind: str) -> npt.NDArray[Any]:
+        """The elements of an accessor with the changes that it states, if it is sparse."""
+        if "sparse" not in accessor:
+            return values
+        sparse = accessor["sparse"]
+        count, rows, changes = int(sparse["count"]), sparse["indices"], sparse["values"]
         index_kind = _COMPONENTS[rows["componentType"]]
         indices = self._view(rows["bufferView"], rows.get("byteOffset", 0), index_kind, count, 1)[:, 0]
         if len(indices) and int(indices.max()) >= len(values):
             raise self.error(f"a sparse accessor changes element {indices.max()} of {len(values):,}")
-        values = values.copy()
         changed = self._view(changes["bufferView"], changes.get("byteOffset", 0), kind, count, values.shape[1])
-        values[indices] = changed
+        values = values.copy()
+        values[indices] = _scaled(changed, kind) if accessor.get("normalized") else changed
         return values
 
     def _view(self, index: Any, offset: Any, kind: str, count: int, width: int) -> npt.NDArray[Any]:

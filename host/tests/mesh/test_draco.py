@@ -157,6 +157,39 @@ def test_an_optional_use_takes_the_uncompressed_data_if_there_are_any(tmp_path: 
     assert np.ptp(load_mesh(written(tmp_path, small, [(stream, ids_of(stream))], None, required)).vertices) > 1.5
 
 
+@pytest.mark.parametrize("is_compressed", [True, False])
+def test_the_changes_of_a_sparse_accessor_are_made(tmp_path: Path, is_compressed: bool) -> None:
+    """Those of a compressed accessor after decoding; normalised ones are scaled."""
+    arrays, faces, stream = ball()
+    arrays = {name: arrays[name] for name in ("POSITION", "COLOR_0")}
+    streams = [(stream, ids_of(stream) if is_compressed else {})]
+    path = written(tmp_path, arrays, streams, None if is_compressed else faces, required=is_compressed)
+    before = read_surface(path).surface
+    document = json.loads(path.read_text())
+    changes = {0: np.array([(2.0, 3.0, 4.0)], np.float32), 1: np.array([(255, 0, 51, 255)], np.uint8)}
+    for accessor, values in changes.items():
+        content = struct.pack("<I", 7) + values.tobytes()
+        document["buffers"].append(
+            {"byteLength": len(content), "uri": "data:;base64," + base64.b64encode(content).decode()}
+        )
+        document["bufferViews"].append({"buffer": len(document["buffers"]) - 1, "byteLength": len(content)})
+        view = len(document["bufferViews"]) - 1
+        document["accessors"][accessor]["sparse"] = {
+            "count": 1,
+            "indices": {"bufferView": view, "componentType": 5125},
+            "values": {"bufferView": view, "byteOffset": 4},
+        }
+    path.write_text(json.dumps(document))
+    found = read_surface(path).surface
+    assert found.colours is not None and before.colours is not None
+    is_changed = found.faces == 7
+    np.testing.assert_array_equal(found.vertices[7], (2.0, 3.0, 4.0))
+    np.testing.assert_array_equal(np.delete(found.vertices, 7, 0), np.delete(before.vertices, 7, 0))
+    albedo = np.array(found.materials[-1].albedo)
+    np.testing.assert_allclose(found.colours[is_changed] / albedo, [(1.0, 0.0, 0.2)] * is_changed.sum(), atol=1e-9)
+    np.testing.assert_array_equal(found.colours[~is_changed], before.colours[~is_changed])
+
+
 @pytest.mark.parametrize("mode", [4, 5])
 def test_triangles_are_a_list_in_any_mode(tmp_path: Path, mode: int) -> None:
     """A primitive may be a strip for a reader that wants one; the decoder gives triangles."""
