@@ -27,7 +27,6 @@ from colonnade.cli.study import study
 from colonnade.cli.verify import verify
 from colonnade.common import ledger, machine_limits, notes
 from colonnade.common.errors import UserError, reason_of
-from colonnade.common.processes import guarded
 from colonnade.common.terminal_text import one_line
 
 #: Exit status for wrong input, and for an internal error.
@@ -126,8 +125,3 @@ def cli(context: click.Context) -> None:
 
 for command in (generate, registers, pack, inspect, light, render, compare, study, verify, fuzz, bench, explore, ppa):
     cli.add_command(command)
-
-
-def main() -> NoReturn:
-    """Entry point of the console script."""
-    guarded(lambda: cli.main(prog_name="colonnade"))

@@ -6,9 +6,12 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from filelock import FileLock, Timeout
-
+from colonnade.common.processes import signals_deferred
 from colonnade.common.progress import QUIET, Progress
+
+with signals_deferred():
+    # The import tries links in a temporary folder
+    from filelock import FileLock, Timeout
 
 
 @contextlib.contextmanager

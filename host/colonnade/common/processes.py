@@ -113,7 +113,7 @@ def started(
     group = _thread_state.group
     process: subprocess.Popen[str] | None = None
     try:
-        with _signals_deferred():
+        with signals_deferred():
             process = _start(group, command, cwd, env, stdout, stderr)
         yield process
         process.wait()
@@ -216,10 +216,10 @@ def _send(process: subprocess.Popen[str], number: int) -> bool:
 
 
 @contextlib.contextmanager
-def _signals_deferred() -> Iterator[None]:
-    """Defer signals to the end of the block, so that a new program is always registered."""
+def signals_deferred() -> Iterator[None]:
+    """Defer signals to the end of the block, so that what it makes is always registered: a program, a folder."""
     global _is_deferred
-    if threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread() or _is_deferred:
         yield
         return
     _is_deferred = True

@@ -43,13 +43,16 @@ def temporary_folder(prefix: str = PREFIX, parent: Path | None = None) -> Iterat
     Raises:
         UserError: there is no disk space or no permission.
     """
-    base = parent or Path(tempfile.gettempdir())
+    with processes.signals_deferred():
+        # It writes a file to try the place
+        base = parent or Path(tempfile.gettempdir())
     remove_abandoned(prefix, base)
-    try:
-        folder, lock = _make_locked(prefix, base)
-    except OSError as error:
-        raise UserError(f"cannot make a temporary folder in {base}: {error.strerror}{_advice(parent)}") from None
-    _in_use.add(folder)
+    with processes.signals_deferred():
+        try:
+            folder, lock = _make_locked(prefix, base)
+        except OSError as error:
+            raise UserError(f"cannot make a temporary folder in {base}: {error.strerror}{_advice(parent)}") from None
+        _in_use.add(folder)
     try:
         yield folder / CONTENT
     except OSError as error:

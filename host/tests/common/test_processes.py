@@ -184,3 +184,36 @@ def test_programs_end_when_their_parent_is_killed(tmp_path: Path, begun: list[su
     time.sleep(0.1)
     process.kill()
     wait_for(lambda: not is_running(below))
+
+
+def test_a_signal_at_a_new_folder_leaves_nothing(tmp_path: Path) -> None:
+    program = """
+import os, signal, sys, tempfile
+from pathlib import Path
+from colonnade.common import processes, temporary
+
+make = tempfile.mkdtemp
+
+def interrupted(**options):
+    folder = make(**options)
+    os.kill(os.getpid(), signal.SIGINT)
+    return folder
+
+def main():
+    with temporary.temporary_folder(".job.", Path(sys.argv[1])):
+        pass
+
+tempfile.mkdtemp = interrupted
+processes.guarded(main)
+"""
+    done = processes.run([sys.executable, "-c", program, tmp_path])
+    assert (done.returncode, done.stderr) == (130, "colonnade: error: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_signals_are_handled_before_the_commands_are_imported() -> None:
+    code = (
+        "import importlib.metadata as m, sys; s, = m.entry_points(group='console_scripts', name='colonnade'); s.load();"
+        "print([name for name in sys.modules if name.startswith(('click', 'numpy', 'colonnade.cli'))])"
+    )
+    assert processes.run([sys.executable, "-c", code]).stdout == "[]\n"

@@ -6,6 +6,7 @@ import base64
 import io
 import json
 import re
+import sys
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -263,6 +264,7 @@ def test_a_study_that_cannot_be_read_is_refused(tmp_path: Path, text: str | None
 def test_plots_are_written_for_each_choice(tmp_path: Path) -> None:
     study(tmp_path)
     paths = write_plots(tmp_path)
+    assert "vl_convert" not in sys.modules, "JavaScript in this process would keep it from answering signals"
     names = {path.name for path in paths}
     assert {"pareto--dists_loss--nj.asap7.png", "pareto--nj.asap7--kge.asap7.svg", "index.svg"} <= names
     for library in LIBRARIES:

@@ -11,11 +11,9 @@ import base64
 import hashlib
 import json
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import vl_convert
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -36,6 +34,7 @@ from colonnade.report.explorer.study import (
     text_of,
     title_of,
 )
+from colonnade.report.explorer.vega import chart_library
 
 _FILES = Path(__file__).parent
 
@@ -79,14 +78,6 @@ def page(study: Study, folder: Path) -> str:
         cycles_table=tables.cycles_table(study),
         levels=LEVELS,
     )
-
-
-@cache
-def chart_library() -> str:
-    """Vega, Vega-Lite and Vega-Embed as one script, which defines `vegaEmbed`."""
-    script = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
-    assert "</script" not in script.lower()
-    return script
 
 
 def own_script() -> str:

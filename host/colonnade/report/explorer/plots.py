@@ -8,25 +8,23 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import vl_convert
-
 from colonnade.common.file_names import FileNames
 from colonnade.report.explorer.charts import INK, Spec
 from colonnade.report.explorer.rows import LEVELS
 from colonnade.report.explorer.sections import Chart, bar_charts, scatter_axes, scatter_chart
 from colonnade.report.explorer.study import Study, objectives
+from colonnade.report.explorer.vega import drawn
 
-#: Width of a plot, CSS pixels, and how many pixels of a PNG each is.
+#: Width of a plot, CSS pixels.
 WIDTH = 760
-SCALE = 2.0
 
 
 def write_all(study: Study, folder: Path, write: Callable[[Path, bytes], None]) -> list[Path]:
     """Write a plot for each pair of objectives and for each library, level and workload; returns the paths."""
     paths = []
-    for name, spec in plots(study):
-        svg = vl_convert.vegalite_to_svg(_static(spec))
-        for suffix, data in ((".svg", svg.encode()), (".png", vl_convert.svg_to_png(svg, scale=SCALE))):
+    charts = list(plots(study))
+    for (name, _), pictures in zip(charts, drawn([_static(spec) for _, spec in charts]), strict=True):
+        for suffix, data in zip((".svg", ".png"), pictures, strict=True):
             paths.append(folder / (name + suffix))
             write(paths[-1], data)
     return paths
