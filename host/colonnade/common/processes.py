@@ -31,6 +31,9 @@ CLEANUP_SECONDS = 0.7
 #: Seconds in which further signals are ignored, because `timeout` and terminals may send several.
 REPEAT_SECONDS = 3.0
 
+#: Seconds after which a signal interrupts again: a library may have caught the first exception.
+INSIST_SECONDS = 2.0
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
 _WORDS = {
@@ -90,6 +93,8 @@ _signal: int | None = None
 _signal_time = 0.0
 _is_deferred = False
 _is_leaving = False
+#: The program has ended, and Python ends: nothing would catch an exception.
+_is_over = False
 
 
 @contextlib.contextmanager
@@ -238,12 +243,16 @@ def when_leaving(function: Callable[[], None]) -> None:
 
 def guarded(program: Callable[[], object]) -> NoReturn:
     """Run a command line's main program and exit; a signal gives one error line and status 128 plus its number."""
+    global _is_over
     for number in SIGNALS:
         # nohup ignores SIGHUP: keep it so
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _receive)
     try:
-        program()
+        try:
+            program()
+        finally:
+            _is_over = True
     except Interrupted as interrupted:
         _leave(interrupted.number)
     except BaseException:
@@ -265,8 +274,17 @@ def _receive(number: int, frame: object) -> None:
             os._exit(128 + number)
         return
     _signal, _signal_time = number, now
-    if not _is_deferred:
-        raise Interrupted(number)
+    signal.signal(signal.SIGALRM, _insist)
+    signal.setitimer(signal.ITIMER_REAL, INSIST_SECONDS, INSIST_SECONDS)
+    _insist(number, frame)
+
+
+def _insist(number: int, frame: object) -> None:
+    if _signal is None or _is_deferred or _is_leaving:
+        return
+    if _is_over:
+        _leave(_signal)
+    raise Interrupted(_signal)
 
 
 def _leave(number: int) -> NoReturn:

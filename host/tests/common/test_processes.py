@@ -206,9 +206,46 @@ def main():
 tempfile.mkdtemp = interrupted
 processes.guarded(main)
 """
-    done = processes.run([sys.executable, "-c", program, tmp_path])
-    assert (done.returncode, done.stderr) == (130, "colonnade: error: interrupted\n")
+    assert interrupted(program, tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def interrupted(program: str, folder: Path) -> bool:
+    """Run a program, with the installed package; whether it ends as an interrupted one, in one line."""
+    done = processes.run([sys.executable, "-c", program, folder], cwd=folder)
+    return (done.returncode, done.stderr) == (130, "colonnade: error: interrupted\n")
+
+
+def test_a_signal_whose_exception_is_caught_interrupts_again(tmp_path: Path) -> None:
+    program = """
+import os, signal, time
+from colonnade.common import processes
+
+def main():
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except BaseException:
+        pass
+    time.sleep(60)
+
+processes.INSIST_SECONDS = 0.1
+processes.guarded(main)
+"""
+    assert interrupted(program, tmp_path)
+
+
+def test_a_signal_at_the_end_of_python_does_not_wait_for_threads(tmp_path: Path) -> None:
+    program = """
+import os, queue, signal, threading
+from colonnade.common import processes
+
+def main():
+    threading.Thread(target=queue.SimpleQueue().get).start()
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+processes.guarded(main)
+"""
+    assert interrupted(program, tmp_path)
 
 
 def test_signals_are_handled_before_the_commands_are_imported() -> None:

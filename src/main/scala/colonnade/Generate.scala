@@ -10,21 +10,21 @@ import java.nio.file.{AccessDeniedException, FileAlreadyExistsException, Invalid
 
 /** The generator's command line. Wrong input ends in one line on standard error and exit status 2. */
 object Generate {
-  private val usage: String =
-    """Writes the Verilog of a Colonnade, and manifest.json, which tells the host all of its formats.
-      |
-      |usage: colonnade.Generate --config CONFIG --output DIR [OPTION...]
-      |
-      |  --config CONFIG       tiny, small, edge, lean, a JSON file, or a precision like 32b32s64d
-      |  --set KEY=VALUE       overrides one field, as in array.rows=4; may be repeated
-      |  --output DIR          takes the place of an earlier output that nobody changed; never half-written
-      |  --manifest-only       writes no Verilog
-      |  --axi BYTES           puts the device into its AXI4 shell, with a bus of 4 to 128 BYTES; shell.json has its registers
-      |  --pixel-stream        gives the shell an AXI4-Stream of pixels, to which frames can go
-      |  --black-box-memories  leaves memories to be filled in; memories.json lists their shapes
-      |  --formats-page FILE   writes the formats as a Markdown page
-      |  --help                prints this
-      |""".stripMargin
+  private def usage: String =
+    s"""Writes the Verilog of a Colonnade, and manifest.json, which tells the host all of its formats.
+       |
+       |usage: colonnade.Generate --config CONFIG --output DIR [OPTION...]
+       |
+       |  --config CONFIG       ${ConfigIO.presets.mkString(", ")}, a JSON file, or a precision like 32b32s64d
+       |  --set KEY=VALUE       overrides one field, as in array.rows=4; may be repeated
+       |  --output DIR          takes the place of an earlier output that nobody changed; never half-written
+       |  --manifest-only       writes no Verilog
+       |  --axi BYTES           puts the device into its AXI4 shell, with a bus of 4 to 128 BYTES; shell.json has its registers
+       |  --pixel-stream        gives the shell an AXI4-Stream of pixels, to which frames can go
+       |  --black-box-memories  leaves memories to be filled in; memories.json lists their shapes
+       |  --formats-page FILE   writes the formats as a Markdown page
+       |  --help                prints this
+       |""".stripMargin
 
   private final case class Options(
       config:           Option[String] = None,

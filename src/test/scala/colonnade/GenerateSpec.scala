@@ -151,6 +151,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     val printed = new ByteArrayOutputStream
     Console.withOut(printed)(Generate.run(Seq("--help"))) shouldBe 0
     printed.toString should include("usage:")
+    all(ConfigIO.presets.map(name => printed.toString.contains(s"$name, "))) shouldBe true
   }
 
   behavior of "Emit"
