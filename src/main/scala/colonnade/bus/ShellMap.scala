@@ -30,7 +30,7 @@ object ShellMap {
 
   val addressBits: Int = 16
 
-  /** Word 0 of the device's [[RegisterMap]]. */
+  /** Word 0 of the device's [[colonnade.formats.RegisterMap]]. */
   val deviceBase: Int = 0x8000
 
   /** "CLND" */

@@ -32,7 +32,7 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   /** Only while idle. */
   val load = Flipped(Valid(new Load(config)))
 
-  /** See [[ColumnBvhMemoryIO]]. */
+  /** See [[colonnade.memory.ColumnBvhMemoryIO]]. */
   val holds = if (config.columnBvhMemory.holdable) Some(Input(UInt(config.columnBvhMemory.banks.W))) else None
 
   /** With a cache, by bank: lines that are awaited, and lines that come. */

@@ -61,7 +61,7 @@ final class ModuloSchedule(phase: UInt, interval: Int = ModuloSchedule.interval)
 
   def latch[T <: Data](cycle: Int)(next: T): Timed[T] = latch(Seq(cycle))(next)
 
-  /** As [[latch]], and a reset clears the register: for a flag that tells whether there is an operation. */
+  /** As `latch`, and a reset clears the register: for a flag that tells whether there is an operation. */
   def latchFlag(cycle: Int)(next: Bool): Timed[Bool] = latched(Seq(cycle), RegInit(false.B))(next)
 
   private def latched[T <: Data](cycles: Seq[Int], register: T)(next: T): Timed[T] = {

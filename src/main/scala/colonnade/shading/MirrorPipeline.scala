@@ -25,7 +25,7 @@ final private[shading] class MirrorHit(config: ColonnadeConfig) extends Bundle {
   *      ▲                                        │ with the geometric normal
   *      └────────────────────────────────────────┘
   * }}}
-  * The stages follow a [[ModuloSchedule]], an axis a cycle, and never stall: a hit enters only if it has a place in the
+  * The stages follow a [[colonnade.common.ModuloSchedule]], an axis a cycle, and never stall: a hit enters only if it has a place in the
   * queue. A result is offered 14 cycles after its request was taken; a restart takes 12 cycles more.
   */
 final class MirrorPipeline(config: ColonnadeConfig) extends Module {

@@ -15,7 +15,7 @@ import colonnade.numbers.Rounding
   *           │   │                 └──────────────────────── queue of surfaces ────────────────────┘
   *           └───┴─ queue of bounces ─▶ BouncePipeline ─▶ bounced ray
   * }}}
-  * The stages follow a [[ModuloSchedule]] and never stall: a light on a hit enters only if it has a place in the queues at
+  * The stages follow a [[colonnade.common.ModuloSchedule]] and never stall: a light on a hit enters only if it has a place in the queues at
   * the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The hit's point and normal are
   * computed again for each light.
   */

@@ -45,7 +45,7 @@ final class PathUnitIO(config: ColonnadeConfig) extends Bundle {
   * RtController holds the state of every context and issues it to its next stage. Pixels leave in any order; their order
   * depends on timing, their values do not.
   *
-  * @param config of the paths, see [[ColonnadeConfig.ofPaths]]
+  * @param config of the paths, see [[colonnade.config.ColonnadeConfig.ofPaths]]
   */
 final class PathUnit(config: ColonnadeConfig) extends Module {
   val io = IO(new PathUnitIO(config))

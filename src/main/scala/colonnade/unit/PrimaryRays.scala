@@ -32,7 +32,7 @@ final class PrimaryRaysIO(config: ColonnadeConfig) extends Bundle {
 
 /** Allocates an idle context to each pixel position, and generates its primary ray.
   *
-  * Throughput: that of [[RayGenerator]], while contexts are idle.
+  * Throughput: that of [[colonnade.ray.RayGenerator]], while contexts are idle.
   */
 final class PrimaryRays(config: ColonnadeConfig) extends Module {
   val io = IO(new PrimaryRaysIO(config))

@@ -29,7 +29,7 @@ final class TracePort(config: ColonnadeConfig) extends Bundle {
 
 /** What a ray has met, from a traversal unit.
   *
-  * @param config of the paths, see [[ColonnadeConfig.ofPaths]]
+  * @param config of the paths, see [[colonnade.config.ColonnadeConfig.ofPaths]]
   */
 final class TraceResult(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
