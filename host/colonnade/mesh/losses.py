@@ -150,10 +150,11 @@ class Losses:
         if count > 0:
             self.counts[loss] = self.counts.get(loss, 0) + count
 
-    def lines(self, label: str) -> tuple[str, ...]:
-        """One line for each kind."""
+    def lines(self, label: str = "") -> tuple[str, ...]:
+        """One line for each kind, after the label."""
+        prefix = f"{label}: " if label else ""
         return tuple(
-            f"{label}: {count:,} {loss.one if count == 1 else loss.several}: {loss.instead}"
+            f"{prefix}{count:,} {loss.one if count == 1 else loss.several}: {loss.instead}"
             for loss, count in self.counts.items()
         )
 

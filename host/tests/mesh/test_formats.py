@@ -269,7 +269,7 @@ def test_a_plain_file_loses_nothing(tmp_path: Path) -> None:
 
 
 def test_a_file_without_faces_says_what_it_holds(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="has no faces: it: 1 line primitive is not shown"):
+    with pytest.raises(UserError, match="has no faces: 1 line primitive is not shown"):
         load_mesh(written(tmp_path / "a.obj", f"{OBJ_POINTS}l 1 2\n"))
 
 
