@@ -264,6 +264,19 @@ def guarded(program: Callable[[], object]) -> NoReturn:
     sys.exit(0)
 
 
+def tool(program: Callable[[], object]) -> NoReturn:
+    """As `guarded`, for a program of `tools`: wrong input gives one error line and status 2."""
+
+    def run() -> None:
+        try:
+            program()
+        except UserError as error:
+            print(f"colonnade: error: {error}", file=sys.stderr)
+            raise SystemExit(2) from None
+
+    guarded(run)
+
+
 def _receive(number: int, frame: object) -> None:
     global _signal, _signal_time
     now = time.monotonic()

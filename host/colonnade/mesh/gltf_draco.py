@@ -42,6 +42,10 @@ class PrimitiveArrays:
     def indices(self) -> npt.NDArray[Any] | None:
         """The vertices in their order, [corners, 1]; None: that of the attributes."""
         if self.mesh is not None:
+            # The decoder does not keep the order of the corners, so no change would meet its corner
+            index = self.primitive.get("indices")
+            if index is not None and "sparse" in self.document.entry("accessors", index):
+                raise self.document.error("the indices of a Draco primitive are sparse: export it again")
             return self.mesh.faces.reshape(-1, 1)
         return self.document.array(self.primitive["indices"]) if "indices" in self.primitive else None
 

@@ -248,6 +248,20 @@ processes.guarded(main)
     assert interrupted(program, tmp_path)
 
 
+def test_wrong_input_of_a_tool_is_one_line(tmp_path: Path) -> None:
+    program = """
+from colonnade.common import processes
+from colonnade.common.errors import UserError
+
+def main():
+    raise UserError("no scene")
+
+processes.tool(main)
+"""
+    done = processes.run([sys.executable, "-c", program], cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "colonnade: error: no scene\n")
+
+
 def test_signals_are_handled_before_the_commands_are_imported() -> None:
     code = (
         "import importlib.metadata as m, sys; s, = m.entry_points(group='console_scripts', name='colonnade'); s.load();"

@@ -190,6 +190,22 @@ def test_the_changes_of_a_sparse_accessor_are_made(tmp_path: Path, is_compressed
     np.testing.assert_array_equal(found.colours[~is_changed], before.colours[~is_changed])
 
 
+def test_changes_of_a_compressed_order_are_refused(tmp_path: Path) -> None:
+    arrays, faces, stream = ball()
+    path = written(tmp_path, {"POSITION": arrays["POSITION"]}, [(stream, ids_of(stream))])
+    document = json.loads(path.read_text())
+    changes = {
+        "count": 1,
+        "indices": {"bufferView": 0, "componentType": 5125},
+        "values": {"bufferView": 0, "byteOffset": 4},
+    }
+    document["accessors"].append({"componentType": 5125, "count": faces.size, "type": "SCALAR", "sparse": changes})
+    document["meshes"][0]["primitives"][0]["indices"] = len(document["accessors"]) - 1
+    path.write_text(json.dumps(document))
+    with pytest.raises(UserError, match="the indices of a Draco primitive are sparse"):
+        read_surface(path)
+
+
 @pytest.mark.parametrize("mode", [4, 5])
 def test_triangles_are_a_list_in_any_mode(tmp_path: Path, mode: int) -> None:
     """A primitive may be a strip for a reader that wants one; the decoder gives triangles."""
