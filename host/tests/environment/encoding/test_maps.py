@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
+from colonnade.environment.encoding.cache import encoded_environment
 from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.encoding.quality import angles, relit
 from colonnade.environment.encoding.selection import best_subsets, choose_within_budget
@@ -208,9 +209,9 @@ def test_labels_name_the_seeds_around(layout: AttributeLayout) -> None:
 def test_two_level_maps_of_the_rooms(
     name: str, decibels: float, similarity: float, degrees: float, relit_decibels: float
 ) -> None:
-    environment, layout = load_environment(ROOMS / name), AttributeLayout()
-    albedo = encode_two_level(environment.albedo, ALBEDO, layout).decoded(layout, ALBEDO)
-    normals = encode_two_level(environment.normals, NORMAL, layout).decoded(layout, NORMAL)
+    environment = load_environment(ROOMS / name)
+    image = encoded_environment(environment, AttributeLayout())
+    albedo, normals = image.decoded_albedo(), image.decoded_normals()
     pair = encode_srgb(environment.albedo), encode_srgb(albedo)
     assert psnr(*pair) > decibels
     assert (ssim(*pair) or 0) > similarity

@@ -177,7 +177,7 @@ def test_few_bounding_planes_are_the_largest() -> None:
 @pytest.mark.parametrize(("name", "mean", "p95"), [("living", 0.6, 0.55), ("office", 1.4, 1.6)])
 def test_surfaces_of_the_rooms(name: str, mean: float, p95: float) -> None:
     environment, layout = load_environment(ROOMS / name), AttributeLayout()
-    content = encode_planes(environment, layout)
+    content = encoded_environment(environment, layout).planes
     centimetres = 100 * ray_errors(
         environment, content.depth(layout, PlaneProjection.of(environment, content.depth_unit))
     )
