@@ -15,9 +15,9 @@ import colonnade.numbers.Rounding
   *           │   │                 └──────────────────────── queue of surfaces ────────────────────┘
   *           └───┴─ queue of bounces ─▶ BouncePipeline ─▶ bounced ray
   * }}}
-  * The stages follow a [[colonnade.common.ModuloSchedule]] and never stall: a light on a hit enters only if it has a place in the queues at
-  * the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The hit's point and normal are
-  * computed again for each light.
+  * The stages follow a [[colonnade.common.ModuloSchedule]] and never stall: a light on a hit enters only if it has a place
+  * in the queues at the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The hit's
+  * point and normal are computed again for each light.
   */
 final class ShadingPipeline(config: ColonnadeConfig) extends Module {
   import ShadingPipeline._
