@@ -61,11 +61,8 @@ def pack(
     from colonnade.common.frame_size import parse_size
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
-    from colonnade.registers.frame import frame_registers
+    from colonnade.device.scene import DeviceScene
     from colonnade.registers.frame_file import frame_file as encode_frame_file
-    from colonnade.render.frames import encoded, max_lights, pack_scene
-    from colonnade.render.lit_room import device_room, lit_room
-    from colonnade.scene.object_mesh import object_mesh
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.device_image import device_image as encode_device_image
     from colonnade.scene_image.dram_image import dram_image as encode_dram_image
@@ -89,11 +86,8 @@ def pack(
     if dram_image is not None:
         line_layout(manifest)
     with terminal.step("packing"):
-        maps = device_room(described, manifest)
-        surface = object_mesh(described, maps, manifest.corner_colours)
-        room = lit_room(described, maps, surface.extent, max_lights(manifest), False, terminal)
-        environment = encoded(room, manifest)
-        image = pack_scene(room.scene, surface, manifest, environment)
+        prepared = DeviceScene.of(described, manifest, progress=terminal)
+        image = prepared.image
         # Everything is encoded before anything is written: a refusal leaves no file
         others: list[tuple[str, Path, bytes]] = []
         if device_image is not None:
@@ -102,8 +96,7 @@ def pack(
             others.append(("for DRAM", dram_image, encode_dram_image(image, manifest)))
         if frame_file is not None:
             width, height = pixels or (described.frame.width, described.frame.height)
-            registers = frame_registers(room.scene, image.header, manifest, width, height, environment)
-            others.append(("a frame", frame_file, encode_frame_file(registers, manifest)))
+            others.append(("a frame", frame_file, encode_frame_file(prepared.registers((width, height)), manifest)))
     image.save(output)
     echo(f"packed      {file}")
     for title, path, content in others:

@@ -13,17 +13,14 @@ from colonnade.common import cache
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.design.toolchain import cache_directory, project_root
+from colonnade.device.scene import DeviceScene
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.mesh.mesh import Mesh
-from colonnade.registers.frame import frame_registers
 from colonnade.render.frames import require_no_errors
 from colonnade.render.report import frame_report, mesh_report
 from colonnade.scene.model import Scene
-from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
-from colonnade.scene.view import with_overrides
 from colonnade.scene_image.file import SceneImage
-from colonnade.scene_image.packer import pack
 
 
 def measure_frame(
@@ -56,9 +53,8 @@ def measure_frame(
     manifest = design.manifest
     check_size(size, manifest)
     begun = time.perf_counter()
-    mesh = with_materials(scene, mesh, SurfaceFeatures.of(manifest))
-    image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
-    registers = frame_registers(scene, image.header, manifest, *size)
+    prepared = DeviceScene.of(scene, manifest, mesh)
+    image, registers = prepared.image, prepared.registers(size)
     pack_seconds = time.perf_counter() - begun
     memory = {"dram_latency": dram_latency, "dram_interval": dram_interval}
     stalls = Stalls(**{name: cycles for name, cycles in memory.items() if cycles is not None})

@@ -24,7 +24,7 @@ from colonnade.explore.schedule import Outcome
 from colonnade.explore.study import StudyFile
 from colonnade.mesh.mesh import Mesh
 from colonnade.ppa.library.one_library import library_files
-from colonnade.render.lit_room import scene_room
+from colonnade.scene.lit_room import scene_room
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 

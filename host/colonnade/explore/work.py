@@ -27,8 +27,8 @@ Size = tuple[int, int]
 def reference(folder: Path, *, scene: Scene, mesh: Mesh, size: Size) -> None:
     """Render a frame with Embree."""
     from colonnade.environment.light_fit import DEFAULT_LIGHTS
-    from colonnade.render.lit_room import scene_room
     from colonnade.render.reference_frames import traced_frames
+    from colonnade.scene.lit_room import scene_room
 
     (rendered,) = traced_frames([scene], mesh, scene_room(scene), size, DEFAULT_LIGHTS)
     write_png(folder / PICTURE, rendered.image)

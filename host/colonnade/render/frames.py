@@ -17,23 +17,20 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoded import EncodedEnvironment, check_layout
+from colonnade.device.scene import DeviceScene
 from colonnade.mesh.mesh import Mesh
-from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
-from colonnade.render.lit_room import LitRoom, device_room, lit_room
 from colonnade.render.report import FrameReport, frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
-from colonnade.scene.cameras import environment_camera
 from colonnade.scene.model import Scene
-from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.parser import load_scene
 from colonnade.scene.samples import PHOTO_SAMPLES
-from colonnade.scene.view import View, make_view, with_overrides
+from colonnade.scene.view import View
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.inspect import coarse_line
-from colonnade.scene_image.packer import pack
+
+Size = tuple[int, int]
 
 #: Names the default to who has not chosen.
 _DEFAULT_SAMPLES = f"{PHOTO_SAMPLES} samples a pixel, the default in a room: --samples 1 takes a quarter of the time"
@@ -60,83 +57,81 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         scene = scene.with_environment(request.background)
     if request.mesh is not None:
         scene = scene.with_mesh(request.mesh)
-    has_default = _has_default_samples(scene, request)
+    note = _DEFAULT_SAMPLES if _has_default_samples(scene, request) else None
     scene = with_requested_samples(scene, request)
-    width, height = request.size or (scene.frame.width, scene.frame.height)
+    size = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
-    check_size((width, height), manifest)
+    check_size(size, manifest)
+    _check_frames(request, scene, size, manifest)
+    frames = _reference_frames if request.backend == "reference" else _device_frames
+    return frames(request, scene, manifest, size, note, progress)
+
+
+def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Manifest) -> None:
+    """Raise a `UserError` for what the backend cannot show."""
     if request.frames > 1 and scene.objects and scene.motion.is_still:
         raise UserError(
             f"nothing moves in these {request.frames} frames, since several objects stand still: give motion.light, or"
             " motion.turn or motion.translate, which move all of them"
         )
     if request.waveform is not None:
-        _check_waveform(request, (width, height))
-    poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
-    exposure = scene.motion.exposure(request.frames)
-    if request.backend == "reference":
-        from colonnade.render.reference_frames import ReferenceOptions, reference_frames
-
-        options = ReferenceOptions(exposure, request.relit, request.truth)
-        for index, result in enumerate(reference_frames(poses, manifest, (width, height), progress, options)):
-            if has_default and index == 0:
-                progress.note(_DEFAULT_SAMPLES)
-            yield result
-        return
-    if request.truth is not None:
+        _check_waveform(request, size)
+    if request.truth is not None and request.backend != "reference":
         raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
     if request.hits and request.backend == "rtl":
         from colonnade.device.verilator import require_hits
 
         require_hits(manifest)
 
+
+def _reference_frames(
+    request: RenderRequest, scene: Scene, manifest: Manifest, size: Size, note: str | None, progress: Progress
+) -> Iterator[RenderResult]:
+    from colonnade.render.reference_frames import ReferenceOptions, reference_frames
+
+    options = ReferenceOptions(scene.motion.exposure(request.frames), request.relit, request.truth)
+    poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
+    for index, result in enumerate(reference_frames(poses, manifest, size, progress, options)):
+        if note is not None and index == 0:
+            progress.note(note)
+        yield result
+
+
+def _device_frames(
+    request: RenderRequest, scene: Scene, manifest: Manifest, size: Size, note: str | None, progress: Progress
+) -> Iterator[RenderResult]:
+    """The frames of the model or the RTL."""
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        maps = device_room(scene, manifest)
-        mesh = object_mesh(scene, maps, manifest.corner_colours)
-        if maps is not None:
-            check_layout(maps, manifest)
-            environment_camera(maps, width, height)
-        room = lit_room(scene, maps, mesh.extent, max_lights(manifest), request.relit, progress)
-        scene, environment = room.scene, encoded(room, manifest)
-        image = pack_scene(scene, mesh, manifest, environment)
-        if (line := coarse_line(image.header)) is not None:
+        prepared = DeviceScene.of(scene, manifest, size=size, relit=request.relit, progress=progress)
+        if (line := coarse_line(prepared.image.header)) is not None:
             progress.note(line)
-        poses = [scene.at(pose.motion_progress) for pose in poses]
-        passes = [pose.passes(exposure) for pose in poses]
-        shows_environment = request.relit or environment is None or environment.environment.photo is None
+        motion = scene.motion
+        poses = [prepared.scene.at(fraction) for fraction in motion.frame_progress(request.frames)]
+        passes = [pose.passes(motion.exposure(request.frames)) for pose in poses]
         registers = [
-            [
-                frame_registers(one, image.header, manifest, width, height, environment, shows_environment)
-                for one in of_frame
-            ]
-            for of_frame in passes
+            [prepared.registers(size, one, composited=not request.relit) for one in of_frame] for of_frame in passes
         ]
-        if has_default:
-            progress.note(_DEFAULT_SAMPLES)
+        if note is not None:
+            progress.note(note)
     packed = time.perf_counter() - begun
-    seen = None if environment is None else environment.environment
     if request.backend == "rtl":
         design = design_for(request.config, request.overrides, progress)
-        rendered = _rtl_frames(design, image, registers, progress, request.waveform)
+        rendered = _rtl_frames(design, prepared.image, registers, progress, request.waveform)
     else:
-        rendered = _model_frames(manifest, image, registers, progress)
+        rendered = _model_frames(manifest, prepared.image, registers, progress)
     for pose, of_frame, (rendered_passes, seconds, rate) in zip(poses, passes, rendered, strict=True):
-        frame = rendered_passes.frame
-        require_no_errors(frame)
+        require_no_errors(rendered_passes.frame)
         report = replace(
-            frame_report(request.backend, manifest, image.header, frame),
+            frame_report(request.backend, manifest, prepared.image.header, rendered_passes.frame),
             share=pose.motion_progress,
             seconds={"pack": packed, "build": None} | seconds,
             simulated_cycles_per_second=rate,
-            bytes=None if environment is None else environment.image.byte_counts(),
+            bytes=None if prepared.maps is None else prepared.maps.image.byte_counts(),
             samples=len(of_frame),
         )
-        view = make_view(of_frame[0], image.header.extent, width, height, image.header.materials, seen)
-        result = _result(rendered_passes, image, view, report)
-        if environment is not None and not request.relit:
-            result = replace(result, image=composited(result.sums, environment.environment))
-        yield result
+        result = _result(rendered_passes, prepared.image, prepared.view(size, of_frame[0]), report)
+        yield result if request.relit else _composited(result, prepared)
 
 
 def _has_default_samples(scene: Scene, request: RenderRequest) -> bool:
@@ -169,7 +164,7 @@ def with_requested_samples(scene: Scene, request: RenderRequest) -> Scene:
     return scene
 
 
-def _check_waveform(request: RenderRequest, size: tuple[int, int]) -> None:
+def _check_waveform(request: RenderRequest, size: Size) -> None:
     """Raise a `UserError` if the request cannot write a waveform: wrong backend, several frames, or a large frame."""
     if request.backend != "rtl":
         raise UserError(f"the {request.backend} backend has no signals: use --backend rtl for --waveform")
@@ -234,48 +229,23 @@ def _model_frames(
     yield from map(one, registers)
 
 
-def render_model(
-    scene: Scene, mesh: Mesh, manifest: Manifest, size: tuple[int, int], progress: Progress = QUIET
-) -> RenderResult:
+def render_model(scene: Scene, mesh: Mesh, manifest: Manifest, size: Size, progress: Progress = QUIET) -> RenderResult:
     """Render one frame of one sample with the model.
 
     The scene's own mesh is not read, and error bits only appear in the report.
     """
     with progress.step("packing the scene"):
-        room = lit_room(scene, device_room(scene, manifest), mesh.extent, max_lights(manifest), False, progress)
-        scene, environment = room.scene, encoded(room, manifest)
-        image = pack_scene(scene, mesh, manifest, environment)
-        seen = None if environment is None else environment.environment
-        registers = frame_registers(
-            scene, image.header, manifest, *size, environment, seen is None or seen.photo is None
-        )
-    ((passes, _, _),) = _model_frames(manifest, image, [[registers]], progress)
-    view = make_view(scene, image.header.extent, *size, image.header.materials, seen)
-    result = _result(passes, image, view, frame_report("model", manifest, image.header, passes.frame))
-    return result if seen is None else replace(result, image=composited(result.sums, seen))
+        prepared = DeviceScene.of(scene, manifest, mesh, progress=progress)
+        registers = prepared.registers(size, composited=True)
+    ((passes, _, _),) = _model_frames(manifest, prepared.image, [[registers]], progress)
+    report = frame_report("model", manifest, prepared.image.header, passes.frame)
+    return _composited(_result(passes, prepared.image, prepared.view(size), report), prepared)
 
 
-def max_lights(manifest: Manifest) -> int:
-    """Lights that a design supports."""
-    return int(manifest.config["frame"]["lights"])
-
-
-def encoded(room: LitRoom, manifest: Manifest) -> EncodedEnvironment | None:
-    """The encoded maps of a scene's room; None without one."""
-    return None if room.environment is None else EncodedEnvironment.of(room.environment, manifest)
-
-
-def pack_scene(
-    scene: Scene, mesh: Mesh, manifest: Manifest, environment: EncodedEnvironment | None = None
-) -> SceneImage:
-    """The scene image of a mesh, with the scene's material and the maps of its room."""
-    mesh = with_materials(scene, mesh, SurfaceFeatures.of(manifest))
-    image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material), scene.headroom)
-    if environment is None:
-        return image
-    from colonnade.scene_image.environment import with_environment
-
-    return with_environment(image, environment, manifest)
+def _composited(result: RenderResult, prepared: DeviceScene) -> RenderResult:
+    """The result in the photo of its room; as it is without a room."""
+    room = prepared.environment
+    return result if room is None else replace(result, image=composited(result.sums, room))
 
 
 def require_no_errors(frame: Frame) -> None:

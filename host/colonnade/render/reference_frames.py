@@ -21,10 +21,10 @@ from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.environment.true_room import true_room
 from colonnade.reference.render import ReferenceResult, render_reference
 from colonnade.render.composite import composited
-from colonnade.render.lit_room import LitRoom, lit_room, scene_room
 from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
 from colonnade.scene.cameras import environment_camera
+from colonnade.scene.lit_room import LitRoom, lit_room, scene_room
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.view import make_view

@@ -13,13 +13,11 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
+from colonnade.device.scene import DeviceScene
 from colonnade.device.shell import Bus, ShellFrame, render_shell
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited, resized_photo
-from colonnade.render.frames import encoded, max_lights, pack_scene
-from colonnade.render.lit_room import device_room, lit_room
-from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
 
@@ -83,20 +81,16 @@ def test_a_room_in_memory_is_that_of_the_model() -> None:
     design = shell_design_for("small", ("array.columns=2", "array.rows=1"), bus_bytes=16)
     manifest = design.manifest
     scene = load_scene(toolchain.project_root() / "scenes" / "room.toml")
-    maps = device_room(scene, manifest)
-    mesh = object_mesh(scene, maps)
-    room = lit_room(scene, maps, mesh.extent, max_lights(manifest), relit=False)
-    environment = encoded(room, manifest)
-    image = pack_scene(room.scene, mesh, manifest, environment)
-    registers = frame_registers(room.scene, image.header, manifest, WIDTH, HEIGHT, environment)
+    prepared = DeviceScene.of(scene, manifest)
+    image, registers = prepared.image, prepared.registers((WIDTH, HEIGHT))
     expected = render_model(manifest, image, registers)
     assert expected.is_object.any()
     (frame,) = render_shell(design, image, [registers], [0], Bus(latency=40, stall=10, seed=3))
     assert_bytes(frame, framebuffer_bytes(expected, 0), PIXEL_BYTES[0])
 
-    photo = resized_photo(room.environment, WIDTH, HEIGHT)
+    photo = resized_photo(prepared.environment, WIDTH, HEIGHT)
     frames = render_shell(design, image, [registers] * 3, [0, 1, 2], Bus(latency=40, stall=10, seed=4), photo=photo)
     for code, frame in enumerate(frames):
         assert_bytes(frame, framebuffer_bytes(expected, code, photo), PIXEL_BYTES[code])
-    host = encode_srgb(composited(Accumulation.of_frame(expected), room.environment))
+    host = encode_srgb(composited(Accumulation.of_frame(expected), prepared.environment))
     np.testing.assert_array_equal(frames[0].lines[:, : 4 * WIDTH].reshape(HEIGHT, WIDTH, 4)[..., 2::-1], host)

@@ -15,10 +15,10 @@ from PIL import Image
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
+from colonnade.device import scene as device_scene
 from colonnade.environment.load import load_environment
 from colonnade.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
-from colonnade.render import frames as render_module
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
@@ -103,8 +103,8 @@ def test_one_frame_is_the_plain_one(folder: Path) -> None:
 
 def test_the_scene_is_packed_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     packed: list[object] = []
-    whole = render_module.pack_scene
-    monkeypatch.setattr(render_module, "pack_scene", lambda *given: packed.append(given) or whole(*given))
+    whole = device_scene.pack
+    monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given) or whole(*given))
     assert len(list(render_frames(RenderRequest(scene_file(folder, ALONE), "tiny", (), "model", SIZE, 5)))) == 5
     assert len(packed) == 1
 

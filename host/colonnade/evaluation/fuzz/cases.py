@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from colonnade.design.manifest import Manifest
+from colonnade.device.scene import DeviceScene
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.texture import Texture
-from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
 from colonnade.scene.object_mesh import object_mesh
-from colonnade.scene.view import with_overrides
 from colonnade.scene_image.file import SceneImage
-from colonnade.scene_image.packer import pack
 
 #: Width and height of a legal frame, pixels.
 SIZE = (12, 9)
@@ -76,9 +74,8 @@ def _case(name: str, scene: Scene, manifest: Manifest) -> Case:
         mesh = coloured(mesh)
     if name == TEXTURED:
         mesh = textured(mesh)
-    image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
-    registers = frame_registers(scene, image.header, manifest, *SIZE)
-    return Case(name, image, registers | {"frame.watchdogCycles": WATCHDOG_CYCLES})
+    prepared = DeviceScene.of(scene, manifest, mesh)
+    return Case(name, prepared.image, prepared.registers(SIZE) | {"frame.watchdogCycles": WATCHDOG_CYCLES})
 
 
 def coloured(mesh: Mesh) -> Mesh:

@@ -11,17 +11,13 @@ import numpy.typing as npt
 from colonnade.common.types import Bytes
 from colonnade.design.manifest import Field, Manifest, value_range
 from colonnade.design.toolchain import project_root
-from colonnade.environment.encoded import EncodedEnvironment
+from colonnade.device.scene import DeviceScene
 from colonnade.evaluation.fuzz.cases import Case
 from colonnade.evaluation.fuzz.records import write_field
 from colonnade.evaluation.fuzz.values import random_value
 from colonnade.mesh.load import load_mesh
-from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Background, Light, Material, MeshSource, Paths, Placement, Scene
-from colonnade.scene.view import with_overrides
-from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.file import LoadSection
-from colonnade.scene_image.packer import pack
 
 #: About a hundred times the cycles of a legal frame, since corrupt rays may take all of their march steps.
 WATCHDOG_CYCLES = 8_000_000
@@ -36,25 +32,23 @@ def environment_cases(manifest: Manifest) -> tuple[Case, ...]:
     if memory is None or (memory["width"], memory["height"]) != _ROOM_SIZE:
         return ()
     folder = project_root() / "scenes" / "rooms" / "living"
-    environment, mesh = EncodedEnvironment.load(folder, manifest), load_mesh("teapot:4")
+    mesh = load_mesh("teapot:4")
     scene = Scene(
         MeshSource(name="teapot:4"),
         placement=Placement((322.0, 306.0), 0.58, 25.0),
         light=Light((0.1, 2.2, 1.2), falloff=1.6),
-        background=Background(room=folder),
+        background=Background(room=folder, colours="albedo"),
     )
     materials = [Material(kind="diffuse")]
     if int(manifest.config["frame"]["maxBounces"]) > 0:
         materials += [Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Material(kind="glass")]
     cases, maps = [], tuple[LoadSection, ...]()
     for material in materials:
-        image = with_environment(pack(mesh, manifest, with_overrides(mesh.materials, material)), environment, manifest)
+        prepared = DeviceScene.of(replace(scene, material=material, paths=Paths(bounces=2)), manifest, mesh)
         # All cases share the same arrays, so that the simulator loads them once
-        maps = maps or image.attributes
-        posed = replace(scene, material=material, paths=Paths(bounces=2))
-        registers = frame_registers(posed, image.header, manifest, *_SIZE, environment)
-        registers |= {"frame.watchdogCycles": WATCHDOG_CYCLES}
-        cases.append(Case(f"{material.kind} in a room", replace(image, attributes=maps), registers))
+        maps = maps or prepared.image.attributes
+        registers = prepared.registers(_SIZE) | {"frame.watchdogCycles": WATCHDOG_CYCLES}
+        cases.append(Case(f"{material.kind} in a room", replace(prepared.image, attributes=maps), registers))
     return tuple(cases)
 
 

@@ -30,7 +30,7 @@ from colonnade.reference.environment.ray_march import HIDDEN, HIT, RayMarch, pos
 from colonnade.reference.environment.surface import SurfaceHits
 from colonnade.reference.object import PlacedObject
 from colonnade.reference.render import primary_directions
-from colonnade.render.lit_room import LitRoom, lit_room, scene_room
+from colonnade.scene.lit_room import LitRoom, lit_room, scene_room
 from colonnade.scene.model import Background, Light, Material, MeshSource, Placement, Scene
 from colonnade.scene.room_lights import lights_of
 

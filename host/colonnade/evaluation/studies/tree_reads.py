@@ -16,8 +16,9 @@ from colonnade.common.markdown import markdown
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
+from colonnade.device.scene import DeviceScene
 from colonnade.evaluation.bench import MESHES, geometric_mean
-from colonnade.render.frames import pack_scene, render_model
+from colonnade.render.frames import render_model
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.file import SceneImage
@@ -39,7 +40,7 @@ def tree_reads(config: str, meshes: Sequence[str], size: tuple[int, int]) -> dic
     for name in meshes:
         own = scene.with_mesh(name)
         mesh = replace(object_mesh(own, corner_colours=True), name=name)
-        image = pack_scene(own, mesh, manifest)
+        image = DeviceScene.of(own, manifest, mesh).image
         counters = render_model(own, mesh, manifest, size).report.counters
         found[name] = {
             "node_records": image.header.triangle_base,

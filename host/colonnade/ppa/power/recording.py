@@ -22,16 +22,14 @@ from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root, require_program
 from colonnade.device.harness_job import parse_output
+from colonnade.device.scene import DeviceScene
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.simulator_sources import COLUMN, UNITS
 from colonnade.device.verilator import write_job
 from colonnade.mesh.mesh import Mesh
-from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Scene
-from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
-from colonnade.scene.view import with_overrides
-from colonnade.scene_image.packer import pack
 
 #: Ports with a special role in a recording or its replay.
 CLOCK, RESET, START = "clock", "reset", "io_start"
@@ -177,16 +175,14 @@ def record(
     design = design_for(config, one_column, progress)
     size = require_recordable(stimulus, design.manifest)
     with progress.step("packing the scene"):
-        scene, manifest = stimulus.scene, design.manifest
-        mesh = with_materials(scene, stimulus.mesh, SurfaceFeatures.of(manifest))
-        image = pack(mesh, manifest, with_overrides(mesh.materials, scene.material))
-        registers = frame_registers(scene, image.header, manifest, *size)
+        prepared = DeviceScene.of(stimulus.scene, design.manifest, stimulus.mesh)
+        registers = prepared.registers(size)
     ports = {module: _Ports.of(yosys) for module, yosys in modules.items()}
     with _with_recorders(design, ports) as recorded:
         program = build_simulator(recorded, progress)
     with temporary_folder() as folder:
         (folder / "limit").write_text(f"{stimulus.cycles}\n")
-        job, _ = write_job(folder, design.manifest, image, [registers])
+        job, _ = write_job(folder, design.manifest, prepared.image, [registers])
         with progress.step("recording a frame"):
             done = processes.run([program, job], cwd=folder)
         if done.returncode != 0:

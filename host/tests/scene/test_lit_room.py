@@ -12,11 +12,15 @@ from click.testing import CliRunner
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import decode_srgb, encode_srgb
+from colonnade.design.generator import manifest_for
+from colonnade.device import scene as device_scene
+from colonnade.device.scene import DeviceScene
 from colonnade.evaluation.studies.synthetic_attic import attic, write_attic
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
+from colonnade.scene.parser import load_scene
 
 SIZE = (96, 72)
 #: An attribute memory for maps of this size.
@@ -99,6 +103,15 @@ def test_the_headroom_of_the_lights_does_not_change_the_object(folder: Path) -> 
         for colours, backend in (("photo", "model"), ("albedo", "model"))
     )
     assert np.abs(encode_srgb(photo.image).astype(int) - encode_srgb(albedo.image)).max() <= 3
+
+
+def test_corners_of_faces_are_packed_darker_by_the_headroom(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "scene.toml").write_text(MIRROR.replace("mirror", "diffuse") + LAMP)
+    packed: list[object] = []
+    whole = device_scene.pack
+    monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given[-1]) or whole(*given))
+    prepared = DeviceScene.of(load_scene(folder / "scene.toml"), manifest_for("small", ROOM).manifest)
+    assert packed == [prepared.scene.headroom] and prepared.scene.headroom > 1
 
 
 def test_colours_need_a_room_with_a_photo(folder: Path) -> None:

@@ -1,0 +1,107 @@
+"""A scene as a design renders it: the image that the design loads, and the registers of its frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from colonnade.common.progress import QUIET, Progress
+from colonnade.environment.encoded import EncodedEnvironment, check_layout
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.cameras import environment_camera
+from colonnade.scene.lit_room import device_room, lit_room
+from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
+from colonnade.scene.view import View, make_view, with_overrides
+from colonnade.scene_image.environment import with_environment
+from colonnade.scene_image.packer import pack
+
+if TYPE_CHECKING:
+    from colonnade.design.manifest import Manifest
+    from colonnade.environment.model import Environment
+    from colonnade.mesh.mesh import Mesh
+    from colonnade.scene.model import Scene
+    from colonnade.scene_image.file import SceneImage
+
+
+@dataclass(frozen=True)
+class DeviceScene:
+    """A scene that is ready for a design.
+
+    Attributes:
+        scene: With lights, a place for the object, and the headroom of the room's colours.
+        manifest: The design's manifest.
+        image: Records of the mesh, textures, and maps of the room.
+        maps: The room and its encoded maps; None without a room.
+    """
+
+    scene: Scene
+    manifest: Manifest
+    image: SceneImage
+    maps: EncodedEnvironment | None
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        manifest: Manifest,
+        mesh: Mesh | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        relit: bool = False,
+        progress: Progress = QUIET,
+    ) -> DeviceScene:
+        """Load a scene's room and mesh, light them, encode the room's maps and pack the mesh.
+
+        Args:
+            scene: The scene.
+            manifest: The design's manifest.
+            mesh: A mesh that replaces the scene's own, which is not read.
+            size: Width and height of frames, pixels; a size that the room cannot have is refused before long work.
+            relit: Frames show the room under the scene's lights, not its photo.
+            progress: Shows the fit of lights, and notes what was fitted.
+
+        Raises:
+            UserError: Mesh or room cannot be read, or the design cannot render them.
+        """
+        room = device_room(scene, manifest)
+        if mesh is None:
+            mesh = object_mesh(scene, room, manifest.corner_colours)
+        if room is not None:
+            check_layout(room, manifest)
+            if size is not None:
+                environment_camera(room, *size)
+        lit = lit_room(scene, room, mesh.extent, int(manifest.config["frame"]["lights"]), relit, progress)
+        maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest)
+        mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
+        image = pack(mesh, manifest, with_overrides(mesh.materials, lit.scene.material), lit.scene.headroom)
+        if maps is not None:
+            image = with_environment(image, maps, manifest)
+        return cls(lit.scene, manifest, image, maps)
+
+    @property
+    def environment(self) -> Environment | None:
+        """The room with the colours that rays see; None without a room."""
+        return None if self.maps is None else self.maps.environment
+
+    def registers(
+        self, size: tuple[int, int], scene: Scene | None = None, *, composited: bool = False
+    ) -> dict[str, int]:
+        """The registers of a frame (`frame_registers`).
+
+        Args:
+            size: Width and height, pixels.
+            scene: Another moment or sample of `scene`; None: `scene` itself.
+            composited: The frame is composited with the room's photo, if it has one: of the room, only pixels whose
+                light the object may block are rendered.
+
+        Raises:
+            UserError: The frame or a distance is out of the hardware's range, or the design lacks a feature.
+        """
+        room = self.environment
+        shows_room = not composited or room is None or room.photo is None
+        return frame_registers(scene or self.scene, self.image.header, self.manifest, *size, self.maps, shows_room)
+
+    def view(self, size: tuple[int, int], scene: Scene | None = None) -> View:
+        """The view of a frame; arguments as in `registers`."""
+        header = self.image.header
+        return make_view(scene or self.scene, header.extent, *size, header.materials, self.environment)
