@@ -78,11 +78,11 @@ def _inspect_environment(
     background: Path, encoding: str, output: Path | None, with_dists: bool, json_file: Path | None
 ) -> None:
     from colonnade.common import progress
-    from colonnade.environment.encoding.cache import encoded_environment
-    from colonnade.environment.encoding.layout import AttributeLayout
-    from colonnade.environment.encoding.quality import measure, report_lines
-    from colonnade.environment.encoding.visualise import map_pictures, write_pictures
     from colonnade.environment.load import load_environment
+    from colonnade.maps.cache import encoded_environment
+    from colonnade.maps.layout import AttributeLayout
+    from colonnade.maps.quality import measure, report_lines
+    from colonnade.maps.visualise import map_pictures, write_pictures
 
     environment = load_environment(background)
     for note in environment.notes:

@@ -9,13 +9,13 @@ import numpy as np
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import field_places
-from colonnade.environment.encoding.image import memory_words
+from colonnade.maps.image import memory_words
 from colonnade.reference.environment.ray_march import HIDDEN, HIT, LEFT_VIEW, LOST, MarchHits
 from colonnade.registers.environment import projection_of, view_registers
 
 if TYPE_CHECKING:
-    from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
+    from colonnade.maps.image import AttributeImage
 
 
 #: Grid steps per metre, log2, for rays without an object that defines the grid.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from colonnade.common.progress import QUIET, Progress
-from colonnade.environment.encoded import EncodedEnvironment, check_layout
+from colonnade.maps.encoded import EncodedEnvironment, check_layout
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.cameras import environment_camera
 from colonnade.scene.lit_room import device_room, lit_room

@@ -9,15 +9,15 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
-from colonnade.environment.encoding.planes import SLOPE_PIXELS, PlaneProjection
+from colonnade.maps.planes import SLOPE_PIXELS, PlaneProjection
 from colonnade.registers.occlusion import occlusion_registers
 from colonnade.registers.shadow_window import shadow_window, whole_frame
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
-    from colonnade.environment.encoded import EncodedEnvironment
-    from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
+    from colonnade.maps.encoded import EncodedEnvironment
+    from colonnade.maps.image import AttributeImage
     from colonnade.scene.view import View
     from colonnade.scene_image.header import ImageHeader
 

@@ -14,7 +14,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.frame_limits import check_size
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoded import EncodedEnvironment
+from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.registers.environment import environment_registers
 from colonnade.registers.shading import check_surfaces, surface_registers
 from colonnade.registers.watchdog import watchdog_cycles

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.types import Floats
-from colonnade.environment.encoding.planes import PlaneProjection
+from colonnade.maps.planes import PlaneProjection
 from colonnade.registers.shadow_window import surface_points
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
-    from colonnade.environment.encoded import EncodedEnvironment
+    from colonnade.maps.encoded import EncodedEnvironment
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.view import View
     from colonnade.scene_image.header import ImageHeader

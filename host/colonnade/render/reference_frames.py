@@ -13,9 +13,9 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoded import layout_of
-from colonnade.environment.encoding.cache import encoded_environment
-from colonnade.environment.encoding.layout import AttributeLayout
+from colonnade.maps.cache import encoded_environment
+from colonnade.maps.encoded import layout_of
+from colonnade.maps.layout import AttributeLayout
 from colonnade.reference.environment.decoded import BoundingPlanes
 from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.environment.true_room import true_room

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
-from colonnade.environment.encoded import layout_of
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
+from colonnade.maps.encoded import layout_of
 from colonnade.scene.object_pose import object_pose, settled
 from colonnade.scene.room_lights import lights_of, with_lights
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoded import EncodedEnvironment, layout_of
-from colonnade.environment.encoding.image import SOURCE_BYTES_PER_PIXEL, memory_words
-from colonnade.environment.encoding.layout import POINTER_BITS
-from colonnade.environment.encoding.plane_map import PLANE_MODES
-from colonnade.environment.encoding.two_level import MODES
+from colonnade.maps.encoded import EncodedEnvironment, layout_of
+from colonnade.maps.image import SOURCE_BYTES_PER_PIXEL, memory_words
+from colonnade.maps.layout import POINTER_BITS
+from colonnade.maps.plane_map import PLANE_MODES
+from colonnade.maps.two_level import MODES
 from colonnade.scene_image.file import LoadSection, SceneImage
 from colonnade.scene_image.header import EnvironmentHeader, ImageHeader, LoadedMemory
 

@@ -12,12 +12,12 @@ from colonnade.common import cache
 from colonnade.common.types import Floats
 from colonnade.design.manifest import AttributeFormats, Manifest
 from colonnade.design.toolchain import cache_directory, project_root
-from colonnade.environment.encoding.cache import encoder_sources
-from colonnade.environment.encoding.image import words_of
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.two_level import TwoLevelMap
-from colonnade.environment.encoding.two_level_encoder import encode_two_level
-from colonnade.environment.encoding.vectors import AlbedoSpace
+from colonnade.maps.cache import encoder_sources
+from colonnade.maps.image import words_of
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.two_level import TwoLevelMap
+from colonnade.maps.two_level_encoder import encode_two_level
+from colonnade.maps.vectors import AlbedoSpace
 from colonnade.scene_image.atlas import Atlas
 from colonnade.scene_image.file import LoadSection, SceneImage
 from colonnade.scene_image.header import LoadedMemory, TextureHeader

@@ -15,13 +15,13 @@ import numpy as np
 from conftest import manifest_data
 
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoding.image import encode_environment, memory_words
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.two_level_encoder import encode_two_level
-from colonnade.environment.encoding.vectors import AlbedoSpace
 from colonnade.environment.light_fit import fit_lights
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
+from colonnade.maps.image import encode_environment, memory_words
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.two_level_encoder import encode_two_level
+from colonnade.maps.vectors import AlbedoSpace
 from colonnade.mesh.load import load_mesh
 from colonnade.scene_image.packer import pack
 

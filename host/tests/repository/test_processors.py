@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 SOURCES = HERE.parents[1] / "colonnade"
 #: What decides words: files and folders.
 DECIDING = (
-    "common/srgb.py", "common/vectors.py", "environment/encoding", "environment/light_fit.py", "environment/lights.py",
+    "common/srgb.py", "common/vectors.py", "maps", "environment/light_fit.py", "environment/lights.py",
     "environment/photo_colours.py", "environment/repair.py", "mesh", "scene/joined_mesh.py", "scene/object_pose.py",
     "scene_image",
 )  # fmt: skip

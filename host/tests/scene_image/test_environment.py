@@ -14,9 +14,9 @@ from click.testing import CliRunner
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoded import EncodedEnvironment, layout_of
-from colonnade.environment.encoding.image import AttributeImage, memory_words
 from colonnade.environment.load import load_environment
+from colonnade.maps.encoded import EncodedEnvironment, layout_of
+from colonnade.maps.image import AttributeImage, memory_words
 from colonnade.mesh.load import load_mesh
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.file import SceneImage

@@ -25,9 +25,9 @@ from colonnade.scene.model import Background, Colour, Light, Material, MeshSourc
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
-    from colonnade.environment.encoded import EncodedEnvironment
-    from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
+    from colonnade.maps.encoded import EncodedEnvironment
+    from colonnade.maps.image import AttributeImage
     from colonnade.mesh.mesh import Mesh
     from colonnade.reference.environment.ray_march import RayMarch
     from colonnade.scene.view import View
@@ -167,10 +167,10 @@ def study_frames(
 ) -> dict[str, Mapping[str, Regions]]:
     """The losses of `OBJECTS` in rooms, by room and object. ``output`` is a folder for the pictures."""
     from colonnade.design.generator import manifest_for
-    from colonnade.environment.encoded import EncodedEnvironment
-    from colonnade.environment.encoding.cache import encoded_environment
-    from colonnade.environment.encoding.layout import AttributeLayout
     from colonnade.environment.load import load_environment
+    from colonnade.maps.cache import encoded_environment
+    from colonnade.maps.encoded import EncodedEnvironment
+    from colonnade.maps.layout import AttributeLayout
     from colonnade.mesh.load import load_mesh
     from colonnade.reference.environment.decoded import float_plane_march
     from colonnade.scene.view import make_view

@@ -258,9 +258,9 @@ def study_rooms(folders: Iterable[Path]) -> dict[str, EnvironmentAccuracy]:
     """
     from colonnade.design.generator import manifest_for
     from colonnade.device.environment_march import DeviceMarch
-    from colonnade.environment.encoding.cache import encoded_environment
-    from colonnade.environment.encoding.layout import AttributeLayout
     from colonnade.environment.load import load_environment
+    from colonnade.maps.cache import encoded_environment
+    from colonnade.maps.layout import AttributeLayout
     from colonnade.reference.environment.decoded import decoded_depth, float_plane_march
 
     reports = {}

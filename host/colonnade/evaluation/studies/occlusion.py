@@ -23,8 +23,8 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Scene, Transform
 
 if TYPE_CHECKING:
-    from colonnade.environment.encoded import EncodedEnvironment
     from colonnade.evaluation.studies.synthetic_attic import SyntheticRoom
+    from colonnade.maps.encoded import EncodedEnvironment
     from colonnade.mesh.mesh import Mesh
     from colonnade.reference.render import ReferenceResult
     from colonnade.scene.view import View
@@ -125,9 +125,9 @@ def measure(
     from colonnade.common.accumulation import Accumulation
     from colonnade.design.generator import manifest_for
     from colonnade.device.bit_exact import render_model
-    from colonnade.environment.encoded import EncodedEnvironment
-    from colonnade.environment.encoding.cache import encoded_environment
-    from colonnade.environment.encoding.layout import AttributeLayout
+    from colonnade.maps.cache import encoded_environment
+    from colonnade.maps.encoded import EncodedEnvironment
+    from colonnade.maps.layout import AttributeLayout
     from colonnade.registers.environment import environment_registers
     from colonnade.registers.frame import registers_of
     from colonnade.render.composite import composited

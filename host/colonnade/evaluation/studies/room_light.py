@@ -35,8 +35,8 @@ from colonnade.scene.model import Background, Light, Material, MeshSource, Place
 from colonnade.scene.room_lights import lights_of
 
 if TYPE_CHECKING:
-    from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
+    from colonnade.maps.image import AttributeImage
     from colonnade.mesh.mesh import Mesh
     from colonnade.scene.view import View
 
@@ -150,10 +150,10 @@ def _measure(mesh: Mesh, room: LitRoom, progress: Progress) -> tuple[LightQualit
     """The quality of a lit room, and the device's frame."""
     from colonnade.design.generator import manifest_for
     from colonnade.device.environment_march import DeviceMarch
-    from colonnade.environment.encoded import EncodedEnvironment
-    from colonnade.environment.encoding.cache import encoded_environment
-    from colonnade.environment.encoding.layout import AttributeLayout
     from colonnade.evaluation.studies.ar_losses import device_frame
+    from colonnade.maps.cache import encoded_environment
+    from colonnade.maps.encoded import EncodedEnvironment
+    from colonnade.maps.layout import AttributeLayout
     from colonnade.reference.environment.decoded import backdrops, float_plane_march
     from colonnade.reference.render import render_reference
     from colonnade.scene.view import make_view
@@ -255,7 +255,7 @@ def single_bounce(mesh: Mesh, view: View, environment: Environment) -> SingleBou
 
 def _relit(room: LitRoom, mesh: Mesh, image: AttributeImage) -> tuple[float, float]:
     """PSNR of the room relit from full and from encoded maps, against its photo."""
-    from colonnade.environment.encoding.planes import PlaneProjection
+    from colonnade.maps.planes import PlaneProjection
 
     environment = room.environment
     assert environment is not None and environment.photo is not None

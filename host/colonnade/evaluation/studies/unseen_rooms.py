@@ -107,11 +107,11 @@ def measure_seed(seed: int, with_dists: bool = True, size: tuple[int, int] = (64
     """
     from colonnade.design.generator import manifest_for
     from colonnade.device.environment_march import DeviceMarch
-    from colonnade.environment.encoding.cache import encoded_environment
-    from colonnade.environment.encoding.layout import AttributeLayout
-    from colonnade.environment.encoding.planes import PlaneProjection
-    from colonnade.environment.encoding.quality import angles, ray_errors
     from colonnade.environment.load import load_environment
+    from colonnade.maps.cache import encoded_environment
+    from colonnade.maps.layout import AttributeLayout
+    from colonnade.maps.planes import PlaneProjection
+    from colonnade.maps.quality import angles, ray_errors
     from colonnade.quality.dists import dists_or_none
     from colonnade.reference.environment.decoded import float_plane_march
     from colonnade.reference.environment.depth_mesh import DepthMesh

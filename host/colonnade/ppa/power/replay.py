@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from colonnade.common import cache, processes
@@ -21,6 +20,7 @@ from colonnade.common.temporary import temporary_folder
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.device.compiler import SAFE, clean_environment, require_compiler, require_right_compiler
 from colonnade.device.verilator import run_program
+from colonnade.ppa.netlist.activity import Activity
 from colonnade.ppa.netlist.hierarchy import Hierarchy
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.power import gate_netlist
@@ -36,25 +36,6 @@ IDLE_PERIOD = 240
 
 #: Options of the compiler.
 OPTIONS = ("-std=c++17", "-O2", *SAFE)
-
-
-@dataclass(frozen=True)
-class Activity:
-    """Activity of the gate netlist in the counted cycles.
-
-    Attributes:
-        cycles: Number of cycles.
-        changes: Transitions of each net, including glitches.
-        settled: Transitions of each net without glitches: cycles with a changed final value.
-        high: Share of the cycles that end with the net at 1.
-        accesses: Reads and writes of each memory, in the order of the netlist's boxes.
-    """
-
-    cycles: int
-    changes: tuple[int, ...]
-    settled: tuple[int, ...]
-    high: tuple[float, ...]
-    accesses: tuple[tuple[int, int], ...]
 
 
 def replay(

@@ -16,13 +16,14 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import GeneratedDesign
 from colonnade.ppa.library import energies
 from colonnade.ppa.netlist import memories
+from colonnade.ppa.netlist.activity import Activity
 from colonnade.ppa.netlist.hierarchy import Hierarchy
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.netlist.synthesis import Technology
 from colonnade.ppa.power.activity import power_of
 from colonnade.ppa.power.frame import Frame, frame_of
 from colonnade.ppa.power.recording import Recording, Stimulus, record
-from colonnade.ppa.power.replay import Activity, replay
+from colonnade.ppa.power.replay import replay
 from colonnade.ppa.power.sums import KINDS, Sum
 from colonnade.ppa.timing import opensta
 from colonnade.ppa.timing.delays import net_timing

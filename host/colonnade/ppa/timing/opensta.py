@@ -13,8 +13,8 @@ from pathlib import Path
 from colonnade.common import processes
 from colonnade.common.temporary import temporary_folder
 from colonnade.ppa.library.cells import Library
+from colonnade.ppa.netlist.activity import Activity
 from colonnade.ppa.netlist.mapped import Bit, Netlist
-from colonnade.ppa.power.replay import Activity
 
 #: The clock port of each unit.
 CLOCK = "clock"

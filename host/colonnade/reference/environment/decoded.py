@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.types import Floats
-from colonnade.environment.encoding.planes import SLOPE_PIXELS, PlaneProjection, unpack_planes
+from colonnade.maps.planes import SLOPE_PIXELS, PlaneProjection, unpack_planes
 from colonnade.reference.environment.depth_mesh import DepthMesh
 from colonnade.reference.environment.ray_march import MarchedGeometry, PlaneMarch, RayMarch
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints
 
 if TYPE_CHECKING:
-    from colonnade.environment.encoding.image import AttributeImage
     from colonnade.environment.model import Environment
+    from colonnade.maps.image import AttributeImage
 
 
 class BoundingPlanes:

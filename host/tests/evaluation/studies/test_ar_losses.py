@@ -9,12 +9,12 @@ import pytest
 
 from colonnade.common.image_io import encode_srgb
 from colonnade.design.generator import manifest_for
-from colonnade.environment.encoded import EncodedEnvironment
-from colonnade.environment.encoding.image import AttributeImage, encode_environment
-from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.model import Environment
 from colonnade.evaluation.studies.ar_losses import Losses, device_frame, losses, placed_scene, table
 from colonnade.evaluation.studies.synthetic_attic import attic
+from colonnade.maps.encoded import EncodedEnvironment
+from colonnade.maps.image import AttributeImage, encode_environment
+from colonnade.maps.layout import AttributeLayout
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import MAX_PSNR
 from colonnade.quality.region_metrics import compare_regions, frame_regions

@@ -14,12 +14,12 @@ from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.ppa.library import energies
 from colonnade.ppa.library.cells import Library
+from colonnade.ppa.netlist.activity import Activity
 from colonnade.ppa.netlist.mapped import Netlist
 from colonnade.ppa.pages.power import power_table, unit_power_table
 from colonnade.ppa.power.activity import Power, power_of
 from colonnade.ppa.power.frame import Frame
 from colonnade.ppa.power.recording import Stimulus, require_recordable
-from colonnade.ppa.power.replay import Activity
 from colonnade.ppa.power.report import node_scale
 from colonnade.ppa.power.sums import Sum, by_unit
 from colonnade.ppa.timing import opensta

@@ -13,12 +13,12 @@ from click.testing import CliRunner
 from colonnade.cli.main import cli
 from colonnade.design.generator import manifest_for
 from colonnade.device.environment_march import DeviceMarch
-from colonnade.environment.encoding.image import encode_environment
-from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.model import Environment, EnvironmentCamera
 from colonnade.evaluation.studies.environment_accuracy import study, table
 from colonnade.evaluation.studies.probe_spheres import RADIUS, cosine_rays, glass_rays, mirror_rays, standing_spheres
 from colonnade.evaluation.studies.synthetic_attic import SyntheticRoom, attic, write_attic
+from colonnade.maps.image import encode_environment
+from colonnade.maps.layout import AttributeLayout
 from colonnade.reference.embree import RayTracer
 from colonnade.reference.environment.ray_march import (
     HIDDEN,

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.plane_fit import refit_planes, sample_pixels
-from colonnade.environment.encoding.planes import PlaneProjection, pack_planes, unpack_planes
-from colonnade.environment.encoding.vectors import AlbedoSpace, NormalSpace
 from colonnade.environment.model import Environment
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.plane_fit import refit_planes, sample_pixels
+from colonnade.maps.planes import PlaneProjection, pack_planes, unpack_planes
+from colonnade.maps.vectors import AlbedoSpace, NormalSpace
 
 #: Distance of the virtual wall behind the camera, metres.
 BEHIND = 0.5

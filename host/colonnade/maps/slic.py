@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
-from colonnade.environment.encoding.layout import BLOCKS_PER_TILE_EDGE, LABEL_BITS, AttributeLayout
-from colonnade.environment.encoding.tiles import inside_mask, split_tiles, sum_cells
-from colonnade.environment.encoding.vectors import VectorSpace
+from colonnade.maps.layout import BLOCKS_PER_TILE_EDGE, LABEL_BITS, AttributeLayout
+from colonnade.maps.tiles import inside_mask, split_tiles, sum_cells
+from colonnade.maps.vectors import VectorSpace
 
 #: Weight of the position in each round: squared 8-bit error that equals a distance of one tile.
 _COMPACTNESS = (400.0, 200.0, 100.0, 50.0, 25.0, 12.0, 6.0, 3.0, 1.0, 0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.environment.encoding.subdivision import Subdivided
+from colonnade.maps.subdivision import Subdivided
 
 #: The share of the heap that a step tries to spend better: the first one, and the least one.
 _FIRST_SHARE, _LEAST_SHARE = 0.4, 0.02

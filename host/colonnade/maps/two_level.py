@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.environment.encoding.layout import POINTER_BITS, AttributeLayout
-from colonnade.environment.encoding.vectors import VectorSpace
+from colonnade.maps.layout import POINTER_BITS, AttributeLayout
+from colonnade.maps.vectors import VectorSpace
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.tiles import inside_mask, split_tiles, sum_cells
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.tiles import inside_mask, split_tiles, sum_cells
 
 #: A tile's weight is 1 / (variance + this constant), on an 8-bit scale: texture masks errors.
 TEXTURE_MASKING = 150.0

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
-from colonnade.environment.encoding.planes import PlaneProjection
 from colonnade.environment.model import Environment
+from colonnade.maps.planes import PlaneProjection
 
 #: Saturation of the error, metres.
 REACH = 0.06

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from colonnade.common.atomic_files import made_folder, replacing
 from colonnade.common.image_io import encode_srgb
-from colonnade.environment.encoding.image import AttributeImage
-from colonnade.environment.encoding.planes import PlaneProjection
-from colonnade.environment.encoding.quality import angles, ray_errors, relit
 from colonnade.environment.model import Environment
+from colonnade.maps.image import AttributeImage
+from colonnade.maps.planes import PlaneProjection
+from colonnade.maps.quality import angles, ray_errors, relit
 
 #: Differences shown as white: 8-bit levels, degrees, metres.
 FULL_LEVELS, FULL_DEGREES, FULL_METRES = 64.0, 30.0, 0.2

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from colonnade.common import cache
 from colonnade.common.errors import UserError
-from colonnade.environment.encoding.cache import encoded_environment
-from colonnade.environment.encoding.image import AttributeImage, encode_environment
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.plane_encoder import encode_planes
-from colonnade.environment.encoding.plane_map import PLANE_MODES, PlaneMap
-from colonnade.environment.encoding.planes import PlaneProjection, pack_planes, unpack_planes
-from colonnade.environment.encoding.quality import ray_errors
-from colonnade.environment.encoding.vectors import unpack
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment, EnvironmentCamera
+from colonnade.maps.cache import encoded_environment
+from colonnade.maps.image import AttributeImage, encode_environment
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.plane_encoder import encode_planes
+from colonnade.maps.plane_map import PLANE_MODES, PlaneMap
+from colonnade.maps.planes import PlaneProjection, pack_planes, unpack_planes
+from colonnade.maps.quality import ray_errors
+from colonnade.maps.vectors import unpack
 
 ROOMS = Path(__file__).resolve().parents[4] / "scenes" / "rooms"
 LEVEL = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 1.2], [0, 0, -1.0, 0]])
@@ -214,7 +214,7 @@ def test_a_room_is_encoded_once(
         raise AssertionError("encoded again")
 
     with monkeypatch.context() as patch:
-        patch.setattr("colonnade.environment.encoding.cache.encode_environment", refuse)
+        patch.setattr("colonnade.maps.cache.encode_environment", refuse)
         assert all_words(encoded_environment(environment, layout, tmp_path)) == all_words(first)
         for other in (
             replace(environment, albedo=environment.albedo * 0.5),

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.image_io import encode_srgb
-from colonnade.environment.encoding.image import AttributeImage
-from colonnade.environment.encoding.planes import PlaneProjection
 from colonnade.environment.model import Environment
+from colonnade.maps.image import AttributeImage
+from colonnade.maps.planes import PlaneProjection
 from colonnade.quality.image_metrics import compare_pictures
 
 #: Lamps of `relit`: direction to the lamp in view space, and intensity; plus ambient light.

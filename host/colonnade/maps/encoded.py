@@ -7,11 +7,11 @@ from pathlib import Path
 
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
-from colonnade.environment.encoding.cache import encoded_environment
-from colonnade.environment.encoding.image import AttributeImage
-from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
+from colonnade.maps.cache import encoded_environment
+from colonnade.maps.image import AttributeImage
+from colonnade.maps.layout import AttributeLayout
 
 
 @dataclass(frozen=True)

@@ -12,17 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.environment.encoding.cell_errors import TilePixels
-from colonnade.environment.encoding.heap import pack_words
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.palette import initial_palette, nearest, update_palette
-from colonnade.environment.encoding.selection import best_subsets, choose_within_budget
-from colonnade.environment.encoding.sharing import shared_words
-from colonnade.environment.encoding.subdivision import Subdivided
-from colonnade.environment.encoding.tiles import expand_cells, sum_cells
-from colonnade.environment.encoding.two_level import MODES, Mode, TwoLevelMap
-from colonnade.environment.encoding.two_level_sharing import errors_with, fitted
-from colonnade.environment.encoding.vectors import VectorSpace
+from colonnade.maps.cell_errors import TilePixels
+from colonnade.maps.heap import pack_words
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.palette import initial_palette, nearest, update_palette
+from colonnade.maps.selection import best_subsets, choose_within_budget
+from colonnade.maps.sharing import shared_words
+from colonnade.maps.subdivision import Subdivided
+from colonnade.maps.tiles import expand_cells, sum_cells
+from colonnade.maps.two_level import MODES, Mode, TwoLevelMap
+from colonnade.maps.two_level_sharing import errors_with, fitted
+from colonnade.maps.vectors import VectorSpace
 
 #: Alternating rounds of choosing modes and updating the palette.
 _ROUNDS = 6

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
-from colonnade.environment.encoding.cell_errors import TilePixels
-from colonnade.environment.encoding.sharing import Users
-from colonnade.environment.encoding.subdivision import Subdivided
+from colonnade.maps.cell_errors import TilePixels
+from colonnade.maps.sharing import Users
+from colonnade.maps.subdivision import Subdivided
 
 #: Tiles per batch, so that their costs fit a cache.
 _TILES = 16

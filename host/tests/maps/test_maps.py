@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
-from colonnade.environment.encoding.cache import encoded_environment
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.quality import angles, relit
-from colonnade.environment.encoding.selection import best_subsets, choose_within_budget
-from colonnade.environment.encoding.slic import encode_slic
-from colonnade.environment.encoding.two_level import MODES, TwoLevelMap
-from colonnade.environment.encoding.two_level_encoder import encode_two_level
-from colonnade.environment.encoding.vectors import AlbedoSpace, NormalSpace, pack, unpack
 from colonnade.environment.load import load_environment
+from colonnade.maps.cache import encoded_environment
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.quality import angles, relit
+from colonnade.maps.selection import best_subsets, choose_within_budget
+from colonnade.maps.slic import encode_slic
+from colonnade.maps.two_level import MODES, TwoLevelMap
+from colonnade.maps.two_level_encoder import encode_two_level
+from colonnade.maps.vectors import AlbedoSpace, NormalSpace, pack, unpack
 from colonnade.quality.image_metrics import psnr, ssim
 
 ROOMS = Path(__file__).resolve().parents[4] / "scenes" / "rooms"

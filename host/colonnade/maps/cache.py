@@ -12,9 +12,9 @@ import numpy as np
 
 from colonnade.common import cache
 from colonnade.design.toolchain import cache_directory, project_root
-from colonnade.environment.encoding.image import AttributeImage, encode_environment
-from colonnade.environment.encoding.layout import AttributeLayout
 from colonnade.environment.model import Environment
+from colonnade.maps.image import AttributeImage, encode_environment
+from colonnade.maps.layout import AttributeLayout
 
 #: File name in a cache entry.
 FILE = "room.npz"
@@ -48,7 +48,7 @@ def encoder_sources() -> bytes:
     """Digest of the encoders' source files."""
     digest = hashlib.sha256()
     here = Path(__file__).parent
-    common = [here.parents[1] / "common" / name for name in ("fixed_order.py", "srgb.py")]
+    common = [here.parent / "common" / name for name in ("fixed_order.py", "srgb.py")]
     for file in [*sorted(here.glob("*.py")), *common]:
         digest.update(file.read_bytes())
     return digest.digest()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.environment.encoding.layout import AttributeLayout
+from colonnade.maps.layout import AttributeLayout
 
 
 def split_tiles(values: NDArray[Any], layout: AttributeLayout) -> NDArray[Any]:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.environment.encoding.two_level import mask_words
+from colonnade.maps.two_level import mask_words
 
 
 class TileMode(Protocol):

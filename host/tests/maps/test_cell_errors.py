@@ -1,4 +1,4 @@
-"""Tests of `colonnade.environment.encoding.cell_errors`."""
+"""Tests of `colonnade.maps.cell_errors`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colonnade.environment.encoding.cell_errors import PIXEL_DETAIL, TilePixels
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.tiles import sum_cells
+from colonnade.maps.cell_errors import PIXEL_DETAIL, TilePixels
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.tiles import sum_cells
 
 
 @settings(deadline=None, max_examples=12)

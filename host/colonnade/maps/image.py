@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.errors import UserError
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.plane_encoder import encode_planes
-from colonnade.environment.encoding.plane_map import PlaneMap
-from colonnade.environment.encoding.planes import PlaneProjection
-from colonnade.environment.encoding.slic import SlicMap, encode_slic
-from colonnade.environment.encoding.two_level import TwoLevelMap
-from colonnade.environment.encoding.two_level_encoder import encode_two_level
-from colonnade.environment.encoding.vectors import AlbedoSpace, NormalSpace, VectorSpace
 from colonnade.environment.model import Environment
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.plane_encoder import encode_planes
+from colonnade.maps.plane_map import PlaneMap
+from colonnade.maps.planes import PlaneProjection
+from colonnade.maps.slic import SlicMap, encode_slic
+from colonnade.maps.two_level import TwoLevelMap
+from colonnade.maps.two_level_encoder import encode_two_level
+from colonnade.maps.vectors import AlbedoSpace, NormalSpace, VectorSpace
 
 #: Bytes per pixel of a source map: three components of 8 bits.
 SOURCE_BYTES_PER_PIXEL = 3

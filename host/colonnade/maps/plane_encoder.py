@@ -12,17 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.environment.encoding.bounding_planes import choose_bounding_planes, pack_bounding_planes
-from colonnade.environment.encoding.heap import pack_words
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.plane_fit import Samples, fit_planes, refit_planes, sample_pixels
-from colonnade.environment.encoding.plane_map import PLANE_MODES, PlaneMap
-from colonnade.environment.encoding.planes import PlaneProjection, pack_planes, unpack_planes
-from colonnade.environment.encoding.selection import best_subsets, choose_within_budget
-from colonnade.environment.encoding.sharing import shared_words
-from colonnade.environment.encoding.subdivision import Subdivided
-from colonnade.environment.encoding.tiles import expand_cells, inside_mask, join_tiles, split_tiles, sum_cells
 from colonnade.environment.model import Environment
+from colonnade.maps.bounding_planes import choose_bounding_planes, pack_bounding_planes
+from colonnade.maps.heap import pack_words
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.plane_fit import Samples, fit_planes, refit_planes, sample_pixels
+from colonnade.maps.plane_map import PLANE_MODES, PlaneMap
+from colonnade.maps.planes import PlaneProjection, pack_planes, unpack_planes
+from colonnade.maps.selection import best_subsets, choose_within_budget
+from colonnade.maps.sharing import shared_words
+from colonnade.maps.subdivision import Subdivided
+from colonnade.maps.tiles import expand_cells, inside_mask, join_tiles, split_tiles, sum_cells
 
 #: Largest error of a pixel, metres.
 _MAX_ERROR = 0.5

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
-from colonnade.environment.encoding.layout import POINTER_BITS, AttributeLayout
-from colonnade.environment.encoding.planes import PlaneProjection, unpack_planes
+from colonnade.maps.layout import POINTER_BITS, AttributeLayout
+from colonnade.maps.planes import PlaneProjection, unpack_planes
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from colonnade.environment.encoding import cell_errors, plane_encoder, sharing, two_level_encoder
-from colonnade.environment.encoding.heap import pack_words
-from colonnade.environment.encoding.layout import AttributeLayout
-from colonnade.environment.encoding.plane_encoder import encode_planes
-from colonnade.environment.encoding.sharing import Offered, Users, choose_shared
-from colonnade.environment.encoding.subdivision import Subdivided
-from colonnade.environment.encoding.tiles import expand_cells, join_tiles
-from colonnade.environment.encoding.two_level import MODES
-from colonnade.environment.encoding.two_level_encoder import encode_two_level
-from colonnade.environment.encoding.vectors import AlbedoSpace
 from colonnade.evaluation.studies.generated_rooms import generated_room
+from colonnade.maps import cell_errors, plane_encoder, sharing, two_level_encoder
+from colonnade.maps.heap import pack_words
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.plane_encoder import encode_planes
+from colonnade.maps.sharing import Offered, Users, choose_shared
+from colonnade.maps.subdivision import Subdivided
+from colonnade.maps.tiles import expand_cells, join_tiles
+from colonnade.maps.two_level import MODES
+from colonnade.maps.two_level_encoder import encode_two_level
+from colonnade.maps.vectors import AlbedoSpace
 
 ALBEDO = AlbedoSpace(12)
 

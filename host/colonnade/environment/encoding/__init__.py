@@ -1,1 +1,0 @@
-"""Encodes an environment's maps into the contents of the on-chip physical-attribute memory."""
