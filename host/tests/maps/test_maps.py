@@ -23,7 +23,7 @@ from colonnade.maps.two_level_encoder import encode_two_level
 from colonnade.maps.vectors import AlbedoSpace, NormalSpace, pack, unpack
 from colonnade.quality.image_metrics import psnr, ssim
 
-ROOMS = Path(__file__).resolve().parents[4] / "scenes" / "rooms"
+ROOMS = Path(__file__).resolve().parents[3] / "scenes" / "rooms"
 ALBEDO, NORMAL = AlbedoSpace(12), NormalSpace(12)
 
 

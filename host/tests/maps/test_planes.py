@@ -24,7 +24,7 @@ from colonnade.maps.planes import PlaneProjection, pack_planes, unpack_planes
 from colonnade.maps.quality import ray_errors
 from colonnade.maps.vectors import unpack
 
-ROOMS = Path(__file__).resolve().parents[4] / "scenes" / "rooms"
+ROOMS = Path(__file__).resolve().parents[3] / "scenes" / "rooms"
 LEVEL = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 1.2], [0, 0, -1.0, 0]])
 
 
