@@ -3,7 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.config.{ColonnadeConfig, MapEncoding}
+import colonnade.config.ColonnadeConfig
 import colonnade.formats.{EnvironmentView, Load}
 import colonnade.{Always, Model, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -40,16 +40,13 @@ class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def shared(config: ColonnadeConfig) =
     config.copy(units = config.units.copy(marches = 1, directView = true))
 
-  private val configs = Seq(0, 4).map(TestConfigs.formats).map(
-    _.copy(physicalAttributeMemory = Some(TestConfigs.environment))
-  ) :+ TestConfigs.withPrecision(16, 16, 16).copy(
-    physicalAttributeMemory = Some(TestConfigs.environment.copy(encoding = MapEncoding.Sliding))
-  )
+  private val configs =
+    Seq(0, 4, 1).map(TestConfigs.formats).map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment)))
 
   for ((config, seed) <- configs.map(shared).zipWithIndex) {
     val size = config.physicalAttributeMemory.get
 
-    it should s"see what the march sees: ${config.precision}, ${size.encoding} maps of ${size.width}x${size.height}" taggedAs Always.unless(
+    it should s"see what the march sees: ${config.precision}, maps of ${size.width}x${size.height}" taggedAs Always.unless(
       seed == 1
     ) in
       test(new DirectViewHarness(config)).withAnnotations(Simulation.verilator) { dut =>

@@ -39,19 +39,26 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
   private def colour(): Seq[Int] =
     xyz(if (random.nextInt(4) == 0) random.nextInt(2) * 4095 else random.nextInt(4096))
 
+  private var ambient = Seq.empty[Int]
+
   private def intensity(): Seq[Int] =
     xyz(if (random.nextInt(6) == 0) 65535 else random.nextInt(6) * random.nextInt(1800))
 
   /** Ambient light, background, transmittance for shadow rays. */
-  def registers(): (Seq[Int], Seq[Int], Int) =
-    (if (random.nextBoolean()) intensity() else xyz(0), colour(), random.nextInt(one + 1))
+  def registers(): (Seq[Int], Seq[Int], Int) = {
+    ambient = if (random.nextBoolean()) intensity() else xyz(0)
+    (ambient, colour(), random.nextInt(one + 1))
+  }
 
-  def surface(): LitColours =
+  /** Some lights are as bright as the ambient light, which gives a ratio of exactly one half. */
+  def surface(): LitColours = {
+    def light() = if (random.nextInt(3) == 0) ambient else intensity()
     LitColours(
       colour(),
-      Seq.tabulate(config.frame.lights)(light => if (light < lights) intensity() else xyz(0)),
+      Seq.tabulate(config.frame.lights)(index => if (index < lights) light() else xyz(0)),
       if (random.nextBoolean()) colour() else xyz(0)
     )
+  }
 
   def path(): Seq[ColourEvent] = {
     val bounces = if (config.frame.hasBounces) random.nextInt(4) else 0
@@ -84,7 +91,7 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
   private val isStraight = Array.fill(contexts)(true)
 
   /** By context, the colours and shadow ratios of its paths. */
-  val colours = Seq.fill(contexts)(mutable.ArrayBuffer.empty[(Seq[BigInt], Option[Seq[BigInt]])])
+  val colours = Seq.fill(contexts)(mutable.ArrayBuffer.empty[(Seq[Int], Option[Seq[Int]])])
 
   def enqueue(events: Seq[Seq[ColourEvent]]): Unit = todo.zip(events).foreach { case (queue, more) => queue ++= more }
 
@@ -144,7 +151,8 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       val context = io.colour.bits.context.peekInt().toInt
       val ended   = waits(context).getOrElse(throw new AssertionError(s"context $context has not ended"))
       val ratio   = io.colour.bits.ratio.filter(_ => ended.isDirectView && !ended.isBackground)
-      colours(context) += (io.colour.bits.colour.channels.map(_.peekInt()) -> ratio.map(_.channels.map(_.peekRaw())))
+      colours(context) +=
+        (io.colour.bits.colour.channels.map(_.peekInt().toInt) -> ratio.map(_.channels.map(_.peekRaw().toInt)))
       waits(context) = None
     }
     (start ++ remember).foreach { case (context, _) => todo(context).dequeue() }

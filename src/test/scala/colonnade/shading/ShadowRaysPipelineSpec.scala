@@ -1,35 +1,15 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{Decoupled, DecoupledIO, Valid}
 import chiseltest._
-import colonnade.config.ColonnadeConfig
 import colonnade.numbers.FixedPorts._
 import colonnade.ray.RayRequest
 import colonnade.{Always, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
-import scala.collection.mutable
 import scala.util.Random
 
-/** The unit and the pipeline at the same surfaces, with requests and rays of their own. */
-private class ShadowRaysHarness(config: ColonnadeConfig) extends Module {
-  private val units = Seq(Module(new ShadowRays(config)).io, Module(new ShadowRaysPipeline(config)).io)
-
-  val lights    = IO(chiselTypeOf(units.head.lights))
-  val unitShift = IO(chiselTypeOf(units.head.unitShift))
-  val surface   = IO(Flipped(Valid(new LitSurface(config))))
-  val requests  = IO(Vec(2, Flipped(Decoupled(new ShadowRequest(config)))))
-  val rays      = IO(Vec(2, Decoupled(new RayRequest(config))))
-  for (((unit, request), ray) <- units.zip(requests).zip(rays)) {
-    unit.lights    := lights
-    unit.unitShift := unitShift
-    unit.surface   := surface
-    unit.req :<>= request
-    ray :<>= unit.ray
-  }
-}
-
+/** A shadow ray goes from its context's surface to its light. */
 class ShadowRaysPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ShadowRaysPipeline"
 
@@ -38,30 +18,36 @@ class ShadowRaysPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
   ) :+ TestConfigs.withPrecision(64, 64, 64)
 
   for (config <- configs)
-    it should s"make the rays of ShadowRays at ${config.precision} with ${config.array.contexts} contexts" taggedAs Always.unless(
+    it should s"send rays from remembered surfaces at ${config.precision} with ${config.array.contexts} contexts" taggedAs Always.unless(
       config == configs(1)
     ) in
-      test(new ShadowRaysHarness(config)) { dut =>
+      test(new ShadowRaysPipeline(config)) { dut =>
         val random                    = new Random(11)
         val numbers                   = config.numbers
         def signed(bits: Int): BigInt = BigInt(bits, random) - (BigInt(1) << (bits - 1))
         val shift                     = random.nextInt(5) + 1
         val bits                      = numbers.macBits.min(numbers.sceneBits - shift)
-        dut.unitShift.poke(shift)
-        for (light <- dut.lights; axis <- light.position.axes) axis.poke(signed(bits))
+        val lights                    = Seq.fill(config.frame.lights)(Seq.fill(3)(signed(bits)))
+        dut.io.unitShift.poke(shift)
+        for ((port, light) <- dut.io.lights.zip(lights); (axis, value) <- port.position.axes.zip(light))
+          axis.poke(value)
 
         for (stalls <- Seq(0.0, 0.5, 0.5, 0.8)) {
-          for (context <- 0 until config.array.contexts) {
-            dut.surface.valid.poke(true)
-            dut.surface.bits.context.poke(context)
-            dut.surface.bits.origin.axes.foreach(_.pokeRaw(signed(numbers.sceneBits)))
+          val surfaces = Seq.fill(config.array.contexts)(Seq.fill(3)(signed(numbers.sceneBits)))
+          for ((surface, context) <- surfaces.zipWithIndex) {
+            dut.io.surface.valid.poke(true)
+            dut.io.surface.bits.context.poke(context)
+            dut.io.surface.bits.origin.axes.zip(surface).foreach { case (axis, value) => axis.pokeRaw(value) }
             dut.clock.step()
           }
-          dut.surface.valid.poke(false)
+          dut.io.surface.valid.poke(false)
           val all            = for (c <- 0 until config.array.contexts; l <- 0 until config.frame.lights) yield (c, l)
           val asks           = Seq.fill(4)(random.shuffle(all)).flatten
           val (rays, cycles) = exchange(dut, asks, random, stalls)
-          assert(rays.head == rays.last)
+          assert(rays == asks.map { case (context, light) =>
+            val (from, to) = (surfaces(context), lights(light).map(_ << shift))
+            Seq[BigInt](context, 1) ++ from ++ to.zip(from).map { case (to, from) => to - from }
+          })
           if (stalls == 0) {
             info(f"${cycles.toDouble / asks.size}%.2f cycles a ray")
             assert(cycles * 2 <= asks.size * 3 + 8)
@@ -69,34 +55,30 @@ class ShadowRaysPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
         }
       }
 
-  /** The rays of both, and the cycles of the pipeline. */
-  private def exchange(dut: ShadowRaysHarness, asks: Seq[(Int, Int)], random: Random, stalls: Double) = {
-    val rays   = Seq.fill(2)(mutable.ArrayBuffer.empty[Seq[BigInt]])
-    val sent   = Array(0, 0)
-    var cycles = 0
-    while (rays.exists(_.size < asks.size)) {
-      for ((request, unit) <- dut.requests.zipWithIndex) {
-        val offers = sent(unit) < asks.size && random.nextDouble() >= stalls
-        request.valid.poke(offers)
-        if (offers) {
-          request.bits.context.poke(asks(sent(unit))._1)
-          request.bits.light.poke(asks(sent(unit))._2)
-          if (request.ready.peekBoolean()) sent(unit) += 1
-        }
+  /** Rays, and cycles to the last one. */
+  private def exchange(dut: ShadowRaysPipeline, asks: Seq[(Int, Int)], random: Random, stalls: Double) = {
+    val request = dut.io.req
+    var rays    = Vector.empty[Seq[BigInt]]
+    var sent    = 0
+    var cycles  = 0
+    while (rays.size < asks.size) {
+      val offers = sent < asks.size && random.nextDouble() >= stalls
+      request.valid.poke(offers)
+      if (offers) {
+        request.bits.context.poke(asks(sent)._1)
+        request.bits.light.poke(asks(sent)._2)
       }
-      for ((ray, unit) <- dut.rays.zipWithIndex) {
-        val takes = random.nextDouble() >= stalls
-        ray.ready.poke(takes)
-        if (takes && ray.valid.peekBoolean()) rays(unit) += peek(ray)
-      }
-      if (rays.last.size < asks.size) cycles += 1
+      val takes = random.nextDouble() >= stalls
+      dut.io.ray.ready.poke(takes)
+      if (takes && dut.io.ray.valid.peekBoolean()) rays :+= peek(dut.io.ray.bits)
+      if (offers && request.ready.peekBoolean()) sent += 1
+      if (rays.size < asks.size) cycles += 1
       dut.clock.step()
     }
-    dut.requests.foreach(_.valid.poke(false))
-    (rays.map(_.toSeq), cycles)
+    request.valid.poke(false)
+    (rays, cycles)
   }
 
-  private def peek(ray: DecoupledIO[RayRequest]): Seq[BigInt] =
-    Seq(ray.bits.context.peekInt(), ray.bits.isShadow.peekInt()) ++ ray.bits.origin.axes.map(_.peekRaw()) ++
-      ray.bits.dir.axes.map(_.peekInt())
+  private def peek(ray: RayRequest): Seq[BigInt] = Seq(ray.context.peekInt(), ray.isShadow.peekInt()) ++
+    ray.origin.axes.map { axis => axis.raw.asInstanceOf[SInt].peekInt() } ++ ray.dir.axes.map(_.peekInt())
 }

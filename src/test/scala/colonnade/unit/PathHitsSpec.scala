@@ -29,6 +29,7 @@ class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
         driver.run(traces = 600)
         driver.shaded should be > 160
         driver.refused should be > 16
+        driver.measured should be > 60
       }
     }
 }
@@ -86,12 +87,14 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
   private val awaited              = mutable.ArrayBuffer.empty[Int]
   private var offer                = Option.empty[Int]
   private var following            = Option.empty[Int]
+  private var measuring            = Option.empty[Int]
   private var readyBefore          = false
+  private var resolvedBefore       = Option.empty[Int]
   private var measuredBefore       = Option.empty[Int]
   private var (cycle, done, quiet) = (0, 0, 0)
 
-  /** Hits that were shaded, and hits whose attributes have an illegal address. */
-  var (shaded, refused) = (0, 0)
+  /** Hits that were shaded, hits whose attributes have an illegal address, and hits whose distance was asked for alone. */
+  var (shaded, refused, measured) = (0, 0, 0)
 
   private val (attributeBase, recordCount) = (16, 24)
 
@@ -210,6 +213,11 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
       else other.state = shading
     }
     trace.hasSurface.valid.expect(shades.nonEmpty)
+    measuring =
+      if (shades.isEmpty && chance(2)) one(in(ended).filter(other => all(other).hasHit && all(other).endedAt < cycle))
+      else None
+    control.measured.valid.poke(measuring.nonEmpty)
+    control.measured.bits.poke(measuring.getOrElse(0))
     now
   }
 
@@ -218,19 +226,23 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     trace.control.occlusion.expect(all(context).occlusion)
   }
 
-  /** In the cycle after its resolution the hit's distance is known. */
+  /** In the cycle after it is resolved or measured, a hit's distance is known. */
   private def checkMeasured(): Unit = {
-    val measured = trace.surfaceHit
-    measured.valid.expect(measuredBefore.nonEmpty)
-    for (context <- measuredBefore; now = all(context)) {
-      measured.bits.context.expect(context)
-      measured.bits.isPrimary.expect(now.isPrimary)
-      measured.bits.id.expect(now.id)
+    val hit = trace.surfaceHit
+    hit.valid.expect(resolvedBefore.nonEmpty)
+    for (context <- resolvedBefore; now = all(context)) {
+      hit.bits.context.expect(context)
+      hit.bits.isPrimary.expect(now.isPrimary)
+      hit.bits.id.expect(now.id)
+    }
+    for (context <- resolvedBefore ++ measuredBefore; now = all(context)) {
       val steps = if (config.numbers.gridFraction >= 0) now.tEntry << config.numbers.gridFraction
       else now.tEntry >> -config.numbers.gridFraction
-      measured.bits.distance.get.expect(steps + now.t)
+      hit.bits.distance.get.expect(steps + now.t)
     }
-    measuredBefore = all.indices.find(index => all(index).state == shading && all(index).resolvedAt == cycle)
+    measured += measuredBefore.size
+    measuredBefore = measuring
+    resolvedBefore = all.indices.find(index => all(index).state == shading && all(index).resolvedAt == cycle)
   }
 
   /** Broadcasts requested records, in any order. */

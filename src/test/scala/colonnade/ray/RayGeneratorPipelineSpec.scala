@@ -12,69 +12,64 @@ import org.scalatest.matchers.should.Matchers
 import scala.util.Random
 
 /** Expected values straight from docs/numbers.md, section 1. */
-class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
-  import RayGeneratorSpec._
+class RayGeneratorPipelineSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  import RayGeneratorPipelineSpec._
 
-  for (pipelined <- Seq(false, true)) {
-    behavior of (if (pipelined) "RayGeneratorPipeline" else "RayGenerator")
-    val kind = if (pipelined) "pipelined" else "sequential"
+  behavior of "RayGeneratorPipeline"
 
-    TestConfigs.formats.foreach { formats =>
-      val name = s"$kind, ${formats.precision} with ${formats.geometry.vertexBits}-bit vertices"
+  TestConfigs.formats.foreach { formats =>
+    val name = s"${formats.precision} with ${formats.geometry.vertexBits}-bit vertices"
 
-      it should s"send every pixel's exact ray under random stalls, $name" in {
-        val config = withPipeline(formats, pipelined)
-        test(RayGenerator(config)) { generator =>
-          val random = new Random(1)
-          for (frame <- frames(config, random)) {
-            setRegisters(generator, frame)
-            run(generator, pixels(config, random, 12), random)(frame)
-            run(generator, tileWithGaps(config, random), random)(frame)
-            // Then the registers change, even if the next pixel would follow the last one
-            stop(generator, RayGeneratorPipeline.emptyCycles)
-          }
-        }
-      }
-    }
-
-    it should s"forget the registers when it is empty, $kind" in {
-      val config = withPipeline(TestConfigs.tiny, pipelined)
-      test(RayGenerator(config)) { generator =>
-        val random = new Random(2)
-        val pixels = tile(config, random)
-        for ((frame, pixel) <- frames(config, random).zip(pixels)) {
+    it should s"send every pixel's exact ray under random stalls, $name" in {
+      test(new RayGeneratorPipeline(formats)) { generator =>
+        val random = new Random(1)
+        for (frame <- frames(formats, random)) {
           setRegisters(generator, frame)
-          run(generator, Seq(pixel), random)(frame)
+          run(generator, pixels(formats, random, 12), random)(frame)
+          run(generator, tileWithGaps(formats, random), random)(frame)
+          // Then the registers change, even if the next pixel would follow the last one
           stop(generator, RayGeneratorPipeline.emptyCycles)
         }
       }
     }
+  }
 
-    val interval = if (pipelined) 1 else 8
-    it should s"accept a pixel of a tile every $interval cycles, $kind" in {
-      val config = withPipeline(TestConfigs.tiny, pipelined)
-      test(RayGenerator(config)) { generator =>
-        val pixels = tile(config, new Random(3))
-        generator.io.position.valid.poke(true)
-        generator.io.ray.ready.poke(true)
-        var taken = Seq.empty[Int]
-        for (cycle <- 0 until 200 if taken.size < pixels.size) {
-          poke(generator, pixels(taken.size))
-          if (generator.io.position.ready.peekBoolean()) taken :+= cycle
-          generator.clock.step()
-        }
-        val intervals = taken.zip(taken.tail).map { case (one, next) => next - one }
-        // The second pixel waits for the direction of the first one
-        intervals.head should be <= interval.max(config.numbers.coordinateBits + 1)
-        all(intervals.tail) should be <= interval
-        taken.size should be > 20
+  it should "forget the registers when it is empty" in {
+    val config = TestConfigs.tiny
+    test(new RayGeneratorPipeline(config)) { generator =>
+      val random = new Random(2)
+      val pixels = tile(config, random)
+      for ((frame, pixel) <- frames(config, random).zip(pixels)) {
+        setRegisters(generator, frame)
+        run(generator, Seq(pixel), random)(frame)
+        stop(generator, RayGeneratorPipeline.emptyCycles)
       }
     }
   }
 
+  it should "accept a pixel of a tile every cycle, after the first one" in {
+    val config = TestConfigs.tiny
+    test(new RayGeneratorPipeline(config)) { generator =>
+      val pixels = tile(config, new Random(3))
+      generator.io.position.valid.poke(true)
+      generator.io.ray.ready.poke(true)
+      var taken = Seq.empty[Int]
+      for (cycle <- 0 until 200 if taken.size < pixels.size) {
+        poke(generator, pixels(taken.size))
+        if (generator.io.position.ready.peekBoolean()) taken :+= cycle
+        generator.clock.step()
+      }
+      val intervals = taken.zip(taken.tail).map { case (one, next) => next - one }
+      // The second pixel waits for the direction of the first one
+      intervals.head should be <= config.numbers.coordinateBits + 1
+      all(intervals.tail) should be <= 1
+      taken.size should be > 20
+    }
+  }
+
   it should "send every pixel's exact ray of two mixed tiles under random stalls" in {
-    val config = withPipeline(TestConfigs.withEnvironment(TestConfigs.environment), pipelined = true)
-    test(RayGenerator(config)) { generator =>
+    val config = TestConfigs.withEnvironment(TestConfigs.environment)
+    test(new RayGeneratorPipeline(config)) { generator =>
       val random = new Random(4)
       for (frame <- frames(config, random)) {
         setRegisters(generator, frame)
@@ -86,8 +81,8 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 
   it should "forget the registers of both tiles when it is empty" in {
-    val config = withPipeline(TestConfigs.withEnvironment(TestConfigs.environment), pipelined = true)
-    test(RayGenerator(config)) { generator =>
+    val config = TestConfigs.withEnvironment(TestConfigs.environment)
+    test(new RayGeneratorPipeline(config)) { generator =>
       val random = new Random(6)
       val tiles  = Seq(true, false).map(isObject => tile(config, random).map(_.copy(inObjectTile = isObject)))
       for (((frame, pixels), index) <- frames(config, random).zip(tiles.transpose).zipWithIndex) {
@@ -100,8 +95,8 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 
   it should "accept a pixel of two mixed tiles every cycle, after the first ones" in {
-    val config = withPipeline(TestConfigs.withEnvironment(TestConfigs.environment), pipelined = true)
-    test(RayGenerator(config)) { generator =>
+    val config = TestConfigs.withEnvironment(TestConfigs.environment)
+    test(new RayGeneratorPipeline(config)) { generator =>
       val random = new Random(5)
       val pixels = mixed(Seq.fill(2)(tile(config, random)), random)
       generator.io.position.valid.poke(true)
@@ -117,7 +112,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
-  private def run(generator: RayGeneratorModule, pixels: Seq[Pixel], random: Random)(frame: Frame): Unit = {
+  private def run(generator: RayGeneratorPipeline, pixels: Seq[Pixel], random: Random)(frame: Frame): Unit = {
     var (sent, received, cycle) = (0, 0, 0)
     while (received < pixels.size) {
       cycle should be < 100 * pixels.size
@@ -140,7 +135,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     }
   }
 
-  private def poke(generator: RayGeneratorModule, pixel: Pixel): Unit = {
+  private def poke(generator: RayGeneratorPipeline, pixel: Pixel): Unit = {
     generator.io.position.bits.context.poke(pixel.context)
     generator.io.position.bits.x.poke(pixel.x)
     generator.io.position.bits.y.poke(pixel.y)
@@ -148,7 +143,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 
   /** Leaves the empty generator without a pixel. */
-  private def stop(generator: RayGeneratorModule, cycles: Int): Unit = {
+  private def stop(generator: RayGeneratorPipeline, cycles: Int): Unit = {
     generator.io.position.valid.poke(false)
     generator.clock.step(cycles)
   }
@@ -164,10 +159,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 }
 
-object RayGeneratorSpec {
-  private def withPipeline(config: ColonnadeConfig, pipelined: Boolean): ColonnadeConfig =
-    config.copy(units = config.units.copy(pipelined = pipelined))
-
+object RayGeneratorPipelineSpec {
   private type Vector = Seq[BigInt]
   private case class Pixel(context: Int, x: BigInt, y: BigInt, inObjectTile: Boolean = true)
   private case class Frame(
@@ -237,7 +229,7 @@ object RayGeneratorSpec {
     isObjects.map(isObject => left(if (isObject) 0 else 1).next().copy(inObjectTile = isObject))
   }
 
-  private def setRegisters(generator: RayGeneratorModule, frame: Frame): Unit = {
+  private def setRegisters(generator: RayGeneratorPipeline, frame: Frame): Unit = {
     val camera                                  = generator.io.registers.camera
     def set(port: Vec3[SInt], to: Vector): Unit = port.axes.zip(to).foreach { case (p, v) => p.poke(v) }
     set(camera.position, frame.position)

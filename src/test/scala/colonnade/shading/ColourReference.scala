@@ -1,0 +1,69 @@
+package colonnade.shading
+
+import colonnade.config.ColonnadeConfig
+
+/** The colours of paths in the integers of docs/numbers.md, sections 5.9 and 6.7.
+  *
+  * @param shadowTransmittance of the light that transmissive triangles leave, of 4096
+  */
+final class ColourReference(
+    config:              ColonnadeConfig,
+    ambient:             Seq[Int],
+    background:          Seq[Int],
+    shadowTransmittance: Int
+) {
+  import ColourEvent._
+
+  private type Xyz = Seq[Int]
+
+  private val one   = 4096
+  private val white = 4095
+
+  /** Colours of the paths of one context, and the shadow ratios of those that have one. Paths end before the last event. */
+  def colours(events: Seq[ColourEvent]): Seq[(Xyz, Option[Xyz])] = {
+    var throughput, radiance           = Seq.empty[Int]
+    var surface                        = Option.empty[LitColours]
+    def add(part: Xyz, seen: Xyz): Xyz =
+      Seq(radiance, part, seen).transpose.map { case Seq(sure, part, seen) => white.min(sure + (part * seen >> 12)) }
+    events.flatMap {
+      case Start =>
+        throughput = Seq.fill(3)(one)
+        radiance = Seq.fill(3)(0)
+        None
+      case Remember(what) =>
+        surface = Some(what)
+        None
+      case Bounce(albedo, isTinted, fresnel, hasSurface) =>
+        val tinted = throughput.zip(albedo).map { case (weight, tint) =>
+          if (isTinted) weight * (tint + (tint >> 11)) >> 12 else weight
+        }
+        val parts = tinted.map(_ * fresnel >> 12)
+        radiance = add(parts, if (hasSurface) shown(surface.get, unshadowed(surface.get)) else background)
+        throughput = tinted.zip(parts).map { case (weight, part) => weight - part }
+        None
+      case End(true, _, _)                      => Some(add(throughput, background) -> None)
+      case End(false, occlusions, isDirectView) =>
+        val (light, all) = (visible(surface.get, occlusions), unshadowed(surface.get))
+        val ratio        = light.zip(all).map { case (part, all) =>
+          if (part == all) one else (part.toLong * one / all).toInt
+        }
+        Some(add(throughput, shown(surface.get, light)) -> Option.when(config.hasEnvironment && isDirectView)(ratio))
+    }
+  }
+
+  private def unshadowed(surface: LitColours): Xyz = visible(surface, surface.direct.map(_ => 0))
+
+  private def visible(surface: LitColours, occlusions: Seq[Int]): Xyz = ambient.indices.map { channel =>
+    ambient(channel) + surface.direct.zip(occlusions).map { case (direct, occlusion) =>
+      val share = Seq(one, shadowTransmittance, 0)(occlusion)
+      (direct(channel).toLong * share >> 12).toInt
+    }.sum
+  }
+
+  /** What a surface reflects of the light, and emits. */
+  private def shown(surface: LitColours, light: Xyz): Xyz =
+    Seq(surface.albedo, light, surface.emission).transpose.map { case Seq(albedo, light, emission) =>
+      val reflected = (albedo.toLong * light >> 12).min(white).toInt
+      if (config.frame.emission) (reflected + emission).min(white) else reflected
+    }
+}
