@@ -6,6 +6,7 @@ A lock lists all packages that pip may install, with their version for each Pyth
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import re
 import subprocess
@@ -54,14 +55,15 @@ def project_tables() -> dict[str, Any]:
 
 
 def wanted_locks() -> list[Lock]:
-    """The locks of pyproject.toml: build requirements, .venv, and each further extra and group."""
+    """The locks of pyproject.toml: build requirements, .venv, `ppa`, and each further group."""
     data = project_tables()
     project = data["project"]
     extras: dict[str, list[str]] = dict(project.get("optional-dependencies", {}))
     groups: dict[str, list[str]] = dict(data.get("dependency-groups", {}))
     build = [*data["build-system"]["requires"], *groups.pop("build", [])]
-    host = [*project["dependencies"], *extras.pop("test", [])]
-    tables = {"build": build, "host": host, **extras, **groups}
+    ppa = extras.pop("ppa", [])
+    host = [*project["dependencies"], *itertools.chain(*extras.values())]
+    tables = {"build": build, "host": host, "ppa": ppa, **groups}
     return [Lock(name, tuple(table), project["requires-python"]) for name, table in tables.items()]
 
 

@@ -78,12 +78,14 @@ def _inspect_environment(
     background: Path, encoding: str, output: Path | None, with_dists: bool, json_file: Path | None
 ) -> None:
     from colonnade.common import progress
+    from colonnade.common.extras import require_extra
     from colonnade.environment.load import load_environment
     from colonnade.maps.cache import encoded_environment
     from colonnade.maps.layout import AttributeLayout
     from colonnade.maps.quality import measure, report_lines
     from colonnade.maps.visualise import map_pictures, write_pictures
 
+    require_extra("quality", "inspect --background")
     environment = load_environment(background)
     for note in environment.notes:
         echo(f"colonnade: note: {environment.name}: {note}", err=True)

@@ -55,10 +55,12 @@ def registers(
 
     from colonnade.common import progress
     from colonnade.common.atomic_files import replacing
+    from colonnade.common.extras import require_extra
     from colonnade.design import generator
     from colonnade.design.design_folder import check_replaceable, listed
     from colonnade.integration import files
 
+    require_extra("integration", "colonnade registers")
     if output is not None:
         check_replaceable(output)
     terminal = progress.for_terminal()

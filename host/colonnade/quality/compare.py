@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from colonnade.common.errors import UserError
+from colonnade.common.extras import require_extra
 from colonnade.common.hits import Hits, read_hits
 from colonnade.common.image_io import read_picture
 from colonnade.quality.dists import dists_or_none
@@ -57,6 +58,7 @@ def compare(
 
 
 def _compare_pictures(first: Path, second: Path, with_dists: bool) -> dict[str, Any]:
+    require_extra("quality", "a comparison of pictures")
     pictures = read_picture(first), read_picture(second)
     _require_same_size((first, second), (pictures[0].shape[:2], pictures[1].shape[:2]))
     difference = compare_pictures(*pictures)

@@ -11,6 +11,7 @@ import numpy as np
 
 from colonnade.common.accumulation import FramePasses
 from colonnade.common.errors import UserError
+from colonnade.common.extras import require_extra
 from colonnade.common.framebuffer import Frame
 from colonnade.common.limits import MAX_WAVEFORM_PIXELS
 from colonnade.common.progress import QUIET, Progress
@@ -52,6 +53,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     Raises:
         UserError: The input is wrong, or the hardware raised an error bit.
     """
+    if request.backend == "reference":
+        require_extra("reference", "the reference backend")
     scene = load_scene(request.scene)
     if request.background is not None:
         scene = scene.with_environment(request.background)
