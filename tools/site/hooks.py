@@ -133,9 +133,10 @@ def _targets(source: str) -> list[Path]:
 
 
 def _packages() -> list[str]:
-    """The Python packages directly under ``colonnade``, and ``colonnade`` itself where it has modules."""
-    found = sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py"))
-    return [f"colonnade.{name}" for name in found if not name.startswith("_")]
+    """The Python packages directly under ``colonnade``, and those of its laboratory."""
+    host = sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py") if path.parent.name != "lab")
+    laboratory = sorted(f"lab.{path.parent.name}" for path in PACKAGE.glob("lab/*/__init__.py"))
+    return [f"colonnade.{name}" for name in (*host, *laboratory)]
 
 
 def _folder(variable: str) -> Path | None:

@@ -1,4 +1,4 @@
-"""Generates host/locks from host/pyproject.toml, and checks offline that the locks are up to date.
+"""Generates host/locks from pyproject.toml of host and laboratory, and checks offline that the locks are up to date.
 
 A lock lists all packages that pip may install, with their version for each Python and the SHA-256 of their files.
 """
@@ -23,6 +23,7 @@ else:
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = ROOT / "host" / "pyproject.toml"
+LABORATORY = ROOT / "host" / "lab" / "pyproject.toml"
 LOCKS = ROOT / "host" / "locks"
 REMADE_BY = "run: tools/lock"
 
@@ -55,15 +56,17 @@ def project_tables() -> dict[str, Any]:
 
 
 def wanted_locks() -> list[Lock]:
-    """The locks of pyproject.toml: build requirements, .venv, `ppa`, and each further group."""
+    """The locks: build requirements, .venv with host and laboratory, `ppa`, and each further group."""
     data = project_tables()
+    laboratory = tomllib.loads(LABORATORY.read_text(encoding="utf-8"))["project"]
     project = data["project"]
     extras: dict[str, list[str]] = dict(project.get("optional-dependencies", {}))
     groups: dict[str, list[str]] = dict(data.get("dependency-groups", {}))
     build = [*data["build-system"]["requires"], *groups.pop("build", [])]
-    ppa = extras.pop("ppa", [])
-    host = [*project["dependencies"], *itertools.chain(*extras.values())]
-    tables = {"build": build, "host": host, "ppa": ppa, **groups}
+    # The laboratory also depends on the host itself
+    measures = [one for one in laboratory["dependencies"] if not one.startswith(project["name"])]
+    host = [*project["dependencies"], *itertools.chain(*extras.values()), *measures]
+    tables = {"build": build, "host": host, **laboratory["optional-dependencies"], **groups}
     return [Lock(name, tuple(table), project["requires-python"]) for name, table in tables.items()]
 
 
@@ -105,7 +108,7 @@ def check() -> list[str]:
     locks = wanted_locks()
     faults = [fault for lock in locks for fault in _faults(lock)]
     for stale in sorted(set(LOCKS.glob("*.txt")) - {lock.path for lock in locks}):
-        faults.append(f"host/locks/{stale.name} has no table in host/pyproject.toml; {REMADE_BY}")
+        faults.append(f"host/locks/{stale.name} has no table in pyproject.toml; {REMADE_BY}")
     return faults
 
 
@@ -115,7 +118,7 @@ def _faults(lock: Lock) -> list[str]:
         return [f"{name} is missing; {REMADE_BY}"]
     text = lock.path.read_text(encoding="utf-8")
     if _MARK + lock.digest not in text.splitlines():
-        return [f"{name} is older than the dependencies in host/pyproject.toml; {REMADE_BY}"]
+        return [f"{name} is older than the dependencies in pyproject.toml; {REMADE_BY}"]
     faults = [f"{name}: {pin.name} {pin.version} has no hash; {REMADE_BY}" for pin in read(text) if not pin.hashes]
     if "://" in text:
         faults.append(f"{name} contains a URL; {REMADE_BY}")

@@ -6,25 +6,21 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, NoReturn
 
 import click
 
 from colonnade import __version__
-from colonnade.cli.bench import bench
 from colonnade.cli.compare import compare
-from colonnade.cli.explore import explore
-from colonnade.cli.fuzz import fuzz
 from colonnade.cli.generate import generate
 from colonnade.cli.inspect import inspect
 from colonnade.cli.light import light
 from colonnade.cli.options import echo
 from colonnade.cli.pack import pack
-from colonnade.cli.ppa import ppa
 from colonnade.cli.registers import registers
 from colonnade.cli.render import render
-from colonnade.cli.study import study
-from colonnade.cli.verify import verify
 from colonnade.common import ledger, machine_limits, notes
 from colonnade.common.errors import UserError, reason_of
 from colonnade.common.terminal_text import one_line
@@ -36,6 +32,16 @@ BUG = 1
 DEBUG = "COLONNADE_DEBUG"
 #: Former commands, and what replaces them.
 REPLACED = {"sweep": "colonnade explore STUDY.toml"}
+#: The commands of the laboratory, which is a distribution of its own, and their summaries. Each one is defined in the
+#: module of its name in `colonnade.lab.cli`.
+LABORATORY = {
+    "study": "Measure reconstructed rooms, or AR frames in them.",
+    "verify": "Compare the RTL with its model, and the model with Embree.",
+    "fuzz": "Compare the RTL with its model on corrupt frames.",
+    "bench": "Measure rays per cycle of the benchmark meshes.",
+    "explore": "Measure quality, speed, area and power of many configurations.",
+    "ppa": "Estimate area, timing and power of a configuration.",
+}
 
 
 class OneLineErrors(click.Group):
@@ -76,9 +82,29 @@ class OneLineErrors(click.Group):
         machine_limits.check(name or "")
         return name, command, rest
 
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """A command by its name; those of the laboratory are imported here."""
+        return _of_laboratory(cmd_name) if cmd_name in LABORATORY else super().get_command(ctx, cmd_name)
+
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The commands in the order in which a user needs them, not alphabetically."""
-        return list(self.commands)
+        return [*self.commands, *LABORATORY]
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands, those of the laboratory apart and without importing them."""
+        own = [(name, command.get_short_help_str()) for name, command in self.commands.items()]
+        for title, rows in (("Commands", own), ("Commands of the laboratory, colonnade-lab", [*LABORATORY.items()])):
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+
+def _of_laboratory(name: str) -> click.Command:
+    """The command of the laboratory; a `UserError` if it is not installed."""
+    if find_spec("colonnade.lab") is None:
+        raise UserError(f"no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab")
+    command = getattr(import_module(f"colonnade.lab.cli.{name}"), name)
+    assert isinstance(command, click.Command)
+    return command
 
 
 def _unexpected(error: BaseException) -> tuple[str, int]:
@@ -123,5 +149,5 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, registers, pack, inspect, light, render, compare, study, verify, fuzz, bench, explore, ppa):
+for command in (generate, registers, pack, inspect, light, render, compare):
     cli.add_command(command)

@@ -1,19 +1,23 @@
-"""Without a package of an extra, a command that needs it says so in one line; frames need none of them."""
+"""Without an extra or the laboratory, a command that needs it says so in one line; frames need none of them."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.metadata import files
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
-from colonnade.cli.main import cli
+from colonnade.cli.main import LABORATORY, cli
 from colonnade.common.extras import EXTRAS
 from colonnade.design.toolchain import project_root
 
-#: Renders and packs in a process that can import no module of an extra.
+#: Packages of the laboratory.
+LIBRARIES = ["colonnade.lab", "matplotlib", "distributed", "dask", "optuna", "altair", "vl_convert", "jinja2"]
+
+#: Renders in a process that can import no module of an extra and none of the laboratory.
 FRAME = """
 import sys
 sys.modules |= dict.fromkeys({missing!r})
@@ -62,11 +66,33 @@ def test_a_missing_package_is_one_line(
     assert not output.exists()
 
 
-def test_a_frame_needs_no_extra(tmp_path: Path) -> None:
+def test_a_frame_needs_neither_extras_nor_laboratory(tmp_path: Path) -> None:
     picture = tmp_path / "picture.png"
-    program = FRAME.format(missing=[module for modules in EXTRAS.values() for module in modules], picture=str(picture))
+    missing = [*LIBRARIES, *(module for modules in EXTRAS.values() for module in modules)]
+    program = FRAME.format(missing=missing, picture=str(picture))
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=project_root(), capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     assert picture.is_file()
+
+
+@pytest.mark.parametrize("name", LABORATORY)
+def test_without_the_laboratory_its_commands_name_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in [module for module in sys.modules if module.startswith("colonnade.lab")]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "colonnade.lab", None)
+    result = CliRunner().invoke(cli, [name, "--help"])
+    line = f"colonnade: error: no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab\n"
+    assert (result.exit_code, result.stderr) == (2, line)
+    assert name in CliRunner().invoke(cli, ["--help"]).stdout
+
+
+def test_no_file_belongs_to_two_distributions() -> None:
+    host, laboratory = (
+        {str(file) for file in files(name) or () if str(file).startswith("colonnade/")}
+        for name in ("colonnade", "colonnade-lab")
+    )
+    assert all(file.startswith("colonnade/lab/") for file in laboratory)
+    assert not any(file.startswith("colonnade/lab/") for file in host)
+    assert "colonnade/lab/report/explorer/page.html.jinja" in laboratory and "colonnade/cli/main.py" in host

@@ -13,7 +13,7 @@ import pytest
 from colonnade.design.generator import design_for, manifest_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
-from colonnade.evaluation.studies.ar_losses import PLACEMENTS
+from colonnade.lab.evaluation.studies.ar_losses import PLACEMENTS
 from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Extent

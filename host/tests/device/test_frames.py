@@ -16,8 +16,8 @@ from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
-from colonnade.evaluation.fuzz.cases import coloured, textured
-from colonnade.evaluation.throughput import figures, records_taken
+from colonnade.lab.evaluation.fuzz.cases import coloured, textured
+from colonnade.lab.evaluation.throughput import figures, records_taken
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.registers.frame import frame_registers

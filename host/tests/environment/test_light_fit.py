@@ -15,7 +15,7 @@ from colonnade.environment.light_fit import fit_lights, relit, relit_psnr
 from colonnade.environment.lights import MAX_FALLOFF, RoomLight, RoomLights, exposure, irradiance, world_surface
 from colonnade.environment.model import Environment
 from colonnade.environment.photo_colours import MAX_CLAMPED, photo_colours
-from colonnade.evaluation.studies.synthetic_attic import AMBIENT, LAMP, LAMP_COLOUR, attic
+from colonnade.lab.evaluation.studies.synthetic_attic import AMBIENT, LAMP, LAMP_COLOUR, attic
 
 
 @pytest.fixture(scope="module")

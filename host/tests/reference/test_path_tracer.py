@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from colonnade.environment.model import Environment, EnvironmentCamera
-from colonnade.evaluation.studies.synthetic_attic import attic
+from colonnade.lab.evaluation.studies.synthetic_attic import attic
 from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh

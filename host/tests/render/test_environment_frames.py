@@ -12,7 +12,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET
 from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
-from colonnade.evaluation.studies.synthetic_attic import attic, write_attic
+from colonnade.lab.evaluation.studies.synthetic_attic import attic, write_attic
 from colonnade.render.reference_frames import reference_frames
 from colonnade.scene.parser import load_scene
 

@@ -17,7 +17,7 @@ from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.device import scene as device_scene
 from colonnade.environment.load import load_environment
-from colonnade.evaluation.studies.synthetic_attic import write_attic
+from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest

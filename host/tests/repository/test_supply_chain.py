@@ -52,9 +52,7 @@ def test_a_lock_older_than_pyproject_is_named(
     newer = tmp_path / "pyproject.toml"
     newer.write_text(locks.PROJECT.read_text().replace('"click>=8.1,<9"', '"click>=8.1,<10"'))
     monkeypatch.setattr(locks, "PROJECT", newer)
-    assert locks.check() == [
-        "host/locks/host.txt is older than the dependencies in host/pyproject.toml; run: tools/lock"
-    ]
+    assert locks.check() == ["host/locks/host.txt is older than the dependencies in pyproject.toml; run: tools/lock"]
 
 
 def test_a_bill_of_materials_with_another_hash_is_named(

@@ -15,7 +15,7 @@ from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.device import scene as device_scene
 from colonnade.device.scene import DeviceScene
-from colonnade.evaluation.studies.synthetic_attic import attic, write_attic
+from colonnade.lab.evaluation.studies.synthetic_attic import attic, write_attic
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest

@@ -7,7 +7,7 @@ import pytest
 
 from colonnade.common.errors import UserError
 from colonnade.environment.model import Environment
-from colonnade.evaluation.studies.synthetic_attic import attic
+from colonnade.lab.evaluation.studies.synthetic_attic import attic
 from colonnade.mesh.load import load_mesh
 from colonnade.reference.render import primary_directions
 from colonnade.scene.model import Light, Material, MeshSource, Placement, Scene, Transform

@@ -1,0 +1,1 @@
+"""The laboratory: what measures the project. Its distribution is colonnade-lab."""

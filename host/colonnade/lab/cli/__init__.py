@@ -1,0 +1,1 @@
+"""The subcommands of the laboratory. Heavy imports stay inside."""

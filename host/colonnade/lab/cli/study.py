@@ -1,0 +1,107 @@
+"""``colonnade study``: the accuracy of a reconstructed room, and the quality loss of AR frames in it."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from colonnade.cli.options import FILE, dists_option, echo_lines, finish, json_option, require_outputs
+
+
+@click.command()
+@click.argument("rooms", type=FILE, nargs=-1)
+@click.option("--frames", is_flag=True, help="Measure frames with objects instead of rays from probe spheres.")
+@click.option(
+    "--occlusion",
+    is_flag=True,
+    help="Measure objects behind furniture in synthetic rooms, without ROOMS; with --rooms, behind thin things.",
+)
+@click.option("--light", is_flag=True, help="Measure relit rooms and mirrors against the photo.")
+@click.option("--rooms", "seeds", metavar="SEEDS", help="Measure generated rooms, such as 0-9,100, without ROOMS.")
+@dists_option
+@click.option("--output", type=FILE, metavar="DIR", help="Not for rays: write the frames as pictures.")
+@json_option
+def study(
+    rooms: tuple[Path, ...],
+    frames: bool,
+    occlusion: bool,
+    light: bool,
+    seeds: str | None,
+    no_dists: bool,
+    output: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Measure reconstructed rooms against their depth maps. ROOMS are folders.
+
+    By default the command traces rays from mirror, matt and glass spheres, and prints the share that finds the correct
+    point: with planes of the full maps, and with those of the attribute memory. With --frames it prints the loss from
+    encoding, reconstruction and fixed-point arithmetic. The loss is PSNR, FLIP and DISTS of frame, object and shadow.
+    With --occlusion it prints the share of an object's pixels that correctly show the object, or the room before it:
+    behind furniture, or with --rooms behind a stool, a plant or a lamp in rooms that a seed generates.
+    With --light it prints the PSNR of relit rooms and of a mirror against the photo, for default and for fitted lights.
+    With --rooms it measures rays and encoded maps in rooms that a seed generates, and counts why rays are wrong.
+    Tables are in Markdown.
+    """
+    context = click.get_current_context()
+    generated = seeds is not None
+    if frames + occlusion + light > 1 or (generated and (frames or light)):
+        raise click.UsageError("give one of --frames, --occlusion, --light and --rooms", context)
+    if output is not None and not (frames or occlusion or light):
+        raise click.UsageError("--output needs --frames, --occlusion or --light", context)
+    if (occlusion or generated) and rooms:
+        option = "--occlusion" if occlusion else "--rooms"
+        raise click.UsageError(f"{option} has its own rooms: leave out ROOMS", context)
+    if not (occlusion or generated or rooms):
+        raise click.UsageError("Missing argument 'ROOMS...'.", context)
+    require_outputs(json_file, folders=[output])
+
+    from colonnade.common import progress
+    from colonnade.common.atomic_files import made_folder
+    from colonnade.lab.evaluation.studies.unseen_rooms import parse_seeds
+
+    report: dict[str, Any]
+    with nullcontext() if output is None else made_folder(output):
+        if occlusion:
+            from colonnade.lab.evaluation.studies import occlusion as study_of_occlusion
+
+            chosen = None if seeds is None else parse_seeds(seeds)
+            results = study_of_occlusion.study(progress.for_terminal(), output, chosen)
+            echo_lines(study_of_occlusion.table(results))
+            report = {name: asdict(value) for name, value in results.items()}
+        elif frames:
+            from colonnade.lab.evaluation.studies import ar_losses
+
+            terminal = progress.for_terminal()
+            with terminal.step("measuring frames"):
+                by_frame = ar_losses.study_frames(rooms, not no_dists, terminal, output)
+            echo_lines(ar_losses.table(by_frame))
+            report = {
+                frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
+                for frame, by_loss in by_frame.items()
+            }
+        elif seeds is not None:
+            from colonnade.lab.evaluation.studies import unseen_rooms
+
+            rooms_of_seeds = unseen_rooms.study_seeds(parse_seeds(seeds), not no_dists, progress.for_terminal())
+            echo_lines(unseen_rooms.table(rooms_of_seeds))
+            report = {str(seed): asdict(value) for seed, value in rooms_of_seeds.items()}
+        elif light:
+            from colonnade.lab.evaluation.studies import room_light
+
+            terminal = progress.for_terminal()
+            with terminal.step("measuring the light"):
+                qualities = room_light.study_light(rooms, terminal, output)
+            echo_lines(room_light.table(qualities))
+            report = {name: asdict(value) for name, value in qualities.items()}
+        else:
+            from colonnade.lab.evaluation.studies import environment_accuracy
+
+            with progress.for_terminal().step("measuring the rooms"):
+                reports = environment_accuracy.study_rooms(rooms)
+            echo_lines(environment_accuracy.table(reports))
+            report = {name: asdict(value) for name, value in reports.items()}
+    finish(report, json_file)

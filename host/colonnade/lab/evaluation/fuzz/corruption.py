@@ -1,0 +1,59 @@
+"""The kinds of corruption of a legal frame, one function each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from colonnade.design.manifest import Manifest
+from colonnade.lab.evaluation.fuzz.cases import Case
+from colonnade.lab.evaluation.fuzz.environments import corrupt_maps
+from colonnade.lab.evaluation.fuzz.records import corrupt_records
+from colonnade.lab.evaluation.fuzz.registers import corrupt_registers
+
+#: Returns the corrupt case and a short description of the change.
+Corrupt = Callable[[np.random.Generator, Case, Manifest], tuple[Case, str]]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of corruption.
+
+    Attributes:
+        name: Name for ``--kind``.
+        corrupt: Corrupts a case; its random generator determines the result.
+        applies: Whether a legal case has data of this kind.
+    """
+
+    name: str
+    corrupt: Corrupt
+    applies: Callable[[Case], bool] = lambda case: True
+
+
+def corrupt_both(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
+    """Corrupt records and registers."""
+    case, records = corrupt_records(random, case, manifest)
+    case, registers = corrupt_registers(random, case, manifest)
+    return case, f"{records}; {registers}"
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("records", corrupt_records),
+        Kind("registers", corrupt_registers),
+        Kind("both", corrupt_both),
+        Kind("maps", corrupt_maps, lambda case: bool(case.image.attributes)),
+    )
+}
+
+
+def corrupt_case(seed: int, kind: Kind, cases: tuple[Case, ...], manifest: Manifest) -> tuple[Case, Case, str]:
+    """The legal case and the corrupt case of a seed, and a description of the change."""
+    random = np.random.default_rng(seed)
+    applicable = [case for case in cases if kind.applies(case)]
+    legal = applicable[int(random.integers(len(applicable)))]
+    corrupt, change = kind.corrupt(random, legal, manifest)
+    return legal, corrupt, f"{legal.name}: {change}"
