@@ -56,10 +56,10 @@ class _Pieces:
         owners = np.concatenate([part.owners for part in parts])
         return cls(owners, np.concatenate([part.weights for part in parts]))
 
-    def positions(self, surface: RawSurface) -> Floats:
+    def uvs(self, surface: RawSurface) -> Floats:
         """Positions in their textures, float64 [k, 3, 2]."""
-        assert surface.positions is not None
-        found: Floats = fixed_order.product(self.weights, surface.positions[self.owners])
+        assert surface.uvs is not None
+        found: Floats = fixed_order.product(self.weights, surface.uvs[self.owners])
         return found
 
 
@@ -128,8 +128,8 @@ def _panes(
     alpha, colours = np.full((len(faces), len(weights)), factor), np.ones((len(faces), 3))
     if surface.alphas is not None:
         alpha *= fixed_order.product(weights, surface.alphas[faces][..., None])[..., 0]
-    if texture is not None and surface.positions is not None and len(faces):
-        at = fixed_order.product(weights, surface.positions[faces]).reshape(-1, 2)
+    if texture is not None and surface.uvs is not None and len(faces):
+        at = fixed_order.product(weights, surface.uvs[faces]).reshape(-1, 2)
         alpha *= texture.alphas(at).reshape(len(faces), -1)
         shown = texture.colours(at).reshape(len(faces), -1, 3) * alpha[..., None]
         colours = shown.sum(axis=1) / np.maximum(alpha.sum(axis=1, keepdims=True), 1e-12)
@@ -213,10 +213,10 @@ class _Cut:
                 return True
         if self._texture is None:
             return False
-        assert self._surface.positions is not None and self._texture.alpha is not None
+        assert self._surface.uvs is not None and self._texture.alpha is not None
         alpha = unfolded(self._texture.alpha, self._texture.wrap) * self._alpha.factor
         counts = PixelCounts((alpha > 2.0) & (alpha < 253.0), self._texture)
-        return bool(counts.within(*pixel_boxes(self._surface.positions[faces], self._texture)).any())
+        return bool(counts.within(*pixel_boxes(self._surface.uvs[faces], self._texture)).any())
 
     def filled(self) -> Texture:
         """The texture with the nearest shown colour where it is hidden, so that filters find no other."""
@@ -234,7 +234,7 @@ class _Cut:
         """Alpha at points of pieces, by the weights of their corners, without the factor, float64 [k, n]."""
         found = np.ones((len(pieces.owners), len(weights)))
         if self._texture is not None:
-            at = fixed_order.product(weights, pieces.positions(self._surface))
+            at = fixed_order.product(weights, pieces.uvs(self._surface))
             found *= self._texture.alphas(at.reshape(-1, 2)).reshape(found.shape)
         if self._corners is not None:
             own = fixed_order.product(pieces.weights, self._corners[pieces.owners][..., None])
@@ -245,7 +245,7 @@ class _Cut:
         """Texels of the texture along the longer side of each piece, float64 [k]."""
         if self._texture is None:
             return np.zeros(len(pieces.owners))
-        return np.asarray(np.ptp(pieces.positions(self._surface) * self._texture.size, axis=1).max(axis=1))
+        return np.asarray(np.ptp(pieces.uvs(self._surface) * self._texture.size, axis=1).max(axis=1))
 
     def _kinds(self, pieces: _Pieces) -> npt.NDArray[np.int8]:
         """1 for pieces that are shown, -1 for those that are hidden, 0 for others, int8 [k]."""
@@ -254,7 +254,7 @@ class _Cut:
             return np.where(shown.all(axis=1), 1, np.where(shown.any(axis=1), 0, -1)).astype(np.int8)
         kinds = np.zeros(len(pieces.owners), dtype=np.int8)
         if self._corners is None:
-            first, last = pixel_boxes(pieces.positions(self._surface), self._texture)
+            first, last = pixel_boxes(pieces.uvs(self._surface), self._texture)
             hides, shows = (marked.within(first, last) > 0 for marked in self._marked)
             kinds = np.where(hides & shows, 0, np.where(shows, 1, -1)).astype(np.int8)
         # The box of a face is larger than the face: look at its own texels
@@ -322,7 +322,7 @@ def _split(surface: RawSurface, pieces: _Pieces) -> RawSurface:
         normals=interpolated(surface.normals),
         face_materials=surface.material_index[owners],
         colours=interpolated(surface.colours),
-        positions=interpolated(surface.positions),
+        uvs=interpolated(surface.uvs),
         source_faces=owners,
         single_sided=None if surface.single_sided is None else surface.single_sided[owners],
         source_count=len(surface.faces),

@@ -25,7 +25,7 @@ from colonnade.mesh.losses import Losses, extension_loss
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, gltf_losses, unused_extensions
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, joined
-from colonnade.mesh.texture import MAX_POSITION
+from colonnade.mesh.texture import MAX_UV
 
 #: Required extensions that are read, or whose loss is reported.
 _KNOWN_EXTENSIONS = (
@@ -104,7 +104,7 @@ def _textured(
     """The materials, with further ones for parts that show their texture, and the material of each part."""
     found, numbers = list(materials), []
     for part, number in parts:
-        use = None if part.positions is None else textures.uses[number]
+        use = None if part.uvs is None else textures.uses[number]
         if use is not None:
             material = replace(materials[number], texture=use.texture)
             number = found.index(material) if material in found else len(found)
@@ -251,17 +251,17 @@ def _primitive(
     if alphas is not None and not has_alpha:
         losses.add(lost.ALPHA, int((alphas < 1.0).sum()))
     use = textures.use_of(int(material)) if material != default else None
-    places = None if use is None else attribute(use.coordinates, 2)
-    if places is not None and use is not None:
-        places = use.positions(places)
-    if places is not None and not (np.abs(places) <= MAX_POSITION).all():
+    uvs = None if use is None else attribute(use.coordinates, 2)
+    if uvs is not None and use is not None:
+        uvs = use.uvs(uvs)
+    if uvs is not None and not (np.abs(uvs) <= MAX_UV).all():
         raise document.error(
-            f"a primitive has texture coordinates beyond {MAX_POSITION:,.0f}, or not finite: export it again"
+            f"a primitive has texture coordinates beyond {MAX_UV:,.0f}, or not finite: export it again"
         )
     if use is not None:
-        losses.add(lost.NO_POSITIONS, len(faces) if places is None else 0)
+        losses.add(lost.NO_UVS, len(faces) if uvs is None else 0)
     shows_colours = colours is not None and not (colours == 1.0).all()
-    if places is not None:
+    if uvs is not None:
         losses.add(lost.TEXTURED_COLOURS, len(faces) if shows_colours else 0)
         shows_colours = False
     return (
@@ -270,7 +270,7 @@ def _primitive(
             faces=faces,
             normals=None if normals is None else normals[faces],
             colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
-            positions=None if places is None else places[faces],
+            uvs=None if uvs is None else uvs[faces],
             alphas=None if alphas is None else alphas[faces],
         ),
         int(material),

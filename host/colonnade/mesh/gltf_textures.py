@@ -1,4 +1,4 @@
-"""The base-colour textures of glTF materials: their pictures, samplers, and the positions of a primitive in them."""
+"""The base-colour textures of glTF materials: their pictures, samplers, and the texture coordinates of a primitive."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ class TextureUse:
 
     Attributes:
         texture: Index in `TextureReader.textures`.
-        coordinates: Name of the positions in a primitive, ``TEXCOORD_0``.
-        matrix: Transform of the positions, float64 [2, 3].
+        coordinates: Name of the texture coordinates in a primitive, ``TEXCOORD_0``.
+        matrix: Transform of the texture coordinates, float64 [2, 3].
     """
 
     texture: int
     coordinates: str
     matrix: Floats
 
-    def positions(self, values: Floats) -> Floats:
+    def uvs(self, values: Floats) -> Floats:
         """Positions in the texture of those of a file, float64 [n, 2]."""
         return fixed_order.product(values, self.matrix[:, :2].T) + self.matrix[:, 2]
 

@@ -115,7 +115,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         raise UserError(f"mesh {path}: {error}") from None
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     materials, face_materials, colours = surface.materials, surface.material_index, surface.colours
-    positions = surface.positions
+    uvs = surface.uvs
     if colours is not None and corner_colours:
         materials, face_materials, colours = corner_coloured_materials(materials, face_materials, colours)
     else:
@@ -127,7 +127,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         vertices, faces = subdivide(vertices, faces)
         normals = None if normals is None else subdivide_corners(unit_vectors(normals))
         colours = None if colours is None else subdivide_corners(colours)
-        positions = None if positions is None else subdivide_corners(positions)
+        uvs = None if uvs is None else subdivide_corners(uvs)
     if len(materials) > MAX_MATERIALS:
         raise UserError(f"mesh {path} has {len(materials):,} materials: use at most {MAX_MATERIALS}")
     return clean_mesh(
@@ -142,7 +142,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         losses=losses,
         colours=colours,
         textures=surface.textures,
-        positions=positions,
+        uvs=uvs,
         single_sided=None if surface.single_sided is None else np.repeat(surface.single_sided, 4**subdivisions),
         sources=None if surface.source_faces is None or subdivisions else (surface.source_faces, surface.source_count),
     )
@@ -160,7 +160,7 @@ def clean_mesh(
     losses: Losses | None = None,
     colours: Floats | None = None,
     textures: tuple[Texture, ...] = (),
-    positions: Floats | None = None,
+    uvs: Floats | None = None,
     single_sided: npt.NDArray[np.bool_] | None = None,
     sources: tuple[Indices, int] | None = None,
 ) -> Mesh:
@@ -178,7 +178,7 @@ def clean_mesh(
         losses: What the file lost so far; what is repaired here is added.
         colours: Corner colours, float64 [m, 3, 3]; see `Mesh.corner_colours`.
         textures: The textures of the materials.
-        positions: Positions of the corners in them, float64 [m, 3, 2]; see `Mesh.corner_positions`.
+        uvs: Texture coordinates of the corners, float64 [m, 3, 2]; see `Mesh.corner_uvs`.
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
         sources: The face of the file that each is a part of, int64 [m], and their number; None: themselves.
 
@@ -208,7 +208,7 @@ def clean_mesh(
         raise UserError(f"{label} is smaller than 1e-100: scale it up")
     used, renumbered = np.unique(corners[keep], return_inverse=True)
     vertices, faces = merged[used], renumbered.reshape(-1, 3).astype(np.int32)
-    normals, colours, positions = (None if values is None else values[keep] for values in (normals, colours, positions))
+    normals, colours, uvs = (None if values is None else values[keep] for values in (normals, colours, uvs))
     winding = find_winding(vertices, faces)
     if single_sided is not None:
         losses.add(lost.BACKS, int((single_sided[keep] & winding.is_open).sum()))
@@ -216,7 +216,7 @@ def clean_mesh(
         losses.add(lost.MIXED, winding.mixed)
         losses.add(lost.INVERTED, winding.inverted)
         faces[winding.reversed] = faces[winding.reversed][:, ::-1]
-        for values in (normals, colours, positions):
+        for values in (normals, colours, uvs):
             if values is not None:
                 values[winding.reversed] = values[winding.reversed][:, ::-1]
     shading = corner_normals(vertices, faces, normals, crease)
@@ -235,5 +235,5 @@ def clean_mesh(
         notes=losses.lines(label),
         corner_colours=colours,
         textures=textures,
-        corner_positions=positions,
+        corner_uvs=uvs,
     )

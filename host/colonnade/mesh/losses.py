@@ -47,7 +47,7 @@ DAMAGED_PICTURES = Loss.of(
 LARGE_PICTURES = Loss.of(
     "picture of a texture", "too large", f"a picture may have {MAX_PIXELS:,} pixels", "pictures of textures"
 )
-NO_POSITIONS = Loss.of(
+NO_UVS = Loss.of(
     "face of a textured material", "untextured", "it has no texture coordinates", "faces of a textured material"
 )
 TEXTURED_COLOURS = Loss.of("colour of a textured face", "not shown", "its texture is", "colours of textured faces")

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, get_args
 
 from colonnade.mesh import losses as lost
@@ -137,9 +138,7 @@ def _gltf_emission(material: Mapping[str, Any]) -> Vector:
 def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
     """Convert a material of an MTL file, given its values by lower-case keyword as `parse_mtl` does."""
 
-    def first(key: str, default: float) -> float:
-        value = entries.get(key)
-        return _number(value[0] if isinstance(value, list | tuple) and value else value, default)
+    first = partial(_first, entries)
 
     colour = _colour(entries.get("kd"), PLAIN.albedo)
     model = first("illum", 2.0)
@@ -152,17 +151,23 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
     return MeshMaterial("diffuse", colour, emission=_colour(entries.get("ke"), _DARK), alpha=alpha)
 
 
+def _first(entries: Mapping[str, Any], key: str, default: float) -> float:
+    """The first number of a value of an MTL file."""
+    value = entries.get(key)
+    return _number(value[0] if isinstance(value, list | tuple) and value else value, default)
+
+
 def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     """What a picture does not show of a material of a glTF file's JSON, apart from its extensions.
 
     The texture of the base colour is not counted.
     """
-    shown, surface, extensions = from_gltf(material).kind, gltf_surface(material), material.get("extensions", {})
+    kind, surface, extensions = from_gltf(material).kind, gltf_surface(material), material.get("extensions", {})
     maps = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
     found = [
         (lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in ("baseColorTexture", "diffuseTexture")
     ]
-    if any(_colour(material.get("emissiveFactor"), _DARK)) and shown != "diffuse":
+    if any(_colour(material.get("emissiveFactor"), _DARK)) and kind != "diffuse":
         found.append((lost.EMISSION, 1))
     transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
     metallic, roughness = _number(surface.get("metallicFactor"), 1.0), _number(surface.get("roughnessFactor"), 1.0)
@@ -171,17 +176,15 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     elif 0.0 < metallic < 1.0:
         found.append((lost.PARTLY_METAL, 1))
     is_metal = metallic >= 0.5 and "metallicRoughnessTexture" not in surface and transmission <= 0.5
-    return [*found, *_roughness_losses(shown, roughness, is_metal)]
+    return [*found, *_roughness_losses(kind, roughness, is_metal)]
 
 
 def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     """What a picture does not show of a material of an MTL file, given as for `from_mtl`."""
 
-    def first(key: str, default: float) -> float:
-        value = entries.get(key)
-        return _number(value[0] if isinstance(value, list | tuple) and value else value, default)
+    first = partial(_first, entries)
 
-    shown = from_mtl(entries).kind
+    kind = from_mtl(entries).kind
     maps = [
         key
         for key in entries
@@ -189,27 +192,27 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         or key in ("bump", "disp", "decal", "refl", "norm")
     ]
     found = [(lost.TEXTURE_OBJ, len(maps))]
-    if any(_colour(entries.get("ke"), _DARK)) and shown != "diffuse":
+    if any(_colour(entries.get("ke"), _DARK)) and kind != "diffuse":
         found.append((lost.EMISSION, 1))
     opacity = min(first("d", 1.0), 1.0 - first("tr", 0.0))
     if 0.0 < opacity < 1.0 and "tf" not in entries:
-        found.append((lost.PARTLY_GLASS if shown == "glass" else lost.BLENDED, 1))
-    if shown == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
+        found.append((lost.PARTLY_GLASS if kind == "glass" else lost.BLENDED, 1))
+    if kind == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
         found.append((lost.HIGHLIGHTS, 1))
     if "pr" in entries:
         is_metal = first("pm", 0.0) >= 0.5 or first("illum", 2.0) in (3.0, 5.0)
-        found += _roughness_losses(shown, first("pr", 0.0), is_metal)
+        found += _roughness_losses(kind, first("pr", 0.0), is_metal)
     return found
 
 
-def _roughness_losses(shown: str, roughness: float, is_metal: bool) -> list[tuple[Loss, int]]:
-    if shown == "diffuse" and is_metal:
+def _roughness_losses(kind: str, roughness: float, is_metal: bool) -> list[tuple[Loss, int]]:
+    if kind == "diffuse" and is_metal:
         return [(lost.ROUGH_METAL, 1)]
-    if shown == "diffuse":
+    if kind == "diffuse":
         return [(lost.HIGHLIGHTS, 1)] if roughness < _GLOSSY else []
     if roughness <= _SMOOTH:
         return []
-    return [(lost.ROUGH_MIRROR if shown == "mirror" else lost.ROUGH_GLASS, 1)]
+    return [(lost.ROUGH_MIRROR if kind == "mirror" else lost.ROUGH_GLASS, 1)]
 
 
 def unused_extensions(material: Mapping[str, Any]) -> list[str]:

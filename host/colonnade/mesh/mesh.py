@@ -74,7 +74,7 @@ class Mesh:
         corner_colours: Linear colours at the corners of the faces, 0 to 1, 0 on faces whose material has none, float64
             [m, 3, 3]; None: no material has any.
         textures: Base-colour textures of the materials.
-        corner_positions: Positions (u, v) of the corners of the faces in the texture of their material, 0 on faces
+        corner_uvs: Texture coordinates (u, v) of the corners of the faces, 0 on faces
             without one, float64 [m, 3, 2]; None: no material has a texture.
     """
 
@@ -90,7 +90,7 @@ class Mesh:
     parts: tuple[MeshPart, ...] = ()
     corner_colours: Floats | None = None
     textures: tuple[Texture, ...] = ()
-    corner_positions: Floats | None = None
+    corner_uvs: Floats | None = None
 
     @cached_property
     def extent(self) -> Extent:

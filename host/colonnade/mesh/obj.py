@@ -20,10 +20,10 @@ from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_mtl, mtl_losses
-from colonnade.mesh.obj_textures import MtlTextures, TextureMap, positions_of
+from colonnade.mesh.obj_textures import MtlTextures, TextureMap, uvs_of
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, from_polygons
-from colonnade.mesh.texture import MAX_POSITION, Texture
+from colonnade.mesh.texture import MAX_UV, Texture
 
 #: Statements of curves, surfaces and their parameter space.
 _CURVES = ("curv", "curv2", "surf")
@@ -39,9 +39,9 @@ class _Statements:
     def __init__(self, text: str) -> None:
         self.vertices: list[str] = []
         self.normals: list[str] = []
-        self.positions: list[str] = []
+        self.uvs: list[str] = []
         self.faces: list[str] = []
-        #: Vertices, normals and texture positions before each face, for relative indices.
+        #: Vertices, normals and texture coordinates before each face, for relative indices.
         self.counts: list[tuple[int, int, int]] = []
         self.face_materials: list[int] = []
         self.names: list[str] = []
@@ -55,12 +55,12 @@ class _Statements:
                 self.vertices.append(rest)
             elif keyword == "f":
                 self.faces.append(rest)
-                self.counts.append((len(self.vertices), len(self.normals), len(self.positions)))
+                self.counts.append((len(self.vertices), len(self.normals), len(self.uvs)))
                 self.face_materials.append(material)
             elif keyword == "vn":
                 self.normals.append(rest)
             elif keyword == "vt":
-                self.positions.append(rest)
+                self.uvs.append(rest)
             elif keyword == "usemtl":
                 material = index.setdefault(rest.strip(), len(index))
             elif keyword == "mtllib":
@@ -83,16 +83,16 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
     file = _Statements(re.sub(r"#[^\r\n]*", "", text))
     vertices, vertex_colours = _vertices(file.vertices, losses)
     normals = _rows(file.normals, 3)[:, :3]
-    sizes, corners, corner_normals, corner_positions = _corners(file, path)
+    sizes, corners, corner_normals, corner_uvs = _corners(file, path)
     losses.add(lost.POINTS, file.losses.get("p", 0))
     losses.add(lost.LINES, file.losses.get("l", 0))
     losses.add(lost.CURVES, sum(file.losses.get(name, 0) for name in _CURVES))
     if file.groups > 1 and not len(normals):
         losses.add(lost.GROUPS, file.groups)
     materials, used, maps, textures = _materials(file, references, losses)
-    positions = None
+    uvs = None
     if textures:
-        materials, used, positions = _placed(file, materials, used, maps, sizes, corner_positions, losses)
+        materials, used, uvs = _placed(file, materials, used, maps, sizes, corner_uvs, losses)
     return from_polygons(
         vertices,
         corners,
@@ -103,7 +103,7 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
         polygon_materials=used,
         vertex_colours=vertex_colours,
         textures=textures,
-        corner_positions=positions,
+        corner_uvs=uvs,
     )
 
 
@@ -113,24 +113,24 @@ def _placed(
     used: Indices,
     maps: Sequence[TextureMap | None],
     sizes: Indices,
-    corner_positions: Indices,
+    corner_uvs: Indices,
     losses: Losses,
 ) -> tuple[tuple[MeshMaterial, ...], Indices, Floats]:
-    """Materials, the material of each polygon, and the positions of the corners in the textures.
+    """Materials, the material of each polygon, and the texture coordinates of the corners.
 
-    A polygon with a corner without a position, or with one beyond `MAX_POSITION`, shows no texture.
+    A polygon with a corner without texture coordinates, or with one beyond `MAX_UV`, shows no texture.
     """
     owner = np.repeat(np.arange(len(sizes)), sizes)
-    rows = _rows([f"{line} 0" for line in file.positions], 2)[:, :2]  # v is 0 unless given
-    values = np.concatenate([rows, np.zeros((1, 2))])[corner_positions]
-    positions = positions_of(values, maps, used[owner])
-    is_known = (corner_positions >= 0) & (np.abs(positions) <= MAX_POSITION).all(axis=1)
+    rows = _rows([f"{line} 0" for line in file.uvs], 2)[:, :2]  # v is 0 unless given
+    values = np.concatenate([rows, np.zeros((1, 2))])[corner_uvs]
+    uvs = uvs_of(values, maps, used[owner])
+    is_known = (corner_uvs >= 0) & (np.abs(uvs) <= MAX_UV).all(axis=1)
     lacks = np.bincount(owner, ~is_known, len(sizes)) > 0
     is_textured = np.array([material.texture is not None for material in materials])[used]
-    losses.add(lost.NO_POSITIONS, int((is_textured & lacks).sum()))
+    losses.add(lost.NO_UVS, int((is_textured & lacks).sum()))
     plain = tuple(replace(material, texture=None) for material in materials)
-    positions = np.where(is_known[:, None], positions, 0.0)
-    return (*materials, *plain), used + np.where(lacks, len(materials), 0), positions
+    uvs = np.where(is_known[:, None], uvs, 0.0)
+    return (*materials, *plain), used + np.where(lacks, len(materials), 0), uvs
 
 
 def _rows(lines: Sequence[str], columns: int) -> Floats:
@@ -176,7 +176,7 @@ def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices, 
     words = [face.split() for face in file.faces]
     sizes = np.array(list(map(len, words)), dtype=np.int64)
     try:
-        vertices, normals, positions = _indices(list(chain.from_iterable(words)))
+        vertices, normals, uvs = _indices(list(chain.from_iterable(words)))
     except ValueError:
         raise UserError(f"mesh {path}: a vertex index of a face is not an integer") from None
     for one, several, indices, count in (
@@ -190,20 +190,20 @@ def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices, 
             if abs(worst) > count and given:
                 raise UserError(f"mesh {path}: a face names {one} {worst}, but the file has {count:,} {several}")
     corners = np.array(vertices, dtype=np.int64)
-    beyond = 1 << 40  # indices of positions are not checked
-    corner_normals, corner_positions = (
+    beyond = 1 << 40  # indices of texture coordinates are not checked
+    corner_normals, corner_uvs = (
         np.array([0 if index is None else max(-beyond, min(index, beyond)) for index in indices], dtype=np.int64)
-        for indices in (normals, positions)
+        for indices in (normals, uvs)
     )
     before = np.repeat(np.array(file.counts, dtype=np.int64).reshape(-1, 3), sizes, axis=0)
     corners = np.where(corners < 0, before[:, 0] + corners, corners - 1)
     corner_normals = np.where(corner_normals < 0, before[:, 1] + corner_normals, corner_normals - 1)
-    corner_positions = np.where(corner_positions < 0, before[:, 2] + corner_positions, corner_positions - 1)
+    corner_uvs = np.where(corner_uvs < 0, before[:, 2] + corner_uvs, corner_uvs - 1)
     # A position that does not exist shows no texture, as none does
-    corner_positions = np.where(corner_positions < len(file.positions), corner_positions, -1)
+    corner_uvs = np.where(corner_uvs < len(file.uvs), corner_uvs, -1)
     if len(corners) and corners.min() < 0:
         raise UserError(f"mesh {path}: a relative index of a face names a vertex before the first")
-    return sizes, corners, np.maximum(corner_normals, -1), np.maximum(corner_positions, -1)
+    return sizes, corners, np.maximum(corner_normals, -1), np.maximum(corner_uvs, -1)
 
 
 def _materials(

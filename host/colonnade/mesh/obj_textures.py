@@ -32,7 +32,7 @@ class TextureMap:
 
 
 class MtlTextures:
-    """The textures of MTL files, read when they are first used, and the transform of each material's positions."""
+    """Textures of MTL files, read when they are first used, and the materials' transforms of texture coordinates."""
 
     def __init__(self, references: References, losses: Losses) -> None:
         self._references, self._losses = references, losses
@@ -49,8 +49,8 @@ class MtlTextures:
             self._parsed(words) if (words := entries.get(keyword)) else None for keyword in ("map_kd", "map_d")
         )
         # One position of a corner serves both
-        places = colour if colour is not None else alpha
-        if places is None:
+        placed = colour if colour is not None else alpha
+        if placed is None:
             return material, None
         key = colour, alpha
         if key not in self._read:
@@ -59,7 +59,7 @@ class MtlTextures:
         if index is None:
             return replace(material, alpha=None), None
         albedo = material.albedo if any(material.albedo) else (1.0, 1.0, 1.0)
-        return replace(material, albedo=albedo if colour is not None else material.albedo, texture=index), places
+        return replace(material, albedo=albedo if colour is not None else material.albedo, texture=index), placed
 
     def _texture(self, colour: TextureMap | None, alpha: TextureMap | None) -> int | None:
         index = None if colour is None else self._picture(colour)
@@ -110,8 +110,8 @@ class MtlTextures:
         return replace(found, name=" ".join(words[at:]))
 
 
-def positions_of(values: Floats, maps: Sequence[TextureMap | None], materials: Any) -> Floats:
-    """Positions in the textures, v downwards, of corners with positions of an OBJ file, float64 [k, 2].
+def uvs_of(values: Floats, maps: Sequence[TextureMap | None], materials: Any) -> Floats:
+    """Texture coordinates, v downwards, of corners with those of an OBJ file, float64 [k, 2].
 
     Args:
         values: Positions (u, v) of the file, v upwards, float64 [k, 2].

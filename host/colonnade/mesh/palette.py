@@ -145,7 +145,7 @@ def without_textures(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
         f"mesh {mesh.name}: {count} {'texture is' if count == 1 else 'textures are'} not shown: surfaces have their"
         f" mean colour, as the hardware has no textures: set {TEXTURE_SETTINGS}"
     )
-    return replace(mesh, materials=materials, textures=(), corner_positions=None), (line,)
+    return replace(mesh, materials=materials, textures=(), corner_uvs=None), (line,)
 
 
 def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:

@@ -14,12 +14,12 @@ from colonnade.mesh.texture import Texture, Wrap
 _NEAR = 1e-4
 
 
-def pixel_boxes(positions: Floats, texture: Texture) -> tuple[Indices, Indices]:
-    """The first and last pixels (x, y) that faces at positions, float64 [k, 3, 2], show, int64 [k, 2] each.
+def pixel_boxes(uvs: Floats, texture: Texture) -> tuple[Indices, Indices]:
+    """The first and last pixels (x, y) that faces at texture coordinates, float64 [k, 3, 2], show, int64 [k, 2] each.
 
     Pixels beyond the picture count on; `PixelCounts` wraps them.
     """
-    at = positions * texture.size
+    at = uvs * texture.size
     first = np.floor(at.min(axis=1) + _NEAR).astype(np.int64)
     return first, np.maximum(first, np.ceil(at.max(axis=1) - _NEAR).astype(np.int64) - 1)
 

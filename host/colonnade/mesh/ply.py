@@ -101,7 +101,7 @@ def read_ply(data: bytes, path: Path, references: References, losses: Losses) ->
         materials=(PLAIN,) if textured is None else textured.materials,
         polygon_materials=None if textured is None else textured.polygon_materials,
         textures=() if textured is None else textured.textures,
-        corner_positions=None if textured is None else textured.corner_positions,
+        corner_uvs=None if textured is None else textured.corner_uvs,
     )
 
 

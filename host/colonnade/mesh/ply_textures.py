@@ -17,7 +17,7 @@ from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.ply_elements import Columns, ListColumn
 from colonnade.mesh.resolver import References
-from colonnade.mesh.texture import MAX_POSITION, Texture
+from colonnade.mesh.texture import MAX_UV, Texture
 from colonnade.mesh.texture_reader import TextureReader
 
 #: Names of a vertex's position, which goes up.
@@ -33,14 +33,14 @@ class TexturedPolygons:
         materials: `PLAIN`, and one for each texture.
         polygon_materials: int64 [p].
         textures: The textures.
-        corner_positions: Positions of all polygons' corners in them, float64 [k, 2].
+        corner_uvs: Texture coordinates of all polygons' corners, float64 [k, 2].
         read: Names of the properties that were read.
     """
 
     materials: tuple[MeshMaterial, ...]
     polygon_materials: Indices
     textures: tuple[Texture, ...]
-    corner_positions: Floats
+    corner_uvs: Floats
     read: tuple[str, ...]
 
 
@@ -70,25 +70,25 @@ def textured_polygons(
         materials[number] = 0 if found is None else found + 1
     reader.count_losses()
     kinds = materials[numbers]
-    positions = np.full((len(corners), 2), np.nan)
+    uvs = np.full((len(corners), 2), np.nan)
     read = next((one for one in _POSITIONS if all(isinstance(vertex.get(name), np.ndarray) for name in one)), ())
     if read:
-        positions = np.stack([vertex[name] for name in read], axis=1)[corners]
+        uvs = np.stack([vertex[name] for name in read], axis=1)[corners]
     own = face.get(_CORNERS)
     if isinstance(own, ListColumn) and len(own.sizes) <= len(sizes):
         # A list that does not fit is none
         fits = own.sizes == 2 * sizes[: len(own.sizes)]
         of_corners = np.repeat(np.append(fits, np.zeros(len(sizes) - len(fits), dtype=np.bool_)), sizes)
-        positions[of_corners] = own.values[np.repeat(fits, own.sizes)].reshape(-1, 2)
+        uvs[of_corners] = own.values[np.repeat(fits, own.sizes)].reshape(-1, 2)
     owner = np.repeat(np.arange(len(sizes)), sizes)
-    is_known = (np.abs(positions) <= MAX_POSITION).all(axis=1)
+    is_known = (np.abs(uvs) <= MAX_UV).all(axis=1)
     lacks = np.bincount(owner, ~is_known, len(sizes)) > 0
-    losses.add(lost.NO_POSITIONS, int((lacks & (kinds > 0)).sum()))
+    losses.add(lost.NO_UVS, int((lacks & (kinds > 0)).sum()))
     textured = (MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=number) for number in range(len(reader.textures)))
     return TexturedPolygons(
         (PLAIN, *textured),
         np.where(lacks, 0, kinds),
         tuple(reader.textures),
-        np.where(is_known[:, None], positions * (1, -1) + (0, 1), 0.0),
+        np.where(is_known[:, None], uvs * (1, -1) + (0, 1), 0.0),
         (*read, _CORNERS, _NUMBER),
     )

@@ -28,7 +28,7 @@ class RawSurface:
         colours: Colours at the corners, which replace the albedo of their materials, linear, 0 to 1, NaN on faces
             without, float64 [m, 3, 3]; None: none.
         textures: Textures of the materials.
-        positions: Positions (u, v) of the corners in them, 0 on faces without, float64 [m, 3, 2]; None: none.
+        uvs: Texture coordinates (u, v) of the corners, 0 on faces without, float64 [m, 3, 2]; None: none.
         source_faces: The face of the file that each is a part of, int64 [m]; None: themselves.
         source_count: Faces of the file, if `source_faces` is given.
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
@@ -42,7 +42,7 @@ class RawSurface:
     face_materials: Indices | None = None
     colours: Floats | None = None
     textures: tuple[Texture, ...] = ()
-    positions: Floats | None = None
+    uvs: Floats | None = None
     source_faces: Indices | None = None
     source_count: int = 0
     single_sided: npt.NDArray[np.bool_] | None = None
@@ -66,7 +66,7 @@ def from_polygons(
     vertex_colours: Floats | None = None,
     polygon_colours: Floats | None = None,
     textures: tuple[Texture, ...] = (),
-    corner_positions: Floats | None = None,
+    corner_uvs: Floats | None = None,
 ) -> RawSurface:
     """Split polygons into triangles, with what they carry.
 
@@ -81,7 +81,7 @@ def from_polygons(
         vertex_colours: float64 [n, 3], linear; not for polygons with a texture.
         polygon_colours: float64 [p, 3], linear, NaN for none; before `vertex_colours`.
         textures: Textures of the materials.
-        corner_positions: Positions in them, float64 [k, 2].
+        corner_uvs: Texture coordinates, float64 [k, 2].
     """
     split = triangulate(vertices[corners], sizes)
     losses.add(SHORT_FACES, split.short)
@@ -103,7 +103,7 @@ def from_polygons(
         face_materials=None if polygon_materials is None else polygon_materials[split.polygons],
         colours=colours,
         textures=textures,
-        positions=None if corner_positions is None else corner_positions[split.corners],
+        uvs=None if corner_uvs is None else corner_uvs[split.corners],
     )
 
 
@@ -126,6 +126,6 @@ def joined(parts: Sequence[RawSurface]) -> RawSurface:
         face_materials=np.concatenate([part.material_index for part in parts]),
         colours=filled("colours", (3, 3), np.nan),
         textures=parts[0].textures,
-        positions=filled("positions", (3, 2), 0.0),
+        uvs=filled("uvs", (3, 2), 0.0),
         alphas=filled("alphas", (3,), 1.0),
     )

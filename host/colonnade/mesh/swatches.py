@@ -18,26 +18,26 @@ from colonnade.mesh.texture import Texture
 
 def with_swatches(surface: RawSurface) -> RawSurface:
     """The surface with the colours of its textures at the corners of faces that show a single texel or colour."""
-    if surface.positions is None:
+    if surface.uvs is None:
         return surface
     index = surface.material_index.copy()
     materials = surface.materials + tuple(replace(material, texture=None) for material in surface.materials)
     colours = np.full((len(index), 3, 3), np.nan) if surface.colours is None else surface.colours.copy()
-    positions = surface.positions.copy()
+    uvs = surface.uvs.copy()
     for number, texture in enumerate(surface.textures):
         users = [place for place, material in enumerate(surface.materials) if material.texture == number]
         faces = np.flatnonzero(np.isin(index, users))
-        first, last = pixel_boxes(positions[faces], texture)
+        first, last = pixel_boxes(uvs[faces], texture)
         plain = _show_one_colour(first, last, texture)
         faces, first, last = faces[plain], first[plain], last[plain]
         albedo = np.array([material.albedo for material in surface.materials])[index[faces]]
-        found = _corner_colours(positions[faces], first, last, texture)
+        found = _corner_colours(uvs[faces], first, last, texture)
         colours[faces] = found * albedo[:, None]
         index[faces] += len(surface.materials)
-        positions[faces] = 0.0
+        uvs[faces] = 0.0
     if (index < len(surface.materials)).all():
         return surface
-    return replace(surface, materials=materials, face_materials=index, colours=colours, positions=positions)
+    return replace(surface, materials=materials, face_materials=index, colours=colours, uvs=uvs)
 
 
 def _show_one_colour(first: Indices, last: Indices, texture: Texture) -> npt.NDArray[np.bool_]:
@@ -51,12 +51,12 @@ def _show_one_colour(first: Indices, last: Indices, texture: Texture) -> npt.NDA
     return found
 
 
-def _corner_colours(positions: Floats, first: Indices, last: Indices, texture: Texture) -> Floats:
+def _corner_colours(uvs: Floats, first: Indices, last: Indices, texture: Texture) -> Floats:
     """Linear colours at the corners of faces of one colour, float64 [k, 3, 3]."""
     column, row = wrapped(first, texture).T
     whole = Texture(texture.name, unfolded(texture.pixels, texture.wrap)[row, column][:, None])
     flat = np.repeat(whole.linear, 3, axis=1)
     # Within a texel the filter of the texture may still blend it with its neighbours
-    blended = texture.colours(positions.reshape(-1, 2)).reshape(-1, 3, 3)
+    blended = texture.colours(uvs.reshape(-1, 2)).reshape(-1, 3, 3)
     is_one = (first == last).all(axis=1)
     return np.where(is_one[:, None, None], blended, flat)

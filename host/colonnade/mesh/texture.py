@@ -1,4 +1,4 @@
-"""The textures of mesh files: pictures of base colours, sampled at positions (u, v) of the surface.
+"""The textures of mesh files: pictures of base colours, sampled at texture coordinates (u, v).
 
 u goes to the right and v down, from the picture's upper left corner, as in glTF; 0 to 1 is the picture.
 """
@@ -19,7 +19,7 @@ from colonnade.common.types import Floats, Indices
 Wrap = Literal["repeat", "mirror", "clamp"]
 
 #: Largest magnitude of a position: beyond it float32 holds no fractions of a picture.
-MAX_POSITION = 1e6
+MAX_UV = 1e6
 
 #: Linear value of each code of 8 bits.
 _LINEAR = linear_from_srgb(np.arange(256) / 255.0)
@@ -77,20 +77,20 @@ class Texture:
             alpha = padded.reshape(height, 2, width, 2).mean(axis=(1, 3)).astype(np.uint8)
         return replace(self, pixels=pixels, alpha=alpha)
 
-    def colours(self, positions: Floats) -> Floats:
-        """Linear colours at positions, float64 [n, 2]: bilinear between the pixels' centres, float64 [n, 3]."""
-        return self._filtered(positions, self.pixels, _LINEAR)
+    def colours(self, uvs: Floats) -> Floats:
+        """Linear colours at texture coordinates, float64 [n, 2]: bilinear between pixels' centres, float64 [n, 3]."""
+        return self._filtered(uvs, self.pixels, _LINEAR)
 
-    def alphas(self, positions: Floats) -> Floats:
-        """Alpha at positions, float64 [n, 2], filtered as the colours, 0 to 1, float64 [n]."""
+    def alphas(self, uvs: Floats) -> Floats:
+        """Alpha at texture coordinates, float64 [n, 2], filtered as the colours, 0 to 1, float64 [n]."""
         if self.alpha is None:
-            return np.ones(len(positions))
-        return self._filtered(positions, self.alpha, np.arange(256) / 255.0)
+            return np.ones(len(uvs))
+        return self._filtered(uvs, self.alpha, np.arange(256) / 255.0)
 
-    def _filtered(self, positions: Floats, pixels: npt.NDArray[np.uint8], values: Floats) -> Floats:
-        """The pixels' values at positions, float64 [n, ...]."""
+    def _filtered(self, uvs: Floats, pixels: npt.NDArray[np.uint8], values: Floats) -> Floats:
+        """The pixels' values at texture coordinates, float64 [n, ...]."""
         width, height = self.size
-        at = positions * (width, height) - (0.0 if self.is_nearest else 0.5)
+        at = uvs * (width, height) - (0.0 if self.is_nearest else 0.5)
         low = np.floor(at)
         far = at - low
         column, row = (low[:, axis].astype(np.int64) for axis in range(2))
@@ -100,7 +100,7 @@ class Texture:
             )
         columns = [_wrapped(column + step, width, self.wrap[0]) for step in range(2)]
         rows = [_wrapped(row + step, height, self.wrap[1]) for step in range(2)]
-        found = np.zeros((len(positions), *pixels.shape[2:]))
+        found = np.zeros((len(uvs), *pixels.shape[2:]))
         for x, share_x in ((0, 1 - far[:, 0]), (1, far[:, 0])):
             for y, share_y in ((0, 1 - far[:, 1]), (1, far[:, 1])):
                 share = (share_x * share_y).reshape(-1, *(1 for _ in pixels.shape[2:]))

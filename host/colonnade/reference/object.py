@@ -89,11 +89,11 @@ class PlacedObject:
         if self._mesh.corner_colours is not None:
             colours = np.einsum("nj,njk->nk", hits.weights, self._mesh.corner_colours[faces])
             albedo = np.where(self._has_colours[faces][:, None], albedo * colours, albedo)
-        if self._mesh.corner_positions is not None:
-            positions = np.einsum("nj,njk->nk", hits.weights, self._mesh.corner_positions[faces])
+        if self._mesh.corner_uvs is not None:
+            uvs = np.einsum("nj,njk->nk", hits.weights, self._mesh.corner_uvs[faces])
             for number, texture in enumerate(self._mesh.textures):
                 shows = np.flatnonzero(self._textures[faces] == number)
-                albedo[shows] = albedo[shows] * texture.colours(positions[shows])
+                albedo[shows] = albedo[shows] * texture.colours(uvs[shows])
         return ObjectPoints(
             hits.position, facing, unit_vectors(normals), ~is_back, hits.t, albedo, self._emission[faces]
         )

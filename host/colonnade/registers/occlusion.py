@@ -33,11 +33,7 @@ def occlusion_registers(
 ) -> dict[str, int]:
     """The registers ``environment.occlusion`` and ``environment.occlusionTolerance`` of a frame.
 
-    Args:
-        view: With the room's pose, `View.view_to_mesh`.
-        encoded: The room and its encoded maps.
-        header: Header of the mesh's scene image.
-        manifest: The design's manifest.
+    Arguments are as in `colonnade.registers.environment.environment_registers`.
     """
     tolerance = occlusion_tolerance(view, encoded, header.extent)
     if not view.occlusion or not may_hide(view, encoded, header.extent, tolerance):
@@ -48,7 +44,7 @@ def occlusion_registers(
 def tolerance_registers(
     view: View, encoded: EncodedEnvironment, header: ImageHeader, manifest: Manifest
 ) -> dict[str, int]:
-    """The register ``environment.occlusionTolerance``, grid steps; arguments as in `occlusion_registers`."""
+    """The register ``environment.occlusionTolerance``, grid steps; arguments as there."""
     steps = header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
     limit = (1 << manifest.registers["environment.occlusionTolerance"].width) - 1
     tolerance = occlusion_tolerance(view, encoded, header.extent)

@@ -16,7 +16,7 @@ from colonnade.mesh.mesh import Mesh, MeshPart
 from colonnade.mesh.palette import MAX_MATERIALS
 from colonnade.mesh.texture import Texture
 from colonnade.scene.model import Scene, SceneObject
-from colonnade.scene.object_pose import Pose, chosen, footprint_of, rotation_matrix, standing_pose
+from colonnade.scene.object_pose import Pose, footprint_of, free_placement, rotation_matrix, standing_pose
 from colonnade.scene.standing import surface_point
 from colonnade.scene.view import with_overrides
 
@@ -55,7 +55,7 @@ def _pose(
     placed = described
     if described.stand_at is None:
         placed = replace(
-            described, stand_at=chosen(described, rotation, mesh.extent, environment, name, taken).stand_at
+            described, stand_at=free_placement(described, rotation, mesh.extent, environment, name, taken).stand_at
         )
     assert placed.stand_at is not None
     point = surface_point(placed.stand_at, environment, f"{name}.stand_at")
@@ -101,7 +101,7 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
         name=" + ".join(mesh.name for mesh in meshes),
         corner_colours=_filled([mesh.corner_colours for mesh in meshes], meshes, 3),
         textures=tuple(textures),
-        corner_positions=_filled([mesh.corner_positions for mesh in meshes], meshes, 2),
+        corner_uvs=_filled([mesh.corner_uvs for mesh in meshes], meshes, 2),
         parts=tuple(
             MeshPart(mesh.name, int(first), mesh.extent.edge * pose.scale)
             for mesh, pose, first in zip(meshes, poses, first_faces[:-1], strict=True)

@@ -10,7 +10,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
 from colonnade.maps.encoded import layout_of
-from colonnade.scene.object_pose import object_pose, settled
+from colonnade.scene.object_pose import object_pose, with_free_placement
 from colonnade.scene.room_lights import lights_of, with_lights
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def lit_room(
     """
     if room is None:
         return LitRoom(scene)
-    scene = settled(scene, extent, room)
+    scene = with_free_placement(scene, extent, room)
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     if not scene.names_light:
         scene = _with_fitted_lights(scene, room, max_lights, progress)

@@ -56,7 +56,7 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
     Raises:
         UserError: A pixel is outside the room's maps, or the motion does not match the kind of pose.
     """
-    scene = settled(scene, extent, environment)
+    scene = with_free_placement(scene, extent, environment)
     placement, motion, progress = scene.placement, scene.motion, scene.motion_progress
     rotation = rotation_matrix(scene.transform)
     if environment is None or placement is None:
@@ -76,7 +76,7 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
     return standing_pose(placement, rotation, extent, point, motion.turn * progress)
 
 
-def settled(scene: Scene, extent: Extent, environment: Environment | None) -> Scene:
+def with_free_placement(scene: Scene, extent: Extent, environment: Environment | None) -> Scene:
     """The scene with the place that is chosen for an object that stands in a room without a given one.
 
     Raises:
@@ -85,10 +85,12 @@ def settled(scene: Scene, extent: Extent, environment: Environment | None) -> Sc
     placement = _placement(scene, environment)
     if environment is None or placement is None or placement.stand_at is not None:
         return scene
-    return replace(scene, placement=chosen(placement, rotation_matrix(scene.transform), extent, environment, "object"))
+    return replace(
+        scene, placement=free_placement(placement, rotation_matrix(scene.transform), extent, environment, "object")
+    )
 
 
-def chosen(
+def free_placement(
     placement: Placement,
     rotation: Floats,
     extent: Extent,

@@ -23,7 +23,7 @@ from colonnade.mesh.texture import Texture
 TILE = 16
 #: Samples of the texture along each axis of a texel, at most.
 _MAX_SAMPLES = 8
-#: Texels around the faces that count as shown: positions are rounded.
+#: Texels around the faces that count as shown: texture coordinates are rounded.
 _MARGIN = 2
 #: Scales that are tried first. Above 1 the filter of the texture smooths it, and a tile holds fewer colours.
 _SCALES = (16.0, 8.0, 4.0, 2.0, 1.0)
@@ -55,14 +55,14 @@ class Atlas:
 
     Attributes:
         colours: Linear, float64 [edge, edge, 3].
-        positions: Positions of the corners of the mesh's faces, texels from the upper left corner, 0 on faces without a
-            texture, float64 [m, 3, 2].
+        uvs: Texture coordinates of the corners of the mesh's faces, texels from the upper left corner, 0 on faces
+            without a texture, float64 [m, 3, 2].
         scale: Texels of the atlas for each pixel of a texture that is not enlarged, along an axis.
         source_bytes: Size of the textures, three bytes a pixel.
     """
 
     colours: Floats
-    positions: Floats
+    uvs: Floats
     scale: float
     source_bytes: int
 
@@ -81,17 +81,15 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
     """
     used = np.unique(mesh.face_materials)
     textured = [int(number) for number in used if materials[number].texture is not None]
-    if mesh.corner_positions is None or not textured:
+    if mesh.corner_uvs is None or not textured:
         return None
     parts = [mesh.face_materials == number for number in textured]
     textures = [mesh.textures[index] for number in textured if (index := materials[number].texture) is not None]
-    unwrapped = [
-        _unwrapped(mesh.corner_positions[part], texture) for part, texture in zip(parts, textures, strict=True)
-    ]
-    lows = [positions.min(axis=(0, 1)) for positions in unwrapped]
+    unwrapped = [_unwrapped(mesh.corner_uvs[part], texture) for part, texture in zip(parts, textures, strict=True)]
+    lows = [uvs.min(axis=(0, 1)) for uvs in unwrapped]
     highs = [
-        np.maximum(positions.max(axis=(0, 1)), low + 1.0 / np.array(texture.size))
-        for positions, low, texture in zip(unwrapped, lows, textures, strict=True)
+        np.maximum(uvs.max(axis=(0, 1)), low + 1.0 / np.array(texture.size))
+        for uvs, low, texture in zip(unwrapped, lows, textures, strict=True)
     ]
     pixels = [(high - low) * texture.size for high, low, texture in zip(highs, lows, textures, strict=True)]
     if len(textured) > (edge // TILE) ** 2:
@@ -100,7 +98,7 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
         )
     scale, corners, gains = _enlarged(np.array(pixels), edge)
     colours = np.zeros((edge, edge, 3))
-    positions = np.zeros_like(mesh.corner_positions)
+    uvs = np.zeros_like(mesh.corner_uvs)
     for index, number in enumerate(textured):
         size = _size(pixels[index] * gains[index] * scale, edge)
         region = Region(lows[index], highs[index], corners[index], (int(size[0]), int(size[1])))
@@ -111,41 +109,41 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
         padding = ((0, bottom - y - height), (0, right - x - width), (0, 0))
         colours[y:bottom, x:right] = np.pad(tile, padding, mode="edge")
         share = (unwrapped[index] - region.low) / (region.high - region.low)
-        positions[parts[index]] = np.array(region.corner) + share * region.size
+        uvs[parts[index]] = np.array(region.corner) + share * region.size
     is_textured = np.isin(mesh.face_materials, textured)
-    colours = _simplified(colours, _covered(positions[is_textured], edge))
+    colours = _simplified(colours, _covered(uvs[is_textured], edge))
     sources = {id(texture): 3 * texture.size[0] * texture.size[1] for texture in textures}
-    return Atlas(colours, positions, scale, sum(sources.values()))
+    return Atlas(colours, uvs, scale, sum(sources.values()))
 
 
-def position_codes(atlas: Atlas, fraction_bits: int) -> npt.NDArray[np.int64]:
-    """The positions of an atlas as the hardware holds them, int64 [m, 3, 2]: texels with fraction bits."""
+def uv_codes(atlas: Atlas, fraction_bits: int) -> npt.NDArray[np.int64]:
+    """The texture coordinates of an atlas as the hardware holds them, int64 [m, 3, 2]: texels with fraction bits."""
     largest = (len(atlas.colours) << fraction_bits) - 1
-    return np.clip(np.rint(atlas.positions * (1 << fraction_bits)), 0, largest).astype(np.int64)
+    return np.clip(np.rint(atlas.uvs * (1 << fraction_bits)), 0, largest).astype(np.int64)
 
 
-def _unwrapped(positions: Floats, texture: Texture) -> Floats:
+def _unwrapped(uvs: Floats, texture: Texture) -> Floats:
     """Positions of the corners of faces, float64 [k, 3, 2], moved by whole periods so that they cover a small part."""
-    moved = positions.copy()
+    moved = uvs.copy()
     for axis, wrap in enumerate(texture.wrap):
         if wrap == "clamp":
             continue
         period = 1.0 if wrap == "repeat" else 2.0
-        along = positions[..., axis]
+        along = uvs[..., axis]
         each = along - period * np.floor(along.min(axis=1, keepdims=True) / period)
         whole = along - period * np.floor(along.min() / period)
         moved[..., axis] = each if np.ptp(each) < np.ptp(whole) else whole
     return moved
 
 
-def _covered(positions: Floats, edge: int) -> npt.NDArray[np.bool_]:
-    """The texels that faces with these positions, float64 [k, 3, 2], show, with a margin, bool [edge, edge]."""
+def _covered(uvs: Floats, edge: int) -> npt.NDArray[np.bool_]:
+    """The texels that faces with such texture coordinates, [k, 3, 2], show, with a margin, bool [edge, edge]."""
     from PIL import Image, ImageDraw
     from scipy.ndimage import binary_dilation
 
     mask = Image.new("1", (edge, edge))
     draw = ImageDraw.Draw(mask)
-    for corners in positions.reshape(-1, 6).tolist():
+    for corners in uvs.reshape(-1, 6).tolist():
         draw.polygon(corners, fill=1)
         draw.line([*corners, *corners[:2]], fill=1)  # a polygon of less than a texel has gaps, with or without outline
     covered: npt.NDArray[np.bool_] = binary_dilation(np.asarray(mask), np.ones((3, 3)), _MARGIN)

@@ -22,7 +22,7 @@ from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.palette import TEXTURE_SETTINGS, table_entries
 from colonnade.mesh.topology import drop_faces, merge_rows
-from colonnade.scene_image.atlas import Atlas, make_atlas, position_codes
+from colonnade.scene_image.atlas import Atlas, make_atlas, uv_codes
 from colonnade.scene_image.bvh import LEAF, NODE, Bvh, build_bvh
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.header import ImageHeader, ObjectFrame
@@ -282,7 +282,7 @@ def _corner_colours(
         values = _colour_codes(mesh, mesh.corner_colours, manifest, materials, headroom)
     if atlas is not None and manifest.texture is not None:
         is_textured = np.array([material.texture is not None for material in materials])[mesh.face_materials]
-        values[is_textured, :, :2] = position_codes(atlas, manifest.texture.sizes["fractionBits"])[is_textured]
+        values[is_textured, :, :2] = uv_codes(atlas, manifest.texture.sizes["fractionBits"])[is_textured]
     return values
 
 

@@ -144,9 +144,9 @@ def test_a_texture_is_placed_by_the_stream(tmp_path: Path) -> None:
     (tmp_path / "a.bin").write_bytes(stream)
     path.write_text(json.dumps(document))
     found = read_surface(path).surface
-    assert found.positions is not None and plain.positions is not None and len(found.textures) == 1
+    assert found.uvs is not None and plain.uvs is not None and len(found.textures) == 1
     order = [int(np.abs(plain.vertices - vertex).sum(axis=1).argmin()) for vertex in found.vertices[found.faces[0]]]
-    np.testing.assert_allclose(found.positions[0], plain.positions[0][order], atol=1e-6)
+    np.testing.assert_allclose(found.uvs[0], plain.uvs[0][order], atol=1e-6)
 
 
 @pytest.mark.parametrize("required", [True, False])

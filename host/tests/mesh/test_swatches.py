@@ -87,6 +87,6 @@ def test_a_small_picture_is_enlarged(tmp_path: Path) -> None:
     mesh = painted(tmp_path, np.repeat(SWATCHES[:, :16], 16, axis=0), spread=15.0 / 16)
     mesh = replace(mesh, textures=(replace(mesh.textures[0], is_nearest=True),))
     atlas = make_atlas(mesh, mesh.materials, 1.0, 512)
-    assert atlas is not None and mesh.corner_positions is not None
+    assert atlas is not None and mesh.corner_uvs is not None
     tiles = atlas.colours.reshape(32, 16, 32, 16, 3).swapaxes(1, 2).reshape(-1, 256, 3)
     assert max(len(np.unique(tile, axis=0)) for tile in tiles) <= 2

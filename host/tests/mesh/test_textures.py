@@ -37,16 +37,16 @@ def obj(folder: Path, faces: str, material: str = "map_Kd a.png") -> Path:
 def test_positions_of_an_obj_file_go_up_and_those_of_a_mesh_down(tmp_path: Path) -> None:
     mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3 4/4"))
     assert mesh.materials == (MeshMaterial(albedo=(0.5, 1.0, 1.0), texture=0),) and mesh.notes == ()
-    assert mesh.corner_positions is not None
+    assert mesh.corner_uvs is not None
     expected = mesh.vertices[mesh.faces][..., :2] * (1, -1) + (0, 1)
-    np.testing.assert_allclose(mesh.corner_positions, expected)
+    np.testing.assert_allclose(mesh.corner_uvs, expected)
     np.testing.assert_array_equal(mesh.textures[0].pixels, FOUR)
 
 
 def test_options_of_a_map_move_its_positions(tmp_path: Path) -> None:
     mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3", "map_Kd -clamp on -s 2 3 1 -o 0.5 -bm 1 a.png"))
-    assert mesh.textures[0].wrap == ("clamp", "clamp") and mesh.corner_positions is not None
-    np.testing.assert_allclose(mesh.corner_positions[0], [(0.5, 1), (2.5, 1), (2.5, -2)])
+    assert mesh.textures[0].wrap == ("clamp", "clamp") and mesh.corner_uvs is not None
+    np.testing.assert_allclose(mesh.corner_uvs[0], [(0.5, 1), (2.5, 1), (2.5, -2)])
     assert mesh.notes[0].endswith("1 option of a texture map is not used: only -s, -o and -clamp are")
 
 
@@ -62,14 +62,14 @@ def test_a_gltf_texture_is_embedded_and_wraps_as_its_sampler_says(tmp_path: Path
     assert mesh.notes == () and mesh.materials[0] == MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=0)
     assert mesh.textures[0].wrap == ("mirror", "clamp")
     np.testing.assert_array_equal(mesh.textures[0].pixels, FOUR)
-    np.testing.assert_allclose(mesh.corner_positions[0], [(0, 0), (1, 0), (0, 1)])  # type: ignore[index]
+    np.testing.assert_allclose(mesh.corner_uvs[0], [(0, 0), (1, 0), (0, 1)])  # type: ignore[index]
 
 
 def test_a_texture_transform_scales_turns_and_moves(tmp_path: Path) -> None:
     transform = {"offset": [0.25, 1], "rotation": np.pi / 2, "scale": [2, 3]}
     texture = {"index": 0, "extensions": {"KHR_texture_transform": transform}}
     mesh = load_mesh(gltf(tmp_path, materials=[{"pbrMetallicRoughness": {"baseColorTexture": texture}}]))
-    np.testing.assert_allclose(mesh.corner_positions[0], [(0.25, 1), (0.25, -1), (3.25, 1)])  # type: ignore[index]
+    np.testing.assert_allclose(mesh.corner_uvs[0], [(0.25, 1), (0.25, -1), (3.25, 1)])  # type: ignore[index]
 
 
 def test_hardware_without_textures_shows_their_mean(tmp_path: Path) -> None:
@@ -211,8 +211,8 @@ def test_positions_of_the_vertices_of_ply(tmp_path: Path, names: str) -> None:
     header = ";".join(f"float {name}" for name in names.split()) + "|"
     mesh = load_mesh(ply(tmp_path, header, ["0 0", "1 0", "1 1", "0 1"], ["4 0 1 2 3"]))
     assert mesh.materials == (MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=0),) and mesh.notes == ()
-    assert mesh.corner_positions is not None
-    np.testing.assert_allclose(mesh.corner_positions, mesh.vertices[mesh.faces][..., :2] * (1, -1) + (0, 1))
+    assert mesh.corner_uvs is not None
+    np.testing.assert_allclose(mesh.corner_uvs, mesh.vertices[mesh.faces][..., :2] * (1, -1) + (0, 1))
     np.testing.assert_array_equal(mesh.textures[0].pixels, FOUR)
 
 
@@ -226,8 +226,8 @@ def test_positions_of_the_corners_of_ply(tmp_path: Path) -> None:
     pixels = [None if texture is None else mesh.textures[texture].pixels[0, 0, 0] for texture in textures]
     assert pixels == [0, 255, None, None]
     assert mesh.notes[0].endswith("1 face of a textured material is untextured: it has no texture coordinates")
-    assert mesh.corner_positions is not None
-    np.testing.assert_allclose(mesh.corner_positions[0], mesh.vertices[mesh.faces[0]][:, :2] * (1, -1) + (0, 1))
+    assert mesh.corner_uvs is not None
+    np.testing.assert_allclose(mesh.corner_uvs[0], mesh.vertices[mesh.faces[0]][:, :2] * (1, -1) + (0, 1))
 
 
 @pytest.mark.parametrize("corner_colours", [True, False])

@@ -57,7 +57,7 @@ def sphere(edge: int) -> Mesh:
     around = np.where(around < around.max(axis=1, keepdims=True) - 1.0, around + 2.0, around)
     positions = np.stack([around, (np.arccos(np.clip(y, -1, 1)) / np.pi)[mesh.faces]], axis=-1)
     materials = (MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=0),)
-    return replace(mesh, materials=materials, textures=(painted(edge),), corner_positions=positions)
+    return replace(mesh, materials=materials, textures=(painted(edge),), corner_uvs=positions)
 
 
 def striped(edge: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.texture import Texture, Wrap
-from colonnade.scene_image.atlas import TILE, make_atlas, position_codes
+from colonnade.scene_image.atlas import TILE, make_atlas, uv_codes
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
@@ -41,7 +41,7 @@ def textured(textures: tuple[Texture, ...], positions: np.ndarray) -> Mesh:
         materials=materials,
         face_materials=index.astype(np.uint8),
         textures=textures,
-        corner_positions=positions[index],
+        corner_uvs=positions[index],
     )
 
 
@@ -58,11 +58,11 @@ def test_a_point_of_a_face_finds_the_colour_of_its_texture(count: int, seed: int
     )
     mesh = textured(textures, random.uniform(-0.7, 1.8, (count, 3, 2)) + random.integers(-3, 3))
     atlas = make_atlas(mesh, mesh.materials, 1.0, EDGE)
-    assert atlas is not None and 0.0 < atlas.scale <= 16.0 and mesh.corner_positions is not None
+    assert atlas is not None and 0.0 < atlas.scale <= 16.0 and mesh.corner_uvs is not None
     weights = random.dirichlet(np.ones(3), len(mesh.faces))
-    at = np.einsum("nj,njk->nk", weights, position_codes(atlas, 3)[:, :, :2] / 8.0).astype(int)
+    at = np.einsum("nj,njk->nk", weights, uv_codes(atlas, 3)[:, :, :2] / 8.0).astype(int)
     found = atlas.colours[at[:, 1], at[:, 0]]
-    wanted = np.einsum("nj,njk->nk", weights, mesh.corner_positions)
+    wanted = np.einsum("nj,njk->nk", weights, mesh.corner_uvs)
     for number, texture in enumerate(textures):
         shows = mesh.face_materials == number
         expected = texture.colours(wanted[shows]) * mesh.materials[number].albedo
@@ -74,12 +74,12 @@ def test_a_picture_that_fills_the_atlas_is_kept() -> None:
     texture = smooth(EDGE, EDGE, 1)
     halves = np.array([[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)], [(0.0, 0.0), (1.0, 1.0), (0.0, 1.0)]])
     mesh = textured((texture,), halves[:1])
-    mesh = replace(mesh, corner_positions=halves[np.arange(len(mesh.faces)) % 2])
+    mesh = replace(mesh, corner_uvs=halves[np.arange(len(mesh.faces)) % 2])
     atlas = make_atlas(mesh, (replace(mesh.materials[0], albedo=(1.0, 1.0, 1.0)),), 1.0, EDGE)
     assert atlas is not None and atlas.scale == 1.0 and atlas.source_bytes == 3 * EDGE * EDGE
     centres = (np.stack(np.meshgrid(np.arange(EDGE), np.arange(EDGE)), axis=-1).reshape(-1, 2) + 0.5) / EDGE
     np.testing.assert_allclose(atlas.colours.reshape(-1, 3), texture.colours(centres), atol=1e-9)
-    assert position_codes(atlas, 3).max() == 8 * EDGE - 1
+    assert uv_codes(atlas, 3).max() == 8 * EDGE - 1
 
 
 def test_headroom_darkens_diffuse_faces_and_no_others() -> None:
@@ -118,9 +118,9 @@ def test_an_image_keeps_its_textures_in_a_file(tmp_path) -> None:  # type: ignor
 def test_whole_periods_between_faces_cost_nothing(wrap: Wrap, period: int) -> None:
     random = np.random.default_rng(2)
     mesh = textured((smooth(200, 200, 1, (wrap, wrap)),), random.random((1, 3, 2)))
-    assert mesh.corner_positions is not None
-    moved = mesh.corner_positions + period * random.integers(-5, 5, (len(mesh.faces), 1, 2))
-    atlas = make_atlas(replace(mesh, corner_positions=moved), mesh.materials, 1.0, EDGE)
+    assert mesh.corner_uvs is not None
+    moved = mesh.corner_uvs + period * random.integers(-5, 5, (len(mesh.faces), 1, 2))
+    atlas = make_atlas(replace(mesh, corner_uvs=moved), mesh.materials, 1.0, EDGE)
     near = make_atlas(mesh, mesh.materials, 1.0, EDGE)
     assert atlas is not None and near is not None and atlas.scale == near.scale
-    np.testing.assert_allclose(atlas.positions, near.positions, atol=1e-6)
+    np.testing.assert_allclose(atlas.uvs, near.uvs, atol=1e-6)

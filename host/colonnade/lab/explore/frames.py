@@ -51,7 +51,7 @@ def frame_of(name: str, scene: Scene, mesh: Mesh, source: str | None) -> Frame:
     plain = _SCENE.dump_python(scene, mode="json", exclude=paths)
     digest = hashlib.sha256()
     arrays = (mesh.vertices, mesh.faces, mesh.corner_normals, mesh.face_materials, mesh.source_faces)
-    of_corners = tuple(array for array in (mesh.corner_colours, mesh.corner_positions) if array is not None)
+    of_corners = tuple(array for array in (mesh.corner_colours, mesh.corner_uvs) if array is not None)
     for array in arrays + of_corners:
         digest.update(f"{array.shape} {array.dtype}\n".encode() + array.tobytes())
     for texture in mesh.textures:

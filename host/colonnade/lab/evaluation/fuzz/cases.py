@@ -92,4 +92,4 @@ def textured(mesh: Mesh) -> Mesh:
     texture = Texture("squares", squares.repeat(8, axis=0).repeat(8, axis=1))
     positions = ((mesh.vertices - mesh.extent.low) / mesh.extent.edge)[:, :2]
     materials = tuple(replace(material, texture=0) for material in mesh.materials)
-    return replace(mesh, materials=materials, textures=(texture,), corner_positions=positions[mesh.faces])
+    return replace(mesh, materials=materials, textures=(texture,), corner_uvs=positions[mesh.faces])

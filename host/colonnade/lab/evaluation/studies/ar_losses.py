@@ -104,11 +104,13 @@ OBJECTS = {
 def placed_scene(mesh: str, material: Material, environment: Environment, placement: Placement) -> Scene:
     """A scene with an object in a room, a lamp about 1.5 m away from it, and ambient light."""
     from colonnade.mesh.load import load_mesh
-    from colonnade.scene.object_pose import chosen, rotation_matrix
+    from colonnade.scene.object_pose import free_placement, rotation_matrix
     from colonnade.scene.standing import surface_point
 
     if placement.stand_at is None:
-        placement = chosen(placement, rotation_matrix(Transform()), load_mesh(mesh).extent, environment, "object")
+        placement = free_placement(
+            placement, rotation_matrix(Transform()), load_mesh(mesh).extent, environment, "object"
+        )
     assert placement.stand_at is not None
     x, y, z = surface_point(placement.stand_at, environment, "object.stand_at")
     return Scene(
