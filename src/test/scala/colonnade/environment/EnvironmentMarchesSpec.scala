@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{Decoupled, Valid}
+import chisel3.util.{Decoupled, RegEnable, Valid}
 import chiseltest._
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
@@ -48,6 +48,12 @@ private class EnvironmentMarchesHarness(config: ColonnadeConfig) extends Module 
     row.visible       := unit.visible
     unit.req :<>= row.req
     unit.surface.ready := row.surface.ready
+
+    // An offer may pause, but stays the same until it is taken
+    val isOffered = RegInit(false.B)
+    val offered   = RegEnable(row.surface.bits, row.surface.valid)
+    when(row.surface.fire) { isOffered := false.B }.elsewhen(row.surface.valid) { isOffered := true.B }
+    assert(!(row.surface.valid && isOffered) || row.surface.bits === offered, "another surface than that before")
   }
 }
 
