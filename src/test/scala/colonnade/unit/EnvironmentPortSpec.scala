@@ -1,0 +1,101 @@
+package colonnade.unit
+
+import chisel3._
+import chiseltest._
+import colonnade.config.ColonnadeConfig
+import colonnade.environment.{EnvironmentRay, StoredRay}
+import colonnade.ray.RayRequest
+import colonnade.{Packed, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+/** Each primary ray goes to the object or past it, once, and every ray that may march is stored, beside those of bounces. */
+class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "EnvironmentPort"
+
+  private val room   = TestConfigs.withEnvironment(TestConfigs.environment)
+  private val config = room.copy(units = room.units.copy(marches = 1))
+
+  it should "route each primary ray once, and store the last ray of each context" in
+    test(new EnvironmentPortHarness(config)) { dut =>
+      val random               = new Random(4)
+      val (primary, bounce)    = (new Packed(new RayRequest(config)), new Packed(new StoredRay(config)))
+      val contexts             = config.array.contexts
+      val port                 = dut.io
+      var stored               = Map.empty[Int, Map[String, BigInt]]
+      var (objects, bypassing) = (0, 0)
+      dut.clock.setTimeout(0)
+      port.view.enabled.poke(true)
+      port.surfaces.ready.poke(false)
+
+      var offered = Option.empty[Map[String, BigInt]]
+      for (_ <- 0 until 600) {
+        if (offered.isEmpty && random.nextBoolean()) {
+          offered =
+            Some(primary.unpack(BigInt(primary.width, random)) + ("context" -> BigInt(random.nextInt(contexts))))
+          port.meetsObject.poke(random.nextBoolean())
+          port.pixel.x.poke(random.nextInt(600))
+          dut.primary.poke(primary.pack(offered.get))
+        }
+        port.primary.valid.poke(offered.nonEmpty)
+        val bounced = Option.when(random.nextInt(3) == 0) {
+          val context = random.shuffle((0 until contexts).filterNot(c => offered.exists(_("context") == c)).toList).head
+          bounce.unpack(BigInt(bounce.width, random)) + ("context" -> BigInt(context))
+        }
+        port.bounces.get.ray.valid.poke(bounced.nonEmpty)
+        bounced.foreach(fields => dut.bounce.poke(bounce.pack(fields)))
+        port.objectRays.ready.poke(random.nextBoolean())
+
+        val isTaken = offered.nonEmpty && port.primary.ready.peekBoolean()
+        val meets   = port.meetsObject.peekBoolean()
+        assert(!(isTaken && bounced.nonEmpty), "one ray is stored in a cycle")
+        assert((port.objectRays.valid.peekBoolean() && port.objectRays.ready.peekBoolean()) == (isTaken && meets))
+        port.control.bypass.valid.expect(isTaken && !meets)
+        for (fields <- bounced)
+          stored += fields("context").toInt -> fields.collect {
+            case (name, value) if name.startsWith("ray.") && !name.startsWith("ray.pixel") => name.drop(4) -> value
+          }
+        for (fields <- offered if isTaken) {
+          port.objectRays.bits.context.expect(fields("context"))
+          port.control.bypass.bits.expect(fields("context"))
+          stored += fields("context").toInt -> (fields - "context" - "isShadow" + ("pixel.x" -> port.pixel.x.peekInt()))
+          if (meets) objects += 1 else bypassing += 1
+          offered = None
+        }
+        dut.clock.step()
+      }
+      assert(objects > 40 && bypassing > 40)
+
+      // Ask for them
+      port.primary.valid.poke(false)
+      port.bounces.get.ray.valid.poke(false)
+      port.marches.get.march.ready.poke(true)
+      for ((context, expected) <- stored) {
+        port.control.req.valid.poke(true)
+        port.control.req.bits.context.poke(context)
+        port.control.req.ready.expect(true)
+        dut.clock.step()
+        port.control.req.valid.poke(false)
+        port.marches.get.march.valid.expect(true)
+        dut.clock.step()
+        val found = new Packed(new EnvironmentRay(config)).unpack(dut.order.peekInt())
+        for ((name, value) <- expected) assert(found(name) == value, s"$name of context $context")
+      }
+      assert(stored.size == contexts)
+    }
+}
+
+/** Packs rays into one port each. */
+private class EnvironmentPortHarness(config: ColonnadeConfig) extends Module {
+  private val unit = Module(new EnvironmentPort(config)).io
+
+  val io      = IO(chiselTypeOf(unit))
+  val primary = IO(Input(UInt(unit.primary.bits.getWidth.W)))
+  val bounce  = IO(Input(UInt(unit.bounces.get.ray.bits.getWidth.W)))
+  val order   = IO(Output(UInt(unit.marches.get.order.ray.getWidth.W)))
+  io :<>= unit
+  unit.primary.bits         := primary.asTypeOf(unit.primary.bits)
+  unit.bounces.get.ray.bits := bounce.asTypeOf(unit.bounces.get.ray.bits)
+  order                     := unit.marches.get.order.ray.asUInt
+}
