@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from importlib.metadata import files
+from importlib.metadata import files, requires, version
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
+from colonnade import __version__
 from colonnade.cli.main import LABORATORY, cli
 from colonnade.common.extras import EXTRAS
 from colonnade.design.toolchain import project_root
@@ -86,6 +87,12 @@ def test_without_the_laboratory_its_commands_name_it(name: str, monkeypatch: pyt
     line = f"colonnade: error: no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab\n"
     assert (result.exit_code, result.stderr) == (2, line)
     assert name in CliRunner().invoke(cli, ["--help"]).stdout
+
+
+def test_both_distributions_have_one_version() -> None:
+    assert version("colonnade") == version("colonnade-lab") == __version__
+    (host,) = (one for one in requires("colonnade-lab") or () if one.startswith("colonnade["))
+    assert host.endswith(f"=={__version__}")
 
 
 def test_no_file_belongs_to_two_distributions() -> None:
