@@ -53,12 +53,12 @@ final class Divider(mantissaBits: Int, digits: Int, digitsPerCycle: Int = 1) ext
 
   private val finished = busy && stepsLeft === 0.U
 
-  // Try the three multiples; a borrow means that a multiple does not fit
+  // Try the three multiples
   private def step(remainder: UInt): (UInt, UInt) = {
-    val tried   = Seq(once.pad(mantissaBits + 2), Cat(0.U(1.W), once, 0.U(1.W)), thrice).map(remainder -& _)
-    val fits    = tried.map(difference => !difference(mantissaBits + 2))
-    val digit   = Cat(fits(1), Mux(fits(1), fits(2), fits(0)))
-    val reduced =
+    val multiples     = Seq(once.pad(mantissaBits + 2), Cat(0.U(1.W), once, 0.U(1.W)), thrice)
+    val (fits, tried) = multiples.map(DigitRecurrence.subtract(remainder, _)).unzip
+    val digit         = Cat(fits(1), Mux(fits(1), fits(2), fits(0)))
+    val reduced       =
       Mux(fits(1), Mux(fits(2), tried(2), tried(1)), Mux(fits(0), tried(0), remainder))(mantissaBits - 1, 0)
     (Cat(reduced, 0.U(2.W)), digit)
   }

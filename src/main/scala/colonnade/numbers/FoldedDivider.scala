@@ -34,21 +34,12 @@ final class FoldedDivider(numeratorBits: Int, denominatorBits: Int, digits: Int,
     val pending   = UInt(found.W)
   }
 
-  /** Whether the divisor fits, and what is left. Operands that are padded more than the difference needs would make firtool
-    * take the borrow for a constant.
-    */
-  private def subtracted(minuend: UInt, divisor: UInt): (Bool, UInt) = {
-    val difference = minuend -& divisor
-    val fits       = !difference(minuend.getWidth)
-    (fits, Mux(fits, difference, minuend)(denominatorBits - 1, 0))
-  }
-
   private def next(from: State): State = {
     val to = Wire(new State)
     to := from
     val (remainder, pending) = (0 until FoldedDivider.perCycle).foldLeft((from.remainder, from.pending)) {
       case ((remainder, pending), _) =>
-        val (fits, rest) = subtracted(Cat(remainder, pending(found - 1)), from.divisor)
+        val (fits, rest) = DigitRecurrence.step(Cat(remainder, pending(found - 1)), from.divisor, denominatorBits)
         (rest, Cat(pending(found - 2, 0), fits))
     }
     to.remainder := remainder
@@ -59,7 +50,7 @@ final class FoldedDivider(numeratorBits: Int, denominatorBits: Int, digits: Int,
   // The integer digit on the way in
   private val bits         = denominatorBits + found
   private val aligned      = Rounding.floor(io.numerator, numeratorBits - bits).pad(bits)
-  private val (fits, rest) = subtracted(aligned(bits - 1, found), io.denominator)
+  private val (fits, rest) = DigitRecurrence.step(aligned(bits - 1, found), io.denominator, denominatorBits)
   private val entering     = Wire(new State)
   entering.remainder := rest
   entering.divisor   := io.denominator

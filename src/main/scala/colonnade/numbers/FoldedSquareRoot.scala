@@ -35,10 +35,9 @@ final class FoldedSquareRoot(radicandBits: Int, interval: Int) extends Module {
 
   private def digit(state: State): State = {
     val (remainder, root, pending) = state
-    val extended                   = Cat(remainder, pending(pending.getWidth - 1, pending.getWidth - 2))
-    val difference                 = extended -& Cat(root, 1.U(2.W))
-    val fits                       = !difference(difference.getWidth - 1)
-    (Mux(fits, difference, extended), Cat(root, fits), Cat(pending(pending.getWidth - 3, 0), 0.U(2.W)))
+    val (fits, rest)               =
+      DigitRecurrence.step(Cat(remainder, pending.head(2)), Cat(root, 1.U(2.W)), root.getWidth + 2)
+    (rest, Cat(root, fits), Cat(pending(pending.getWidth - 3, 0), 0.U(2.W)))
   }
 
   private val radicand = (io.radicand << (2 * found - radicandBits)).pad(2 * found)

@@ -37,9 +37,7 @@ final class PipelinedDivider(mantissaBits: Int, digits: Int, lanes: Int) extends
   private case class Partial(remainder: UInt, quotient: Option[UInt])
 
   private def step(from: Partial, denominator: UInt): Partial = {
-    val tried = from.remainder -& denominator
-    val fits  = !tried(mantissaBits + 1)
-    val rest  = Mux(fits, tried, from.remainder)(mantissaBits - 1, 0)
+    val (fits, rest) = DigitRecurrence.step(from.remainder, denominator, mantissaBits)
     Partial(Cat(rest, false.B), Some(from.quotient.fold(fits.asUInt)(Cat(_, fits))))
   }
 

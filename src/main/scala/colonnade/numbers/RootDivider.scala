@@ -57,9 +57,7 @@ final class RootDivider(radicandBits: Int, mantissaBits: Int, digits: Int) exten
   private val minuend    = Mux(isDivision, remainder, Cat(remainder(remainderBits - 3, 0), pair))
   private val subtrahend =
     Mux(isDivision, operand(mantissaBits - 1, 0), Cat(result(rootBits - 1, 0), 1.U(2.W))).pad(remainderBits)
-  private val difference = minuend -& subtrahend
-  private val bit        = !difference(remainderBits)
-  private val rest       = Mux(bit, difference, minuend)(remainderBits - 1, 0)
+  private val (bit, rest) = DigitRecurrence.step(minuend, subtrahend, remainderBits)
 
   when(busy && !finished) {
     remainder := Mux(isDivision, Cat(rest(remainderBits - 2, 0), 0.U(1.W)), rest)

@@ -35,12 +35,11 @@ final class SquareRoot(radicandBits: Int) extends Module {
   private val finished = busy && bitsLeft === 0.U
 
   // The next bit is set if (2 root + 1)² fits, that is if 4 root + 1 does not exceed the remainder
-  private val extended   = Cat(remainder, pending(2 * rootBits - 1, 2 * rootBits - 2))
-  private val difference = extended -& Cat(0.U(1.W), root, 1.U(2.W))
-  private val bit        = !difference(rootBits + 3)
+  private val extended    = Cat(remainder, pending(2 * rootBits - 1, 2 * rootBits - 2))
+  private val (bit, rest) = DigitRecurrence.step(extended, Cat(0.U(1.W), root, 1.U(2.W)), rootBits + 1)
 
   when(busy && !finished) {
-    remainder := Mux(bit, difference, extended)(rootBits, 0)
+    remainder := rest
     root      := Cat(root, bit)(rootBits - 1, 0)
     pending   := Cat(pending, 0.U(2.W))(2 * rootBits - 1, 0)
     bitsLeft  := bitsLeft - 1.U

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Cat, Decoupled}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb}
-import colonnade.numbers.{Fixed, Rounding}
+import colonnade.numbers.{DigitRecurrence, Fixed, Rounding}
 import colonnade.ray.RayFormats
 
 /** Ports of [[CornerColours]]. */
@@ -85,9 +85,7 @@ final class CornerColours(config: ColonnadeConfig) extends Module {
   when(isDivided) {
     found := found + 1.U
     for (sum <- sums) {
-      val high = sum.head(totalBits + 1)
-      val fits = high >= total
-      val left = Mux(fits, high - total, high)(totalBits - 1, 0)
+      val (fits, left) = DigitRecurrence.step(sum.head(totalBits + 1), total, totalBits)
       sum := Cat(left, sum(colourBits - 2, 0), fits)
     }
   }

@@ -6,6 +6,7 @@ import colonnade.common.ModuloSchedule
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb}
+import colonnade.numbers.DigitRecurrence
 
 /** Ports of [[CornerStage]]. */
 final class CornerStageIO(config: ColonnadeConfig) extends Bundle {
@@ -47,9 +48,8 @@ final class CornerStage(config: ColonnadeConfig) extends Module {
 
   /** What is left of the division, above the bits found so far; and the divisor. */
   private def step(left: UInt, divisor: UInt): UInt = {
-    val high = left.head(totalBits + 1)
-    val fits = high >= divisor
-    Cat(Mux(fits, high - divisor, high)(totalBits - 1, 0), left(colourBits - 2, 0), fits)
+    val (fits, rest) = DigitRecurrence.step(left.head(totalBits + 1), divisor, totalBits)
+    Cat(rest, left(colourBits - 2, 0), fits)
   }
   for ((channel, index) <- io.colour.channels.zipWithIndex) {
     val isStart = isAt(2 + index)

@@ -3,7 +3,7 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled, Valid}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.numbers.Fixed
+import colonnade.numbers.{DigitRecurrence, Fixed}
 
 /** Ports of [[ShadowRatios]].
   *
@@ -54,11 +54,10 @@ final class ShadowRatios(config: ColonnadeConfig, bits: Int) extends Module {
     val ratio     = Reg(UInt((fraction + 1).W))
 
     /** The ratio is one, and needs no division. */
-    val isOne = Reg(Bool())
-    val twice = remainder << 1
-    val fits  = twice >= whole
+    val isOne        = Reg(Bool())
+    val (fits, rest) = DigitRecurrence.step((remainder << 1).asUInt, whole, bits)
     when(divides && !isOne) {
-      remainder := Mux(fits, twice - whole, twice)
+      remainder := rest
       ratio     := Cat(ratio(fraction - 1, 0), fits)
     }
     when(io.load.valid && io.load.bits.channel === channel.U) {
