@@ -98,7 +98,8 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
       geometry = tiny.geometry.copy(bvh = false, trianglesPerRecord = 1),
       columnBvhMemory = tiny.columnBvhMemory.copy(snooping = false, banks = 1),
       frame = tiny.frame.copy(hits = false)
-    )
+    ),
+    Matrix
   )
   render(
     "an environment, five paths",
