@@ -56,7 +56,7 @@ def manifest_data(
         "version": 1,
         "config": {
             "array": {"rows": 1, "columns": 1, "contexts": 8},
-            "units": {"pathContexts": 0},
+            "units": {"pathContexts": 8, "marches": 1},
             "geometry": {
                 "vertexBits": vertex_bits,
                 "boxBits": box_bits,
@@ -206,16 +206,16 @@ SMALL_ARRAY = {
         "boxLanes": 2,
         "triangleLanes": 1,
         "triangleRows": 1,
-        "marches": 0,
-        "directView": False,
-        "pathContexts": 0,
+        "marches": 1,
+        "pathContexts": 8,
         "pipelined": False,
         "shortPaths": False,
     },
     "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1, "cache": None},
 }
 
-#: Counters of a frame of 100 cycles on `SMALL_ARRAY`: 600 unit, 2,400 context, 600 bank and 300 stream cycles.
+#: Counters of a frame of 100 cycles on `SMALL_ARRAY`: 600 unit, 300 path unit, 2,400 context, 600 bank and 300 stream
+#: cycles.
 COUNTERS = {
     "raysPrimary": 150,
     "raysInBox": 50,
@@ -225,10 +225,10 @@ COUNTERS = {
     "hits": 20,
     "recordReads": 60,
     "snoopHits": 180,
-    "busyRaySetup": 60,
+    "busyRaySetup": 30,
     "busyBoxUnit": 480,
     "busyTriangleUnit": 120,
-    "busyShader": 6,
+    "busyShader": 3,
     "idleContexts": 240,
     "contextsRaySetup": 480,
     "waitRecord": 120,

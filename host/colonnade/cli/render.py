@@ -164,7 +164,6 @@ def summary(report: FrameReport) -> str:
         words.append(f"{report.rays_per_cycle_in_box:.3f} rays per cycle in box")
         words.append(f"{report.rays_per_cycle:.3f} of all")
     if report.room is not None:
-        each = "" if report.room.cycles is None else f" of {report.room.cycles:.0f} cycles"
-        words.append(f"{report.room.look_ups:,} environment lookups{each}")
+        words.append(f"{report.room.look_ups:,} environment lookups")
     seconds = ", ".join(f"{step} {value:.1f} s" for step, value in report.seconds.items() if value is not None)
     return ", ".join(words) + (f" ({seconds})" if seconds else "")

@@ -1,8 +1,8 @@
 """Sources of a simulator: Verilator models of unit, column and device, and their coupling.
 
-The unit is the render unit, or the traversal unit if the columns have path units. Verilator generates C++ for each
-instance of a module, about 170 MB for 80 render units. So unit and column are separate models, and each instance is
-an object. An outer model is *opened*: its inner instances are removed, and variables replace their ports.
+Verilator generates C++ for each instance of a module, about 170 MB for 80 traversal units. So unit and column are
+separate models, and each instance is an object. A module is *opened*: its inner instances are removed, and variables
+replace their ports. `PathTracer`, a part of the column, is opened for the units, and the device for the columns.
 
 One evaluation of each unit and a few of columns and device simulate a cycle exactly, by three properties of the RTL:
 
@@ -24,15 +24,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-#: Modules of which a column has one in each row; a design has one of them.
-UNITS = ("RenderUnit", "TraversalUnit")
-COLUMN, DEVICE = "Column", "Colonnade"
+#: A column has a unit in each row, in its path tracer.
+UNIT, TRACER, COLUMN, DEVICE = "TraversalUnit", "PathTracer", "Column", "Colonnade"
+
+#: The path tracer's name in the column's model.
+TRACER_IN_COLUMN = f"{COLUMN}__DOT__tracer"
 
 #: The wrapper with registers at the unit's inputs.
 UNIT_MODEL = "UnitModel"
 
 #: Inputs of a unit that depend combinationally on its outputs or on the device's inputs.
-DIRECT = re.compile(r"reset|io_start|io_\w*_ready")
+DIRECT = re.compile(r"reset|io_start|io_\w*_ready(Next)?")
 
 #: Prefix of the inputs that change only while no frame runs.
 FRAME_REGISTERS = "io_registers_"
@@ -173,8 +175,8 @@ def open_module(verilog: str, module: str, inner: str, ports: Sequence[Port]) ->
     return Opened(text + verilog[end:], module, wired, len(instances), shared)
 
 
-def coupling(opened: Opened, inner: str) -> str:
-    """C++ code that gives the harness access to the variables of an opened module.
+def coupling(opened: Opened, inner: str, model: str, path: str) -> str:
+    """C++ code that gives the harness access to the variables of an opened module, at a path in a model.
 
     ``INNER_OUTPUTS(DO)``, ``_DIRECT``, ``_INPUTS`` and ``_REGISTERS`` expand ``DO(port)`` for each port of the kind.
     ``INNERVariables`` has a pointer for each port, and ``bindINNER(root)`` returns one per instance.
@@ -184,11 +186,9 @@ def coupling(opened: Opened, inner: str) -> str:
         for kind in ("OUTPUTS", "DIRECT", "INPUTS", "REGISTERS")
     ]
     lines += [f"struct {inner}Variables {{", *(f"    {port.cpp_type}* {port.name};" for port in opened.ports), "};"]
-    lines.append(
-        f"inline std::vector<{inner}Variables> bind{inner}(V{opened.module}___024root& root) {{\n    return {{"
-    )
+    lines.append(f"inline std::vector<{inner}Variables> bind{inner}(V{model}___024root& root) {{\n    return {{")
     for number in range(opened.count):
-        variables = (f"&root.{opened.module}__DOT__{opened.variable(number, port)}" for port in opened.ports)
+        variables = (f"&root.{path}__DOT__{opened.variable(number, port)}" for port in opened.ports)
         lines.append("        {" + ", ".join(variables) + "},")
     return "\n".join([*lines, "    };", "}"]) + "\n"
 
@@ -211,16 +211,17 @@ def write_sources(sources: Iterable[Path], folder: Path) -> dict[str, list[Path]
         The files of each model by top module: `UNIT_MODEL`, `COLUMN`, `DEVICE`.
     """
     verilog = {path.stem: both_edges(path.read_text()) for path in sources}
-    (unit,) = (module for module in UNITS if module in verilog)
-    ports = {module: module_ports(verilog[module], module) for module in (unit, COLUMN)}
-    column = open_module(verilog[COLUMN], COLUMN, unit, ports[unit])
+    ports = {module: module_ports(verilog[module], module) for module in (UNIT, COLUMN)}
+    tracer = open_module(verilog[TRACER], TRACER, UNIT, ports[UNIT])
     device = open_module(verilog[DEVICE], DEVICE, COLUMN, ports[COLUMN])
     header = "#pragma once\n" + record_banks(verilog.get("ColumnBvhMemory"))
-    (folder / "coupling.hpp").write_text(header + coupling(column, "Unit") + coupling(device, COLUMN))
+    (folder / "coupling.hpp").write_text(
+        header + coupling(tracer, "Unit", COLUMN, TRACER_IN_COLUMN) + coupling(device, COLUMN, DEVICE, DEVICE)
+    )
     for module in verilog:
         if module.startswith("records_"):
             verilog[module] = _RECORDS_ARRAY.sub(r"\1 /*verilator public_flat_rw*/;", verilog[module])
-    verilog |= {UNIT_MODEL: unit_model(unit, ports[unit]), COLUMN: column.verilog, DEVICE: device.verilog}
+    verilog |= {UNIT_MODEL: unit_model(UNIT, ports[UNIT]), TRACER: tracer.verilog, DEVICE: device.verilog}
     return {top: list(_written(verilog, top, folder / top)) for top in (UNIT_MODEL, COLUMN, DEVICE)}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from colonnade.design.manifest import Manifest
 from colonnade.scene_image.header import ImageHeader
@@ -19,7 +18,7 @@ RAY_CYCLES = 1_000
 NODE_CYCLES = 12
 TRIANGLE_CYCLES = 24
 
-#: Nodes, and triangle records, that each ray of a render unit visits, one ray after the other. No ray visits as many on
+#: Nodes, and triangle records, that each ray of a column visits, one ray after the other. No ray visits as many on
 #: the eight meshes of the benchmark (`make verify`), and contexts overlap: a single ray may visit many times as many.
 #: A design without a tree visits all records.
 TREE_VISITS = 128
@@ -35,12 +34,10 @@ TILE_STEPS = 17
 def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest: Manifest) -> int:
     """The register ``frame.watchdogCycles`` of a frame with these registers.
 
-    A pixel leaves at the latest when all contexts of its render unit, or of its column's path unit, have traced all
-    their rays. A path unit hands out rays in any order, so one may wait for all others.
+    A pixel leaves at the latest when all contexts of its column's path unit have traced all their rays. The path unit
+    hands out rays in any order, so one may wait for all others.
     """
-    array: Mapping[str, Any] = manifest.config["array"]
-    rows, contexts = int(array["rows"]), int(array["contexts"])
-    shared = int(manifest.config["units"]["pathContexts"])
+    rows, contexts = int(manifest.config["array"]["rows"]), int(manifest.config["units"]["pathContexts"])
     geometry = manifest.config["geometry"]
     nodes, leaves = header.triangle_base, header.triangle_records
     if geometry["bvh"]:
@@ -54,19 +51,16 @@ def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest:
     rays = 1 + bounces + lights
     # Glass looks up the environment once more at each bounce
     march = _march(manifest) if registers.get("environment.enabled", 0) else 0
-    cycles = (shared or contexts) * (rays * (RAY_CYCLES + walk) + (rays + bounces) * march)
+    cycles = contexts * (rays * (RAY_CYCLES + walk) + (rays + bounces) * march)
     return min(BASE_CYCLES + cycles, (1 << 32) - 1)
 
 
 def _march(manifest: Manifest) -> int:
-    """Cycles of one ray along the longest way through the maps, behind one of every unit that shares its march."""
+    """Cycles of one ray along the longest way through the maps."""
     maps = manifest.config["physicalAttributeMemory"]
     if maps is None:
         return 0
-    array, units = manifest.config["array"], manifest.config["units"]
-    rows, marches = 1 if units["pathContexts"] else int(array["rows"]), int(units["marches"])
-    sharers = -(-rows // marches) if marches else 1
-    requesters = marches + bool(units["directView"]) if marches else rows
-    requesters *= min(int(maps["columnsPerCopy"]), int(array["columns"]))
+    ports = int(manifest.config["units"]["marches"]) + 1
+    requesters = ports * min(int(maps["columnsPerCopy"]), int(manifest.config["array"]["columns"]))
     tiles = (int(maps["width"]) + int(maps["height"])) // int(maps["tileSize"])
-    return sharers * tiles * TILE_STEPS * (MARCH_CYCLES + requesters)
+    return tiles * TILE_STEPS * (MARCH_CYCLES + requesters)

@@ -32,13 +32,11 @@ class EnvironmentReport:
 
     Attributes:
         look_ups: Number of lookups.
-        cycles: Mean cycles per lookup; none where a pipeline takes the directly seen pixels.
         steps: Mean march steps per lookup.
         busy: Utilisation of a ray march, 0.0 to 1.0.
     """
 
     look_ups: int
-    cycles: float | None
     steps: float
     busy: float
 
@@ -160,10 +158,8 @@ def _environment_report(manifest: Manifest, counters: Mapping[str, int]) -> Envi
     look_ups, busy = counters.get("raysEnvironment", 0), counters.get("busyEnvironment")
     if look_ups == 0 or busy is None:
         return None
-    array, units = manifest.config["array"], manifest.config["units"]
-    marches = (int(units["marches"]) or int(array["rows"])) * int(array["columns"])
-    cycles = None if units["directView"] else busy / look_ups
-    return EnvironmentReport(look_ups, cycles, counters["marchSteps"] / look_ups, busy / (marches * counters["cycles"]))
+    marches = int(manifest.config["units"]["marches"]) * int(manifest.config["array"]["columns"])
+    return EnvironmentReport(look_ups, counters["marchSteps"] / look_ups, busy / (marches * counters["cycles"]))
 
 
 def sequence_report(frames: Sequence[FrameReport]) -> FrameReport:

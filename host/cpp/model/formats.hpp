@@ -61,7 +61,7 @@ struct Numbers {
         lightFraction = take("lightFraction");
         etaFraction = take("etaFraction");
         rootBits = take("rootBits");
-        maxExponent = take("mostExponent");
+        maxExponent = take("maxExponent");
         arity = take("arity");
         trianglesPerRecord = take("trianglesPerRecord");
         stackDepth = take("stackDepth");

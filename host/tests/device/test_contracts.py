@@ -93,7 +93,7 @@ def wrongly_culled(count: int, precision: str, seed: int) -> tuple[int, int]:
     # The child begins at any plane of a node whose axes may be coarser than it needs
     most = (1 << box_bits) - 1
     coarser = random.integers(0, 4, size=(count, 3)) * (random.random((count, 3)) < 0.3)
-    exponents = np.minimum(exponents + coarser, numbers["mostExponent"])
+    exponents = np.minimum(exponents + coarser, numbers["maxExponent"])
     high = -(-extent >> exponents)
     first = (random.random((count, 3)) * (np.minimum(most - high, low >> exponents) + 1)).astype(np.int64)
     corner = low - (first << exponents)

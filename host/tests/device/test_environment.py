@@ -45,9 +45,9 @@ SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
     [
         ("diffuse", ()),
         ("mirror", ()),
-        ("glass", ("units.marches=1", "units.directView=true", "physicalAttributeMemory.columnsPerCopy=2")),
+        ("glass", ("physicalAttributeMemory.columnsPerCopy=2",)),
     ],
-    ids=["diffuse", "mirror", "glass, environment in the column, maps shared by two columns"],
+    ids=["diffuse", "mirror", "glass, maps shared by two columns"],
 )
 def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, ...]) -> None:
     """The relit room and the shadow window; two lights, one light, no bounces; a sample; a stalled sink."""
@@ -97,8 +97,8 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, 
 @NEEDS_SIMULATOR
 @pytest.mark.long_simulation
 def test_a_room_after_an_abort_is_right() -> None:
-    """A column with a path unit, with pixels in all stages when the watchdog aborts: none is in the next frame."""
-    units = ("units.pathContexts=24", "units.pipelined=true", "units.marches=2", "units.directView=true")
+    """Pixels are in all stages when the watchdog aborts: none is in the next frame."""
+    units = ("units.pathContexts=24", "units.pipelined=true", "units.marches=2")
     design = design_for("small", ("array.rows=3", *units))
     held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
     mesh, material = load_mesh("teapot:4"), Material(kind="glass")

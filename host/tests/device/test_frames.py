@@ -257,7 +257,7 @@ def nodes_of(manifest: Manifest, pointers: Sequence[tuple[int, int]]) -> npt.NDA
         for axis in "xyz":
             fields[f"high[{slot}].{axis}"][:] = layout.fields[f"high[{slot}].{axis}"].range[1]
     for axis in "xyz":
-        fields[f"exponent.{axis}"][:] = manifest.numbers["mostExponent"]
+        fields[f"exponent.{axis}"][:] = manifest.numbers["maxExponent"]
     return layout.pack(fields)
 
 

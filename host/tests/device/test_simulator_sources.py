@@ -16,7 +16,7 @@ from colonnade.device.simulator_sources import (
 )
 
 UNIT = """\
-module RenderUnit(
+module TraversalUnit(
   input          clock,
                  reset,
   input  [31:0]  io_registers_frame_unitShift,
@@ -40,26 +40,26 @@ endmodule
 def instance(number: int) -> str:
     suffix = f"_{number}" if number else ""
     return f"""\
-  RenderUnit RenderUnit{suffix} (
+  TraversalUnit TraversalUnit{suffix} (
     .clock (clock),
     .reset (reset),
     .io_registers_frame_unitShift (io_registers_frame_unitShift),
     .io_positions_valid (_walker_io_positions_{number}_valid & ~(a | b)),
     .io_positions_ready
-      (_RenderUnit{suffix}_io_positions_ready),
+      (_TraversalUnit{suffix}_io_positions_ready),
     .io_broadcasts_0_bits_record (_controller_io_broadcasts_0_bits_record),
-    .io_requests_bits_address (_RenderUnit{suffix}_io_requests_bits_address),
+    .io_requests_bits_address (_TraversalUnit{suffix}_io_requests_bits_address),
     .io_requests_ready (_controller_io_requests_{number}_ready),
     .io_unused (/* unused */)
   );
 """
 
 
-COLUMN = f"module Column(\n  input clock\n);\n  wire before;\n{instance(0)}{instance(1)}  wire behind;\nendmodule\n"
+TRACER = f"module PathTracer(\n  input clock\n);\n  wire before;\n{instance(0)}{instance(1)}  wire behind;\nendmodule\n"
 
 
 def test_ports_have_direction_width_and_kind() -> None:
-    ports = {port.name: port for port in module_ports(UNIT, "RenderUnit")}
+    ports = {port.name: port for port in module_ports(UNIT, "TraversalUnit")}
     assert "clock" not in ports
     assert {name: port.bits for name, port in ports.items() if port.bits > 1} == {
         "io_registers_frame_unitShift": 32,
@@ -82,8 +82,8 @@ def test_ports_have_direction_width_and_kind() -> None:
 
 
 def test_an_unknown_port_is_an_error() -> None:
-    with pytest.raises(ValueError, match=r"cannot parse a port of RenderUnit: inout x"):
-        module_ports("module RenderUnit(\n  inout x\n);\n", "RenderUnit")
+    with pytest.raises(ValueError, match=r"cannot parse a port of TraversalUnit: inout x"):
+        module_ports("module TraversalUnit(\n  inout x\n);\n", "TraversalUnit")
 
 
 def test_registers_use_both_edges_of_any_clock() -> None:
@@ -92,7 +92,7 @@ def test_registers_use_both_edges_of_any_clock() -> None:
 
 
 def test_the_units_model_registers_all_but_the_direct_inputs() -> None:
-    text = unit_model("RenderUnit", module_ports(UNIT, "RenderUnit"))
+    text = unit_model("TraversalUnit", module_ports(UNIT, "TraversalUnit"))
     held = {line.split()[-1].rstrip(";") for line in text.splitlines() if line.startswith("  reg ")}
     assert held == {"held_io_registers_frame_unitShift", "held_io_positions_valid", "held_io_broadcasts_0_bits_record"}
     assert "    .io_positions_valid(held_io_positions_valid)" in text
@@ -100,9 +100,9 @@ def test_the_units_model_registers_all_but_the_direct_inputs() -> None:
 
 
 def test_variables_replace_the_ports_of_removed_instances() -> None:
-    opened = open_module(COLUMN, "Column", "RenderUnit", module_ports(UNIT, "RenderUnit"))
+    opened = open_module(TRACER, "PathTracer", "TraversalUnit", module_ports(UNIT, "TraversalUnit"))
     assert opened.count == 2
-    assert "RenderUnit RenderUnit" not in opened.verilog
+    assert "TraversalUnit TraversalUnit" not in opened.verilog
     assert opened.verilog.index("wire before") < opened.verilog.index("wire behind")
     assert opened.shared == {"reset", "io_registers_frame_unitShift", "io_broadcasts_0_bits_record"}
     lines = [line.strip() for line in opened.verilog.splitlines()]
@@ -110,30 +110,32 @@ def test_variables_replace_the_ports_of_removed_instances() -> None:
     assert f"wire instance1_io_positions_valid {public} = _walker_io_positions_1_valid & ~(a | b);" in lines
     assert sum("shared_io_broadcasts_0_bits_record" in line for line in lines) == 1
     assert "reg [16:0] instance1_io_requests_bits_address /*verilator public_flat_rw*/;" in lines
-    assert "assign _RenderUnit_1_io_requests_bits_address = instance1_io_requests_bits_address;" in lines
+    assert "assign _TraversalUnit_1_io_requests_bits_address = instance1_io_requests_bits_address;" in lines
     assert "io_unused" not in opened.verilog
 
 
 def test_the_harness_gets_every_connected_port() -> None:
-    opened = open_module(COLUMN, "Column", "RenderUnit", module_ports(UNIT, "RenderUnit"))
-    header = coupling(opened, "Unit")
+    opened = open_module(TRACER, "PathTracer", "TraversalUnit", module_ports(UNIT, "TraversalUnit"))
+    header = coupling(opened, "Unit", "Column", "Column__DOT__tracer")
     assert "#define Unit_DIRECT(DO) DO(reset) DO(io_requests_ready)\n" in header
     assert "#define Unit_REGISTERS(DO) DO(io_registers_frame_unitShift)\n" in header
-    assert header.count("&root.Column__DOT__shared_io_broadcasts_0_bits_record") == 2
+    assert header.count("&root.Column__DOT__tracer__DOT__shared_io_broadcasts_0_bits_record") == 2
     assert "io_unused" not in header
 
 
 def test_each_model_gets_its_modules(tmp_path: Path) -> None:
     top = "  Column columns_0 (\n    .clock (clock)\n  );\n"
+    inside = "  PathTracer tracer (\n    .clock (clock)\n  );\n  ColumnBvhMemory memory (\n    .clock (clock)\n  );\n"
     files = {
-        "RenderUnit": UNIT,
+        "TraversalUnit": UNIT,
         "Queue1_Pixel": "module Queue1_Pixel(\n  input clock\n);\nendmodule\n",
-        "Column": COLUMN.replace("  wire before;\n", "  ColumnBvhMemory memory (\n    .clock (clock)\n  );\n"),
+        "PathTracer": TRACER,
+        "Column": f"module Column(\n  input clock\n);\n{inside}endmodule\n",
         "ColumnBvhMemory": "module ColumnBvhMemory(\n  input clock\n);\n"
         "  records_64x320 records_ext (\n  );\n  records_64x320 records_1_ext (\n  );\nendmodule\n",
         "records_64x320": "module records_64x320(\n  input RW0_clk\n);\n  reg [319:0] Memory[0:63];\nendmodule\n",
         "Colonnade": f"module Colonnade(\n  input clock\n);\n{top}endmodule\n",
-        "Recorder": "bind RenderUnit ColonnadeRecorder recorder();\n",
+        "Recorder": "bind TraversalUnit ColonnadeRecorder recorder();\n",
         "Unused": "module Unused(\n);\nendmodule\n",
     }
     folder, out = tmp_path / "in", tmp_path / "out"
@@ -143,8 +145,8 @@ def test_each_model_gets_its_modules(tmp_path: Path) -> None:
         (folder / f"{name}.sv").write_text(text)
     models = write_sources(sorted(folder.iterdir()), out)
     assert {top: [path.stem for path in paths] for top, paths in models.items()} == {
-        "UnitModel": ["Recorder", "Queue1_Pixel", "RenderUnit", "UnitModel"],
-        "Column": ["Column", "ColumnBvhMemory", "records_64x320"],
+        "UnitModel": ["Recorder", "Queue1_Pixel", "TraversalUnit", "UnitModel"],
+        "Column": ["Column", "ColumnBvhMemory", "PathTracer", "records_64x320"],
         "Colonnade": ["Colonnade"],
     }
     assert "Memory[0:63] /*verilator public_flat_rw*/;" in (out / "Column" / "records_64x320.sv").read_text()

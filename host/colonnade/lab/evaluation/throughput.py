@@ -41,15 +41,13 @@ class Shape:
 
     Attributes:
         units: Render units.
-        path_units: Units that follow paths: one a column, or the render units.
         triangle_units: Triangle units.
-        contexts: Contexts of the units that follow paths.
-        columns: Columns, each with a pixel stream.
+        contexts: Contexts of the path units.
+        columns: Columns, each with a path unit and a pixel stream.
         banks: Memory banks.
     """
 
     units: int
-    path_units: int
     triangle_units: int
     contexts: int
     columns: int
@@ -61,10 +59,9 @@ class Shape:
         columns = int(config["array"]["columns"])
         units = columns * int(config["array"]["rows"])
         banks = columns * int(config["columnBvhMemory"]["banks"])
-        lanes, shared = int(config["units"]["triangleLanes"]), int(config["units"]["pathContexts"])
+        lanes, contexts = int(config["units"]["triangleLanes"]), columns * int(config["units"]["pathContexts"])
         groups = columns * -(-int(config["array"]["rows"]) // int(config["units"]["triangleRows"]))
-        contexts = columns * shared or units * int(config["array"]["contexts"])
-        return Shape(units, columns if shared else units, groups * lanes, contexts, columns, banks)
+        return Shape(units, groups * lanes, contexts, columns, banks)
 
 
 def figures(report: Mapping[str, Any]) -> dict[str, Any]:
@@ -101,10 +98,10 @@ def figures(report: Mapping[str, Any]) -> dict[str, Any]:
 def utilisation(counters: Mapping[str, int], cycles: int, shape: Shape) -> dict[str, float]:
     """Busy share of the frame's cycles for each kind of unit or port, averaged over its instances, 0 to 1."""
     instances = {
-        "ray set-up": shape.path_units,
+        "ray set-up": shape.columns,
         "box unit": shape.units,
         "triangle unit": shape.triangle_units,
-        "shader": shape.path_units,
+        "shader": shape.columns,
     }
     return {
         RENDER_UNIT: 1.0 - _ratio(counters["idleContexts"], cycles * shape.contexts),

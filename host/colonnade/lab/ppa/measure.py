@@ -10,7 +10,7 @@ from typing import Any
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import black_boxed_design_for
 from colonnade.lab.ppa.netlist import memories
-from colonnade.lab.ppa.netlist.hierarchy import LEVEL_NAMES, Hierarchy, Level, Memory
+from colonnade.lab.ppa.netlist.hierarchy import LEVEL_NAMES, LEVELS, Hierarchy, Level, Memory
 from colonnade.lab.ppa.netlist.mapped import Netlist
 from colonnade.lab.ppa.netlist.synthesis import Technology, count_gates, require_yosys, synthesise, technology
 from colonnade.lab.ppa.power.recording import require_recordable
@@ -53,7 +53,7 @@ def measure(
         require_recordable(operation.stimulus, design.manifest)
     netlists: dict[str, Any] = {}
     units: dict[str, dict[str, Any]] = {}
-    for level in hierarchy.levels:
+    for level in LEVELS:
         for module in (*hierarchy.units(level), level.top):
             name = level.rest if module == level.top else module
             with progress.step(f"synthesising {name}"):
@@ -63,7 +63,7 @@ def measure(
                 units[name] = _unit(level, module, count, netlists, hierarchy.parts(module), tech)
             finished(level.name, name, units[name])
     with progress.step("timing the whole render unit"):
-        whole = _timing(Netlist(netlists, hierarchy.levels[0].top, tech.library), tech) if tech.library else None
+        whole = _timing(Netlist(netlists, LEVELS[0].top, tech.library), tech) if tech.library else None
     power = None
     if tech.library and operation:
         power = measure_power(design, config, overrides, hierarchy, netlists, tech, operation, progress)

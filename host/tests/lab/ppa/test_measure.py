@@ -16,7 +16,7 @@ from colonnade.lab.ppa import measure
 from colonnade.lab.ppa.library import liberty, liberty_files
 from colonnade.lab.ppa.library.cells import Library, LookupTable
 from colonnade.lab.ppa.netlist import memories
-from colonnade.lab.ppa.netlist.hierarchy import BOUNDARIES, SEPARATE, Hierarchy, Memory
+from colonnade.lab.ppa.netlist.hierarchy import BOUNDARIES, LEVELS, Hierarchy, Memory
 from colonnade.lab.ppa.netlist.mapped import Netlist
 from colonnade.lab.ppa.netlist.synthesis import Technology, count_gates
 from colonnade.lab.ppa.studies.guard import differences, gates_of_tiny
@@ -158,11 +158,11 @@ def test_register_outputs_are_named_after_the_register(small: Library) -> None:
 def test_synthesis_stops_at_units(tmp_path: Path) -> None:
     sources = {
         "Colonnade": "  Column columns_0 (\n  Column columns_1 (\n",
-        "Column": "  RenderUnit a (\n  RenderUnit b (\n  records records_0 (\n  Arbiter arbiter (\n",
-        "RenderUnit": "  BoxUnit boxUnit (\n  Queue queue (\n  Shader shader (\n",
+        "Column": "  TraversalUnit a (\n  TraversalUnit b (\n  records records_0 (\n  Arbiter arbiter (\n",
+        "TraversalUnit": "  BoxUnit boxUnit (\n  Queue queue (\n  FetchStage fetch (\n",
         "BoxUnit": "  Divider one (\n  Divider other (\n",
-        "Shader": "  BounceUnit mirrors (\n  BounceUnit glass (\n",
-        "BounceUnit": "  rays rays_0 (\n",
+        "FetchStage": "  RecordFetch one (\n  RecordFetch other (\n",
+        "RecordFetch": "  rays rays_0 (\n",
         "rays": "  rays_ext rays_ext (\n",
         "records": "  records_ext records_ext (\n",
         "Arbiter": "",
@@ -174,18 +174,18 @@ def test_synthesis_stops_at_units(tmp_path: Path) -> None:
     shape = {"name": "records_ext", "depth": 8, "width": 4, "ports": ["rw"], "maskBits": None}
     (tmp_path / "memories.json").write_text(json.dumps([shape, shape | {"name": "rays_ext"}]))
     hierarchy = Hierarchy(tmp_path)
-    assert hierarchy.closure("RenderUnit") == (["Queue", "RenderUnit"], ["BoxUnit", "Shader"])
+    assert hierarchy.closure("TraversalUnit") == (["FetchStage", "Queue", "TraversalUnit"], ["BoxUnit", "RecordFetch"])
     assert hierarchy.closure("BoxUnit") == (["BoxUnit"], ["Divider"])
     assert hierarchy.parts("BoxUnit") == {"Divider": 2}
-    assert hierarchy.parts("RenderUnit") == {}
+    assert hierarchy.parts("TraversalUnit") == {}
     assert hierarchy.shape("records") == (8, 4)
-    assert hierarchy.closure("Column") == (["Arbiter", "Column"], ["RenderUnit", "records"])
+    assert hierarchy.closure("Column") == (["Arbiter", "Column"], ["TraversalUnit", "records"])
     assert hierarchy.count("BoxUnit", "Colonnade") == 4
     assert hierarchy.count("BoxUnit", "Colonnade", BOUNDARIES) == 0
     assert hierarchy.header("Queue") == "module Queue(\n  input clock\n);\nendmodule\n"
-    assert [hierarchy.instances(unit, SEPARATE[0]) for unit in ("RenderUnit", "BoxUnit", "BounceUnit")] == [1, 1, 2]
+    assert [hierarchy.instances(unit, LEVELS[0]) for unit in ("TraversalUnit", "BoxUnit", "RecordFetch")] == [1, 1, 2]
     rays, records = hierarchy.memories()
-    assert (rays.level, rays.unit, rays.count) == ("render_unit", "BounceUnit", 2)
+    assert (rays.level, rays.unit, rays.count) == ("render_unit", "RecordFetch", 2)
     assert (records.level, records.unit, records.count, records.bits) == ("column", "rest of Column", 1, 32)
 
 

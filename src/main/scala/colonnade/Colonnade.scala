@@ -3,13 +3,12 @@ package colonnade
 import chisel3._
 import chisel3.experimental.hierarchy.{Definition, Instance}
 import chisel3.util.{Decoupled, Pipe}
-import colonnade.column.Column
+import colonnade.column.{Column, PathTracer, PathTracerModule}
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.{AttributeArbiter, AttributePort, PhysicalAttributeMemory}
+import colonnade.environment.{AttributeArbiter, PhysicalAttributeMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, EnvironmentWindow, FrameController}
 import colonnade.memory.{DramPort, SceneMemory, SharedCache}
-import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** Ports of [[Colonnade]]. */
 final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
@@ -39,11 +38,11 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   * errors and counters. A frame with an error bit is invalid. An aborted frame withdraws pixels that the sink has not
   * accepted.
   *
-  * @param renderUnit makes a render unit; specs pass another one with the same ports
+  * @param pathTracer makes the path tracer of a column; specs pass another one with the same ports
   */
 final class Colonnade(
     config:     ColonnadeConfig,
-    renderUnit: ColonnadeConfig => RenderUnitModule = new RenderUnit(_)
+    pathTracer: ColonnadeConfig => PathTracerModule = new PathTracer(_)
 ) extends Module {
   val io = IO(new ColonnadeIO(config))
 
@@ -51,7 +50,7 @@ final class Colonnade(
   private val controller = Module(new FrameController(config))
   private val counters   = Module(new CounterFile(config))
   private val clears     = reset.asBool || controller.io.aborts
-  private val definition = Definition(new Column(config, renderUnit)) // elaborated once, not once per column
+  private val definition = Definition(new Column(config, pathTracer)) // elaborated once, not once per column
   private val columns    = Seq.fill(config.array.columns)(withReset(clears)(Instance(definition)))
 
   // Loads go to all columns
@@ -61,7 +60,7 @@ final class Colonnade(
 
   // The environment's maps, if columns share them
   for (ports <- columns.flatMap(_.io.environment).grouped(config.columnsPerCopy)) {
-    val tagBits = AttributeArbiter.tagBits(config.mapRequesters, AttributePort.tagBits(config))
+    val tagBits = AttributeArbiter.tagBits(config.mapRequesters)
     val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, ports.size, tagBits)))
     maps.io.load := load
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }

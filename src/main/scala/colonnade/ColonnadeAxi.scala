@@ -4,20 +4,20 @@ import chisel3._
 import chisel3.util.{DecoupledIO, Mux1H, Queue}
 import colonnade.axi.AxiPins
 import colonnade.bus._
+import colonnade.column.{PathTracer, PathTracerModule}
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.RegisterMap
 import colonnade.memory.DramPort
-import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** The device in its AXI4 shell: registers by AXI4-Lite, images read and frames written by an AXI4 master, an interrupt;
   * docs/bus-shell.md.
   *
-  * @param renderUnit makes a render unit; specs pass another one with the same ports
+  * @param pathTracer makes the path tracer of a column; specs pass another one with the same ports
   */
 final class ColonnadeAxi(
     config:     ColonnadeConfig,
     shell:      ShellConfig,
-    renderUnit: ColonnadeConfig => RenderUnitModule = new RenderUnit(_)
+    pathTracer: ColonnadeConfig => PathTracerModule = new PathTracer(_)
 ) extends Module {
   val registerPins = IO(AxiPins.lite(ShellMap.addressBits)).suggestName("s_axil")
   val masterPins   = IO(AxiPins.readsAndWrites(BurstWriter.idBits, shell.busBytes)).suggestName("m_axi")
@@ -44,7 +44,7 @@ final class ColonnadeAxi(
   private val clears =
     if (config.units.shortPaths) RegNext(reset.asBool || control.io.resetNext, true.B)
     else reset.asBool || control.io.reset
-  private val device = withReset(clears)(Module(new Colonnade(config, renderUnit)))
+  private val device = withReset(clears)(Module(new Colonnade(config, pathTracer)))
   private val writer = withReset(clears)(Module(new FramebufferWriter(config, shell)))
   private val loader = withReset(clears)(Module(new ImageLoader(config, shell)))
 

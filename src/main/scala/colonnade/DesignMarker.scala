@@ -17,7 +17,7 @@ object DesignMarker {
   val title: String =
     "# Written by colonnade generate, which replaces this folder only while its files are as listed here."
 
-  private val mostBytes = 1 << 24
+  private val maxBytes = 1 << 24
 
   /** Lists the files of a complete directory. */
   def write(directory: Path): Unit = {
@@ -59,7 +59,7 @@ object DesignMarker {
 
   /** SHA-256 by name; none if the file is not such a list. */
   private def read(file: Path): Option[Map[String, String]] =
-    if (Files.size(file) > mostBytes) None
+    if (Files.size(file) > maxBytes) None
     else
       try {
         val lines   = Files.readString(file).split("\n", -1).toSeq

@@ -14,7 +14,7 @@ object ArbitraryConfig {
 
   private val array = for {
     rows     <- Gen.chooseNum(1, 100)
-    columns  <- Gen.chooseNum(1, 100.min(ArrayConfig.mostUnits / rows))
+    columns  <- Gen.chooseNum(1, 100.min(ArrayConfig.maxUnits / rows))
     contexts <- Gen.chooseNum(1, 16)
   } yield ArrayConfig(rows, columns, contexts)
 
@@ -32,18 +32,16 @@ object ArbitraryConfig {
   private def units(arity: Int) = for {
     boxLanes      <- Gen.oneOf(Seq(1, 2, 4).filter(_ <= arity))
     triangleLanes <- Gen.chooseNum(1, 4)
-    marches       <- Gen.chooseNum(0, 16)
-    directView    <- if (marches == 0) Gen.const(false) else flag
-    pathContexts  <- if (marches == 0) Gen.const(0) else Gen.chooseNum(0, UnitsConfig.mostPathContexts)
-    triangleRows  <- if (pathContexts == 0) Gen.const(1) else Gen.chooseNum(1, UnitsConfig.mostTriangleRows)
+    triangleRows  <- Gen.chooseNum(1, UnitsConfig.maxTriangleRows)
+    marches       <- Gen.chooseNum(1, UnitsConfig.maxMarches)
+    pathContexts  <- Gen.chooseNum(1, UnitsConfig.maxPathContexts)
     pipelined     <- flag
-    shortPaths    <- if (pathContexts == 0) flag else Gen.const(false)
+    shortPaths    <- flag
   } yield UnitsConfig(
     boxLanes,
     triangleLanes,
     triangleRows,
     marches,
-    directView,
     pathContexts,
     pipelined,
     shortPaths

@@ -2,14 +2,14 @@ package colonnade
 
 import chiseltest._
 import colonnade.bus._
-import colonnade.column.FakeRenderUnit
+import colonnade.column.FakePathTracer
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{Manifest, RecordFormats}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** The device in its shell, with fake render units and a memory of random latency. */
+/** The device in its shell, with fake path tracers and a memory of random latency. */
 class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ColonnadeAxi"
 
@@ -33,14 +33,14 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private def onBench(seed: Int, shortPaths: Boolean = false)(body: ShellBench => Unit): Unit = {
     val built = if (shortPaths) TestConfigs.withShortPaths(config) else config
-    test(new ColonnadeAxi(built, shell, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) { dut =>
+    test(new ColonnadeAxi(built, shell, new FakePathTracer(_))).withAnnotations(Simulation.verilator) { dut =>
       body(new ShellBench(dut, config, shell, new Random(seed)))
     }
   }
 
   private def expectPicture(bench: ShellBench, scene: Seq[BigInt]): Unit = {
     for (y <- 0 until h; x <- 0 until w) {
-      val green = SrgbEncoder(FakeRenderUnit.colour(config, scene, x, y))
+      val green = SrgbEncoder(FakePathTracer.colour(config, scene, x, y))
       assert(bench.memory.dump(pixels + stride * y + 4 * x, 4) == Seq(0, green, 0, 255), s"pixel $x, $y")
     }
     assert(bench.memory.written.size == 4 * w * h)

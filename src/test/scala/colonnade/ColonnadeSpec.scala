@@ -1,14 +1,14 @@
 package colonnade
 
 import chiseltest._
-import colonnade.column.FakeRenderUnit
+import colonnade.column.FakePathTracer
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Pixel, RecordFormats}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** The device with fake render units. */
+/** The device with fake path tracers. */
 class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "Colonnade"
 
@@ -27,13 +27,13 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
     (pixel.x.peekInt().toInt, pixel.y.peekInt().toInt) -> pixel.colour.g.peekInt().toInt
 
   private def picture(config: ColonnadeConfig, records: Seq[BigInt], wide: Int, high: Int) =
-    (for (x <- 0 until wide; y <- 0 until high) yield (x, y) -> FakeRenderUnit.colour(config, records, x, y)).toMap
+    (for (x <- 0 until wide; y <- 0 until high) yield (x, y) -> FakePathTracer.colour(config, records, x, y)).toMap
 
   for ((rows, columns, banks, latency) <- Seq((1, 1, 1, 1), (3, 2, 2, 1), (2, 3, 4, 4))) {
     it should s"render several frames with $rows rows, $columns columns, $banks banks of latency $latency" in {
       val configuration = config(rows, columns, banks, latency)
       val random        = new Random(rows)
-      test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) {
+      test(new Colonnade(configuration, new FakePathTracer(_))).withAnnotations(Simulation.verilator) {
         dut =>
           val device = new Device(dut, configuration)
           for (((wide, high), seed) <- Seq((13, 6), (4, 4), (0, 5), (1, 7)).zipWithIndex) {
@@ -52,7 +52,7 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
             assert(device.read("status.done") == 1 && device.read("status.busy") == 0)
             if (pixels.nonEmpty) assert(device.read("counters.cycles") == cycles)
             assert(device.read("counters.raysPrimary") == pixels.size)
-            assert(device.read("counters.nodeReads") == FakeRenderUnit.reads * pixels.size)
+            assert(device.read("counters.nodeReads") == FakePathTracer.reads * pixels.size)
             assert(device.read("counters.deepestStack") == (wide - 1).max(0).min(7) * high.min(1))
             val contexts = Seq("waitRecord", "waitUnit", "idleContexts").map(name => device.read(s"counters.$name"))
             assert(contexts.sum == units * device.read("counters.cycles"))
@@ -65,7 +65,7 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "end a frame that hangs with an error, and render the next one" in {
     val configuration = config(rows = 2, columns = 2, banks = 2, latency = 2)
-    test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) { dut =>
+    test(new Colonnade(configuration, new FakePathTracer(_))).withAnnotations(Simulation.verilator) { dut =>
       val device = new Device(dut, configuration)
       val scene  = records(configuration, 1)
       device.load(scene)
@@ -88,7 +88,7 @@ class ColonnadeSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "not abort a frame whose sink stalls, nor load while a frame runs" in {
     val configuration = config(rows = 2, columns = 1, banks = 1, latency = 1)
-    test(new Colonnade(configuration, new FakeRenderUnit(_))).withAnnotations(Simulation.verilator) { dut =>
+    test(new Colonnade(configuration, new FakePathTracer(_))).withAnnotations(Simulation.verilator) { dut =>
       val device = new Device(dut, configuration)
       var cycle  = 0
       device.load(records(configuration, 1))

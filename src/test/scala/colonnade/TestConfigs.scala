@@ -23,9 +23,8 @@ object TestConfigs {
       boxLanes = 2,
       triangleLanes = 1,
       triangleRows = 1,
-      marches = 0,
-      directView = false,
-      pathContexts = 0,
+      marches = 1,
+      pathContexts = 5,
       pipelined = false,
       shortPaths = false
     ),

@@ -13,22 +13,23 @@ from pathlib import Path
 PATHS = (
     *("RayGenerator", "RayGeneratorPipeline", "RaySetup", "RaySetupPipeline", "Shader", "ShadingPipeline"),
     *("BounceUnit", "BouncePipeline", "ShadowRays", "ShadowRaysPipeline", "ColourUnit", "ColourPipeline"),
-    *("BounceScheduler", "EnvironmentStage", "EnvironmentRays", "RtController"),
+    *("BounceScheduler", "EnvironmentRays", "RtController"),
 )
-TRACE = ("BoxUnit", "TraversalStack", "TriangleUnit", "RecordFetch", "HitTable")
+TRACE = ("BoxUnit", "TraversalStack", "RecordFetch", "HitTable")
 
 #: Modules of a column that follow the paths of its traversal units.
 PATH_MODULES = ("PathUnit", "PathHits", "RayBus", "ResultBus")
 
-#: The triangle units that some rows of a column share.
-SHARED_TRIANGLES = "SharedTriangles"
+#: The triangle units of a group of rows.
+TRIANGLES = "TriangleGroup"
 
 COLUMN = (
     "PathUnit",
     "PathHits",
     "RayBus",
     "ResultBus",
-    SHARED_TRIANGLES,
+    TRIANGLES,
+    "TriangleUnit",
     "ColumnBvhController",
     "ColumnEnvironment",
     "EnvironmentMarches",
@@ -68,25 +69,19 @@ class Level:
 
 ARRAY = Level("array", "Colonnade", DEVICE, "rest of Colonnade")
 
-#: Every render unit follows its own paths.
-SEPARATE = (
-    Level("render_unit", "RenderUnit", (*PATHS, *TRACE), "contexts"),
-    Level("column", "Column", COLUMN, "rest of Column"),
-    ARRAY,
-)
-
-#: A column has a path unit, and its render units are traversal units.
-SHARED = (
+#: The levels, the lowest first. A render unit is a traversal unit of a column.
+LEVELS = (
     Level("render_unit", "TraversalUnit", TRACE, "contexts"),
-    Level("column", "Column", (*PATHS, *COLUMN, "TriangleUnit"), "rest of Column"),
+    Level("column", "Column", (*PATHS, *COLUMN), "rest of Column"),
     ARRAY,
 )
+LEVEL_NAMES = tuple(level.name for level in LEVELS)
 
-#: Names of the levels, the lowest first.
-LEVEL_NAMES = tuple(level.name for level in SEPARATE)
+#: The modules whose power is measured: the traversal unit, then those of the column that work for it.
+REPLAYED = (LEVELS[0].top, *PATH_MODULES, TRIANGLES)
 
 #: Modules that the synthesis of another module treats as black boxes.
-BOUNDARIES = frozenset({*PATHS, *TRACE, *COLUMN, *DEVICE, "RenderUnit", "TraversalUnit", "Column"})
+BOUNDARIES = frozenset({*PATHS, *TRACE, *COLUMN, *DEVICE, "TraversalUnit", "Column"})
 
 
 @dataclass(frozen=True)
@@ -144,30 +139,13 @@ class Hierarchy:
             for kind in set(counts) - known:
                 del counts[kind]
 
-    @property
-    def levels(self) -> tuple[Level, ...]:
-        """The levels of this design, the lowest first."""
-        return SHARED if "TraversalUnit" in self.files else SEPARATE
-
-    @property
-    def has_path_unit(self) -> bool:
-        """A column has a path unit."""
-        return self.levels == SHARED
-
-    @property
-    def replayed(self) -> tuple[str, ...]:
-        """The modules whose power is measured: the render unit, then those of the column that work for it."""
-        followers = PATH_MODULES if self.has_path_unit else ()
-        triangles = (SHARED_TRIANGLES,) if SHARED_TRIANGLES in self.files else ()
-        return (self.levels[0].top, *followers, *triangles)
-
     def units(self, level: Level) -> list[str]:
         """The units of a level that this design has."""
         return [unit for unit in level.units if unit in self.files and self.instances(unit, level)]
 
     def instances(self, unit: str, level: Level) -> int:
         """Number of instances of a unit in a level, without those in the levels below."""
-        below = {other.top for other in self.levels} - {level.top}
+        below = {other.top for other in LEVELS} - {level.top}
         return 1 if unit == level.top else self.count(unit, level.top, below)
 
     def closure(self, top: str) -> tuple[list[str], list[str]]:
@@ -231,7 +209,7 @@ class Hierarchy:
 
     def _inside_units(self, modules: Iterable[str]) -> Iterator[tuple[str, str, str, int]]:
         """Module, level, unit and number of instances for each unit that contains a module of `modules`."""
-        for level in self.levels:
+        for level in LEVELS:
             for unit in (*self.units(level), level.top):
                 for module in modules:
                     number = self.count(module, unit, BOUNDARIES - {unit}) * self.instances(unit, level)

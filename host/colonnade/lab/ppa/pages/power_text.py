@@ -13,8 +13,7 @@ KINDS = {"zero_delay": "without glitches", "glitch_aware": "with glitches"}
 
 #: What the figures leave out, without and with a path unit.
 OUTSIDE = (
-    "Units of column and array are not included.",
-    "A path unit counts with this unit's share of the in-box rays; other units of column and array are not included.",
+    "The path unit counts with this unit's share of the in-box rays; other units of column and array are not included."
 )
 
 
@@ -24,12 +23,11 @@ def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
     window, scene = power["window"], power["scene"]
     yield ""
     width, height = scene["size"]
-    has_path_unit = report["config"]["units"]["pathContexts"] > 0
-    of_column = f" in the column, whose row 0 traces {window['rays_traced']:,} of them" if has_path_unit else ""
     yield (
         f"power of a render unit at {power['clock_mhz']:g} MHz and {power['volts']:g} V: {scene['mesh']}, "
         f"{width}×{height}, {window['cycles']:,} cycles, {window['pixels']:,} pixels, {window['rays']:,} rays, "
-        f"{window['rays_in_box']:,} in-box rays, {window['hits']:,} hits{of_column}"
+        f"{window['rays_in_box']:,} in-box rays, {window['hits']:,} hits in the column, "
+        f"whose row 0 traces {window['rays_traced']:,} of them"
     )
     for kind, title in KINDS.items():
         figures = power[kind]
@@ -61,10 +59,10 @@ def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
             yield f"    {memory['memory']} in {memory['unit']}: {1e3 * memory['energy_per_ray_nj']:.1f} pJ"
     yield (
         "  Method: replay on the gate netlist, checked against the RTL in every cycle; no wires, no clock tree; mean "
-        f"leakage over the states of a cell. {OUTSIDE[has_path_unit]}"
+        f"leakage over the states of a cell. {OUTSIDE}"
     )
     if power["opensta_mw"] is not None:
-        gates = power["glitch_aware"]["dynamic_mw"] + power["glitch_aware"]["leakage_mw"]
-        yield f"  gates by OpenSTA with the same activity: {power['opensta_mw']:.3f} mW; ours: {gates:.3f} mW"
+        ours, other = (power["opensta_mw"][name] for name in ("ours", "opensta"))
+        yield f"  gates of the traversal unit by OpenSTA with the same activity: {other:.3f} mW; ours: {ours:.3f} mW"
     elif power["opensta_is_there"]:
         yield "  The OpenSTA on PATH cannot read SAIF: power is not cross-checked."

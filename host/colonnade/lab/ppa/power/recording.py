@@ -24,7 +24,7 @@ from colonnade.design.toolchain import project_root, require_program
 from colonnade.device.harness_job import parse_output
 from colonnade.device.scene import DeviceScene
 from colonnade.device.simulator_build import build_simulator
-from colonnade.device.simulator_sources import COLUMN, UNITS
+from colonnade.device.simulator_sources import TRACER, UNIT
 from colonnade.device.verilator import write_job
 from colonnade.mesh.mesh import Mesh
 from colonnade.scene.model import Scene
@@ -233,9 +233,9 @@ def _with_recorders(design: GeneratedDesign, modules: Mapping[str, _Ports]) -> I
 def _recorder(module: str, ports: _Ports, design: GeneratedDesign) -> str:
     """The Verilog of a module's recorder, with its `bind` statement."""
     scope, instance = module, ""
-    if module not in UNITS:
-        scope = COLUMN
-        name = re.findall(rf"^  {module}\s+(\w+) \(", (design.dir / f"{COLUMN}.sv").read_text(), re.MULTILINE)[0]
+    if module != UNIT:
+        scope = TRACER
+        name = re.findall(rf"^  {module}\s+(\w+) \(", (design.dir / f"{TRACER}.sv").read_text(), re.MULTILINE)[0]
         instance = f"{name}."
 
     def joined(names: Sequence[Port]) -> str:

@@ -17,10 +17,10 @@ from colonnade.design.generator import GeneratedDesign
 from colonnade.lab.ppa.library import energies
 from colonnade.lab.ppa.netlist import memories
 from colonnade.lab.ppa.netlist.activity import Activity
-from colonnade.lab.ppa.netlist.hierarchy import Hierarchy
+from colonnade.lab.ppa.netlist.hierarchy import LEVELS, REPLAYED, Hierarchy
 from colonnade.lab.ppa.netlist.mapped import Netlist
 from colonnade.lab.ppa.netlist.synthesis import Technology
-from colonnade.lab.ppa.power.activity import power_of
+from colonnade.lab.ppa.power.activity import NO_POWER, power_of
 from colonnade.lab.ppa.power.frame import Frame, frame_of
 from colonnade.lab.ppa.power.recording import Recording, Stimulus, record
 from colonnade.lab.ppa.power.replay import replay
@@ -69,19 +69,18 @@ def measure_power(
         progress: Shows the steps.
     """
     assert tech.library is not None
-    modules = hierarchy.replayed
-    ports = {module: netlists[module]["ports"] for module in modules}
+    ports = {module: netlists[module]["ports"] for module in REPLAYED}
     recordings = record(config, overrides, ports, operation.stimulus, progress)
-    frame = frame_of(recordings, modules, int(design.manifest.config["array"]["rows"]))
+    frame = frame_of(recordings)
     with progress.step("reading the gate netlists"):
-        gates = {module: Netlist(netlists, module, tech.library) for module in modules}
+        gates = {module: Netlist(netlists, module, tech.library) for module in REPLAYED}
         used = {instance.cell.name for netlist in gates.values() for instance in netlist.instances}
         cells = energies.load(tech.sources, used)
     megahertz = operation.megahertz
     scale = node_scale(tech.library.nand2.area, cells.voltage)
     found = Sum(frame, megahertz, scale)
-    found.records = _record_power(recordings[modules[0]], frame, design.manifest.record_bits, megahertz)
-    second = None
+    found.records = _record_power(recordings[REPLAYED[0]], frame, design.manifest.record_bits, megahertz)
+    second: dict[str, float] | None = None
     for module, netlist in gates.items():
         with progress.step(f"measuring {module}"):
             analysis = Analysis(netlist, tech.library)
@@ -93,13 +92,15 @@ def measure_power(
                 for kind, changes in zip(KINDS, (activity.settled, activity.changes), strict=True)
             }
             found.add(module, powers, memory_power(netlist, hierarchy, activity, megahertz))
-            if opensta.reads_activities() and len(modules) == 1:
-                second = opensta.power(netlist, tech.sources, activity, analysis.slew, megahertz)
+            if opensta.reads_activities() and module == REPLAYED[0]:
+                own = sum(powers["glitch_aware"].values(), NO_POWER)
+                other = opensta.power(netlist, tech.sources, activity, analysis.slew, megahertz)
+                second = None if other is None else {"ours": own.dynamic + own.leakage, "opensta": other}
     return {
-        "of": hierarchy.levels[0].name,
+        "of": LEVELS[0].name,
         "clock_mhz": megahertz,
         "volts": cells.voltage,
-        "scene": recordings[modules[0]].scene,
+        "scene": recordings[REPLAYED[0]].scene,
         "window": {"cycles": frame.cycles, **frame.counts, "rays_traced": frame.traced},
         "memories_mw": found.kinds(),
         "memory_pj_per_bit": memories.SRAM[memories.CHIP_NODE].pj_per_bit,

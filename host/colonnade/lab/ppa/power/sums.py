@@ -6,14 +6,14 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
-from colonnade.lab.ppa.netlist.hierarchy import PATHS, SEPARATE, SHARED, TRACE
+from colonnade.lab.ppa.netlist.hierarchy import LEVELS, PATHS, TRACE
 from colonnade.lab.ppa.power.activity import NO_POWER, Power
 from colonnade.lab.ppa.power.frame import Frame
 
 #: The two power figures: from cycles in which a net has changed, and from all its transitions.
 KINDS = ("zero_delay", "glitch_aware")
 
-_UNITS = frozenset({*PATHS, *TRACE})
+_UNITS = frozenset({*PATHS, *TRACE, "TriangleUnit"})
 
 
 class Sum:
@@ -114,5 +114,5 @@ def by_unit(powers: Mapping[str, Power], module: str) -> dict[str, Power]:
 
 def _unit(owner: str, module: str) -> str:
     """The innermost unit of an instance's path within a replayed module."""
-    rest = {level.top: level.rest for level in (SEPARATE[0], SHARED[0])}.get(module, module)
+    rest = LEVELS[0].rest if module == LEVELS[0].top else module
     return next((name for name in reversed(owner.split("/")) if name in _UNITS), rest)

@@ -2,7 +2,7 @@ package colonnade.column
 
 import chisel3._
 import chisel3.experimental.hierarchy.{instantiable, public}
-import chisel3.util.{Decoupled, PopCount, Valid}
+import chisel3.util.{Decoupled, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributePort, ColumnEnvironment, EnvironmentMarches, TextureMemory}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
@@ -17,7 +17,6 @@ import colonnade.frame.{
   TileWalker
 }
 import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
-import colonnade.unit.{RenderUnit, RenderUnitModule}
 
 /** Ports of [[Column]]. */
 final class ColumnIO(config: ColonnadeConfig) extends Bundle {
@@ -57,31 +56,33 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   val events = Output(new EventSums(config, 1))
 }
 
-/** A column of render units that share one record memory. A reset clears all but the memory.
+/** A column: a path tracer, its record memory, the environment's marches and maps, and the textures. A reset clears all but
+  * the memories.
   *
-  * @param renderUnit makes a render unit; specs pass another one with the same ports
+  * @param pathTracer makes the path tracer; specs pass another one with the same ports
   */
 @instantiable
 final class Column(
     config:     ColonnadeConfig,
-    renderUnit: ColonnadeConfig => RenderUnitModule = new RenderUnit(_)
+    pathTracer: ColonnadeConfig => PathTracerModule = new PathTracer(_)
 ) extends Module {
   @public val io = IO(new ColumnIO(config))
 
   private val paths      = config.ofPaths
   private val hasCache   = config.columnBvhMemory.cache.nonEmpty
-  private val walker     = Module(new TileWalker(paths, Column.mostEnvironment(config)))
+  private val walker     = Module(new TileWalker(config))
   private val background = Module(new BackgroundWalker(config))
-  private val units = if (config.hasPathUnit) ColumnUnits.sharing(config) else ColumnUnits.separate(config, renderUnit)
+  private val tracer     = Module(pathTracer(config))
+  private val units      = tracer.io
   private val controller = Module(new ColumnBvhController(config))
-  private val collector  = Module(new PixelCollector(config, paths.array.rows + 1))
+  private val collector  = Module(new PixelCollector(config, 2))
 
-  // Walk tiles: pixel positions for the units
+  // Walk tiles: pixel positions
   private val window = EnvironmentWindow(config, io.registers)
   walker.io.frame  := io.registers.frame
   walker.io.window := window
   walker.io.tiles :<>= io.tiles.ofObject
-  units.positions.zip(walker.io.positions).foreach { case (unit, positions) => unit <> positions }
+  units.positions :<>= walker.io.positions
 
   // Tiles of the environment
   walker.io.environmentLeaves := units.environmentLeaves
@@ -101,8 +102,8 @@ final class Column(
   for ((to, from) <- background.io.others.zip(walker.io.others +: environmentWalker.map(_.others).toSeq)) to :<>= from
 
   // Records: units send requests and receive all broadcasts
-  controller.io.requests.zip(units.requests).foreach { case (requests, unit) => requests <> unit }
-  units.broadcasts.foreach(_ := controller.io.broadcasts)
+  controller.io.requests :<>= units.requests
+  units.broadcasts := controller.io.broadcasts
 
   // The whole scene, or a cache of it
   private val memory = if (hasCache) None else Some(Module(new ColumnBvhMemory(config)))
@@ -123,40 +124,38 @@ final class Column(
   }
   for (error <- io.memoryError) error := RegNext(caches.flatMap(_.error).reduce(_ || _), false.B)
 
-  // Environment: units, or the marches that they share, read the column's own maps, or those that some columns share
+  // Environment: marches read the column's own maps, or those that some columns share
   private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(paths)).io)
   for (maps <- environment) {
     maps.load := io.load
     maps.shared.zip(io.environment).foreach { case (shared, port) => port <> shared }
-    maps.ports.zip(units.maps).foreach { case (port, unit) => port <> unit }
   }
-  private val marches = Option.when(config.sharesMarches)(Module(new EnvironmentMarches(paths)).io)
-  for (shared <- marches; maps <- environment) {
-    shared.view := io.registers.environment.get
-    shared.units.zip(units.marches).foreach { case (port, unit) => port :<>= unit }
-    maps.ports.zip(shared.maps).foreach { case (port, march) => port <> march }
+  private val marches = environment.map { maps =>
+    val marches = Module(new EnvironmentMarches(paths)).io
+    marches.view := io.registers.environment.get
+    marches.paths :<>= units.marches.get
+    maps.ports.zip(marches.maps).foreach { case (port, march) => port <> march }
+    marches
   }
 
-  // Textures: units read the column's own copy
-  for (layout <- config.geometry.texture) {
+  // Textures: the column's own copy
+  for (port <- units.texture) {
     val memory = Module(new TextureMemory(paths)).io
     memory.load := io.load
-    memory.ports.zip(units.texture).foreach { case (port, unit) => port <> unit }
+    memory.port :<>= port
   }
 
   // Collect finished pixels
-  collector.io.sources.zip(units.pixels :+ background.io.pixels).foreach { case (source, pixels) =>
-    source <> pixels
-  }
+  for ((source, pixels) <- collector.io.sources.zip(Seq(units.pixels, background.io.pixels))) source <> pixels
   io.pixels <> collector.io.pixels
 
   // Registers
-  units.registers.foreach(_ := io.registers)
-  units.starts.foreach(_ := io.start)
+  units.registers := io.registers
+  units.start     := io.start
 
   // Progress: pixels that have started and not yet retired
   private val inFlight = RegInit(0.U((2 * config.numbers.coordinateBits).W))
-  private val enters   = PopCount(walker.io.positions.map(_.fire) :+ background.io.pixels.fire)
+  private val enters   = walker.io.positions.fire +& background.io.pixels.fire
   private val retired  = io.pixels.fire
   inFlight := inFlight + enters - retired
 
@@ -166,19 +165,6 @@ final class Column(
     units.isIdle && controller.io.isIdle && caches.map(_.isIdle).fold(true.B)(_ && _),
     true.B
   )
-  io.events := RegNext(EventSums.ofColumn(
-    config,
-    enters,
-    units.events,
-    controller.io.events,
-    environment.map(_.events),
-    marches.map(_.events)
-  ))
-}
-
-object Column {
-
-  /** Pixels of a tile of the environment that a path unit has in flight at most: about those that its pipelines hold. */
-  private def mostEnvironment(config: ColonnadeConfig): Option[Int] =
-    Option.when(config.hasPathUnit)((config.units.pathContexts * 3 / 8).max(1))
+  private val parts = units.events.parts ++ environment.map(_.events) ++ marches.map(_.events)
+  io.events := RegNext(EventSums.ofColumn(config, enters, controller.io.events, parts))
 }

@@ -10,8 +10,8 @@ final class TriangleGrantsIO(count: Int) extends Bundle {
   /** By row: a record waits. */
   val waits = Input(UInt(count.W))
 
-  /** Records in the queue, at most [[SharedTriangles.places]], and whether a triangle unit takes one in the next cycle. */
-  val queued    = Input(UInt(log2Ceil(SharedTriangles.places + 1).W))
+  /** Records in the queue, at most [[TriangleGroup.queueDepth]], and whether a triangle unit takes one in the next cycle. */
+  val queued    = Input(UInt(log2Ceil(TriangleGroup.queueDepth + 1).W))
   val readyNext = Input(Bool())
 
   /** The row, if any, that may send a record in the next cycle. */
@@ -21,7 +21,7 @@ final class TriangleGrantsIO(count: Int) extends Bundle {
   val sender = Output(UInt(count.W))
 }
 
-/** Grants places in the queue of [[SharedTriangles]] to rows, one cycle before a record comes and one cycle after the row
+/** Grants places in the queue of [[TriangleGroup]] to rows, one cycle before a record comes and one cycle after the row
   * was chosen. So a record never comes to a full queue. A row that keeps waiting is one of the next `count` chosen.
   */
 final class TriangleGrants(count: Int) extends Module {
@@ -33,7 +33,7 @@ final class TriangleGrants(count: Int) extends Module {
   private val moves   = RegNext(io.readyNext, false.B)
 
   // The queue has a place in the next cycle, beside the record that comes now
-  private val hasPlace = io.queued +& isOpen < SharedTriangles.places.U +& moves
+  private val hasPlace = io.queued +& isOpen < TriangleGroup.queueDepth.U +& moves
   arbiter.requests := io.waits & ~Mux(hasPlace, chosen, 0.U)
   arbiter.isTaken  := hasPlace || !chosen.orR
   when(arbiter.isTaken) { chosen := arbiter.grant }

@@ -4,30 +4,30 @@ import chisel3.util.log2Ceil
 
 /** Shape of the array.
   *
-  * @param rows     render units that share one column memory (N)
+  * @param rows     traversal units that share one column memory (N)
   * @param columns  columns side by side (M)
-  * @param contexts rays in flight in each render unit
+  * @param contexts rays in flight in each traversal unit
   */
 final case class ArrayConfig(rows: Int, columns: Int, contexts: Int) {
-  Require.within("array.rows", rows, 1, ArrayConfig.mostRows)
-  Require.within("array.columns", columns, 1, ArrayConfig.mostColumns)
-  Require.product("array.rows", rows, "array.columns", columns, ArrayConfig.mostUnits)
-  Require.within("array.contexts", contexts, 1, UnitsConfig.mostPathContexts)
+  Require.within("array.rows", rows, 1, ArrayConfig.maxRows)
+  Require.within("array.columns", columns, 1, ArrayConfig.maxColumns)
+  Require.product("array.rows", rows, "array.columns", columns, ArrayConfig.maxUnits)
+  Require.within("array.contexts", contexts, 1, UnitsConfig.maxPathContexts)
 }
 
 object ArrayConfig {
 
-  /** Maximum number of contexts of a render unit; a path unit may have more. */
-  val mostContexts: Int = 16
+  /** Maximum number of contexts of a traversal unit; a path unit may have more. */
+  val maxContexts: Int = 16
 
   /** Only a path unit has so many contexts. */
-  def isLarge(contexts: Int): Boolean = contexts > mostContexts
+  def isLarge(contexts: Int): Boolean = contexts > maxContexts
 
-  val mostRows:    Int = 256
-  val mostColumns: Int = 256
+  val maxRows:    Int = 256
+  val maxColumns: Int = 256
 
-  /** Maximum number of render units: twelve times `edge`. */
-  val mostUnits: Int = 1024
+  /** Maximum number of traversal units: twelve times `edge`. */
+  val maxUnits: Int = 1024
 }
 
 /** Operand widths, the paper's mixed precision: `32b32s64d` is mac 32, sqrt 32, div 64.
@@ -77,14 +77,13 @@ final case class GeometryConfig(
   val texture: Option[TextureLayout] = Option.when(textureBytes != 0)(TextureLayout(textureBytes))
 }
 
-/** Parallel lanes in a render unit, and what the units of a column share.
+/** Units of a column.
   *
   * @param boxLanes      children that the box unit tests per cycle
-  * @param triangleLanes parallel triangle units of a render unit, or of the rows that share them
-  * @param triangleRows  rows of a column that share triangle units; 1: each render unit has its own
-  * @param marches       environment marches that the render units of a column share; 0: one in every render unit
-  * @param directView    with shared marches: a pipeline of the column for directly seen pixels of an environment
-  * @param pathContexts  pixels in flight in the path unit that a column has; 0: every render unit follows its own paths
+  * @param triangleLanes parallel triangle units of a group of rows
+  * @param triangleRows  rows of a column in a group, which shares its triangle units
+  * @param marches       environment marches of a column, if the device supports an environment
+  * @param pathContexts  pixels in flight in a column's path unit
   * @param pipelined     ray set-up, shading, bounces and colours are pipelines, for a path unit that serves a column
   * @param shortPaths    registers in the traversal stack and around the record fetch, for FPGAs: some steps take a cycle more
   */
@@ -93,38 +92,30 @@ final case class UnitsConfig(
     triangleLanes: Int,
     triangleRows:  Int,
     marches:       Int,
-    directView:    Boolean,
     pathContexts:  Int,
     pipelined:     Boolean,
     shortPaths:    Boolean
 ) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
   Require.within("units.triangleLanes", triangleLanes, 1, 4)
-  Require.within("units.triangleRows", triangleRows, 1, UnitsConfig.mostTriangleRows)
-  Require(
-    "units.triangleRows",
-    triangleRows == 1 || pathContexts > 0,
-    "needs a path unit, units.pathContexts from 1 on"
-  )
-  Require.within("units.marches", marches, 0, UnitsConfig.mostMarches)
-  Require("units.directView", !directView || marches > 0, "needs shared marches, units.marches from 1 on")
-  Require.within("units.pathContexts", pathContexts, 0, UnitsConfig.mostPathContexts)
-  Require("units.shortPaths", !shortPaths || pathContexts == 0, "does not go with a path unit, units.pathContexts=0")
+  Require.within("units.triangleRows", triangleRows, 1, UnitsConfig.maxTriangleRows)
+  Require.within("units.marches", marches, 1, UnitsConfig.maxMarches)
+  Require.within("units.pathContexts", pathContexts, 1, UnitsConfig.maxPathContexts)
 }
 
 object UnitsConfig {
-  val mostMarches:      Int = 16
-  val mostPathContexts: Int = 256
-  val mostTriangleRows: Int = 16
+  val maxMarches:      Int = 16
+  val maxPathContexts: Int = 256
+  val maxTriangleRows: Int = 16
 }
 
-/** The memory that the render units of a column share.
+/** The memory that the units of a column share.
   *
   * @param depth         records
   * @param banks         independent banks, interleaved by record address
   * @param stackDepth    traversal stack entries of each context
-  * @param snooping      a context gets its record from the read of any render unit of the column
-  * @param recordBuffers record buffers of a render unit
+  * @param snooping      a context gets its record from the read of any unit of the column
+  * @param recordBuffers record buffers of a traversal unit
   * @param readLatency   cycles from an accepted read to its record
   * @param holdable      an input per bank that stalls it, so that verification can vary the latency at run time
   * @param cache         the memory is a cache of records in DRAM; none: a scratchpad that holds the whole scene
@@ -196,42 +187,27 @@ final case class ColonnadeConfig(
 
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
-  /** A path unit follows the paths of a column, and its render units are traversal units. */
-  val hasPathUnit: Boolean = units.pathContexts > 0
+  /** What the parts that follow a path see: the contexts of a column's path unit. */
+  lazy val ofPaths: ColonnadeConfig = copy(array = array.copy(contexts = units.pathContexts))
 
-  /** What the parts that follow a path see: the contexts of a column's path unit, or of a render unit. */
-  lazy val ofPaths: ColonnadeConfig =
-    if (hasPathUnit)
-      copy(
-        array = array.copy(rows = 1, contexts = units.pathContexts),
-        units = units.copy(pathContexts = 0, triangleRows = 1)
-      )
-    else this
-
-  /** Rows of a column share triangle units. */
+  /** Rows share triangle units. */
   val sharesTriangleUnits: Boolean = units.triangleRows > 1
 
-  /** What shared triangle units see: the contexts of all their rows. */
-  lazy val ofTriangleRows: ColonnadeConfig =
-    copy(array = array.copy(contexts = array.contexts.max(2) << log2Ceil(units.triangleRows)))
+  /** What the triangle units of a group see: the contexts of all its rows. */
+  lazy val ofTriangleGroup: ColonnadeConfig =
+    if (sharesTriangleUnits)
+      copy(array = array.copy(contexts = array.contexts.max(2) << log2Ceil(units.triangleRows)))
+    else this
 
   /** Requesters of a column's records: its rows, and the path unit for attributes. */
-  val recordRequesters: Int = array.rows + (if (hasPathUnit) 1 else 0)
+  val recordRequesters: Int = array.rows + 1
 
   /** The device supports an environment. */
   val hasEnvironment: Boolean = physicalAttributeMemory.nonEmpty
-  Require(
-    "units.pathContexts",
-    !(hasPathUnit && hasEnvironment) || units.marches > 0,
-    "with an environment needs shared marches, units.marches from 1 on"
-  )
-
-  /** The render units of a column share their environment marches. */
-  val sharesMarches: Boolean = hasEnvironment && units.marches > 0
 
   /** Columns that read one copy of the environment's maps. */
   val columnsPerCopy: Int = physicalAttributeMemory.fold(1)(_.columnsPerCopy.min(array.columns))
 
-  /** Ports to a column's maps of an environment: of its render units, or of what they share. */
-  val mapRequesters: Int = if (sharesMarches) units.marches + (if (units.directView) 1 else 0) else array.rows
+  /** Ports to a column's maps of an environment: of its marches, and of the pipeline for directly seen pixels. */
+  val mapRequesters: Int = units.marches + 1
 }

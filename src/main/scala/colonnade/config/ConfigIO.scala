@@ -13,7 +13,7 @@ object ConfigIO {
   lazy val presets: Seq[String] = resource("names").linesIterator.toSeq
 
   /** Maximum size of a configuration file. */
-  private val mostBytes = 1 << 20
+  private val maxBytes = 1 << 20
 
   private val notation = """(\d{1,6})b(\d{1,6})s(\d{1,6})d""".r
 
@@ -59,7 +59,6 @@ object ConfigIO {
       "triangleLanes",
       "triangleRows",
       "marches",
-      "directView",
       "pathContexts",
       "pipelined",
       "shortPaths"
@@ -87,7 +86,7 @@ object ConfigIO {
       "emission"
     )
 
-    Require.within("array.contexts", array.int("contexts"), 1, ArrayConfig.mostContexts)
+    Require.within("array.contexts", array.int("contexts"), 1, ArrayConfig.maxContexts)
     ColonnadeConfig(
       array = ArrayConfig(
         rows = array.int("rows"),
@@ -110,7 +109,6 @@ object ConfigIO {
         triangleLanes = units.int("triangleLanes"),
         triangleRows = units.int("triangleRows"),
         marches = units.int("marches"),
-        directView = units.boolean("directView"),
         pathContexts = units.int("pathContexts"),
         pipelined = units.boolean("pipelined"),
         shortPaths = units.boolean("shortPaths")
@@ -190,7 +188,6 @@ object ConfigIO {
         "triangleLanes" -> units.triangleLanes,
         "triangleRows"  -> units.triangleRows,
         "marches"       -> units.marches,
-        "directView"    -> units.directView,
         "pathContexts"  -> units.pathContexts,
         "pipelined"     -> units.pipelined,
         "shortPaths"    -> units.shortPaths
@@ -317,8 +314,8 @@ object ConfigIO {
       try Paths.get(name)
       catch { case _: InvalidPathException => throw missing(s"'$name' is no configuration") }
     if (!Files.isRegularFile(path)) throw missing(s"there is no configuration '$name'")
-    if (Files.size(path) > mostBytes)
-      throw new ConfigError(s"$name is too large: a configuration may have $mostBytes bytes")
+    if (Files.size(path) > maxBytes)
+      throw new ConfigError(s"$name is too large: a configuration may have $maxBytes bytes")
     try text(path)
     catch { case failure: IOException => throw new ConfigError(s"cannot read $name as text: ${failure.getMessage}") }
   }

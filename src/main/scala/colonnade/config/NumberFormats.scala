@@ -22,7 +22,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   val mantissaBits:   Int = precision.div / 2
 
   /** The largest left shift of a position that is not out of the scene at once. */
-  val mostUnitShift: Int = (sceneBits - macBits).max(0)
+  val maxUnitShift: Int = (sceneBits - macBits).max(0)
 
   val shearFraction:      Int = gridBits - 2
   val shearDigits:        Int = shearFraction.min(mantissaBits)
@@ -44,7 +44,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   val rootBits: Int = (2 * shadeBits + 1).min(gridBits.max(shadeBits + 1).max(lightBits + 2) - 1)
 
   /** Largest exponent of a node: a child's planes are less than two cubes from its node's corner. */
-  val mostExponent: Int = (vertexBits - boxBits + 1).max(1)
+  val maxExponent: Int = (vertexBits - boxBits + 1).max(1)
 
   /** The box test's reciprocal: fraction bits of its mantissa, enough for a quarter of a child's plane. */
   val stepFraction: Int = (boxBits + 2).min(reciprocalFraction)
@@ -108,7 +108,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
     "shadeBits"          -> shadeBits,
     "radicandBits"       -> radicandBits,
     "cosineFraction"     -> cosineFraction,
-    "mostExponent"       -> mostExponent,
+    "maxExponent"        -> maxExponent,
     "boxDistanceBits"    -> boxDistanceBits,
     "boxPadLog"          -> boxPadLog,
     "stepFraction"       -> stepFraction,

@@ -47,7 +47,7 @@ final case class PhysicalAttributeMemoryConfig(
   Require.oneOf(s"$section.paletteSize", paletteSize, powers)
   Require.oneOf(s"$section.planes", planes, powers)
   Require.within(s"$section.boundingPlanes", boundingPlanes, 2, 16)
-  Require.within(s"$section.columnsPerCopy", columnsPerCopy, 1, ArrayConfig.mostColumns)
+  Require.within(s"$section.columnsPerCopy", columnsPerCopy, 1, ArrayConfig.maxColumns)
 
   /** All derived sizes. */
   val layout: AttributeLayout = AttributeLayout(this)

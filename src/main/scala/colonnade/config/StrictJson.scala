@@ -7,10 +7,10 @@ import upickle.core.{ObjVisitor, Visitor}
 private[config] object StrictJson {
 
   /** Nested arrays and objects. */
-  val mostDepth: Int = 64
+  val maxDepth: Int = 64
 
   /** Characters of a number. */
-  val mostDigits: Int = 40
+  val maxDigits: Int = 40
 
   /** @param source for messages
     * @throws ujson.ParsingFailedException it is no JSON
@@ -31,7 +31,7 @@ private[config] object StrictJson {
         case '"'                    => isString = !isString
         case '[' | '{' if !isString =>
           depth += 1
-          if (depth > mostDepth) throw new ConfigError(s"$source is nested too deeply: $mostDepth levels at most")
+          if (depth > maxDepth) throw new ConfigError(s"$source is nested too deeply: $maxDepth levels at most")
         case ']' | '}' if !isString => depth -= 1
         case _                      =>
       }
@@ -65,7 +65,7 @@ private[config] object StrictJson {
     def visitTrue(index:  Int): ujson.Value = ujson.True
 
     def visitFloat64StringParts(number: CharSequence, point: Int, exponent: Int, index: Int): ujson.Value = {
-      if (number.length > mostDigits) throw new ConfigError(s"$source has a number of ${number.length} characters")
+      if (number.length > maxDigits) throw new ConfigError(s"$source has a number of ${number.length} characters")
       val value = number.toString.toDouble
       if (value.isInfinite) throw new ConfigError(s"$source has the number $number, which is too large")
       ujson.Num(value)

@@ -21,8 +21,8 @@ final case class TextureLayout(bytes: Int) extends TileGrid {
   private val fixedBytes = tiles * mapDescriptorBits / 8 + paletteSize * entryBits / 8
 
   /** One tile in the finest mode; all that pointers reach. */
-  private val (leastHeap, mostHeap) = (66, (1 << pointerBits) * heapWordBits / 8)
-  Require.within("geometry.textureBytes", bytes, fixedBytes + leastHeap, fixedBytes + mostHeap, orElse = "0, or ")
+  private val (leastHeap, maxHeap) = (66, (1 << pointerBits) * heapWordBits / 8)
+  Require.within("geometry.textureBytes", bytes, fixedBytes + leastHeap, fixedBytes + maxHeap, orElse = "0, or ")
 
   val heapWords: Int = (bytes - fixedBytes) * 8 / heapWordBits
 

@@ -46,5 +46,5 @@ final class AttributeArbiter[Q <: Data, R <: Data](request: Q, response: R, coun
 object AttributeArbiter {
 
   /** Bits of the joined channel's tag. */
-  def tagBits(requesters: Int, tagBits: Int): Int = tagBits + log2Ceil(requesters)
+  def tagBits(requesters: Int, tagBits: Int = 0): Int = tagBits + log2Ceil(requesters)
 }

@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Valid}
+import chisel3.util.{Decoupled, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig, TileGrid}
 import colonnade.formats.{AlbedoEntry, AttributeEvents, BoundingPlaneEntry, NormalEntry}
 
@@ -70,8 +70,10 @@ final class PlaneRequest(layout: AttributeLayout) extends Bundle {
 
 /** All channels of a requester; they are independent of each other. Albedo and normal of a plane's response are valid for
   * bounding planes only.
+  *
+  * @param tagBits bits of a tag; none of a single requester
   */
-final class AttributePort(layout: AttributeLayout, tagBits: Int) extends Bundle {
+final class AttributePort(layout: AttributeLayout, tagBits: Int = 0) extends Bundle {
   val albedo  = new AttributeChannel(new MapPixel(layout), new AlbedoEntry, tagBits)
   val normals = new AttributeChannel(new MapPixel(layout), new NormalEntry, tagBits)
   val cells   = new AttributeChannel(new CellRequest(layout), new CellResponse(layout), tagBits)
@@ -98,10 +100,7 @@ final class AttributePort(layout: AttributeLayout, tagBits: Int) extends Bundle 
 
 object AttributePort {
 
-  /** Bits of a render unit's tag, which is a context. */
-  def tagBits(config: ColonnadeConfig): Int = log2Ceil(config.ofPaths.array.contexts.max(2))
-
-  /** The port of a column, for all of its marches. */
+  /** The port of a column, for all of its requesters. */
   def ofColumn(config: ColonnadeConfig): AttributePort =
-    new AttributePort(AttributeLayout.of(config), AttributeArbiter.tagBits(config.mapRequesters, tagBits(config)))
+    new AttributePort(AttributeLayout.of(config), AttributeArbiter.tagBits(config.mapRequesters))
 }

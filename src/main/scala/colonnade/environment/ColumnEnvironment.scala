@@ -7,13 +7,12 @@ import colonnade.formats.{AttributeEvents, Load}
 
 /** Ports of [[ColumnEnvironment]]. */
 final class ColumnEnvironmentIO(config: ColonnadeConfig) extends Bundle {
-  private val port = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
 
   /** Only while no request is in flight. */
   val load = Flipped(Valid(new Load(config)))
 
-  /** One for each march: of a render unit, or shared. */
-  val ports = Vec(config.mapRequesters, Flipped(port))
+  /** One for each march, and one for the pipeline of directly seen pixels. */
+  val ports = Vec(config.mapRequesters, Flipped(new AttributePort(AttributeLayout.of(config))))
 
   /** To the maps that some columns share, if the configuration says so. */
   val shared = Option.when(config.columnsPerCopy > 1)(AttributePort.ofColumn(config))
@@ -24,16 +23,14 @@ final class ColumnEnvironmentIO(config: ColonnadeConfig) extends Bundle {
 final class ColumnEnvironment(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnEnvironmentIO(config))
 
-  private val tagBits = AttributePort.tagBits(config)
-
   io.shared match {
     case Some(shared) =>
-      val units = Module(new AttributeConcentrator(config, config.mapRequesters, tagBits))
+      val units = Module(new AttributeConcentrator(config, config.mapRequesters, tagBits = 0))
       units.io.ports <> io.ports
       shared <> units.io.joined
       io.events := shared.events
     case None =>
-      val maps = Module(new PhysicalAttributeMemory(config, config.mapRequesters, tagBits))
+      val maps = Module(new PhysicalAttributeMemory(config, config.mapRequesters, tagBits = 0))
       maps.io.ports <> io.ports
       maps.io.load := io.load
       io.events    := maps.io.events

@@ -11,7 +11,6 @@ import colonnade.ray.RayFormats
 final class DirectPixel(config: ColonnadeConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
-  val row     = MarchRow(config)
   val request = new EnvironmentRequest(config)
 
   /** Scaled to f bits. */
@@ -33,7 +32,7 @@ final class DirectPointIO(config: ColonnadeConfig) extends Bundle {
   val normal   = Flipped(Decoupled(new NormalEntry))
 
   /** Offered until it is taken. */
-  val answer = Decoupled(new RowAnswer(config))
+  val answer = Decoupled(new MarchAnswer(config))
 }
 
 /** Position and normal of a directly seen point, and whether it hides the object's hit. A pixel every four cycles, by one
@@ -105,12 +104,11 @@ final class DirectPoint(config: ColonnadeConfig) extends Module {
   }
 
   // The answer
-  private val answer  = io.answer.bits.answer
+  private val answer  = io.answer.bits
   private val request = latch(pixel.request, isLast)
   private val isHit   = latch(found.isHit, isLast)
   io.answer.valid        := isDone && (!isHit || io.albedo.valid)
   io.albedo.ready        := takes && isHit
-  io.answer.bits.row     := latch(pixel.row, isLast)
   answer.isOcclusionTest := request.isOcclusionTest
   answer.isHit           := isHit && (!request.isOcclusionTest || (wasNearer && isNearer))
   answer.surface.context := request.context

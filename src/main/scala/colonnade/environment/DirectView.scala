@@ -13,14 +13,14 @@ final class DirectViewIO(config: ColonnadeConfig) extends Bundle {
   val view = Input(new EnvironmentView(config.numbers))
 
   /** A direct view, only in a cycle after one with `isReady` and without an order. All origins of a frame are equal. */
-  val order   = Flipped(Valid(new RowOrder(config)))
+  val order   = Flipped(Valid(new MarchOrder(config)))
   val isReady = Output(Bool())
 
   /** In the order of the orders; offered until it is taken. */
-  val answer = Decoupled(new RowAnswer(config))
+  val answer = Decoupled(new MarchAnswer(config))
 
-  /** Several requests may be in flight in each channel; tags are 0. */
-  val maps = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
+  /** Several requests may be in flight in each channel. */
+  val maps = new AttributePort(AttributeLayout.of(config))
 
   /** A response is illegal. */
   val isIllegal = Output(Bool())
@@ -69,10 +69,9 @@ final class DirectView(config: ColonnadeConfig) extends Module {
   io.isReady           := projection.isReady && between(io.order.valid, point.pixel.fire, places) < (places - 1).U
   projection.view      := io.view
   projection.ray.valid := io.order.valid
-  projection.ray.bits  := io.order.bits.order.ray
-  pixel.row            := order.row
-  pixel.request        := order.order.request
-  pixel.hitDistance    := order.order.hitDistance
+  projection.ray.bits  := io.order.bits.ray
+  pixel.request        := order.request
+  pixel.hitDistance    := order.hitDistance
   pixel.dir            := projection.dir
   private val enters = projection.place.valid
 
@@ -111,7 +110,7 @@ final class DirectView(config: ColonnadeConfig) extends Module {
 
   // The point
   point.view   := io.view
-  point.origin := order.order.ray.origin
+  point.origin := order.ray.origin
   point.pixel :<>= queue(new DirectPixel(config), places)(enters, pixel)
   point.distance :<>= depth.distance
   point.albedo :<>= queue(new AlbedoEntry, texels)(maps.albedo.resp.valid, maps.albedo.resp.bits.content)

@@ -7,8 +7,7 @@ import colonnade.microcode.{Microprogram, Repeat}
 
 /** Finds the point of the environment that a ray hits, with its albedo and normal. It projects the ray into the map, where
   * the ray is straight, and steps from tile to tile until the ray is no longer in front of the map's surfaces. A ray that
-  * leaves the map hits a bounding plane. A ray from the camera hits what its pixel shows; with `units.directView` a
-  * pipeline takes these rays, and none may come here.
+  * leaves the map hits a bounding plane. A ray from the camera hits what its pixel shows: it goes to [[DirectView]].
   *
   * One ray at a time; its request is taken together with its result. docs/march.md describes the steps and their latency.
   */
@@ -30,30 +29,10 @@ final class EnvironmentMarch(config: ColonnadeConfig) extends Module {
   private val resolver   = prefix("resolver")(
     new HitResolver(operations, stepper, planes, hitPixel, texel, planeTest.hitDistance, io.view)
   )
-  private val directView = Option.when(operations.hasDirectView)(
-    prefix("directView")(
-      new DirectViewProgram(
-        operations,
-        projection,
-        planes,
-        hitPixel,
-        texel,
-        resolver,
-        io.maps.cells,
-        io.view,
-        request
-      )
-    )
-  )
   private val surface = prefix("surface")(new SurfacePoint(operations, stepper, texel, resolver, io.view, request))
   private val isBusy  = WireInit(true.B)
 
   val program: Microprogram[MarchLabel] = operations.program
-
-  assert(
-    operations.hasDirectView.B || !(io.request.valid && request.isDirectView),
-    "a ray from the camera comes to a march beside the pipeline for directly seen pixels"
-  )
 
   io.request.ready                         := false.B
   io.result.valid                          := false.B
@@ -87,7 +66,6 @@ final class EnvironmentMarch(config: ColonnadeConfig) extends Module {
   resolver.describeHit()
   hitPixel.describe()
   resolver.describeBoundingPlanes()
-  directView.foreach(_.describe())
   surface.describe()
   program.step(MarchLabel.Finish) {
     when(program.now) {

@@ -1,8 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, DecoupledIO, Mux1H, OHToUInt, PopCount, PriorityEncoderOH, Queue, RegEnable}
-import colonnade.common.RoundRobin
+import chisel3.util.{log2Ceil, PopCount, PriorityEncoderOH, Queue, RRArbiter}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.EnvironmentView
 
@@ -19,93 +18,54 @@ final class MarchSums(config: ColonnadeConfig) extends Bundle {
 final class EnvironmentMarchesIO(config: ColonnadeConfig) extends Bundle {
 
   /** Constant while a frame runs. */
-  val view = Input(new EnvironmentView(config.numbers))
+  val view  = Input(new EnvironmentView(config.numbers))
+  val paths = Flipped(new MarchPort(config))
 
-  /** One for each render unit; one for each march. */
-  val units = Vec(config.array.rows, Flipped(new MarchPort(config)))
-  val maps  =
-    Vec(config.mapRequesters, new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config)))
+  /** One for each march; the last one for the pipeline of directly seen pixels. */
+  val maps   = Vec(config.mapRequesters, new AttributePort(AttributeLayout.of(config)))
   val events = Output(new MarchSums(config))
 }
 
-/** The marches that the render units of a column share, and with `units.directView` the pipeline for directly seen pixels.
-  * One request a cycle goes into the pipeline, or else to an empty march, by round-robin for each; one answer every other
-  * cycle, by round-robin, goes back to its unit.
+/** The marches of a column, and the pipeline for directly seen pixels. One request a cycle goes into the pipeline, or else
+  * to an empty march; one answer every other cycle, by round-robin, goes back to the path unit.
   *
-  * A march is empty once its answer has left it. An answer leaves as soon as its unit stores no ray in the same cycle, and
-  * a unit stores at most one ray for each of its contexts without an answer. So every request ends.
+  * A march is empty once its answer has left it. An answer leaves as soon as the path unit stores no ray in the same cycle,
+  * and it stores at most one ray for each of its contexts without an answer. So every request ends.
+  *
+  * @param config of the paths
   */
 final class EnvironmentMarches(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentMarchesIO(config))
 
   private val marches = Seq.fill(config.units.marches)(Module(new MarchSlot(config)).io)
-  private val direct  = Option.when(config.units.directView)(Module(new DirectView(config)).io)
+  private val direct  = Module(new DirectView(config)).io
 
-  // Requests: a unit that is granted sends its order in the next cycle
+  // Requests: the order of one that is accepted comes in the next cycle
   private val isAwaited = RegInit(VecInit.fill(config.units.marches)(false.B))
   private val isFree    = VecInit(marches.zip(isAwaited).map { case (march, awaited) => march.isEmpty && !awaited })
-  private val mayDirect = RegInit(true.B) // no pixel came into the pipeline in the cycle before
-  private val seenGrant = direct.fold(0.U)(pipeline => grant(io.units.map(_.direct.get), pipeline.isReady && mayDirect))
-  private val toDirect  = seenGrant.orR
-  private val rayGrant  = grant(io.units.map(_.march), isFree.asUInt.orR && !toDirect)
-  private val grants    = seenGrant | rayGrant
-  private val granted   = RegEnable(grants, grants.orR)
-  private val order     = Wire(new RowOrder(config))
-  order.row                                                                 := OHToUInt(granted)
-  order.order                                                               := Mux1H(granted, io.units.map(_.order))
-  mayDirect                                                                 := !toDirect
-  for ((awaited, free) <- isAwaited.zip(PriorityEncoderOH(isFree))) awaited := rayGrant.orR && free
+  private val hasDirect = RegNext(io.paths.direct.fire, false.B)
+  io.paths.direct.ready := direct.isReady && !hasDirect
+  io.paths.march.ready  := isFree.asUInt.orR && !io.paths.direct.fire
+  for ((awaited, free) <- isAwaited.zip(PriorityEncoderOH(isFree))) awaited := io.paths.march.fire && free
 
-  // Marches
-  private val marched = marches.zip(isAwaited).zip(io.maps).map { case ((march, awaited), maps) =>
+  // Marches, and directly seen pixels
+  for (((march, awaited), maps) <- marches.zip(isAwaited).zip(io.maps)) {
     march.view        := io.view
     march.order.valid := awaited
-    march.order.bits  := order.order
+    march.order.bits  := io.paths.order
     maps <> march.maps
-    val answer = Wire(Decoupled(new RowAnswer(config)))
-    answer.valid       := march.answer.valid
-    answer.bits.row    := RegEnable(order.row, awaited)
-    answer.bits.answer := march.answer.bits
-    march.answer.ready := answer.ready
-    answer
   }
-
-  // Directly seen pixels
-  private val seen = direct.map { pipeline =>
-    pipeline.view        := io.view
-    pipeline.order.valid := !mayDirect
-    pipeline.order.bits  := order
-    io.maps.last <> pipeline.maps
-    pipeline.answer
-  }
+  direct.view        := io.view
+  direct.order.valid := hasDirect
+  direct.order.bits  := io.paths.order
+  io.maps.last <> direct.maps
 
   // Answers
-  private val answers       = marched ++ seen
-  private val answerArbiter = Module(new RoundRobin(answers.size)).io
-  private val first         = Wire(Decoupled(new RowAnswer(config)))
-  answerArbiter.requests := VecInit(answers.map(_.valid)).asUInt
-  answerArbiter.isTaken  := first.fire
-  first.valid            := answerArbiter.grant.orR
-  first.bits             := Mux1H(answerArbiter.grant, answers.map(_.bits))
-  answers.zip(answerArbiter.grant.asBools).foreach { case (answer, isFirst) => answer.ready := isFirst && first.ready }
-  private val leaving = Queue(first, 1)
-  leaving.ready := VecInit(io.units.zipWithIndex.map { case (unit, row) =>
-    unit.answer.valid := leaving.valid && leaving.bits.row === row.U
-    unit.answer.bits  := leaving.bits.answer
-    unit.answer.ready && leaving.bits.row === row.U
-  }).asUInt.orR
+  private val answers = Module(new RRArbiter(new MarchAnswer(config), marches.size + 1)).io
+  for ((in, answer) <- answers.in.zip(marches.map(_.answer) :+ direct.answer)) in :<>= answer
+  io.paths.answer :<>= Queue(answers.out, 1)
 
   io.events.marchSteps      := PopCount(marches.map(_.events.step))
   io.events.busyEnvironment := PopCount(marches.map(_.events.busy))
-  io.events.illegalRecord   := marches.map(_.events.illegal).reduce(_ || _) || direct.fold(false.B)(_.isIllegal)
-
-  /** Accepts one of the requests, by round-robin, if one may go; returns which one, one-hot. */
-  private def grant(requests: Seq[DecoupledIO[EnvironmentRequest]], mayGo: Bool): UInt = {
-    val arbiter = Module(new RoundRobin(config.array.rows)).io
-    arbiter.requests := VecInit(requests.map(_.valid)).asUInt
-    arbiter.isTaken  := mayGo
-    val granted = Mux(mayGo, arbiter.grant, 0.U)
-    requests.zip(granted.asBools).foreach { case (request, isGranted) => request.ready := isGranted }
-    granted
-  }
+  io.events.illegalRecord   := marches.map(_.events.illegal).reduce(_ || _) || direct.isIllegal
 }

@@ -1,10 +1,36 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{DecoupledIO, Mux1H, Queue, RegEnable}
+import chisel3.util.{Decoupled, DecoupledIO, Mux1H, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable, First}
 import colonnade.config.ColonnadeConfig
 import colonnade.shading.EnvironmentSurface
+
+/** The ray of a context, for the table of [[EnvironmentRays]]. */
+final class StoredRay(config: ColonnadeConfig) extends Bundle {
+  val context = Context(config)
+  val ray     = new EnvironmentRay(config)
+}
+
+/** Ports of [[EnvironmentRays]]. */
+final class EnvironmentRaysIO(config: ColonnadeConfig) extends Bundle {
+
+  /** Stored in place of the context's previous ray. */
+  val ray = Flipped(Valid(new StoredRay(config)))
+
+  /** Ready as [[accepts]] says of its kind. */
+  val req     = Flipped(Decoupled(new EnvironmentRequest(config)))
+  val accepts = Output(new EnvironmentAccepts)
+
+  /** In the cycle after an occlusion test's `req`: the distance of its hit. */
+  val hitDistance = Input(HitDistance(config))
+
+  /** The result: a point to shade, a context whose ray misses, or one whose occlusion test finds its hit visible. */
+  val surface = Decoupled(new EnvironmentSurface(config))
+  val miss    = Valid(Context(config))
+  val visible = Valid(Context(config))
+  val marches = new MarchPort(config)
+}
 
 /** Stores each context's ray, sends it to the marches of the column, and stores the point that comes back in its place,
   * until the shader takes it. So an answer never waits for the shader, and all contexts may be under way at a time.
@@ -13,14 +39,13 @@ import colonnade.shading.EnvironmentSurface
   * is read again, so `surface.valid` may fall before it is taken. A new ray goes before an answer.
   */
 final class EnvironmentRays(config: ColonnadeConfig) extends Module {
-  val io = IO(new EnvironmentStageIO(config))
+  val io = IO(new EnvironmentRaysIO(config))
 
-  private val column  = io.marches.get
+  private val column  = io.marches
   private val answer  = column.answer
   private val rayType = new EnvironmentRay(config)
   private val point   = new EnvironmentSurface(config)
   private val table   = ContextTable(config, UInt(rayType.getWidth.max(point.getWidth).W))
-  io.events := 0.U.asTypeOf(io.events)
 
   // Rays and points into the table
   answer.ready := !io.ray.valid
@@ -32,16 +57,16 @@ final class EnvironmentRays(config: ColonnadeConfig) extends Module {
   }
 
   // A request of each kind waits until the column takes it; its ray is read then
-  private val isDirect = column.direct.fold(false.B)(_ => io.req.bits.isDirectView)
+  private val isDirect = io.req.bits.isDirectView
   private val march    = new Waiting(column.march, !isDirect)
-  private val direct   = column.direct.map(new Waiting(_, isDirect))
-  private val kinds    = direct.toSeq :+ march
+  private val direct   = new Waiting(column.direct, isDirect)
+  private val kinds    = Seq(direct, march)
   private val isTaken  = kinds.map(_.isTaken).reduce(_ || _)
   private val taken    = Mux1H(kinds.map(kind => kind.isTaken -> kind.request.bits))
   private val leaves   = kinds.map(kind => RegNext(kind.isTaken, false.B))
   io.accepts.march         := march.accepts
-  io.accepts.directView    := direct.fold(march.accepts)(_.accepts)
-  io.req.ready             := Mux(isDirect, io.accepts.directView, march.accepts)
+  io.accepts.directView    := direct.accepts
+  io.req.ready             := Mux(isDirect, direct.accepts, march.accepts)
   column.order.request     := RegEnable(taken, isTaken)
   column.order.hitDistance := Mux1H(leaves, kinds.map(_.hitDistance))
 

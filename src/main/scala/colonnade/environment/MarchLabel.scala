@@ -60,10 +60,6 @@ object MarchLabel {
   /** HitPixel: projects a point of the ray to a pixel. */
   case object Pixel extends MarchLabel
 
-  // DirectViewProgram: a ray from the camera
-  case object DirectView      extends MarchLabel
-  case object DirectViewDepth extends MarchLabel
-
   /** SurfacePoint: the point and its normal. */
   case object Point extends MarchLabel
 

@@ -10,9 +10,6 @@ final class MarchOperations(config: ColonnadeConfig, datapath: MarchDatapathIO) 
   val formats = new MarchFormats(config)
   import formats._
 
-  /** Rays from the camera come to the march, since no pipeline takes them. */
-  val hasDirectView: Boolean = !config.units.directView
-
   val program = new Microprogram[MarchLabel](StepEncoding.OneHot)
 
   // The ray

@@ -1,11 +1,11 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled}
+import chisel3.util.Decoupled
 import colonnade.config.ColonnadeConfig
 import colonnade.shading.EnvironmentSurface
 
-/** A ray for a march, and what its unit wants to know. */
+/** A ray for a march, and what its path wants to know. */
 final class MarchOrder(config: ColonnadeConfig) extends Bundle {
   val request = new EnvironmentRequest(config)
   val ray     = new EnvironmentRay(config)
@@ -25,28 +25,11 @@ final class MarchAnswer(config: ColonnadeConfig) extends Bundle {
   val surface = new EnvironmentSurface(config)
 }
 
-/** The number of a render unit in its column. */
-object MarchRow {
-  def apply(config: ColonnadeConfig): UInt = UInt(log2Ceil(config.array.rows.max(2)).W)
-}
-
-/** An order and the unit that it comes from. */
-final class RowOrder(config: ColonnadeConfig) extends Bundle {
-  val row   = MarchRow(config)
-  val order = new MarchOrder(config)
-}
-
-/** An answer and the unit that it is for. */
-final class RowAnswer(config: ColonnadeConfig) extends Bundle {
-  val row    = MarchRow(config)
-  val answer = new MarchAnswer(config)
-}
-
-/** A render unit's port to the marches of its column. */
+/** The path unit's port to the marches of its column. */
 final class MarchPort(config: ColonnadeConfig) extends Bundle {
 
-  /** For the pipeline of directly seen pixels, if there is one; for the marches. At most one is accepted in a cycle. */
-  val direct = Option.when(config.units.directView)(Decoupled(new EnvironmentRequest(config)))
+  /** For the pipeline of directly seen pixels; for the marches. At most one is accepted in a cycle. */
+  val direct = Decoupled(new EnvironmentRequest(config))
   val march  = Decoupled(new EnvironmentRequest(config))
 
   /** The order, in the cycle after its request is accepted, and only then. */
@@ -57,7 +40,7 @@ final class MarchPort(config: ColonnadeConfig) extends Bundle {
 
   /** Ties off a port without a requester. */
   def tieOff(): Unit = {
-    for (req <- direct.toSeq :+ march) {
+    for (req <- Seq(direct, march)) {
       req.valid := false.B
       req.bits  := DontCare
     }

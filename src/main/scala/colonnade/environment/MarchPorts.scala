@@ -26,9 +26,7 @@ final class EnvironmentRay(config: ColonnadeConfig) extends Bundle {
 final class MarchRequest(config: ColonnadeConfig) extends Bundle {
   val context = Context(config)
 
-  /** The ray comes from the camera: it hits what the maps show in its pixel. */
-  val isDirectView = Bool()
-  val ray          = new EnvironmentRay(config)
+  val ray = new EnvironmentRay(config)
 
   /** The distance of the object on this ray; see [[MarchResult.hidesObject]]. */
   val hitDistance = HitDistance(config)
@@ -111,7 +109,7 @@ final class EnvironmentMarchIO(config: ColonnadeConfig) extends Bundle {
   val request = Flipped(Decoupled(new MarchRequest(config)))
   val result  = Decoupled(new MarchResult(config))
 
-  /** At most one request in flight in each channel; tags are 0. */
-  val maps   = new AttributePort(layout, AttributePort.tagBits(config))
+  /** At most one request in flight in each channel. */
+  val maps   = new AttributePort(layout)
   val events = Output(new MarchEvents)
 }

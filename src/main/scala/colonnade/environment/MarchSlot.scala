@@ -11,14 +11,13 @@ final class MarchSlotIO(config: ColonnadeConfig) extends Bundle {
   /** Constant while a frame runs. */
   val view = Input(new EnvironmentView(config.numbers))
 
-  /** Only in a cycle after one with `isReady` or `isEmpty`. */
+  /** Only in a cycle after one with `isEmpty`. */
   val order = Flipped(Valid(new MarchOrder(config)))
 
-  /** No order is held, or it ends in this cycle; no order is held. */
-  val isReady = Output(Bool())
+  /** No order is held. */
   val isEmpty = Output(Bool())
   val answer  = Decoupled(new MarchAnswer(config))
-  val maps    = new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
+  val maps    = new AttributePort(AttributeLayout.of(config))
   val events  = Output(new MarchEvents)
 }
 
@@ -30,15 +29,13 @@ final class MarchSlot(config: ColonnadeConfig) extends Module {
   private val isHeld = RegInit(false.B)
   private val order  = RegEnable(io.order.bits, io.order.valid)
   when(io.order.valid) { isHeld := true.B }.elsewhen(march.io.request.ready) { isHeld := false.B }
-  io.isReady := !isHeld || march.io.request.ready
   io.isEmpty := !isHeld
 
-  march.io.view                      := io.view
-  march.io.request.valid             := isHeld
-  march.io.request.bits.context      := order.request.context
-  march.io.request.bits.isDirectView := order.request.isDirectView && !config.units.directView.B
-  march.io.request.bits.ray          := order.ray
-  march.io.request.bits.hitDistance  := order.hitDistance
+  march.io.view                     := io.view
+  march.io.request.valid            := isHeld
+  march.io.request.bits.context     := order.request.context
+  march.io.request.bits.ray         := order.ray
+  march.io.request.bits.hitDistance := order.hitDistance
   io.maps <> march.io.maps
   io.events := march.io.events
 

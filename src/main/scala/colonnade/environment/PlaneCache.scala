@@ -20,7 +20,7 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
   import m.program._
 
   /** The purpose of a look-up decides where the program continues. */
-  val Seq(forTile, forNearest, forFront, forCell, forBoundingPlane, forDirectView) = Enum(6)
+  val Seq(forTile, forNearest, forFront, forCell, forBoundingPlane) = Enum(5)
   val purpose: UInt = Reg(UInt(3.W))
 
   /** The plane to look up. */
@@ -101,10 +101,10 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
     step {
       m.accumulate()
       set(depth.slope, m.combine(aligned, scaledSum, subtract = true))
-      val directView = Option.when(m.hasDirectView)(DirectViewDepth.when(purpose === forDirectView, "direct view"))
       branch(
-        Seq(BoundingDepth.when(purpose === forBoundingPlane, "bounding plane")) ++ directView :+
-          RecordFront.when(purpose === forFront, "nearest plane") :+ DepthLabel.otherwise: _*
+        BoundingDepth.when(purpose === forBoundingPlane, "bounding plane"),
+        RecordFront.when(purpose === forFront, "nearest plane"),
+        DepthLabel.otherwise
       )
     }
   }

@@ -35,10 +35,7 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
         normalise(at, m.dir, m.projectedDirExponent, axis, begin = 2 * axis + 1)
       }
       align(at, m.dir, m.projectedDirExponent, begin = 7)
-      at(10) {
-        selectRow(0.U)
-        if (m.hasDirectView) branch(DirectView.when(request.isDirectView, "direct view"))
-      }
+      at(10)(selectRow(0.U))
     }
   }
 
@@ -49,9 +46,6 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
     for ((entry, column) <- matrixRow.zipWithIndex) set(entry, selected(column))
     set(offset, VecInit(view.offset.axes)(axis))
   }
-
-  /** Steps that compute the product of the selected matrix row and the direction. */
-  def describeDirRow(): Unit = row(terms(m.dir))
 
   /** Steps that project the ray. They end at `Finish` if the origin is behind the camera. */
   def describe(): Unit = {

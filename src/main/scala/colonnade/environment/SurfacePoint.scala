@@ -57,7 +57,7 @@ final class SurfacePoint(
     overlap { at =>
       at(0) {
         set(isNearer, true.B)
-        set(isAway, request.isDirectView)
+        set(isAway, false.B)
         await(texel.isReady, "texel")
       }
       for (axis <- 0 until 3) rotateNormal(at, axis, begin = 3 * axis)

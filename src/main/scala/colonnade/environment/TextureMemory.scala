@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.Valid
+import chisel3.util.{Decoupled, Pipe, Queue, Valid}
 import colonnade.config.{ColonnadeConfig, TextureLayout}
 import colonnade.formats.{AlbedoEntry, Load}
 import colonnade.shading.TexturePort
@@ -12,34 +12,30 @@ final class TextureMemoryIO(config: ColonnadeConfig) extends Bundle {
   /** Only while no request is in flight. */
   val load = Flipped(Valid(new Load(config)))
 
-  /** One for each render unit. */
-  val ports = Vec(config.array.rows, Flipped(new TexturePort(config)))
+  val port = Flipped(new TexturePort(config))
 }
 
-/** A column's copy of the textures: one atlas as a two-level map, with a port for each render unit: docs/textures.md.
+/** A column's copy of the textures: one atlas as a two-level map: docs/textures.md.
   *
-  * One request a cycle, by round-robin. Latency: that of [[TwoLevelMap]] and two cycles. A reset drops requests in flight,
-  * but keeps the atlas.
+  * One request a cycle. Latency: that of [[TwoLevelMap]] and two cycles. A reset drops requests in flight, but keeps the
+  * atlas.
   */
 final class TextureMemory(config: ColonnadeConfig) extends Module {
   val io = IO(new TextureMemoryIO(config))
 
-  private val rows    = config.array.rows
-  private val layout  = TextureLayout.of(config)
-  private val arbiter = Module(new AttributeArbiter(new MapPixel(layout), new AlbedoEntry, rows, tagBits = 0))
-  private val map     =
-    Module(new TwoLevelMap(config, layout, "texture", new AlbedoEntry, AttributeArbiter.tagBits(rows, tagBits = 0)))
+  private val map =
+    Module(new TwoLevelMap(config, TextureLayout.of(config), "texture", new AlbedoEntry, tagBits = 0)).io
+  private val req = Wire(Decoupled(chiselTypeOf(map.pixels.req.bits)))
+  req.valid          := io.port.req.valid
+  req.bits.tag       := 0.U
+  req.bits.content.x := io.port.req.bits.x
+  req.bits.content.y := io.port.req.bits.y
+  io.port.req.ready  := req.ready
+  map.pixels.req :<>= Queue(req)
+  map.load := io.load
 
-  for ((port, requester) <- io.ports.zip(arbiter.io.requesters)) {
-    requester.req.valid          := port.req.valid
-    requester.req.bits.tag       := 0.U
-    requester.req.bits.content.x := port.req.bits.x
-    requester.req.bits.content.y := port.req.bits.y
-    port.req.ready               := requester.req.ready
-    port.resp.valid              := requester.resp.valid
-    port.resp.bits.colour        := requester.resp.bits.content
-    port.resp.bits.isIllegal     := requester.resp.bits.isIllegal
-  }
-  map.io.pixels <> arbiter.io.joined
-  map.io.load := io.load
+  private val resp = Pipe(map.pixels.resp)
+  io.port.resp.valid          := resp.valid
+  io.port.resp.bits.colour    := resp.bits.content
+  io.port.resp.bits.isIllegal := resp.bits.isIllegal
 }

@@ -45,7 +45,7 @@ final class NodeRecord(config: ColonnadeConfig) extends Bundle {
     */
   def isLegal(at: UInt): Bool = {
     val isKnown  = !kinds.map(_ === ChildKind.illegal).reduce(_ || _)
-    val isSmall  = exponent.axes.map(_ <= config.numbers.mostExponent.U).reduce(_ && _)
+    val isSmall  = exponent.axes.map(_ <= config.numbers.maxExponent.U).reduce(_ && _)
     val isBelow  = firstChild > at && !firstChild.head(address - log2Ceil(geometry.arity)).andR
     val hasNodes = kinds.map(_ === ChildKind.node).reduce(_ || _)
     isKnown && isSmall && (isBelow || !hasNodes)
@@ -140,5 +140,5 @@ object RecordFormats {
   def idBits(config: ColonnadeConfig): Int = addressBits(config) + 1
 
   /** The largest exponent lets a box coordinate reach across the cube. */
-  def exponentBits(config: ColonnadeConfig): Int = NumberFormats.bitLength(config.numbers.mostExponent)
+  def exponentBits(config: ColonnadeConfig): Int = NumberFormats.bitLength(config.numbers.maxExponent)
 }

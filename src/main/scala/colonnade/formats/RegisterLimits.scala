@@ -19,7 +19,7 @@ object RegisterLimits {
       s"scene.$name" -> BigInt(config.columnBvhMemory.depth)
     )
     val limits = Seq(
-      "frame.unitShift"             -> BigInt(numbers.mostUnitShift),
+      "frame.unitShift"             -> BigInt(numbers.maxUnitShift),
       "camera.stepShift"            -> BigInt(numbers.coordinateBits),
       "shading.lights"              -> BigInt(config.frame.lights),
       "shading.bounces"             -> BigInt(config.frame.maxBounces),

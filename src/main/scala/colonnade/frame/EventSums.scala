@@ -3,8 +3,7 @@ package colonnade.frame
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.MarchSums
-import colonnade.formats.AttributeEvents
+import colonnade.unit.AttributeFetch
 
 /** Events of a column BVH controller in one cycle; names as in `Counters`. */
 final class ColumnBvhEvents(config: ColonnadeConfig) extends Bundle {
@@ -22,50 +21,52 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   private val units = columns * config.array.rows
 
   private def sum(max: Int): UInt = UInt(log2Ceil(max + 1).W)
+  private def perColumn           = sum(columns)
   private def perUnit             = sum(units)
-  private def perContext          = sum(units * config.array.contexts + columns * config.units.pathContexts)
-  private def perMarch            = sum(columns * config.mapRequesters)
-  private def perEnvironment      = ifEnvironment(sum(columns))
+  private def perPath             = sum(columns * config.units.pathContexts)
+  private def perTrace            = sum(units * config.array.contexts)
+  private def perFetch            = sum(units * config.array.contexts + columns * AttributeFetch.slots)
+  private def perMarch            = sum(columns * config.units.marches)
 
   private def ifEnvironment[T <: Data](event: T): Option[T] = if (config.hasEnvironment) Some(event) else None
 
   /** Including background pixels, which bypass the units. */
-  val raysPrimary      = sum(units + columns)
-  val raysShadow       = perUnit
-  val raysReflection   = perUnit
-  val raysRefraction   = perUnit
+  val raysPrimary      = sum(2 * columns)
+  val raysShadow       = perColumn
+  val raysReflection   = perColumn
+  val raysRefraction   = perColumn
   val raysInBox        = perUnit
   val nodeReads        = perUnit
   val boxTests         = sum(units * config.geometry.arity)
   val triangleTests    = perUnit
-  val hits             = perUnit
+  val hits             = perColumn
   val recordReads      = sum(columns * config.columnBvhMemory.banks)
-  val snoopHits        = perContext
+  val snoopHits        = perFetch
   val bankConflicts    = sum(columns * config.recordRequesters)
   val cacheMisses      = config.columnBvhMemory.cache.map(_ => sum(columns * config.columnBvhMemory.banks))
-  val busyRaySetup     = perUnit
+  val busyRaySetup     = perColumn
   val busyBoxUnit      = perUnit
   val busyTriangleUnit = sum(units * config.units.triangleLanes)
-  val busyShader       = perUnit
+  val busyShader       = perColumn
 
-  val idleContexts      = perContext
-  val contextsRaySetup  = perContext
-  val waitRecord        = perContext
-  val waitUnit          = perContext
-  val contextsBox       = perContext
-  val contextsTriangles = perContext
-  val contextsShading   = perContext
+  val idleContexts      = perPath
+  val contextsRaySetup  = perPath
+  val waitRecord        = perFetch
+  val waitUnit          = perFetch
+  val contextsBox       = perTrace
+  val contextsTriangles = perTrace
+  val contextsShading   = perPath
 
   /** With an environment. */
-  val raysEnvironment     = ifEnvironment(perUnit)
+  val raysEnvironment     = ifEnvironment(perColumn)
   val marchSteps          = ifEnvironment(perMarch)
   val busyEnvironment     = ifEnvironment(perMarch)
-  val contextsEnvironment = ifEnvironment(perContext)
+  val contextsEnvironment = ifEnvironment(perPath)
 
-  val albedoReads = perEnvironment
-  val normalReads = perEnvironment
-  val cellReads   = perEnvironment
-  val planeReads  = perEnvironment
+  val albedoReads = ifEnvironment(perColumn)
+  val normalReads = ifEnvironment(perColumn)
+  val cellReads   = ifEnvironment(perColumn)
+  val planeReads  = ifEnvironment(perColumn)
 
   /** A level, not an event: the maximum of all units. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
@@ -77,26 +78,18 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
 
 object EventSums {
 
-  /** The events of a column: its started pixels, its units, its controller, the environment's maps and shared marches. */
+  /** The events of a column: its started pixels, its controller, and its other parts. */
   def ofColumn(
       config:      ColonnadeConfig,
       raysPrimary: UInt,
-      units:       Seq[Record],
       controller:  ColumnBvhEvents,
-      environment: Option[AttributeEvents],
-      marches:     Option[MarchSums]
+      parts:       Seq[Bundle]
   ): EventSums = {
-    val sums = joined(new EventSums(config, 1), units.map(_.elements.toMap))
+    val sums = joined(new EventSums(config, 1), parts.map(_.elements.toMap))
     sums.raysPrimary   := raysPrimary
     sums.recordReads   := controller.recordReads
     sums.bankConflicts := controller.bankConflicts
     sums.cacheMisses.zip(controller.cacheMisses).foreach { case (sum, misses) => sum := misses }
-    for (events <- environment; (name, event) <- events.elements) sums.elements(name) := event
-    for (events <- marches) {
-      sums.marchSteps.get      := events.marchSteps
-      sums.busyEnvironment.get := events.busyEnvironment
-      sums.illegalRecord := tree(units.map(_.elements("illegalRecord").asUInt))(_ | _).asBool || events.illegalRecord
-    }
     sums
   }
 

@@ -22,22 +22,15 @@ final class PixelMixerIO(config: ColonnadeConfig) extends Bundle {
 /** Mixes the pixels of two tiles: those of the environment use units that those of the object leave idle, and the other
   * way round. Combinational, one pixel per cycle.
   *
-  * With `most`, pixels of the environment go first while fewer of them are in flight, and wait otherwise. Without it the
-  * tiles take turns.
+  * @param maxEnvironment
+  *   pixels of the environment go first while fewer of them are in flight, and wait otherwise
   */
-final class PixelMixer(config: ColonnadeConfig, most: Option[Int]) extends Module {
+final class PixelMixer(config: ColonnadeConfig, maxEnvironment: Int) extends Module {
   val io = IO(new PixelMixerIO(config))
 
-  private val isEnvironment = most match {
-    case None =>
-      val wasEnvironment = RegInit(false.B)
-      when(io.positions.fire) { wasEnvironment := io.environment.fire }
-      io.environment.valid && !(wasEnvironment && io.objects.valid)
-    case Some(number) =>
-      val inFlight = RegInit(0.U(log2Ceil(number + 1).W))
-      inFlight := inFlight + io.environment.fire - io.leaves
-      io.environment.valid && inFlight =/= number.U
-  }
+  private val inFlight = RegInit(0.U(log2Ceil(maxEnvironment + 1).W))
+  inFlight := inFlight + io.environment.fire - io.leaves
+  private val isEnvironment = io.environment.valid && inFlight =/= maxEnvironment.U
   io.objects.ready     := io.positions.ready && !isEnvironment
   io.environment.ready := io.positions.ready && isEnvironment
 

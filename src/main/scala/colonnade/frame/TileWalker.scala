@@ -1,8 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{Decoupled, DecoupledIO, Queue, RegEnable}
-import colonnade.common.Dispatcher
+import chisel3.util.{Decoupled, Queue, RegEnable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
 
@@ -17,10 +16,10 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   /** A pixel of `environment` has left the column. */
   val environmentLeaves = Input(Bool())
 
-  /** Pixels to render, by render unit. */
-  val positions = Vec(config.array.rows, Decoupled(new UnitPosition(config)))
+  /** Pixels to render. */
+  val positions = Decoupled(new UnitPosition(config))
 
-  /** Render units get the pixels of this window, too. */
+  /** Pixels of this window are rendered, too. */
   val window = Input(new EnvironmentWindow(config))
 
   /** Pixels that show the background. */
@@ -30,23 +29,20 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** Dispatches the pixels of a tile in the order of [[TileScan]]: those that may show the object or the environment to ready
-  * render units, round-robin; the others to the background walker. With an environment a [[PixelMixer]] mixes them with
-  * pixels of another tile.
+/** Sorts the pixels of a tile, in the order of [[TileScan]]: those that may show the object or the environment are rendered,
+  * the others go to the background walker. With an environment a [[PixelMixer]] mixes them with pixels of another tile.
   *
-  * Throughput: one pixel per cycle, the first one four cycles after its tile is accepted. A queue of one entry before each
-  * render unit holds its next pixel. The next tile is accepted when only these and two more pixels are left, so tiles
-  * follow each other without a gap, and no column takes tiles early.
+  * Throughput: one pixel per cycle, the first one four cycles after its tile is accepted. Of the others
+  * [[TileWalker.maxOthers]] wait in a queue, so that they do not hold up those behind them. The next tile is accepted when
+  * only the queues and two more pixels are left, so tiles follow each other without a gap, and no column takes tiles early.
   *
-  * @param mostEnvironment
-  *   `most` of [[PixelMixer]]
+  * @param config of the column
   */
-final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = None) extends Module {
+final class TileWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new TileWalkerIO(config))
 
-  private val scan     = Module(new TileScan(config, isQueued = false)) // its tile is that of `edgeValues`
-  private val outline  = Module(new PixelTest(config))
-  private val dispatch = Module(new Dispatcher(new UnitPosition(config), config.array.rows))
+  private val scan    = Module(new TileScan(config, isQueued = false)) // its tile is that of `edgeValues`
+  private val outline = Module(new PixelTest(config))
 
   scan.io.frame        := io.frame
   scan.io.isDivided    := TileScheduler.divides(io.window)
@@ -67,20 +63,29 @@ final class TileWalker(config: ColonnadeConfig, mostEnvironment: Option[Int] = N
   taken.bits.y := tested.bits.first.y
   taken.bits.meetsObject.foreach(_ := tested.bits.meetsObject)
   taken.bits.inObjectTile.foreach(_ := true.B)
-  io.others.valid := tested.valid && !forUnits
-  io.others.bits  := tested.bits.first
-  tested.ready    := Mux(forUnits, taken.ready, io.others.ready)
+  private val others = Module(new Queue(new PixelPosition(config), TileWalker.maxOthers, useSyncReadMem = true)).io
+  others.enq.valid := tested.valid && !forUnits
+  others.enq.bits  := tested.bits.first
+  tested.ready     := Mux(forUnits, taken.ready, others.enq.ready)
+  io.others :<>= others.deq
 
-  dispatch.io.items :<>= io.environment.fold(taken) { environment =>
-    val mixer = Module(new PixelMixer(config, mostEnvironment)).io
+  private val positions = io.environment.fold(taken) { environment =>
+    val mixer = Module(new PixelMixer(config, TileWalker.maxEnvironment(config))).io
     mixer.objects :<>= taken
     mixer.environment :<>= environment
     mixer.leaves := io.environmentLeaves
     mixer.positions
   }
 
-  private def queued(taker: DecoupledIO[UnitPosition]): DecoupledIO[UnitPosition] =
-    if (config.units.shortPaths) Queue(taker, 2) else Queue(taker, 1, pipe = true)
-  io.positions.zip(dispatch.io.takers).foreach { case (position, taker) => position <> queued(taker) }
-  io.isIdle := scan.io.isIdle && outline.io.isIdle && !tested.valid && !io.positions.map(_.valid).reduce(_ || _)
+  io.positions :<>= (if (config.units.shortPaths) Queue(positions, 2) else Queue(positions, 1, pipe = true))
+  io.isIdle := scan.io.isIdle && outline.io.isIdle && !tested.valid && !io.others.valid && !io.positions.valid
+}
+
+object TileWalker {
+
+  /** Pixels outside the object that wait for the background walker. */
+  val maxOthers: Int = 64
+
+  /** Pixels of a tile of the environment that are in flight at most: about those that the pipelines of the marches hold. */
+  def maxEnvironment(config: ColonnadeConfig): Int = (config.units.pathContexts * 3 / 8).max(1)
 }

@@ -66,7 +66,7 @@ final class DramReader(config: ColonnadeConfig) extends Module {
     line.bits.records := gathered.asUInt(Lines.records * new RecordFormats(config).recordBits - 1, 0)
       .asTypeOf(Vec(Lines.records, new RecordFormats(config).record))
       .map(Lines.withParity(config, _))
-    port :<>= (if (beats > DramReader.mostBeats) line else Queue(line, 1, pipe = true))
+    port :<>= (if (beats > DramReader.maxBeats) line else Queue(line, 1, pipe = true))
     isFor && ready
   }
   io.axi.r.ready := accepts.reduce(_ || _)
@@ -100,5 +100,5 @@ private object DramReader {
   }
 
   /** Beats of a line that waits beside the next one. */
-  val mostBeats: Int = 16
+  val maxBeats: Int = 16
 }

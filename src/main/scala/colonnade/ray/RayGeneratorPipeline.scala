@@ -71,7 +71,7 @@ final class RayGeneratorPipeline(config: ColonnadeConfig) extends RayGeneratorMo
 
   /** The shift has as many bits as its legal values: `RegisterLimits`. */
   private def origin(axis: Int): SInt = {
-    val shiftBits = NumberFormats.bitLength(numbers.mostUnitShift)
+    val shiftBits = NumberFormats.bitLength(numbers.maxUnitShift)
     val shift     = if (shiftBits == 0) 0.U(0.W) else io.registers.unitShift(shiftBits - 1, 0)
     RayGenerator.shiftLeft(io.registers.camera.position.axes(axis), shift, scene.width)
   }

@@ -54,12 +54,12 @@ final class NodeStageIO(config: ColonnadeConfig) extends Bundle {
 final class NodeStage(config: ColonnadeConfig) extends Module {
   val io = IO(new NodeStageIO(config))
 
-  private val numbers   = config.numbers
-  private val node      = io.node
-  private val mostPlane = (BigInt(1) << numbers.boxBits) - 1
+  private val numbers  = config.numbers
+  private val node     = io.node
+  private val maxPlane = (BigInt(1) << numbers.boxBits) - 1
 
   // First cycle: the way from the node's first z' plane, which is its last one if z is negative, to the origin
-  private val span         = Rounding.narrow((mostPlane.U << node.exponent(2)).zext, numbers.vertexBits + 2)
+  private val span         = Rounding.narrow((maxPlane.U << node.exponent(2)).zext, numbers.vertexBits + 2)
   private val away         = Mux(node.negative(2), node.corner(2), ~node.corner(2))
   private val toOrigin     = Rounding.narrow(away +& Mux(node.negative(2), span, 1.S), numbers.boxDistanceBits)
   private val toTMaxNext   = RegEnable(toOrigin +& node.tMax, io.isValid(0))
@@ -152,5 +152,5 @@ object NodeStage {
     log2Ceil(numbers.nearBits - 1 + numbers.stepReach - numbers.nearFraction + 1)
 
   /** Width of the right shift of a product to the scale of the steps. */
-  private def dropBits(numbers: NumberFormats): Int = NumberFormats.bitLength(numbers.mostExponent)
+  private def dropBits(numbers: NumberFormats): Int = NumberFormats.bitLength(numbers.maxExponent)
 }

@@ -62,7 +62,7 @@ final class AttributeFetch(config: ColonnadeConfig, most: Int = AttributeFetch.s
   fetch.scene      := io.scene
   fetch.broadcasts := io.broadcasts
   fetch.readyNext  := VecInit(false.B, false.B, io.readyNext)
-  io.requests :<>= fetch.requests
+  io.requests :<>= (if (config.units.shortPaths) Queue(fetch.requests, 2) else fetch.requests)
 
   // Queue hits for a slot; there are never more than contexts
   private val waiting =

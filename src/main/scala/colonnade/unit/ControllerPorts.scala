@@ -109,34 +109,28 @@ final class AllocationControl(config: ColonnadeConfig) extends Bundle {
 
 /** Control of traces, seen from the stage that traces rays. */
 final class TraceControl(config: ColonnadeConfig) extends Bundle {
-  private val contexts = config.array.contexts
 
   /** A prepared ray that enters the object's box. */
   val entered = Valid(Context(config))
 
-  /** Traces that have ended: the ray misses the box, has no record left to visit, or is occluded. */
-  val ended = Vec(3, Valid(Context(config)))
+  /** Traces that have ended: the ray misses the box; it has its result. */
+  val missesBox = Valid(Context(config))
+  val hasResult = Valid(Context(config))
 
-  /** A context whose ray has ended; of many contexts, the one that is asked for in the next cycle. */
-  val asked     = Flipped(Valid(Context(config)))
-  val askedNext = Flipped(Valid(Context(config)))
+  /** A context whose result is read now, and the one whose result is read in the next cycle. */
+  val query     = Flipped(Valid(Context(config)))
+  val queryNext = Flipped(Valid(Context(config)))
 
-  /** Its ray has a hit; what it has hit as a shadow ray. */
+  /** The ray of `query` has a hit; what it has hit as a shadow ray. */
   val hasHit    = Output(Bool())
   val occlusion = Output(Occlusion())
 
-  /** The ended ray that is resolved in this cycle. */
-  val resolved = Flipped(Valid(Context(config)))
+  /** The ended ray that is resolved has a surface to shade; it is a primary ray. */
+  val startsShading = Input(Bool())
+  val isPrimary     = Input(Bool())
 
-  /** That ray has a surface to shade. */
-  val shades = Input(Bool())
-
-  /** A context whose hit's distance is read; not in a cycle with `shades`. */
-  val measured = Flipped(Valid(Context(config)))
-
-  /** By context: its ray is a shadow ray; its ray is the primary ray. */
-  val isShadow  = Input(Vec(contexts, Bool()))
-  val isPrimary = Input(Vec(contexts, Bool()))
+  /** A context whose hit's distance is read; not in a cycle with `startsShading`. */
+  val readsDistance = Flipped(Valid(Context(config)))
 }
 
 /** Retirement of pixels, seen from the stage that assembles them. */

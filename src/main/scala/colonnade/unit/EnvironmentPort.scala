@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Decoupled
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.{EnvironmentRays, EnvironmentStage, EnvironmentStageIO, HitDistance, MarchEvents}
+import colonnade.environment.{EnvironmentRays, HitDistance, MarchPort}
 import colonnade.formats.{EnvironmentView, PixelPosition}
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
@@ -26,27 +26,20 @@ final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
   /** Points of the environment to shade. */
   val surfaces = Decoupled(new EnvironmentSurface(config))
 
-  /** To the maps, for a march of its own; or to the marches of the column. */
-  val maps    = new EnvironmentStageIO(config).maps
-  val marches = new EnvironmentStageIO(config).marches
-  val events  = Output(new MarchEvents)
+  val marches = new MarchPort(config)
 }
 
-/** Routes rays to the environment march, its own or one of the column: every ray that may miss the object is stored there. A primary ray that cannot
+/** Routes rays to the marches of the environment: every ray that may miss the object is stored. A primary ray that cannot
   * hit the object bypasses ray set-up. The ray of a hit that the environment may hide is marched too.
   */
 final class EnvironmentPort(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentPortIO(config))
 
-  private val stage =
-    if (config.sharesMarches) Module(new EnvironmentRays(config)).io else Module(new EnvironmentStage(config)).io
+  private val stage   = Module(new EnvironmentRays(config)).io
   private val control = io.control
   control.enabled   := io.view.enabled
   control.occlusion := io.view.occlusion
-  stage.view        := io.view
-  io.maps.zip(stage.maps).foreach { case (port, maps) => port <> maps }
-  io.marches.zip(stage.marches).foreach { case (port, marches) => port :<>= marches }
-  io.events := stage.events
+  io.marches :<>= stage.marches
 
   // March
   stage.req :<>= control.req

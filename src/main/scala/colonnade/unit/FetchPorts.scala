@@ -6,7 +6,6 @@ import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{NodeRecord, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.ray.BoxRay
-import colonnade.traversal.TriangleHit
 
 /** The kind of a record; each kind has one unit that takes it: box unit, triangle unit, shader. */
 object RecordKind extends ChiselEnum {
@@ -42,16 +41,7 @@ final class NodeCandidate(config: ColonnadeConfig) extends Bundle {
   val ray     = new BoxRay(config.numbers)
 }
 
-/** A read port of the [[HitTable]] for a granted context, seen from the reader. */
-final class GrantedHitReader(config: ColonnadeConfig) extends Bundle {
-
-  /** The context of the next cycle, and that of this cycle. */
-  val grantNext = Output(Valid(Context(config)))
-  val context   = Output(Context(config))
-  val hit       = Input(new TriangleHit(config))
-}
-
-/** Events of [[FetchStage]]; names as in `UnitEvents`. */
+/** Events of [[FetchStage]]; names as in `Counters`. */
 final class FetchEvents(config: ColonnadeConfig) extends Bundle {
   private def contextCount = UInt(log2Ceil(config.array.contexts + 1).W)
 
@@ -78,8 +68,8 @@ final class RecordFetchIO(config: ColonnadeConfig) extends Bundle {
   /** By [[RecordKind]]: the unit accepts a record in the next cycle. It must keep to this. */
   val readyNext = Input(Vec(RecordKind.all.size, Bool()))
 
-  /** With shared triangle units: a record waits for one. */
-  val waitsForTriangles = Option.when(config.sharesTriangleUnits)(Output(Bool()))
+  /** A record waits for a triangle unit. */
+  val waitsForTriangles = Output(Bool())
 
   /** The context that gets a response in the next cycle, and whether its record is a node. */
   val grantNext      = Output(Valid(Context(config)))

@@ -7,7 +7,6 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.numbers.Fixed
 import colonnade.ray.{PreparedRay, RayFormats, RayOrientation, TracedRay}
-import colonnade.shading.ShadeRequest
 import colonnade.traversal.TriangleCandidate
 
 /** Ports of [[FetchStage]]. */
@@ -22,29 +21,22 @@ final class FetchStageIO(config: ColonnadeConfig) extends Bundle {
 
   /** A ray whose trace starts. */
   val ray     = Flipped(Valid(new PreparedRay(config)))
-  val fetches = Flipped(Vec(3, Valid(new FetchRequest(config))))
+  val fetches = Flipped(Vec(2, Valid(new FetchRequest(config))))
 
-  /** The closest hit of the context whose attributes come. */
-  val closestHit = new GrantedHitReader(config)
-
-  /** A record with the ray of its context; one of the three ports in a cycle. */
+  /** A record with the ray of its context; one of the two ports in a cycle. */
   val nodes     = Decoupled(new NodeCandidate(config))
   val triangles = Decoupled(new TriangleCandidate(config))
-  val hits      = Decoupled(new ShadeRequest(config))
 
-  /** `nodes`, `triangles` and `hits` are ready in the next cycle. */
-  val readyNext = Input(Vec(RecordKind.all.size, Bool()))
+  /** `nodes` and `triangles` are ready in the next cycle. */
+  val nodesReadyNext     = Input(Bool())
+  val trianglesReadyNext = Input(Bool())
 
-  /** With shared triangle units: a record waits for one. */
-  val waitsForTriangles = Option.when(config.sharesTriangleUnits)(Output(Bool()))
+  /** A record waits for a triangle unit. */
+  val waitsForTriangles = Output(Bool())
 
-  /** Contexts that get no record because its address is illegal: during traversal, and for attributes. */
-  val traversalError = Output(Valid(Context(config)))
-  val attributeError = Output(Valid(Context(config)))
-  val events         = Output(new FetchEvents(config))
-
-  /** With short paths: no request waits. */
-  val isIdle = Option.when(config.units.shortPaths)(Output(Bool()))
+  /** A context that gets no record because its address is illegal. */
+  val error  = Output(Valid(Context(config)))
+  val events = Output(new FetchEvents(config))
 }
 
 /** Fetches records and joins each one with the ray of its context, which a table holds.
@@ -62,13 +54,12 @@ final class FetchStage(config: ColonnadeConfig) extends Module {
   recordFetch.io.row        := io.row
   recordFetch.io.scene      := io.scene
   recordFetch.io.broadcasts := io.broadcasts
-  recordFetch.io.fetches    := io.fetches
-  recordFetch.io.readyNext  := io.readyNext
+  recordFetch.io.fetches    := io.fetches :+ 0.U.asTypeOf(io.fetches.head)
+  recordFetch.io.readyNext  := VecInit(io.nodesReadyNext, io.trianglesReadyNext, false.B)
   // With short paths requests wait in a queue, where they are not withdrawn
   private val requests = if (config.units.shortPaths) Queue(recordFetch.io.requests, 2) else recordFetch.io.requests
   io.requests :<>= requests
-  io.isIdle.foreach(_ := !requests.valid)
-  io.waitsForTriangles.zip(recordFetch.io.waitsForTriangles).foreach { case (waits, record) => waits := record }
+  io.waitsForTriangles := recordFetch.io.waitsForTriangles
 
   private val rays = new RayTable(config)
   when(io.ray.valid) { rays.write(io.ray.bits.context, io.ray.bits.ray) }
@@ -76,9 +67,6 @@ final class FetchStage(config: ColonnadeConfig) extends Module {
   // Join the record with the ray of its context
   private val response = recordFetch.io.response.bits
   private val ray      = rays.read(recordFetch.io.grantNext, recordFetch.io.grantsNodeNext)
-  io.closestHit.grantNext := recordFetch.io.grantNext
-  io.closestHit.context   := response.context
-
   io.nodes.valid        := isFor(RecordKind.node)
   io.nodes.bits.context := response.context
   io.nodes.bits.address := response.address
@@ -90,25 +78,13 @@ final class FetchStage(config: ColonnadeConfig) extends Module {
   io.triangles.bits.record  := formats.asTriangles(response.record)
   io.triangles.bits.ray     := ray.forTriangles
 
-  private val faces    = formats.asAttributes(response.record).faces
-  private val slotBits = RecordFormats.faceSlotBits(config)
-  io.hits.valid        := isFor(RecordKind.attributes)
-  io.hits.bits.context := response.context
-  io.hits.bits.ray     := ray.forTriangles
-  io.hits.bits.hit     := io.closestHit.hit
-  io.hits.bits.face    := (if (slotBits == 0) faces.head else faces(io.closestHit.hit.id(slotBits - 1, 0)))
-
   assert(!io.nodes.valid || io.nodes.ready, "the box unit does not accept its node")
   assert(!io.triangles.valid || io.triangles.ready, "the triangle unit does not accept its record")
-  assert(!io.hits.valid || io.hits.ready, "the shader does not accept its hit")
 
   // Errors and events
-  private val error        = recordFetch.io.error
-  private val isAttributes = error.bits.kind === RecordKind.attributes
-  io.traversalError.valid := error.valid && !isAttributes
-  io.traversalError.bits  := error.bits.context
-  io.attributeError.valid := error.valid && isAttributes
-  io.attributeError.bits  := error.bits.context
+  private val error = recordFetch.io.error
+  io.error.valid          := error.valid
+  io.error.bits           := error.bits.context
   io.events.waitRecord    := recordFetch.io.stalledContexts
   io.events.waitUnit      := recordFetch.io.readyContexts
   io.events.snoopHits     := recordFetch.io.snoopHits

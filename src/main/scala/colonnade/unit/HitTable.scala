@@ -1,14 +1,14 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.Valid
+import chisel3.util.{RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 import colonnade.shading.Occlusion
-import colonnade.traversal.{TMaxReader, TMaxUnits, TriangleResult}
+import colonnade.traversal.{TMaxReader, TMaxUnits, TriangleHit, TriangleResult}
 
 /** A ray whose trace starts: only hits with t < `tMax` count. */
 final class TraceStart(config: ColonnadeConfig) extends Bundle {
@@ -18,8 +18,6 @@ final class TraceStart(config: ColonnadeConfig) extends Bundle {
 
 /** Ports of [[HitTable]]. */
 final class HitTableIO(config: ColonnadeConfig) extends Bundle {
-  private val contexts = config.array.contexts
-
   val start  = Flipped(Valid(new TraceStart(config)))
   val result = Flipped(Valid(new TriangleResult(config)))
 
@@ -32,17 +30,8 @@ final class HitTableIO(config: ColonnadeConfig) extends Bundle {
   /** For box unit and stack. */
   val tMax = Vec(2, Flipped(new TMaxReader(config)))
 
-  /** By context: whether the ray has a hit. */
-  val hasHit = Output(Vec(contexts, Bool()))
-
-  /** By context: what its shadow ray has hit. */
-  val occlusions = Output(Vec(contexts, Occlusion()))
-
-  /** Distance and id of a context's hit, in the same cycle. */
-  val closest = Flipped(new ClosestHitReader(config))
-
-  /** The hit of the context that `grantNext` named one cycle earlier. */
-  val granted = Flipped(new GrantedHitReader(config))
+  /** What the ray of a context has met. */
+  val outcome = Flipped(new HitReader(config))
 }
 
 /** The closest hit of every context's ray: the least (t, packed triangle id), whatever the order of tests.
@@ -95,18 +84,18 @@ final class HitTable(config: ColonnadeConfig) extends Module {
   private def compared(isTrue: Bool): Bool = if (config.units.shortPaths) RegNext(isTrue) else isTrue
 
   io.tMax.foreach(reader => reader.units := TMaxUnits(config.numbers)(closestT(reader.context)))
-  io.hasHit     := hasHit
-  io.occlusions := VecInit(hasHit.zip(hasTransmissiveHit).map { case (hasOpaqueHit, hasTransmissiveHit) =>
-    Mux(hasOpaqueHit, Occlusion.opaque, Mux(hasTransmissiveHit, Occlusion.transmissive, Occlusion.none))
-  })
-  io.closest.t  := closestT(io.closest.context)
-  io.closest.id := ids(io.closest.context)
 
-  private val detail = details.read(io.granted.grantNext.bits, io.granted.grantNext.valid)
-  io.granted.hit.t        := closestT(io.granted.context)
-  io.granted.hit.id       := ids(io.granted.context)
-  io.granted.hit.weights  := detail.weights
-  io.granted.hit.backSide := detail.backSide
+  // The ray's outcome, one cycle after its context
+  private val asked  = io.outcome.context
+  private val reader = RegEnable(asked.bits, asked.valid)
+  private val detail = details.read(asked.bits, asked.valid)
+  io.outcome.hasHit    := hasHit(reader)
+  io.outcome.occlusion :=
+    Mux(hasHit(reader), Occlusion.opaque, Mux(hasTransmissiveHit(reader), Occlusion.transmissive, Occlusion.none))
+  io.outcome.hit.t        := closestT(reader)
+  io.outcome.hit.id       := ids(reader)
+  io.outcome.hit.weights  := detail.weights
+  io.outcome.hit.backSide := detail.backSide
 }
 
 /** The parts of a hit that no comparison needs. */
@@ -116,8 +105,11 @@ private final class HitDetails(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A read port of the [[HitTable]], seen from the reader. */
-final class ClosestHitReader(config: ColonnadeConfig) extends Bundle {
-  val context = Output(Context(config))
-  val t       = Input(new Fixed(new RayFormats(config.numbers).grid))
-  val id      = Input(UInt(RecordFormats.idBits(config).W))
+final class HitReader(config: ColonnadeConfig) extends Bundle {
+  val context = Output(Valid(Context(config)))
+
+  /** In the next cycle: the ray has a hit; what it has hit as a shadow ray; its hit. */
+  val hasHit    = Input(Bool())
+  val occlusion = Input(Occlusion())
+  val hit       = Input(new TriangleHit(config))
 }

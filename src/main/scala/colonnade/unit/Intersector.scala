@@ -1,48 +1,14 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Arbiter, Decoupled, DecoupledIO, Pipe, Queue, RegEnable, Valid}
-import colonnade.common.{Context, ContextTable}
+import chisel3.util.{log2Ceil, Arbiter, Decoupled, DecoupledIO, Pipe, Queue, Valid}
+import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.HitDistance
 import colonnade.formats.{RecordFormats, SceneMap}
-import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.{PreparedRay, RayFormats}
-import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanes, TriangleLanesIO, TriangleResult}
+import colonnade.ray.PreparedRay
+import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanesIO, TriangleResult}
 
-/** The closest hit of a ray that is to be shaded. */
-final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
-  val context   = Context(config)
-  val isPrimary = Bool()
-
-  /** Packed triangle id. */
-  val id = UInt(RecordFormats.idBits(config).W)
-  val t  = new Fixed(new RayFormats(config.numbers).grid)
-
-  /** From the ray's origin along its dominant axis. */
-  val distance = if (SurfaceHit.hasDistance(config)) Some(HitDistance(config)) else None
-}
-
-object SurfaceHit {
-
-  /** A traversal unit leaves distances to its path unit. */
-  def hasDistance(config: ColonnadeConfig): Boolean =
-    !config.hasPathUnit && (config.frame.hits || config.hasEnvironment)
-
-  /** The distance of a hit at `t` of a ray that enters the object's box at `tEntry`, in whole units. */
-  def distance(config: ColonnadeConfig, tEntry: UInt, t: Fixed): UInt =
-    Rounding.floor(tEntry, -config.numbers.gridFraction) +& t.integer.asUInt
-
-  /** The record with the attributes of a triangle. */
-  def attributeAddress(config: ColonnadeConfig, scene: SceneMap, id: UInt): UInt = {
-    val slotBits = RecordFormats.faceSlotBits(config)
-    // With one face per record the sum may be too large: all ones is no legal address
-    if (slotBits == 0) Rounding.saturate(scene.attributeBase +& id, id.getWidth)
-    else scene.attributeBase + (id >> slotBits)
-  }
-}
-
-/** Events of [[Intersector]]; names as in `UnitEvents`. */
+/** Events of [[Intersector]]; names as in `Counters`. */
 final class IntersectorEvents(config: ColonnadeConfig) extends Bundle {
   private def contextCount = UInt(log2Ceil(config.array.contexts + 1).W)
 
@@ -63,34 +29,32 @@ final class IntersectorEvents(config: ColonnadeConfig) extends Bundle {
 final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
 
   /** A frame starts. */
-  val start   = Input(Bool())
-  val scene   = Input(new SceneMap(RecordFormats.idBits(config)))
-  val control = new TraceControl(config)
-  val rays    = Flipped(Decoupled(new PreparedRay(config)))
+  val start = Input(Bool())
+  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
 
-  /** A ray that enters the object's box. */
-  val entered = Valid(new PreparedRay(config))
+  /** A ray that enters the object's box, for an idle context. */
+  val rays = Flipped(Valid(new PreparedRay(config)))
 
-  /** Fetches of the first record, of the next record, and of the attributes of a hit. */
-  val fetches   = Vec(3, Valid(new FetchRequest(config)))
-  val nodes     = Flipped(Decoupled(new NodeCandidate(config)))
-  val triangles = Flipped(Decoupled(new TriangleCandidate(config)))
+  /** By context: its ray is a shadow ray. */
+  val isShadow = Input(Vec(config.array.contexts, Bool()))
 
-  /** To the triangle units that rows share. */
-  val triangleLanes = Option.when(config.sharesTriangleUnits)(Flipped(new TriangleLanesIO(config)))
-  val fetchError    = Flipped(Valid(Context(config)))
+  /** Traces that have ended: no record is left to visit, or the shadow ray is occluded. */
+  val ended   = Output(Vec(2, Valid(Context(config))))
+  val outcome = Flipped(new HitReader(config))
+
+  /** Fetches of the first record and of the next record. */
+  val fetches    = Output(Vec(2, Valid(new FetchRequest(config))))
+  val nodes      = Flipped(Decoupled(new NodeCandidate(config)))
+  val triangles  = Flipped(Decoupled(new TriangleCandidate(config)))
+  val fetchError = Flipped(Valid(Context(config)))
+
+  /** To the triangle units of the group of rows. */
+  val triangleLanes = Flipped(new TriangleLanesIO(config))
 
   /** `nodes` and `triangles` are ready in the next cycle. */
   val nodesReadyNext     = Output(Bool())
   val trianglesReadyNext = Output(Bool())
-
-  /** A resolved context whose ray has a surface to shade; one cycle later its hit. After `control.measured`, the hit's
-    * distance comes in the same way.
-    */
-  val hasSurface = Valid(Context(config))
-  val surfaceHit = Valid(new SurfaceHit(config))
-  val closestHit = Flipped(new GrantedHitReader(config))
-  val events     = Output(new IntersectorEvents(config))
+  val events             = Output(new IntersectorEvents(config))
 }
 
 /** Intersects rays with the scene: BVH traversal, triangle tests, closest hits, and early termination of shadow rays.
@@ -101,22 +65,16 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   val io = IO(new IntersectorIO(config))
 
   private val traversal = Module(new Traversal(config))
-  private val triangles = io.triangleLanes.getOrElse(Module(new TriangleLanes(config)).io)
+  private val triangles = io.triangleLanes
   private val hitTable  = Module(new HitTable(config))
-  private val control   = io.control
 
-  // Start a trace, or end it at once if the ray misses the object's box
+  // Start a trace
   private val ray = io.rays.bits
-  io.rays.ready    := true.B
-  io.entered.valid := io.rays.fire && ray.enters
-  io.entered.bits  := ray
-  drive(control.entered, io.entered.valid, ray.context)
-  drive(traversal.io.start, io.entered.valid, ray.context)
-  hitTable.io.start.valid        := io.rays.fire
+  drive(traversal.io.start, io.rays.valid, ray.context)
+  hitTable.io.start.valid        := io.rays.valid
   hitTable.io.start.bits.context := ray.context
   hitTable.io.start.bits.tMax    := ray.tMax
-  drive(control.ended(0), io.rays.fire && !ray.enters, ray.context)
-  fetch(io.fetches(0), io.entered.valid, ray.context, Traversal.root(config, io.scene))
+  fetch(io.fetches(0), io.rays.valid, ray.context, Traversal.root(config, io.scene))
 
   // Traverse the BVH
   private val step = traversal.io.steps
@@ -125,14 +83,14 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   hitTable.io.tMax.zip(traversal.io.tMax).foreach { case (table, reader) => table :<>= reader }
   traversal.io.nodes :<>= io.nodes
   step.ready := true.B
-  drive(control.ended(1), step.fire && step.bits.isDone, step.bits.context)
+  drive(io.ended(0), step.fire && step.bits.isDone, step.bits.context)
   fetch(io.fetches(1), step.fire && !step.bits.isDone, step.bits.context, step.bits.target)
 
   // Test triangles: a result terminates an occluded shadow ray, or the ray resumes after its record.
-  // The termination is registered, so that no path leads from the triangle unit through the hit table to the controller
+  // The termination is registered, so that no path leads from the triangle units through the hit table to the results
   private val result   = if (config.units.shortPaths) compared(Queue(triangles.result, 2)) else triangles.result
   private val isShadow = {
-    val ofContext = control.isShadow(result.bits.context)
+    val ofContext = io.isShadow(result.bits.context)
     if (config.units.shortPaths) RegNext(ofContext) else ofContext
   }
   private val isOccluded = isShadow && hitTable.io.hasHitNow
@@ -142,7 +100,8 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   hitTable.io.result.bits  := result.bits
   hitTable.io.isShadow     := isShadow
   result.ready             := isOccluded || !result.bits.isLast || resumes.io.in(1).ready
-  control.ended(2)         := Pipe(result.fire && result.bits.isLast && isOccluded, result.bits.context)
+  io.ended(1)              := Pipe(result.fire && result.bits.isLast && isOccluded, result.bits.context)
+  hitTable.io.outcome :<>= io.outcome
 
   // A record with an illegal address is skipped
   private val skipped =
@@ -153,37 +112,10 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   resumes.io.in(1).bits  := result.bits.context
   traversal.io.resume :<>= resumes.io.out
 
-  // Fetch the attributes of a hit, unless it belongs to a shadow ray
-  private val resolved   = control.resolved.bits
-  private val hasSurface = control.shades
-  private val closest    = hitTable.io.closest
-  drive(io.hasSurface, hasSurface, resolved)
-  private val reads   = hasSurface || control.measured.valid
-  private val readHit = Mux(control.measured.valid, control.measured.bits, resolved)
-  closest.context              := RegEnable(readHit, reads)
-  io.surfaceHit.valid          := RegNext(hasSurface, false.B)
-  io.surfaceHit.bits.context   := closest.context
-  io.surfaceHit.bits.isPrimary := RegNext(control.isPrimary(resolved))
-  io.surfaceHit.bits.id        := closest.id
-  io.surfaceHit.bits.t         := closest.t
-  for (distance <- io.surfaceHit.bits.distance) {
-    val entries = ContextTable(config, UInt(config.numbers.entryBits.W))
-    when(io.entered.valid) { entries.write(ray.context, ray.tEntry.natural) }
-    distance := SurfaceHit.distance(config, entries.read(readHit, reads), closest.t)
-  }
-  assert(!(hasSurface && control.measured.valid), "one hit is read in a cycle")
-  io.fetches(2).valid        := io.surfaceHit.valid
-  io.fetches(2).bits.context := closest.context
-  io.fetches(2).bits.kind    := RecordKind.attributes
-  io.fetches(2).bits.address := SurfaceHit.attributeAddress(config, io.scene, closest.id)
-
   io.nodesReadyNext     := traversal.io.readyNext
   io.trianglesReadyNext := triangles.readyNext
-  control.hasHit        := hitTable.io.hasHit(control.asked.bits)
-  control.occlusion     := hitTable.io.occlusions(control.asked.bits)
-  hitTable.io.granted :<>= io.closestHit
 
-  io.events.raysInBox         := io.entered.valid
+  io.events.raysInBox         := io.rays.valid
   io.events.nodeReads         := io.nodes.fire
   io.events.boxTests          := traversal.io.boxTests
   io.events.triangleTests     := result.fire
@@ -193,7 +125,7 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   io.events.contextsTriangles := Occupancy(config, Seq(io.triangles.fire), Seq(result.fire && result.bits.isLast))
   io.events.deepestStack      := traversal.io.deepest
   io.events.stackOverflow     := traversal.io.overflow
-  // Behind a register, since shared triangle units take a record by a combinational path through the column
+  // Behind a register, since a group's triangle units take a record by a combinational path through the column
   private val isIllegal = RegNext(io.triangles.fire && !io.triangles.bits.record.isLegal, false.B)
   io.events.illegalRecord := traversal.io.illegal || isIllegal
 

@@ -2,13 +2,45 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
-import colonnade.common.{Choice, ContextTable}
+import colonnade.common.{Choice, Context, ContextTable}
 import colonnade.config.ColonnadeConfig
+import colonnade.environment.HitDistance
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
-import colonnade.numbers.Fixed
+import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PreparedRay, RayFormats, TriangleRay}
 import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleHit
+
+/** The closest hit of a ray that is to be shaded.
+  *
+  * @param config of the paths
+  */
+final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
+  val context   = Context(config)
+  val isPrimary = Bool()
+
+  /** Packed triangle id. */
+  val id = UInt(RecordFormats.idBits(config).W)
+  val t  = new Fixed(new RayFormats(config.numbers).grid)
+
+  /** From the ray's origin along its dominant axis. */
+  val distance = Option.when(config.frame.hits || config.hasEnvironment)(HitDistance(config))
+}
+
+object SurfaceHit {
+
+  /** The distance of a hit at `t` of a ray that enters the object's box at `tEntry`, in whole units. */
+  def distance(config: ColonnadeConfig, tEntry: UInt, t: Fixed): UInt =
+    Rounding.floor(tEntry, -config.numbers.gridFraction) +& t.integer.asUInt
+
+  /** The record with the attributes of a triangle. */
+  def attributeAddress(config: ColonnadeConfig, scene: SceneMap, id: UInt): UInt = {
+    val slotBits = RecordFormats.faceSlotBits(config)
+    // With one face per record the sum may be too large: all ones is no legal address
+    if (slotBits == 0) Rounding.saturate(scene.attributeBase +& id, id.getWidth)
+    else scene.attributeBase + (id >> slotBits)
+  }
+}
 
 /** Ports of [[PathHits]]. */
 final class PathHitsIO(config: ColonnadeConfig) extends Bundle {
@@ -53,19 +85,18 @@ final class PathHits(config: ColonnadeConfig) extends Module {
 
   // Results. Rays that miss the box have a table of their own, so that each table has one writer
   private val result   = io.results.bits
-  private val asked    = Choice(control.asked, control.askedNext)
+  private val query    = Choice(control.query, control.queryNext)
   private val entered  = new FlagTable(paths, Bool())
   private val outcomes = new FlagTable(paths, UInt((1 + Occlusion.getWidth).W))
-  private val outcome  = Mux(entered.read(asked).asBool, outcomes.read(asked), false.B ## Occlusion.none.asUInt)
+  private val outcome  = Mux(entered.read(query).asBool, outcomes.read(query), false.B ## Occlusion.none.asUInt)
   entered.write(trace.rays.fire, ray.context, ray.enters)
   outcomes.write(io.results.valid, result.context, result.hasHit ## result.occlusion.asUInt)
-  control.hasHit    := outcome.head(1).asBool
-  control.occlusion := Occlusion.safe(outcome.tail(1))._1
-  control.ended.foreach(_ := 0.U.asTypeOf(control.ended.head))
-  control.ended(0).valid := misses
-  control.ended(0).bits  := ray.context
-  control.ended(1).valid := io.results.valid
-  control.ended(1).bits  := result.context
+  control.hasHit          := outcome.head(1).asBool
+  control.occlusion       := Occlusion.safe(outcome.tail(1))._1
+  control.missesBox.valid := misses
+  control.missesBox.bits  := ray.context
+  control.hasResult.valid := io.results.valid
+  control.hasResult.bits  := result.context
 
   // Tables: what the resolution of a hit reads, and what its shading reads
   private val closest = ContextTable(paths, new ClosestHit(config))
@@ -81,24 +112,25 @@ final class PathHits(config: ColonnadeConfig) extends Module {
   }
 
   // A hit with a surface to shade, or whose distance is measured
-  private val resolved = control.resolved.bits
-  private val reads    = control.shades || control.measured.valid
-  private val readHit  = Mux(control.measured.valid, control.measured.bits, resolved)
+  private val shades   = control.startsShading
+  private val distance = control.readsDistance
+  private val reads    = shades || distance.valid
+  private val readHit  = Mux(distance.valid, distance.bits, control.query.bits)
   private val hit      = closest.read(readHit, reads)
   private val context  = RegEnable(readHit, reads)
-  trace.hasSurface.valid          := control.shades
-  trace.hasSurface.bits           := resolved
-  trace.surfaceHit.valid          := RegNext(control.shades, false.B)
+  trace.hasSurface.valid          := shades
+  trace.hasSurface.bits           := control.query.bits
+  trace.surfaceHit.valid          := RegNext(shades, false.B)
   trace.surfaceHit.bits.context   := context
-  trace.surfaceHit.bits.isPrimary := RegNext(control.isPrimary(resolved))
+  trace.surfaceHit.bits.isPrimary := RegNext(control.isPrimary)
   trace.surfaceHit.bits.id        := hit.id
   trace.surfaceHit.bits.t         := hit.t
-  for (distance <- trace.surfaceHit.bits.distance) {
+  for (measured <- trace.surfaceHit.bits.distance) {
     val entries = ContextTable(paths, UInt(config.numbers.entryBits.W))
     when(io.rays.fire) { entries.write(ray.context, ray.tEntry.natural) }
-    distance := SurfaceHit.distance(config, entries.read(readHit, reads), hit.t)
+    measured := SurfaceHit.distance(config, entries.read(readHit, reads), hit.t)
   }
-  assert(!(control.shades && control.measured.valid), "one hit is read in a cycle")
+  assert(!(shades && distance.valid), "one hit is read in a cycle")
 
   // Its attributes
   attributes.start      := io.start

@@ -2,8 +2,8 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Arbiter, Decoupled, Queue, Valid}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.environment.{AttributePort, MarchPort}
+import colonnade.config.ColonnadeConfig
+import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, UnitPosition}
 import colonnade.ray.{RayRequest, RaySetup}
 import colonnade.shading.{ColourUnit, LitSurface, Shader, ShadowRays, TexturePort}
@@ -15,11 +15,8 @@ final class PathUnitIO(config: ColonnadeConfig) extends Bundle {
   val pixels    = Decoupled(new Pixel(config))
   val trace     = new TracePort(config)
 
-  /** To the maps of the environment, for a march of its own; or to the marches of the column. */
-  val maps = Option.when(config.hasEnvironment && !config.sharesMarches)(
-    new AttributePort(AttributeLayout.of(config), AttributePort.tagBits(config))
-  )
-  val marches = Option.when(config.sharesMarches)(new MarchPort(config))
+  /** To the marches of the environment. */
+  val marches = Option.when(config.hasEnvironment)(new MarchPort(config))
 
   /** To the textures. */
   val texture = config.geometry.texture.map(_ => new TexturePort(config))
@@ -39,7 +36,7 @@ final class PathUnitIO(config: ColonnadeConfig) extends Bundle {
   *                 bounced rays  │   │ shadow rays
   *              BounceScheduler ─┘   └─ ShadowRays ◀──────── Shader ◀─ trace: hits with attributes
   *                     └──────────────┬──────────────────────┘  ▲
-  *                                    ▼                         └─ EnvironmentPort ◀─▶ column (maps)
+  *                                    ▼                         └─ EnvironmentPort ◀─▶ marches
   *                                ColourUnit ─▶ PixelAssembler ─▶ pixels
   * }}}
   * RtController holds the state of every context and issues it to its next stage. Pixels leave in any order; their order
@@ -94,8 +91,7 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
     environment.hitDistance := trace.surfaceHit.bits.distance.get
     for (bounces <- bounces) environment.bounces.get :<>= bounces.environment.get
     shader.environment.get :<>= environment.surfaces
-    io.maps.zip(environment.maps).foreach { case (port, maps) => port <> maps }
-    io.marches.zip(environment.marches).foreach { case (port, marches) => port :<>= marches }
+    io.marches.get :<>= environment.marches
   }
 
   // From a path to a pixel
@@ -123,7 +119,7 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
   environment.foreach(_.control :<>= controller.environment.get)
   io.isIdle := controller.idleCount === config.array.contexts.U && assembler.isIdle
   io.events :=
-    PathCounters(config, controller, raySetup, trace, shader, shadowRays, bounces, environment)
+    PathCounters(config, controller, raySetup, trace, shader, shadowRays, bounces)
 
   // Registers
   private val registers = io.registers

@@ -340,10 +340,9 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   }
   when(io.start) { buffers.foreach(_.state := BufferState.empty) }
 
-  for (waits <- io.waitsForTriangles)
-    waits            := fetches.map(fetch => fetch.hasRecord && fetch.kind === RecordKind.triangles).reduce(_ || _)
-  io.stalledContexts := PopCount(fetches.map(_.isPending))
-  io.readyContexts   := PopCount(fetches.map(_.hasRecord) :+ io.response.valid)
+  io.waitsForTriangles := fetches.map(fetch => fetch.hasRecord && fetch.kind === RecordKind.triangles).reduce(_ || _)
+  io.stalledContexts   := PopCount(fetches.map(_.isPending))
+  io.readyContexts     := PopCount(fetches.map(_.hasRecord) :+ io.response.valid)
 }
 
 object RecordFetch {

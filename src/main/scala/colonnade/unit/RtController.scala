@@ -74,20 +74,18 @@ final class RtController(config: ColonnadeConfig) extends Module {
   }
 
   // Trace its ray
-  io.trace.isShadow  := isShadow
-  io.trace.isPrimary := isPrimary
   private val ended = choose(isAt(ContextState.resolve), true.B)
-  io.trace.asked     := ended.now
-  io.trace.askedNext := ended.following
-  io.trace.resolved  := ended.now
+  io.trace.query     := ended.now
+  io.trace.queryNext := ended.following
   move(io.trace.entered.valid, io.trace.entered.bits, ContextState.traversing)
-  io.trace.ended.foreach(ended => move(ended.valid, ended.bits, ContextState.resolve))
+  for (ended <- Seq(io.trace.missesBox, io.trace.hasResult)) move(ended.valid, ended.bits, ContextState.resolve)
 
   // Resolve an ended ray
-  private val resolved   = io.trace.resolved.bits
+  private val resolved   = ended.now.bits
   private val hasVisible = io.trace.hasHit && !mayBeHidden(resolved)
-  io.trace.shades   := io.trace.resolved.valid && !isShadow(resolved) && hasVisible
-  io.trace.measured := 0.U.asTypeOf(io.trace.measured)
+  io.trace.startsShading := ended.now.valid && !isShadow(resolved) && hasVisible
+  io.trace.isPrimary     := isPrimary(resolved)
+  io.trace.readsDistance := 0.U.asTypeOf(io.trace.readsDistance)
   private val afterTrace = Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
   private val lightsLeft =
@@ -168,13 +166,13 @@ final class RtController(config: ColonnadeConfig) extends Module {
     // The distance of a hit is read through the port that serves the surfaces to shade
     val isTest = isOcclusionTest(pending)
     val isAny  = isCamera || (others.valid && environment.accepts.march)
-    environment.req.valid                    := isAny && !(isTest && io.trace.shades)
+    environment.req.valid                    := isAny && !(isTest && io.trace.startsShading)
     environment.req.bits.context             := pending
     environment.req.bits.isDirectView        := isPrimary(pending)
     environment.req.bits.isFresnelReflection := isFresnelReflection(pending)
     environment.req.bits.isOcclusionTest     := isTest
-    io.trace.measured.valid                  := environment.req.fire && isTest
-    io.trace.measured.bits                   := pending
+    io.trace.readsDistance.valid             := environment.req.fire && isTest
+    io.trace.readsDistance.bits              := pending
     move(environment.req.fire, pending, ContextState.environmentMarch)
     when(environment.req.fire) {
       isDirectView(pending) := environment.req.bits.isDirectView

@@ -13,7 +13,7 @@ final class TracePort(config: ColonnadeConfig) extends Bundle {
   val rays    = Decoupled(new PreparedRay(config))
   val control = Flipped(new TraceControl(config))
 
-  /** A resolved context whose ray has a surface to shade; one cycle later its hit. After `control.measured`, the hit's
+  /** A context whose ray has a surface to shade; one cycle later its hit. After `control.readsDistance`, the hit's
     * distance comes in the same way.
     */
   val hasSurface = Flipped(Valid(Context(config)))

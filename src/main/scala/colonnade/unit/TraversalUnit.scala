@@ -5,13 +5,19 @@ import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{log2Ceil, Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.{Context, First}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap, UnitEvents}
+import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.ray.PreparedRay
 import colonnade.traversal.TriangleLanesIO
 
+/** Events of a [[TraversalUnit]] in one cycle. */
+final class TraversalEvents(config: ColonnadeConfig) extends Bundle {
+  val intersector = new IntersectorEvents(config)
+  val fetch       = new FetchEvents(config)
+}
+
 /** Ports of [[TraversalUnit]]. `scene` is constant while a frame runs; `start` precedes the first ray. */
 final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
-  val row        = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
+  val row        = Input(UInt(log2Ceil(config.recordRequesters).W))
   val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
   val start      = Input(Bool())
   val requests   = Decoupled(new RecordRequest(config))
@@ -21,13 +27,13 @@ final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
   val rays   = Flipped(Valid(new PreparedRay(config.ofPaths)))
   val isFree = Output(Bool())
 
-  /** To the triangle units that rows share; a record waits for one. */
-  val triangleLanes     = Option.when(config.sharesTriangleUnits)(Flipped(new TriangleLanesIO(config)))
-  val waitsForTriangles = Option.when(config.sharesTriangleUnits)(Output(Bool()))
+  /** To the triangle units of the group of rows; a record waits for one. */
+  val triangleLanes     = Flipped(new TriangleLanesIO(config))
+  val waitsForTriangles = Output(Bool())
 
   /** In any order. */
   val results = Decoupled(new TraceResult(config.ofPaths))
-  val events  = Output(new UnitEvents(config))
+  val events  = Output(new TraversalEvents(config))
 }
 
 /** Traces rays for a path unit: {{{
@@ -45,7 +51,6 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   private val contexts    = config.array.contexts
   private val fetch       = Module(new FetchStage(config)).io
   private val intersector = Module(new Intersector(config)).io
-  private val control     = intersector.control
 
   private val isUsed   = RegInit(VecInit.fill(contexts)(false.B))
   private val hasEnded = RegInit(VecInit.fill(contexts)(false.B))
@@ -56,11 +61,10 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
 
   // Allocate a context
   private val free = First(isUsed.map(!_)).bits
-  io.isFree                     := !isUsed.asUInt.andR
-  intersector.rays.valid        := io.rays.valid
-  intersector.rays.bits         := io.rays.bits
-  intersector.rays.bits.context := free
-  intersector.rays.bits.enters  := true.B
+  private val ray  = Wire(Valid(new PreparedRay(config)))
+  ray              := io.rays
+  ray.bits.context := free
+  io.isFree        := !isUsed.asUInt.andR
   when(io.rays.valid) {
     isUsed(free)   := true.B
     owners(free)   := io.rays.bits.context
@@ -70,29 +74,24 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
 
   // Trace
   io.requests :<>= fetch.requests
-  fetch.broadcasts := io.broadcasts
-  fetch.ray        := intersector.entered
-  fetch.fetches    := intersector.fetches
-  fetch.readyNext  := VecInit(intersector.nodesReadyNext, intersector.trianglesReadyNext, false.B)
+  fetch.broadcasts         := io.broadcasts
+  fetch.ray                := ray
+  fetch.fetches            := intersector.fetches
+  fetch.nodesReadyNext     := intersector.nodesReadyNext
+  fetch.trianglesReadyNext := intersector.trianglesReadyNext
+  fetch.start              := io.start
+  fetch.row                := io.row
+  fetch.scene              := io.scene
+  intersector.rays         := ray
+  intersector.isShadow     := isShadow
+  intersector.fetchError   := fetch.error
+  intersector.start        := io.start
+  intersector.scene        := io.scene
   intersector.nodes :<>= fetch.nodes
   intersector.triangles :<>= fetch.triangles
-  io.triangleLanes.zip(intersector.triangleLanes).foreach { case (lanes, port) => port :<>= lanes }
-  io.waitsForTriangles.zip(fetch.waitsForTriangles).foreach { case (waits, record) => waits := record }
-  intersector.fetchError := fetch.traversalError
-  fetch.hits.ready       := false.B
-  fetch.closestHit.hit   := DontCare
-  fetch.start            := io.start
-  fetch.row              := io.row
-  fetch.scene            := io.scene
-  intersector.start      := io.start
-  intersector.scene      := io.scene
-  control.isShadow       := isShadow
-  control.isPrimary      := VecInit.fill(contexts)(false.B)
-  control.askedNext      := 0.U.asTypeOf(control.askedNext)
-  control.resolved       := 0.U.asTypeOf(control.resolved)
-  control.measured       := 0.U.asTypeOf(control.measured)
-  control.shades         := false.B
-  control.ended.foreach(ended => when(ended.valid) { hasEnded(ended.bits) := true.B })
+  intersector.triangleLanes :<>= io.triangleLanes
+  io.waitsForTriangles := fetch.waitsForTriangles
+  intersector.ended.foreach(ended => when(ended.valid) { hasEnded(ended.bits) := true.B })
 
   // Results: the hit's details are read in one cycle, and the result leaves in the next
   private val result = Wire(Decoupled(new TraceResult(config.ofPaths)))
@@ -102,18 +101,16 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   private val reader = RegEnable(ended, reads)
   when(reads) { hasEnded(ended) := false.B }
   when(result.valid) { isUsed(reader) := false.B }
-  intersector.closestHit.grantNext.valid := reads
-  intersector.closestHit.grantNext.bits  := ended
-  intersector.closestHit.context         := reader
-  control.asked.valid                    := result.valid
-  control.asked.bits                     := reader
-  result.valid                           := RegNext(reads, false.B)
-  result.bits.context                    := owners(reader)
-  result.bits.hasHit                     := control.hasHit
-  result.bits.occlusion                  := control.occlusion
-  result.bits.hit                        := intersector.closestHit.hit
+  intersector.outcome.context.valid := reads
+  intersector.outcome.context.bits  := ended
+  result.valid                      := RegNext(reads, false.B)
+  result.bits.context               := owners(reader)
+  result.bits.hasHit                := intersector.outcome.hasHit
+  result.bits.occlusion             := intersector.outcome.occlusion
+  result.bits.hit                   := intersector.outcome.hit
   queue.io.enq :<>= result
   io.results :<>= queue.io.deq
 
-  io.events := UnitCounters(config, None, intersector, fetch)
+  io.events.intersector := intersector.events
+  io.events.fetch       := fetch.events
 }

@@ -10,7 +10,7 @@ import colonnade.formats.Banks
   * broadcast. With snooping, a row waits only for a record that is being read.
   */
 class ColumnBvhControllerProof(config: ColonnadeConfig) extends Module {
-  private val rows     = config.array.rows
+  private val rows     = config.recordRequesters
   private val banks    = config.columnBvhMemory.banks
   private val capacity = config.columnBvhMemory.readLatency + 1
 

@@ -13,7 +13,7 @@ import scala.util.Random
 
 /** The controller with its memory. */
 class ControllerAndMemory(config: ColonnadeConfig) extends Module {
-  val requests   = IO(Vec(config.array.rows, Flipped(Decoupled(new RecordRequest(config)))))
+  val requests   = IO(Vec(config.recordRequesters, Flipped(Decoupled(new RecordRequest(config)))))
   val broadcasts = IO(Output(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config)))))
   val load       = IO(Flipped(Valid(new Load(config))))
   val reads      = IO(Output(UInt(8.W)))
@@ -34,8 +34,9 @@ class ControllerAndMemory(config: ColonnadeConfig) extends Module {
 class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
   behavior of "ColumnBvhController"
 
+  /** With `rows` requesters: the path unit is one of them. */
   private def config(rows: Int, banks: Int, latency: Int, depth: Int = 61): ColonnadeConfig = TestConfigs.tiny.copy(
-    array = TestConfigs.tiny.array.copy(rows = rows),
+    array = TestConfigs.tiny.array.copy(rows = rows - 1),
     columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(depth = depth, banks = banks, readLatency = latency)
   )
 
@@ -58,7 +59,7 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
     dut.load.valid.poke(false)
   }
 
-  for ((rows, banks, latency) <- Seq((1, 1, 1), (3, 2, 1), (10, 2, 3), (4, 4, 6))) {
+  for ((rows, banks, latency) <- Seq((2, 1, 1), (3, 2, 1), (10, 2, 3), (4, 4, 6))) {
     it should s"serve $rows rows from $banks banks of latency $latency, and count" in {
       val configuration = config(rows, banks, latency)
       val depth         = configuration.columnBvhMemory.depth

@@ -85,12 +85,13 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private val tiny = TestConfigs.tiny
 
-  private def withPaths(config: ColonnadeConfig, contexts: Int, marches: Int = 0): ColonnadeConfig =
-    config.copy(units = config.units.copy(pathContexts = contexts, marches = marches))
+  private def withPaths(config: ColonnadeConfig, contexts: Int): ColonnadeConfig =
+    config.copy(units = config.units.copy(pathContexts = contexts))
 
   private val narrow = TestConfigs.withPrecision(16, 16, 32)
 
   render("a tree, snooping, eight paths", withPaths(tiny, 8))
+  render("timing slices", TestConfigs.withShortPaths(withPaths(tiny, 8)))
   render(
     "no tree, one context, one path, no snooping",
     withPaths(narrow, 1).copy(
@@ -103,18 +104,17 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
   )
   render(
     "an environment, five paths",
-    withPaths(TestConfigs.withEnvironment(TestConfigs.environment), 5, marches = 1)
+    withPaths(TestConfigs.withEnvironment(TestConfigs.environment), 5)
   )
   render(
     "two rows that share triangle units, pipelines, many paths, corner colours and emission, an environment", {
       val coloured = TestConfigs.withColours.head
-      withPaths(coloured, 24, marches = 2).copy(
+      withPaths(coloured, 24).copy(
         array = tiny.array.copy(rows = 2),
         physicalAttributeMemory = Some(TestConfigs.environment),
         frame = coloured.frame.copy(emission = true),
         units = tiny.units.copy(
           marches = 2,
-          directView = true,
           pathContexts = 24,
           pipelined = true,
           triangleRows = 2,
@@ -138,7 +138,7 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
   )
   render(
     "an environment, one context, one path, no bounces",
-    withPaths(narrow, 1, marches = 1).copy(
+    withPaths(narrow, 1).copy(
       array = tiny.array.copy(contexts = 1),
       frame = tiny.frame.copy(lights = 1, maxBounces = 0, hits = false),
       physicalAttributeMemory = Some(TestConfigs.environment)

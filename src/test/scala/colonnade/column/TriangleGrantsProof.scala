@@ -4,11 +4,11 @@ import chisel3._
 import chisel3.util.{log2Ceil, PopCount, Queue}
 
 /** Drives [[TriangleGrants]] with rows that wait, and send what they may, at any time, and a queue that triangle units empty
-  * at any time. As in [[SharedTriangles]], the units take a record in the cycle after they announce it, and perhaps earlier.
+  * at any time. As in [[TriangleGroup]], the units take a record in the cycle after they announce it, and perhaps earlier.
   */
 class TriangleGrantsProof(count: Int) extends Module {
   private val dut   = Module(new TriangleGrants(count)).io
-  private val queue = Module(new Queue(UInt(1.W), SharedTriangles.places, flow = true)).io
+  private val queue = Module(new Queue(UInt(1.W), TriangleGroup.queueDepth, flow = true)).io
 
   val waits     = IO(Input(UInt(count.W)))
   val sends     = IO(Input(UInt(count.W)))
@@ -34,5 +34,5 @@ class TriangleGrantsProof(count: Int) extends Module {
 
   private val granted = RegNext(dut.grant, 0.U)
   cover(dut.grant.orR && granted.orR && dut.grant =/= granted, "two rows in two cycles")
-  cover(queue.count === SharedTriangles.places.U && dut.grant.orR, "a grant to a queue that empties")
+  cover(queue.count === TriangleGroup.queueDepth.U && dut.grant.orR, "a grant to a queue that empties")
 }

@@ -13,7 +13,7 @@ import scala.util.Random
 /** The pipeline with its maps; each wide port is one number. */
 private class DirectViewHarness(config: ColonnadeConfig) extends Module {
   private val pipeline = Module(new DirectView(config))
-  private val maps     = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
+  private val maps     = Module(new PhysicalAttributeMemory(config, 1, tagBits = 0))
 
   val load      = IO(Flipped(Valid(new Load(config))))
   val view      = IO(Input(UInt(pipeline.io.view.getWidth.W)))
@@ -37,13 +37,10 @@ private class DirectViewHarness(config: ColonnadeConfig) extends Module {
 class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "DirectView"
 
-  private def shared(config: ColonnadeConfig) =
-    config.copy(units = config.units.copy(marches = 1, directView = true))
-
   private val configs =
     Seq(0, 4, 1).map(TestConfigs.formats).map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment)))
 
-  for ((config, seed) <- configs.map(shared).zipWithIndex) {
+  for ((config, seed) <- configs.zipWithIndex) {
     val size = config.physicalAttributeMemory.get
 
     it should s"see what the march sees: ${config.precision}, maps of ${size.width}x${size.height}" taggedAs Always.unless(
@@ -97,7 +94,7 @@ class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
       willing: Double,
       isSlow:  Boolean
   ): Seq[Map[String, BigInt]] = {
-    val (order, answer) = (new Packed(new RowOrder(config)), new Packed(new RowAnswer(config)))
+    val (order, answer) = (new Packed(new MarchOrder(config)), new Packed(new MarchAnswer(config)))
     val isTest          = rays.map(_ => random.nextBoolean())
     dut.isSlow.poke(isSlow)
     var sent      = 0
@@ -109,15 +106,11 @@ class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
       val sends = mayOrder && sent < rays.size && (willing == 1 || random.nextInt(4) > 0)
       dut.order.valid.poke(sends)
       if (sends) {
-        val fields = (rays(sent).fields - "context" - "isDirectView").map { case (name, value) =>
-          s"order.$name" -> value
-        }
-        dut.order.bits.poke(order.pack(fields ++ Map(
-          "row"                               -> BigInt(0),
-          "order.request.context"             -> BigInt(rays(sent).context),
-          "order.request.isDirectView"        -> BigInt(1),
-          "order.request.isFresnelReflection" -> BigInt(sent % 2),
-          "order.request.isOcclusionTest"     -> BigInt(if (isTest(sent)) 1 else 0)
+        dut.order.bits.poke(order.pack(rays(sent).fields - "context" - "isDirectView" ++ Map(
+          "request.context"             -> BigInt(rays(sent).context),
+          "request.isDirectView"        -> BigInt(1),
+          "request.isFresnelReflection" -> BigInt(sent % 2),
+          "request.isOcclusionTest"     -> BigInt(if (isTest(sent)) 1 else 0)
         )))
         sent += 1
       }
@@ -142,7 +135,7 @@ class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
       ).map(MarchCase.answer.zip(_).toMap)
     for ((((bits, expected), ray), index) <- found.zip(expected).zip(rays).zipWithIndex) {
       val values = answer.unpack(bits).map { case (name, value) =>
-        name.replace("answer.", "").replace("surface.", "") -> value
+        name.replace("surface.", "") -> value
       }
       val isHit = if (isTest(index)) expected("hidesObject") == 1 else expected("kind") == HitKind.map
       assert(values("isHit") == (if (isHit) 1 else 0), s"of $ray in $view")

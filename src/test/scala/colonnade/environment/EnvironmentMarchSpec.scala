@@ -15,7 +15,7 @@ import scala.util.Random
 private class EnvironmentMarchHarness(config: ColonnadeConfig)
     extends PackedUnit(new MarchRequest(config), new MarchResult(config)) {
   private val march = Module(new EnvironmentMarch(config))
-  private val maps  = Module(new PhysicalAttributeMemory(config, 1, AttributePort.tagBits(config)))
+  private val maps  = Module(new PhysicalAttributeMemory(config, 1, tagBits = 0))
 
   val load   = IO(Flipped(Valid(new Load(config))))
   val view   = IO(Input(UInt(march.io.view.getWidth.W)))
@@ -47,7 +47,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     val (request, result) = (new Packed(new MarchRequest(config)), new Packed(new MarchResult(config)))
     unit.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
-    val inputs = rays.map(ray => request.pack(ray.fields))
+    val inputs = rays.map(ray => request.pack(ray.fields - "isDirectView"))
     val found  = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),
       (port: UInt) => port.peekInt()
@@ -85,8 +85,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             scene.words,
             camera.view,
-            Seq.fill(60)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.behindBox(camera)) ++
-              Seq.fill(30)(stimulus.fromCamera(camera)),
+            Seq.fill(60)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.behindBox(camera)),
             random,
             isSlow = round == 1
           )
@@ -107,7 +106,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             image.words,
             camera.view,
-            Seq.fill(30)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.fromCamera(camera)),
+            Seq.fill(30)(stimulus.inRoom(camera)),
             random,
             isSlow = round == 1
           )
@@ -116,7 +115,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             image.words,
             stimulus.anyView(),
-            Seq.fill(20)(stimulus.anyRay()) ++ Seq.fill(20)(stimulus.anyPixel()),
+            Seq.fill(20)(stimulus.anyRay()),
             random,
             isSlow = round == 1
           )
@@ -132,8 +131,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             illegal.words,
             if (round < 4) camera.view else stimulus.wildView(),
-            Seq.fill(20)(stimulus.inRoom(camera)) ++ Seq.fill(10)(stimulus.fromCamera(camera)) ++
-              Seq.fill(20)(stimulus.anyRay()) ++ Seq.fill(20)(stimulus.wildPixel()),
+            Seq.fill(20)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.anyRay()),
             random,
             isSlow = round == 1
           )

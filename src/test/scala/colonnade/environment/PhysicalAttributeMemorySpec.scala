@@ -10,7 +10,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** The maps of a device with several units: a copy in the only column, or copies that columns share. */
+/** The maps of a device with several marches: a copy in the only column, or copies that columns share. */
 private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
   val load    = IO(Flipped(Valid(new Load(config))))
   val columns = Seq.fill(config.array.columns)(Module(new ColumnEnvironment(config)).io)
@@ -19,7 +19,7 @@ private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
   events.zip(columns).foreach { case (port, column) => port := column.events }
 
   for (ports <- columns.flatMap(_.shared).grouped(config.columnsPerCopy)) {
-    val tagBits = AttributeArbiter.tagBits(config.array.rows, AttributePort.tagBits(config))
+    val tagBits = AttributeArbiter.tagBits(config.mapRequesters)
     val maps    = Module(new PhysicalAttributeMemory(config, ports.size, tagBits))
     maps.io.load := load
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
@@ -34,23 +34,26 @@ private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
 class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "PhysicalAttributeMemory"
 
-  private def config(encoding: MapEncoding, rows: Int, columns: Int): ColonnadeConfig = {
+  private def config(encoding: MapEncoding, marches: Int, columns: Int): ColonnadeConfig = {
     val environment =
       TestConfigs.withEnvironment(TestConfigs.environment.copy(encoding = encoding, columnsPerCopy = 2))
-    environment.copy(array = environment.array.copy(rows = rows, columns = columns))
+    environment.copy(
+      array = environment.array.copy(columns = columns),
+      units = environment.units.copy(marches = marches)
+    )
   }
 
   for (
-    (encoding, rows, columns) <- Seq(
+    (encoding, marches, columns) <- Seq(
       (MapEncoding.TwoLevel, 1, 1),
       (MapEncoding.TwoLevel, 10, 1),
       (MapEncoding.Sliding, 3, 1),
       (MapEncoding.TwoLevel, 4, 3)
     )
-  ) it should s"give each unit its own responses: $rows rows, $columns columns, ${encoding.name}" in {
+  ) it should s"give each march its own responses: $marches marches, $columns columns, ${encoding.name}" in {
     val count       = 60
-    val random      = new Random(rows)
-    val shape       = config(encoding, rows, columns)
+    val random      = new Random(marches)
+    val shape       = config(encoding, marches, columns)
     val environment = new EnvironmentStimulus(shape, random)
     test(new EnvironmentHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
       environment.load(dut.load, dut.clock)
@@ -65,7 +68,7 @@ class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester
         channels.zip(names.zip(exchanges)).map { case (channel, (name, exchanges)) =>
           // Some units send requests all the time, others now and then
           val offered = if (unit % 3 == 0) 1.0 else 0.1
-          new ChannelTester(s"$name of unit $unit", channel, AttributePort.tagBits(shape), exchanges, offered, random)
+          new ChannelTester(s"$name of unit $unit", channel, tagBits = 0, exchanges, offered, random)
         }
       }
       var reads            = Seq.fill(4)(0)
@@ -74,7 +77,7 @@ class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester
         reads = reads.zip(now).map { case (sum, event) => sum + event.peekInt().toInt }
       }
       ChannelTester.run(dut.clock, testers.flatten, () => addReads())
-      assert(reads == Seq.fill(4)(count * rows * columns))
+      assert(reads == Seq.fill(4)(count * (marches + 1) * columns))
     }
   }
 }

@@ -64,24 +64,16 @@ class PixelMixerSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "give every pixel of both tiles once, with at most some of the environment in flight" in {
-    for (most <- Seq(1, 5, 40)) test(new PixelMixer(config, Some(most))) { dut =>
+    for (most <- Seq(1, 5, 40)) test(new PixelMixer(config, most)) { dut =>
       val random = new Random(most)
       for (offering <- Seq(0.4, 1.0)) mix(dut, (150, 200), most, 0.3, offering, random)
     }
   }
 
   it should "let the environment go first until so many are in flight" in {
-    test(new PixelMixer(config, Some(8))) { dut =>
+    test(new PixelMixer(config, 8)) { dut =>
       val order = mix(dut, (30, 8), 8, 0.05, 1.0, new Random(1))
       assert(order == Seq.fill(8)(true) ++ Seq.fill(30)(false))
-    }
-  }
-
-  it should "take turns without a limit" in {
-    test(new PixelMixer(config, None)) { dut =>
-      val order = mix(dut, (20, 20), 1000, 1.0, 1.0, new Random(1))
-      assert(order == Seq.fill(20)(Seq(true, false)).flatten)
-      mix(dut, (100, 200), 1000, 0.5, 0.5, new Random(2))
     }
   }
 }

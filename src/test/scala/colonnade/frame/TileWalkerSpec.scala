@@ -10,27 +10,27 @@ import scala.util.Random
 class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "TileWalker"
 
-  private def config(rows: Int, tileSize: Int, base: ColonnadeConfig = TestConfigs.tiny): ColonnadeConfig =
-    base.copy(array = base.array.copy(rows = rows), frame = base.frame.copy(tileSize = tileSize))
+  private def config(tileSize: Int, base: ColonnadeConfig = TestConfigs.tiny): ColonnadeConfig =
+    base.copy(frame = base.frame.copy(tileSize = tileSize))
 
-  /** Walks tiles; returns positions with their row in order of time, and the cycles. Background pixels have row -1;
-    * `meets` is called with the flag of each pixel for the render units.
+  /** Walks tiles; returns positions in order of time, with whether they are rendered, and the cycles. `meets` is called with
+    * the flag of each pixel that is rendered.
     */
   private def walk(
       dut:      TileWalker,
       size:     (Int, Int),
       tileSize: Int,
       tiles:    Seq[(Int, Int)],
-      isReady:  Int => Boolean,
+      isReady:  Boolean => Boolean,
       edge:     (Int, Int, Int) = (0, 0, 0),
       meets:    ((Int, Int), Boolean) => Unit = (_, _) => ()
-  ): (Seq[(Int, (Int, Int))], Int) = {
+  ): (Seq[(Boolean, (Int, Int))], Int) = {
     val outline = Outline.within(size, edge)
     dut.io.frame.pixelsWide.poke(size._1)
     dut.io.frame.pixelsHigh.poke(size._2)
     outline.poke(dut.io.frame)
     var waiting   = tiles
-    var positions = Vector.empty[(Int, (Int, Int))]
+    var positions = Vector.empty[(Boolean, (Int, Int))]
     var cycles    = 0
     while (waiting.nonEmpty || !dut.io.isIdle.peekBoolean()) {
       dut.io.tiles.valid.poke(waiting.nonEmpty)
@@ -39,13 +39,13 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.tiles.bits.y.poke(y)
         outline.pokeValues(dut.io.tiles.bits.edgeValues, tileSize)(x, y)
       }
-      for ((port, row) <- (dut.io.others +: dut.io.positions).zip(-1 until dut.io.positions.size)) {
-        val ready = isReady(row)
+      for ((port, isRendered) <- Seq(dut.io.others -> false, dut.io.positions -> true)) {
+        val ready = isReady(isRendered)
         port.ready.poke(ready)
         if (ready && port.valid.peekBoolean()) {
-          positions :+= row -> (port.bits.x.peekInt().toInt, port.bits.y.peekInt().toInt)
-          if (row >= 0)
-            dut.io.positions(row).bits.meetsObject.foreach(claim => meets(positions.last._2, claim.peekBoolean()))
+          positions :+= isRendered -> (port.bits.x.peekInt().toInt, port.bits.y.peekInt().toInt)
+          if (isRendered)
+            dut.io.positions.bits.meetsObject.foreach(claim => meets(positions.last._2, claim.peekBoolean()))
         }
       }
       if (waiting.nonEmpty && dut.io.tiles.ready.peekBoolean()) waiting = waiting.tail
@@ -64,7 +64,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (tileSize <- Seq(4, 32)) {
     it should s"walk tiles of $tileSize in Morton order without a gap" in {
       val tiles = Seq((0, 0), (tileSize, 0), (2 * tileSize, 3 * tileSize))
-      test(new TileWalker(config(rows = 1, tileSize))) { dut =>
+      test(new TileWalker(config(tileSize))) { dut =>
         dut.clock.setTimeout(0)
         val (positions, cycles) = walk(dut, (640, 480), tileSize, tiles, _ => true)
         assert(positions.map(_._2) == tiles.flatMap(pixels((640, 480), _, tileSize)))
@@ -73,20 +73,34 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "spread neighbours over the rows" in {
-    test(new TileWalker(config(rows = 4, tileSize = 8))) { dut =>
-      val (positions, _) = walk(dut, (640, 480), 8, Seq((8, 16)), _ => true)
-      assert(positions.map(_._1) == Seq.tabulate(64)(_ % 4))
+  it should "walk on while pixels outside the outline wait" in {
+    test(new TileWalker(config(tileSize = 8))) { dut =>
+      val tile           = Seq((0, 0))
+      val sees           = (pixel: (Int, Int)) => pixel._1 >= 4 // behind the others in Morton order
+      var cycle          = 0
+      val (positions, _) = walk(
+        dut,
+        (640, 480),
+        8,
+        tile,
+        isRendered => {
+          cycle += 1
+          isRendered || cycle > 400
+        },
+        edge = (1, 0, -4)
+      )
+      val (rendered, others) = positions.map(_._2).partition(sees)
+      assert(positions.map(_._2) == rendered ++ others && others.size == 32)
     }
   }
 
   for {
-    (hasWindow, claim) <- Seq(false -> "sort out the pixels", true -> "give units the room's window, too,")
+    (hasWindow, claim) <- Seq(false -> "sort out the pixels", true -> "render the room's window, too,")
     shortPaths         <- Seq(false, true)
   }
-    it should s"$claim outside the outline, whichever unit is ready, short paths $shortPaths" in {
+    it should s"$claim outside the outline, whichever side is ready, short paths $shortPaths" in {
       val random = new Random(3)
-      val plain  = config(rows = 3, tileSize = 8, TestConfigs.withEnvironment(TestConfigs.environment))
+      val plain  = config(tileSize = 8, TestConfigs.withEnvironment(TestConfigs.environment))
       test(new TileWalker(if (shortPaths) TestConfigs.withShortPaths(plain) else plain)) {
         dut =>
           val window = dut.io.window
@@ -107,27 +121,27 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
               (640, 480),
               tileSize = 8,
               tiles,
-              row => random.nextInt(3 + 2 * row + 2) == 0,
+              isRendered => random.nextInt(if (isRendered) 5 else 3) == 0,
               edge = (3, -2, -9),
               (pixel, meets) => claims += pixel -> meets
             )
-          val (others, units)     = positions.partition(_._1 < 0)
+          val (rendered, others)  = positions.partition(_._1)
           val expected            = tiles.flatMap(pixels((640, 480), _, size))
           val sees                = (pixel: (Int, Int)) => 3 * pixel._1 - 2 * pixel._2 - 9 >= 0
           val (isTaken, isOthers) = expected.partition(pixel => inWindow(pixel) || sees(pixel))
-          assert(units.map(_._2).sorted == isTaken.sorted)
+          assert(rendered.map(_._2) == isTaken)
           assert(others.map(_._2) == isOthers)
           assert(claims == isTaken.map(pixel => pixel -> sees(pixel)).toMap)
           assert(expected.exists(sees) && !expected.forall(sees))
       }
     }
 
-  it should "give every pixel of clipped tiles once, whichever unit is ready" in {
+  it should "give every pixel of clipped tiles once" in {
     val random = new Random(2)
     val size   = (21, 10)
     val tiles  = Seq((0, 0), (8, 0), (16, 0), (0, 8), (8, 8), (16, 8))
-    for (rows <- Seq(1, 3, 10)) test(new TileWalker(config(rows, tileSize = 8))) { dut =>
-      val (positions, _) = walk(dut, size, 8, tiles, row => random.nextInt(5 + 20 * row.max(0)) == 0)
+    test(new TileWalker(config(tileSize = 8))) { dut =>
+      val (positions, _) = walk(dut, size, 8, tiles, _ => random.nextInt(5) == 0)
       val expected       = tiles.flatMap(pixels(size, _, 8))
       assert(positions.map(_._2).sorted == expected.sorted)
     }

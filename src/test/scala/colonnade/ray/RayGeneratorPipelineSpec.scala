@@ -180,10 +180,10 @@ object RayGeneratorPipelineSpec {
     def any(bits:     Int): BigInt       = BigInt(bits, random) - (BigInt(1) << (bits - 1))
     val maxShift                         = numbers.coordinateBits
     Seq(least, most).map(v =>
-      Frame(vector(v), vector(v), vector(v), vector(v), maxShift, numbers.mostUnitShift)
+      Frame(vector(v), vector(v), vector(v), vector(v), maxShift, numbers.maxUnitShift)
     ) ++
       Seq.fill(4) {
-        val unitShift = random.nextInt(numbers.mostUnitShift + 1)
+        val unitShift = random.nextInt(numbers.maxUnitShift + 1)
         val position  = vector(any(numbers.macBits.min(numbers.sceneBits - unitShift)))
         def steps     = vector(any(numbers.macBits))
         Frame(position, steps, steps, steps, random.nextInt(maxShift + 1), unitShift)

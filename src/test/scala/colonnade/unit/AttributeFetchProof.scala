@@ -78,9 +78,9 @@ class AttributeFetchProof(config: ColonnadeConfig, slots: Int) extends Module {
 
   // No hang: if the bank has answered and the shader is ready, something happens soon
   private val progress = answer.valid || dut.error.valid || dut.requests.valid || held =/= 0.U || !readyNext
-  private val quiet    = RegInit(0.U(log2Ceil(mostQuiet + 2).W))
+  private val quiet    = RegInit(0.U(log2Ceil(maxQuiet + 2).W))
   quiet := Mux(pending.asUInt.orR && !progress, quiet + 1.U, 0.U)
-  assert(quiet <= mostQuiet.U, "a hit is answered")
+  assert(quiet <= maxQuiet.U, "a hit is answered")
 
   private val reads = RegInit(0.U(4.W))
   reads := reads + dut.requests.fire
@@ -98,5 +98,5 @@ object AttributeFetchProof {
   private val capacity = 2
 
   /** Cycles without progress of a pending hit: the queue, its slot, its record and the grant. */
-  private val mostQuiet = 4
+  private val maxQuiet = 4
 }

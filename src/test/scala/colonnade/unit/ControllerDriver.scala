@@ -65,11 +65,10 @@ private class ControllerDriver(
       // Each stage names one context, and no two stages name the same one
       val (starting, passing) = random.shuffle(at(ContextState.raySetup)).partition(!contexts(_).bypasses)
       for (context <- starting.headOption if happens)
-        if (random.nextInt(3) > 0) events.entered = Some(context) else events.ended(0) = Some(context)
+        if (random.nextInt(3) > 0) events.entered = Some(context) else events.missesBox = Some(context)
       for (context <- passing.headOption if happens) events.bypasses = Some(context)
       val traversing = random.shuffle(at(ContextState.traversing))
-      for (context <- traversing.headOption if happens) events.ended(1) = Some(context)
-      for (context <- traversing.drop(1).headOption if happens) events.ended(2) = Some(context)
+      for (context <- traversing.headOption if happens) events.hasResult = Some(context)
       val shading = random.shuffle(at(ContextState.shading))
       for (context <- shading.headOption if happens) finishShading(context, events)
       for (context <- shading.drop(1).find(contexts(_).willBounce.isEmpty) if happens && random.nextInt(3) == 0)
@@ -99,18 +98,19 @@ private class ControllerDriver(
   def cycle(happen: ControllerEvents => Unit): Unit = {
     dut.io.idleCount.expect(at(ContextState.idle).size)
     val free     = shown(dut.io.allocation.free.valid, dut.io.allocation.free.bits, at(ContextState.idle))
-    val resolved = shown(dut.io.trace.resolved.valid, dut.io.trace.resolved.bits, at(ContextState.resolve))
+    val resolved = shown(dut.io.trace.query.valid, dut.io.trace.query.bits, at(ContextState.resolve))
     val done     = shown(dut.io.pixel.done.valid, dut.io.pixel.done.bits, at(ContextState.done))
     val shadowed = shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow)
     val ended    = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
     for (index <- resolved) {
       dut.io.trace.hasHit.poke(contexts(index).hasHit)
       dut.io.trace.occlusion.poke(contexts(index).occlusion)
+      dut.io.trace.isPrimary.expect(contexts(index).isPrimary)
     }
     // The hit of an occlusion test is not read together with that of a surface
     val shades =
       resolved.exists(index => !contexts(index).isShadow && contexts(index).hasHit && !contexts(index).mayBeHidden)
-    dut.io.trace.shades.expect(shades)
+    dut.io.trace.startsShading.expect(shades)
     // Rays from the camera go before others; each kind only if it is accepted
     val accepts = dut.io.environment.toSeq.flatMap { environment =>
       Seq(environment.accepts.directView, environment.accepts.march).map { port =>
@@ -135,8 +135,6 @@ private class ControllerDriver(
       _.expect(at(ContextState.environmentPending).size + at(ContextState.environmentMarch).size)
     )
     for ((context, index) <- contexts.zipWithIndex if context.state != ContextState.idle) {
-      dut.io.trace.isShadow(index).expect(context.isShadow, s"context $index at ${context.state}")
-      dut.io.trace.isPrimary(index).expect(context.isPrimary, s"context $index at ${context.state}")
       context.waited += 1
       assert(context.waited < 2000, s"context $index is stuck in ${context.state}")
     }
@@ -168,8 +166,8 @@ private class ControllerDriver(
     for (environment <- dut.io.environment) environment.occlusion.poke(occlusion)
     events.poke(dut, allocated.nonEmpty, retires.nonEmpty, hasEnvironment)(random.nextInt(count))
     val measured = marched.filter(index => events.march && contexts(index).isOcclusionTest)
-    dut.io.trace.measured.valid.expect(measured.nonEmpty)
-    for (index <- measured) dut.io.trace.measured.bits.expect(index)
+    dut.io.trace.readsDistance.valid.expect(measured.nonEmpty)
+    for (index <- measured) dut.io.trace.readsDistance.bits.expect(index)
     dut.clock.step()
 
     def change(index: Option[Int])(how: ContextModel => Unit): Unit = index.foreach(index => how(contexts(index)))
@@ -187,7 +185,7 @@ private class ControllerDriver(
     }
     change(events.entered)(_.state = ContextState.traversing)
     change(resolved)(resolve)
-    events.ended.flatten.foreach { index =>
+    (events.missesBox ++ events.hasResult).foreach { index =>
       val context = contexts(index)
       context.state = ContextState.resolve
       context.hasHit = random.nextBoolean()

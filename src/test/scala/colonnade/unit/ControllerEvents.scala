@@ -9,7 +9,8 @@ private class ControllerEvents {
   var allocate    = false
   var retire      = false
   var entered     = Option.empty[Int]
-  val ended       = Array.fill(3)(Option.empty[Int])
+  var missesBox   = Option.empty[Int]
+  var hasResult   = Option.empty[Int]
   var shaded      = Option.empty[(Int, Seq[Boolean])]
   var bounced     = Option.empty[(Int, Boolean)]
   var isInside    = false
@@ -38,7 +39,8 @@ private class ControllerEvents {
     dut.io.shadow.ready.poke(shadow)
     dut.io.end.ready.poke(end)
     name(dut.io.trace.entered, entered)
-    dut.io.trace.ended.zip(ended).foreach { case (port, context) => name(port, context) }
+    name(dut.io.trace.missesBox, missesBox)
+    name(dut.io.trace.hasResult, hasResult)
     dut.io.shaded.valid.poke(shaded.nonEmpty)
     for ((context, needs) <- shaded) {
       dut.io.shaded.bits.context.poke(context)

@@ -14,8 +14,7 @@ import scala.util.Random
 class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "EnvironmentPort"
 
-  private val room   = TestConfigs.withEnvironment(TestConfigs.environment)
-  private val config = room.copy(units = room.units.copy(marches = 1))
+  private val config = TestConfigs.withEnvironment(TestConfigs.environment)
 
   it should "route each primary ray once, and store the last ray of each context" in
     test(new EnvironmentPortHarness(config)) { dut =>
@@ -70,14 +69,14 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
       // Ask for them
       port.primary.valid.poke(false)
       port.bounces.get.ray.valid.poke(false)
-      port.marches.get.march.ready.poke(true)
+      port.marches.march.ready.poke(true)
       for ((context, expected) <- stored) {
         port.control.req.valid.poke(true)
         port.control.req.bits.context.poke(context)
         port.control.req.ready.expect(true)
         dut.clock.step()
         port.control.req.valid.poke(false)
-        port.marches.get.march.valid.expect(true)
+        port.marches.march.valid.expect(true)
         dut.clock.step()
         val found = new Packed(new EnvironmentRay(config)).unpack(dut.order.peekInt())
         for ((name, value) <- expected) assert(found(name) == value, s"$name of context $context")
@@ -93,9 +92,9 @@ private class EnvironmentPortHarness(config: ColonnadeConfig) extends Module {
   val io      = IO(chiselTypeOf(unit))
   val primary = IO(Input(UInt(unit.primary.bits.getWidth.W)))
   val bounce  = IO(Input(UInt(unit.bounces.get.ray.bits.getWidth.W)))
-  val order   = IO(Output(UInt(unit.marches.get.order.ray.getWidth.W)))
+  val order   = IO(Output(UInt(unit.marches.order.ray.getWidth.W)))
   io :<>= unit
   unit.primary.bits         := primary.asTypeOf(unit.primary.bits)
   unit.bounces.get.ray.bits := bounce.asTypeOf(unit.bounces.get.ray.bits)
-  order                     := unit.marches.get.order.ray.asUInt
+  order                     := unit.marches.order.ray.asUInt
 }

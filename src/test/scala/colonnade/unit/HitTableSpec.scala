@@ -44,9 +44,11 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
       driver.begin(context = 1, tMax = 100, isShadow = true)
       driver.offer(1, driver.result(t = 100, id = 0))
-      dut.io.hasHit(1).expect(false)
+      driver.check()
+      assert(!driver.hasHit(1))
       driver.offer(1, driver.result(t = 99, id = 9))
-      dut.io.hasHit(1).expect(true)
+      driver.check()
+      assert(driver.hasHit(1))
     }
 
   it should "let a shadow ray pass transmissive triangles, and record them" in
@@ -54,11 +56,11 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
       driver.begin(context = 1, tMax = 100, isShadow = true)
       driver.offer(1, driver.result(t = 30, id = 0, isTransmissive = true))
-      dut.io.hasHit(1).expect(false)
-      dut.io.occlusions(1).expect(Occlusion.transmissive)
+      driver.check()
+      assert(driver.occlusion(1) == Occlusion.transmissive)
       driver.offer(1, driver.result(t = 60, id = 4))
-      dut.io.hasHit(1).expect(true)
-      dut.io.occlusions(1).expect(Occlusion.opaque)
+      driver.check()
+      assert(driver.occlusion(1) == Occlusion.opaque)
     }
 
   it should "discard the hit of the previous ray" in
@@ -67,7 +69,8 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       driver.begin(context = 0, tMax = 100, isShadow = false)
       driver.offer(0, driver.result(t = 10, id = 1))
       driver.begin(context = 0, tMax = 50, isShadow = false)
-      dut.io.hasHit(0).expect(false)
+      driver.check()
+      assert(!driver.hasHit(0))
       driver.offer(0, driver.result(t = 20, id = 4))
       driver.check()
       assert(driver.best(0).get.id == 4)
@@ -111,9 +114,11 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
 
   dut.io.start.valid.poke(false)
   dut.io.result.valid.poke(false)
-  dut.io.granted.grantNext.valid.poke(true)
+  dut.io.outcome.context.valid.poke(true)
 
-  def best(context: Int): Option[Result] = traces(context).flatMap(_.best)
+  def best(context:      Int): Option[Result] = traces(context).flatMap(_.best)
+  def hasHit(context:    Int): Boolean        = traces(context).exists(_.hits.nonEmpty)
+  def occlusion(context: Int): Occlusion.Type = traces(context).get.occlusion
 
   def result(t: BigInt, id: BigInt, isHit: Boolean = true, isTransmissive: Boolean = false): Result = {
     val bits = config.numbers.barycentricBits
@@ -146,26 +151,23 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     assert(found == Model.answers(config, asked.map(Seq(_)), "limit").map(_.head))
   }
 
-  /** Checks every ray; the hit of a granted context comes one cycle later. */
+  /** Checks every ray; the outcome of a context comes one cycle later. */
   def check(): Unit = for ((trace, context) <- traces.zipWithIndex; ray <- trace) {
-    dut.io.hasHit(context).expect(ray.hits.nonEmpty, s"context $context, $ray")
     // Hits do not shorten a shadow ray
     for (reader <- dut.io.tMax) {
       reader.context.poke(context)
       tMaxUnits += (if (ray.isShadow) ray.tMax else ray.best.fold(ray.tMax)(_.t)) -> reader.units.peekRaw()
     }
-    if (ray.isShadow) dut.io.occlusions(context).expect(ray.occlusion)
+    val outcome = dut.io.outcome
+    outcome.context.bits.poke(context)
+    dut.clock.step()
+    outcome.hasHit.expect(ray.hits.nonEmpty, s"context $context, $ray")
+    if (ray.isShadow) outcome.occlusion.expect(ray.occlusion)
     for (hit <- ray.best if !ray.isShadow) {
-      dut.io.closest.context.poke(context)
-      assert(dut.io.closest.t.peekRaw() == hit.t, s"context $context, $ray")
-      assert(dut.io.closest.id.peekInt() == hit.id, s"context $context, $ray")
-      dut.io.granted.grantNext.bits.poke(context)
-      dut.clock.step()
-      dut.io.granted.context.poke(context)
-      assert(dut.io.granted.hit.t.peekRaw() == hit.t, s"context $context, $ray")
-      assert(dut.io.granted.hit.id.peekInt() == hit.id, s"context $context, $ray")
-      assert(dut.io.granted.hit.weights.map(_.peekRaw()) == hit.weights)
-      dut.io.granted.hit.backSide.expect(hit.backSide)
+      assert(outcome.hit.t.peekRaw() == hit.t, s"context $context, $ray")
+      assert(outcome.hit.id.peekInt() == hit.id, s"context $context, $ray")
+      assert(outcome.hit.weights.map(_.peekRaw()) == hit.weights)
+      outcome.hit.backSide.expect(hit.backSide)
     }
   }
 

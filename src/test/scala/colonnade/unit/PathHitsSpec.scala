@@ -130,8 +130,8 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     quiet += 1
     takeRay()
     result.foreach { context =>
-      trace.control.ended(1).valid.expect(true)
-      trace.control.ended(1).bits.expect(context)
+      trace.control.hasResult.valid.expect(true)
+      trace.control.hasResult.bits.expect(context)
       all(context).state = ended
       all(context).endedAt = cycle
     }
@@ -162,8 +162,8 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     val enters = trace.rays.bits.enters.peekBoolean()
     dut.io.rays.valid.expect(enters)
     trace.control.entered.valid.expect(enters)
-    trace.control.ended(0).valid.expect(!enters)
-    (if (enters) dut.io.rays.bits.context else trace.control.ended(0).bits).expect(context)
+    trace.control.missesBox.valid.expect(!enters)
+    (if (enters) dut.io.rays.bits.context else trace.control.missesBox.bits).expect(context)
     now.hasHit = false
     now.occlusion = Occlusion.none
     now.state = if (enters) traced else ended
@@ -197,17 +197,15 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     val now     = following
     following =
       if (chance(2)) one(in(ended).filter(other => all(other).endedAt < cycle && !now.contains(other))) else None
-    control.asked.valid.poke(now.nonEmpty)
-    control.asked.bits.poke(now.getOrElse(0))
-    control.askedNext.valid.poke(following.nonEmpty)
-    control.askedNext.bits.poke(following.getOrElse(0))
-    control.resolved.valid.poke(now.nonEmpty)
-    control.resolved.bits.poke(now.getOrElse(0))
+    control.query.valid.poke(now.nonEmpty)
+    control.query.bits.poke(now.getOrElse(0))
+    control.queryNext.valid.poke(following.nonEmpty)
+    control.queryNext.bits.poke(following.getOrElse(0))
     val shades = now.filter(all(_).hasHit)
-    control.shades.poke(shades.nonEmpty)
+    control.startsShading.poke(shades.nonEmpty)
     for (context <- now; other = all(context)) {
       other.isPrimary = random.nextBoolean()
-      control.isPrimary(context).poke(other.isPrimary)
+      control.isPrimary.poke(other.isPrimary)
       other.resolvedAt = cycle
       if (shades.isEmpty) retire(other)
       else other.state = shading
@@ -216,8 +214,8 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     measuring =
       if (shades.isEmpty && chance(2)) one(in(ended).filter(other => all(other).hasHit && all(other).endedAt < cycle))
       else None
-    control.measured.valid.poke(measuring.nonEmpty)
-    control.measured.bits.poke(measuring.getOrElse(0))
+    control.readsDistance.valid.poke(measuring.nonEmpty)
+    control.readsDistance.bits.poke(measuring.getOrElse(0))
     now
   }
 

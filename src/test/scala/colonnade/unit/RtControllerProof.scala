@@ -34,8 +34,8 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
   // Each stage answers for its contexts
   private val shaded  = (io.shaded.valid, io.shaded.bits.context)
   private val bounced = (io.bounced.valid, io.bounced.bits.context)
-  answer(Place.raySetup, (Seq(io.trace.entered, io.trace.ended(0)) ++ environment.map(_.bypass)).map(event))
-  answer(Place.traversal, io.trace.ended.tail.map(event))
+  answer(Place.raySetup, (Seq(io.trace.entered, io.trace.missesBox) ++ environment.map(_.bypass)).map(event))
+  answer(Place.traversal, Seq(event(io.trace.hasResult)))
   answer(Place.shader, Seq(shaded, bounced, event(io.fetchFailed)) ++ environment.map(_.fresnelReflection).map(event))
   answer(Place.march, environment.flatMap(march => Seq(march.hit, march.miss, march.visible)).map(event))
   answer(Place.colour, Seq(event(io.accumulated)))
@@ -62,27 +62,23 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
   }
 
   // Rays are traced
-  for ((path, context) <- paths.zipWithIndex)
-    when(path.isAt(Place.raySetup) || path.isAt(Place.traversal) || path.isAt(Place.toResolve)) {
-      assert(io.trace.isShadow(context) === path.isShadow, "a shadow ray or another one")
-      assert(io.trace.isPrimary(context) === path.isPrimary, "a primary ray or another one")
-    }
   on(io.trace.entered)(_.place := Place.traversal)
-  io.trace.ended.foreach(on(_)(_.place := Place.toResolve))
+  for (ended <- Seq(io.trace.missesBox, io.trace.hasResult)) on(ended)(_.place := Place.toResolve)
 
   // One ended ray is resolved
-  private val resolved = path(io.trace.resolved.bits)
+  private val resolved = path(io.trace.query.bits)
   private val isHit    = io.trace.hasHit && !resolved.isShadow
   private val tests    = isHit && resolved.needsTest
-  assume(!io.trace.resolved.valid || !resolved.isTest || io.trace.hasHit, "a visible hit stays a hit")
-  offer(Place.toResolve, event(io.trace.resolved), io.trace.resolved.valid, "an ended ray is resolved, once")
-  assert(io.trace.shades === (io.trace.resolved.valid && isHit && !tests), "a visible hit is shaded")
+  assume(!io.trace.query.valid || !resolved.isTest || io.trace.hasHit, "a visible hit stays a hit")
+  offer(Place.toResolve, event(io.trace.query), io.trace.query.valid, "an ended ray is resolved, once")
+  assert(!io.trace.query.valid || io.trace.isPrimary === resolved.isPrimary, "a primary ray or another one")
+  assert(io.trace.startsShading === (io.trace.query.valid && isHit && !tests), "a visible hit is shaded")
   if (isLarge) {
-    val next = io.trace.askedNext
-    assert(io.trace.resolved.valid === RegNext(next.valid, false.B), "the next ended ray is known")
-    assert(!io.trace.resolved.valid || io.trace.resolved.bits === RegNext(next.bits), "the next ended ray is that one")
+    val next = io.trace.queryNext
+    assert(io.trace.query.valid === RegNext(next.valid, false.B), "the next ended ray is known")
+    assert(!io.trace.query.valid || io.trace.query.bits === RegNext(next.bits), "the next ended ray is that one")
   }
-  on(io.trace.resolved) { path =>
+  on(io.trace.query) { path =>
     path.needsTest := false.B
     path.isTest    := tests
     path.mayBounce := true.B
@@ -190,7 +186,7 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
     }
     val isCamera = camera && environment.accepts.directView
     val isAny    = isCamera || (others && environment.accepts.march)
-    val waits    = asked.isTest && io.trace.shades
+    val waits    = asked.isTest && io.trace.startsShading
     assert(environment.req.valid === (isAny && !waits), "a ray that is accepted marches")
     when(isAny) {
       assert(request.context < used.U && asked.isAt(Place.toMarch), "a ray marches once")
@@ -199,8 +195,11 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
       assert(request.isFresnelReflection === asked.isReflection, "a march for a Fresnel reflection or another ray")
       assert(request.isOcclusionTest === asked.isTest, "an occlusion test or a march")
     }
-    assert(io.trace.measured.valid === (environment.req.fire && asked.isTest), "the hit of an occlusion test is read")
-    assert(!io.trace.measured.valid || io.trace.measured.bits === request.context, "the hit of that test")
+    assert(
+      io.trace.readsDistance.valid === (environment.req.fire && asked.isTest),
+      "the hit of an occlusion test is read"
+    )
+    assert(!io.trace.readsDistance.valid || io.trace.readsDistance.bits === request.context, "the hit of that test")
     on(environment.req.fire, request.context)(_.place := Place.march)
     on(environment.hit) { path =>
       path.isDirectView := path.isPrimary

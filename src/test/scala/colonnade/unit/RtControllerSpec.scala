@@ -45,18 +45,18 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     test(new RtController(config(contexts = 4))) { dut =>
       val rounds = new ControllerDriver(dut, count = 4, seed = 1)
       for (_ <- 0 until 3) rounds.cycle(_.allocate = true)
-      rounds.cycle(_.ended(1) = Some(0))
+      rounds.cycle(_.hasResult = Some(0))
       rounds.cycle(_.retire = true)
       dut.io.idleCount.expect(1)
       rounds.cycle { events =>
-        events.ended(0) = Some(1)
-        events.ended(2) = Some(2)
+        events.missesBox = Some(1)
+        events.hasResult = Some(2)
       }
       for (_ <- 0 until 2) {
-        dut.io.trace.resolved.valid.expect(true)
+        dut.io.trace.query.valid.expect(true)
         rounds.cycle(_.retire = true)
       }
-      dut.io.trace.resolved.valid.expect(false)
+      dut.io.trace.query.valid.expect(false)
       rounds.cycle(_.retire = true)
       dut.io.idleCount.expect(3)
     }

@@ -53,7 +53,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
       (changed("firstChild" -> most.toInt), 5, false),
       (changed(("firstChild" -> 0) +: leaves: _*), 5, true),
       (changed("kinds[3]" -> 3), 0, false),
-      (changed("exponent.y" -> (shape.numbers.mostExponent + 1)), 0, false)
+      (changed("exponent.y" -> (shape.numbers.maxExponent + 1)), 0, false)
     )
     test(new TraversalHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
       dut.io.steps.ready.poke(true)

@@ -48,11 +48,11 @@ class TraversalUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       array = tiny.array.copy(rows = 2, contexts = 3),
       units = tiny.units.copy(pathContexts = 5, triangleRows = 2, triangleLanes = 2)
     ),
-    "triangle units outside"
+    "triangle units of a group"
   )
 }
 
-/** Packs rays and results into one port each; adds the triangle units that rows share. */
+/** Packs rays and results into one port each; adds triangle units. */
 private class TraversalUnitHarness(config: ColonnadeConfig) extends Module {
   private val unit = Module(new TraversalUnit(config)).io
 
@@ -77,7 +77,7 @@ private class TraversalUnitHarness(config: ColonnadeConfig) extends Module {
   results.bits       := unit.results.bits.asUInt
   unit.results.ready := results.ready
   events             := unit.events
-  unit.triangleLanes.foreach(_ :<>= Module(new TriangleLanes(config)).io)
+  unit.triangleLanes :<>= Module(new TriangleLanes(config)).io
 }
 
 /** Traces random rays in a small scene.
@@ -181,7 +181,7 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
   /** The ray of each context of the path unit that is traced. */
   private val traced       = mutable.Map.empty[Int, Int]
   private var now          = 0
-  private var mostTraced   = 0
+  private var maxTraced    = 0
   private var enteredCount = 0
   private var hasIllegal   = false
 
@@ -221,7 +221,7 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
         traced(context) = sent
         sent += 1
       }
-      mostTraced = mostTraced.max(traced.size)
+      maxTraced = maxTraced.max(traced.size)
       countEvents()
       step()
     }
@@ -235,7 +235,7 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
     }
     dut.isFree.expect(true)
     // Results wait in a queue and in the test
-    assert(mostTraced >= contexts, "all contexts are used")
+    assert(maxTraced >= contexts, "all contexts are used")
     assert(enteredCount == rays.size && hasIllegal == isIllegal)
     val kinds = expected.groupBy(_._1).map { case (kind, all) => kind -> all.size }
     assert(expected.count(_._2.nonEmpty) > rays.size / 3 && kinds(Occlusion.opaque) > 3)
@@ -248,9 +248,10 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
   }
 
   private def countEvents(): Unit = {
-    if (dut.events.raysInBox.peekBoolean()) enteredCount += 1
-    if (dut.events.illegalRecord.peekBoolean()) hasIllegal = true
-    dut.events.stackOverflow.expect(false)
+    if (dut.events.intersector.raysInBox.peekBoolean()) enteredCount += 1
+    if (dut.events.intersector.illegalRecord.peekBoolean() || dut.events.fetch.illegalRecord.peekBoolean())
+      hasIllegal = true
+    dut.events.intersector.stackOverflow.expect(false)
   }
 
   private def check(fields: Fields): Unit = {

@@ -9,21 +9,21 @@ import org.scalatest.matchers.should.Matchers
 import scala.collection.mutable
 import scala.util.Random
 
-/** [[SharedTriangles]]: every row gets the results of its own records, whatever the others do. */
-class SharedTrianglesSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
-  behavior of "SharedTriangles"
+/** [[TriangleGroup]]: every row gets the results of its own records, whatever the others do. */
+class TriangleGroupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  behavior of "TriangleGroup"
 
-  for ((rows, lanes, stalls) <- Seq((3, 2, 3), (1, 1, 0)))
-    it should s"return each result to its row, with $rows rows on $lanes units, stalls $stalls" in {
+  for ((rows, of, lanes, stalls) <- Seq((3, 3, 2, 3), (1, 3, 1, 0), (1, 1, 2, 3)))
+    it should s"return each result to its row, with $rows of $of rows on $lanes units, stalls $stalls" in {
       val tiny   = TestConfigs.tiny
       val config = tiny.copy(
         array = tiny.array.copy(contexts = 3),
-        units = tiny.units.copy(triangleLanes = lanes, triangleRows = 3, pathContexts = 4)
+        units = tiny.units.copy(triangleLanes = lanes, triangleRows = of)
       )
       val stimulus = new TriangleStimulus(config, seed = 5)
       val harness  = new TriangleHarness(config, stimulus)
       val random   = new Random(7)
-      test(new SharedTriangles(config, rows)).withAnnotations(Simulation.verilator) { shared =>
+      test(new TriangleGroup(config, rows)).withAnnotations(Simulation.verilator) { shared =>
         shared.clock.setTimeout(0)
 
         // By row: records that wait, and by context the results that are still to come

@@ -3,7 +3,6 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{log2Ceil, PopCount}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.UnitEvents
 import colonnade.ray.RaySetupIO
 import colonnade.shading.{ShaderIO, ShadowRaysIO}
 
@@ -16,10 +15,9 @@ object Occupancy {
   }
 }
 
-/** Events of a [[PathUnit]] in one cycle; names as in `UnitEvents`. */
+/** Events of a [[PathUnit]] in one cycle; names as in `Counters`. */
 final class PathEvents(config: ColonnadeConfig) extends Bundle {
-  private def contexts                               = UInt(log2Ceil(config.array.contexts + 1).W)
-  private def ifRoom[T <: Data](event: T): Option[T] = Option.when(config.hasEnvironment)(event)
+  private def contexts = UInt(log2Ceil(config.array.contexts + 1).W)
 
   val raysShadow          = Bool()
   val raysReflection      = Bool()
@@ -30,26 +28,23 @@ final class PathEvents(config: ColonnadeConfig) extends Bundle {
   val idleContexts        = contexts
   val contextsRaySetup    = contexts
   val contextsShading     = contexts
-  val raysEnvironment     = ifRoom(Bool())
-  val contextsEnvironment = ifRoom(contexts)
-  val marchSteps          = ifRoom(Bool())
-  val busyEnvironment     = ifRoom(Bool())
+  val raysEnvironment     = Option.when(config.hasEnvironment)(Bool())
+  val contextsEnvironment = Option.when(config.hasEnvironment)(contexts)
 
-  /** An illegal map entry or texel. */
+  /** An illegal texel. */
   val illegalRecord = Bool()
 }
 
 /** Collects the events of a path unit from its stages. */
 object PathCounters {
   def apply(
-      config:      ColonnadeConfig,
-      controller:  RtControllerIO,
-      raySetup:    RaySetupIO,
-      trace:       TracePort,
-      shader:      ShaderIO,
-      shadowRays:  ShadowRaysIO,
-      bounces:     Option[BounceSchedulerIO],
-      environment: Option[EnvironmentPortIO]
+      config:     ColonnadeConfig,
+      controller: RtControllerIO,
+      raySetup:   RaySetupIO,
+      trace:      TracePort,
+      shader:     ShaderIO,
+      shadowRays: ShadowRaysIO,
+      bounces:    Option[BounceSchedulerIO]
   ): PathEvents = {
     val events = Wire(new PathEvents(config))
 
@@ -71,27 +66,7 @@ object PathCounters {
 
     events.raysEnvironment.foreach(_ := controller.environment.get.req.fire)
     events.contextsEnvironment.foreach(_ := controller.environmentCount.get)
-    events.marchSteps.foreach(_ := environment.get.events.step)
-    events.busyEnvironment.foreach(_ := environment.get.events.busy)
-    events.illegalRecord := environment.map(_.events.illegal).getOrElse(false.B) ||
-      shader.isIllegalTexel.getOrElse(false.B)
-    events
-  }
-}
-
-/** Collects the events of a unit that traces rays; without the paths if another unit follows them. */
-object UnitCounters {
-  def apply(
-      config:      ColonnadeConfig,
-      paths:       Option[PathEvents],
-      intersector: IntersectorIO,
-      fetch:       FetchStageIO
-  ): UnitEvents = {
-    val events = WireInit(0.U.asTypeOf(new UnitEvents(config)))
-    for (part <- Seq(intersector.events, fetch.events) ++ paths; (name, event) <- part.elements)
-      events.elements(name) := event
-    events.illegalRecord    := fetch.events.illegalRecord || intersector.events.illegalRecord ||
-      paths.map(_.illegalRecord).getOrElse(false.B)
+    events.illegalRecord := shader.isIllegalTexel.getOrElse(false.B)
     events
   }
 }

@@ -1,0 +1,111 @@
+package colonnade.column
+
+import chisel3._
+import chisel3.experimental.hierarchy.{Definition, Instance}
+import chisel3.experimental.noPrefix
+import chisel3.util.{Decoupled, Valid}
+import colonnade.config.ColonnadeConfig
+import colonnade.environment.MarchPort
+import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitPosition}
+import colonnade.shading.TexturePort
+import colonnade.unit.{AttributeFetch, FetchEvents, PathEvents, PathHits, PathUnit, TraversalEvents, TraversalUnit}
+
+/** Events of a [[PathTracer]] in one cycle. */
+final class PathTracerEvents(config: ColonnadeConfig) extends Bundle {
+  val traversal  = Vec(config.array.rows, new TraversalEvents(config))
+  val paths      = new PathEvents(config.ofPaths)
+  val attributes = new FetchEvents(AttributeFetch.slotConfig(config))
+
+  /** By part, with names as in `Counters`. */
+  def parts: Seq[Bundle] = traversal.flatMap(unit => Seq(unit.intersector, unit.fetch)) ++ Seq(paths, attributes)
+}
+
+/** Ports of a [[PathTracer]]. `registers` is constant while a frame runs; `start` precedes the first position. */
+final class PathTracerIO(config: ColonnadeConfig) extends Bundle {
+  val registers = Input(new FrameRegisters(config))
+  val start     = Input(Bool())
+  val positions = Flipped(Decoupled(new UnitPosition(config)))
+
+  /** In any order. */
+  val pixels = Decoupled(new Pixel(config))
+
+  /** To the column's records: of each traversal unit, and of the path unit for attributes. */
+  val requests   = Vec(config.recordRequesters, Decoupled(new RecordRequest(config)))
+  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+
+  /** To the marches of the environment. */
+  val marches = Option.when(config.hasEnvironment)(new MarchPort(config.ofPaths))
+
+  /** To the textures. */
+  val texture = config.geometry.texture.map(_ => new TexturePort(config))
+
+  /** A pixel of a tile of the environment leaves. */
+  val environmentLeaves = Output(Bool())
+
+  /** No pixel is in flight, and no request waits. */
+  val isIdle = Output(Bool())
+  val events = Output(new PathTracerEvents(config))
+}
+
+/** A module with the ports of a path tracer: [[PathTracer]], or what specs put in its place. */
+abstract class PathTracerModule(config: ColonnadeConfig) extends Module {
+  final val io: PathTracerIO = IO(new PathTracerIO(config))
+}
+
+/** Turns pixel positions into pixels: a path unit, and the traversal units that trace its rays: docs/path-unit.md. {{{
+  * positions ─▶ PathUnit ─ rays ─▶ PathHits ─▶ RayBus ─▶ TraversalUnit ×rows ◀─▶ records
+  *    pixels ◀─┘    ▲               │  ▲  ▲                  │    ▲
+  *                  └─── hits ◀─────┘  │  └── ResultBus ◀────┘    └─▶ TriangleGroup
+  *                                     └─▶ records (attributes)
+  * }}}
+  */
+final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config) {
+  // A definition: the unit is elaborated once, not once per row. Without prefix the instances are TraversalUnit, TraversalUnit_1…
+  private val definition = Definition(new TraversalUnit(config))
+  private val traversals = Seq.fill(config.array.rows)(noPrefix(Instance(definition)).io)
+  private val paths      = Module(new PathUnit(config.ofPaths)).io
+  private val hits       = Module(new PathHits(config)).io
+  private val rays       = Module(new RayBus(config)).io
+  private val results    = Module(new ResultBus(config)).io
+  private val scene      = io.registers.scene
+
+  // Pixels
+  paths.registers := io.registers
+  paths.positions :<>= io.positions
+  io.pixels :<>= paths.pixels
+  io.marches.zip(paths.marches).foreach { case (port, marches) => port :<>= marches }
+  io.texture.zip(paths.texture).foreach { case (port, texture) => port :<>= texture }
+  io.environmentLeaves := paths.environmentLeaves
+
+  // Rays and their results
+  hits.trace :<>= paths.trace
+  rays.rays :<>= hits.rays
+  hits.results := results.results
+  for ((unit, row) <- traversals.zipWithIndex) {
+    unit.row         := row.U
+    unit.scene       := scene
+    unit.start       := io.start
+    unit.rays        := rays.units(row)
+    rays.isFree(row) := unit.isFree
+    results.units(row) :<>= unit.results
+  }
+  for (rows <- traversals.grouped(config.units.triangleRows)) {
+    val group = Module(new TriangleGroup(config, rows.size)).io
+    for ((unit, row) <- rows.zipWithIndex) {
+      unit.triangleLanes :<>= group.rows(row)
+      group.waits(row) := unit.waitsForTriangles
+    }
+  }
+
+  // Records
+  hits.start := io.start
+  hits.scene := scene
+  for ((port, requests) <- io.requests.zip(traversals.map(_.requests) :+ hits.requests)) port :<>= requests
+  traversals.foreach(_.broadcasts := io.broadcasts)
+  hits.broadcasts := io.broadcasts
+
+  io.isIdle := paths.isIdle && !io.requests.map(_.valid).reduce(_ || _)
+  for ((events, unit) <- io.events.traversal.zip(traversals)) events := unit.events
+  io.events.paths                                                    := paths.events
+  io.events.attributes                                               := hits.events
+}

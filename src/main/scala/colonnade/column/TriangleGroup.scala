@@ -1,0 +1,70 @@
+package colonnade.column
+
+import chisel3._
+import chisel3.util.{log2Ceil, Cat, Mux1H, OHToUInt, Queue}
+import colonnade.config.ColonnadeConfig
+import colonnade.traversal.{TriangleCandidate, TriangleLanes, TriangleLanesIO}
+
+/** Ports of [[TriangleGroup]]. */
+final class TriangleGroupIO(config: ColonnadeConfig, count: Int) extends Bundle {
+
+  /** By row. `busy` of the first row counts for all. */
+  val rows = Vec(count, new TriangleLanesIO(config))
+
+  /** By row: a record waits for a triangle unit. */
+  val waits = Input(Vec(count, Bool()))
+}
+
+/** Triangle units of a group of rows: docs/triangle.md. {{{
+  * rows ─ candidate, row ─▶ queue ─▶ TriangleLanes ─ result, row ─▶ register ─▶ rows
+  * }}}
+  * A row is chosen one cycle before it may grant a record to a context, so a record takes three cycles more than in a group
+  * of one row, and its results one. Throughput: a record and a result per cycle. A row that keeps waiting is one of the
+  * next `count` chosen. With `units.triangleRows` 1 the row has the units for itself, and the group is wires.
+  *
+  * @param count rows
+  */
+final class TriangleGroup(config: ColonnadeConfig, count: Int) extends Module {
+  val io = IO(new TriangleGroupIO(config, count))
+
+  private val shared = config.ofTriangleGroup
+  private val lanes  = Module(new TriangleLanes(shared)).io
+  if (config.sharesTriangleUnits) share() else io.rows.head :<>= lanes
+
+  private def share(): Unit = {
+    val rowBits = log2Ceil(config.units.triangleRows)
+    val queue   = Module(new Queue(new TriangleCandidate(shared), TriangleGroup.queueDepth, flow = true)).io
+
+    // Choose a row, and take its record; its number stands in front of the context
+    val grants = Module(new TriangleGrants(count)).io
+    grants.waits           := io.waits.asUInt
+    grants.queued          := queue.count
+    grants.readyNext       := lanes.readyNext
+    queue.enq.valid        := Mux1H(grants.sender, io.rows.map(_.candidate.valid))
+    queue.enq.bits         := Mux1H(grants.sender, io.rows.map(_.candidate.bits))
+    queue.enq.bits.context :=
+      Cat(OHToUInt(grants.sender).pad(rowBits), Mux1H(grants.sender, io.rows.map(_.candidate.bits.context)))
+    for ((row, index) <- io.rows.zipWithIndex) {
+      row.readyNext       := grants.grant(index)
+      row.candidate.ready := grants.sender(index)
+    }
+    lanes.candidate :<>= queue.deq
+    assert(!queue.enq.valid || queue.enq.ready, "a record comes to a full queue of triangles")
+
+    // Return results to their rows
+    val results = Queue(lanes.result, 1, pipe = true)
+    val owner   = results.bits.context >> (results.bits.context.getWidth - rowBits)
+    for ((row, index) <- io.rows.zipWithIndex) {
+      row.result.valid := results.valid && owner === index.U
+      row.result.bits  := results.bits
+      row.busy         := (if (index == 0) lanes.busy else 0.U)
+    }
+    results.ready := Mux1H(io.rows.zipWithIndex.map { case (row, index) => (owner === index.U) -> row.result.ready })
+  }
+}
+
+object TriangleGroup {
+
+  /** Records that wait for a triangle unit. */
+  val queueDepth: Int = 1
+}
