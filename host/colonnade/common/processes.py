@@ -110,7 +110,10 @@ def started(
 
     Args:
         command: the program and its arguments, strings or paths.
-        cwd, env, stdout, stderr: see `subprocess.Popen`.
+        cwd: see `subprocess.Popen`, as for the next three.
+        env: the environment.
+        stdout: where its output goes.
+        stderr: where its errors go.
 
     Raises:
         Ended: this thread's group ended before or during the run.

@@ -113,9 +113,11 @@ def generate(
     """Generate into the user's folder ``output``; `design_folder` defines which folders it may replace.
 
     Args:
-        config, overrides: The configuration.
+        config: The configuration.
+        overrides: Fields that replace some of it.
         output: The folder.
-        manifest_only, black_box_memories: Options of the generator.
+        manifest_only: Option of the generator.
+        black_box_memories: Option of the generator.
         progress: Shows the steps.
         bus_bytes: Generate the AXI4 shell, too, with a bus of so many bytes.
         pixel_stream: The shell has an AXI4-Stream of pixels.

@@ -219,7 +219,8 @@ def shared_edge_order(
 
     Args:
         corners: int32 [m, 3, 3], vertex units, in the order of packed ids.
-        leaf_first, leaf_count: As in `Bvh`.
+        leaf_first: As in `Bvh`.
+        leaf_count: As in `Bvh`.
     """
     first = leaf_first[leaf_count == 2].astype(np.int64)
     rotation = np.zeros(len(corners), dtype=np.int64)

@@ -52,7 +52,7 @@ abstract class PathTracerModule(config: ColonnadeConfig) extends Module {
   final val io: PathTracerIO = IO(new PathTracerIO(config))
 }
 
-/** Turns pixel positions into pixels: a path unit, and the traversal units that trace its rays: docs/path-unit.md. {{{
+/** Turns pixel positions into pixels: a path unit, and the traversal units that trace its rays: docs/path-tracer.md. {{{
   * positions ─▶ PathUnit ─ rays ─▶ PathHits ─▶ RayBus ─▶ TraversalUnit ×rows ◀─▶ records
   *    pixels ◀─┘    ▲               │  ▲  ▲                  │    ▲
   *                  └─── hits ◀─────┘  │  └── ResultBus ◀────┘    └─▶ TriangleGroup
