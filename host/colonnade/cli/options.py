@@ -144,7 +144,7 @@ def require_outputs(*paths: Path | None, folders: Sequence[Path | None] = ()) ->
 
 
 def require_suffix(option: str, path: Path | None, *suffixes: str) -> None:
-    """Refuse a file name that promises another format than the one that is written; a name may have no suffix."""
+    """Refuse a file name with the suffix of another format than the one that is written; a name may have none."""
     if path is not None and path.suffix and path.suffix.lower() not in suffixes:
         formats = " or ".join(suffix[1:].upper() for suffix in suffixes)
         raise UserError(f"{option} {path} is written as {formats}: end its name in {' or '.join(suffixes)}")

@@ -37,12 +37,12 @@ struct RelativeNode {
     std::int64_t pad, origin, tMax;
 
     RelativeNode(const Ray& ray, const Node& node, std::int64_t tMaxInUnits, const Numbers& n) {
-        const std::int64_t mostPlane = (std::int64_t(1) << n.boxBits) - 1;
+        const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1;
         std::array<std::int64_t, 3> corner, span;
         for (int a = 0; a < 3; ++a) {
             const int axis = ray.objectAxis(a);
             corner[a] = node.origin[axis] - ray.boxOrigin[a];
-            span[a] = mostPlane << node.exponent[axis];
+            span[a] = maxPlane << node.exponent[axis];
         }
         exponent = node.exponent[ray.objectAxis(2)];
         z = ray.negative[2] ? -(corner[2] + span[2]) : corner[2];
@@ -56,8 +56,8 @@ struct RelativeNode {
             const std::int64_t pad = (((step[a] + 1) << n.boxPadLog) >> axisExponent) + 1;
             scale[a] = lowest - (exponent - n.nearFraction);
             const std::int64_t roundUp = scale[a] < 0 ? (std::int64_t(1) << -scale[a]) - 1 : 0;
-            near[a] = base - pad - (ray.negative[a] ? mostPlane * (step[a] + 1) : 0);
-            far[a] = base + pad + 1 + roundUp - (ray.negative[a] ? mostPlane * step[a] : 0);
+            near[a] = base - pad - (ray.negative[a] ? maxPlane * (step[a] + 1) : 0);
+            far[a] = base + pad + 1 + roundUp - (ray.negative[a] ? maxPlane * step[a] : 0);
         }
         pad = std::int64_t(1) << std::max(0, n.boxPadLog + n.nearFraction - exponent);
         origin = saturate(floorShift<Wide>(-z, exponent - n.nearFraction), n);
@@ -75,7 +75,7 @@ struct RelativeNode {
 /// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
 inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, 4>& entered, std::uint64_t& tests) {
     const RelativeNode relative(ray, node, tMaxUnits(tMax, n), n);
-    const std::int64_t mostPlane = (std::int64_t(1) << n.boxBits) - 1;
+    const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1;
     int count = 0;
     for (int slot = 0; slot < n.arity; ++slot) {
         if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
@@ -84,7 +84,7 @@ inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const 
         for (int a = 0; a < 3; ++a) {
             const int axis = ray.objectAxis(a);
             const std::int64_t low = node.low[slot][axis], high = node.high[slot][axis];
-            const std::int64_t first = ray.negative[a] ? mostPlane - high : low, last = ray.negative[a] ? mostPlane - low : high;
+            const std::int64_t first = ray.negative[a] ? maxPlane - high : low, last = ray.negative[a] ? maxPlane - low : high;
             if (a < 2) {
                 const std::int64_t near = relative.near[a] + first * relative.step[a], far = relative.far[a] + last * (relative.step[a] + 1);
                 tNear = std::max(tNear, RelativeNode::saturate(floorShift<Wide>(near, -relative.scale[a]), n));

@@ -91,11 +91,11 @@ def wrongly_culled(count: int, precision: str, seed: int) -> tuple[int, int]:
     while (too_wide := (-(-extent >> exponents) > (1 << box_bits) - 1)).any():
         exponents += too_wide
     # The child begins at any plane of a node whose axes may be coarser than it needs
-    most = (1 << box_bits) - 1
+    highest = (1 << box_bits) - 1
     coarser = random.integers(0, 4, size=(count, 3)) * (random.random((count, 3)) < 0.3)
     exponents = np.minimum(exponents + coarser, numbers["maxExponent"])
     high = -(-extent >> exponents)
-    first = (random.random((count, 3)) * (np.minimum(most - high, low >> exponents) + 1)).astype(np.int64)
+    first = (random.random((count, 3)) * (np.minimum(highest - high, low >> exponents) + 1)).astype(np.int64)
     corner = low - (first << exponents)
     # Rays aim at points in or near their box from various distances; some are parallel to an axis or start on a plane
     target = (

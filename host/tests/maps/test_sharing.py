@@ -115,8 +115,8 @@ def test_shared_maps_lose_less(seed: int, heap_bytes: int, tile_size: int) -> No
         assert shared <= loss(original, layout) * (1 + 1e-5)
 
 
-@pytest.mark.parametrize("most", [0, 1 << 13, 1 << 26], ids=["none", "in the heap", "all"])
-def test_decoded_is_what_the_encoder_chose(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("max_errors", [0, 1 << 13, 1 << 26], ids=["none", "in the heap", "all"])
+def test_decoded_is_what_the_encoder_chose(max_errors: int, monkeypatch: pytest.MonkeyPatch) -> None:
     layout = AttributeLayout(160, 130, map_bytes=4200, plane_bytes=2700)
     parts: list[list[Subdivided]] = []
 
@@ -129,7 +129,7 @@ def test_decoded_is_what_the_encoder_chose(most: int, monkeypatch: pytest.Monkey
 
         monkeypatch.setattr(encoder, "_written", written)
 
-    monkeypatch.setattr(sharing, "_MOST_ERRORS", most)
+    monkeypatch.setattr(sharing, "_MOST_ERRORS", max_errors)
     note(two_level_encoder)
     note(plane_encoder)
     v, u = np.mgrid[:130, :160]

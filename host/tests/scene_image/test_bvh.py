@@ -135,14 +135,14 @@ def half_area(points: Integers) -> int:
     return int(x * y + y * z + z * x)
 
 
-def cuts(subtree: Subtree, most: int) -> Iterator[list[Subtree]]:
-    """All lists of at most `most` subtrees that together are `subtree`."""
+def cuts(subtree: Subtree, max_count: int) -> Iterator[list[Subtree]]:
+    """All lists of at most `max_count` subtrees that together are `subtree`."""
     yield [subtree]
     if subtree.children is not None:
-        for count in range(1, most):
+        for count in range(1, max_count):
             for left in cuts(subtree.children[0], count):
                 if len(left) == count:
-                    yield from (left + right for right in cuts(subtree.children[1], most - count))
+                    yield from (left + right for right in cuts(subtree.children[1], max_count - count))
 
 
 def least_area(subtree: Subtree, stack: int) -> float:

@@ -91,8 +91,8 @@ def _near(random: np.random.Generator, registers: Registers, case: Case) -> dict
         if random.random() < 0.5:
             changed[register.name] = _fitted(register, current ^ (1 << int(random.integers(register.width))))
         else:
-            least, most = value_range(register.width, register.signed)
-            changed[register.name] = min(max(current + int(random.integers(-4, 5)), least), most)
+            lowest, highest = value_range(register.width, register.signed)
+            changed[register.name] = min(max(current + int(random.integers(-4, 5)), lowest), highest)
     return changed
 
 
@@ -105,15 +105,15 @@ def _inverted(random: np.random.Generator, registers: Registers, case: Case) -> 
     changed: dict[str, int] = {}
     for each in axes if many else axis:
         names = low.format(each), high.format(each)
-        most = value_range(registers[names[0]].width, registers[names[0]].signed)[1]
+        highest = value_range(registers[names[0]].width, registers[names[0]].signed)[1]
         ends = sorted(case.registers[name] for name in names)
         how = int(random.integers(4))
         if how == 1:
             ends = sorted(_any(random, registers[name]) for name in names)
         elif how == 2:
-            ends = [ends[1], min(ends[1] + int(random.integers(1, 1 << int(random.integers(1, 12)))), most)]
+            ends = [ends[1], min(ends[1] + int(random.integers(1, 1 << int(random.integers(1, 12)))), highest)]
         elif how == 3:
-            ends = [0, most]
+            ends = [0, highest]
         changed |= {names[0]: ends[1], names[1]: ends[0]}
     return changed
 
@@ -150,8 +150,8 @@ def _any(random: np.random.Generator, register: Register) -> int:
 
 
 def _extreme(random: np.random.Generator, register: Register, how: int) -> int:
-    least, most = value_range(register.width, register.signed)
-    return (_any(random, register), 0, _fitted(register, -1), least, most)[how]
+    lowest, highest = value_range(register.width, register.signed)
+    return (_any(random, register), 0, _fitted(register, -1), lowest, highest)[how]
 
 
 def _fitted(register: Register, value: int) -> int:

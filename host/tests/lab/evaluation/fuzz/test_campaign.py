@@ -81,12 +81,12 @@ def test_inverted_bounds_are_as_empty_for_a_pipeline_as_for_the_model() -> None:
     """On each axis: the lower plane above the upper one, by much, by little, and by no more than the pads."""
     design = design_for("tiny", PIPELINED)
     legal = next(case for case in legal_cases(design.manifest) if case.name == "torus")
-    most = (1 << design.manifest.registers["bounds.low.x"].width) - 1
+    highest = (1 << design.manifest.registers["bounds.low.x"].width) - 1
     frames = [legal.registers]
     for axis in "xyz":
         low, high = f"bounds.low.{axis}", f"bounds.high.{axis}"
         middle = (legal.registers[low] + legal.registers[high]) // 2
-        for bounds in ((most, legal.registers[high]), (legal.registers[low], 0), (middle + 9, middle), (most, 0)):
+        for bounds in ((highest, legal.registers[high]), (legal.registers[low], 0), (middle + 9, middle), (highest, 0)):
             frames.append({**legal.registers, low: bounds[0], high: bounds[1]})
     model = loaded_model(design.manifest, legal.image)
     simulated = render_rtl(design, legal.image, frames).frames

@@ -108,7 +108,7 @@ final class RtController(config: ColonnadeConfig) extends Module {
   }
   move(io.fetchFailed.valid, io.fetchFailed.bits, ContextState.accumulatePending)
 
-  // Issue shadow rays, one light after the other. A Fresnel reflection has none, so the ray before the first one is none
+  // Issue shadow rays, one light after the other. A Fresnel reflection has none, so its previous ray is no shadow ray
   private val tested = choose(isAt(ContextState.shadowTest), io.shadow.ready)
   private val shadow = tested.now
   io.shadow.valid        := shadow.valid

@@ -11,7 +11,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 class TMaxUnitsSpec extends AnyFlatSpec with ChiselScalatestTester {
-  behavior of "LimitUnits"
+  behavior of "TMaxUnits"
 
   for ((config, i) <- TestConfigs.formats.zipWithIndex)
     it should s"follow the model, extremes included, format $i (${config.precision})" in {
