@@ -98,7 +98,7 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, 
 @pytest.mark.long_simulation
 def test_a_room_after_an_abort_is_right() -> None:
     """Pixels are in all stages when the watchdog aborts: none is in the next frame."""
-    units = ("units.pathContexts=24", "units.pipelined=true", "units.marches=2")
+    units = ("units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3", "units.marches=2")
     design = design_for("small", ("array.rows=3", *units))
     held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
     mesh, material = load_mesh("teapot:4"), Material(kind="glass")

@@ -35,7 +35,8 @@ object ArbitraryConfig {
     triangleRows  <- Gen.chooseNum(1, UnitsConfig.maxTriangleRows)
     marches       <- Gen.chooseNum(1, UnitsConfig.maxMarches)
     pathContexts  <- Gen.chooseNum(1, UnitsConfig.maxPathContexts)
-    pipelined     <- flag
+    rayInterval   <- Gen.oneOf(UnitsConfig.rayIntervals)
+    shadeInterval <- Gen.oneOf(UnitsConfig.shadeIntervals)
     shortPaths    <- flag
   } yield UnitsConfig(
     boxLanes,
@@ -43,7 +44,8 @@ object ArbitraryConfig {
     triangleRows,
     marches,
     pathContexts,
-    pipelined,
+    rayInterval,
+    shadeInterval,
     shortPaths
   )
 

@@ -25,7 +25,8 @@ object TestConfigs {
       triangleRows = 1,
       marches = 1,
       pathContexts = 5,
-      pipelined = false,
+      rayInterval = UnitsConfig.sequentialRayInterval,
+      shadeInterval = UnitsConfig.sequentialShadeInterval,
       shortPaths = false
     ),
     ColumnBvhMemoryConfig(
@@ -117,6 +118,10 @@ object TestConfigs {
 
   def withShortPaths(config: ColonnadeConfig): ColonnadeConfig =
     config.copy(units = config.units.copy(shortPaths = true))
+
+  /** With both pipelines. */
+  def withPipelines(config: ColonnadeConfig): ColonnadeConfig =
+    config.copy(units = config.units.copy(rayInterval = 1, shadeInterval = 3))
 
   def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig =
     tiny.copy(precision = PrecisionConfig(mac, sqrt, div))

@@ -11,8 +11,8 @@ from pathlib import Path
 
 #: Units of each level in the order of the data flow. The remaining logic of the level's module is one more unit.
 PATHS = (
-    *("RayGenerator", "RayGeneratorPipeline", "RaySetup", "RaySetupPipeline", "Shader", "ShadingPipeline"),
-    *("BounceUnit", "BouncePipeline", "ShadowRays", "ShadowRaysPipeline", "ColourUnit", "ColourPipeline"),
+    *("RayGenerator", "SequentialRaySetup", "RaySetupPipeline", "SequentialShader", "ShadingPipeline"),
+    *("BounceUnit", "BouncePipeline", "ShadowRays", "ColourUnit"),
     *("BounceScheduler", "EnvironmentRays", "RtController"),
 )
 TRACE = ("BoxUnit", "TraversalStack", "RecordFetch", "HitTable")

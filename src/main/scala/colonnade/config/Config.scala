@@ -84,7 +84,11 @@ final case class GeometryConfig(
   * @param triangleRows  rows of a column in a group, which shares its triangle units
   * @param marches       environment marches of a column, if the device supports an environment
   * @param pathContexts  pixels in flight in a column's path unit
-  * @param pipelined     ray set-up, shading, bounces and colours are pipelines, for a path unit that serves a column
+  * @param rayInterval   most cycles between rays that ray set-up takes, while the rays that it has prepared are taken: 1
+  *                      chooses a pipeline, 32 one ray after the other
+  * @param shadeInterval most cycles that a light on a hit takes the shader, while what it has shaded is taken and texels
+  *                      come at once: 3 chooses a pipeline, 128 one hit after the other. Hits on mirrors take 3 in the
+  *                      pipeline, those on glass have no limit
   * @param shortPaths    registers in the traversal stack and around the record fetch, for FPGAs: some steps take a cycle more
   */
 final case class UnitsConfig(
@@ -93,7 +97,8 @@ final case class UnitsConfig(
     triangleRows:  Int,
     marches:       Int,
     pathContexts:  Int,
-    pipelined:     Boolean,
+    rayInterval:   Int,
+    shadeInterval: Int,
     shortPaths:    Boolean
 ) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
@@ -101,12 +106,22 @@ final case class UnitsConfig(
   Require.within("units.triangleRows", triangleRows, 1, UnitsConfig.maxTriangleRows)
   Require.within("units.marches", marches, 1, UnitsConfig.maxMarches)
   Require.within("units.pathContexts", pathContexts, 1, UnitsConfig.maxPathContexts)
+  Require.oneOf("units.rayInterval", rayInterval, UnitsConfig.rayIntervals)
+  Require.oneOf("units.shadeInterval", shadeInterval, UnitsConfig.shadeIntervals)
 }
 
 object UnitsConfig {
   val maxMarches:      Int = 16
   val maxPathContexts: Int = 256
   val maxTriangleRows: Int = 16
+
+  /** Intervals of sequential ray set-up and of the sequential shader, which hold at all formats. */
+  val sequentialRayInterval:   Int = 32
+  val sequentialShadeInterval: Int = 128
+
+  /** Legal intervals: those of the pipeline and of the sequential unit. */
+  val rayIntervals:   Seq[Int] = Seq(1, sequentialRayInterval)
+  val shadeIntervals: Seq[Int] = Seq(3, sequentialShadeInterval)
 }
 
 /** The memory that the units of a column share.

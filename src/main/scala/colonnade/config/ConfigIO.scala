@@ -60,7 +60,8 @@ object ConfigIO {
       "triangleRows",
       "marches",
       "pathContexts",
-      "pipelined",
+      "rayInterval",
+      "shadeInterval",
       "shortPaths"
     )
     val memory = root.section(
@@ -110,7 +111,8 @@ object ConfigIO {
         triangleRows = units.int("triangleRows"),
         marches = units.int("marches"),
         pathContexts = units.int("pathContexts"),
-        pipelined = units.boolean("pipelined"),
+        rayInterval = units.int("rayInterval"),
+        shadeInterval = units.int("shadeInterval"),
         shortPaths = units.boolean("shortPaths")
       ),
       columnBvhMemory = ColumnBvhMemoryConfig(
@@ -189,7 +191,8 @@ object ConfigIO {
         "triangleRows"  -> units.triangleRows,
         "marches"       -> units.marches,
         "pathContexts"  -> units.pathContexts,
-        "pipelined"     -> units.pipelined,
+        "rayInterval"   -> units.rayInterval,
+        "shadeInterval" -> units.shadeInterval,
         "shortPaths"    -> units.shortPaths
       ),
       "columnBvhMemory" -> ujson.Obj(

@@ -1,11 +1,11 @@
 package colonnade.ray
 
 import chisel3._
-import chisel3.util.{Counter, Decoupled, RegEnable}
+import chisel3.util.{log2Ceil, Cat, Decoupled, Mux1H, RegEnable}
 import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.formats.{Camera, Vec3}
-import colonnade.numbers.{Fixed, Rounding}
+import colonnade.formats.Camera
+import colonnade.numbers.{CarrySave, Fixed, Rounding}
 
 /** A pixel, and the context of its primary ray. */
 final class RayPosition(config: ColonnadeConfig) extends Bundle {
@@ -35,91 +35,129 @@ final class RayGeneratorIO(config: ColonnadeConfig) extends Bundle {
   val pixel = Output(new RayPosition(config))
 }
 
-/** Ray generation: [[RayGenerator]], or with `units.pipelined` a [[RayGeneratorPipeline]]. */
-abstract class RayGeneratorModule(config: ColonnadeConfig) extends Module {
-  final val io = IO(new RayGeneratorIO(config))
-}
-
 /** Generates primary rays: `dir = (camera.dir << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
+  * A ray per cycle while each pixel follows the one before it in the Morton order of a tile.
   *
-  * One multiplier computes the six products in sequence. Latency: a ray is offered 8 cycles after its pixel was accepted,
-  * and the next pixel is accepted in the cycle that takes the ray. The registers are constant while a pixel is in the
-  * unit. A position outside the scene wraps around; the host rejects it. Source: docs/numbers.md, section 1.
+  * Such a pixel needs one addition to the direction before. Pixels of two tiles may be mixed, `inObjectTile` tells them
+  * apart; the direction before is kept for both. The direction of another pixel is summed up bit by bit, in
+  * `coordinateBits` + 1 cycles. Any order gives the same rays. Latency: a ray is offered 2 cycles after its pixel was
+  * accepted, later by the cycles of a sum bit by bit, and if another ray waits before it. The registers may change when
+  * the unit has been empty for [[RayGenerator.emptyCycles]] cycles. Source: docs/ray-setup.md, pipelines.
   */
-final class RayGenerator(config: ColonnadeConfig) extends RayGeneratorModule(config) {
+final class RayGenerator(config: ColonnadeConfig) extends Module {
+  val io = IO(new RayGeneratorIO(config))
+
   private val numbers = config.numbers
   private val scene   = new RayFormats(numbers).scene
+  private val levels  = log2Ceil(config.frame.tileSize)
 
-  // Control: six products; each sum follows one cycle later
-  private val products   = 2 * 3
-  private val occupied   = RegInit(false.B)
-  private val multiplies = RegInit(false.B)
-  private val product    = Counter(products)
-  private val adds       = RegNext(multiplies, false.B)
-  private val ofY        = product.value(0)
-  private val addsOfY    = RegNext(ofY)
-
-  io.ray.valid      := occupied && !multiplies && !adds
-  io.position.ready := !occupied || io.ray.fire
-  when(multiplies) {
-    when(product.inc()) { multiplies := false.B }
-  }
-  when(io.ray.fire) { occupied := false.B }
-  when(io.position.fire) {
-    occupied   := true.B
-    multiplies := true.B
-  }
-
-  // Datapath: the components in order, for each the x product, then the y product
+  // Control: a pixel waits in front for its direction; the back offers its ray
+  private val inFront  = RegInit(false.B)
+  private val inBack   = RegInit(false.B)
+  private val empty    = RegInit(RayGenerator.emptyCycles.U)
+  private val isNew    = empty === RayGenerator.emptyCycles.U
   private val position = RegEnable(io.position.bits, io.position.fire)
-  private val camera   = io.registers.camera
 
-  private def component[T <: Data](vector: Vec3[T]): T = {
-    val axis = product.value >> 1
-    Mux(axis === 0.U, vector.x, Mux(axis === 1.U, vector.y, vector.z))
-  }
+  // The tiles' last pixels, and whether a pixel comes after those of the other tile
+  private val takes    = io.position.fire
+  private val changes  = !isNew && tileOf(io.position.bits) =/= tileOf(position)
+  private val isChange = RegEnable(changes, takes)
+  private val other    = RegEnable(position, takes && changes)
+  private val hasOther = Reg(Bool())
+  when(takes) { hasOther := !isNew && (hasOther || changes) }
+  private val isKnown = !isNew && (!changes || hasOther)
+  private val follows = RegEnable(isKnown && isNext(Mux(changes, other, position), io.position.bits), takes)
+  private val topBit  = numbers.coordinateBits
+  private val bit     = RegInit(topBit.U)
+  private val sums    = inFront && (!inBack || io.ray.ready)
+  private val moves   = sums && (follows || bit === 0.U)
 
-  private val step       = Mux(ofY, component(camera.stepY), component(camera.stepX))
-  private val coordinate = Mux(ofY, position.y, position.x)
-  private val base       = Mux(ofY, component(camera.position), component(camera.dir))
-  private val amount     = Mux(ofY, io.registers.unitShift, camera.stepShift)
-  private val term       = Reg(SInt((numbers.macBits + numbers.coordinateBits + 1).W))
-  private val shifted    = Reg(SInt(numbers.directionBits.W))
+  io.ray.valid      := inBack
+  io.position.ready := !inFront || moves
+  inFront           := io.position.valid || (inFront && !moves)
+  inBack            := moves || (inBack && !io.ray.ready)
+  when(sums && !follows) { bit := Mux(bit === 0.U, topBit.U, bit - 1.U) }
+  when(inFront || inBack) { empty := 0.U }.elsewhen(!isNew) { empty := empty + 1.U }
 
-  term    := step * coordinate.zext
-  shifted := RayGenerator.shiftLeft(base, amount, numbers.directionBits)
+  // What is added. A pixel that follows sets the lowest clear bit of the Morton code before, and clears those below it. If
+  // it sets bit n of x, it adds stepX + stepY - (stepY << n); if bit n of y, stepX + stepY - (stepX << n + 1).
+  //
+  // For another pixel, the sum starts with 0 and goes through the bits of x and y from the top: it is doubled, and the
+  // steps whose bit is set are added. The camera's direction joins in at bit stepShift, so it needs no shifter.
+  private val code     = tileCode(position).asBools
+  private val sets     = code.indices.map(n => follows && code(n) && !code.take(n).fold(false.B)(_ || _))
+  private val clears   = sets.tail.reduce(_ || _)
+  private val addsX    = follows || bitOf(position.x)
+  private val addsY    = Mux(follows, clears, bitOf(position.y))
+  private val addsDir  = !follows && bit === io.registers.camera.stepShift
+  private val isDouble = !follows && bit =/= topBit.U
 
-  private val origin = Reg(Vec(3, SInt(scene.width.W)))
-  private val dir    = Reg(Vec(3, SInt(numbers.directionBits.W)))
-
-  // The sums cannot overflow: directionBits holds all three terms.
-  private val sum = Rounding.narrow(Mux(addsOfY, dir.last, shifted) +& term, numbers.directionBits)
-  when(adds && !addsOfY) {
-    dir.zip(dir.tail).foreach { case (to, from) => to := from }
-  }
-  when(adds) { dir.last := sum }
-  when(adds && addsOfY) {
-    origin.zip(origin.tail).foreach { case (to, from) => to := from }
-    origin.last := Rounding.narrow(shifted, scene.width)
-  }
-
-  io.pixel             := position
-  io.ray.bits.context  := position.context
+  // Datapath: the camera registers are constant, so their terms have no registers of their own
+  private val pixel = RegEnable(position, moves)
+  io.pixel             := pixel
+  io.ray.bits.context  := pixel.context
   io.ray.bits.isShadow := false.B
-  io.ray.bits.origin.axes.zip(origin).foreach { case (to, from) => to := Fixed(scene, from) }
-  io.ray.bits.dir.axes.zip(dir).foreach { case (to, from) => to := from }
+  (0 until 3).foreach { axis =>
+    io.ray.bits.origin.axes(axis) := Fixed(scene, origin(axis))
+    io.ray.bits.dir.axes(axis)    := direction(axis)
+  }
 
-}
-
-object RayGenerator {
-  def apply(config: ColonnadeConfig): RayGeneratorModule =
-    if (config.units.pipelined) new RayGeneratorPipeline(config) else new RayGenerator(config)
+  /** The shift has as many bits as its legal values: `RegisterLimits`. */
+  private def origin(axis: Int): SInt = {
+    val shiftBits = NumberFormats.bitLength(numbers.maxUnitShift)
+    val shift     = if (shiftBits == 0) 0.U(0.W) else io.registers.unitShift(shiftBits - 1, 0)
+    shiftLeft(io.registers.camera.position.axes(axis), shift, scene.width)
+  }
 
   /** A value shifted left, in `width` bits; the bits above are lost. */
-  private[ray] def shiftLeft(value: SInt, by: UInt, width: Int): SInt = {
+  private def shiftLeft(value: SInt, by: UInt, width: Int): SInt = {
     val wide = Rounding.narrow(value.pad(width), width)
     (0 until by.getWidth).foldLeft(wide) { (shifted, bit) =>
       Mux(by(bit), Rounding.narrow((shifted << (1 << bit)).asSInt, width), shifted)
     }
   }
+
+  private def direction(axis: Int): SInt = {
+    val bits   = numbers.directionBits
+    val camera = io.registers.camera
+    val terms  = Seq(camera.stepX, camera.stepY, camera.dir).map(_.axes(axis).pad(bits).asUInt)
+    val sum    = Reg(UInt(bits.W))
+
+    def shifted(term: UInt, by: Int): UInt = (term << by)(bits - 1, 0)
+    val subtracted = sets.indices.tail.map(n => sets(n) -> ~shifted(terms((n + 1) % 2), (n + 1) / 2))
+    val third      = Mux1H((addsDir -> terms(2)) +: subtracted)
+    // The direction before: the last one, or that of the other tile, which is kept when the tile changes
+    val ofOther = RegEnable(sum, sums && isChange && (follows || bit === topBit.U))
+    val start   =
+      Mux1H(Seq((follows && !isChange) -> sum, (follows && isChange) -> ofOther, isDouble -> shifted(sum, 1)))
+
+    val (steps, stepCarries) = CarrySave(Mux(addsX, terms(0), 0.U), Mux(addsY, terms(1), 0.U), third, clears)
+    val (whole, carries)     = CarrySave(start, steps, stepCarries)
+    when(sums) { sum := whole + carries }
+    sum.asSInt
+  }
+
+  /** The bit of a coordinate that is added; the highest step has none. */
+  private def bitOf(coordinate: UInt): Bool = (0.U(1.W) ## coordinate)(bit)
+
+  /** Which of two tiles a pixel belongs to. */
+  private def tileOf(pixel: RayPosition): Bool = pixel.inObjectTile.getOrElse(true.B)
+
+  /** Whether a pixel follows another one in a tile. */
+  private def isNext(before: RayPosition, pixel: RayPosition): Bool = {
+    def tile(pixel: RayPosition): UInt = (pixel.y >> levels) ## (pixel.x >> levels)
+    tileCode(pixel) === tileCode(before) +& 1.U && tile(pixel) === tile(before)
+  }
+
+  /** The Morton code of a pixel in its tile. */
+  private def tileCode(pixel: RayPosition): UInt =
+    Cat((0 until levels).reverse.flatMap(level => Seq(pixel.y, pixel.x).map(_.pad(levels)(level))))
+}
+
+object RayGenerator {
+
+  /** Cycles that a [[RayGenerator]] must have been empty before the registers may change. A primary ray takes
+    * longer to become a pixel.
+    */
+  val emptyCycles = 8
 }

@@ -6,15 +6,15 @@ import colonnade.common.DelayLine
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.PipelinedDivider
 
-/** What [[RaySetup]] does, a ray a cycle: {{{
+/** Prepares a ray a cycle for traversal: {{{
   * request ─▶ DirectionStages ─ mantissas ─▶ 3 × PipelinedDivider ─ quotients ─▶ EntryStages ─ entry ─▶ AdvanceStages ─▶ ray
   *                    └──────── DelayLine ── the ray in its own frame ─────────────▲ └─── DelayLine ───────▲
   * }}}
-  * In order and bit for bit as [[RaySetup]]. Latency: [[SetupStages.count]] cycles, 18 with 24-bit triangle tests. All
+  * In order and bit for bit as [[SequentialRaySetup]]. Latency: [[SetupStages.count]] cycles, 18 with 24-bit triangle tests. All
   * stages stall together while the offered ray is not taken; a stage without a ray keeps its values. `busy`: a ray enters.
   * Source: docs/numbers.md, section 2.
   */
-final class RaySetupPipeline(config: ColonnadeConfig) extends RaySetupModule(config) {
+final class RaySetupPipeline(config: ColonnadeConfig) extends RaySetup(config) {
   private val numbers = config.numbers
   private val stages  = new SetupStages(numbers)
 

@@ -5,7 +5,7 @@ import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.FrameRegisters
 
-/** A bounce or an end in [[ColourPipeline]]. */
+/** A bounce or an end in [[ColourUnit]]. */
 final private[shading] class ColourOperation(config: ColonnadeConfig) extends Bundle {
   val context    = Context(config)
   val isBounce   = Bool()
@@ -19,7 +19,7 @@ final private[shading] class ColourOperation(config: ColonnadeConfig) extends Bu
   val fresnel = Option.when(config.frame.hasBounces)(FrameRegisters.weight)
 }
 
-/** A channel and a light of an operation in the stages of [[ColourPipeline]]. */
+/** A channel and a light of an operation in the stages of [[ColourUnit]]. */
 final private[shading] class ColourSlot(config: ColonnadeConfig) extends Bundle {
   private val bits = NumberFormats.colourBits
 

@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, MuxLookup, Valid}
-import colonnade.common.{Context, ContextTable}
+import colonnade.common.ContextTable
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
 import colonnade.numbers.{Fixed, Rounding}
@@ -21,11 +21,14 @@ final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Colours of paths: docs/numbers.md, 5.9 and 6. A path has a radiance so far, and a throughput that weights what it still
-  * hits.
+  * hits. A pipeline, a channel a cycle: docs/shading.md. {{{
   *
-  * One path at a time, two cycles per product and channel. A path's end takes 2 + 6 · (lights + 2) cycles, or 8 in the
-  * background. A bounce takes 20 cycles, and 6 · (lights + 1) more if its reflection shows a surface. Bounces have
-  * priority. A shadow ratio takes 12 cycles per channel that lacks some light.
+  * end ────┬▶ read ─▶ light · transmittance ─▶ sum of the lights ─▶ light · albedo  ─▶ throughput · colour ─▶ colour, path
+  * bounce ─┘          throughput · tint                             tinted · Fresnel   part · behind
+  * }}}
+  * An end takes 3 · lights cycles, with the lights that are on, at least one; in the background 3. A bounce takes 3, and
+  * 3 · lights more if its reflection shows a surface; none if it is the path's first and has no Fresnel reflection.
+  * Colours come in any order; the throughput and radiance of every path are in a table.
   *
   * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights · transmittance))
   */
@@ -36,13 +39,92 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
   private val colourBits = NumberFormats.colourBits
   private val sumBits    = NumberFormats.lightBits + log2Ceil(lights + 1)
   private val weightBits = fraction + 1
+  private val one        = (1 << fraction).U(weightBits.W)
 
   val io = IO(new ColourUnitIO(config))
 
-  // Tables, by context
-  private val surfaces = ContextTable(config, new TerminalSurface(config))
-  private val paths    = if (hasBounces) Some(ContextTable(config, new PathState)) else None
+  // The operation: a bounce or an end; and the next one, while it is read
+  private val isReading = RegInit(false.B)
+  private val isIssuing = RegInit(false.B)
+  private val next      = Reg(new ColourOperation(config))
+  private val operation = Reg(new ColourOperation(config))
+  import operation.{hasSurface, isBounce, needsRatio, occlusions}
 
+  /** A slot of the operation is a channel and a light of its surface, or a channel of its path. */
+  private val ofSurface = Reg(Bool())
+  private val channel   = Reg(UInt(2.W))
+  private val light     = Reg(UInt(log2Ceil(lights.max(2)).W))
+  private val lastPass  = !(isBounce && ofSurface)
+
+  private def isLastLight(light: UInt): Bool = !ofSurface || light +& 1.U >= io.shading.lights // off, it adds nothing
+
+  private val lastLight   = isLastLight(light)
+  private val lightThen   = Mux(lastLight, 0.U, light + 1.U)
+  private val channelThen = Mux(!lastLight, channel, Mux(channel === 2.U, 0.U, channel + 1.U))
+  private val isLast      = isIssuing && lastPass && channel === 2.U && lastLight
+  private val endsNext    = isIssuing && lastPass && channelThen === 2.U && isLastLight(lightThen)
+
+  // Take one while the last slot is issued, or in the cycle before
+  private val isFree    = !isReading && (!isIssuing || isLast || endsNext)
+  private val isWriting = Wire(Bool())
+
+  /** The path's first bounce, without a Fresnel reflection: its tint is the throughput. It needs no slot. */
+  private val isDirect =
+    io.bounce.map(bounce => bounce.bits.isFirst && bounce.bits.fresnel.natural === 0.U).getOrElse(false.B)
+  private val mayBounce = io.bounce.map(_.valid && !isDirect).getOrElse(false.B)
+  private val bounces   = mayBounce && isFree
+  private val takes     = bounces || io.end.fire
+  private val taken = Mux(mayBounce, io.bounce.map(_.bits.context).getOrElse(io.end.bits.context), io.end.bits.context)
+  private val tints = io.bounce.map { bounce =>
+    bounce.bits.albedo.channels.map(albedo => Mux(bounce.bits.isTinted, albedo +& albedo(colourBits - 1), one))
+  }
+  io.bounce.foreach(_.ready := Mux(isDirect, !isWriting, isFree))
+  io.end.ready := isFree && !mayBounce
+  when(takes) {
+    next.context    := taken
+    next.isBounce   := bounces
+    next.isStraight :=
+      io.bounce.map(bounce => Mux(bounces, bounce.bits.isFirst, io.end.bits.isStraight.get)).getOrElse(true.B)
+    next.occlusions := io.end.bits.occlusions
+    when(bounces) { next.occlusions.foreach(_ := Occlusion.none) }
+    val showsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
+    next.hasSurface := showsSurface
+    next.needsRatio := !bounces && showsSurface && io.end.bits.isDirectView.getOrElse(false.B) &&
+      io.end.bits.occlusions.map(_ =/= Occlusion.none).reduce(_ || _)
+    for (bounce <- io.bounce) when(bounces) {
+      next.fresnel.get := bounce.bits.fresnel
+      next.tint.get.zip(tints.get).foreach { case (to, tint) => to := Fixed(to.format, tint) }
+    }
+  }
+
+  // Its slots follow those of the operation before. Its path is read again and again while a bounce of the same path is
+  // under way, or while the ratio unit is busy
+  private val isUpdating = Wire(Bool())
+  private val ratios     = Option.when(config.hasEnvironment)(Module(new ShadowRatios(config, sumBits)).io)
+  private val starts     = isReading && !isUpdating && !(next.needsRatio && ratios.map(_.busy).getOrElse(false.B))
+  private val repeats    = isReading && !starts
+  private val reads      = takes || repeats
+  assert(!starts || !isIssuing || isLast, "an operation before the end of another one")
+  isReading := reads
+  when(isIssuing) {
+    light   := lightThen
+    channel := channelThen
+    when(lastLight && channel === 2.U && isBounce) { ofSurface := false.B }
+  }
+  when(starts) {
+    isIssuing := true.B
+    operation := next
+    ofSurface := next.hasSurface
+    channel   := 0.U
+    light     := 0.U
+  }.elsewhen(isLast) { isIssuing := false.B }
+  ratios.foreach(_.claim := starts && next.needsRatio)
+
+  private val surfaces    = ContextTable(config, new TerminalSurface(config))
+  private val surface     = surfaces.read(taken, takes)
+  private val albedo      = Reg(Vec(3, UInt(colourBits.W)))
+  private val directLight = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
+  private val emission    = Option.when(config.frame.emission)(Reg(Vec(3, UInt(colourBits.W))))
   when(io.surface.valid) {
     val surface = Wire(new TerminalSurface(config))
     surface.albedo      := io.surface.bits.albedo
@@ -50,194 +132,160 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
     surface.emission.zip(io.surface.bits.emission).foreach { case (to, from) => to := from }
     surfaces.write(io.surface.bits.context, surface)
   }
-
-  // The current path
-  private val isBusy  = RegInit(false.B)
-  private val isEnd   = Reg(Bool())
-  private val context = Reg(Context(config))
-
-  /** The tables' entries are read. */
-  private val isRead = RegInit(false.B)
-
-  /** The product's number and channel; and whether it is ready. */
-  private val step    = Reg(UInt(log2Ceil(lights + 1).max(2).W))
-  private val channel = Reg(UInt(2.W))
-  private val isReady = Reg(Bool())
-
-  /** The path had hit neither mirror nor glass before: its entry in `paths` is meaningless. */
-  private val isStraight = Reg(Bool())
-
-  /** The current product is the surface's, not the path's. */
-  private val ofSurface  = Reg(Bool())
-  private val hasSurface = Reg(Bool())
-
-  private val occlusions  = Reg(Vec(lights, Occlusion()))
-  private val albedo      = Reg(Vec(3, UInt(colourBits.W)))
-  private val directLight = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
-  private val fresnel     = Reg(UInt(weightBits.W))
-  private val isTinted    = Reg(Bool())
-  private val throughput  = Reg(Vec(3, UInt(weightBits.W)))
-  private val radiance    = Reg(Vec(3, UInt(colourBits.W)))
-  private val sum         = Reg(UInt(sumBits.W))
-  private val surface     = Reg(UInt(colourBits.W))
-  private val emission    = if (config.frame.emission) Some(Reg(Vec(3, UInt(colourBits.W)))) else None
-
-  /** The surface's albedo, in registers of its own if a bounce may have a surface. */
-  private val surfaceAlbedo = if (hasBounces && config.hasEnvironment) Reg(Vec(3, UInt(colourBits.W))) else albedo
-  private val colours       = Reg(Vec(3, UInt(colourBits.W)))
-  private val ratios        = if (config.hasEnvironment) Some(Module(new ShadowRatioDivider(sumBits)).io) else None
-
-  /** The shadow ratio is needed, and the light without shadows. */
-  private val isDirectView = Reg(Bool())
-  private val unshadowed   = Reg(UInt(sumBits.W))
-
-  private val reflects = step === lights.U
-  private val lastStep = Mux(ofSurface, lights.U, Mux(isEnd, 0.U, 2.U))
-
-  // Take a bounce or an end
-  private val bounces = io.bounce.map(_.fire).getOrElse(false.B)
-  io.bounce.foreach(_.ready := !isBusy)
-  io.end.ready := !isBusy && !io.bounce.map(_.valid).getOrElse(false.B)
-  private val takes = bounces || io.end.fire
-  private val taken =
-    io.bounce.map(bounce => Mux(bounce.valid, bounce.bits.context, io.end.bits.context)).getOrElse(io.end.bits.context)
-  private val surfaceRead = surfaces.read(taken, takes)
-  private val pathRead    = paths.map(_.read(taken, takes))
-  isRead := takes
-  when(takes) {
-    isBusy     := true.B
-    isEnd      := !bounces
-    context    := taken
-    channel    := 0.U
-    isReady    := false.B
-    step       := 0.U
-    isStraight := ColourUnit.isStraight(io, bounces)
-    val showsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
-    ofSurface  := showsSurface
-    hasSurface := showsSurface
-    occlusions := io.end.bits.occlusions
-    when(bounces) { occlusions.foreach(_ := Occlusion.none) }
-    io.bounce.foreach { bounce =>
-      albedo   := VecInit(bounce.bits.albedo.channels)
-      fresnel  := bounce.bits.fresnel.natural
-      isTinted := bounce.bits.isTinted
-    }
-    isDirectView := !bounces && io.end.bits.isDirectView.getOrElse(false.B)
-  }
-  when(isRead) {
-    throughput := VecInit.fill(3)((1 << fraction).U)
-    radiance   := VecInit.fill(3)(0.U)
-    pathRead.foreach { path =>
-      when(!isStraight) {
-        throughput := VecInit(path.throughput.map(_.natural))
-        radiance   := VecInit(path.radiance.channels)
-      }
-    }
-    when(hasSurface) {
-      surfaceAlbedo := VecInit(surfaceRead.albedo.channels)
-      directLight   := VecInit(surfaceRead.directLight.map(light => VecInit(light.channels.map(_.natural))))
-      emission.zip(surfaceRead.emission).foreach { case (to, from) => to := VecInit(from.channels) }
-    }
+  when(RegNext(takes, false.B)) {
+    albedo      := VecInit(surface.albedo.channels)
+    directLight := VecInit(surface.directLight.map(light => VecInit(light.channels.map(_.natural))))
+    emission.zip(surface.emission).foreach { case (to, from) => to := VecInit(from.channels) }
   }
 
-  private def of[T <: Data](channels: Seq[T]): T =
+  private val paths      = Option.when(hasBounces)(ContextTable(config, new PathState))
+  private val throughput = if (hasBounces) Reg(Vec(3, UInt(weightBits.W))) else VecInit.fill(3)(one)
+  private val radiance   = if (hasBounces) Reg(Vec(3, UInt(colourBits.W))) else VecInit.fill(3)(0.U(colourBits.W))
+  for (path <- paths.map(_.read(Mux(repeats, next.context, taken), reads)))
+    when(starts) {
+      throughput := VecInit(path.throughput.map(weight => Mux(next.isStraight, one, weight.natural)))
+      radiance   := VecInit(path.radiance.channels.map(Mux(next.isStraight, 0.U, _)))
+    }
+
+  private def of[T <: Data](channels: Seq[T], channel: UInt = channel): T =
     MuxLookup(channel, channels(2))(Seq(0.U -> channels(0), 1.U -> channels(1)))
 
-  // One product
-  private val one                               = (1 << fraction).U(weightBits.W)
-  private val shadowTransmittance               = io.shading.shadowTransmittance.map(_.natural).getOrElse(one)
-  private val light                             = step(log2Ceil(lights.max(2)) - 1, 0)
-  private val reflectance                       = of(surfaceAlbedo)
+  private def background(slot: ColourSlot): UInt = of(io.background.channels, slot.channel)
+
   private def at[T <: Data](entries: Vec[T]): T = if (lights == 1) entries.head else entries(light)
-  private val transmittance                     =
+
+  private def drop(product: UInt, width: Int): UInt = Rounding.narrow(Rounding.floor(product, fraction), width)
+
+  /** The slot, one stage later. */
+  private def after(slot: ColourSlot)(change: ColourSlot => Unit = _ => ()): ColourSlot = {
+    val now = WireInit(slot)
+    change(now)
+    val later = WireInit(RegNext(now))
+    later.isValid := RegNext(now.isValid, false.B)
+    later
+  }
+
+  // Light that arrives at the surface from a light, or the tinted throughput
+  private val slot = Wire(new ColourSlot(config))
+  slot.isValid      := isIssuing
+  slot.context      := operation.context
+  slot.isLast       := isLast
+  slot.isPath       := lastPass
+  slot.isBounce     := isBounce
+  slot.hasSurface   := hasSurface
+  slot.needsRatio   := needsRatio
+  slot.channel      := channel
+  slot.isFirstLight := light === 0.U
+  slot.isLastLight  := lastLight
+  slot.radiance     := of(radiance)
+  slot.weight       := of(throughput)
+  slot.emission.zip(emission).foreach { case (to, from) => to := of(from) }
+  private val shadowTransmittance = io.shading.shadowTransmittance.map(_.natural).getOrElse(one)
+  private val transmittance       =
     MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> one, Occlusion.transmissive -> shadowTransmittance))
-  private val hitColour = Mux(hasSurface, surface, of(io.background.channels))
-  private val albedoNow = of(albedo)
-
-  /** All ones is 1.0. */
-  private val tint = Mux(isTinted, albedoNow +& albedoNow(colourBits - 1), one)
-  private val left = Mux(
-    ofSurface,
-    Mux(reflects, sum, of(at(directLight))),
-    Mux(isEnd, hitColour, Mux(step === 2.U, sum, of(throughput)))
+  private val tint     = operation.tint.map(tint => of(tint.map(_.natural))).getOrElse(one)
+  private val fresnel  = operation.fresnel.map(_.natural).getOrElse(0.U(weightBits.W))
+  private val direct   = of(at(directLight))
+  private val arriving = Reg(UInt(NumberFormats.lightBits.W))
+  arriving := drop(
+    Mux(ofSurface, direct, of(throughput)) * Mux(ofSurface, transmittance, tint),
+    NumberFormats.lightBits
   )
-  private val right = Mux(
-    ofSurface,
-    Mux(reflects, reflectance, transmittance),
-    Mux(isEnd, of(throughput), Mux(step === 0.U, tint, Mux(step === 1.U, fresnel, hitColour)))
-  )
-  private val product = Reg(UInt((sumBits + weightBits).W))
-  product := left * right
-  private val part   = Rounding.floor(product, fraction)
-  private val colour = Rounding.saturate(part, colourBits)
-  private val shown  = emission.map(value => Rounding.saturate(colour +& of(value), colourBits)).getOrElse(colour)
-  private val total  = Rounding.saturate(of(radiance) +& part, colourBits)
 
-  // Use the product
-  private val retires   = RegInit(false.B)
-  private val divides   = ratios.map(_.busy).getOrElse(false.B)
-  private val isWorking = isBusy && !isRead && !retires && !divides
-  private val isDone    = isWorking && isReady && !ofSurface && step === lastStep && channel === 2.U
-  private val first     = of(io.ambient.channels).natural
-  when(isWorking) {
-    isReady := !isReady
-    when(isReady) {
-      step := step + 1.U
-      when(step === lastStep) {
-        step      := 0.U
-        ofSurface := !ofSurface && hasSurface
-        when(!ofSurface) { channel := channel + 1.U }
-      }
-      when(ofSurface) {
-        when(reflects) { surface := shown }.otherwise { sum := Mux(step === 0.U, first, sum) + part }
-        when(!reflects) { unshadowed := Mux(step === 0.U, first, unshadowed) + of(at(directLight)) }
-      }.elsewhen(isEnd) {
-        set(colours, total)
-      }.otherwise {
-        when(step === 0.U) { set(throughput, Rounding.narrow(part, weightBits)) }
-        when(step === 1.U) {
-          sum := part
-          set(throughput, of(throughput) - Rounding.narrow(part, weightBits))
-        }
-        when(step === 2.U) { set(radiance, total) }
-      }
+  // The sum of the lights
+  private val arrival = after(slot)()
+  private val lit     = Reg(UInt(sumBits.W))
+  private val all     = Reg(UInt(sumBits.W))
+  private val ambient = of(io.ambient.channels, arrival.channel).natural
+  lit := Mux(arrival.isBounce && arrival.isPath, 0.U, Mux(arrival.isFirstLight, ambient, lit)) + arriving
+  all := Mux(arrival.isFirstLight, ambient, all) + RegNext(direct)
+
+  // The light that leaves the surface, or the weight of the Fresnel reflection
+  private val sum       = after(arrival)(slot => slot.isValid := arrival.isValid && arrival.isLastLight)
+  private val factors   = Reg(Vec(2, UInt(weightBits.W)))
+  private val reflected = Reg(UInt((sumBits + weightBits - fraction).W))
+  factors   := VecInit(Mux(ofSurface, of(albedo), fresnel), factors(0))
+  reflected := Rounding.floor(lit * factors(1), fraction)
+  for (ratios <- ratios) {
+    ratios.load.valid        := sum.isValid && sum.needsRatio
+    ratios.load.bits.part    := lit
+    ratios.load.bits.channel := sum.channel
+    ratios.whole             := all
+  }
+
+  // Its colour
+  private val leaving = after(sum)(slot => when(sum.isBounce) { slot.weight := Rounding.narrow(lit, weightBits) })
+  private val colour  = Rounding.saturate(reflected, colourBits)
+  private val shown   =
+    leaving.emission.map(emission => Rounding.saturate(colour +& emission, colourBits)).getOrElse(colour)
+  private val seen = Reg(UInt(weightBits.W))
+  seen := Mux(
+    leaving.isBounce && leaving.isPath,
+    Rounding.narrow(reflected, weightBits),
+    Mux(leaving.hasSurface, shown, background(leaving))
+  )
+  private val reflection = Reg(Vec(3, UInt(colourBits.W)))
+  when(leaving.isValid && !leaving.isPath) { shiftIn(reflection, shown) }
+
+  // What the path shows of it, and still lets through
+  private val weighed = after(leaving)(slot => slot.isValid := leaving.isValid && leaving.isPath)
+  private val weight  =
+    if (hasBounces)
+      Mux(
+        weighed.isBounce,
+        Mux(weighed.hasSurface, of(reflection, weighed.channel), background(weighed)),
+        weighed.weight
+      )
+    else weighed.weight
+  private val part = Reg(UInt(weightBits.W))
+  part := drop(seen * weight, weightBits)
+
+  // The path's colour so far
+  private val added   = after(weighed)(slot => slot.weight := weighed.weight - seen)
+  private val colours = Reg(Vec(3, UInt(colourBits.W)))
+  private val weights = Reg(Vec(3, UInt(weightBits.W)))
+  when(added.isValid) {
+    shiftIn(colours, Rounding.saturate(added.radiance +& part, colourBits))
+    shiftIn(weights, added.weight)
+  }
+
+  // An end's colour leaves, or waits for its ratio
+  private val done    = after(added)(slot => slot.isValid := added.isValid && added.isLast)
+  private val isShown = done.isValid && !done.isBounce && !done.needsRatio
+  private val result  = Wire(new PathColour(config))
+  result.context := done.context
+  result.colour.channels.zip(colours).foreach { case (to, from) => to := from }
+  result.ratio.foreach(_.channels.foreach(to => to := Fixed(to.format, one)))
+  io.colour.valid := isShown
+  io.colour.bits  := result
+  for (ratios <- ratios) {
+    ratios.colour.valid := done.isValid && done.needsRatio
+    ratios.colour.bits  := result
+    ratios.result.ready := !isShown
+    when(!isShown) {
+      io.colour.valid := ratios.result.valid
+      io.colour.bits  := ratios.result.bits
     }
   }
 
-  // In the cycle after the last product, a bounce's path is remembered, and an end's colour retires
-  retires := isDone
-  when(retires) { isBusy := false.B }
-  io.colour.valid        := retires && isEnd
-  io.colour.bits.context := context
-  io.colour.bits.colour.channels.zip(colours).foreach { case (to, from) => to := from }
-  for (divider <- ratios; to <- io.colour.bits.ratio) {
-    divider.start.valid        := isWorking && isReady && ofSurface && reflects && isDirectView
-    divider.start.bits.part    := sum
-    divider.start.bits.channel := channel
-    divider.whole              := unshadowed
-    to.channels.zip(divider.ratios).foreach { case (channel, part) => channel := Fixed(channel.format, part) }
+  // A bounce's path enters the table; a read in the same cycle does not count
+  isWriting := done.isValid && done.isBounce
+  for (table <- paths; bounce <- io.bounce) when(isWriting || (bounce.fire && isDirect)) {
+    val path = Wire(new PathState)
+    for ((to, (weight, tint)) <- path.throughput.zip(weights.zip(tints.get)))
+      to := Fixed(to.format, Mux(isWriting, weight, tint))
+    path.radiance.channels.zip(colours).foreach { case (to, from) => to := Mux(isWriting, from, 0.U) }
+    table.write(Mux(isWriting, done.context, bounce.bits.context), path)
   }
-  paths.foreach { table =>
-    when(retires && !isEnd) {
-      val path = Wire(new PathState)
-      path.throughput.zip(throughput).foreach { case (to, from) => to := Fixed(to.format, from) }
-      path.radiance.channels.zip(radiance).foreach { case (to, from) => to := from }
-      table.write(context, path)
-    }
+  isUpdating := Seq(slot, arrival, sum, leaving, weighed, added, done, after(done)())
+    .map(slot => slot.isValid && slot.isBounce && slot.context === next.context)
+    .reduce(_ || _)
+
+  private def shiftIn(channels: Vec[UInt], value: UInt): Unit = {
+    channels(0) := channels(1)
+    channels(1) := channels(2)
+    channels(2) := value
   }
-  private def set(channels: Vec[UInt], value: UInt): Unit =
-    for (index <- 0 until 3) when(channel === index.U) { channels(index) := value }
-}
-
-object ColourUnit {
-
-  /** Whether the path of a bounce that is taken, or else of an end, is new. */
-  private[shading] def isStraight(io: ColourUnitIO, isBounce: Bool): Bool =
-    io.bounce.map(bounce => Mux(isBounce, bounce.bits.isFirst, io.end.bits.isStraight.get)).getOrElse(true.B)
-
-  /** The ports of a new unit: with `units.pipelined` a [[ColourPipeline]]. */
-  def apply(config: ColonnadeConfig): ColourUnitIO =
-    if (config.units.pipelined) Module(new ColourPipeline(config)).io else Module(new ColourUnit(config)).io
 }
 
 /** The surface at which a path ends. */

@@ -8,7 +8,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Material, MaterialKind}
 import colonnade.numbers.Rounding
 
-/** Shades hits as [[Shader]] does, bit for bit: a hit with one light every three cycles, and three cycles more for
+/** Shades hits as [[SequentialShader]] does, bit for bit: a hit with one light every three cycles, and three cycles more for
   * each further light. {{{
   *
   * hit ─▶ SurfaceStage ─ normal, origin ─▶ AngleStage ─ angle, falloff ─▶ BrightnessStage ─ light ─┬▶ lit surface
@@ -19,13 +19,11 @@ import colonnade.numbers.Rounding
   * in the queues at the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The hit's
   * point and normal are computed again for each light.
   */
-final class ShadingPipeline(config: ColonnadeConfig) extends Module {
+final class ShadingPipeline(config: ColonnadeConfig) extends Shader(config) {
   import ShadingPipeline._
 
   private val numbers = config.numbers
   private val cycles  = new BrightnessCycles(numbers)
-
-  val io = IO(new ShaderIO(config))
 
   private val phase    = RegInit(0.U.asTypeOf(ModuloSchedule.phase()))
   private val schedule = new ModuloSchedule(phase)

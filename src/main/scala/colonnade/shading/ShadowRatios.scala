@@ -5,6 +5,12 @@ import chisel3.util.{log2Ceil, Cat, Decoupled, Valid}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{DigitRecurrence, Fixed}
 
+/** The light that arrives at a surface, in one channel. */
+final class ShadowRatioRequest(bits: Int) extends Bundle {
+  val part    = UInt(bits.W)
+  val channel = UInt(2.W)
+}
+
 /** Ports of [[ShadowRatios]].
   *
   * @param bits of the light that arrives at a surface, in one channel
@@ -26,7 +32,7 @@ final class ShadowRatiosIO(config: ColonnadeConfig, bits: Int) extends Bundle {
   val result = Decoupled(new PathColour(config))
 }
 
-/** Shadow ratios of one pixel at a time, beside the stream of [[ColourPipeline]]: three dividers, one quotient bit a cycle
+/** Shadow ratios of one pixel at a time, beside the stream of [[ColourUnit]]: three dividers, one quotient bit a cycle
   * each. The result is offered 13 cycles after the last channel.
   */
 final class ShadowRatios(config: ColonnadeConfig, bits: Int) extends Module {

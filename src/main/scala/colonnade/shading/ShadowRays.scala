@@ -25,58 +25,48 @@ final class ShadowRaysIO(config: ColonnadeConfig) extends Bundle {
   val ray     = Decoupled(new RayRequest(config))
 }
 
-/** Makes shadow rays, from a context's surface to a light.
+/** Makes shadow rays, from a context's surface to a light: docs/shading.md. Two rays in three cycles; all axes at a time,
+  * one shifter and subtractor for each.
   *
-  * One ray at a time, offered five cycles after its request. The light's position is shifted to grid steps axis by axis,
-  * and the surface's position is subtracted one cycle later.
+  * A ray is offered two cycles after its request, in the order of the requests. A request that waits for the ray before it
+  * reads its origin again, so no register holds the origin.
   */
 final class ShadowRays(config: ColonnadeConfig) extends Module {
-  private val numbers = config.numbers
-  private val scene   = new RayFormats(numbers).scene
+  private val scene = new RayFormats(config.numbers).scene
 
   val io = IO(new ShadowRaysIO(config))
 
   private val origins = ContextTable(config, Vec3(new Fixed(scene)))
   when(io.surface.valid) { origins.write(io.surface.bits.context, io.surface.bits.origin) }
 
-  private val isBusy  = RegInit(false.B)
-  private val step    = Reg(UInt(3.W))
+  // A request whose origin was read in the cycle before
+  private val isHeld  = RegInit(false.B)
   private val request = Reg(new ShadowRequest(config))
-  private val origin  = Reg(Vec3(new Fixed(scene)))
-  private val shifted = Reg(SInt(scene.width.W))
-  private val dir     = Reg(Vec(3, SInt((scene.width + 1).W)))
+  private val hasRay  = RegInit(false.B)
+  private val moves   = isHeld && (!hasRay || io.ray.ready)
+  private val repeats = isHeld && !moves
+  private val origin  = origins.read(Mux(repeats, request.context, io.req.bits.context), repeats || io.req.fire)
 
-  // The surface is read in step 0. The light's axes are shifted in steps 0 to 2; the direction is complete after step 3
-  private val read = origins.read(io.req.bits.context, io.req.fire)
-  when(step === 0.U) { origin := read }
-  private val light    = if (config.frame.lights == 1) io.lights.head else io.lights(request.light)
-  private val position = light.position.axes.zipWithIndex.tail.foldLeft(light.position.x) {
-    case (other, (axis, index)) =>
-      Mux(step === index.U, axis, other)
-  }
-  shifted := Rounding.narrow((position.pad(scene.width) << io.unitShift).asSInt, scene.width)
-  for (axis <- 0 until 3) {
-    when(step === (axis + 1).U) { dir(axis) := shifted -& origin.axes(axis).integer }
-  }
-
-  io.req.ready := !isBusy
+  // Ready without a look at the ray's way out
+  io.req.ready := !isHeld || !hasRay
   when(io.req.fire) {
-    isBusy  := true.B
-    step    := 0.U
+    isHeld  := true.B
     request := io.req.bits
-  }.elsewhen(isBusy && step =/= 4.U) { step := step + 1.U }
-  when(io.ray.fire) { isBusy := false.B }
+  }.elsewhen(moves) { isHeld := false.B }
 
-  io.ray.valid         := isBusy && step === 4.U
-  io.ray.bits.context  := request.context
+  // Its ray
+  private val ray   = Reg(chiselTypeOf(io.ray.bits))
+  private val light = if (config.frame.lights == 1) io.lights.head else io.lights(request.light)
+  when(moves) {
+    ray.context := request.context
+    ray.origin  := origin
+    for (((dir, position), from) <- ray.dir.axes.zip(light.position.axes).zip(origin.axes)) {
+      val shifted = Rounding.narrow((position.pad(scene.width) << io.unitShift).asSInt, scene.width)
+      dir := shifted -& from.integer
+    }
+  }
+  when(moves) { hasRay := true.B }.elsewhen(io.ray.ready) { hasRay := false.B }
+  io.ray.valid         := hasRay
+  io.ray.bits          := ray
   io.ray.bits.isShadow := true.B
-  io.ray.bits.origin   := origin
-  io.ray.bits.dir.axes.zip(dir).foreach { case (to, from) => to := from }
-}
-
-object ShadowRays {
-
-  /** The ports of a new unit: with `units.pipelined` a [[ShadowRaysPipeline]]. */
-  def apply(config: ColonnadeConfig): ShadowRaysIO =
-    if (config.units.pipelined) Module(new ShadowRaysPipeline(config)).io else Module(new ShadowRays(config)).io
 }

@@ -51,9 +51,9 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
   private val controller  = Module(new RtController(config)).io
   private val primaryRays = Module(new PrimaryRays(config)).io
   private val raySetup    = Module(RaySetup(config)).io
-  private val shader      = Shader(config)
-  private val shadowRays  = ShadowRays(config)
-  private val colourUnit  = ColourUnit(config)
+  private val shader      = Module(Shader(config)).io
+  private val shadowRays  = Module(new ShadowRays(config)).io
+  private val colourUnit  = Module(new ColourUnit(config)).io
   private val assembler   = Module(new PixelAssembler(config)).io
   private val bounces     = Option.when(config.frame.hasBounces)(Module(new BounceScheduler(config)).io)
   private val environment = Option.when(config.hasEnvironment)(Module(new EnvironmentPort(config)).io)

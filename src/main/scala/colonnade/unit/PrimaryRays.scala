@@ -37,7 +37,7 @@ final class PrimaryRaysIO(config: ColonnadeConfig) extends Bundle {
 final class PrimaryRays(config: ColonnadeConfig) extends Module {
   val io = IO(new PrimaryRaysIO(config))
 
-  private val generator = Module(RayGenerator(config))
+  private val generator = Module(new RayGenerator(config))
   private val position  = io.positions.bits
   private val free      = io.control.free
   generator.io.registers             := io.camera

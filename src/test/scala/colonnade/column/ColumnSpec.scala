@@ -2,7 +2,7 @@ package colonnade.column
 
 import chisel3._
 import chiseltest._
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, UnitsConfig}
 import colonnade.environment.EnvironmentImage
 import colonnade.formats.{FrameRegisters, LoadTarget, Pixel}
 import colonnade.unit.{SmallEnvironment, SmallScene}
@@ -88,6 +88,12 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def withPaths(config: ColonnadeConfig, contexts: Int): ColonnadeConfig =
     config.copy(units = config.units.copy(pathContexts = contexts))
 
+  private def withIntervals(
+      config: ColonnadeConfig,
+      ray:    Int = UnitsConfig.sequentialRayInterval,
+      shade:  Int = UnitsConfig.sequentialShadeInterval
+  ): ColonnadeConfig = config.copy(units = config.units.copy(rayInterval = ray, shadeInterval = shade))
+
   private val narrow = TestConfigs.withPrecision(16, 16, 32)
 
   render("a tree, snooping, eight paths", withPaths(tiny, 8))
@@ -103,9 +109,10 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
     Matrix
   )
   render(
-    "an environment, five paths",
-    withPaths(TestConfigs.withEnvironment(TestConfigs.environment), 5)
+    "an environment, five paths, pipelined ray set-up",
+    withIntervals(withPaths(TestConfigs.withEnvironment(TestConfigs.environment), 5), ray = 1)
   )
+  render("a shading pipeline, eight paths", withIntervals(withPaths(tiny, 8), shade = 3))
   render(
     "two rows that share triangle units, pipelines, many paths, corner colours and emission, an environment", {
       val coloured = TestConfigs.withColours.head
@@ -116,7 +123,8 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
         units = tiny.units.copy(
           marches = 2,
           pathContexts = 24,
-          pipelined = true,
+          rayInterval = 1,
+          shadeInterval = 3,
           triangleRows = 2,
           triangleLanes = 2
         )

@@ -120,6 +120,8 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     refusal("tiny", "array.columns=257") shouldBe "array.columns is 257; it must be from 1 to 256"
     refusal("tiny", "array.rows=256", "array.columns=5") shouldBe
       "array.rows times array.columns is 1280; it must be at most 1024"
+    refusal("tiny", "units.rayInterval=16") shouldBe "units.rayInterval is 16; it must be one of 1, 32"
+    refusal("tiny", "units.shadeInterval=1") shouldBe "units.shadeInterval is 1; it must be one of 3, 128"
     refusal("tiny", "geometry.arity=3") shouldBe "geometry.arity is 3; it must be one of 2, 4"
     refusal("tiny", "frame.tileSize=5") shouldBe "frame.tileSize is 5; it must be one of 4, 8, 16, 32"
   }

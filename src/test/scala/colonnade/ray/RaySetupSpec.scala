@@ -3,7 +3,7 @@ package colonnade.ray
 import chisel3._
 import chiseltest._
 import colonnade.{Always, Matrix, Simulation, TestConfigs}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, UnitsConfig}
 import colonnade.numbers.Fixed
 import org.scalatest.Tag
 import org.scalatest.flatspec.AnyFlatSpec
@@ -25,43 +25,41 @@ private class RaySetupHarness(config: ColonnadeConfig) extends Module {
 class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   import RaySetupSpec._
 
-  for (pipelined <- Seq(false, true)) {
-    behavior of (if (pipelined) "RaySetupPipeline" else "RaySetup")
-    val kind = if (pipelined) "pipelined" else "sequential"
+  for (interval <- UnitsConfig.rayIntervals) {
+    behavior of (if (interval == 1) "RaySetupPipeline" else "SequentialRaySetup")
 
-    formatsOf(pipelined).foreach { formats =>
-      val name = s"$kind, ${formats.precision} with ${formats.geometry.vertexBits}-bit vertices and " +
-        s"${formats.numbers.gridBits}-bit triangle tests" + (if (formats.units.shortPaths) ", short paths" else "")
-      it should s"equal the model under random stalls, also at inverted bounds, $name" taggedAs tag(
-        formats,
-        pipelined
-      ) in {
-        val config = withPipeline(formats, pipelined)
+    formatsOf(interval).foreach { formats =>
+      it should s"equal the model under random stalls, also at inverted bounds, ${nameOf(formats, interval)}" taggedAs
+        tag(formats, interval) in {
+          val config = withInterval(formats, interval)
+          test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
+            val random = new Random(2)
+            val boxes  = new SetupStimulus(config, random)
+            val cases  = boxes.all(raysPerBox = if (interval == 1) 40 else 14)
+            val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
+            cases.zip(rates).foreach { case (box, rate) => run(setup, box, box.answers(config), random, rate) }
+            boxes.inverted(raysPerBox = 6).foreach(box => run(setup, box, box.answers(config), random, Rates(1, 1)))
+          }
+        }
+    }
+
+    val limits = Seq(TestConfigs.tiny -> interval.min(16)) ++ Seq(slowest -> interval).filter(_ => interval > 1)
+    for ((formats, limit) <- limits)
+      it should s"accept a ray every $limit cycles, ${nameOf(formats, interval)}, and lose none" in {
+        val config = withInterval(formats, interval)
         test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
-          val random = new Random(2)
-          val boxes  = new SetupStimulus(config, random)
-          val cases  = boxes.all(raysPerBox = if (pipelined) 40 else 14)
-          val rates  = Seq(Rates(1, 1), Rates(2, 3), Rates(25, 1), Rates(1, 25))
-          cases.zip(rates).foreach { case (box, rate) => run(setup, box, box.answers(config), random, rate) }
-          boxes.inverted(raysPerBox = 6).foreach(box => run(setup, box, box.answers(config), random, Rates(1, 1)))
+          val random   = new Random(3)
+          val box      = new SetupStimulus(config, random).all(raysPerBox = 40).head
+          val answers  = box.answers(config)
+          val inBox    = answers.map(_.head == 1)
+          val left     = run(setup, box, answers, random, Rates(1, 1))
+          val starting = 4
+          inBox.count(identity) should be > 20
+          val intervals = left.zip(left.tail).drop(starting).map { case (one, next) => next - one }
+          info(s"at most ${intervals.max} cycles")
+          intervals.max should be <= limit
         }
       }
-    }
-
-    val interval = if (pipelined) 1 else 16
-    it should s"accept a ray every $interval cycles at 32b32s64d, $kind, and lose none" in {
-      val config = withPipeline(TestConfigs.tiny, pipelined)
-      test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
-        val random   = new Random(3)
-        val box      = new SetupStimulus(config, random).all(raysPerBox = 40).head
-        val answers  = box.answers(config)
-        val inBox    = answers.map(_.head == 1)
-        val left     = run(setup, box, answers, random, Rates(1, 1))
-        val starting = 4
-        inBox.count(identity) should be > 20
-        left.zip(left.tail).drop(starting).map { case (one, next) => next - one }.max should be <= interval
-      }
-    }
   }
 
   /** Sends all requests and checks all results; returns the cycles of the results. */
@@ -123,16 +121,27 @@ object RaySetupSpec {
   private val narrowTests: ColonnadeConfig =
     TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(triangleBits = Some(24)))
 
-  private def formatsOf(pipelined: Boolean): Seq[ColonnadeConfig] =
-    TestConfigs.formats ++ (narrowTests +: Option.unless(pipelined)(shortPaths).toSeq)
-
   private val shortPaths = TestConfigs.withShortPaths(narrowTests)
 
-  private def tag(config: ColonnadeConfig, pipelined: Boolean): Tag =
-    if (config == narrowTests || config == shortPaths) Always else if (pipelined) Matrix else Always.ifExtreme(config)
+  /** The most slices of a shear factor, with short paths. */
+  private val slowest: ColonnadeConfig = {
+    val wide = TestConfigs.withShortPaths(TestConfigs.withPrecision(64, 64, 64))
+    wide.copy(geometry = wide.geometry.copy(vertexBits = 10))
+  }
 
-  private def withPipeline(config: ColonnadeConfig, pipelined: Boolean): ColonnadeConfig =
-    config.copy(units = config.units.copy(pipelined = pipelined))
+  private def formatsOf(interval: Int): Seq[ColonnadeConfig] =
+    TestConfigs.formats ++ (narrowTests +: Seq(shortPaths).filter(_ => interval > 1))
+
+  private def tag(config: ColonnadeConfig, interval: Int): Tag =
+    if (config == narrowTests || config == shortPaths) Always
+    else if (interval == 1) Matrix else Always.ifExtreme(config)
+
+  private def withInterval(config: ColonnadeConfig, interval: Int): ColonnadeConfig =
+    config.copy(units = config.units.copy(rayInterval = interval))
+
+  private def nameOf(config: ColonnadeConfig, interval: Int): String =
+    s"interval $interval, ${config.precision} with ${config.geometry.vertexBits}-bit vertices and " +
+      s"${config.numbers.gridBits}-bit triangle tests" + (if (config.units.shortPaths) ", short paths" else "")
 
   /** A request is offered in one of `offer` cycles, a ray is accepted in one of `accept` cycles. */
   private case class Rates(offer: Int, accept: Int)

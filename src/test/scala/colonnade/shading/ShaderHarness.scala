@@ -9,7 +9,7 @@ import colonnade.config.ColonnadeConfig
 final class ShaderHarness(config: ColonnadeConfig) extends Module {
   val io = IO(new ShaderIO(config))
 
-  private val shader = Shader(config)
+  private val shader = Module(Shader(config)).io
   io <> shader
 
   for ((port, unused) <- shader.texture.zip(io.texture)) {

@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chiseltest._
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, UnitsConfig}
 import colonnade.numbers.StreamTester
 import colonnade.{Always, Matrix, Model, Simulation, TestConfigs}
 import org.scalatest.Tag
@@ -60,12 +60,12 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  private def pipelined(config: ColonnadeConfig) = config.copy(units = config.units.copy(pipelined = true))
-
   for (
     config <-
       TestConfigs.formats ++ TestConfigs.withColours ++
-        (TestConfigs.formats ++ TestConfigs.withColours).map(pipelined) :+ TestConfigs.withShortPaths(TestConfigs.tiny)
+        (TestConfigs.formats ++ TestConfigs.withColours).map(TestConfigs.withPipelines) :+ TestConfigs.withShortPaths(
+          TestConfigs.tiny
+        )
   ) {
     val name = nameOf(config)
 
@@ -85,17 +85,27 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   /** [[ShadingPipelineSpec]] covers other formats of the pipeline. */
   private def tag(config: ColonnadeConfig): Tag = {
-    val common = Seq(pipelined(TestConfigs.tiny), TestConfigs.withColours.head)
+    val common = Seq(TestConfigs.withPipelines(TestConfigs.tiny), TestConfigs.withColours.head)
     if (common.contains(config.copy(physicalAttributeMemory = None))) Always
-    else if (config.units.pipelined || config.geometry.cornerColours) Matrix
+    else if (isPipeline(config) || config.geometry.cornerColours) Matrix
     else Always.ifExtreme(config)
   }
+
+  /** The widest operands, and each option that takes the shader's time. */
+  private def slowest: Seq[ColonnadeConfig] = {
+    val wide     = TestConfigs.withPrecision(64, 64, 64)
+    val coloured = wide.copy(geometry = wide.geometry.copy(cornerColours = true))
+    Seq(TestConfigs.withShortPaths(wide), coloured)
+  }
+
+  private def isPipeline(config: ColonnadeConfig) =
+    config.units.shadeInterval < UnitsConfig.sequentialShadeInterval
 
   private def nameOf(config: ColonnadeConfig): String =
     s"${config.precision} and ${config.geometry.vertexBits}-bit vertices" +
       (if (config.geometry.cornerColours) " with corner colours" else "") +
       (if (config.geometry.texture.nonEmpty) " and textures" else "") +
-      (if (config.units.pipelined) " in a pipeline" else "") +
+      (if (isPipeline(config)) " in a pipeline" else "") +
       (if (config.units.shortPaths) " with short paths" else "")
 
   /** Every number at a limit of its range. */
@@ -171,6 +181,37 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
         assert(taken.max <= limit, s"cycles from a hit to the next: $taken")
       }
 
+  // Without textures: a texel may come at any time
+  for (config <- (TestConfigs.formats ++ TestConfigs.withColours.init ++ slowest).distinct)
+    it should s"take any hit with a light within ${config.units.shadeInterval} cycles at ${nameOf(config)}" taggedAs
+      (if (slowest.contains(config)) Always else Matrix) in
+      test(new ShaderHarness(config)).withAnnotations(verilator) { shader =>
+        val random   = new Random(26)
+        val stimulus = new ShaderStimulus(config, random)
+        shader.io.lit.ready.poke(true)
+        var most = 0
+        for (round <- 0 until 40) {
+          val plain = if (round % 2 == 0) stimulus.light() else stimulus.typicalLight()
+          val light = plain.copy(shining = 1, isFlat = false)
+          pokeLight(shader.io, light)
+          for (hit <- Seq.fill(8)(stimulus.surfaceHit(light)) :+ stimulus.withoutSmoothNormal() :+ stimulus.anyHit()) {
+            shader.io.request.valid.poke(true)
+            pokeHit(shader.io.request.bits, hit)
+            var cycles = 1
+            while (!shader.io.request.ready.peekBoolean()) {
+              shader.clock.step()
+              cycles += 1
+            }
+            shader.clock.step()
+            most = most.max(cycles)
+          }
+          shader.io.request.valid.poke(false)
+          shader.clock.step(config.units.shadeInterval * 3)
+        }
+        info(s"at most $most cycles")
+        assert(most <= config.units.shadeInterval)
+      }
+
   it should "tell the materials of a table apart, whatever its size" in {
     for (materials <- Seq(1, 5, 8)) {
       val config = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(materials = materials, maxBounces = 0))
@@ -238,8 +279,8 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (
     config <- (TestConfigs.formats ++ Seq(
       TestConfigs.withColours.head,
-      pipelined(TestConfigs.tiny),
-      pipelined(TestConfigs.withTextures)
+      TestConfigs.withPipelines(TestConfigs.tiny),
+      TestConfigs.withPipelines(TestConfigs.withTextures)
     )).map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment)))
   )
     it should s"light points of an environment between hits, with ${nameOf(config)}" taggedAs tag(config) in

@@ -13,7 +13,7 @@ import scala.util.Random
 private class ShadersHarness(config: ColonnadeConfig) extends Module {
   val registers = IO(new ShaderIO(config))
 
-  private val units = Seq(Module(new Shader(config)).io, Module(new ShadingPipeline(config)).io)
+  private val units = Seq(Module(new SequentialShader(config)).io, Module(new ShadingPipeline(config)).io)
   val shaders       = units.map(unit => IO(chiselTypeOf(unit)))
   for ((port, unit) <- shaders.zip(units)) {
     port <> unit
@@ -162,7 +162,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for (shining <- Seq(1, 2))
     it should s"take a hit every ${ModuloSchedule.interval * shining} cycles with $shining lights" in
-      test(new ShaderHarness(TestConfigs.tiny.copy(units = TestConfigs.tiny.units.copy(pipelined = true))))
+      test(new ShaderHarness(TestConfigs.withPipelines(TestConfigs.tiny)))
         .withAnnotations(Simulation.verilator) { dut =>
           val stimulus = new ShaderStimulus(TestConfigs.tiny, new Random(3))
           val light    = stimulus.light().copy(shining = shining)

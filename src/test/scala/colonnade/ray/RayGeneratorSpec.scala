@@ -12,23 +12,23 @@ import org.scalatest.matchers.should.Matchers
 import scala.util.Random
 
 /** Expected values straight from docs/numbers.md, section 1. */
-class RayGeneratorPipelineSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
-  import RayGeneratorPipelineSpec._
+class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  import RayGeneratorSpec._
 
-  behavior of "RayGeneratorPipeline"
+  behavior of "RayGenerator"
 
   TestConfigs.formats.foreach { formats =>
     val name = s"${formats.precision} with ${formats.geometry.vertexBits}-bit vertices"
 
     it should s"send every pixel's exact ray under random stalls, $name" in {
-      test(new RayGeneratorPipeline(formats)) { generator =>
+      test(new RayGenerator(formats)) { generator =>
         val random = new Random(1)
         for (frame <- frames(formats, random)) {
           setRegisters(generator, frame)
           run(generator, pixels(formats, random, 12), random)(frame)
           run(generator, tileWithGaps(formats, random), random)(frame)
           // Then the registers change, even if the next pixel would follow the last one
-          stop(generator, RayGeneratorPipeline.emptyCycles)
+          stop(generator, RayGenerator.emptyCycles)
         }
       }
     }
@@ -36,20 +36,20 @@ class RayGeneratorPipelineSpec extends AnyFlatSpec with ChiselScalatestTester wi
 
   it should "forget the registers when it is empty" in {
     val config = TestConfigs.tiny
-    test(new RayGeneratorPipeline(config)) { generator =>
+    test(new RayGenerator(config)) { generator =>
       val random = new Random(2)
       val pixels = tile(config, random)
       for ((frame, pixel) <- frames(config, random).zip(pixels)) {
         setRegisters(generator, frame)
         run(generator, Seq(pixel), random)(frame)
-        stop(generator, RayGeneratorPipeline.emptyCycles)
+        stop(generator, RayGenerator.emptyCycles)
       }
     }
   }
 
   it should "accept a pixel of a tile every cycle, after the first one" in {
     val config = TestConfigs.tiny
-    test(new RayGeneratorPipeline(config)) { generator =>
+    test(new RayGenerator(config)) { generator =>
       val pixels = tile(config, new Random(3))
       generator.io.position.valid.poke(true)
       generator.io.ray.ready.poke(true)
@@ -69,34 +69,34 @@ class RayGeneratorPipelineSpec extends AnyFlatSpec with ChiselScalatestTester wi
 
   it should "send every pixel's exact ray of two mixed tiles under random stalls" in {
     val config = TestConfigs.withEnvironment(TestConfigs.environment)
-    test(new RayGeneratorPipeline(config)) { generator =>
+    test(new RayGenerator(config)) { generator =>
       val random = new Random(4)
       for (frame <- frames(config, random)) {
         setRegisters(generator, frame)
         for (tiles <- Seq.fill(4)(Seq.fill(2)(tileWithGaps(config, random))))
           run(generator, mixed(tiles, random), random)(frame)
-        stop(generator, RayGeneratorPipeline.emptyCycles)
+        stop(generator, RayGenerator.emptyCycles)
       }
     }
   }
 
   it should "forget the registers of both tiles when it is empty" in {
     val config = TestConfigs.withEnvironment(TestConfigs.environment)
-    test(new RayGeneratorPipeline(config)) { generator =>
+    test(new RayGenerator(config)) { generator =>
       val random = new Random(6)
       val tiles  = Seq(true, false).map(isObject => tile(config, random).map(_.copy(inObjectTile = isObject)))
       for (((frame, pixels), index) <- frames(config, random).zip(tiles.transpose).zipWithIndex) {
         setRegisters(generator, frame)
         // The second pixel follows one of the frame before, whose tile was the first then
         run(generator, if (index % 2 == 0) pixels else pixels.reverse, random)(frame)
-        stop(generator, RayGeneratorPipeline.emptyCycles)
+        stop(generator, RayGenerator.emptyCycles)
       }
     }
   }
 
   it should "accept a pixel of two mixed tiles every cycle, after the first ones" in {
     val config = TestConfigs.withEnvironment(TestConfigs.environment)
-    test(new RayGeneratorPipeline(config)) { generator =>
+    test(new RayGenerator(config)) { generator =>
       val random = new Random(5)
       val pixels = mixed(Seq.fill(2)(tile(config, random)), random)
       generator.io.position.valid.poke(true)
@@ -112,7 +112,7 @@ class RayGeneratorPipelineSpec extends AnyFlatSpec with ChiselScalatestTester wi
     }
   }
 
-  private def run(generator: RayGeneratorPipeline, pixels: Seq[Pixel], random: Random)(frame: Frame): Unit = {
+  private def run(generator: RayGenerator, pixels: Seq[Pixel], random: Random)(frame: Frame): Unit = {
     var (sent, received, cycle) = (0, 0, 0)
     while (received < pixels.size) {
       cycle should be < 100 * pixels.size
@@ -135,7 +135,7 @@ class RayGeneratorPipelineSpec extends AnyFlatSpec with ChiselScalatestTester wi
     }
   }
 
-  private def poke(generator: RayGeneratorPipeline, pixel: Pixel): Unit = {
+  private def poke(generator: RayGenerator, pixel: Pixel): Unit = {
     generator.io.position.bits.context.poke(pixel.context)
     generator.io.position.bits.x.poke(pixel.x)
     generator.io.position.bits.y.poke(pixel.y)
@@ -143,7 +143,7 @@ class RayGeneratorPipelineSpec extends AnyFlatSpec with ChiselScalatestTester wi
   }
 
   /** Leaves the empty generator without a pixel. */
-  private def stop(generator: RayGeneratorPipeline, cycles: Int): Unit = {
+  private def stop(generator: RayGenerator, cycles: Int): Unit = {
     generator.io.position.valid.poke(false)
     generator.clock.step(cycles)
   }
@@ -159,7 +159,7 @@ class RayGeneratorPipelineSpec extends AnyFlatSpec with ChiselScalatestTester wi
   }
 }
 
-object RayGeneratorPipelineSpec {
+object RayGeneratorSpec {
   private type Vector = Seq[BigInt]
   private case class Pixel(context: Int, x: BigInt, y: BigInt, inObjectTile: Boolean = true)
   private case class Frame(
@@ -229,7 +229,7 @@ object RayGeneratorPipelineSpec {
     isObjects.map(isObject => left(if (isObject) 0 else 1).next().copy(inObjectTile = isObject))
   }
 
-  private def setRegisters(generator: RayGeneratorPipeline, frame: Frame): Unit = {
+  private def setRegisters(generator: RayGenerator, frame: Frame): Unit = {
     val camera                                  = generator.io.registers.camera
     def set(port: Vec3[SInt], to: Vector): Unit = port.axes.zip(to).foreach { case (p, v) => p.poke(v) }
     set(camera.position, frame.position)

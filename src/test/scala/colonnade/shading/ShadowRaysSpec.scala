@@ -10,8 +10,8 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 /** A shadow ray goes from its context's surface to its light. */
-class ShadowRaysPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
-  behavior of "ShadowRaysPipeline"
+class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "ShadowRays"
 
   private val configs = Seq(TestConfigs.tiny, TestConfigs.withPrecision(16, 16, 32)).map(config =>
     config.copy(array = config.array.copy(contexts = 16))
@@ -21,7 +21,7 @@ class ShadowRaysPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
     it should s"send rays from remembered surfaces at ${config.precision} with ${config.array.contexts} contexts" taggedAs Always.unless(
       config == configs(1)
     ) in
-      test(new ShadowRaysPipeline(config)) { dut =>
+      test(new ShadowRays(config)) { dut =>
         val random                    = new Random(11)
         val numbers                   = config.numbers
         def signed(bits: Int): BigInt = BigInt(bits, random) - (BigInt(1) << (bits - 1))
@@ -56,7 +56,7 @@ class ShadowRaysPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
 
   /** Rays, and cycles to the last one. */
-  private def exchange(dut: ShadowRaysPipeline, asks: Seq[(Int, Int)], random: Random, stalls: Double) = {
+  private def exchange(dut: ShadowRays, asks: Seq[(Int, Int)], random: Random, stalls: Double) = {
     val request = dut.io.req
     var rays    = Vector.empty[Seq[BigInt]]
     var sent    = 0

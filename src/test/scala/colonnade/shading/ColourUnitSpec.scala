@@ -7,10 +7,10 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 /** A path's colour is that of its last surface, weighted by its throughput, whatever other paths do meanwhile. */
-class ColourPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
+class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   import ColourEvent._
 
-  behavior of "ColourPipeline"
+  behavior of "ColourUnit"
 
   for {
     (lights, maxBounces, hasEnvironment) <- Seq((1, 2, true), (3, 15, true), (1, 2, false), (2, 0, true))
@@ -24,7 +24,7 @@ class ColourPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
     it should s"colour paths with $lights lights and $maxBounces bounces$where" taggedAs Always.unless(
       maxBounces == 0 || !hasEnvironment
     ) in
-      test(new ColourPipeline(config)).withAnnotations(Simulation.verilator) { dut =>
+      test(new ColourUnit(config)).withAnnotations(Simulation.verilator) { dut =>
         val random = new Random(lights)
         val script = new ColourScript(config, random)
         val driver = new ColourDriver(dut.io, config)
