@@ -209,7 +209,7 @@ SMALL_ARRAY = {
         "marches": 1,
         "pathContexts": 8,
         "pipelined": False,
-        "shortPaths": False,
+        "extraSlices": False,
     },
     "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1, "cache": None},
 }

@@ -36,7 +36,7 @@ object ArbitraryConfig {
     marches       <- Gen.chooseNum(1, UnitsConfig.maxMarches)
     pathContexts  <- Gen.chooseNum(1, UnitsConfig.maxPathContexts)
     pipelined     <- flag
-    shortPaths    <- flag
+    extraSlices   <- flag
   } yield UnitsConfig(
     boxLanes,
     triangleLanes,
@@ -44,7 +44,7 @@ object ArbitraryConfig {
     marches,
     pathContexts,
     pipelined,
-    shortPaths
+    extraSlices
   )
 
   private val memory = for {

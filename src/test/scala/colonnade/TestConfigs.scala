@@ -26,7 +26,7 @@ object TestConfigs {
       marches = 1,
       pathContexts = 5,
       pipelined = false,
-      shortPaths = false
+      extraSlices = false
     ),
     ColumnBvhMemoryConfig(
       depth = 1024,
@@ -115,8 +115,8 @@ object TestConfigs {
     )
   )
 
-  def withShortPaths(config: ColonnadeConfig): ColonnadeConfig =
-    config.copy(units = config.units.copy(shortPaths = true))
+  def withExtraSlices(config: ColonnadeConfig): ColonnadeConfig =
+    config.copy(units = config.units.copy(extraSlices = true))
 
   def withPrecision(mac: Int, sqrt: Int, div: Int): ColonnadeConfig =
     tiny.copy(precision = PrecisionConfig(mac, sqrt, div))

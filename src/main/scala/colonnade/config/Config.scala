@@ -85,7 +85,7 @@ final case class GeometryConfig(
   * @param marches       environment marches of a column, if the device supports an environment
   * @param pathContexts  pixels in flight in a column's path unit
   * @param pipelined     ray set-up, shading, bounces and colours are pipelines, for a path unit that serves a column
-  * @param shortPaths    registers in the traversal stack and around the record fetch, for FPGAs: some steps take a cycle more
+  * @param extraSlices   the optional timing slices of traversal and caches, for FPGAs: some steps take a cycle more
   */
 final case class UnitsConfig(
     boxLanes:      Int,
@@ -94,7 +94,7 @@ final case class UnitsConfig(
     marches:       Int,
     pathContexts:  Int,
     pipelined:     Boolean,
-    shortPaths:    Boolean
+    extraSlices:   Boolean
 ) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
   Require.within("units.triangleLanes", triangleLanes, 1, 4)

@@ -61,7 +61,7 @@ object ConfigIO {
       "marches",
       "pathContexts",
       "pipelined",
-      "shortPaths"
+      "extraSlices"
     )
     val memory = root.section(
       "columnBvhMemory",
@@ -111,7 +111,7 @@ object ConfigIO {
         marches = units.int("marches"),
         pathContexts = units.int("pathContexts"),
         pipelined = units.boolean("pipelined"),
-        shortPaths = units.boolean("shortPaths")
+        extraSlices = units.boolean("extraSlices")
       ),
       columnBvhMemory = ColumnBvhMemoryConfig(
         depth = memory.int("depth"),
@@ -190,7 +190,7 @@ object ConfigIO {
         "marches"       -> units.marches,
         "pathContexts"  -> units.pathContexts,
         "pipelined"     -> units.pipelined,
-        "shortPaths"    -> units.shortPaths
+        "extraSlices"   -> units.extraSlices
       ),
       "columnBvhMemory" -> ujson.Obj(
         "depth"         -> columnBvhMemory.depth,

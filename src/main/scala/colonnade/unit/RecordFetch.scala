@@ -82,7 +82,7 @@ final class RecordFetch(config: ColonnadeConfig) extends Module {
   }
 
   /** With short paths broadcasts are registered, and compared in the cycle before. */
-  private val shortPaths = config.units.shortPaths
+  private val shortPaths = config.units.extraSlices
   private val broadcasts = io.broadcasts.map { broadcast =>
     if (shortPaths) Pipe(broadcast.valid, broadcast.bits) else broadcast
   }

@@ -31,7 +31,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
     formatsOf(pipelined).foreach { formats =>
       val name = s"$kind, ${formats.precision} with ${formats.geometry.vertexBits}-bit vertices and " +
-        s"${formats.numbers.gridBits}-bit triangle tests" + (if (formats.units.shortPaths) ", short paths" else "")
+        s"${formats.numbers.gridBits}-bit triangle tests" + (if (formats.units.extraSlices) ", extra slices" else "")
       it should s"equal the model under random stalls, also at inverted bounds, $name" taggedAs tag(
         formats,
         pipelined
@@ -124,12 +124,12 @@ object RaySetupSpec {
     TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(triangleBits = Some(24)))
 
   private def formatsOf(pipelined: Boolean): Seq[ColonnadeConfig] =
-    TestConfigs.formats ++ (narrowTests +: Option.unless(pipelined)(shortPaths).toSeq)
+    TestConfigs.formats ++ (narrowTests +: Option.unless(pipelined)(extraSlices).toSeq)
 
-  private val shortPaths = TestConfigs.withShortPaths(narrowTests)
+  private val extraSlices = TestConfigs.withExtraSlices(narrowTests)
 
   private def tag(config: ColonnadeConfig, pipelined: Boolean): Tag =
-    if (config == narrowTests || config == shortPaths) Always else if (pipelined) Matrix else Always.ifExtreme(config)
+    if (config == narrowTests || config == extraSlices) Always else if (pipelined) Matrix else Always.ifExtreme(config)
 
   private def withPipeline(config: ColonnadeConfig, pipelined: Boolean): ColonnadeConfig =
     config.copy(units = config.units.copy(pipelined = pipelined))

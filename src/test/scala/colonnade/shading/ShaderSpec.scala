@@ -65,7 +65,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (
     config <-
       TestConfigs.formats ++ TestConfigs.withColours ++
-        (TestConfigs.formats ++ TestConfigs.withColours).map(pipelined) :+ TestConfigs.withShortPaths(TestConfigs.tiny)
+        (TestConfigs.formats ++ TestConfigs.withColours).map(pipelined) :+ TestConfigs.withExtraSlices(TestConfigs.tiny)
   ) {
     val name = nameOf(config)
 
@@ -96,7 +96,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       (if (config.geometry.cornerColours) " with corner colours" else "") +
       (if (config.geometry.texture.nonEmpty) " and textures" else "") +
       (if (config.units.pipelined) " in a pipeline" else "") +
-      (if (config.units.shortPaths) " with short paths" else "")
+      (if (config.units.extraSlices) " with extra slices" else "")
 
   /** Every number at a limit of its range. */
   private def extremes(config: ColonnadeConfig, stimulus: ShaderStimulus): Seq[(LightCase, Seq[HitCase])] = {
