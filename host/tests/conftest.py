@@ -210,7 +210,7 @@ SMALL_ARRAY = {
         "pathContexts": 8,
         "rayInterval": 32,
         "shadeInterval": 128,
-        "shortPaths": False,
+        "extraSlices": False,
     },
     "columnBvhMemory": {"banks": 2, "snooping": True, "readLatency": 1, "cache": None},
 }

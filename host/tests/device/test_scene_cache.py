@@ -81,7 +81,7 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
 
 
 def test_frames_of_the_preset_for_fpgas() -> None:
-    """Its short paths change no pixel and no counter of events, with the slow memory of a board."""
+    """Its timing slices change no pixel and no counter of events, with the slow memory of a board."""
     design = design_for("fpga")
     image = pack(load_mesh("torus"), design.manifest)
     scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")

@@ -3,6 +3,7 @@ package colonnade
 import chisel3._
 import chisel3.experimental.hierarchy.{Definition, Instance}
 import chisel3.util.{Decoupled, Pipe}
+import colonnade.common.TimingSlice
 import colonnade.column.{Column, PathTracer, PathTracerModule}
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributeArbiter, PhysicalAttributeMemory}
@@ -76,8 +77,8 @@ final class Colonnade(
     isStale     := (isStale && !invalidate) || registers.io.invalidate.get || hasFailed
     memory.page := registers.io.frame.dram.get.page
     io.memory.get :<>= memory.axi
-    // With short paths the caches forget a cycle later, still before the frame's first request
-    val forgets = if (config.units.shortPaths) RegNext(invalidate, false.B) else invalidate
+    // The caches forget a cycle later, still before the frame's first request
+    val forgets = TimingSlice.flag(invalidate)
     memory.invalidate := forgets
     for (((column, requests), index) <- columns.zip(memory.requests).zipWithIndex) {
       requests :<>= column.io.lineRequests.get

@@ -1,9 +1,10 @@
 package colonnade
 
 import chisel3._
-import chisel3.util.{DecoupledIO, Mux1H, Queue}
+import chisel3.util.Mux1H
 import colonnade.axi.AxiPins
 import colonnade.bus._
+import colonnade.common.TimingSlice
 import colonnade.column.{PathTracer, PathTracerModule}
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.RegisterMap
@@ -40,10 +41,8 @@ final class ColonnadeAxi(
 
   private val streamGuard = streamPins.map(_ => Module(new StreamGuard(shell.busBytes)))
 
-  // What a soft reset resets. With short paths by a register, whose output reaches all of the device
-  private val clears =
-    if (config.units.shortPaths) RegNext(reset.asBool || control.io.resetNext, true.B)
-    else reset.asBool || control.io.reset
+  // What a soft reset resets, by a register: its output reaches all of the device
+  private val clears = TimingSlice.flag(reset.asBool || control.io.resetNext, atReset = true)
   private val device = withReset(clears)(Module(new Colonnade(config, pathTracer)))
   private val writer = withReset(clears)(Module(new FramebufferWriter(config, shell)))
   private val loader = withReset(clears)(Module(new ImageLoader(config, shell)))
@@ -61,7 +60,7 @@ final class ColonnadeAxi(
   control.io.settings            := registers.io.framebuffer
   control.io.writesAreDone       := registers.io.writesAreDone
 
-  // The device's register port: the host's, or the start of a frame. With short paths a cycle later
+  // The device's register port, a cycle later: the host's, or the start of a frame
   private val start = RegisterMap(config).find(_.name == "control.start").get
   private val port  = Wire(chiselTypeOf(registers.io.device))
   port <> registers.io.device
@@ -70,30 +69,16 @@ final class ColonnadeAxi(
     port.address   := start.address.U
     port.writeData := 1.U
   }
-  port.readData := device.io.register.readData
-  private val isStarting =
-    if (config.units.shortPaths) {
-      device.io.register.write     := RegNext(port.write, false.B)
-      device.io.register.read      := RegNext(port.read, false.B)
-      device.io.register.address   := RegNext(port.address)
-      device.io.register.writeData := RegNext(port.writeData)
-      RegNext(control.io.start, false.B)
-    } else {
-      device.io.register.write     := port.write
-      device.io.register.read      := port.read
-      device.io.register.address   := port.address
-      device.io.register.writeData := port.writeData
-      false.B
-    }
+  port.readData                := device.io.register.readData
+  device.io.register.write     := TimingSlice.flag(port.write)
+  device.io.register.read      := TimingSlice.flag(port.read)
+  device.io.register.address   := TimingSlice(port.address)
+  device.io.register.writeData := TimingSlice(port.writeData)
+  private val isStarting = TimingSlice.flag(control.io.start)
   device.io.memoryHolds.foreach(_ := 0.U)
 
-  // With short paths queues lie between the writer and its guard
-  private def written[T <: Data](channel: DecoupledIO[T]): DecoupledIO[T] =
-    if (config.units.shortPaths) withReset(clears)(Queue(channel, 2)) else channel
-  private val isWriting =
-    if (config.units.shortPaths) writeGuard.io.inner.aw.valid || writeGuard.io.inner.w.valid else false.B
-
   // Frames
+  private val isWriting = writeGuard.io.inner.aw.valid || writeGuard.io.inner.w.valid
   control.io.deviceDone   := device.io.done && !isStarting
   control.io.writerIsIdle := writer.io.isIdle && !isWriting && writeGuard.io.isIdle && streamGuard.fold(true.B)(
     _.isIdle
@@ -103,8 +88,8 @@ final class ColonnadeAxi(
   writer.io.flush         := control.io.flush
   writer.io.settings      := control.io.framebuffer
   writer.io.pixels.zip(device.io.pixels).foreach { case (sink, pixels) => sink :<>= pixels }
-  writeGuard.io.inner.aw :<>= written(writer.io.axi.aw)
-  writeGuard.io.inner.w :<>= written(writer.io.axi.w)
+  writeGuard.io.inner.aw :<>= withReset(clears)(TimingSlice.queue(writer.io.axi.aw))
+  writeGuard.io.inner.w :<>= withReset(clears)(TimingSlice.queue(writer.io.axi.w))
   writer.io.axi.b :<>= writeGuard.io.inner.b
   for (pins <- streamPins; guard <- streamGuard) {
     guard.inner :<>= writer.io.stream.get

@@ -37,7 +37,7 @@ object ArbitraryConfig {
     pathContexts  <- Gen.chooseNum(1, UnitsConfig.maxPathContexts)
     rayInterval   <- Gen.oneOf(UnitsConfig.rayIntervals)
     shadeInterval <- Gen.oneOf(UnitsConfig.shadeIntervals)
-    shortPaths    <- flag
+    extraSlices   <- flag
   } yield UnitsConfig(
     boxLanes,
     triangleLanes,
@@ -46,7 +46,7 @@ object ArbitraryConfig {
     pathContexts,
     rayInterval,
     shadeInterval,
-    shortPaths
+    extraSlices
   )
 
   private val memory = for {

@@ -31,9 +31,8 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     Seq.fill(config.columnBvhMemory.depth)(BigInt(new RecordFormats(config).recordBits, random))
   }
 
-  private def onBench(seed: Int, shortPaths: Boolean = false)(body: ShellBench => Unit): Unit = {
-    val built = if (shortPaths) TestConfigs.withShortPaths(config) else config
-    test(new ColonnadeAxi(built, shell, new FakePathTracer(_))).withAnnotations(Simulation.verilator) { dut =>
+  private def onBench(seed: Int)(body: ShellBench => Unit): Unit = {
+    test(new ColonnadeAxi(config, shell, new FakePathTracer(_))).withAnnotations(Simulation.verilator) { dut =>
       body(new ShellBench(dut, config, shell, new Random(seed)))
     }
   }
@@ -82,9 +81,8 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     assert(!bench.interrupt && host("interrupt.status") == 1)
   }
 
-  for (shortPaths <- Seq(false, true))
-    it should s"load images and write frames, one after the other, and refuse images by name, short paths $shortPaths" in
-      onBench(3, shortPaths)(loadsAndFrames)
+  it should "load images and write frames, one after the other, and refuse images by name" in
+    onBench(3)(loadsAndFrames)
 
   private def loadsAndFrames(bench: ShellBench): Unit = {
     bench.size(w, h)
@@ -132,9 +130,8 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     assert(bench.load(good).isEmpty)
   }
 
-  for (shortPaths <- Seq(false, true))
-    it should s"refuse a misaligned framebuffer, end a frame whose writes fail, and recover by a soft reset, short paths $shortPaths" in
-      onBench(5, shortPaths)(errorsAndResets)
+  it should "refuse a misaligned framebuffer, end a frame whose writes fail, and recover by a soft reset" in
+    onBench(5)(errorsAndResets)
 
   private def errorsAndResets(bench: ShellBench): Unit = {
     val scene = records(1)

@@ -27,7 +27,7 @@ object TestConfigs {
       pathContexts = 5,
       rayInterval = UnitsConfig.sequentialRayInterval,
       shadeInterval = UnitsConfig.sequentialShadeInterval,
-      shortPaths = false
+      extraSlices = false
     ),
     ColumnBvhMemoryConfig(
       depth = 1024,
@@ -116,8 +116,8 @@ object TestConfigs {
     )
   )
 
-  def withShortPaths(config: ColonnadeConfig): ColonnadeConfig =
-    config.copy(units = config.units.copy(shortPaths = true))
+  def withExtraSlices(config: ColonnadeConfig): ColonnadeConfig =
+    config.copy(units = config.units.copy(extraSlices = true))
 
   /** With both pipelines. */
   def withPipelines(config: ColonnadeConfig): ColonnadeConfig =

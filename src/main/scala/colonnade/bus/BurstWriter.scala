@@ -3,6 +3,7 @@ package colonnade.bus
 import chisel3._
 import chisel3.util._
 import colonnade.axi.{Axi, AxiWritePort}
+import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 final class BurstWriterIO(config: ColonnadeConfig, shell: ShellConfig) extends Bundle {
@@ -24,7 +25,8 @@ final class BurstWriterIO(config: ColonnadeConfig, shell: ShellConfig) extends B
   *
   * Rows of narrow pixels may be narrower than the bus: they are one beat with the lanes of the row. Rows begin at multiples
   * of their size, a power of two of at most 256 bytes, so no burst crosses 4 KB. A burst's beats follow each other; the
-  * address of the next one goes out during the last beat.
+  * address of the next one goes out during the last beat. A row takes two cycles at least: in the first one its address is
+  * compared with the window.
   */
 final class BurstWriter(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   val io = IO(new BurstWriterIO(config, shell))
@@ -39,12 +41,10 @@ final class BurstWriter(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   private val row         = RegEnable(io.rows.bits, io.rows.fire)
   private val address     = RegEnable(addressOf(io.rows.bits), io.rows.fire)
   private val rowBeats    = RowBeats(config, shell, io.settings.format, row, address)
-  private val isInsideNow = io.settings.window.contains(address, rowBytes)
+  private val isInside    = TimingSlice(io.settings.window.contains(address, rowBytes))
   private val isOffered   = RegInit(false.B) // the address is on the bus, and holds
-  // With short paths a row waits a cycle while its address is compared
   private val isChecked   = RegInit(false.B)
-  private val isInside    = if (config.units.shortPaths) RegNext(isInsideNow) else isInsideNow
-  private val mayLeave    = if (config.units.shortPaths) hasRow && isChecked else hasRow
+  private val mayLeave    = hasRow && isChecked
   private val isDropped   = mayLeave && !isOffered && (io.drop || !isInside)
   private val isAddressed = io.axi.aw.fire
   private val leaves      = isDropped || isAddressed

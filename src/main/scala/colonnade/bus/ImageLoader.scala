@@ -3,6 +3,7 @@ package colonnade.bus
 import chisel3._
 import chisel3.util._
 import colonnade.axi.AxiReadPort
+import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{AttributeMemories, Load, RecordFormats}
 
@@ -28,11 +29,11 @@ final class ImageLoader(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   val io = IO(new ImageLoaderIO(config, shell))
 
   private object State extends ChiselEnum {
-    val idle, header, section, record, load, end = Value
+    val idle, check, header, section, record, load, end = Value
   }
   private val state  = RegInit(State.idle)
   private val errors = RegInit(0.U.asTypeOf(new ImageError))
-  private val reader = Module(new ImageReader(shell, config.units.shortPaths))
+  private val reader = Module(new ImageReader(shell))
   private val word   = reader.io.words.bits
   private val takes  = reader.io.words.fire
 
@@ -60,16 +61,12 @@ final class ImageLoader(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   private val record = Reg(Vec(widest, UInt(32.W)))
 
   private val isAligned = !(io.settings.base | io.settings.bytes)(log2Ceil(ImageReader.burstBytes) - 1, 0).orR
-  private val isInside  = {
-    // With short paths that of the cycle before: nobody writes a setting in the cycle before `start`
-    val contains = io.settings.window.contains(io.settings.base, io.settings.bytes)
-    if (config.units.shortPaths) RegNext(contains) else contains
-  }
-  private val isEmpty = io.settings.bytes === 0.U
-  private val canRead = isAligned && isInside && !isEmpty
-  private val isShort = reader.io.isIdle && !reader.io.words.valid // no word will come
+  private val isInside  = TimingSlice(io.settings.window.contains(io.settings.base, io.settings.bytes))
+  private val isEmpty   = io.settings.bytes === 0.U
+  private val canRead   = isAligned && isInside && !isEmpty
+  private val isShort   = reader.io.isIdle && !reader.io.words.valid // no word will come
 
-  reader.io.start       := io.start && canRead
+  reader.io.start       := state === State.check && canRead
   reader.io.base        := io.settings.base
   reader.io.bytes       := io.settings.bytes
   reader.io.stop        := state === State.end
@@ -86,14 +83,17 @@ final class ImageLoader(config: ColonnadeConfig, shell: ShellConfig) extends Mod
   switch(state) {
     is(State.idle) {
       when(io.start) {
-        errors           := 0.U.asTypeOf(errors)
-        errors.window    := !isInside
-        errors.alignment := !isAligned
-        errors.length    := isEmpty
-        state            := Mux(canRead, State.header, State.end)
-        position         := 0.U
-        rest             := io.settings.bytes >> 2
+        errors := 0.U.asTypeOf(errors)
+        state  := State.check
       }
+    }
+    is(State.check) {
+      errors.window    := !isInside
+      errors.alignment := !isAligned
+      errors.length    := isEmpty
+      state            := Mux(canRead, State.header, State.end)
+      position         := 0.U
+      rest             := io.settings.bytes >> 2
     }
     is(State.header) {
       when(takes) {

@@ -3,6 +3,7 @@ package colonnade.bus
 import chisel3._
 import chisel3.util._
 import colonnade.axi.{Axi, AxiReadPort}
+import colonnade.common.TimingSlice
 import colonnade.config.ShellConfig
 
 final class ImageReaderIO(shell: ShellConfig) extends Bundle {
@@ -29,7 +30,7 @@ final class ImageReaderIO(shell: ShellConfig) extends Bundle {
   * Up to four bursts are under way; each has a place in a queue before it is requested, so R never waits. One word per
   * cycle.
   */
-final class ImageReader(shell: ShellConfig, shortPaths: Boolean = false) extends Module {
+final class ImageReader(shell: ShellConfig) extends Module {
   import ImageReader._
 
   val io = IO(new ImageReaderIO(shell))
@@ -58,11 +59,11 @@ final class ImageReader(shell: ShellConfig, shortPaths: Boolean = false) extends
   }
 
   // Beats to words; while it stops, a beat is discarded as a whole
-  private val queue  = Module(new Queue(UInt((8 * bus).W), maxBursts * beats, useSyncReadMem = true))
-  private val queued = if (shortPaths) Queue(queue.io.deq, 2) else queue.io.deq // the memory's output is registered
-  private val ofBeat = bus / 4
-  private val word   = RegInit(0.U(log2Ceil(burstBytes / 4).W))
-  private val lane   = if (ofBeat == 1) 0.U else word(log2Ceil(ofBeat) - 1, 0)
+  private val queue   = Module(new Queue(UInt((8 * bus).W), maxBursts * beats, useSyncReadMem = true))
+  private val queued  = TimingSlice.queue(queue.io.deq)          // of the memory's output
+  private val ofBeat  = bus / 4
+  private val word    = RegInit(0.U(log2Ceil(burstBytes / 4).W))
+  private val lane    = if (ofBeat == 1) 0.U else word(log2Ceil(ofBeat) - 1, 0)
   private val last    = word | Mux(io.stop, (ofBeat - 1).U, 0.U) // the word of this cycle, or of its beat
   private val isTaken = queued.valid && (io.words.ready || io.stop)
   queue.io.enq.valid := io.axi.r.valid

@@ -2,6 +2,7 @@ package colonnade.bus
 
 import chisel3._
 import chisel3.util._
+import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.Pixel
 
@@ -28,7 +29,7 @@ object PixelWord {
   def showsPhoto(word: UInt): Bool = if (word.getWidth > 8 * PixelFormat.maxBytes) word.head(1).asBool else false.B
 }
 
-/** Encodes pixels for the framebuffer, one per cycle, in two cycles; with `units.shortPaths` in five. */
+/** Encodes pixels for the framebuffer, one per cycle, in five cycles. */
 final class PixelEncoder(config: ColonnadeConfig) extends Module {
   val format = IO(Input(UInt(PixelFormat.getWidth.W)))
   val pixels = IO(Flipped(Decoupled(new Pixel(config))))
@@ -38,18 +39,15 @@ final class PixelEncoder(config: ColonnadeConfig) extends Module {
   /** With an environment: pixels that do not show the object become shadow ratios. */
   val composites = Option.when(config.hasEnvironment)(IO(Input(Bool())))
 
-  // With short paths the search takes twice the cycles, and pixels leave by a queue
-  private val shortPaths = config.units.shortPaths
-  private val latency    = if (shortPaths) 2 * SrgbEncoder.latency else SrgbEncoder.latency
-  private val encoded    = if (shortPaths) Wire(chiselTypeOf(out)) else out
-  private val moves      = !encoded.valid || encoded.ready
-  private val valids     = Seq.iterate(pixels.valid, latency + 1)(valid => RegEnable(valid, false.B, moves))
-  private val pixel      = Seq.iterate(pixels.bits, latency + 1)(pixel => RegEnable(pixel, moves)).last
+  private val encoded = Wire(chiselTypeOf(out))
+  private val moves   = !encoded.valid || encoded.ready
+  private val valids  = Seq.iterate(pixels.valid, SrgbEncoder.latency + 1)(valid => RegEnable(valid, false.B, moves))
+  private val pixel   = Seq.iterate(pixels.bits, SrgbEncoder.latency + 1)(pixel => RegEnable(pixel, moves)).last
   pixels.ready := moves
 
   private val channels = Seq(pixels.bits.colour.r, pixels.bits.colour.g, pixels.bits.colour.b)
   private val codes    = channels.map { channel =>
-    val encoder = Module(new SrgbEncoder(cycles = latency))
+    val encoder = Module(new SrgbEncoder())
     encoder.linear := channel
     encoder.enable := moves
     encoder.code
@@ -67,11 +65,6 @@ final class PixelEncoder(config: ColonnadeConfig) extends Module {
   for (ratio <- pixel.ratio) when(composites.get && !pixel.isObject) {
     encoded.bits.data := PixelWord.ofRatio(Seq(ratio.r, ratio.g, ratio.b).map(_.natural))
   }
-  private val isEncoding = valids.drop(1).reduce(_ || _)
-  if (shortPaths) {
-    out <> Queue(encoded, 2)
-    isIdle := !isEncoding && !out.valid
-  } else {
-    isIdle := !isEncoding
-  }
+  out :<>= TimingSlice.queue(encoded)
+  isIdle := !valids.drop(1).reduce(_ || _) && !out.valid
 }

@@ -2,6 +2,7 @@ package colonnade.bus
 
 import chisel3._
 import chisel3.util._
+import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 /** A tile's pixels in one line of the frame.
@@ -21,8 +22,8 @@ final class TileRow(config: ColonnadeConfig, wordBits: Int = 8 * PixelFormat.max
 
 /** Gathers the pixels of a column, which come in any order, to rows of a tile: a write-combining buffer.
   *
-  * A row leaves when it is whole, when another one needs its place, or at `flush`. A pixel enters per cycle; a row leaves
-  * in three. With `units.shortPaths` a pixel enters every second cycle: in the first one it is compared with the rows.
+  * A row leaves when it is whole, when another one needs its place, or at `flush`. A pixel enters per cycle, in two cycles:
+  * in the first one it is compared with the rows. A row leaves in three, and is chosen in the cycle before.
   */
 final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   private val tileBits = log2Ceil(config.frame.tileSize)
@@ -39,53 +40,45 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
   private val masks = Reg(Vec(shell.rows, UInt(config.frame.tileSize.W)))
   private val data  = SyncReadMem(shell.rows, chiselTypeOf(out.bits.pixels))
 
-  // A pixel joins its row, or begins one
-  private val tag     = (pixels.bits.x >> tileBits) ## pixels.bits.y
-  private val matches = VecInit(tags.map(_ === tag))
-  private val isNew   = RegInit(true.B) // the pixel was not compared yet
-  private val mayJoin = if (config.units.shortPaths) !isNew else true.B
-  private val hits    = VecInit(
-    valid.zip(if (config.units.shortPaths) RegNext(matches) else matches).map { case (isValid, is) => isValid && is }
-  )
-  if (config.units.shortPaths) isNew := !pixels.valid || pixels.fire
-  private val isHit   = hits.asUInt.orR
+  // A pixel is compared with the rows as they are in the next cycle, when it joins its row or begins one
+  private def tagOf(pixel: EncodedPixel): UInt = (pixel.x >> tileBits) ## pixel.y
+  private val hasPixel                         = RegInit(false.B)
+  private val pixel                            = RegEnable(pixels.bits, pixels.fire)
+  private val joins                            = Wire(UInt(shell.rows.W)) // the row that takes `pixel` in this cycle
+  private val matches                          = tags.zip(joins.asBools).map { case (tag, isTaken) =>
+    RegEnable(tagOf(pixels.bits) === Mux(isTaken, tagOf(pixel), tag), pixels.fire)
+  }
+  private val hits    = VecInit(valid.zip(matches).map { case (isValid, isMatch) => isValid && isMatch }).asUInt
+  private val isHit   = hits.orR
   private val hasFree = !valid.asUInt.andR
-  private val row     = Mux(isHit, OHToUInt(hits), PriorityEncoder(~valid.asUInt))
-  private val column  = UIntToOH(pixels.bits.x(tileBits - 1, 0), config.frame.tileSize)
-  pixels.ready := mayJoin && (isHit || hasFree)
-  when(pixels.fire) {
-    if (config.units.shortPaths) {
-      for ((isRow, index) <- Mux(isHit, hits.asUInt, PriorityEncoderOH(~valid.asUInt)).asBools.zipWithIndex)
-        when(isRow) {
-          valid(index) := true.B
-          tags(index)  := tag
-          masks(index) := Mux(isHit, masks(index), 0.U) | column
-        }
-    } else {
-      valid(row) := true.B
-      tags(row)  := tag
-      masks(row) := Mux(isHit, masks(row), 0.U) | column
-    }
-    data.write(row, VecInit.fill(config.frame.tileSize)(pixels.bits.data), column.asBools)
+  private val column  = UIntToOH(pixel.x(tileBits - 1, 0), config.frame.tileSize)
+  joins        := Mux(hasPixel, Mux(isHit, hits, PriorityEncoderOH(~valid.asUInt)), 0.U)
+  pixels.ready := !hasPixel || isHit || hasFree
+  when(pixels.ready) { hasPixel := pixels.valid }
+  for ((isTaken, index) <- joins.asBools.zipWithIndex) when(isTaken) {
+    valid(index) := true.B
+    tags(index)  := tagOf(pixel)
+    masks(index) := Mux(isHit, masks(index), 0.U) | column
+  }
+  when(joins.orR) {
+    data.write(OHToUInt(joins), VecInit.fill(config.frame.tileSize)(pixel.data), column.asBools)
   }
 
-  // A row leaves
+  // A row leaves. It is chosen in the cycle before: no other one leaves then
   private val isReading = RegInit(false.B)
   private val isOut     = RegInit(false.B)
   private val leaving   = Reg(chiselTypeOf(out.bits))
   private val whole     = VecInit(valid.zip(masks).map { case (isValid, mask) =>
-    val isWhole = isValid && mask.andR
-    if (config.units.shortPaths) isValid && RegNext(isWhole, false.B) else isWhole
+    isValid && TimingSlice.flag(isValid && mask.andR)
   }).asUInt
-  private val victim = RegInit(0.U(log2Ceil(shell.rows).W))
-  // With short paths rows are chosen in the cycle before: no other one leaves then
-  private val isForced  = before(pixels.valid && mayJoin && !isHit && !hasFree)
-  private val hasWhole  = before(whole.orR)
-  private val isFlushed = flush && !pixels.valid && before(valid.asUInt.orR)
-  private val evicted   =
-    Mux(hasWhole, chosen(whole), Mux(isForced, victim, chosen(valid.asUInt)))
-  private val evicts = !isReading && !isOut && (hasWhole || isForced || isFlushed)
-  private val read   = data.read(evicted, evicts)
+  private val victim    = RegInit(0.U(log2Ceil(shell.rows).W))
+  private val isForced  = TimingSlice.flag(hasPixel && !isHit && !hasFree)
+  private val hasWhole  = TimingSlice.flag(whole.orR)
+  private val isFlushed = flush && !pixels.valid && !hasPixel && TimingSlice.flag(valid.asUInt.orR)
+  private val firstOf   = (rows: UInt) => TimingSlice(PriorityEncoder(rows))
+  private val evicted   = Mux(hasWhole, firstOf(whole), Mux(isForced, victim, firstOf(valid.asUInt)))
+  private val evicts    = !isReading && !isOut && (hasWhole || isForced || isFlushed)
+  private val read      = data.read(evicted, evicts)
   isReading := evicts
   when(evicts) {
     valid(evicted) := false.B
@@ -101,12 +94,5 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
   when(out.fire) { isOut := false.B }
   out.valid := isOut
   out.bits  := leaving
-  isIdle    := !valid.asUInt.orR && !isReading && !isOut
-
-  private def before(value: Bool): Bool = if (config.units.shortPaths) RegNext(value, false.B) else value
-
-  private def chosen(rows: UInt): UInt = {
-    val first = PriorityEncoder(rows)
-    if (config.units.shortPaths) RegNext(first) else first
-  }
+  isIdle    := !hasPixel && !valid.asUInt.orR && !isReading && !isOut
 }

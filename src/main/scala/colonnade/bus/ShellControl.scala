@@ -2,6 +2,7 @@ package colonnade.bus
 
 import chisel3._
 import chisel3.util._
+import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 final class ShellControlIO extends Bundle {
@@ -64,17 +65,19 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
   private val settings = Reg(new FramebufferSettings)
   private val resets   = RegInit(0.U(log2Ceil(resetCycles + 1).W))
 
-  // With short paths the settings are checked as they are taken
+  // Settings are checked as they are taken
   private val takes       = WireInit(false.B)
-  private val checked     = if (config.units.shortPaths) io.settings else settings
-  private val rowBytesLog = log2Ceil(config.frame.tileSize).U +& PixelFormat.bytesLog(checked.format)
+  private val rowBytesLog = log2Ceil(config.frame.tileSize).U +& PixelFormat.bytesLog(io.settings.format)
   private val rowMask     = ((1.U << rowBytesLog) - 1.U)(log2Ceil(config.frame.tileSize * PixelFormat.maxBytes) - 1, 0)
-  private val isLegal     = asTaken(PixelFormat.isLegal(checked.format))
+  private val isLegal     = TimingSlice(PixelFormat.isLegal(io.settings.format), takes)
   private val photoMask   = (config.frame.tileSize * PhotoCompositor.photoBytes - 1).U
-  private val photo       = checked.photo
-  private val hasBase     = if (shell.pixelStream) !checked.toStream else true.B
-  private val isAligned   = asTaken((!hasBase || !((checked.base | checked.stride) & rowMask).orR) &&
-    !(photo.isEnabled && ((photo.base | photo.stride) & photoMask).orR))
+  private val photo       = io.settings.photo
+  private val hasBase     = if (shell.pixelStream) !io.settings.toStream else true.B
+  private val isAligned   = TimingSlice(
+    (!hasBase || !((io.settings.base | io.settings.stride) & rowMask).orR) &&
+      !(photo.isEnabled && ((photo.base | photo.stride) & photoMask).orR),
+    takes
+  )
   private val begins = state === State.begin
 
   private val frameDone = (state === State.flushing && io.writerIsIdle) || (begins && !io.start)
@@ -139,8 +142,6 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
   io.status.isQueued    := isQueued
   io.status.isLoading   := state === State.loading
   io.status.isResetting := state === State.resetting
-
-  private def asTaken(check: Bool): Bool = if (config.units.shortPaths) RegEnable(check, takes) else check
 
   private val hasError = Mux(loadDone, io.loadError, errors.asUInt.orR)
   io.events := ((frameDone || loadDone) && hasError) ## loadDone ## frameDone

@@ -3,6 +3,7 @@ package colonnade.bus
 import chisel3._
 import chisel3.util._
 import colonnade.axi.AxiLite
+import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{Access, RegisterFile, RegisterMap, RegisterPort}
 
@@ -61,14 +62,12 @@ final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
 /** The registers of [[ShellMap]], and the way to those of the device. What is written there while a frame runs waits for
   * its end; all of the device's registers fit.
   *
-  * A request is answered in the next cycle, with `units.shortPaths` a cycle later. The answer is an error, and a write has no effect, if the address has no
-  * register, the register cannot be written or not now, some bytes of the word are not written, or the value does not fit.
+  * A request is answered two cycles later; the device's register port is registered. The answer is an error, and a write
+  * has no effect, if the address has no register, the register cannot be written or not now, some bytes of the word are
+  * not written, or the value does not fit.
   */
 final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   val io = IO(new ShellRegistersIO(config))
-
-  // With short paths the device's register port is registered
-  private val answerCycles = if (config.units.shortPaths) 2 else 1
 
   private val request     = io.access.request.bits
   private val isDevice    = request.address >= (ShellMap.deviceBase / 4).U
@@ -79,8 +78,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   // Writes to the device wait while a frame runs
   private val (posted, delivered) = withReset(reset.asBool || io.status.isResetting) {
     val queue = Module(new Queue(new PostedWrite(config), ShellMap.postedWrites(config), useSyncReadMem = true))
-    // With short paths the memory's output is registered
-    (queue, if (config.units.shortPaths) Queue(queue.io.deq, 2) else queue.io.deq)
+    (queue, TimingSlice.queue(queue.io.deq)) // of the memory's output
   }
   private val delivers = delivered.valid && !io.status.isRunning
   delivered.ready  := !io.status.isRunning
@@ -131,9 +129,8 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
     word := request.data
   }
 
-  // With short paths a cycle later: before the answer
-  private val commands = writtenBits("control", 3)
-  io.commands := (if (config.units.shortPaths) RegNext(commands, 0.U) else commands).asTypeOf(io.commands)
+  // Before the answer
+  io.commands := RegNext(writtenBits("control", 3), 0.U).asTypeOf(io.commands)
 
   private val interrupts = Module(new InterruptController)
   interrupts.io.events := io.events
@@ -195,9 +192,15 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private val data      = answered(Mux1H(readable))
   private val mayRead   = inDevice || VecInit(readable.map(_._1)).asUInt.orR
   private val isWrite   = VecInit(writable.map(_._2)).asUInt.orR || (inDevice && deviceWritable)
-  io.access.response.valid        := ShiftRegister(accepts, answerCycles, false.B, true.B)
+  io.access.response.valid        := ShiftRegister(accepts, ShellRegisters.answerCycles, false.B, true.B)
   io.access.response.bits.data    := Mux(wasDevice, io.device.readData, data)
   io.access.response.bits.isError := answered(Mux(request.isWrite, !(isWrite && request.isWhole), !mayRead))
 
-  private def answered[T <: Data](value: T): T = ShiftRegister(value, answerCycles)
+  private def answered[T <: Data](value: T): T = ShiftRegister(value, ShellRegisters.answerCycles)
+}
+
+private object ShellRegisters {
+
+  /** From a request to its answer, which may come from the device. */
+  val answerCycles: Int = 2
 }

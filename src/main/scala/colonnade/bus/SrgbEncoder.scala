@@ -8,13 +8,12 @@ import scala.collection.concurrent.TrieMap
 
 /** Encodes a linear channel as 8 bits of sRGB (IEC 61966-2-1), rounded to the nearest code.
   *
-  * A search by halves in the table of the least linear values of all codes, one bit of the code after the other, in
-  * `cycles` in which `enable` lets values move.
+  * A search by halves in the table of the least linear values of all codes, two bits of the code in each of four cycles in
+  * which `enable` lets values move.
   *
   * @param linearBits width of a linear value; all ones is 1.0
-  * @param cycles     a divisor of the code's bits
   */
-final class SrgbEncoder(linearBits: Int = NumberFormats.colourBits, cycles: Int = SrgbEncoder.latency) extends Module {
+final class SrgbEncoder(linearBits: Int = NumberFormats.colourBits) extends Module {
   val linear = IO(Input(UInt(linearBits.W)))
   val enable = IO(Input(Bool()))
   val code   = IO(Output(UInt(SrgbEncoder.codeBits.W)))
@@ -28,17 +27,18 @@ final class SrgbEncoder(linearBits: Int = NumberFormats.colourBits, cycles: Int 
     known.fold((value >= least).asUInt)(Cat(_, value >= least))
   }
   private def part(known: Option[UInt], value: UInt): UInt =
-    (0 until SrgbEncoder.codeBits / cycles).foldLeft(known)((bits, _) => Some(next(bits, value))).get
+    (0 until SrgbEncoder.codeBits / SrgbEncoder.latency).foldLeft(known)((bits, _) => Some(next(bits, value))).get
 
-  private val (_, found) = (0 until cycles).foldLeft((linear, Option.empty[UInt])) { case ((value, known), _) =>
-    (RegEnable(value, enable), Some(RegEnable(part(known, value), enable)))
+  private val (_, found) = (0 until SrgbEncoder.latency).foldLeft((linear, Option.empty[UInt])) {
+    case ((value, known), _) =>
+      (RegEnable(value, enable), Some(RegEnable(part(known, value), enable)))
   }
   code := found.get
 }
 
 object SrgbEncoder {
   val codeBits: Int = 8
-  val latency:  Int = 2
+  val latency:  Int = 4
 
   /** The code of a linear value. */
   def apply(linear: Int, linearBits: Int = NumberFormats.colourBits): Int = {

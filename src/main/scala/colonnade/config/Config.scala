@@ -89,7 +89,7 @@ final case class GeometryConfig(
   * @param shadeInterval most cycles that a light on a hit takes the shader, while what it has shaded is taken and texels
   *                      come at once: 3 chooses a pipeline, 128 one hit after the other. Hits on mirrors take 3 in the
   *                      pipeline, those on glass have no limit
-  * @param shortPaths    registers in the traversal stack and around the record fetch, for FPGAs: some steps take a cycle more
+  * @param extraSlices   the optional timing slices of traversal and caches, for FPGAs: some steps take a cycle more
   */
 final case class UnitsConfig(
     boxLanes:      Int,
@@ -99,7 +99,7 @@ final case class UnitsConfig(
     pathContexts:  Int,
     rayInterval:   Int,
     shadeInterval: Int,
-    shortPaths:    Boolean
+    extraSlices:   Boolean
 ) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
   Require.within("units.triangleLanes", triangleLanes, 1, 4)

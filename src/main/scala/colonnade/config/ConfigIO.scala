@@ -62,7 +62,7 @@ object ConfigIO {
       "pathContexts",
       "rayInterval",
       "shadeInterval",
-      "shortPaths"
+      "extraSlices"
     )
     val memory = root.section(
       "columnBvhMemory",
@@ -113,7 +113,7 @@ object ConfigIO {
         pathContexts = units.int("pathContexts"),
         rayInterval = units.int("rayInterval"),
         shadeInterval = units.int("shadeInterval"),
-        shortPaths = units.boolean("shortPaths")
+        extraSlices = units.boolean("extraSlices")
       ),
       columnBvhMemory = ColumnBvhMemoryConfig(
         depth = memory.int("depth"),
@@ -193,7 +193,7 @@ object ConfigIO {
         "pathContexts"  -> units.pathContexts,
         "rayInterval"   -> units.rayInterval,
         "shadeInterval" -> units.shadeInterval,
-        "shortPaths"    -> units.shortPaths
+        "extraSlices"    -> units.extraSlices
       ),
       "columnBvhMemory" -> ujson.Obj(
         "depth"         -> columnBvhMemory.depth,

@@ -39,9 +39,7 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
 
   private val registers = RegisterMap(config)
 
-  // With short paths settings are read from a memory: registers all over the device need no way back
-  private val hasCopies = config.units.shortPaths
-  private val writes    = io.register.write && !io.device.status.busy
+  private val writes = io.register.write && !io.device.status.busy
 
   // Settings: one hardware register per number, combined to the bundle by its layout.
   private val settings = registers.filter(_.access == Access.ReadWrite).map(r => r -> storage(r))
@@ -60,14 +58,14 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   io.start := pulse("control.start")
   io.invalidate.foreach(_ := pulse("control.invalidate"))
 
-  // Reads of settings and status.
+  // Reads of status
   private val status   = Layout.of(io.device).map(field => field.name -> field).toMap
   private val observed = registers.filter(_.access == Access.ReadOnly).map { r =>
     val field = status(r.name)
     r -> io.device.asUInt(field.end - 1, field.offset)
   }
   private val words = (for {
-    (r, value) <- if (hasCopies) observed else settings ++ observed
+    (r, value) <- observed
     word       <- 0 until r.words
   } yield r.address + word -> wordOf(value, word)).toMap
 
@@ -76,26 +74,23 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   private val addresses = 1 << io.register.address.getWidth
   private val shown     = VecInit(Seq.tabulate(addresses)(words.getOrElse(_, 0.U(readData.getWidth.W))))
   when(io.register.read)(readData := shown(io.register.address))
-  io.register.readData := (if (hasCopies) copyOf(readData) else readData)
 
-  /** What was read from the registers, or the copy of a setting that was read in the cycle before. */
-  private def copyOf(readData: UInt): UInt = {
-    val masks = settings.flatMap { case (r, _) =>
-      (0 until r.words).map(word => r.address + word -> ((BigInt(1) << wordBits(r, word)) - 1))
-    }.toMap.withDefaultValue(BigInt(0))
-    val copies    = SyncReadMem(addresses, UInt(RegisterMap.dataBits.W))
-    val isSetting = masks.keys.map(address => BigInt(1) << address).sum.U(addresses.W)
-    val isWritten = RegInit(0.U(addresses.W))
-    val mask      = VecInit(Seq.tabulate(addresses)(masks(_).U(RegisterMap.dataBits.W)))
-    val isCopy    = RegNext(io.register.read && isWritten(io.register.address), false.B)
-    val copy      = copies.read(io.register.address, io.register.read)
-    when(writes) {
-      copies.write(io.register.address, io.register.writeData & mask(io.register.address))
-      isWritten := isWritten | (UIntToOH(io.register.address, addresses) & isSetting)
-    }
-    when(isCopy) { readData := copy }
-    Mux(isCopy, copy, readData)
+  // Settings are read from a memory of copies: registers all over the device need no way back
+  private val masks = settings.flatMap { case (r, _) =>
+    (0 until r.words).map(word => r.address + word -> ((BigInt(1) << wordBits(r, word)) - 1))
+  }.toMap.withDefaultValue(BigInt(0))
+  private val copies    = SyncReadMem(addresses, UInt(RegisterMap.dataBits.W))
+  private val isSetting = masks.keys.map(address => BigInt(1) << address).sum.U(addresses.W)
+  private val isWritten = RegInit(0.U(addresses.W))
+  private val mask      = VecInit(Seq.tabulate(addresses)(masks(_).U(RegisterMap.dataBits.W)))
+  private val isCopy    = RegNext(io.register.read && isWritten(io.register.address), false.B)
+  private val copy      = copies.read(io.register.address, io.register.read)
+  when(writes) {
+    copies.write(io.register.address, io.register.writeData & mask(io.register.address))
+    isWritten := isWritten | (UIntToOH(io.register.address, addresses) & isSetting)
   }
+  when(isCopy) { readData := copy }
+  io.register.readData := Mux(isCopy, copy, readData)
 
   private def least(a: UInt, b: UInt): UInt = Mux(a < b, a, b)
 

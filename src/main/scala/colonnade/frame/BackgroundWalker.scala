@@ -2,6 +2,7 @@ package colonnade.frame
 
 import chisel3._
 import chisel3.util.{Arbiter, Decoupled}
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, FrameSettings, Pixel, PixelHit, PixelPosition, Rgb}
 
@@ -25,13 +26,14 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
 final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new BackgroundWalkerIO(config))
 
-  private val scan      = Module(new TileScan(config, isQueued = config.units.shortPaths))
+  private val scan      = Module(new TileScan(config))
   private val positions = Module(new Arbiter(new PixelPosition(config), io.others.size + 1))
   scan.io.frame     := io.frame
   scan.io.isDivided := false.B
   scan.io.tiles <> io.tiles
 
-  positions.io.in.zip(io.others :+ scan.io.positions).foreach { case (in, positions) => in <> positions }
+  private val own = TimingSlice.queue(scan.io.positions)
+  positions.io.in.zip(io.others :+ own).foreach { case (in, positions) => in <> positions }
 
   io.pixels.valid         := positions.io.out.valid
   io.pixels.bits.x        := positions.io.out.bits.x
@@ -41,5 +43,5 @@ final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   io.pixels.bits.ratio.foreach(_.channels.foreach(_ := FrameRegisters.one))
   io.pixels.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
   positions.io.out.ready := io.pixels.ready
-  io.isIdle              := scan.io.isIdle
+  io.isIdle              := scan.io.isIdle && !own.valid
 }

@@ -2,6 +2,7 @@ package colonnade.frame
 
 import chisel3._
 import chisel3.util.Decoupled
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition}
 
@@ -23,22 +24,22 @@ final class EnvironmentWalkerIO(config: ColonnadeConfig) extends Bundle {
 
 /** Walks the tiles that show the environment and not the object, and sorts out their pixels outside the window.
   *
-  * Throughput: one pixel per cycle. Combinational behind its [[TileScan]].
+  * Throughput: one pixel per cycle. Combinational behind the queue of its [[TileScan]].
   */
 final class EnvironmentWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new EnvironmentWalkerIO(config))
 
-  private val scan = Module(new TileScan(config, isQueued = config.units.shortPaths))
+  private val scan = Module(new TileScan(config))
   scan.io.frame     := io.frame
   scan.io.isDivided := false.B
   scan.io.tiles <> io.tiles
-  io.isIdle := scan.io.isIdle
 
-  private val position = scan.io.positions
+  private val position = TimingSlice.queue(scan.io.positions)
   private val inWindow = io.window.meets(position.bits, size = 1)
   position.ready     := Mux(inWindow, io.positions.ready, io.others.ready)
   io.positions.valid := position.valid && inWindow
   io.positions.bits  := position.bits
   io.others.valid    := position.valid && !inWindow
   io.others.bits     := position.bits
+  io.isIdle          := scan.io.isIdle && !position.valid
 }

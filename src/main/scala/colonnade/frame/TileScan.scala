@@ -1,7 +1,7 @@
 package colonnade.frame
 
 import chisel3._
-import chisel3.util.{Decoupled, Queue, RegEnable}
+import chisel3.util.{Decoupled, RegEnable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition}
 
@@ -22,11 +22,8 @@ final class TileScanIO(config: ColonnadeConfig) extends Bundle {
   *
   * Throughput: one pixel per cycle. The next tile is accepted with the last pixel of the current one, so tiles follow each
   * other without a gap.
-  *
-  * @param isQueued
-  *   pixels wait in a queue: then those of a tile may leave after the next tile is accepted
   */
-final class TileScan(config: ColonnadeConfig, isQueued: Boolean) extends Module {
+final class TileScan(config: ColonnadeConfig) extends Module {
   val io = IO(new TileScanIO(config))
 
   private val scan = Module(new MortonScan(Tile.pixelLevels(config)))
@@ -37,17 +34,11 @@ final class TileScan(config: ColonnadeConfig, isQueued: Boolean) extends Module 
   scan.io.size.bits.high := clipped(io.frame.pixelsHigh, io.tiles.bits.y)
   io.tiles.ready         := scan.io.size.ready
 
-  private val positions = if (isQueued) Wire(chiselTypeOf(io.positions)) else io.positions
-  positions.valid     := scan.io.cells.valid
-  positions.bits.x    := tile.x | scan.io.cells.bits.x
-  positions.bits.y    := tile.y | scan.io.cells.bits.y
-  scan.io.cells.ready := positions.ready
-  if (isQueued) {
-    io.positions <> Queue(positions, 2)
-    io.isIdle := scan.io.isIdle && !io.positions.valid
-  } else {
-    io.isIdle := scan.io.isIdle
-  }
+  io.positions.valid  := scan.io.cells.valid
+  io.positions.bits.x := tile.x | scan.io.cells.bits.x
+  io.positions.bits.y := tile.y | scan.io.cells.bits.y
+  scan.io.cells.ready := io.positions.ready
+  io.isIdle           := scan.io.isIdle
 
   /** The size of a tile in one direction. */
   private def clipped(frame: UInt, first: UInt): UInt = {

@@ -2,6 +2,7 @@ package colonnade.frame
 
 import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable}
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
 
@@ -32,7 +33,7 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
 /** Sorts the pixels of a tile, in the order of [[TileScan]]: those that may show the object or the environment are rendered,
   * the others go to the background walker. With an environment a [[PixelMixer]] mixes them with pixels of another tile.
   *
-  * Throughput: one pixel per cycle, the first one four cycles after its tile is accepted. Of the others
+  * Throughput: one pixel per cycle, the first one five cycles after its tile is accepted. Of the others
   * [[TileWalker.maxOthers]] wait in a queue, so that they do not hold up those behind them. The next tile is accepted when
   * only the queues and two more pixels are left, so tiles follow each other without a gap, and no column takes tiles early.
   *
@@ -41,7 +42,7 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
 final class TileWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new TileWalkerIO(config))
 
-  private val scan    = Module(new TileScan(config, isQueued = false)) // its tile is that of `edgeValues`
+  private val scan    = Module(new TileScan(config))
   private val outline = Module(new PixelTest(config))
 
   scan.io.frame        := io.frame
@@ -55,7 +56,7 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
   outline.io.pixels <> scan.io.positions
   outline.io.edgeValues := RegEnable(io.tiles.bits.edgeValues, io.tiles.fire)
 
-  private val tested   = if (config.units.shortPaths) Queue(outline.io.tested, 2) else outline.io.tested
+  private val tested   = TimingSlice.queue(outline.io.tested)
   private val forUnits = tested.bits.isForUnits
   private val taken    = Wire(Decoupled(new UnitPosition(config)))
   taken.valid  := tested.valid && forUnits
@@ -77,7 +78,7 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
     mixer.positions
   }
 
-  io.positions :<>= (if (config.units.shortPaths) Queue(positions, 2) else Queue(positions, 1, pipe = true))
+  io.positions :<>= TimingSlice.queue(positions)
   io.isIdle := scan.io.isIdle && outline.io.isIdle && !tested.valid && !io.others.valid && !io.positions.valid
 }
 

@@ -2,6 +2,7 @@ package colonnade.memory
 
 import chisel3._
 import chisel3.util._
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 
 /** Ports of [[ColumnCache]]. */
@@ -48,7 +49,8 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
 
   val io = IO(new ColumnCacheIO(config))
 
-  private val tags    = new TagStore(sets, ways, lineBits, config.units.shortPaths)
+  private val slice   = TimingSlice.extra(config)
+  private val tags    = new TagStore(sets, ways, lineBits, inMemory = slice.isThere)
   private val records = SyncReadMem(sets * ways * Lines.records, Lines.stored(config))
 
   private final class AwaitedLine {
@@ -78,38 +80,33 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val accepted  = RegNext(request.fire, false.B)
   private val address   = RegEnable(request.bits, request.fire)
   private val freeCount = PopCount(awaited.map(!_.isUsed))
-  // With short paths a line that misses is entered a cycle after its comparison
-  private val shortPaths = config.units.shortPaths
-  private val missed     = WireInit(false.B) // it is entered in this cycle
-  private val missedLine = RegNext(lineOf(address))
-  request.ready := blocked === 0.U && freeCount > accepted +& missed
+  // An extra slice lies between the comparison and the entry of a line that misses
+  private val enters   = WireInit(false.B)
+  private val missed   = slice(lineOf(address))
+  private val isMissed = if (slice.isThere) enters else false.B // in the cycle before
+  request.ready := blocked === 0.U && freeCount > accepted +& isMissed
 
   // Cycle c + 1: compare. A line is never both held and awaited
   private val hitOH  = tags.hitOH(lineOf(address))
   private val isHit  = accepted && hitOH.orR
   private val awaits =
-    awaited.map(_.is(lineOf(address))).reduce(_ || _) || (missed && missedLine === lineOf(address))
+    awaited.map(_.is(lineOf(address))).reduce(_ || _) || (isMissed && missed === lineOf(address))
   private val hitWay = OHToUInt(hitOH)
   private val freeOH = PriorityEncoderOH(awaited.map(!_.isUsed))
   private val isMiss = accepted && !hitOH.orR
-  // With short paths the replacement sees a hit a cycle later
-  if (config.units.shortPaths) when(RegNext(isHit, false.B)) { tags.use(lineOf(RegNext(address)), RegNext(hitWay)) }
-  else when(isHit) { tags.use(lineOf(address), hitWay) }
-  private val enters = isMiss && !awaits
-  if (shortPaths) missed := RegNext(enters, false.B)
-  for ((entry, isFree) <- awaited.zip(freeOH)) {
-    when((if (shortPaths) missed else enters) && isFree) {
-      entry.isUsed      := true.B
-      entry.isRequested := false.B
-      entry.line        := (if (shortPaths) missedLine else lineOf(address))
-    }
+  when(slice.flag(isHit)) { tags.use(slice(lineOf(address)), slice(hitWay)) }
+  enters := slice.flag(isMiss && !awaits)
+  for ((entry, isFree) <- awaited.zip(freeOH)) when(enters && isFree) {
+    entry.isUsed      := true.B
+    entry.isRequested := false.B
+    entry.line        := missed
   }
   assert(!(isHit && awaits), "a line is held and awaited")
 
-  // Cycle a + 1: the line replaces another one, and is no longer awaited. With short paths the other one is found in this
-  // cycle, and replaced in the next one
-  private val victim   = if (shortPaths) RegNext(tags.victim(line)) else tags.victim(line)
-  private val replaces = if (shortPaths) RegNext(taken, false.B) else taken
+  // Cycle a + 1: the line replaces another one, and is no longer awaited. With an extra slice the other one is found in
+  // this cycle, and replaced in the next one
+  private val victim   = slice(tags.victim(line))
+  private val replaces = slice.flag(taken)
   when(replaces) {
     tags.replace(line, victim, isKept = true.B)
     awaited.foreach(entry => when(entry.is(line)) { entry.isUsed := false.B })
@@ -118,7 +115,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
 
   // Cycles a + 3 to a + 6: its records
   private val place      = RegEnable(tags.place(line, victim), replaces)
-  private val placeNow   = if (shortPaths) place else RegNext(place) // valid from a + 3
+  private val placeNow   = ShiftRegister(place, 1 - slice.cycles) // valid from a + 3
   private val lineNow    = RegNext(RegEnable(line, taken))
   private val firstComes = RegNext(RegNext(taken, false.B), false.B)
   private val word       = RegInit(0.U(Lines.wordBits.W))
@@ -143,16 +140,12 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   for (error <- io.error)
     error := RegNext((fills && io.lines.record.xorR) || (RegNext(isHit, false.B) && data.xorR), false.B)
 
-  // Request awaited lines
-  private val nextOH = PriorityEncoderOH(awaited.map(entry => entry.isUsed && !entry.isRequested))
-  // With short paths it is chosen in the cycle before
-  private val chosenOH = if (shortPaths) RegNext(VecInit(nextOH)) else nextOH
-  private val chosen   = Mux1H(nextOH, awaited.map(_.line))
-  io.request.valid := (
-    if (shortPaths) chosenOH.zip(awaited).map { case (is, entry) => is && entry.isUsed && !entry.isRequested }
-    else nextOH
-  ).reduce(_ || _)
-  io.request.bits := (if (shortPaths) RegNext(chosen) else chosen)
+  // Request awaited lines, one after the other; an extra slice lies behind the choice
+  private def isOpen(entry: AwaitedLine): Bool = entry.isUsed && !entry.isRequested
+  private val nextOH                           = PriorityEncoderOH(awaited.map(isOpen))
+  private val chosenOH                         = slice(VecInit(nextOH))
+  io.request.valid := chosenOH.zip(awaited).map { case (is, entry) => is && isOpen(entry) }.reduce(_ || _)
+  io.request.bits := slice(Mux1H(nextOH, awaited.map(_.line)))
   when(io.request.fire) {
     awaited.zip(chosenOH).foreach { case (entry, isNext) => when(isNext) { entry.isRequested := true.B } }
   }

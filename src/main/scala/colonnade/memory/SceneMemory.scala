@@ -2,6 +2,7 @@ package colonnade.memory
 
 import chisel3._
 import chisel3.util._
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.SceneInDram
 
@@ -56,7 +57,7 @@ final class SceneMemory(config: ColonnadeConfig) extends Module {
       cache.io.invalidate := io.invalidate
       io.lines.zip(cache.io.lines).foreach { case (bus, lines) => bus(bank) := lines }
     }
-    io.isIdle           := late(caches.map(_.io.isIdle).reduce(_ && _))
+    io.isIdle           := TimingSlice.flag(caches.map(_.io.isIdle).reduce(_ && _), atReset = true)
     io.events.dramReads := RegNext(PopCount(dram.io.reads.map(_.fire)))
     io.events.error     := RegNext(dram.io.lines.map(line => line.fire && line.bits.isError).reduce(_ || _), false.B)
   } else {
@@ -69,11 +70,8 @@ final class SceneMemory(config: ColonnadeConfig) extends Module {
       io.lines.foreach(bus => bus(bank) := forwarder.io.lines)
     }
     io.axi.r.ready      := forwarders.map(_.io.beats.fire).reduce(_ || _)
-    io.isIdle           := late(forwarders.map(_.io.isIdle).reduce(_ && _))
+    io.isIdle           := TimingSlice.flag(forwarders.map(_.io.isIdle).reduce(_ && _), atReset = true)
     io.events.dramReads := RegNext(PopCount(forwarders.map(_.io.reads.fire)))
     io.events.error     := RegNext(forwarders.map(_.io.error).reduce(_ || _), false.B)
   }
-
-  /** With short paths a cycle later. */
-  private def late(isIdle: Bool): Bool = if (config.units.shortPaths) RegNext(isIdle, true.B) else isIdle
 }

@@ -2,7 +2,7 @@ package colonnade.memory
 
 import chisel3._
 import chisel3.util._
-import colonnade.common.RoundRobin
+import colonnade.common.{RoundRobin, TimingSlice}
 import colonnade.config.ColonnadeConfig
 
 /** A line from DRAM. */
@@ -59,7 +59,8 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
 
   val io = IO(new SharedCacheIO(config))
 
-  private val tags    = new TagStore(sets, ways, lineBits, config.units.shortPaths)
+  private val slice   = TimingSlice.extra(config)
+  private val tags    = new TagStore(sets, ways, lineBits, inMemory = slice.isThere)
   private val lines   = SyncReadMem(sets * ways, Vec(Lines.records, Lines.stored(config)))
   private val awaited = Module(new AwaitedLines(config, cache.sharedMisses / banks))
 
@@ -97,8 +98,8 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   private val eligible = io.requests.zipWithIndex.map { case (request, column) =>
     request.valid && willBeFree(SharedCache.busOf(config, column))
   }
-  // With short paths a request enters in the cycle after the last one has left
-  private val isVacant = if (config.units.shortPaths) !isWaiting else !isWaiting || leaves
+  // With extra slices a request enters in the cycle after the last one has left
+  private val isVacant = if (slice.isThere) !isWaiting else !isWaiting || leaves
   private val accepts  = isVacant && arbiter.io.requests.orR
   private val next     = Mux1H(arbiter.io.grant, io.requests.map(_.bits))
   arbiter.io.requests := VecInit(eligible).asUInt
@@ -133,11 +134,8 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   starts := Mux(fills || delivers, Mux(fills, filled.buses, asked.buses) | joining, 0.U)
 
   // A line from DRAM replaces another one
-  // With short paths it is found in the cycle before: then the line is the oldest one already
-  private val victim = {
-    val found = tags.victim(filled.line)
-    if (config.units.shortPaths) RegNext(found) else found
-  }
+  // With an extra slice it is found in the cycle before: then the line is the oldest one already
+  private val victim = slice(tags.victim(filled.line))
   private val keeps  = fills && !io.data.bits.isError
   private val hitWay = OHToUInt(hitOH)
   awaited.io.oldest.ready := fills
@@ -148,38 +146,31 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
 
   // Cycle d + 1: announce
   private val isAnnounced = starts.asBools.map(RegNext(_, false.B))
-  private val lineNow     = atStart(announced)
+  private val lineNow     = RegNext(announced)
   for ((port, isOn) <- io.lines.zip(isAnnounced)) {
     port.announced.valid := isOn
     port.announced.bits  := lineNow
   }
 
   // Cycle d + 2: read the line, or write that from DRAM, which is stable until it is taken a cycle later
-  private val place  = RegNext(atStart(Mux(fills, tags.place(filled.line, victim), tags.place(line, hitWay))))
-  private val isFill = RegNext(RegNext(fills, false.B), false.B)
-  private val isKept = RegNext(RegNext(keeps, false.B), false.B)
-  private val isRead = RegNext(RegNext(delivers, false.B), false.B)
-  // With short paths a failed line becomes zeros on the bus: nobody reads what was not kept
-  private val shortPaths = config.units.shortPaths
-  private val isFailed   = io.data.bits.isError
-  private val arriving   =
-    io.data.bits.records.map(record => if (shortPaths) record else Mux(isFailed, 0.U.asTypeOf(record), record))
-  private val held    = lines.readWrite(place, VecInit(arriving), isRead || isKept, isKept)
+  private val place   = ShiftRegister(Mux(fills, tags.place(filled.line, victim), tags.place(line, hitWay)), 2)
+  private val isFill  = RegNext(RegNext(fills, false.B), false.B)
+  private val isKept  = RegNext(RegNext(keeps, false.B), false.B)
+  private val isRead  = RegNext(RegNext(delivers, false.B), false.B)
+  private val held    = lines.readWrite(place, io.data.bits.records, isRead || isKept, isKept)
   private val isTaken = RegNext(isFill, false.B)
   io.data.ready := isTaken
 
-  // Cycles d + 4 to d + 7: the records on the bus
-  private val ready = VecInit(held.zip(arriving).map { case (record, other) => Mux(isTaken, other, record) })
+  // Cycles d + 4 to d + 7: the records on the bus; those of a failed read become zeros there, and nobody reads them later
+  private val ready = VecInit(held.zip(io.data.bits.records).map { case (record, other) =>
+    Mux(isTaken, other, record)
+  })
   for ((port, isOn) <- io.lines.zip(isAnnounced)) {
     val begins = ShiftRegister(isOn, 2, false.B, true.B)
     val rest   = Reg(Vec(Lines.records, Lines.stored(config)))
     rest        := Mux(begins, ready, VecInit(rest.tail :+ rest.last))
-    port.record := (if (shortPaths) Mux(RegEnable(isTaken && isFailed, begins), 0.U.asTypeOf(rest.head), rest.head)
-                    else rest.head)
+    port.record := Mux(RegEnable(isTaken && io.data.bits.isError, begins), 0.U.asTypeOf(rest.head), rest.head)
   }
-
-  /** Of the cycle before, if something was announced then. */
-  private def atStart(value: UInt): UInt = if (config.units.shortPaths) RegNext(value) else RegEnable(value, starts.orR)
 
   io.reads :<>= awaited.io.reads
   when(io.invalidate) { tags.clear() }

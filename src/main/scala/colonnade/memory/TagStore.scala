@@ -8,23 +8,23 @@ import chisel3.util.{log2Ceil, Fill, PriorityEncoder, UIntToOH}
   * @param sets     sets of the bank, a power of two
   * @param ways     ways of a set
   * @param lineBits width of the number of a line
-  * @param shortPaths
+  * @param inMemory
   *   valid bits and the replacement lie in memories, with a flag for each set that it was written; tags are read before a
-  *   register, not behind one; no set becomes valid in the cycle in which its tags are read for a comparison
+  *   register, not behind one
   */
-private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, shortPaths: Boolean) {
+private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, inMemory: Boolean) {
   private val setBits     = log2Ceil(sets)
   private val tagBits     = (lineBits - setBits).max(1)
-  private val tags        = Option.unless(shortPaths)(SyncReadMem(sets, Vec(ways, UInt(tagBits.W))))
-  private val earlyTags   = Option.when(shortPaths)(Mem(sets, Vec(ways, UInt(tagBits.W))))
+  private val tags        = Option.unless(inMemory)(SyncReadMem(sets, Vec(ways, UInt(tagBits.W))))
+  private val earlyTags   = Option.when(inMemory)(Mem(sets, Vec(ways, UInt(tagBits.W))))
   private val found       = Wire(Vec(ways, UInt(tagBits.W)))
-  private val replacement = new Replacement(sets, ways, shortPaths)
+  private val replacement = new Replacement(sets, ways, inMemory)
 
-  /** By set: a bit for each way, or with short paths whether `validMemory` has them. */
-  private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U((if (shortPaths) 1 else ways).W))))
-  private val validMemory = Option.when(shortPaths)(Mem(sets, UInt(ways.W)))
+  /** By set: a bit for each way, or whether `validMemory` has them. */
+  private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U((if (inMemory) 1 else ways).W))))
+  private val validMemory = Option.when(inMemory)(Mem(sets, UInt(ways.W)))
 
-  /** With short paths the valid bits of a set are read with its tags. */
+  /** The valid bits of a set are read with its tags: no set changes in the cycle in which it is read. */
   private val foundValid = Wire(UInt(ways.W))
 
   private def setOf(line: UInt): UInt = line.pad(setBits + 1)(setBits - 1, 0)
@@ -49,7 +49,7 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, shortP
 
   /** The way that holds a line, one-hot; 0 if none does. The tags of its set were read in the cycle before. */
   def hitOH(line: UInt): UInt = VecInit(found.zipWithIndex.map { case (tag, way) =>
-    (if (shortPaths) foundValid else validOf(line)) (way) && tag === tagOf(line)
+    foundValid(way) && tag === tagOf(line)
   }).asUInt
 
   /** The way for a new line: an empty one, or the one to replace. */
@@ -66,7 +66,7 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, shortP
     val rest = validOf(line) & ~UIntToOH(way, ways)
     val bits = Mux(isKept, rest | UIntToOH(way, ways), rest)
     validMemory.foreach(_.write(setOf(line), bits))
-    isValid(setOf(line)) := (if (shortPaths) 1.U else bits)
+    isValid(setOf(line)) := validMemory.fold(bits)(_ => 1.U)
     replacement.use(setOf(line), way)
   }
 

@@ -2,7 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, ShiftRegister}
-import colonnade.common.Context
+import colonnade.common.{Context, TimingSlice}
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
 
@@ -54,15 +54,15 @@ final class DirectionNormaliserIO(config: ColonnadeConfig) extends Bundle {
 /** Finds a ray's dominant axis, permutes the ray to its own frame and normalises its direction.
   *
   * The components share one normaliser, then the axes rotate one step per cycle. Latency from the request to both
-  * results: 4 cycles for dominant axis z, 5 for x, 6 for y, with `units.shortPaths` one more. The results are
+  * results: 4 cycles for dominant axis z, 5 for x, 6 for y, with `units.extraSlices` one more. The results are
   * independent of each other; the next request is accepted in the cycle that takes the last of them. Source:
   * docs/numbers.md, sections 2.1 and 2.2.
   */
 final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
   private val numbers = config.numbers
 
-  // The steps. With short paths the leading zeros of a magnitude are counted in a cycle of their own
-  private val delay   = if (config.units.shortPaths) 1 else 0
+  // The steps. With extra slices the leading zeros of a magnitude are counted in a cycle of their own
+  private val delay   = TimingSlice.extra(config).cycles
   private val idle    = 0.U(3.W)
   private val first   = (1 + delay).U(3.W)
   private val last    = (3 + delay).U(3.W)

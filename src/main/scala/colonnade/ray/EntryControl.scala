@@ -2,6 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.log2Ceil
+import colonnade.common.TimingSlice
 
 /** Control signals of the [[EntryDatapath]] for one cycle; `side` is 0 for x', 1 for y'. */
 final class EntryCommand(slices: Int) extends Bundle {
@@ -74,18 +75,18 @@ final class EntryControlIO(slices: Int) extends Bundle {
   *
   * The sides are pipelined: each cycle one plane starts distance, product, scaling and clipping. Their order is near x',
   * near y', far y', far x', so that the advance starts while the exit distance is still computed. The advance takes
-  * `slices` cycles per side; a ray that misses the box skips it. With `shortPaths` the operands of products and what was
-  * scaled are registered, and what follows comes later.
+  * `slices` cycles per side; a ray that misses the box skips it. With extra `timing` slices the operands of products and
+  * what was scaled are registered, and what follows comes later.
   */
-final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Module {
+final class EntryControl(slices: Int, timing: TimingSlice) extends Module {
   val io = IO(new EntryControlIO(slices))
 
   private val quotients = 3
-  private val delay     = if (shortPaths) 2 else 0 // of products
-  private val scaling   = if (shortPaths) 1 else 0 // of what was scaled
-  private val limiting  = if (shortPaths) 1 else 0 // of what limits entry and exit
-  private val rounding  = if (shortPaths) 1 else 0 // of what moves the origin sideways
-  private val deciding  = if (shortPaths) 1 else 0 // of whether the ray enters
+  private val delay     = 2 * timing.cycles // of products
+  private val scaling   = timing.cycles     // of what was scaled
+  private val limiting  = timing.cycles     // of what limits entry and exit
+  private val rounding  = timing.cycles     // of what moves the origin sideways
+  private val deciding  = timing.cycles     // of whether the ray enters
   private val decided   = 10 + delay + scaling + limiting + deciding
   private val advance   = 8 + delay + scaling + limiting
   private val last      = advance + 2 * slices + delay + rounding
@@ -110,7 +111,7 @@ final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Modul
   io.rayReady       := !busy || (io.outputValid && io.outputReady)
   io.quotientsReady := busy && isTaking
 
-  private val enters  = if (shortPaths) RegNext(io.enters) else io.enters
+  private val enters  = timing(io.enters)
   private val follows = Mux(at(decided) && !enters, finished.U, step + 1.U)
   private val next    = Mux(io.command.loads, 0.U, Mux(busy && !waits && !io.outputValid, follows, step))
   step       := next
@@ -137,20 +138,19 @@ final class EntryControl(slices: Int, shortPaths: Boolean = false) extends Modul
   command.takesAlongNear   := at(2)
   command.takesAlongFar    := command.takesReciprocals
   command.takesReciprocals := at(quotients) && io.quotientsValid
-  command.takesShear       :=
-    (if (shortPaths) at(quotients + 1, quotients + 2) else command.takesReciprocals || at(quotients + 1))
-  command.shearSide       := at(quotients + 1).asUInt
-  command.takenSide       := at(quotients + 1 + scaling).asUInt
-  command.multipliesShear := shears
-  command.multiplySide    := side
-  command.slice           := slice
-  command.scales          := late(5, 6, 7, 8)
-  command.scalesFar       := late(7, 8)
-  command.scalesShearNext := next <= (quotients + 1).U
-  command.scaleSideNext   := (next === (quotients + 1).U || next === (6 + delay).U || next === (7 + delay).U).asUInt
-  command.boundsFar       := late(8, 9)
-  command.limits          := late(Seq(6, 7, 8, 9).map(_ + limiting): _*)
-  command.limitsFar       := late(Seq(8, 9).map(_ + limiting): _*)
-  command.advancesAlong   := at(advance)
-  command.advancesSide    := at(last - slices, last)
+  command.takesShear       := timing.flag(command.takesReciprocals || at(quotients + 1))
+  command.shearSide        := at(quotients + 1).asUInt
+  command.takenSide        := at(quotients + 1 + scaling).asUInt
+  command.multipliesShear  := shears
+  command.multiplySide     := side
+  command.slice            := slice
+  command.scales           := late(5, 6, 7, 8)
+  command.scalesFar        := late(7, 8)
+  command.scalesShearNext  := next <= (quotients + 1).U
+  command.scaleSideNext    := (next === (quotients + 1).U || next === (6 + delay).U || next === (7 + delay).U).asUInt
+  command.boundsFar        := late(8, 9)
+  command.limits           := late(Seq(6, 7, 8, 9).map(_ + limiting): _*)
+  command.limitsFar        := late(Seq(8, 9).map(_ + limiting): _*)
+  command.advancesAlong    := at(advance)
+  command.advancesSide     := at(last - slices, last)
 }

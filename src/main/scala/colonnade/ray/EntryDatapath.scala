@@ -2,6 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.{Cat, MuxLookup, RegEnable}
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Bounds
 import colonnade.numbers.{Fixed, Rounding}
@@ -73,6 +74,7 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   private val shearSlice   =
     MuxLookup(command.slice, sliceOf(slices - 1))((0 until slices - 1).map(i => i.U -> sliceOf(i)))
   private val multiplier = Mux(command.multipliesShear, shearSlice, onSide(reciprocal, command.multiplySide).zext)
+  private val operand    = TimingSlice.extra(config)
   private val carries    = operand(operand(command.multipliesShear && command.slice =/= 0.U))
   // An entry times a slice is one bit shorter than productBits; the carried part, shorter by a slice, adds no bit.
   product := Rounding.narrow(
@@ -170,11 +172,6 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
   }
   output.tEntry := Fixed(formats.entry, tEntry)
   output.tMax   := Fixed(formats.grid, Rounding.narrow(tMax.zext, numbers.gridBits))
-
-  /** With short paths a register: of the multiplier's operands and product, what was scaled, what limits entry and exit,
-    * and what moves the origin.
-    */
-  private def operand[T <: Data](value: T): T = if (config.units.shortPaths) RegEnable(value, true.B) else value
 
   private def onSide[T <: Data](values: Seq[T], side: UInt): T = Mux(side.asBool, values(1), values(0))
 

@@ -2,6 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.Decoupled
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Bounds
 
@@ -17,13 +18,13 @@ final class RayEntryIO(config: ColonnadeConfig) extends Bundle {
   *
   * A ray may come before its quotients, which must stay valid until they are accepted. If they are in time, the latency
   * is 10 + 2 · slices cycles (14 with a shear factor of two multiplier slices), or 12 for a ray that misses the
-  * box; with `units.shortPaths` three more. The next ray is accepted in the cycle in which the result is taken. Source:
+  * box; with `units.extraSlices` three more. The next ray is accepted in the cycle in which the result is taken. Source:
   * docs/numbers.md, sections 2.3 to 2.8.
   */
 final class RayEntry(config: ColonnadeConfig) extends Module {
   val io = IO(new RayEntryIO(config))
 
-  private val control  = Module(new EntryControl(EntryDatapath.slices(config), config.units.shortPaths))
+  private val control  = Module(new EntryControl(EntryDatapath.slices(config), TimingSlice.extra(config)))
   private val datapath = Module(new EntryDatapath(config))
 
   control.io.rayValid       := io.ray.valid

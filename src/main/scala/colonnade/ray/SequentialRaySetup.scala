@@ -10,7 +10,7 @@ import colonnade.numbers.Divider
   *                    └────────────────── the ray in its own frame ───────────▲
   * }}}
   * In order, with up to three rays in flight. With quotients of 31 and 19 bits, the latency is about 30 cycles and the
-  * throughput at least one ray every 16 cycles; it is one every 27 cycles at the widest formats with short paths. The
+  * throughput at least one ray every 16 cycles; it is one every 27 cycles at the widest formats with extra slices. The
   * quotients of a component that is 0 are computed, then replaced. A direction of 0 gives a ray that does not enter the
   * box. Source: docs/numbers.md, section 2.
   */

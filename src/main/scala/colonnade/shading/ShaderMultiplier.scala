@@ -2,6 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{Decoupled, ShiftRegister, Valid}
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 
 /** Ports of [[ShaderMultiplier]]. */
@@ -39,6 +40,7 @@ final class ShaderMultiplier(formats: ShaderFormats, hasCornerColours: Boolean, 
 
 object ShaderMultiplier {
 
-  /** Cycles from operands to the product: with short paths the operands are registered. Corner colours do not wait. */
-  def latency(config: ColonnadeConfig): Int = if (config.units.shortPaths && !config.geometry.cornerColours) 2 else 1
+  /** Cycles from operands to the product. An extra slice registers the operands; corner colours do not wait for it. */
+  def latency(config: ColonnadeConfig): Int =
+    if (config.geometry.cornerColours) 1 else 1 + TimingSlice.extra(config).cycles
 }

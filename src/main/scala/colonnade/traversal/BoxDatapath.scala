@@ -2,6 +2,7 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.RegEnable
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Rounding
@@ -85,17 +86,16 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
   )
 
   // Add the node's terms, and shift to the node's t
-  private val shortPaths   = config.units.shortPaths
+  private val slice        = TimingSlice.extra(config)
   private val intersection = BoxDatapath.latency(config) - 1
-  private val shiftRight   = terms.shiftRight.map(by => if (shortPaths) RegEnable(by, isValid(2)) else by)
+  private val shiftRight   = terms.shiftRight.map(slice(_, isValid(2)))
   private val shifts       = shiftRight.map(
     new SaturatingShift(_, numbers.nearBits - 1 + numbers.stepReach - numbers.nearFraction, numbers.nearBits)
   )
   private def sides(products: Seq[Seq[UInt]], nodes: Vec[SInt]) = {
     val sums = byLane(products, stage = 2) { (lane, isTested) =>
       Seq.tabulate(2) { axis =>
-        val sum = Rounding.narrow(nodes(axis) +& lane(axis).zext, numbers.nodeBits + 1)
-        if (shortPaths) RegEnable(sum, isTested) else sum
+        slice(Rounding.narrow(nodes(axis) +& lane(axis).zext, numbers.nodeBits + 1), isTested)
       }
     }
     byLane(sums, stage = intersection - 1) { (lane, isTested) =>
@@ -134,7 +134,7 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
 
   /** The third slab waits while the others are shifted. */
   private def held(z: Seq[SInt]): Seq[SInt] =
-    if (shortPaths) byLane(z, stage = 3)((z, isTested) => RegEnable(z, isTested)) else z
+    if (slice.isThere) byLane(z, stage = 3)(slice(_, _)) else z
 
   private def least(a: SInt, b: SInt): SInt = Mux(a < b, a, b)
 
@@ -143,6 +143,6 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
 
 object BoxDatapath {
 
-  /** Cycles from operands to intervals. With short paths the sums are registered before they are shifted. */
-  def latency(config: ColonnadeConfig): Int = if (config.units.shortPaths) 5 else 4
+  /** Cycles from operands to intervals. An extra slice registers the sums before they are shifted. */
+  def latency(config: ColonnadeConfig): Int = 4 + TimingSlice.extra(config).cycles
 }

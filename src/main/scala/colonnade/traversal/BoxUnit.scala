@@ -55,9 +55,9 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
   beat        := nextBeat
   inFlight    := nextInFlight
   io.in.ready := inFlight =/= queueDepth.U && !follows
-  // With short paths a result that leaves makes room a cycle later
+  // With extra slices a result that leaves makes room a cycle later
   private val mayEnter =
-    if (config.units.shortPaths) inFlight +& io.in.fire < queueDepth.U else nextInFlight =/= queueDepth.U
+    if (config.units.extraSlices) inFlight +& io.in.fire < queueDepth.U else nextInFlight =/= queueDepth.U
   io.readyNext  := nextBeat === 0.U && mayEnter
   tags.in.valid := io.in.fire
   tags.in.bits  := NodeTag(config, io.in.bits)

@@ -1,8 +1,8 @@
 package colonnade.traversal
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Queue, RegEnable, Valid}
-import colonnade.common.Context
+import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
+import colonnade.common.{Context, TimingSlice}
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Rounding
 
@@ -49,7 +49,7 @@ final class TraversalStackIO(config: ColonnadeConfig) extends Bundle {
   * gives one step. A context has at most one operation in flight, so its steps stay in order.
   *
   * Throughput: one operation per cycle, plus one cycle for each push beyond the first and each culled entry. Latency:
-  * one cycle after the last of these. With `units.shortPaths` each read of an entry, and a step, take a cycle more. A
+  * one cycle after the last of these. With `units.extraSlices` each read of an entry, and a step, take a cycle more. A
   * round-robin arbiter selects between results and resumptions.
   */
 class TraversalStack(config: ColonnadeConfig) extends Module {
@@ -61,19 +61,22 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
 
   private val entries   = SyncReadMem(StackAddress.size(config), UInt(new StackEntry(config).getWidth.W))
   private val levels    = RegInit(VecInit.fill(contexts)(0.U.asTypeOf(StackLevel(config))))
+  private val slice     = TimingSlice.extra(config)
   private val stepQueue =
-    Module(new Queue(new TraversalStep(config), TraversalStack.stepQueueDepth, flow = !config.units.shortPaths))
+    Module(new Queue(new TraversalStep(config), TraversalStack.stepQueueDepth, flow = !slice.isThere))
 
-  // With short paths the entry that was read and its comparison are registered, in a cycle between the two of a pop
-  private val isReading = if (config.units.shortPaths) RegInit(false.B) else false.B
+  // An extra slice registers the entry that was read and its comparison, in a cycle between the two of a pop
+  private val readsEntry = WireInit(false.B)
+  private val isRead     = slice.flag(readsEntry)
+  private val isReading  = if (slice.isThere) isRead else false.B
 
   // Second cycle of an operation: its result, or the entry that was read
   private val isSecondCycle = RegInit(false.B)
   private val operation     = Reg(new PendingOperation(config))
   private val entryNow      = Wire(new StackEntry(config))
   private val exceedsNow    = entryNow.tNear.zext > operation.tMax
-  private val entry         = if (config.units.shortPaths) RegEnable(entryNow, isReading) else entryNow
-  private val exceeds       = if (config.units.shortPaths) RegEnable(exceedsNow, isReading) else exceedsNow
+  private val entry         = slice(entryNow, isReading)
+  private val exceeds       = slice(exceedsNow, isReading)
   private val isDropped     = operation.isPop && exceeds
   private val popsAgain     = isSecondCycle && isDropped && operation.level =/= 0.U
   stepQueue.io.enq.valid        := isSecondCycle && !popsAgain
@@ -120,12 +123,8 @@ class TraversalStack(config: ColonnadeConfig) extends Module {
   entryNow := entries.readWrite(address, StackEntry(config, child).asUInt, reads || pushes, pushes).asTypeOf(entryNow)
 
   // Start the second cycle
-  if (config.units.shortPaths) {
-    isReading     := (completes && pops) || popsAgain
-    isSecondCycle := (completes && !pops) || isReading
-  } else {
-    isSecondCycle := completes || popsAgain
-  }
+  readsEntry    := (completes && pops) || popsAgain
+  isSecondCycle := (completes && !pops) || isRead
   when(popsAgain) {
     operation.level       := operation.level - 1.U
     operation.nextAddress := operation.nextAddress - 1.U

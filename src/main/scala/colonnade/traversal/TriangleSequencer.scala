@@ -91,8 +91,8 @@ final class TriangleSequencer(config: ColonnadeConfig) extends Module {
   // A candidate is accepted with the last vertex of a record, or without a record
   private val isOpen = RegNext(io.readyNext, false.B)
   io.candidate.ready := isOpen
-  // With short paths after the last vertex: then no path leads from the pipeline to the record fetch
-  private val ends = if (config.units.shortPaths) issues && isEnd else step === gap && io.advances && isEnd
+  // With extra slices after the last vertex: then no path leads from the pipeline to the record fetch
+  private val ends = if (config.units.extraSlices) issues && isEnd else step === gap && io.advances && isEnd
   io.readyNext := ends || (!hasRecord && !isOpen)
 
   private def vertexOf(triangle: UInt, vertex: Int): Vec3[UInt] =

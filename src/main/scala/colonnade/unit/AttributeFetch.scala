@@ -2,7 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Decoupled, Queue, Valid}
-import colonnade.common.{Context, First}
+import colonnade.common.{Context, First, TimingSlice}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 
@@ -62,7 +62,7 @@ final class AttributeFetch(config: ColonnadeConfig, most: Int = AttributeFetch.s
   fetch.scene      := io.scene
   fetch.broadcasts := io.broadcasts
   fetch.readyNext  := VecInit(false.B, false.B, io.readyNext)
-  io.requests :<>= (if (config.units.shortPaths) Queue(fetch.requests, 2) else fetch.requests)
+  io.requests :<>= TimingSlice.queue(fetch.requests)
 
   // Queue hits for a slot; there are never more than contexts
   private val waiting =

@@ -61,7 +61,7 @@ final class RecordFetchIO(config: ColonnadeConfig) extends Bundle {
   val scene = Input(new SceneMap(RecordFormats.idBits(config)))
 
   /** A context has at most one request outstanding. */
-  val fetches    = Flipped(Vec(3, Valid(new FetchRequest(config))))
+  val fetches    = Flipped(Vec(RecordFetch.ports, Valid(new FetchRequest(config))))
   val requests   = Decoupled(new RecordRequest(config))
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
 

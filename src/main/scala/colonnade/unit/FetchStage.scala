@@ -1,8 +1,8 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
-import colonnade.common.{Context, ContextTable}
+import chisel3.util.{log2Ceil, Decoupled, Valid}
+import colonnade.common.{Context, ContextTable, TimingSlice}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.numbers.Fixed
@@ -56,9 +56,7 @@ final class FetchStage(config: ColonnadeConfig) extends Module {
   recordFetch.io.broadcasts := io.broadcasts
   recordFetch.io.fetches    := io.fetches :+ 0.U.asTypeOf(io.fetches.head)
   recordFetch.io.readyNext  := VecInit(io.nodesReadyNext, io.trianglesReadyNext, false.B)
-  // With short paths requests wait in a queue, where they are not withdrawn
-  private val requests = if (config.units.shortPaths) Queue(recordFetch.io.requests, 2) else recordFetch.io.requests
-  io.requests :<>= requests
+  io.requests :<>= TimingSlice.extra(config).queue(recordFetch.io.requests) // in a queue requests are not withdrawn
   io.waitsForTriangles := recordFetch.io.waitsForTriangles
 
   private val rays = new RayTable(config)

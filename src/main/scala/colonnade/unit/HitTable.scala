@@ -2,7 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{RegEnable, Valid}
-import colonnade.common.{Context, ContextTable}
+import colonnade.common.{Context, ContextTable, TimingSlice}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
@@ -37,7 +37,7 @@ final class HitTableIO(config: ColonnadeConfig) extends Bundle {
 /** The closest hit of every context's ray: the least (t, packed triangle id), whatever the order of tests.
   *
   * Throughput: one result per cycle, visible in the next cycle. A shadow ray overwrites the hit of its context. With
-  * `units.shortPaths` the comparison takes a cycle: a result's bits must be there in the cycle before its `valid`, too.
+  * `units.extraSlices` the comparison takes a cycle: a result's bits must be there in the cycle before its `valid`, too.
   */
 final class HitTable(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
@@ -54,11 +54,12 @@ final class HitTable(config: ColonnadeConfig) extends Module {
   private val details            = ContextTable(config, new HitDetails(config))
 
   // Compare the result with the closest hit so far
-  private val context = io.result.bits.context
-  private val hit     = io.result.bits.hit
-  private val best    = closestT(context)
-  private val hadHit  = compared(hasHit(context))
-  private val isTied  =
+  private val compared = TimingSlice.extra(config)
+  private val context  = io.result.bits.context
+  private val hit      = io.result.bits.hit
+  private val best     = closestT(context)
+  private val hadHit   = compared(hasHit(context))
+  private val isTied   =
     compared(hit.t.integer === best.integer) && hadHit && compared(hit.id < ids(context))
   private val isCloser       = io.result.bits.isHit && (compared(hit.t < best) || (isTied && !io.isShadow))
   private val isTransmissive = io.isShadow && io.result.bits.isTransmissive && config.frame.hasBounces.B
@@ -80,8 +81,6 @@ final class HitTable(config: ColonnadeConfig) extends Module {
     hasHit(io.start.bits.context)             := false.B
     hasTransmissiveHit(io.start.bits.context) := false.B
   }
-
-  private def compared(isTrue: Bool): Bool = if (config.units.shortPaths) RegNext(isTrue) else isTrue
 
   io.tMax.foreach(reader => reader.units := TMaxUnits(config.numbers)(closestT(reader.context)))
 

@@ -1,8 +1,8 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Arbiter, Decoupled, DecoupledIO, Pipe, Queue, Valid}
-import colonnade.common.Context
+import chisel3.util.{log2Ceil, Arbiter, Decoupled, DecoupledIO, Pipe, Valid}
+import colonnade.common.{Context, TimingSlice}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordFormats, SceneMap}
 import colonnade.ray.PreparedRay
@@ -88,11 +88,9 @@ final class Intersector(config: ColonnadeConfig) extends Module {
 
   // Test triangles: a result terminates an occluded shadow ray, or the ray resumes after its record.
   // The termination is registered, so that no path leads from the triangle units through the hit table to the results
-  private val result   = if (config.units.shortPaths) compared(Queue(triangles.result, 2)) else triangles.result
-  private val isShadow = {
-    val ofContext = io.isShadow(result.bits.context)
-    if (config.units.shortPaths) RegNext(ofContext) else ofContext
-  }
+  private val slice      = TimingSlice.extra(config)
+  private val result     = if (slice.isThere) compared(slice.queue(triangles.result)) else triangles.result
+  private val isShadow   = slice(io.isShadow(result.bits.context))
   private val isOccluded = isShadow && hitTable.io.hasHitNow
   private val resumes    = Module(new Arbiter(Context(config), 2))
   triangles.candidate :<>= io.triangles
@@ -104,8 +102,7 @@ final class Intersector(config: ColonnadeConfig) extends Module {
   hitTable.io.outcome :<>= io.outcome
 
   // A record with an illegal address is skipped
-  private val skipped =
-    if (config.units.shortPaths) Pipe(io.fetchError.valid, io.fetchError.bits) else WireInit(io.fetchError)
+  private val skipped = TimingSlice.valid(io.fetchError)
   resumes.io.in(0).valid := skipped.valid
   resumes.io.in(0).bits  := skipped.bits
   resumes.io.in(1).valid := result.valid && result.bits.isLast && !isOccluded

@@ -1,7 +1,8 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Arbiter, Decoupled, Queue, Valid}
+import chisel3.util.{Arbiter, Decoupled, Valid}
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, UnitPosition}
@@ -64,8 +65,7 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
   private val raySources    = Seq(shadowRays.ray) ++ bounces.map(_.ray) :+ tracedPrimary
   private val rayArbiter    = Module(new Arbiter(new RayRequest(config), raySources.size)).io
   rayArbiter.in.zip(raySources).foreach { case (in, rays) => in :<>= rays }
-  // With short paths a ray waits before its set-up: no path leads from there to the tiles
-  raySetup.request :<>= (if (config.units.shortPaths) Queue(rayArbiter.out, 1) else rayArbiter.out)
+  raySetup.request :<>= TimingSlice.queue(rayArbiter.out) // no path leads from set-up to the tiles
   trace.rays :<>= raySetup.ray
 
   // Shading: a lit surface ends its path, after a shadow ray to each light; a mirror or glass continues it

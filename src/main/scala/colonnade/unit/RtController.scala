@@ -26,7 +26,7 @@ import scala.collection.mutable
 final class RtController(config: ColonnadeConfig) extends Module {
   private val contexts = config.array.contexts
 
-  /** The number of contexts takes a cycle, and so does a choice of one of them; the latter with short paths, too. */
+  /** The number of contexts takes a cycle, and so does a choice of one of them; the latter with extra slices, too. */
   private val isLarge = ArrayConfig.isLarge(contexts)
 
   val io = IO(new RtControllerIO(config))
@@ -220,11 +220,11 @@ final class RtController(config: ColonnadeConfig) extends Module {
 
   private def isAt(wanted: ContextState.Type): Seq[Bool] = state.map(_ === wanted)
 
-  /** The context that is served next, of those that wait for it. Of many contexts, and with short paths, it is chosen one
+  /** The context that is served next, of those that wait for it. Of many contexts, and with extra slices, it is chosen one
     * cycle early.
     */
   private def choose(claims: Seq[Bool], isServed: => Bool): Choice =
-    if (isLarge || config.units.shortPaths) First.registered(claims, isServed) else Choice(First(claims))
+    if (isLarge || config.units.extraSlices) First.registered(claims, isServed) else Choice(First(claims))
 
   private def count(claims: Seq[Bool], atReset: Int = 0): UInt = {
     val number = PopCount(claims)

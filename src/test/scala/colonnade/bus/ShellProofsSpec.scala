@@ -22,10 +22,10 @@ class ShellProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs
   behavior of "BurstWriter"
 
   it should "write nothing outside the window, rows of less, as much and more than a beat" in
-    prove(cycles = 5)(new BurstWriterProof(config, ShellConfig(16)))
+    prove(cycles = 6)(new BurstWriterProof(config, ShellConfig(16)))
 
   behavior of "ImageLoader"
 
   it should "read nothing outside the window, whatever the image" in
-    prove(cycles = 7)(new ImageLoaderProof(config, ShellConfig(128)))
+    prove(cycles = 9)(new ImageLoaderProof(config, ShellConfig(128)))
 }

@@ -97,7 +97,7 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val narrow = TestConfigs.withPrecision(16, 16, 32)
 
   render("a tree, snooping, eight paths", withPaths(tiny, 8))
-  render("timing slices", TestConfigs.withShortPaths(withPaths(tiny, 8)))
+  render("timing slices", TestConfigs.withExtraSlices(withPaths(tiny, 8)))
   render(
     "no tree, one context, one path, no snooping",
     withPaths(narrow, 1).copy(

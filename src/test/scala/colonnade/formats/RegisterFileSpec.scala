@@ -1,7 +1,6 @@
 package colonnade.formats
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.{ColonnadeConfig, ConfigIO}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
@@ -36,10 +35,6 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     data
   }
 
-  private def onBoth(body: RegisterFile => Unit): Unit =
-    for (shape <- Seq(config, TestConfigs.withShortPaths(config)))
-      withClue(s"short paths ${shape.units.shortPaths}: ")(test(new RegisterFile(shape))(body))
-
   private def writeWhole(unit: RegisterFile, register: Register, bits: BigInt): Unit =
     for (word <- 0 until register.words) write(unit, register.address + word, (bits >> 32 * word) & 0xffffffffL)
 
@@ -52,7 +47,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     LayoutSpec.number(unit.io.frame, register.name).peek().litValue & ones(register)
 
   it should "store every setting, clamp it for the hardware, and read it back" in {
-    onBoth { unit =>
+    test(new RegisterFile(config)) { unit =>
       val random = new Random(8)
       val values = settings.map(r => r -> BigInt(r.width, random))
       values.foreach { case (register, bits) => writeWhole(unit, register, bits) }
@@ -71,7 +66,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       "camera.stepShift",
       "scene.recordCount"
     )
-    onBoth { unit =>
+    test(new RegisterFile(config)) { unit =>
       for (register <- limited.sortBy(_.name != "scene.recordCount"); limit <- register.limit)
         withClue(s"${register.name}: ") {
           for (value <- Seq(limit - 1, limit + 1, ones(register), limit).filter(_ >= 0)) {
@@ -86,7 +81,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   it should "end a section at the base of the next one" in {
     val Seq(count, triangles, attributes) =
       Seq("recordCount", "triangleBase", "attributeBase").map(name => settings.find(_.name == s"scene.$name").get)
-    onBoth { unit =>
+    test(new RegisterFile(config)) { unit =>
       for {
         (written, legal) <- Seq(
           Seq(30, 10, 20) -> Seq(30, 10, 20),
@@ -103,7 +98,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 
   it should "read status, errors and counters" in {
-    onBoth { unit =>
+    test(new RegisterFile(config)) { unit =>
       val random = new Random(9)
       for (register <- registers if register.access == Access.ReadOnly) withClue(s"${register.name}: ") {
         val bits = BigInt(register.width, random)
@@ -118,7 +113,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 
   it should "start a frame by a write of 1, for one cycle" in {
-    onBoth { unit =>
+    test(new RegisterFile(config)) { unit =>
       val start = registers.find(_.name == "control.start").get.address
       unit.io.start.expect(false)
       unit.io.register.write.poke(true)
@@ -137,7 +132,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 
   it should "ignore every write while a frame runs" in {
-    onBoth { unit =>
+    test(new RegisterFile(config)) { unit =>
       val width = settings.find(_.name == "frame.width").get
       writeWhole(unit, width, 640)
       unit.io.device.status.busy.poke(true)
@@ -151,7 +146,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 
   it should "read 0 from unknown addresses and from write-only registers" in {
-    onBoth { unit =>
+    test(new RegisterFile(config)) { unit =>
       val size = RegisterMap.size(registers)
       read(unit, (1 << RegisterFile.addressBits(config)) - 1) shouldBe 0
       if (size < (1 << RegisterFile.addressBits(config))) read(unit, size) shouldBe 0

@@ -46,6 +46,7 @@ class BackgroundWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.tiles.valid.poke(true)
       dut.clock.step()
       dut.io.tiles.valid.poke(false)
+      dut.clock.step() // through the queue
       dut.io.others(0).bits.x.poke(100)
       dut.io.others(0).bits.y.poke(7)
       val xs = for (cycle <- 0 until 65) yield {
@@ -70,6 +71,7 @@ class BackgroundWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
       dut.io.tiles.valid.poke(true)
       dut.clock.step()
       dut.io.tiles.valid.poke(false)
+      dut.clock.step() // through the queue
       for (_ <- 0 until 64) {
         dut.io.pixels.valid.expect(true)
         dut.io.isIdle.expect(false)

@@ -16,11 +16,11 @@ class ColumnCacheSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
 
   for {
     (banks, sets, ways, misses) <- Seq((1, 1, 1, 1), (2, 2, 2, 2), (2, 4, 1, 3), (4, 1, 4, 2), (1, 2, 3, 2))
-    shortPaths                  <- Seq(false, true)
+    extraSlices                 <- Seq(false, true)
   }
-    it should s"answer from $sets sets of $ways ways, $misses misses, as one of $banks banks, short paths $shortPaths" in {
+    it should s"answer from $sets sets of $ways ways, $misses misses, as one of $banks banks, extra slices $extraSlices" in {
       val cached = TestConfigs.withCache(banks = banks, sets = sets, ways = ways, misses = misses, parity = sets == 4)
-      val config = if (shortPaths) TestConfigs.withShortPaths(cached) else cached
+      val config = if (extraSlices) TestConfigs.withExtraSlices(cached) else cached
       test(new ColumnCache(config)).withAnnotations(Simulation.verilator) { dut =>
         new Surroundings(dut, config, new Random(7 * sets + ways)).run(9000)
       }

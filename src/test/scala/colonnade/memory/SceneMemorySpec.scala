@@ -17,9 +17,9 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   for {
     (columns, banks, sets, ways, bus) <-
       Seq((1, 1, 1, 1, 64), (3, 2, 2, 2, 32), (3, 4, 1, 4, 16), (6, 2, 4, 1, 128), (1, 2, 2, 2, 8), (2, 2, 2, 5, 64))
-    shortPaths <- if (columns == 3) Seq(false, true) else Seq(false)
+    extraSlices <- if (columns == 3) Seq(false, true) else Seq(false)
   }
-    it should s"serve $columns columns from $banks banks of $sets sets of $ways ways over a bus of $bus bytes, short paths $shortPaths" in {
+    it should s"serve $columns columns from $banks banks of $sets sets of $ways ways over a bus of $bus bytes, extra slices $extraSlices" in {
       val cached =
         TestConfigs.withCache(
           columns = columns,
@@ -29,7 +29,7 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
           bus = bus,
           parity = columns > 3
         )
-      val config = if (shortPaths) TestConfigs.withShortPaths(cached) else cached
+      val config = if (extraSlices) TestConfigs.withExtraSlices(cached) else cached
       test(new SceneMemory(config)).withAnnotations(Simulation.verilator) { dut =>
         val dram = new Dram(dut, config, new Random(columns))
         dram.run(requests = 120)

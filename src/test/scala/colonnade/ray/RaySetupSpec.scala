@@ -121,19 +121,19 @@ object RaySetupSpec {
   private val narrowTests: ColonnadeConfig =
     TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(triangleBits = Some(24)))
 
-  private val shortPaths = TestConfigs.withShortPaths(narrowTests)
+  private val extraSlices = TestConfigs.withExtraSlices(narrowTests)
 
-  /** The most slices of a shear factor, with short paths. */
+  /** The most slices of a shear factor, with extra slices. */
   private val slowest: ColonnadeConfig = {
-    val wide = TestConfigs.withShortPaths(TestConfigs.withPrecision(64, 64, 64))
+    val wide = TestConfigs.withExtraSlices(TestConfigs.withPrecision(64, 64, 64))
     wide.copy(geometry = wide.geometry.copy(vertexBits = 10))
   }
 
   private def formatsOf(interval: Int): Seq[ColonnadeConfig] =
-    TestConfigs.formats ++ (narrowTests +: Seq(shortPaths).filter(_ => interval > 1))
+    TestConfigs.formats ++ (narrowTests +: Seq(extraSlices).filter(_ => interval > 1))
 
   private def tag(config: ColonnadeConfig, interval: Int): Tag =
-    if (config == narrowTests || config == shortPaths) Always
+    if (config == narrowTests || config == extraSlices) Always
     else if (interval == 1) Matrix else Always.ifExtreme(config)
 
   private def withInterval(config: ColonnadeConfig, interval: Int): ColonnadeConfig =
@@ -141,7 +141,7 @@ object RaySetupSpec {
 
   private def nameOf(config: ColonnadeConfig, interval: Int): String =
     s"interval $interval, ${config.precision} with ${config.geometry.vertexBits}-bit vertices and " +
-      s"${config.numbers.gridBits}-bit triangle tests" + (if (config.units.shortPaths) ", short paths" else "")
+      s"${config.numbers.gridBits}-bit triangle tests" + (if (config.units.extraSlices) ", extra slices" else "")
 
   /** A request is offered in one of `offer` cycles, a ray is accepted in one of `accept` cycles. */
   private case class Rates(offer: Int, accept: Int)

@@ -63,7 +63,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (
     config <-
       TestConfigs.formats ++ TestConfigs.withColours ++
-        (TestConfigs.formats ++ TestConfigs.withColours).map(TestConfigs.withPipelines) :+ TestConfigs.withShortPaths(
+        (TestConfigs.formats ++ TestConfigs.withColours).map(TestConfigs.withPipelines) :+ TestConfigs.withExtraSlices(
           TestConfigs.tiny
         )
   ) {
@@ -95,7 +95,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def slowest: Seq[ColonnadeConfig] = {
     val wide     = TestConfigs.withPrecision(64, 64, 64)
     val coloured = wide.copy(geometry = wide.geometry.copy(cornerColours = true))
-    Seq(TestConfigs.withShortPaths(wide), coloured)
+    Seq(TestConfigs.withExtraSlices(wide), coloured)
   }
 
   private def isPipeline(config: ColonnadeConfig) =
@@ -106,7 +106,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       (if (config.geometry.cornerColours) " with corner colours" else "") +
       (if (config.geometry.texture.nonEmpty) " and textures" else "") +
       (if (isPipeline(config)) " in a pipeline" else "") +
-      (if (config.units.shortPaths) " with short paths" else "")
+      (if (config.units.extraSlices) " with extra slices" else "")
 
   /** Every number at a limit of its range. */
   private def extremes(config: ColonnadeConfig, stimulus: ShaderStimulus): Seq[(LightCase, Seq[HitCase])] = {

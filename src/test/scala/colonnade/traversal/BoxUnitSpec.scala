@@ -21,7 +21,7 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for (
     (config, i) <-
-      (TestConfigs.formats ++ (binary +: laneVariants) :+ TestConfigs.withShortPaths(TestConfigs.tiny)).zipWithIndex
+      (TestConfigs.formats ++ (binary +: laneVariants) :+ TestConfigs.withExtraSlices(TestConfigs.tiny)).zipWithIndex
   )
     it should s"follow the model under random stalls, format $i (${shape(config)})" taggedAs
       (if (i < TestConfigs.formats.size) Always.ifExtreme(config) else Always) in

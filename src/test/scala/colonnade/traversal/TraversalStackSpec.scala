@@ -17,18 +17,18 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
     columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(stackDepth = stackDepth)
   )
 
-  private def withShortPaths(config: ColonnadeConfig): ColonnadeConfig =
-    config.copy(units = config.units.copy(shortPaths = true))
+  private def withExtraSlices(config: ColonnadeConfig): ColonnadeConfig =
+    config.copy(units = config.units.copy(extraSlices = true))
 
   behavior of "TraversalStack"
 
   for {
     (arity, stackDepth, contexts) <- Seq((4, 16, 4), (2, 5, 3), (4, 6, 8), (4, 4, 1))
-    shortPaths                    <- Seq(false, true)
+    extraSlices                   <- Seq(false, true)
   }
-    it should s"walk like the reference under random stalls, arity $arity, $stackDepth entries, $contexts contexts, short paths $shortPaths" in {
+    it should s"walk like the reference under random stalls, arity $arity, $stackDepth entries, $contexts contexts, extra slices $extraSlices" in {
       val plain = config(arity, stackDepth, contexts)
-      val shape = if (shortPaths) withShortPaths(plain) else plain
+      val shape = if (extraSlices) withExtraSlices(plain) else plain
       test(new TraversalStack(shape)) { dut =>
         for ((accepted, seed) <- Seq((1.0, 1), (0.4, 2))) {
           new StackDriver(dut, shape, seed).run(operations = 400, accepted)
@@ -36,11 +36,11 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
       }
     }
 
-  for ((arity, cycles, shortPaths) <- Seq((2, 11, false), (2, 12, true), (4, 10, false)))
-    it should s"neither lose, duplicate nor reorder entries, and cull only those beyond tMax, arity $arity, short paths $shortPaths" taggedAs Always
+  for ((arity, cycles, extraSlices) <- Seq((2, 11, false), (2, 12, true), (4, 10, false)))
+    it should s"neither lose, duplicate nor reorder entries, and cull only those beyond tMax, arity $arity, extra slices $extraSlices" taggedAs Always
       .unless(arity == 2) in {
       val plain = config(arity, stackDepth = 4, contexts = 2)
-      val shape = if (shortPaths) withShortPaths(plain) else plain
+      val shape = if (extraSlices) withExtraSlices(plain) else plain
       prove(cycles) {
         new TraversalStackProof(
           shape.copy(
@@ -64,8 +64,8 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
     }
   }
 
-  it should "pop an entry every two cycles with short paths" in {
-    val shape = withShortPaths(config(arity = 4, stackDepth = 16, contexts = 2))
+  it should "pop an entry every two cycles with extra slices" in {
+    val shape = withExtraSlices(config(arity = 4, stackDepth = 16, contexts = 2))
     test(new TraversalStack(shape)) { dut =>
       val driver = new StackDriver(dut, shape, seed = 1)
       for (round <- 0 until 3)

@@ -23,8 +23,8 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       test(new HitTable(shape))(dut => new HitTableDriver(dut, shape, seed = contexts).run(cycles = 600))
     }
 
-  it should "hold the least hit with short paths" in {
-    val shape = TestConfigs.withShortPaths(config(contexts = 4, TestConfigs.formats.head))
+  it should "hold the least hit with extra slices" in {
+    val shape = TestConfigs.withExtraSlices(config(contexts = 4, TestConfigs.formats.head))
     test(new HitTable(shape))(dut => new HitTableDriver(dut, shape, seed = 9).run(cycles = 400))
   }
 
@@ -199,7 +199,7 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     bits.hit.backSide.poke(result.backSide)
     bits.isTransmissive.poke(result.isTransmissive)
     dut.io.isShadow.poke(trace.isShadow)
-    if (config.units.shortPaths) {
+    if (config.units.extraSlices) {
       // The result is compared in the cycle before; a start comes with the result itself
       val starts = dut.io.start.valid.peekBoolean()
       dut.io.start.valid.poke(false)

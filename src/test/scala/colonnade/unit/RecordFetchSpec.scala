@@ -26,8 +26,8 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
         TestConfigs.tiny.columnBvhMemory.copy(banks = banks, snooping = snooping, recordBuffers = recordBuffers)
     )
 
-  private def withShortPaths(config: ColonnadeConfig): ColonnadeConfig =
-    config.copy(units = config.units.copy(shortPaths = true))
+  private def withExtraSlices(config: ColonnadeConfig): ColonnadeConfig =
+    config.copy(units = config.units.copy(extraSlices = true))
 
   private val row         = 1
   private val recordCount = 24
@@ -53,8 +53,8 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   }
 
   for ((contexts, snooping) <- Seq((4, true), (4, false), (6, true)))
-    it should s"serve $contexts contexts with short paths, snooping $snooping" in {
-      val config = withShortPaths(variant(contexts, banks = 2, snooping))
+    it should s"serve $contexts contexts with extra slices, snooping $snooping" in {
+      val config = withExtraSlices(variant(contexts, banks = 2, snooping))
       test(new RecordFetch(config)).withAnnotations(simulation(contexts)) { dut =>
         new Column(dut, config, new Random(contexts)).run(fetches = 200)
       }
@@ -62,11 +62,11 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
 
   for {
     (contexts, recordBuffers) <- Seq((1, 1), (4, 1), (6, 2), (6, 4))
-    shortPaths                <- Seq(false, true)
+    extraSlices               <- Seq(false, true)
   }
-    it should s"serve $contexts contexts and $recordBuffers buffers when records come later, short paths $shortPaths" in {
+    it should s"serve $contexts contexts and $recordBuffers buffers when records come later, extra slices $extraSlices" in {
       val plain  = variant(contexts, banks = 2, snooping = true, recordBuffers)
-      val shape  = if (shortPaths) withShortPaths(plain) else plain
+      val shape  = if (extraSlices) withExtraSlices(plain) else plain
       val cached = TestConfigs.withCache().columnBvhMemory.cache
       val config = shape.copy(columnBvhMemory = shape.columnBvhMemory.copy(depth = 256, cache = cached))
       test(new RecordFetch(config)).withAnnotations(simulation(contexts, isLong = true)) { dut =>

@@ -12,15 +12,15 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def config(contexts: Int, base: ColonnadeConfig = TestConfigs.tiny): ColonnadeConfig =
     base.copy(array = base.array.copy(contexts = contexts))
 
-  for ((contexts, shortPaths) <- Seq((1, false), (3, false), (3, true), (16, false)))
-    it should s"follow $contexts contexts through random events, short paths $shortPaths" in
+  for ((contexts, extraSlices) <- Seq((1, false), (3, false), (3, true), (16, false)))
+    it should s"follow $contexts contexts through random events, extra slices $extraSlices" in
       test(
         new RtController(
-          config(contexts, if (shortPaths) TestConfigs.withShortPaths(TestConfigs.tiny) else TestConfigs.tiny)
+          config(contexts, if (extraSlices) TestConfigs.withExtraSlices(TestConfigs.tiny) else TestConfigs.tiny)
         )
       ).withAnnotations(Simulation.verilator) { dut =>
         for ((eagerness, seed) <- Seq((0.9, 1), (0.15, 2)))
-          new ControllerDriver(dut, contexts, seed, isLate = shortPaths).run(pixels = 70, eagerness)
+          new ControllerDriver(dut, contexts, seed, isLate = extraSlices).run(pixels = 70, eagerness)
       }
 
   for (contexts <- Seq(1, 3, 16))

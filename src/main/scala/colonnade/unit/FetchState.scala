@@ -1,0 +1,54 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{log2Ceil, UIntToOH}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.RecordFormats
+
+private[unit] object BufferState extends ChiselEnum {
+  val empty, reserved, full = Value
+}
+
+/** The registers of a record buffer of [[RecordFetch]]. */
+private[unit] final class RecordBuffer(config: ColonnadeConfig) {
+  val state   = RegInit(BufferState.empty)
+  val address = Reg(UInt(RecordFormats.addressBits(config).W))
+  val record  = Reg(new RecordFormats(config).record)
+
+  /** With a cache: stays reserved when the record comes later. */
+  val isPinned = Option.when(config.columnBvhMemory.cache.nonEmpty)(Reg(Bool()))
+}
+
+/** The registers of a context's fetch in [[RecordFetch]]. */
+private[unit] final class ContextFetch(config: ColonnadeConfig) {
+  private val buffers  = config.columnBvhMemory.recordBuffers
+  private val hasCache = config.columnBvhMemory.cache.nonEmpty
+
+  val kind    = Reg(RecordKind())
+  val address = Reg(UInt(RecordFormats.addressBits(config).W))
+
+  /** The context waits for the record. */
+  val isPending = RegInit(false.B)
+
+  /** The address is illegal: the fetch waits to report its error and takes no record, whatever the buffers hold. */
+  val isIllegal = RegInit(false.B)
+
+  /** `buffer` has the record. */
+  val hasRecord = RegInit(false.B)
+
+  /** The context has requested its own read, which fills `buffer`. */
+  val isIssued = Reg(Bool())
+  val buffer   = Reg(UInt(log2Ceil(buffers.max(2)).W))
+
+  /** A reserved buffer, of any context, awaits the record. */
+  val isExpected = Reg(Bool())
+
+  /** With a cache: the record comes later, without a request. */
+  val awaitsFill = Option.when(hasCache)(RegInit(false.B))
+
+  /** With a cache: the context has missed the broadcast that it awaited. */
+  val retries = Option.when(hasCache)(Reg(Bool()))
+
+  /** `buffer` by its bit. */
+  val bufferOH: Seq[Bool] = UIntToOH(buffer, buffers).asBools
+}

@@ -1,0 +1,63 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Mux1H, RegEnable, Valid}
+import colonnade.common.TimingSlice
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.RecordFormats
+
+/** Ports of [[RecordLookup]]. */
+final class RecordLookupIO(config: ColonnadeConfig) extends Bundle {
+  private val contexts = config.array.contexts
+  private val buffers  = config.columnBvhMemory.recordBuffers
+
+  val fetches = Flipped(Vec(RecordFetch.ports, Valid(new FetchRequest(config))))
+
+  /** By buffer: its address, and whether it takes another one in this cycle. */
+  val addresses = Input(Vec(buffers, UInt(RecordFormats.addressBits(config).W)))
+  val isWritten = Input(Vec(buffers, Bool()))
+
+  /** By context and buffer, in one cycle after a fetch: the buffer has its address. */
+  val matches = Output(Vec(contexts, Vec(buffers, Bool())))
+
+  /** By context: its fetch came in the cycle before. */
+  val isNew = Output(Vec(contexts, Bool()))
+
+  /** By context: the matches of its fetch are still to come. */
+  val isUnderWay = Output(Vec(contexts, Bool()))
+}
+
+/** Lookup: compares the address of a new fetch with those of all buffers, once. Later only a fill or a new reservation
+  * changes what a fetch finds. The matches come in the cycle after the fetch. Two extra slices make it the third cycle:
+  * behind the comparators, and behind the choice of the fetch's port. A buffer that takes another address meanwhile does
+  * not match.
+  */
+final class RecordLookup(config: ColonnadeConfig) extends Module {
+  val io = IO(new RecordLookupIO(config))
+
+  private val slice = TimingSlice.extra(config)
+
+  // By context and port
+  private val cameFrom = Seq.tabulate(config.array.contexts) { context =>
+    VecInit(io.fetches.map(port => RegNext(port.valid && port.bits.context === context.U, false.B)))
+  }
+
+  // By port and buffer
+  private val portMatches = io.fetches.map { port =>
+    val address = RegEnable(port.bits.address, port.valid)
+    passed(io.addresses.map(_ === address))
+  }
+
+  for ((from, context) <- cameFrom.zipWithIndex) {
+    val isNew = from.asUInt.orR
+    val port  = slice(from)
+    io.isNew(context)      := isNew
+    io.isUnderWay(context) := (if (slice.isThere) isNew || RegNext(isNew, false.B) else false.B)
+    io.matches(context)    := VecInit(passed(portMatches.transpose.map(Mux1H(port, _))))
+  }
+
+  /** Matches by buffer, behind a slice. */
+  private def passed(matches: Seq[Bool]): Seq[Bool] = if (slice.isThere)
+    matches.zip(io.isWritten).map { case (isMatch, isWritten) => RegNext(isMatch && !isWritten) }
+  else matches
+}
