@@ -193,7 +193,7 @@ object ConfigIO {
         "pathContexts"  -> units.pathContexts,
         "rayInterval"   -> units.rayInterval,
         "shadeInterval" -> units.shadeInterval,
-        "extraSlices"    -> units.extraSlices
+        "extraSlices"   -> units.extraSlices
       ),
       "columnBvhMemory" -> ujson.Obj(
         "depth"         -> columnBvhMemory.depth,
