@@ -53,7 +53,7 @@ def manifest_data(
     layouts = _layouts(vertex_bits, box_bits, arity, per_record, address)
     widest = max(sum(width for _, width, _ in fields) for fields in layouts.values())
     return {
-        "version": 1,
+        "version": 2,
         "config": {
             "array": {"rows": 1, "columns": 1, "contexts": 8},
             "units": {"pathContexts": 8, "marches": 1},

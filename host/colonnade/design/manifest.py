@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from colonnade.common.errors import UserError
 
-VERSION = 1
+#: The newest version of manifests that is read; the older ones are, too.
+VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -183,7 +184,7 @@ class Manifest:
         """Read ``manifest.json``, given the file or its folder.
 
         Raises:
-            UserError: The file is missing or is not a manifest of this version.
+            UserError: The file is missing, no manifest, or newer than this host.
         """
         file = Path(path)
         if file.is_dir():
@@ -193,13 +194,15 @@ class Manifest:
         except FileNotFoundError:
             raise UserError(f"no manifest at {file}: run colonnade generate first") from None
         except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError):
-            raise UserError(f"{file} is not a manifest of this version: generate the design again") from None
+            raise UserError(f"{file} is not a manifest: generate the design again") from None
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Manifest:
         """Build a manifest from its JSON object."""
-        if data["version"] != VERSION:
-            raise UserError(f"the manifest has version {data['version']}, this host reads {VERSION}: generate it again")
+        if data["version"] > VERSION:
+            raise UserError(f"the manifest has version {data['version']}, this host reads {VERSION} at most: update it")
+        if ((data.get("attributes") or {}).get("sizes") or {}).get("sliding"):
+            raise UserError("the manifest is of a design with slic maps, which this host cannot pack: generate it again")
         bits = int(data["records"]["bits"])
         return Manifest(
             config=data["config"],

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 from colonnade.design.manifest import Manifest
 from colonnade.integration.register_table import RegisterTable, identifier
 
@@ -11,8 +9,8 @@ from colonnade.integration.register_table import RegisterTable, identifier
 def design_header(table: RegisterTable, manifest: Manifest) -> str:
     """Format hash, places of registers, and names of errors and counters. Needs ``colonnade.h`` of the driver."""
     words = [f"{word:#010x}u" for word in manifest.format_words]
-    errors = _of(manifest, "errors.")
-    counters = _of(manifest, "counters.")
+    errors = _indices(manifest, "errors.")
+    counters = _indices(manifest, "counters.")
     lines = [
         "/* Written by `colonnade registers`. Do not edit. */",
         "#ifndef COLONNADE_DESIGN_H",
@@ -21,8 +19,8 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
         '#include "colonnade.h"',
         "",
         "enum {",
-        *(f"    COLONNADE_{_constant(name)} = {index}," for index, name in enumerate(errors)),
-        *(f"    COLONNADE_{_constant(name)} = {index}," for index, name in enumerate(counters)),
+        *(f"    COLONNADE_{_constant(name)} = {index}," for name, index in errors.items()),
+        *(f"    COLONNADE_{_constant(name)} = {index}," for name, index in counters.items()),
         "};",
         "",
         "static const struct colonnade_design colonnade_design = {",
@@ -30,10 +28,10 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
         f"                    {', '.join(words[4:])}}},",
         f"    .device_end = {table.device.base + table.device.words[-1].address + 4:#x},",
         f"    .frame_registers = {_first_frame_register(table):#x},",
-        f"    .errors = {_place(table, manifest, errors)},",
-        f"    .error_count = {len(errors)},",
-        f"    .counters = {_place(table, manifest, counters)},",
-        f"    .counter_count = {len(counters)},",
+        f"    .errors = {_place(table, manifest, next(iter(errors)))},",
+        f"    .error_count = {max(errors.values()) + 1},",
+        f"    .counters = {_place(table, manifest, next(iter(counters)))},",
+        f"    .counter_count = {max(counters.values()) + 1},",
         f"    .tile_size = {manifest.config['frame']['tileSize']},",
         f"    .posted_writes = {table.posted_writes},",
         *_scene_in_dram(table, manifest),
@@ -44,13 +42,13 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _of(manifest: Manifest, prefix: str) -> list[str]:
-    """Registers with a prefix; they follow each other without a gap."""
+def _indices(manifest: Manifest, prefix: str) -> dict[str, int]:
+    """Registers with a prefix, by their position from the first one; the design may lack some between them."""
     registers = [register for register in manifest.registers.values() if register.name.startswith(prefix)]
-    for last, following in itertools.pairwise(registers):
-        if last.address + last.words != following.address or last.words != following.words:
-            raise ValueError(f"{following.name} does not follow {last.name}")
-    return [register.name for register in registers]
+    words, first = registers[0].words, registers[0].address
+    if any(register.words != words or (register.address - first) % words for register in registers):
+        raise ValueError(f"the registers {prefix}* are no array")
+    return {register.name: (register.address - first) // words for register in registers}
 
 
 def _first_frame_register(table: RegisterTable) -> int:
@@ -62,8 +60,8 @@ def _first_frame_register(table: RegisterTable) -> int:
     return table.device.base + words[first].address
 
 
-def _place(table: RegisterTable, manifest: Manifest, names: list[str]) -> str:
-    return f"{table.device.base + 4 * manifest.registers[names[0]].address:#x}"
+def _place(table: RegisterTable, manifest: Manifest, name: str) -> str:
+    return f"{table.device.base + 4 * manifest.registers[name].address:#x}"
 
 
 def _scene_in_dram(table: RegisterTable, manifest: Manifest) -> list[str]:
@@ -73,8 +71,8 @@ def _scene_in_dram(table: RegisterTable, manifest: Manifest) -> list[str]:
     if manifest.registers["dram.page"].words != 1:
         raise ValueError("dram.page has more than one word")
     return [
-        f"    .scene_page = {_place(table, manifest, ['dram.page'])},",
-        f"    .invalidate = {_place(table, manifest, ['control.invalidate'])},",
+        f"    .scene_page = {_place(table, manifest, 'dram.page')},",
+        f"    .invalidate = {_place(table, manifest, 'control.invalidate')},",
     ]
 
 

@@ -5,8 +5,8 @@
 | descriptors | 32 | tiles |
 | palette | three fields | `palette_size` |
 | heap | 16 | rest of `map_bytes` |
-| seeds (`slic`) | three fields | tiles |
-| labels (`slic`) | 16: four labels | blocks / 4 |
+| seeds (`slic`, host only) | three fields | tiles |
+| labels (`slic`, host only) | 16: four labels | blocks / 4 |
 | plane descriptors | 16 | tiles |
 | planes | 64 | `planes` |
 | plane heap | 16 | rest of `plane_bytes` |
@@ -35,8 +35,8 @@ LABEL_BITS = 4
 BLOCKS_PER_TILE_EDGE = 4
 
 
-#: Fields that are fixed in the hardware, and so not in its configuration.
-HOST_ONLY = ("field_bits",)
+#: Fields that no configuration has: the hardware decodes two-level maps with components of 12 bits.
+HOST_ONLY = ("field_bits", "encoding")
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class AttributeLayout:
 
     Attributes:
         width, height: Pixels of the maps.
-        encoding: ``twoLevel`` or ``slic``, for albedo and normals.
+        encoding: Of albedo and normals: ``twoLevel``, or ``slic``, the baseline that no hardware decodes.
         tile_size: Edge of a tile, pixels: 8, 16 or 32.
         palette_size: Entries of a map's palette, 4 to 256.
         field_bits: Bits of a vector's component, 6 to 13.

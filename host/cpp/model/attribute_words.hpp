@@ -17,11 +17,9 @@ struct PlaneWord {
 
 /// The manifest's `attributes.sizes`.
 struct AttributeSizes {
-    int width, height, tileLog, tileColumns, tileRows, blockLog, blockColumns, blockRows, paletteSize, planes, boundingPlanes;
-    /// Depth of the heaps and of the label memory, words.
-    int mapHeapWords, planeHeapWords, labelWords;
-    /// Whether the encoding is `slic` (labels and seeds), not `twoLevel` (descriptors, palette and heap).
-    bool isSlic;
+    int width, height, tileLog, tileColumns, tileRows, paletteSize, planes, boundingPlanes;
+    /// Depth of the heaps, words.
+    int mapHeapWords, planeHeapWords;
 
     explicit AttributeSizes(const std::map<std::string, std::int64_t>& values) {
         const auto take = [&](const char* key) { return static_cast<int>(lookUp(values, key)); };
@@ -30,21 +28,16 @@ struct AttributeSizes {
         tileLog = take("tileLog");
         tileColumns = take("tileColumns");
         tileRows = take("tileRows");
-        blockLog = take("blockLog");
-        blockColumns = take("blockColumns");
-        blockRows = take("blockRows");
         paletteSize = take("paletteSize");
         planes = take("planes");
         boundingPlanes = take("boundingPlanes");
         mapHeapWords = take("mapHeapWords");
         planeHeapWords = take("planeHeapWords");
-        labelWords = take("labelWords");
-        isSlic = take("sliding") != 0;
     }
 
-    /// Sizes of the texture memory, by the manifest's `texture.sizes`: an atlas in the encoding `twoLevel`, without planes.
+    /// Sizes of the texture memory, by the manifest's `texture.sizes`: an atlas without planes.
     static AttributeSizes ofTexture(std::map<std::string, std::int64_t> values) {
-        for (const char* key : {"blockLog", "blockColumns", "blockRows", "planes", "boundingPlanes", "planeHeapWords", "labelWords", "sliding"}) values[key] = 0;
+        for (const char* key : {"planes", "boundingPlanes", "planeHeapWords"}) values[key] = 0;
         return AttributeSizes(values);
     }
 
@@ -76,7 +69,7 @@ public:
     int low(int address) const { return word(address) & 255; }
     int high(int address) const { return word(address) >> 8; }
 
-    /// Element `index` of a mask at `address` with elements of `bits` (1, 2 or 4) bits.
+    /// Element `index` of a mask at `address` with elements of `bits` (1 or 2) bits.
     int select(int address, int index, int bits) const {
         return (word(wordOf(address, index, bits)) >> (index * bits % 16)) & ((1 << bits) - 1);
     }

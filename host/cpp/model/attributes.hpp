@@ -1,4 +1,4 @@
-// Decoders of the physical-attribute memory, as in the RTL's AttributeMap and PlaneMap (docs/attributes.md).
+// Decoders of the physical-attribute memory, as in the RTL's TwoLevelMap and PlaneMap (docs/attributes.md).
 #pragma once
 #include "attribute_words.hpp"
 
@@ -34,7 +34,7 @@ struct CellPlane {
     bool isIllegal;
 };
 
-/// Index of a pixel's palette entry or seed.
+/// Index of a pixel's palette entry.
 struct MapEntry {
     int index;
     bool isIllegal;
@@ -47,14 +47,13 @@ struct BoundingPlaneEntry {
     Normal12 normal;
 };
 
-/// A map of three 12-bit components per pixel (albedo or normals), in either encoding.
+/// A map of three 12-bit components per pixel (albedo or normals).
 class ComponentMap {
 public:
     using Components = std::array<int, 3>;
 
     explicit ComponentMap(const AttributeSizes& sizes)
-        : sizes_(sizes), descriptors_(sizes.tiles()), entries_(sizes.isSlic ? sizes.tiles() : sizes.paletteSize),
-          heap_(sizes.isSlic ? sizes.labelWords : sizes.mapHeapWords) {}
+        : sizes_(sizes), descriptors_(sizes.tiles()), entries_(sizes.paletteSize), heap_(sizes.mapHeapWords) {}
 
     void loadDescriptors(const AttributeWords& words) {
         for (std::size_t i = 0; i < std::min(words.count(), descriptors_.size()); ++i)
@@ -67,13 +66,10 @@ public:
     AttributeHeap& heap() { return heap_; }
     const AttributeHeap& heap() const { return heap_; }
 
-    /// The palette entry or the seed of a pixel.
-    MapEntry entryAt(int x, int y) const { return sizes_.isSlic ? MapEntry{seedAt(x, y), false} : paletteEntryAt(x, y); }
-
     const Components& components(const MapEntry& entry) const { return entries_[entry.index]; }
 
-    /// The mask's word has the highest address that a pixel reads: if it is legal, all are.
-    MapEntry paletteEntryAt(int x, int y) const {
+    /// The palette entry of a pixel. The mask's word has the highest address that a pixel reads: if it is legal, all are.
+    MapEntry entryAt(int x, int y) const {
         const Descriptor& tile = descriptors_.at(sizes_.tileOf(x, y));
         const int cell = sizes_.cellOf(x, y, sizes_.tileLog - 1 - (tile.mode & 3));
         const int known = sizes_.paletteSize - 1;
@@ -85,15 +81,6 @@ public:
         return {entry & known, !heap_.covers(AttributeHeap::wordOf(mask, cell, bits))};
     }
 
-    /// Seed of a pixel. Labels above 8 select the tile itself; neighbours are clamped to the map.
-    int seedAt(int x, int y) const {
-        const int block = (y >> sizes_.blockLog) * sizes_.blockColumns + (x >> sizes_.blockLog);
-        const int label = heap_.select(0, block, 4), neighbour = label > 8 ? 4 : label;
-        const int column = clamp((x >> sizes_.tileLog) + neighbour % 3 - 1, 0, sizes_.tileColumns - 1);
-        const int row = clamp((y >> sizes_.tileLog) + neighbour / 3 - 1, 0, sizes_.tileRows - 1);
-        return row * sizes_.tileColumns + column;
-    }
-
 private:
     struct Descriptor {
         int mode, pointer;
@@ -101,9 +88,9 @@ private:
     };
 
     AttributeSizes sizes_;
-    std::vector<Descriptor> descriptors_; // two-level encoding only
+    std::vector<Descriptor> descriptors_;
     std::vector<Components> entries_;
-    AttributeHeap heap_; // of masks (two-level) or labels (SLIC)
+    AttributeHeap heap_;
 };
 
 /// The texture memory: one atlas as a two-level map (docs/textures.md).
@@ -124,7 +111,7 @@ public:
 
     /// The texel at a position, which has fraction bits and lies in the atlas.
     Rgb12 texelAt(std::int64_t u, std::int64_t v) const {
-        const MapEntry entry = atlas_.paletteEntryAt(static_cast<int>(u >> fractionBits_), static_cast<int>(v >> fractionBits_));
+        const MapEntry entry = atlas_.entryAt(static_cast<int>(u >> fractionBits_), static_cast<int>(v >> fractionBits_));
         const auto [r, g, b] = atlas_.components(entry);
         return {r, g, b, entry.isIllegal};
     }
@@ -191,10 +178,10 @@ public:
         const auto by = [&](const char* layout) { return AttributeWords(layouts_.at(layout), words, count, stride); };
         if (memory == "albedo.descriptors") albedo_.loadDescriptors(by("mapDescriptor"));
         else if (memory == "normals.descriptors") normals_.loadDescriptors(by("mapDescriptor"));
-        else if (memory == "albedo.palette" || memory == "albedo.seeds") albedo_.loadEntries(by("albedo"), "rgb");
-        else if (memory == "normals.palette" || memory == "normals.seeds") normals_.loadEntries(by("normal"), "xyz");
-        else if (memory == "albedo.heap" || memory == "albedo.labels") albedo_.heap().load(words, count, stride);
-        else if (memory == "normals.heap" || memory == "normals.labels") normals_.heap().load(words, count, stride);
+        else if (memory == "albedo.palette") albedo_.loadEntries(by("albedo"), "rgb");
+        else if (memory == "normals.palette") normals_.loadEntries(by("normal"), "xyz");
+        else if (memory == "albedo.heap") albedo_.heap().load(words, count, stride);
+        else if (memory == "normals.heap") normals_.heap().load(words, count, stride);
         else if (memory == "planes.descriptors") ids_.loadDescriptors(by("planeDescriptor"));
         else if (memory == "planes.heap") ids_.heap().load(words, count, stride);
         else if (memory == "planes.planes") loadPlanes(by("plane"));

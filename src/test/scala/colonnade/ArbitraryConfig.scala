@@ -97,7 +97,6 @@ object ArbitraryConfig {
   private val physicalAttributeMemory = for {
     width          <- Gen.chooseNum(64, 1000, 640)
     height         <- Gen.chooseNum(64, 1000, 480)
-    encoding       <- Gen.oneOf(MapEncoding.all)
     tileSize       <- Gen.oneOf(16, 32)
     paletteSize    <- Gen.oneOf(16, 64, 256)
     planes         <- Gen.oneOf(16, 128, 256)
@@ -107,19 +106,12 @@ object ArbitraryConfig {
     columnsPerCopy <- Gen.chooseNum(1, 4)
   } yield {
     def parts(size: Int, edge: Int) = (size + edge - 1) / edge
-    val (tiles, blocks)             = (
-      parts(width, tileSize) * parts(height, tileSize),
-      parts(width, tileSize / 4) * parts(height, tileSize / 4)
-    )
-    val mapBytes = encoding match {
-      case MapEncoding.TwoLevel => tiles * 4 + paletteSize * 9 / 2 + mapHeap
-      case MapEncoding.Sliding  => (tiles * 9 + 1) / 2 + (blocks + 3) / 4 * 2 + mapHeap
-    }
-    val planeBytes = tiles * 2 + planes * 8 + boundingPlanes * 18 + planeHeap
+    val tiles                       = parts(width, tileSize) * parts(height, tileSize)
+    val mapBytes                    = tiles * 4 + paletteSize * 9 / 2 + mapHeap
+    val planeBytes                  = tiles * 2 + planes * 8 + boundingPlanes * 18 + planeHeap
     PhysicalAttributeMemoryConfig(
       width,
       height,
-      encoding,
       tileSize,
       paletteSize,
       mapBytes,

@@ -56,7 +56,6 @@ object TestConfigs {
   val environment: PhysicalAttributeMemoryConfig = PhysicalAttributeMemoryConfig(
     width = 150,
     height = 70,
-    encoding = MapEncoding.TwoLevel,
     tileSize = 16,
     paletteSize = 256,
     mapBytes = 3000,
@@ -69,7 +68,7 @@ object TestConfigs {
   def withEnvironment(environment: PhysicalAttributeMemoryConfig): ColonnadeConfig =
     tiny.copy(physicalAttributeMemory = Some(environment))
 
-  /** Small maps, maps of the presets' size and maps of odd sizes, in both encodings. */
+  /** Small maps, maps of the presets' size and maps of odd sizes. */
   val environments: Seq[ColonnadeConfig] = {
     val large = environment.copy(width = 640, height = 480, mapBytes = 16384, planeBytes = 12288)
     val odd   = environment.copy(
@@ -82,8 +81,7 @@ object TestConfigs {
       mapBytes = 16848,
       planeBytes = 16781
     )
-    Seq(environment, large, odd)
-      .flatMap(size => MapEncoding.all.map(encoding => withEnvironment(size.copy(encoding = encoding))))
+    Seq(environment, large, odd).map(withEnvironment)
   }
 
   /** A cache of a few lines in front of a scene of `depth` records. */

@@ -143,8 +143,8 @@ object ShellMap {
     )
   )
 
-  /** Writes to the device's registers that the shell takes while a frame runs: at least its words. */
-  def postedWrites(config: ColonnadeConfig): Int = 1 << log2Ceil(RegisterMap.size(RegisterMap(config)))
+  /** Writes to the device's registers that the shell takes while a frame runs: at least one of each word. */
+  def postedWrites(config: ColonnadeConfig): Int = 1 << log2Ceil(writableWords(config).size)
 
   /** Words of the device's registers that may be written, without `control.start`: the shell starts frames. */
   def writableWords(config: ColonnadeConfig): Seq[Int] =

@@ -17,40 +17,24 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends 
   val tileRows:    Int = (height + tileSize - 1) / tileSize
   val tiles:       Int = tileColumns * tileRows
 
-  /** Log2 of the edge of a labelled block. */
-  val blockLog:     Int = tileLog - log2(cellsPerBlockRow)
-  val blockColumns: Int = (width + (1 << blockLog) - 1) >> blockLog
-  val blockRows:    Int = (height + (1 << blockLog) - 1) >> blockLog
+  val xBits:                  Int = bitsOf(width)
+  val yBits:                  Int = bitsOf(height)
+  val tileBits:               Int = bitsOf(tiles)
+  val paletteBits:            Int = bitsOf(paletteSize)
+  val planeIdBits:            Int = bitsOf(planes)
+  val boundingPlaneIndexBits: Int = bitsOf(boundingPlanes)
+  val tableIndexBits:         Int = planeIdBits.max(boundingPlaneIndexBits)
 
-  /** Heap words of labels. */
-  val labelWords: Int = (blockColumns * blockRows * labelBits + heapWordBits - 1) / heapWordBits
-
-  val xBits:                  Int     = bitsOf(width)
-  val yBits:                  Int     = bitsOf(height)
-  val tileBits:               Int     = bitsOf(tiles)
-  val paletteBits:            Int     = bitsOf(paletteSize)
-  val planeIdBits:            Int     = bitsOf(planes)
-  val boundingPlaneIndexBits: Int     = bitsOf(boundingPlanes)
-  val tableIndexBits:         Int     = planeIdBits.max(boundingPlaneIndexBits)
-  val isSliding:              Boolean = encoding == MapEncoding.Sliding
-
-  /** Heap words of a two-level map; 0 for a sliding map. */
+  /** Heap words of albedo, and of normals. */
   val mapHeapWords: Int = {
-    val descriptors = tiles * mapDescriptorBits / 8
-    if (isSliding) {
-      val (labels, seeds) = (labelWords * heapWordBits / 8, bytes(tiles * entryBits))
-      fits("mapBytes", mapBytes, labels + seeds, s"$tiles seeds take $seeds bytes and the labels of blocks $labels")
-      0
-    } else {
-      val palette = bytes(paletteSize * entryBits)
-      heapWords(
-        "mapBytes",
-        mapBytes,
-        descriptors + palette,
-        s"$tiles tile descriptors take $descriptors bytes and $paletteSize palette entries $palette",
-        largestTile = 1 + 2 * (1 << 8) / heapWordBits
-      )
-    }
+    val (descriptors, palette) = (tiles * mapDescriptorBits / 8, bytes(paletteSize * entryBits))
+    heapWords(
+      "mapBytes",
+      mapBytes,
+      descriptors + palette,
+      s"$tiles tile descriptors take $descriptors bytes and $paletteSize palette entries $palette",
+      largestTile = 1 + 2 * (1 << 8) / heapWordBits
+    )
   }
 
   val planeHeapWords: Int = {
@@ -69,14 +53,9 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends 
   def entries: Seq[(String, Int)] = Seq(
     "width"          -> width,
     "height"         -> height,
-    "sliding"        -> (if (isSliding) 1 else 0),
     "tileLog"        -> tileLog,
     "tileColumns"    -> tileColumns,
     "tileRows"       -> tileRows,
-    "blockLog"       -> blockLog,
-    "blockColumns"   -> blockColumns,
-    "blockRows"      -> blockRows,
-    "labelWords"     -> labelWords,
     "paletteSize"    -> paletteSize,
     "mapHeapWords"   -> mapHeapWords,
     "mapBytes"       -> mapBytes,
@@ -92,19 +71,14 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends 
     */
   private def heapWords(field: String, all: Int, fixed: Int, because: String, largestTile: Int): Int = {
     def bytesOf(words: Int): Int = words * heapWordBits / 8
-    fits(field, all, fixed + bytesOf(largestTile), s"$because, the finest tile ${bytesOf(largestTile)}")
-    val max = fixed + bytesOf(1 << pointerBits)
+    val (min, max)               = (fixed + bytesOf(largestTile), fixed + bytesOf(1 << pointerBits))
+    val is                       = s"${PhysicalAttributeMemoryConfig.section}.$field is $all; it must be"
+    if (all < min)
+      throw new ConfigError(s"$is at least $min: $because, the finest tile ${bytesOf(largestTile)}")
     if (all > max)
-      throw new ConfigError(
-        s"${name(field)} is $all; it must be at most $max: $because, and tiles reach ${bytesOf(1 << pointerBits)} more"
-      )
+      throw new ConfigError(s"$is at most $max: $because, and tiles reach ${bytesOf(1 << pointerBits)} more")
     (all - fixed) / bytesOf(1)
   }
-
-  private def fits(field: String, all: Int, needed: Int, because: String): Unit =
-    if (all < needed) throw new ConfigError(s"${name(field)} is $all; it must be at least $needed: $because")
-
-  private def name(field: String): String = s"${PhysicalAttributeMemoryConfig.section}.$field"
 }
 
 object AttributeLayout {
@@ -124,12 +98,9 @@ object AttributeLayout {
   /** Width of a stored index into a palette or into the plane table. */
   val indexBits: Int = 8
 
-  /** Width of a component of a palette entry or of a seed. */
+  /** Width of a component of a palette entry. */
   val componentBits: Int = 12
   val entryBits:     Int = 3 * componentBits
-
-  /** Width of a block label: one of the nine neighbouring seeds. */
-  val labelBits: Int = 4
 
   val mapDescriptorBits:   Int = modeBits + pointerBits + 2 * indexBits
   val planeDescriptorBits: Int = modeBits + pointerBits
@@ -141,8 +112,6 @@ object AttributeLayout {
 
   /** Size of a bounding plane, rounded up to heap words. */
   val boundingPlaneEntryBytes: Int = (planeBits + 2 * entryBits + heapWordBits - 1) / heapWordBits * (heapWordBits / 8)
-
-  private val cellsPerBlockRow = 4
 
   private def bytes(bits: Int): Int = (bits + 7) / 8
 

@@ -8,11 +8,12 @@ import chisel3.util.log2Ceil
   * @param columns  columns side by side (M)
   * @param contexts rays in flight in each traversal unit
   */
-final case class ArrayConfig(rows: Int, columns: Int, contexts: Int) {
+final case class ArrayConfig(rows: Int = 1, columns: Int = 1, contexts: Int = 8) {
   Require.within("array.rows", rows, 1, ArrayConfig.maxRows)
   Require.within("array.columns", columns, 1, ArrayConfig.maxColumns)
   Require.product("array.rows", rows, "array.columns", columns, ArrayConfig.maxUnits)
-  Require.within("array.contexts", contexts, 1, UnitsConfig.maxPathContexts)
+  if (!ArrayConfig.isLarge(contexts) || contexts > UnitsConfig.maxPathContexts)
+    Require.within("array.contexts", contexts, 1, ArrayConfig.maxContexts)
 }
 
 object ArrayConfig {
@@ -36,12 +37,21 @@ object ArrayConfig {
   * @param sqrt radicand of the square root
   * @param div  dividend of a division
   */
-final case class PrecisionConfig(mac: Int, sqrt: Int, div: Int) {
+final case class PrecisionConfig(mac: Int = 32, sqrt: Int = 32, div: Int = 64) {
   Require.within("precision.mac", mac, 16, 64)
   Require.within("precision.sqrt", sqrt, 16, 64)
   Require.within("precision.div", div, 16, 64)
 
   override def toString: String = s"${mac}b${sqrt}s${div}d"
+}
+
+object PrecisionConfig {
+  private val notation = """(\d{1,6})b(\d{1,6})s(\d{1,6})d""".r
+
+  /** A precision in the paper's notation. */
+  def unapply(text: String): Option[PrecisionConfig] = PartialFunction.condOpt(text) {
+    case notation(mac, sqrt, div) => PrecisionConfig(mac.toInt, sqrt.toInt, div.toInt)
+  }
 }
 
 /** Geometry records and the acceleration structure.
@@ -57,14 +67,14 @@ final case class PrecisionConfig(mac: Int, sqrt: Int, div: Int) {
   *                           in it; 0: no textures
   */
 final case class GeometryConfig(
-    vertexBits:         Int,
-    boxBits:            Int,
-    triangleBits:       Option[Int],
-    arity:              Int,
-    trianglesPerRecord: Int,
-    bvh:                Boolean,
-    cornerColours:      Boolean,
-    textureBytes:       Int
+    vertexBits:         Int = 16,
+    boxBits:            Int = 8,
+    triangleBits:       Option[Int] = Some(24),
+    arity:              Int = 4,
+    trianglesPerRecord: Int = 2,
+    bvh:                Boolean = true,
+    cornerColours:      Boolean = false,
+    textureBytes:       Int = 0
 ) {
   Require.within("geometry.vertexBits", vertexBits, 10, 24)
   Require.within("geometry.boxBits", boxBits, 4, 12)
@@ -92,14 +102,14 @@ final case class GeometryConfig(
   * @param extraSlices   the optional timing slices of traversal and caches, for FPGAs: some steps take a cycle more
   */
 final case class UnitsConfig(
-    boxLanes:      Int,
-    triangleLanes: Int,
-    triangleRows:  Int,
-    marches:       Int,
-    pathContexts:  Int,
-    rayInterval:   Int,
-    shadeInterval: Int,
-    extraSlices:   Boolean
+    boxLanes:      Int = 2,
+    triangleLanes: Int = 1,
+    triangleRows:  Int = 1,
+    marches:       Int = 1,
+    pathContexts:  Int = 8,
+    rayInterval:   Int = UnitsConfig.sequentialRayInterval,
+    shadeInterval: Int = UnitsConfig.sequentialShadeInterval,
+    extraSlices:   Boolean = false
 ) {
   Require.oneOf("units.boxLanes", boxLanes, Seq(1, 2, 4))
   Require.within("units.triangleLanes", triangleLanes, 1, 4)
@@ -136,14 +146,14 @@ object UnitsConfig {
   * @param cache         the memory is a cache of records in DRAM; none: a scratchpad that holds the whole scene
   */
 final case class ColumnBvhMemoryConfig(
-    depth:         Int,
-    banks:         Int,
-    stackDepth:    Int,
-    snooping:      Boolean,
-    recordBuffers: Int,
-    readLatency:   Int,
-    holdable:      Boolean,
-    cache:         Option[SceneCacheConfig]
+    depth:         Int = 131072,
+    banks:         Int = 2,
+    stackDepth:    Int = 32,
+    snooping:      Boolean = true,
+    recordBuffers: Int = 2,
+    readLatency:   Int = 1,
+    holdable:      Boolean = false,
+    cache:         Option[SceneCacheConfig] = None
 ) {
   Require.within("columnBvhMemory.depth", depth, 16, 1 << 22)
   Require.oneOf("columnBvhMemory.banks", banks, Seq(1, 2, 4))
@@ -165,14 +175,14 @@ final case class ColumnBvhMemoryConfig(
   * @param emission   materials have a colour that diffuse surfaces emit
   */
 final case class FrameConfig(
-    maxWidth:   Int,
-    maxHeight:  Int,
-    tileSize:   Int,
-    materials:  Int,
-    lights:     Int,
-    maxBounces: Int,
-    hits:       Boolean,
-    emission:   Boolean
+    maxWidth:   Int = 1920,
+    maxHeight:  Int = 1080,
+    tileSize:   Int = 16,
+    materials:  Int = 8,
+    lights:     Int = 1,
+    maxBounces: Int = 0,
+    hits:       Boolean = true,
+    emission:   Boolean = false
 ) {
   Require.within("frame.maxWidth", maxWidth, 8, 4096)
   Require.within("frame.maxHeight", maxHeight, 8, 4096)
@@ -185,18 +195,19 @@ final case class FrameConfig(
   val hasBounces: Boolean = maxBounces > 0
 }
 
-/** A whole generator configuration: immutable, checked at construction.
+/** A whole generator configuration: immutable, checked at construction. The names, types and defaults of the parameters
+  * are those of the keys of its JSON, see [[ConfigIO]]. The defaults are the preset `tiny`.
   *
   * @param physicalAttributeMemory none for a device without an environment
   */
 final case class ColonnadeConfig(
-    array:                   ArrayConfig,
-    precision:               PrecisionConfig,
-    geometry:                GeometryConfig,
-    units:                   UnitsConfig,
-    columnBvhMemory:         ColumnBvhMemoryConfig,
-    physicalAttributeMemory: Option[PhysicalAttributeMemoryConfig],
-    frame:                   FrameConfig
+    array:                   ArrayConfig = ArrayConfig(),
+    precision:               PrecisionConfig = PrecisionConfig(),
+    geometry:                GeometryConfig = GeometryConfig(),
+    units:                   UnitsConfig = UnitsConfig(),
+    columnBvhMemory:         ColumnBvhMemoryConfig = ColumnBvhMemoryConfig(),
+    physicalAttributeMemory: Option[PhysicalAttributeMemoryConfig] = None,
+    frame:                   FrameConfig = FrameConfig()
 ) {
   Require.oneOf("units.boxLanes", units.boxLanes, Seq(1, 2, 4).filter(_ <= geometry.arity))
 
@@ -225,4 +236,13 @@ final case class ColonnadeConfig(
 
   /** Ports to a column's maps of an environment: of its marches, and of the pipeline for directly seen pixels. */
   val mapRequesters: Int = units.marches + 1
+}
+
+object ColonnadeConfig {
+
+  /** The defaults, with every optional part. */
+  val complete: ColonnadeConfig = ColonnadeConfig(
+    columnBvhMemory = ColumnBvhMemoryConfig(cache = Some(SceneCacheConfig())),
+    physicalAttributeMemory = Some(PhysicalAttributeMemoryConfig())
+  )
 }

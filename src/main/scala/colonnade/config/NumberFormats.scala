@@ -85,43 +85,47 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
     bitLength((farthestPlane << (stepReach - nearFraction)) + (steps << boxBits) + (steps << boxPadLog) + 4) + 1
   }
 
+  /** The values that scene images and frame registers depend on, by their manifest key. */
+  def ofImages: Seq[(String, Int)] = Seq(
+    "vertexBits"     -> vertexBits,
+    "boxBits"        -> boxBits,
+    "macBits"        -> macBits,
+    "gridBits"       -> gridBits,
+    "gridFraction"   -> gridFraction,
+    "sceneBits"      -> sceneBits,
+    "coordinateBits" -> coordinateBits,
+    "mantissaBits"   -> mantissaBits,
+    "weightBits"     -> weightBits,
+    "distanceDigits" -> distanceDigits,
+    "shadeBits"      -> shadeBits,
+    "maxExponent"    -> maxExponent,
+    "boxPadLog"      -> boxPadLog,
+    "normalBits"     -> normalBits,
+    "normalFraction" -> normalFraction,
+    "colourBits"     -> colourBits,
+    "lightBits"      -> lightBits,
+    "lightFraction"  -> lightFraction,
+    "etaFraction"    -> etaFraction
+  )
+
   /** All values by their manifest key. */
-  def entries: Seq[(String, Int)] = Seq(
-    "vertexBits"         -> vertexBits,
-    "boxBits"            -> boxBits,
-    "macBits"            -> macBits,
-    "gridBits"           -> gridBits,
-    "gridFraction"       -> gridFraction,
-    "sceneBits"          -> sceneBits,
-    "coordinateBits"     -> coordinateBits,
+  def entries: Seq[(String, Int)] = ofImages ++ Seq(
     "directionBits"      -> directionBits,
-    "mantissaBits"       -> mantissaBits,
     "shearFraction"      -> shearFraction,
     "shearDigits"        -> shearDigits,
     "reciprocalFraction" -> reciprocalFraction,
     "reciprocalDigits"   -> reciprocalDigits,
     "entrySlackShift"    -> entrySlackShift,
     "entryBits"          -> entryBits,
-    "weightBits"         -> weightBits,
-    "distanceDigits"     -> distanceDigits,
     "barycentricBits"    -> barycentricBits,
-    "shadeBits"          -> shadeBits,
     "radicandBits"       -> radicandBits,
     "cosineFraction"     -> cosineFraction,
-    "maxExponent"        -> maxExponent,
     "boxDistanceBits"    -> boxDistanceBits,
-    "boxPadLog"          -> boxPadLog,
     "stepFraction"       -> stepFraction,
     "stepReach"          -> stepReach,
     "nearFraction"       -> nearFraction,
     "nearBits"           -> nearBits,
     "nodeBits"           -> nodeBits,
-    "normalBits"         -> normalBits,
-    "normalFraction"     -> normalFraction,
-    "colourBits"         -> colourBits,
-    "lightBits"          -> lightBits,
-    "lightFraction"      -> lightFraction,
-    "etaFraction"        -> etaFraction,
     "rootBits"           -> rootBits
   )
 }

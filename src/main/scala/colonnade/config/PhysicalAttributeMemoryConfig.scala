@@ -1,26 +1,11 @@
 package colonnade.config
 
-/** How a map of colours or normals is stored. */
-sealed abstract class MapEncoding(val name: String)
-
-object MapEncoding {
-
-  /** Each tile has a mode: two or four palette entries, and the size of the cells that select one of them. */
-  case object TwoLevel extends MapEncoding("twoLevel")
-
-  /** SLIC superpixels with one seed per tile: the label of a block of pixels selects one of nine neighbouring seeds. */
-  case object Sliding extends MapEncoding("slic")
-
-  val all: Seq[MapEncoding] = Seq(TwoLevel, Sliding)
-}
-
 /** The on-chip maps of the environment: albedo, normals and planes.
   *
   * @param width       of the maps, pixels
   * @param height      of the maps, pixels
-  * @param encoding    of albedo and normals
   * @param tileSize    edge of a tile, pixels
-  * @param paletteSize entries of a two-level map's palette
+  * @param paletteSize entries of a map's palette
   * @param mapBytes    of albedo, and of normals
   * @param planes      entries of the plane table
   * @param planeBytes  of the plane map, its table and the bounding planes
@@ -28,16 +13,15 @@ object MapEncoding {
   * @param columnsPerCopy consecutive columns that read one copy of the maps; 1: each column has its own
   */
 final case class PhysicalAttributeMemoryConfig(
-    width:          Int,
-    height:         Int,
-    encoding:       MapEncoding,
-    tileSize:       Int,
-    paletteSize:    Int,
-    mapBytes:       Int,
-    planes:         Int,
-    planeBytes:     Int,
-    boundingPlanes: Int,
-    columnsPerCopy: Int
+    width:          Int = 640,
+    height:         Int = 480,
+    tileSize:       Int = 16,
+    paletteSize:    Int = 256,
+    mapBytes:       Int = 16384,
+    planes:         Int = 128,
+    planeBytes:     Int = 12288,
+    boundingPlanes: Int = 8,
+    columnsPerCopy: Int = 1
 ) {
   import PhysicalAttributeMemoryConfig._
 

@@ -13,14 +13,14 @@ package colonnade.config
   * @param parity       each record in a cache has a parity bit
   */
 final case class SceneCacheConfig(
-    lines:        Int,
-    ways:         Int,
-    misses:       Int,
-    sharedLines:  Int,
-    sharedWays:   Int,
-    sharedMisses: Int,
-    busBytes:     Int,
-    parity:       Boolean
+    lines:        Int = 512,
+    ways:         Int = 4,
+    misses:       Int = 8,
+    sharedLines:  Int = 0,
+    sharedWays:   Int = 0,
+    sharedMisses: Int = 8,
+    busBytes:     Int = 4,
+    parity:       Boolean = false
 ) {
   Require.within("columnBvhMemory.cache.ways", ways, 1, 16)
   Require.within(

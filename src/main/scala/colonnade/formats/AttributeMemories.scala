@@ -24,7 +24,8 @@ object AttributeMemories {
   private def environment(config: ColonnadeConfig): Seq[(String, Int, Int)] =
     config.physicalAttributeMemory.toSeq.flatMap { memory =>
       val layout = memory.layout
-      map("albedo", layout) ++ map("normals", layout) ++ Seq(
+      val maps   = Seq("albedo", "normals")
+      maps.flatMap(twoLevel(_, layout.tiles, memory.paletteSize, layout.mapHeapWords)) ++ Seq(
         ("planes.descriptors", layout.tiles, (new PlaneDescriptor).getWidth),
         ("planes.heap", layout.planeHeapWords, AttributeLayout.heapWordBits),
         ("planes.planes", memory.planes, (new Plane).getWidth),
@@ -50,14 +51,6 @@ object AttributeMemories {
     "plane"              -> (() => new Plane),
     "boundingPlaneEntry" -> (() => new BoundingPlaneEntry)
   )
-
-  private def map(name: String, layout: AttributeLayout): Seq[(String, Int, Int)] =
-    if (layout.isSliding)
-      Seq(
-        (s"$name.labels", layout.labelWords, AttributeLayout.heapWordBits),
-        (s"$name.seeds", layout.tiles, AttributeLayout.entryBits)
-      )
-    else twoLevel(name, layout.tiles, layout.config.paletteSize, layout.mapHeapWords)
 
   private def twoLevel(name: String, tiles: Int, paletteSize: Int, heapWords: Int): Seq[(String, Int, Int)] = Seq(
     (s"$name.descriptors", tiles, (new MapDescriptor).getWidth),

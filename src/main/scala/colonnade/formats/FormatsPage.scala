@@ -32,8 +32,7 @@ object FormatsPage {
       table(formats.attributes),
       "## Physical-attribute memory",
       room(config),
-      """A heap's words have 16 bits, and none is laid out further. A word of labels holds those of four blocks, the first in
-        |its low bits.""".stripMargin,
+      "A heap's words have 16 bits, and none is laid out further.",
       "### Tile of a two-level map",
       """Modes 0 to 3 choose between two entries of the palette, for cells of 1/2, 1/4, 1/8 or 1/16 of the tile's edge; modes 4 to
         |7 between four, for the same cells. Cells are counted row by row; cell c has bit c of the mask, or bits 2c and 2c + 1,
@@ -41,10 +40,10 @@ object FormatsPage {
         |`pointer`. With four entries the word at `pointer` holds entries 2 (low byte) and 3, and the mask follows.""".stripMargin,
       table(new MapDescriptor),
       "### Albedo",
-      "An entry of a palette, or a seed: linear, all ones is 1.0.",
+      "An entry of a palette: linear, all ones is 1.0.",
       table(new AlbedoEntry),
       "### Normal",
-      "An entry of a palette, or a seed: a unit vector in view space (x to the right, y down, z forward).",
+      "An entry of a palette: a unit vector in view space (x to the right, y down, z forward).",
       table(new NormalEntry),
       "### Tile of the plane map",
       """Mode 0, and 7: all of the tile lies in the plane `pointer`. Modes 1, 2 and 5: in two planes, for cells of 1/4, 1/8 or 1/16 of
@@ -66,9 +65,9 @@ object FormatsPage {
       "A record and its place; every column takes it.",
       table(new Load(config)),
       "## Registers",
-      s"""Words of ${RegisterMap.dataBits} bits. A number starts at a word of its own, low word first; `rw` registers hold still while a frame
-         |runs. A write of 1 to `control.start` starts a frame, and clears the errors and counters of the last one. The device takes
-         |a value above its register's limit as the limit; without one, any value that fits is legal ([errors](errors.md)).""".stripMargin,
+      s"""Words of ${RegisterMap.dataBits} bits. A number starts at a word of its own, low word first. Commands, status, errors and counters have the same
+         |addresses in every design; words without a register read as 0. `rw` registers hold still while a frame runs. A write of 1 to `control.start` starts a frame, and clears the errors and counters of the last one. The device takes a value above
+         |its register's limit as the limit; without one, any value that fits is legal ([errors](errors.md)).""".stripMargin,
       registers(RegisterMap(config))
     )
     page.mkString("\n\n") + "\n"

@@ -186,7 +186,7 @@ final class Status extends Bundle {
   val done = Bool()
 }
 
-/** Sticky until the next start. */
+/** Sticky until the next start. A new one comes last. */
 final class Errors(config: ColonnadeConfig) extends Bundle {
   val stackOverflow = Bool()
   val illegalRecord = Bool()
@@ -196,7 +196,9 @@ final class Errors(config: ColonnadeConfig) extends Bundle {
   val memory = config.columnBvhMemory.cache.map(_ => Bool())
 }
 
-/** Event counters of the last frame, summed over the array unless a field says otherwise. */
+/** Event counters of the last frame, summed over the array unless a field says otherwise. A new one comes last: the others
+  * keep their addresses.
+  */
 final class Counters(config: ColonnadeConfig) extends Bundle {
   private def counter            = UInt(Counters.bits.W)
   private def environmentCounter = config.physicalAttributeMemory.map(_ => counter)
@@ -273,6 +275,7 @@ final class DeviceStatus(config: ColonnadeConfig) extends Bundle {
   val counters = new Counters(config)
 }
 
+/** The registers that the host pulses. A new one comes last. */
 final class Control(config: ColonnadeConfig) extends Bundle {
 
   /** A write of 1 starts a frame. */
@@ -280,9 +283,4 @@ final class Control(config: ColonnadeConfig) extends Bundle {
 
   /** A write of 1 makes the caches forget the scene. */
   val invalidate = config.columnBvhMemory.cache.map(_ => Bool())
-}
-
-/** The registers that the host pulses. */
-final class HostCommands(config: ColonnadeConfig) extends Bundle {
-  val control = new Control(config)
 }

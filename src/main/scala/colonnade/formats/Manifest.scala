@@ -2,14 +2,15 @@ package colonnade.formats
 
 import chisel3.Bundle
 import colonnade.config.{ColonnadeConfig, ConfigIO, TextureLayout}
+import colonnade.formats.Access.ReadWrite
 
 /** The description of a design for the host: configuration, number formats, and the bit position of every number in
   * records, registers and streams. The generator writes it beside the Verilog; packer, model and harness read it.
   */
 object Manifest {
 
-  /** Incremented when a key changes its meaning. */
-  val version: Int = 1
+  /** Incremented when a key changes its meaning or leaves. */
+  val version: Int = 2
 
   def apply(config: ColonnadeConfig): ujson.Obj = {
     val formats = new RecordFormats(config)
@@ -46,17 +47,8 @@ object Manifest {
         )
     for (memory <- AttributeMemories(config))
       memories(memory.name) = ujson.Obj("depth" -> memory.depth, "bits" -> memory.bits, "target" -> memory.target)
-    val maps   = config.physicalAttributeMemory.map(_ => attributes(config))
-    val hashed = ujson.Obj(
-      "records"   -> records,
-      "registers" -> registers,
-      "numbers"   -> numbers,
-      "bvh"       -> config.geometry.bvh // an image without nodes says nothing to hardware that walks them
-    )
+    val maps    = config.physicalAttributeMemory.map(_ => attributes(config))
     val texture = config.geometry.texture.map(textures)
-    maps.foreach(hashed("attributes") = _)
-    texture.foreach(hashed("texture") = _)
-    val formatHash = Json.hash(hashed)
 
     val manifest = ujson.Obj(
       "version"    -> version,
@@ -66,13 +58,24 @@ object Manifest {
       "registers"  -> registers,
       "streams"    -> streams,
       "memories"   -> memories,
-      "attributes" -> maps.getOrElse[ujson.Value](ujson.Null),
-      "formatHash" -> formatHash
+      "attributes" -> maps.getOrElse[ujson.Value](ujson.Null)
     )
     texture.foreach(manifest("texture") = _)
+    manifest("formatHash") = formatHash(manifest, config)
     manifest("configHash") = Json.hash(manifest)
     manifest
   }
+
+  /** Of all that a scene image, a frame file and the writes of a driver depend on; of a manifest that has the rest. */
+  private[formats] def formatHash(manifest: ujson.Value, config: ColonnadeConfig): String = Json.hash(ujson.Obj.from(
+    Seq("records" -> manifest("records")) ++ Seq("attributes", "texture").flatMap(key =>
+      manifest.obj.get(key).filterNot(_.isNull).map(key -> _)
+    ) ++ Seq(
+      "registers" -> ujson.Arr.from(manifest("registers")("fields").arr.filter(_("access").str == ReadWrite.label)),
+      "numbers" -> ujson.Obj.from(config.numbers.ofImages.map { case (name, _) => name -> manifest("numbers")(name) }),
+      "bvh"     -> ujson.Bool(config.geometry.bvh) // an image without nodes says nothing to hardware that walks them
+    )
+  ))
 
   /** The settings that determine an image of the environment's maps; the number of copies is not one of them. */
   private def attributes(config: ColonnadeConfig): ujson.Obj = ujson.Obj(

@@ -1,5 +1,6 @@
 package colonnade.formats
 
+import chisel3.Data
 import colonnade.config.ColonnadeConfig
 
 /** The access of the host to a register. */
@@ -27,29 +28,66 @@ final case class Register(
     limit:   Option[BigInt]
 )
 
-/** Addresses of all registers, in order of declaration: control, status, errors, counters, then
-  * [[FrameRegisters]]. Each number starts at its own word.
+/** Addresses of all registers. Each number starts at its own word.
+  *
+  * A kind of register has a block at a fixed address. Commands, status, errors and counters have the same addresses in
+  * every design, whichever of them it has: a new one is declared last, and moves no other. Words without a register read
+  * as 0.
   */
 object RegisterMap {
 
   /** Width of a word. */
   val dataBits: Int = 32
 
-  def apply(config: ColonnadeConfig): Seq[Register] = {
-    val numbers = Seq(
-      (new HostCommands(config), Access.WriteOnly),
-      (new DeviceStatus(config), Access.ReadOnly),
-      (new FrameRegisters(config), Access.ReadWrite)
-    ).flatMap { case (bundle, access) => Layout.of(bundle).map(_ -> access) }
+  /** A kind of register.
+    *
+    * @param base     its first word
+    * @param numbers  those of a design
+    * @param isCommon each has the same address in every design
+    */
+  private case class Block(base: Int, access: Access, numbers: ColonnadeConfig => Seq[Field], isCommon: Boolean = true)
 
-    val limits    = RegisterLimits(config)
-    val words     = numbers.map { case (number, _) => (number.width + dataBits - 1) / dataBits }
-    val addresses = words.scanLeft(0)(_ + _)
-    numbers.zip(words).zip(addresses).map { case (((number, access), count), address) =>
-      Register(number.name, address, count, number.width, number.signed, access, limits.get(number.name))
-    }
+  private def named(name: String, kind: Data): Seq[Field] =
+    Layout.of(kind).map(field => field.copy(name = s"$name.${field.name}"))
+
+  private val blocks = Seq(
+    Block(0, Access.WriteOnly, config => named("control", new Control(config))),
+    Block(8, Access.ReadOnly, _ => named("status", new Status)),
+    Block(16, Access.ReadOnly, config => named("errors", new Errors(config))),
+    Block(32, Access.ReadOnly, config => named("counters", new Counters(config))),
+    Block(256, Access.ReadWrite, config => Layout.of(new FrameRegisters(config)), isCommon = false)
+  )
+
+  def apply(config: ColonnadeConfig): Seq[Register] = {
+    val limits = RegisterLimits(config)
+    for {
+      block <- blocks
+      present = block.numbers(config).map(_.name).toSet
+      (number, address) <- placed(block, config)
+      if present(number.name)
+    } yield Register(
+      number.name,
+      address,
+      words(number),
+      number.width,
+      number.signed,
+      block.access,
+      limits.get(number.name)
+    )
   }
 
   /** Total number of words. */
   def size(registers: Seq[Register]): Int = registers.map(r => r.address + r.words).max
+
+  private def placed(block: Block, config: ColonnadeConfig): Seq[(Field, Int)] = {
+    val numbers   = block.numbers(if (block.isCommon) ColonnadeConfig.complete else config)
+    val addresses = numbers.scanLeft(block.base)(_ + words(_))
+    require(
+      blocks.map(_.base).filter(_ > block.base).forall(_ >= addresses.last),
+      s"the block at ${block.base} is full"
+    )
+    numbers.zip(addresses)
+  }
+
+  private def words(number: Field): Int = (number.width + dataBits - 1) / dataBits
 }

@@ -62,7 +62,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private def environments: Seq[ColonnadeConfig] =
     TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment))) ++
-      TestConfigs.environments.filterNot(_.physicalAttributeMemory.get.layout.isSliding).tail
+      TestConfigs.environments.tail
 
   for ((config, seed) <- environments.zipWithIndex) {
     val size = config.physicalAttributeMemory.get

@@ -3,7 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.config.{ColonnadeConfig, MapEncoding}
+import colonnade.config.ColonnadeConfig
 import colonnade.formats.{AttributeEvents, Load}
 import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -34,50 +34,43 @@ private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
 class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "PhysicalAttributeMemory"
 
-  private def config(encoding: MapEncoding, marches: Int, columns: Int): ColonnadeConfig = {
-    val environment =
-      TestConfigs.withEnvironment(TestConfigs.environment.copy(encoding = encoding, columnsPerCopy = 2))
+  private def config(marches: Int, columns: Int): ColonnadeConfig = {
+    val environment = TestConfigs.withEnvironment(TestConfigs.environment.copy(columnsPerCopy = 2))
     environment.copy(
       array = environment.array.copy(columns = columns),
       units = environment.units.copy(marches = marches)
     )
   }
 
-  for (
-    (encoding, marches, columns) <- Seq(
-      (MapEncoding.TwoLevel, 1, 1),
-      (MapEncoding.TwoLevel, 10, 1),
-      (MapEncoding.Sliding, 3, 1),
-      (MapEncoding.TwoLevel, 4, 3)
-    )
-  ) it should s"give each march its own responses: $marches marches, $columns columns, ${encoding.name}" in {
-    val count       = 60
-    val random      = new Random(marches)
-    val shape       = config(encoding, marches, columns)
-    val environment = new EnvironmentStimulus(shape, random)
-    test(new EnvironmentHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
-      environment.load(dut.load, dut.clock)
-      val testers = dut.channels.zipWithIndex.map { case (channels, unit) =>
-        val exchanges = Seq(
-          environment.albedo(count),
-          environment.normals(count),
-          environment.cells(count),
-          environment.planes(count)
-        )
-        val names = Seq("albedo", "normals", "cells", "planes")
-        channels.zip(names.zip(exchanges)).map { case (channel, (name, exchanges)) =>
-          // Some units send requests all the time, others now and then
-          val offered = if (unit % 3 == 0) 1.0 else 0.1
-          new ChannelTester(s"$name of unit $unit", channel, tagBits = 0, exchanges, offered, random)
+  for ((marches, columns) <- Seq((1, 1), (10, 1), (4, 3)))
+    it should s"give each march its own responses: $marches marches, $columns columns" in {
+      val count       = 60
+      val random      = new Random(marches)
+      val shape       = config(marches, columns)
+      val environment = new EnvironmentStimulus(shape, random)
+      test(new EnvironmentHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
+        environment.load(dut.load, dut.clock)
+        val testers = dut.channels.zipWithIndex.map { case (channels, unit) =>
+          val exchanges = Seq(
+            environment.albedo(count),
+            environment.normals(count),
+            environment.cells(count),
+            environment.planes(count)
+          )
+          val names = Seq("albedo", "normals", "cells", "planes")
+          channels.zip(names.zip(exchanges)).map { case (channel, (name, exchanges)) =>
+            // Some units send requests all the time, others now and then
+            val offered = if (unit % 3 == 0) 1.0 else 0.1
+            new ChannelTester(s"$name of unit $unit", channel, tagBits = 0, exchanges, offered, random)
+          }
         }
+        var reads            = Seq.fill(4)(0)
+        def addReads(): Unit = for (events <- dut.events) {
+          val now = Seq(events.albedoReads, events.normalReads, events.cellReads, events.planeReads)
+          reads = reads.zip(now).map { case (sum, event) => sum + event.peekInt().toInt }
+        }
+        ChannelTester.run(dut.clock, testers.flatten, () => addReads())
+        assert(reads == Seq.fill(4)(count * (marches + 1) * columns))
       }
-      var reads            = Seq.fill(4)(0)
-      def addReads(): Unit = for (events <- dut.events) {
-        val now = Seq(events.albedoReads, events.normalReads, events.cellReads, events.planeReads)
-        reads = reads.zip(now).map { case (sum, event) => sum + event.peekInt().toInt }
-      }
-      ChannelTester.run(dut.clock, testers.flatten, () => addReads())
-      assert(reads == Seq.fill(4)(count * (marches + 1) * columns))
     }
-  }
 }

@@ -26,9 +26,7 @@ private object PlaneMapHarness {
 class PlaneMapSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "PlaneMap"
 
-  for (
-    (config, seed) <- TestConfigs.environments.filterNot(_.physicalAttributeMemory.get.layout.isSliding).zipWithIndex
-  ) {
+  for ((config, seed) <- TestConfigs.environments.zipWithIndex) {
     val size = config.physicalAttributeMemory.get
     it should s"give the model's tiles, cells and planes: ${size.width}x${size.height}, tiles of ${size.tileSize}" in {
       val random      = new Random(seed)

@@ -3,7 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.config.{ColonnadeConfig, MapEncoding, PhysicalAttributeMemoryConfig, TextureLayout}
+import colonnade.config.{ColonnadeConfig, PhysicalAttributeMemoryConfig, TextureLayout}
 import colonnade.formats.{AlbedoEntry, AttributeMemories, Load}
 import colonnade.{Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -41,7 +41,6 @@ class TextureMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
     val memory = PhysicalAttributeMemoryConfig(
       width = layout.mapWidth,
       height = layout.mapHeight,
-      encoding = MapEncoding.TwoLevel,
       tileSize = 1 << layout.tileLog,
       paletteSize = layout.paletteSize,
       mapBytes = layout.bytes,

@@ -1,11 +1,12 @@
 package colonnade.formats
 
-import colonnade.TestConfigs
-import colonnade.config.{ConfigError, ConfigIO, MapEncoding, PhysicalAttributeMemoryConfig}
+import colonnade.{ArbitraryConfig, Properties, TestConfigs}
+import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO, PhysicalAttributeMemoryConfig}
+import org.scalacheck.Prop
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
-class ManifestSpec extends AnyFlatSpec with Matchers {
+class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
   behavior of "Manifest"
 
   private val environment =
@@ -87,12 +88,11 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
       Manifest(TestConfigs.withEnvironment(environment))("formatHash").str
     hash(environment.copy(columnsPerCopy = 2)) shouldBe hash(environment)
     val others = Seq(
-      environment.copy(encoding = MapEncoding.Sliding),
       environment.copy(paletteSize = 128),
       environment.copy(height = 464),
       environment.copy(planeBytes = 8190)
     )
-    (others.map(hash) :+ hash(environment) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 6
+    (others.map(hash) :+ hash(environment) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 5
   }
 
   it should "have textures only where the configuration does" in {
@@ -127,18 +127,84 @@ class ManifestSpec extends AnyFlatSpec with Matchers {
     coloured("formatHash") should not be without("formatHash")
   }
 
-  it should "assign every word of the register map to one register" in {
+  it should "give each register words of its own, in order" in {
     for (precision <- Seq("16b16s16d", "33b32s64d", "64b64s64d")) {
       val registers = manifest(s"precision=$precision", "geometry.triangleBits=null")("registers")("fields").arr.toSeq
       val words     = registers.flatMap(r => Seq.tabulate(r("words").num.toInt)(r("address").num.toInt + _))
-      words shouldBe words.indices
+      words shouldBe words.distinct.sorted
       registers.foreach(r => r("words").num shouldBe math.ceil(r("width").num / 32))
     }
   }
 
+  it should "give what the host reads the same addresses in every design, and fixed ones to the blocks" in
+    holds(cases = 100) {
+      val complete = RegisterMap(ColonnadeConfig.complete).map(register => register.name -> register.address).toMap
+      Prop.forAll(ArbitraryConfig.legal) { config =>
+        val registers = RegisterMap(config)
+        val settings  = registers.filter(_.access == Access.ReadWrite)
+        registers.diff(settings).forall(register => complete(register.name) == register.address) &&
+        complete("control.start") == 0 && complete("status.busy") == 8 && complete("errors.stackOverflow") == 16 &&
+        complete("counters.cycles") == 32 && settings.head.address == 256 &&
+        settings.map(_.address) == settings.scanLeft(256)((address, register) => address + register.words).init
+      }
+    }
+
+  /** All objects of a part of the manifest that describe a field or a register. */
+  private def fieldsOf(json: ujson.Value): Seq[ujson.Obj] = json match {
+    case field: ujson.Obj if field.value.contains("name") => Seq(field)
+    case ujson.Obj(parts)                                 => parts.values.flatMap(fieldsOf).toSeq
+    case ujson.Arr(items)                                 => items.flatMap(fieldsOf).toSeq
+    case _                                                => Nil
+  }
+
+  it should "hash every field of records, maps, textures and frame registers, and nothing that the host only reads" in {
+    val config =
+      ConfigIO.load("textured", Seq("columnBvhMemory.cache={}", "units.marches=2"))
+    val whole = Manifest(config)
+    val hash  = whole("formatHash").str
+    whole.value.remove("configHash")
+    def changed(part: ujson.Value, key: String, value: ujson.Value): String = {
+      val old = part(key)
+      part(key) = value
+      try Manifest.formatHash(whole, config)
+      finally part(key) = old
+    }
+    def hashes(part: ujson.Value, keys: String*): Seq[String] = for {
+      field <- fieldsOf(part)
+      key   <- keys
+    } yield changed(
+      field,
+      key,
+      field(key) match {
+        case ujson.Num(number) => number + 1
+        case ujson.Bool(flag)  => !flag
+        case _                 => "other"
+      }
+    )
+    Manifest.formatHash(whole, config) shouldBe hash
+    val places = Seq("name", "offset", "width", "signed", "fraction")
+    for (part <- Seq(whole("records"), whole("attributes")("layouts"), whole("texture")("layouts")))
+      hashes(part, places: _*) should (not be empty and not contain hash)
+    for (part <- Seq("attributes", "texture"); sizes = whole(part)("sizes"); name <- sizes.obj.keys.toSeq)
+      changed(sizes, name, -1) should not be hash
+    changed(whole("records"), "bits", 1024) should not be hash
+
+    val (settings, others) = whole("registers")("fields").arr.toSeq.partition(_("access").str == "rw")
+    hashes(settings, "name", "address", "words", "width", "signed", "limit") should (not be empty and not contain hash)
+    hashes(others, "name", "address", "words", "width").toSet shouldBe Set(hash)
+    hashes(whole("streams"), places: _*).toSet shouldBe Set(hash)
+
+    // Another counter, and another number of the datapaths
+    val registers = whole("registers")("fields").arr
+    registers.insert(0, ujson.Obj("name" -> "counters.other", "address" -> 254, "words" -> 2, "access" -> "ro"))
+    whole("numbers")("otherBits") = 5
+    Manifest.formatHash(whole, config) shouldBe hash
+    for ((name, value) <- config.numbers.ofImages) changed(whole("numbers"), name, value + 1) should not be hash
+  }
+
   it should "change the format hash with the settings of a scene image, and only then" in {
     val base    = manifest()
-    val larger  = manifest("array.rows=2", "columnBvhMemory.snooping=false", "columnBvhMemory.readLatency=4")
+    val larger  = manifest("array.rows=2", "precision.sqrt=40", "columnBvhMemory.readLatency=4")
     val narrow  = manifest("geometry.vertexBits=15")
     val precise = manifest("precision.div=62")
     base("formatHash").str should fullyMatch regex "[0-9a-f]{64}"
