@@ -2,7 +2,7 @@ package colonnade
 
 import chisel3.Module
 import circt.stage.ChiselStage
-import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO}
+import colonnade.config.{ConfigError, ConfigIO, PathConfig}
 import colonnade.environment.EnvironmentMarch
 import colonnade.microcode.Microprogram
 import colonnade.shading.{BounceUnit, ShaderGeometry}
@@ -16,15 +16,15 @@ object ProgramGraphs {
   def main(arguments: Array[String]): Unit = arguments.toSeq match {
     case Seq("--target-dir", directory) =>
       val target = Paths.get(directory).toAbsolutePath.normalize
-      for ((name, graph) <- ProgramGraphs(ConfigIO.load("small"))) OutputFiles.writeFile(target.resolve(name), graph)
+      for ((name, graph) <- ProgramGraphs(PathConfig(ConfigIO.load("small")))) OutputFiles.writeFile(target.resolve(name), graph)
     case _ => throw new ConfigError(usage)
   }
 
   /** Text by file name. */
-  def apply(config: ColonnadeConfig): Map[String, String] = Map(
-    "shader-geometry.dot"   -> graph("shader geometry", new ShaderGeometry(config))(_.program),
-    "bounce.dot"            -> graph("bounce", new BounceUnit(config))(_.program),
-    "environment-march.dot" -> graph("environment march", new EnvironmentMarch(config))(_.program)
+  def apply(config: PathConfig): Map[String, String] = Map(
+    "shader-geometry.dot"   -> graph("shader geometry", new ShaderGeometry(PathConfig(config)))(_.program),
+    "bounce.dot"            -> graph("bounce", new BounceUnit(PathConfig(config)))(_.program),
+    "environment-march.dot" -> graph("environment march", new EnvironmentMarch(PathConfig(config)))(_.program)
   )
 
   private def graph[M <: Module](name: String, module: => M)(program: M => Microprogram[_]): String = {

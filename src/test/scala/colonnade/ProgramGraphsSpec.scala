@@ -1,6 +1,6 @@
 package colonnade
 
-import colonnade.config.ConfigIO
+import colonnade.config.{ConfigIO, PathConfig}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import java.nio.charset.StandardCharsets.UTF_8
@@ -13,7 +13,7 @@ class ProgramGraphsSpec extends AnyFlatSpec {
   private def inDocs(name: String): Path = Paths.get("docs", "diagrams", "programs", name)
 
   it should "be the graphs in docs/diagrams/programs" in {
-    for ((name, graph) <- ProgramGraphs(ConfigIO.load("small")))
+    for ((name, graph) <- ProgramGraphs(PathConfig(ConfigIO.load("small"))))
       withClue(s"$name has changed; run tools/regenerate: ") {
         assert(Files.readString(inDocs(name)) == graph)
         val hash = MessageDigest.getInstance("SHA-256").digest(graph.getBytes(UTF_8)).map(byte => f"$byte%02x").mkString

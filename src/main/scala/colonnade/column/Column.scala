@@ -3,7 +3,7 @@ package colonnade.column
 import chisel3._
 import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{Decoupled, Valid}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.environment.{AttributePort, ColumnEnvironment, EnvironmentMarches, TextureMemory}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{
@@ -68,7 +68,6 @@ final class Column(
 ) extends Module {
   @public val io = IO(new ColumnIO(config))
 
-  private val paths      = config.ofPaths
   private val hasCache   = config.columnBvhMemory.cache.nonEmpty
   private val walker     = Module(new TileWalker(config))
   private val background = Module(new BackgroundWalker(config))
@@ -125,13 +124,13 @@ final class Column(
   for (error <- io.memoryError) error := RegNext(caches.flatMap(_.error).reduce(_ || _), false.B)
 
   // Environment: marches read the column's own maps, or those that some columns share
-  private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(paths)).io)
+  private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(config)).io)
   for (maps <- environment) {
     maps.load := io.load
     maps.shared.zip(io.environment).foreach { case (shared, port) => port <> shared }
   }
   private val marches = environment.map { maps =>
-    val marches = Module(new EnvironmentMarches(paths)).io
+    val marches = Module(new EnvironmentMarches(PathConfig(config))).io
     marches.view := io.registers.environment.get
     marches.paths :<>= units.marches.get
     maps.ports.zip(marches.maps).foreach { case (port, march) => port <> march }
@@ -140,7 +139,7 @@ final class Column(
 
   // Textures: the column's own copy
   for (port <- units.texture) {
-    val memory = Module(new TextureMemory(paths)).io
+    val memory = Module(new TextureMemory(PathConfig(config))).io
     memory.load := io.load
     memory.port :<>= port
   }

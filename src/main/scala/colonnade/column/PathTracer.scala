@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.experimental.hierarchy.{Definition, Instance}
 import chisel3.experimental.noPrefix
 import chisel3.util.{Decoupled, Valid}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, PathConfig, TraversalConfig}
 import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitPosition}
 import colonnade.shading.TexturePort
@@ -12,8 +12,8 @@ import colonnade.unit.{AttributeFetch, FetchEvents, PathEvents, PathHits, PathUn
 
 /** Events of a [[PathTracer]] in one cycle. */
 final class PathTracerEvents(config: ColonnadeConfig) extends Bundle {
-  val traversal  = Vec(config.array.rows, new TraversalEvents(config))
-  val paths      = new PathEvents(config.ofPaths)
+  val traversal  = Vec(config.array.rows, new TraversalEvents(TraversalConfig(config)))
+  val paths      = new PathEvents(PathConfig(config))
   val attributes = new FetchEvents(AttributeFetch.slotConfig(config))
 
   /** By part, with names as in `Counters`. */
@@ -34,10 +34,10 @@ final class PathTracerIO(config: ColonnadeConfig) extends Bundle {
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
 
   /** To the marches of the environment. */
-  val marches = Option.when(config.hasEnvironment)(new MarchPort(config.ofPaths))
+  val marches = Option.when(config.hasEnvironment)(new MarchPort(PathConfig(config)))
 
   /** To the textures. */
-  val texture = config.geometry.texture.map(_ => new TexturePort(config))
+  val texture = config.geometry.texture.map(_ => new TexturePort(PathConfig(config)))
 
   /** A pixel of a tile of the environment leaves. */
   val environmentLeaves = Output(Bool())
@@ -60,11 +60,13 @@ abstract class PathTracerModule(config: ColonnadeConfig) extends Module {
   * }}}
   */
 final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config) {
+  private val pathConfig = PathConfig(config)
+
   // A definition: the unit is elaborated once, not once per row. Without prefix the instances are TraversalUnit, TraversalUnit_1…
-  private val definition = Definition(new TraversalUnit(config))
+  private val definition = Definition(new TraversalUnit(TraversalConfig(config)))
   private val traversals = Seq.fill(config.array.rows)(noPrefix(Instance(definition)).io)
-  private val paths      = Module(new PathUnit(config.ofPaths)).io
-  private val hits       = Module(new PathHits(config)).io
+  private val paths      = Module(new PathUnit(pathConfig)).io
+  private val hits       = Module(new PathHits(pathConfig)).io
   private val rays       = Module(new RayBus(config)).io
   private val results    = Module(new ResultBus(config)).io
   private val scene      = io.registers.scene

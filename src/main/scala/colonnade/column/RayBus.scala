@@ -3,16 +3,16 @@ package colonnade.column
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.RoundRobin
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.ray.PreparedRay
 
 /** Ports of [[RayBus]]. */
 final class RayBusIO(config: ColonnadeConfig) extends Bundle {
-  val rays = Flipped(Decoupled(new PreparedRay(config.ofPaths)))
+  val rays = Flipped(Decoupled(new PreparedRay(PathConfig(config))))
 
   /** By row: the unit has an idle context, without regard to a ray that comes in this cycle. */
   val isFree = Input(Vec(config.array.rows, Bool()))
-  val units  = Vec(config.array.rows, Valid(new PreparedRay(config.ofPaths)))
+  val units  = Vec(config.array.rows, Valid(new PreparedRay(PathConfig(config))))
 }
 
 /** Sends each ray to a traversal unit with an idle context, by round-robin, so that rays spread evenly.

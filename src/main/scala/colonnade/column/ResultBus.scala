@@ -3,15 +3,15 @@ package colonnade.column
 import chisel3._
 import chisel3.util.{Decoupled, Mux1H, RegEnable, Valid}
 import colonnade.common.RoundRobin
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.unit.TraceResult
 
 /** Ports of [[ResultBus]]. */
 final class ResultBusIO(config: ColonnadeConfig) extends Bundle {
 
   /** By row. */
-  val units   = Vec(config.array.rows, Flipped(Decoupled(new TraceResult(config.ofPaths))))
-  val results = Valid(new TraceResult(config.ofPaths))
+  val units   = Vec(config.array.rows, Flipped(Decoupled(new TraceResult(PathConfig(config)))))
+  val results = Valid(new TraceResult(PathConfig(config)))
 }
 
 /** Collects the results of traversal units, by round-robin. Throughput: one per cycle. Latency: one cycle. */

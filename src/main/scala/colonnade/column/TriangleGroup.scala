@@ -2,14 +2,14 @@ package colonnade.column
 
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Mux1H, OHToUInt, Queue}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, TraversalConfig, TriangleGroupConfig}
 import colonnade.traversal.{TriangleCandidate, TriangleLanes, TriangleLanesIO}
 
 /** Ports of [[TriangleGroup]]. */
 final class TriangleGroupIO(config: ColonnadeConfig, count: Int) extends Bundle {
 
   /** By row. `busy` of the first row counts for all. */
-  val rows = Vec(count, new TriangleLanesIO(config))
+  val rows = Vec(count, new TriangleLanesIO(TraversalConfig(config)))
 
   /** By row: a record waits for a triangle unit. */
   val waits = Input(Vec(count, Bool()))
@@ -27,7 +27,7 @@ final class TriangleGroupIO(config: ColonnadeConfig, count: Int) extends Bundle 
 final class TriangleGroup(config: ColonnadeConfig, count: Int) extends Module {
   val io = IO(new TriangleGroupIO(config, count))
 
-  private val shared = config.ofTriangleGroup
+  private val shared = TriangleGroupConfig(config)
   private val lanes  = Module(new TriangleLanes(shared)).io
   if (config.sharesTriangleUnits) share() else io.rows.head :<>= lanes
 

@@ -2,9 +2,9 @@ package colonnade.common
 
 import chisel3._
 import chisel3.util.log2Ceil
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 
 /** The number of a context: a ray in flight in a render unit. */
 object Context {
-  def apply(config: ColonnadeConfig): UInt = UInt(log2Ceil(config.array.contexts.max(2)).W)
+  def apply(config: PartConfig): UInt = UInt(log2Ceil(config.contexts.max(2)).W)
 }

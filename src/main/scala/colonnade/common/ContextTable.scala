@@ -1,7 +1,7 @@
 package colonnade.common
 
 import chisel3._
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 
 /** A table with one entry per context, as a memory with one read port and one write port.
   *
@@ -9,6 +9,6 @@ import colonnade.config.ColonnadeConfig
   * is read in the cycle in which it is written.
   */
 object ContextTable {
-  def apply[T <: Data](config: ColonnadeConfig, entry: T): SyncReadMem[T] =
-    SyncReadMem(config.array.contexts.max(2), entry)
+  def apply[T <: Data](config: PartConfig, entry: T): SyncReadMem[T] =
+    SyncReadMem(config.contexts.max(2), entry)
 }

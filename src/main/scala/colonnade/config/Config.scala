@@ -1,7 +1,5 @@
 package colonnade.config
 
-import chisel3.util.log2Ceil
-
 /** Shape of the array.
   *
   * @param rows     traversal units that share one column memory (N)
@@ -12,18 +10,13 @@ final case class ArrayConfig(rows: Int = 1, columns: Int = 1, contexts: Int = 8)
   Require.within("array.rows", rows, 1, ArrayConfig.maxRows)
   Require.within("array.columns", columns, 1, ArrayConfig.maxColumns)
   Require.product("array.rows", rows, "array.columns", columns, ArrayConfig.maxUnits)
-  if (!ArrayConfig.isLarge(contexts) || contexts > UnitsConfig.maxPathContexts)
-    Require.within("array.contexts", contexts, 1, ArrayConfig.maxContexts)
+  Require.within("array.contexts", contexts, 1, ArrayConfig.maxContexts)
 }
 
 object ArrayConfig {
 
   /** Maximum number of contexts of a traversal unit; a path unit may have more. */
   val maxContexts: Int = 16
-
-  /** Only a path unit has so many contexts. */
-  def isLarge(contexts: Int): Boolean = contexts > maxContexts
-
   val maxRows:    Int = 256
   val maxColumns: Int = 256
 
@@ -213,17 +206,8 @@ final case class ColonnadeConfig(
 
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
-  /** What the parts that follow a path see: the contexts of a column's path unit. */
-  lazy val ofPaths: ColonnadeConfig = copy(array = array.copy(contexts = units.pathContexts))
-
   /** Rows share triangle units. */
   val sharesTriangleUnits: Boolean = units.triangleRows > 1
-
-  /** What the triangle units of a group see: the contexts of all its rows. */
-  lazy val ofTriangleGroup: ColonnadeConfig =
-    if (sharesTriangleUnits)
-      copy(array = array.copy(contexts = array.contexts.max(2) << log2Ceil(units.triangleRows)))
-    else this
 
   /** Requesters of a column's records: its rows, and the path unit for attributes. */
   val recordRequesters: Int = array.rows + 1

@@ -41,11 +41,7 @@ object ConfigIO {
   private def completed(json: ujson.Value): ujson.Value =
     ConfigSchema.completed(json, ColonnadeConfig.complete, ColonnadeConfig())
 
-  private def built(json: ujson.Value): ColonnadeConfig = {
-    val config = ConfigPickler.read[ColonnadeConfig](json)
-    Require.within("array.contexts", config.array.contexts, 1, ArrayConfig.maxContexts)
-    config
-  }
+  private def built(json: ujson.Value): ColonnadeConfig = ConfigPickler.read[ColonnadeConfig](json)
 
   private def withOverride(json: ujson.Value, setting: String): ujson.Value = {
     val (path, value) = setting.split("=", 2) match {

@@ -2,12 +2,12 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{Decoupled, Mux1H}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.{EnvironmentView, Plane}
 import colonnade.numbers.{Divider, Normalise, Rounding}
 
 /** The way to a directly seen point: distance · 2^exponent times the ray's direction. */
-final class DirectDistance(config: ColonnadeConfig) extends Bundle {
+final class DirectDistance(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
   /** The map shows something there, in front of the camera. */
@@ -17,7 +17,7 @@ final class DirectDistance(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[DirectDepth]]. */
-final class DirectDepthIO(config: ColonnadeConfig) extends Bundle {
+final class DirectDepthIO(config: PathConfig) extends Bundle {
   val view = Input(new EnvironmentView(config.numbers))
 
   /** Of the same pixel; they are offered until they are taken, in the same cycle. */
@@ -35,7 +35,7 @@ final class DirectDepthIO(config: ColonnadeConfig) extends Bundle {
 /** The distance of a directly seen point, from the plane of its pixel: 1 / (w · rate). A pixel every four cycles, by one
   * multiplier for the plane, one for w · rate, and three dividers that take turns.
   */
-final class DirectDepth(config: ColonnadeConfig) extends Module {
+final class DirectDepth(config: PathConfig) extends Module {
   private val formats = new MarchFormats(config)
   import DirectView.latch
   import formats._

@@ -2,13 +2,13 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{Cat, Decoupled}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.formats.{AlbedoEntry, EnvironmentView, NormalEntry, Vec3}
 import colonnade.numbers.{Fixed, Normalise, Rounding}
 import colonnade.ray.RayFormats
 
 /** A pixel on its way through the [[DirectView]]. */
-final class DirectPixel(config: ColonnadeConfig) extends Bundle {
+final class DirectPixel(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
   val request = new EnvironmentRequest(config)
@@ -19,7 +19,7 @@ final class DirectPixel(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[DirectPoint]]. */
-final class DirectPointIO(config: ColonnadeConfig) extends Bundle {
+final class DirectPointIO(config: PathConfig) extends Bundle {
   val view = Input(new EnvironmentView(config.numbers))
 
   /** The camera's position, grid steps. */
@@ -38,7 +38,7 @@ final class DirectPointIO(config: ColonnadeConfig) extends Bundle {
 /** Position and normal of a directly seen point, and whether it hides the object's hit. A pixel every four cycles, by one
   * multiplier for the position and three for the normal.
   */
-final class DirectPoint(config: ColonnadeConfig) extends Module {
+final class DirectPoint(config: PathConfig) extends Module {
   private val formats = new MarchFormats(config)
   import DirectView.latch
   import formats._

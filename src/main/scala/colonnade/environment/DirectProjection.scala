@@ -2,12 +2,12 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.Valid
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.EnvironmentView
 import colonnade.numbers.{Normalise, Rounding}
 
 /** Where a directly seen pixel lies in the map. */
-final class DirectPlace(config: ColonnadeConfig) extends Bundle {
+final class DirectPlace(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
   /** From the map's centre, in map units. */
@@ -18,7 +18,7 @@ final class DirectPlace(config: ColonnadeConfig) extends Bundle {
 }
 
 /** How fast a pixel's ray goes away from the camera: mantissa · 2^(exponent - f). */
-final class DirectRate(config: ColonnadeConfig) extends Bundle {
+final class DirectRate(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
   val mantissa   = UInt(formats.f.W)
@@ -27,7 +27,7 @@ final class DirectRate(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[DirectProjection]]. */
-final class DirectProjectionIO(config: ColonnadeConfig) extends Bundle {
+final class DirectProjectionIO(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
   val view = Input(new EnvironmentView(config.numbers))
@@ -51,7 +51,7 @@ final class DirectProjectionIO(config: ColonnadeConfig) extends Bundle {
   *
   * One multiplier for the two coordinates of the pixel, one for the three products of the depth.
   */
-final class DirectProjection(config: ColonnadeConfig) extends Module {
+final class DirectProjection(config: PathConfig) extends Module {
   private val formats = new MarchFormats(config)
   import DirectView.latch
   import formats._

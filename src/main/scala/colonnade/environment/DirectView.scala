@@ -3,11 +3,11 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, DecoupledIO, Queue, RegEnable, Valid}
 import colonnade.common.ReservedQueue
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.{AlbedoEntry, EnvironmentView, NormalEntry, Plane}
 
 /** Ports of [[DirectView]]. */
-final class DirectViewIO(config: ColonnadeConfig) extends Bundle {
+final class DirectViewIO(config: PathConfig) extends Bundle {
 
   /** Constant while a frame runs. */
   val view = Input(new EnvironmentView(config.numbers))
@@ -36,7 +36,7 @@ final class DirectViewIO(config: ColonnadeConfig) extends Bundle {
   * }}}
   * A pixel has its place in every queue from its order on, so no response of the maps is ever without space.
   */
-final class DirectView(config: ColonnadeConfig) extends Module {
+final class DirectView(config: PathConfig) extends Module {
   import DirectView._
 
   val io = IO(new DirectViewIO(config))

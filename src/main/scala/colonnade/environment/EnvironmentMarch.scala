@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.experimental.prefix
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.microcode.{Microprogram, Repeat}
 
 /** Finds the point of the environment that a ray hits, with its albedo and normal. It projects the ray into the map, where
@@ -11,7 +11,7 @@ import colonnade.microcode.{Microprogram, Repeat}
   *
   * One ray at a time; its request is taken together with its result. docs/march.md describes the steps and their latency.
   */
-final class EnvironmentMarch(config: ColonnadeConfig) extends Module {
+final class EnvironmentMarch(config: PathConfig) extends Module {
   val io = IO(new EnvironmentMarchIO(config))
 
   private val request    = io.request.bits

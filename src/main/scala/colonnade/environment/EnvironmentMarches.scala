@@ -2,11 +2,11 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{log2Ceil, PopCount, PriorityEncoderOH, Queue, RRArbiter}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.EnvironmentView
 
 /** Events of a column's marches in one cycle; names as in `Counters`. */
-final class MarchSums(config: ColonnadeConfig) extends Bundle {
+final class MarchSums(config: PathConfig) extends Bundle {
   private def perMarch = UInt(log2Ceil(config.units.marches + 1).W)
 
   val marchSteps      = perMarch
@@ -15,7 +15,7 @@ final class MarchSums(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[EnvironmentMarches]]. */
-final class EnvironmentMarchesIO(config: ColonnadeConfig) extends Bundle {
+final class EnvironmentMarchesIO(config: PathConfig) extends Bundle {
 
   /** Constant while a frame runs. */
   val view  = Input(new EnvironmentView(config.numbers))
@@ -31,10 +31,8 @@ final class EnvironmentMarchesIO(config: ColonnadeConfig) extends Bundle {
   *
   * A march is empty once its answer has left it. An answer leaves as soon as the path unit stores no ray in the same cycle,
   * and it stores at most one ray for each of its contexts without an answer. So every request ends.
-  *
-  * @param config of the paths
   */
-final class EnvironmentMarches(config: ColonnadeConfig) extends Module {
+final class EnvironmentMarches(config: PathConfig) extends Module {
   val io = IO(new EnvironmentMarchesIO(config))
 
   private val marches = Seq.fill(config.units.marches)(Module(new MarchSlot(config)).io)

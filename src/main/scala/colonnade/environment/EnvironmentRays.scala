@@ -3,17 +3,17 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.{Decoupled, DecoupledIO, Mux1H, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable, First}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.shading.EnvironmentSurface
 
 /** The ray of a context, for the table of [[EnvironmentRays]]. */
-final class StoredRay(config: ColonnadeConfig) extends Bundle {
+final class StoredRay(config: PathConfig) extends Bundle {
   val context = Context(config)
   val ray     = new EnvironmentRay(config)
 }
 
 /** Ports of [[EnvironmentRays]]. */
-final class EnvironmentRaysIO(config: ColonnadeConfig) extends Bundle {
+final class EnvironmentRaysIO(config: PathConfig) extends Bundle {
 
   /** Stored in place of the context's previous ray. */
   val ray = Flipped(Valid(new StoredRay(config)))
@@ -38,7 +38,7 @@ final class EnvironmentRaysIO(config: ColonnadeConfig) extends Bundle {
   * The table's read port serves an order, when the column takes one, and else the shader. A surface that has not been taken
   * is read again, so `surface.valid` may fall before it is taken. A new ray goes before an answer.
   */
-final class EnvironmentRays(config: ColonnadeConfig) extends Module {
+final class EnvironmentRays(config: PathConfig) extends Module {
   val io = IO(new EnvironmentRaysIO(config))
 
   private val column  = io.marches
@@ -71,7 +71,7 @@ final class EnvironmentRays(config: ColonnadeConfig) extends Module {
   column.order.hitDistance := Mux1H(leaves, kinds.map(_.hitDistance))
 
   // Points wait in the table; one of them is offered to the shader
-  private val hasPoint  = RegInit(VecInit.fill(config.array.contexts)(false.B))
+  private val hasPoint  = RegInit(VecInit.fill(config.contexts)(false.B))
   private val isChosen  = RegInit(false.B)
   private val chosen    = Reg(Context(config))
   private val isOffered = RegNext(!isTaken && isChosen && !io.surface.fire, false.B)

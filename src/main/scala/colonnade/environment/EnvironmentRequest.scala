@@ -2,10 +2,10 @@ package colonnade.environment
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 
 /** A context whose ray is to be traced to the environment. */
-final class EnvironmentRequest(config: ColonnadeConfig) extends Bundle {
+final class EnvironmentRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
 
   /** The ray is the pixel's primary ray. */

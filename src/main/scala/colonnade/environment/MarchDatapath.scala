@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{Cat, Valid}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.numbers.{Divider, Division, Normalise, Rounding}
 
 /** Operands of the march's multiplier. */
@@ -67,7 +67,7 @@ final class MarchDatapathIO(formats: MarchFormats) extends Bundle {
   *
   * A product can be added one step after its factors, and the sum can be used one step later.
   */
-final class MarchDatapath(config: ColonnadeConfig) extends Module {
+final class MarchDatapath(config: PathConfig) extends Module {
   private val formats = new MarchFormats(config)
   import formats._
 

@@ -1,12 +1,12 @@
 package colonnade.environment
 
 import chisel3._
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.microcode.{Microprogram, Operand, StepEncoding}
 import colonnade.numbers.Rounding
 
 /** The program of the march, the registers of its ray, and the operations that its steps have of the datapath. */
-final class MarchOperations(config: ColonnadeConfig, datapath: MarchDatapathIO) {
+final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val formats = new MarchFormats(config)
   import formats._
 

@@ -2,11 +2,11 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.Decoupled
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.shading.EnvironmentSurface
 
 /** A ray for a march, and what its path wants to know. */
-final class MarchOrder(config: ColonnadeConfig) extends Bundle {
+final class MarchOrder(config: PathConfig) extends Bundle {
   val request = new EnvironmentRequest(config)
   val ray     = new EnvironmentRay(config)
 
@@ -15,7 +15,7 @@ final class MarchOrder(config: ColonnadeConfig) extends Bundle {
 }
 
 /** What a ray has met. */
-final class MarchAnswer(config: ColonnadeConfig) extends Bundle {
+final class MarchAnswer(config: PathConfig) extends Bundle {
 
   /** There is a point to shade; if the request was an occlusion test, it hides the hit. */
   val isHit           = Bool()
@@ -26,7 +26,7 @@ final class MarchAnswer(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The path unit's port to the marches of its column. */
-final class MarchPort(config: ColonnadeConfig) extends Bundle {
+final class MarchPort(config: PathConfig) extends Bundle {
 
   /** For the pipeline of directly seen pixels; for the marches. At most one is accepted in a cycle. */
   val direct = Decoupled(new EnvironmentRequest(config))

@@ -3,13 +3,13 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Decoupled
 import colonnade.common.Context
-import colonnade.config.{AttributeLayout, ColonnadeConfig, NumberFormats}
+import colonnade.config.{AttributeLayout, NumberFormats, PathConfig}
 import colonnade.formats.{AlbedoEntry, EnvironmentView, PixelPosition, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
 /** A ray that misses the object. */
-final class EnvironmentRay(config: ColonnadeConfig) extends Bundle {
+final class EnvironmentRay(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   /** Grid steps. */
@@ -23,7 +23,7 @@ final class EnvironmentRay(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A ray to march. */
-final class MarchRequest(config: ColonnadeConfig) extends Bundle {
+final class MarchRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
 
   val ray = new EnvironmentRay(config)
@@ -34,7 +34,7 @@ final class MarchRequest(config: ColonnadeConfig) extends Bundle {
 
 /** The distance of the object's hit from the ray's origin along its dominant axis, in grid steps. */
 object HitDistance {
-  def apply(config: ColonnadeConfig): UInt = UInt((config.numbers.sceneBits + 1).W)
+  def apply(config: PathConfig): UInt = UInt((config.numbers.sceneBits + 1).W)
 }
 
 /** Kinds of [[MarchResult]]. */
@@ -47,7 +47,7 @@ object HitKind {
 }
 
 /** The point of the environment that a ray hits. Fields that do not belong to its kind are 0. */
-final class MarchResult(config: ColonnadeConfig) extends Bundle {
+final class MarchResult(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
   private val layout  = AttributeLayout.of(config)
 
@@ -101,7 +101,7 @@ final class MarchEvents extends Bundle {
 }
 
 /** Ports of [[EnvironmentMarch]]. */
-final class EnvironmentMarchIO(config: ColonnadeConfig) extends Bundle {
+final class EnvironmentMarchIO(config: PathConfig) extends Bundle {
   private val layout = AttributeLayout.of(config)
 
   /** Constant while a ray is marched. */

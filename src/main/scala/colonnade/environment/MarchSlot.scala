@@ -2,11 +2,11 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.EnvironmentView
 
 /** Ports of [[MarchSlot]]. */
-final class MarchSlotIO(config: ColonnadeConfig) extends Bundle {
+final class MarchSlotIO(config: PathConfig) extends Bundle {
 
   /** Constant while a frame runs. */
   val view = Input(new EnvironmentView(config.numbers))
@@ -22,7 +22,7 @@ final class MarchSlotIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** An [[EnvironmentMarch]] with the order that it works on. */
-final class MarchSlot(config: ColonnadeConfig) extends Module {
+final class MarchSlot(config: PathConfig) extends Module {
   val io = IO(new MarchSlotIO(config))
 
   private val march  = Module(new EnvironmentMarch(config))

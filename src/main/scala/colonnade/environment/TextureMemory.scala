@@ -2,12 +2,12 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{Decoupled, Pipe, Queue, Valid}
-import colonnade.config.{ColonnadeConfig, TextureLayout}
+import colonnade.config.{PathConfig, TextureLayout}
 import colonnade.formats.{AlbedoEntry, Load}
 import colonnade.shading.TexturePort
 
 /** Ports of [[TextureMemory]]. */
-final class TextureMemoryIO(config: ColonnadeConfig) extends Bundle {
+final class TextureMemoryIO(config: PathConfig) extends Bundle {
 
   /** Only while no request is in flight. */
   val load = Flipped(Valid(new Load(config)))
@@ -20,7 +20,7 @@ final class TextureMemoryIO(config: ColonnadeConfig) extends Bundle {
   * One request a cycle. Latency: that of [[TwoLevelMap]] and two cycles. A reset drops requests in flight, but keeps the
   * atlas.
   */
-final class TextureMemory(config: ColonnadeConfig) extends Module {
+final class TextureMemory(config: PathConfig) extends Module {
   val io = IO(new TextureMemoryIO(config))
 
   private val map =

@@ -3,11 +3,11 @@ package colonnade.ray
 import chisel3._
 import chisel3.util.Cat
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.numbers.{Fixed, Normalise, Rounding}
 
 /** A ray in its own frame that waits for its entry into the object's box. */
-final class AdvancingRay(config: ColonnadeConfig) extends Bundle {
+final class AdvancingRay(config: PathConfig) extends Bundle {
   private val formats = new RayFormats(config.numbers)
 
   val context     = Context(config)
@@ -18,7 +18,7 @@ final class AdvancingRay(config: ColonnadeConfig) extends Bundle {
   val tMax        = UInt((config.numbers.sceneBits + 1).W)
 }
 
-final class AdvanceStagesIO(config: ColonnadeConfig) extends Bundle {
+final class AdvanceStagesIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val loads = Input(Vec(new SetupStages(numbers).count, Bool()))
@@ -44,7 +44,7 @@ final class AdvanceStagesIO(config: ColonnadeConfig) extends Bundle {
   * A shear factor is a magnitude here, and its sign that of its component: rounding to nearest even is symmetric. Source:
   * docs/numbers.md, sections 2.3, 2.4 and 2.7.
   */
-final class AdvanceStages(config: ColonnadeConfig) extends Module {
+final class AdvanceStages(config: PathConfig) extends Module {
   private val numbers  = config.numbers
   private val formats  = new RayFormats(numbers)
   private val stages   = new SetupStages(numbers)

@@ -3,7 +3,7 @@ package colonnade.ray
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, ShiftRegister}
 import colonnade.common.{Context, TimingSlice}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
 
 /** Mantissas of a direction in the ray's own frame, from which the quotients are computed. */
@@ -17,7 +17,7 @@ final class DirectionMantissas(numbers: NumberFormats) extends Bundle {
 }
 
 /** Properties of a ray's direction besides its mantissas. */
-final class DirectionInfo(config: ColonnadeConfig) extends Bundle {
+final class DirectionInfo(config: PathConfig) extends Bundle {
   val context     = Context(config)
   val isShadow    = Bool()
   val orientation = new RayOrientation
@@ -35,7 +35,7 @@ final class DirectionInfo(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A ray in its own frame while its quotients are being computed. */
-final class PermutedRay(config: ColonnadeConfig) extends Bundle {
+final class PermutedRay(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val info   = new DirectionInfo(config)
@@ -45,7 +45,7 @@ final class PermutedRay(config: ColonnadeConfig) extends Bundle {
   val tMax = UInt((numbers.sceneBits + 1).W)
 }
 
-final class DirectionNormaliserIO(config: ColonnadeConfig) extends Bundle {
+final class DirectionNormaliserIO(config: PathConfig) extends Bundle {
   val request   = Flipped(Decoupled(new RayRequest(config)))
   val mantissas = Decoupled(new DirectionMantissas(config.numbers))
   val ray       = Decoupled(new PermutedRay(config))
@@ -58,7 +58,7 @@ final class DirectionNormaliserIO(config: ColonnadeConfig) extends Bundle {
   * independent of each other; the next request is accepted in the cycle that takes the last of them. Source:
   * docs/numbers.md, sections 2.1 and 2.2.
   */
-final class DirectionNormaliser(config: ColonnadeConfig) extends Module {
+final class DirectionNormaliser(config: PathConfig) extends Module {
   private val numbers = config.numbers
 
   // The steps. With extra slices the leading zeros of a magnitude are counted in a cycle of their own

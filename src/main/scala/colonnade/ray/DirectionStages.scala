@@ -2,10 +2,10 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.{Cat, Mux1H, RegEnable}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.numbers.{Normalise, Rounding}
 
-final class DirectionStagesIO(config: ColonnadeConfig) extends Bundle {
+final class DirectionStagesIO(config: PathConfig) extends Bundle {
   val loads   = Input(Vec(2, Bool()))
   val request = Input(new RayRequest(config))
 
@@ -17,7 +17,7 @@ final class DirectionStagesIO(config: ColonnadeConfig) extends Bundle {
 /** What a [[DirectionNormaliser]] does, a ray a cycle: stage 0 has the magnitudes; from there, three normalisers and three
   * comparators in parallel lead to stage 1. Source: docs/numbers.md, sections 2.1 and 2.2.
   */
-final class DirectionStages(config: ColonnadeConfig) extends Module {
+final class DirectionStages(config: PathConfig) extends Module {
   private val numbers = config.numbers
 
   val io = IO(new DirectionStagesIO(config))

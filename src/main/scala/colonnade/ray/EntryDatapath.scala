@@ -3,17 +3,17 @@ package colonnade.ray
 import chisel3._
 import chisel3.util.{Cat, MuxLookup, RegEnable}
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.formats.Bounds
 import colonnade.numbers.{Fixed, Rounding}
 
 /** Quotients of a direction's mantissas, x' then y'. */
-final class SlopeQuotients(config: ColonnadeConfig) extends Bundle {
+final class SlopeQuotients(config: PathConfig) extends Bundle {
   val shear      = Vec(2, UInt((config.numbers.shearDigits + 1).W))
   val reciprocal = Vec(2, UInt((config.numbers.reciprocalDigits + 1).W))
 }
 
-final class EntryDatapathIO(config: ColonnadeConfig) extends Bundle {
+final class EntryDatapathIO(config: PathConfig) extends Bundle {
   val command   = Input(new EntryCommand(EntryDatapath.slices(config)))
   val ray       = Input(new PermutedRay(config))
   val quotients = Input(new SlopeQuotients(config))
@@ -26,7 +26,7 @@ final class EntryDatapathIO(config: ColonnadeConfig) extends Bundle {
   * positions. All axes share them. The multiplier's first operand is a distance or the entry distance; its second one is
   * a reciprocal or a slice of a shear factor.
   */
-final class EntryDatapath(config: ColonnadeConfig) extends Module {
+final class EntryDatapath(config: PathConfig) extends Module {
   private val numbers  = config.numbers
   private val formats  = new RayFormats(numbers)
   private val slices   = EntryDatapath.slices(config)
@@ -190,7 +190,7 @@ final class EntryDatapath(config: ColonnadeConfig) extends Module {
 object EntryDatapath {
 
   /** Number of products of an entry and a shear factor. */
-  def slices(config: ColonnadeConfig): Int = {
+  def slices(config: PathConfig): Int = {
     val formats = new RayFormats(config.numbers)
     (formats.shear.width + formats.reciprocal.width - 1) / formats.reciprocal.width
   }

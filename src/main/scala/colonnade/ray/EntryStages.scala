@@ -2,11 +2,11 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.Fill
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.Bounds
 import colonnade.numbers.Rounding
 
-final class EntryStagesIO(config: ColonnadeConfig) extends Bundle {
+final class EntryStagesIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val loads  = Input(Vec(new SetupStages(numbers).count, Bool()))
@@ -30,7 +30,7 @@ final class EntryStagesIO(config: ColonnadeConfig) extends Bundle {
   * Entries below 0 are equivalent to 0, so they are unsigned from stage to stage. An exit below 0 is a flag. The order of
   * the planes' distances, products, shifts and slacks is that of docs/numbers.md, section 2.6.
   */
-final class EntryStages(config: ColonnadeConfig) extends Module {
+final class EntryStages(config: PathConfig) extends Module {
   private val numbers      = config.numbers
   private val stages       = new SetupStages(numbers)
   private val entryBits    = numbers.entryBits

@@ -3,10 +3,10 @@ package colonnade.ray
 import chisel3._
 import chisel3.util.Decoupled
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.formats.Bounds
 
-final class RayEntryIO(config: ColonnadeConfig) extends Bundle {
+final class RayEntryIO(config: PathConfig) extends Bundle {
   val ray       = Flipped(Decoupled(new PermutedRay(config)))
   val quotients = Flipped(Decoupled(new SlopeQuotients(config)))
   val bounds    = Input(new Bounds(config.numbers))
@@ -21,7 +21,7 @@ final class RayEntryIO(config: ColonnadeConfig) extends Bundle {
   * box; with `units.extraSlices` three more. The next ray is accepted in the cycle in which the result is taken. Source:
   * docs/numbers.md, sections 2.3 to 2.8.
   */
-final class RayEntry(config: ColonnadeConfig) extends Module {
+final class RayEntry(config: PathConfig) extends Module {
   val io = IO(new RayEntryIO(config))
 
   private val control  = Module(new EntryControl(EntryDatapath.slices(config), TimingSlice.extra(config)))

@@ -3,12 +3,12 @@ package colonnade.ray
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled, Mux1H, RegEnable}
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.Camera
 import colonnade.numbers.{CarrySave, Fixed, Rounding}
 
 /** A pixel, and the context of its primary ray. */
-final class RayPosition(config: ColonnadeConfig) extends Bundle {
+final class RayPosition(config: PathConfig) extends Bundle {
   val context = Context(config)
   val x       = UInt(config.numbers.coordinateBits.W)
   val y       = UInt(config.numbers.coordinateBits.W)
@@ -19,14 +19,14 @@ final class RayPosition(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The frame registers that define a primary ray. */
-final class CameraRegisters(config: ColonnadeConfig) extends Bundle {
+final class CameraRegisters(config: PathConfig) extends Bundle {
   val camera = new Camera(config.numbers)
 
   /** Left shift of a camera position to grid steps. */
   val unitShift = UInt(NumberFormats.bitLength(config.numbers.sceneBits).W)
 }
 
-final class RayGeneratorIO(config: ColonnadeConfig) extends Bundle {
+final class RayGeneratorIO(config: PathConfig) extends Bundle {
   val registers = Input(new CameraRegisters(config))
   val position  = Flipped(Decoupled(new RayPosition(config)))
   val ray       = Decoupled(new RayRequest(config))
@@ -44,7 +44,7 @@ final class RayGeneratorIO(config: ColonnadeConfig) extends Bundle {
   * accepted, later by the cycles of a sum bit by bit, and if another ray waits before it. The registers may change when
   * the unit has been empty for [[RayGenerator.emptyCycles]] cycles. Source: docs/ray-setup.md, pipelines.
   */
-final class RayGenerator(config: ColonnadeConfig) extends Module {
+final class RayGenerator(config: PathConfig) extends Module {
   val io = IO(new RayGeneratorIO(config))
 
   private val numbers = config.numbers

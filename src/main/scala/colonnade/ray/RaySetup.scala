@@ -2,10 +2,10 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.Decoupled
-import colonnade.config.{ColonnadeConfig, UnitsConfig}
+import colonnade.config.{PathConfig, UnitsConfig}
 import colonnade.formats.Bounds
 
-final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
+final class RaySetupIO(config: PathConfig) extends Bundle {
   val request = Flipped(Decoupled(new RayRequest(config)))
 
   /** Constant while a ray is in the unit. */
@@ -17,14 +17,14 @@ final class RaySetupIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Prepares rays for traversal: docs/numbers.md, section 2. In order. */
-abstract class RaySetup(config: ColonnadeConfig) extends Module {
+abstract class RaySetup(config: PathConfig) extends Module {
   final val io = IO(new RaySetupIO(config))
 }
 
 object RaySetup {
 
   /** The smallest unit that takes a ray every `units.rayInterval` cycles. */
-  def apply(config: ColonnadeConfig): RaySetup =
+  def apply(config: PathConfig): RaySetup =
     if (config.units.rayInterval >= UnitsConfig.sequentialRayInterval) new SequentialRaySetup(config)
     else new RaySetupPipeline(config)
 }

@@ -3,7 +3,7 @@ package colonnade.ray
 import chisel3._
 import chisel3.util.Cat
 import colonnade.common.DelayLine
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.numbers.PipelinedDivider
 
 /** Prepares a ray a cycle for traversal: {{{
@@ -14,7 +14,7 @@ import colonnade.numbers.PipelinedDivider
   * stages stall together while the offered ray is not taken; a stage without a ray keeps its values. `busy`: a ray enters.
   * Source: docs/numbers.md, section 2.
   */
-final class RaySetupPipeline(config: ColonnadeConfig) extends RaySetup(config) {
+final class RaySetupPipeline(config: PathConfig) extends RaySetup(config) {
   private val numbers = config.numbers
   private val stages  = new SetupStages(numbers)
 

@@ -2,7 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PartConfig}
 import colonnade.formats.Vec3
 import colonnade.numbers.{Fixed, FixedPointFormat, Rounding}
 
@@ -35,7 +35,7 @@ final class RayFormats(numbers: NumberFormats) {
 }
 
 /** A ray to prepare. `dir` is its direction, of any length. A shadow ray ends at origin + dir, the light. */
-final class RayRequest(config: ColonnadeConfig) extends Bundle {
+final class RayRequest(config: PartConfig) extends Bundle {
   private val numbers = config.numbers
 
   val context  = Context(config)
@@ -104,7 +104,7 @@ final class TracedRay(numbers: NumberFormats) extends Bundle {
 }
 
 /** The result of ray set-up. If the ray does not enter the object's box (`enters`), the other fields are invalid. */
-final class PreparedRay(config: ColonnadeConfig) extends Bundle {
+final class PreparedRay(config: PartConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new RayFormats(numbers)
 

@@ -2,7 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chisel3.util.Cat
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.numbers.Divider
 
 /** Prepares rays for traversal, one after the other: {{{
@@ -14,7 +14,7 @@ import colonnade.numbers.Divider
   * quotients of a component that is 0 are computed, then replaced. A direction of 0 gives a ray that does not enter the
   * box. Source: docs/numbers.md, section 2.
   */
-final class SequentialRaySetup(config: ColonnadeConfig) extends RaySetup(config) {
+final class SequentialRaySetup(config: PathConfig) extends RaySetup(config) {
   private val numbers = config.numbers
 
   private val normaliser = Module(new DirectionNormaliser(config))

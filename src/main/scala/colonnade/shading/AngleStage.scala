@@ -4,12 +4,12 @@ import chisel3._
 import chisel3.util.{log2Ceil, PriorityEncoder, Reverse}
 import colonnade.common.ModuloSchedule
 import colonnade.common.ModuloSchedule.xyz
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.Light
 import colonnade.numbers.{Normalise, Rounding}
 
 /** Ports of [[AngleStage]]. Vectors come a component at a time, x first. */
-final class AngleStageIO(config: ColonnadeConfig) extends Bundle {
+final class AngleStageIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
@@ -33,7 +33,7 @@ final class AngleStageIO(config: ColonnadeConfig) extends Bundle {
 /** The vector from a point to a light, and its angle to the normal: docs/numbers.md, 5.4 to 5.6 and the product of 5.7. An
   * angle every three cycles, by three multipliers, one for each dot product, and one for the lengths, digit by digit.
   */
-final class AngleStage(config: ColonnadeConfig) extends Module {
+final class AngleStage(config: PathConfig) extends Module {
   private val numbers   = config.numbers
   private val formats   = new ShaderFormats(numbers)
   private val shadeBits = formats.shadeBits

@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{Cat, Mux1H}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.numbers.Rounding
 
 /** Ports of [[BounceAdder]]. */
-final class BounceAdderIO(config: ColonnadeConfig) extends Bundle {
+final class BounceAdderIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new BounceFormats(numbers)
 
@@ -33,7 +33,7 @@ final class BounceAdderIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The bounce unit's only adder and its accumulator. [[BounceActions]] select the operands. */
-final class BounceAdder(config: ColonnadeConfig) extends Module {
+final class BounceAdder(config: PathConfig) extends Module {
   private val formats = new BounceFormats(config.numbers)
   private val one     = 1 << NumberFormats.lightFraction
 

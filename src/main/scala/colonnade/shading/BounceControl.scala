@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.log2Ceil
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 
 /** The product of a step: at most one of these. n is the normal, d the ray's direction, c = −n·d the cosine up to a
   * factor. A product takes as many cycles as a factor has digits.
@@ -134,7 +134,7 @@ final class BounceState {
 }
 
 /** Ports of [[BounceDatapath]]. */
-final class BounceDatapathIO(config: ColonnadeConfig) extends Bundle {
+final class BounceDatapathIO(config: PathConfig) extends Bundle {
   val control = Input(new BounceControl(new BounceFormats(config.numbers)))
   val request = Input(new BounceRequest(config))
   val offset  = Input(UInt((config.numbers.gridBits - 2).W))

@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Mux1H, PriorityEncoder, Reverse}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.Vec3
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
@@ -10,7 +10,7 @@ import colonnade.ray.RayFormats
 /** The bounce unit's datapath: rotating vector registers around one multiplier, one adder, and a unit for roots and
   * quotients. [[BounceProgram]] controls it; see `VectorRegister`.
   */
-final class BounceDatapath(config: ColonnadeConfig) extends Module {
+final class BounceDatapath(config: PathConfig) extends Module {
   import VectorRegister.rotate
 
   private val numbers    = config.numbers

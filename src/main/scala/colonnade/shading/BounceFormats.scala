@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Vec3}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 import colonnade.ray.RayFormats
@@ -58,7 +58,7 @@ final class BounceFormats(numbers: NumberFormats) {
 }
 
 /** A hit on a mirror or on glass. */
-final class BounceRequest(config: ColonnadeConfig) extends Bundle {
+final class BounceRequest(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new BounceFormats(numbers)
 
@@ -93,7 +93,7 @@ final class BounceRequest(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The ray that leaves a mirror or glass. */
-final class BounceResult(config: ColonnadeConfig) extends Bundle {
+final class BounceResult(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val context      = Context(config)

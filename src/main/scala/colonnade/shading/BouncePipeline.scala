@@ -2,12 +2,12 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{Mux1H, PriorityEncoderOH}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 
 /** [[BounceUnit]] with several hits at a time: docs/bounce.md. Mirrors take a [[MirrorPipeline]], a hit every three cycles;
   * glass takes one of several units. Results come in any order; the hits in it are of different contexts.
   */
-final class BouncePipeline(config: ColonnadeConfig) extends Module {
+final class BouncePipeline(config: PathConfig) extends Module {
   val io = IO(new BounceUnitIO(config))
 
   private val mirrors = Module(new MirrorPipeline(config)).io

@@ -3,26 +3,26 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.common.{Context, ContextTable, ReservedQueue}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Material, MaterialKind, RecordFormats, Rgb, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
 /** A hit on a mirror or glass. */
-final class BounceHit(config: ColonnadeConfig) extends Bundle {
+final class BounceHit(config: PathConfig) extends Bundle {
   val context  = Context(config)
   val material = UInt(RecordFormats.materialBits.W)
   val backSide = Bool()
 }
 
 /** Components of vectors that are known early: the geometric normal, turned against the ray, and the ray's direction. */
-final class BounceDirections(config: ColonnadeConfig) extends Bundle {
+final class BounceDirections(config: PathConfig) extends Bundle {
   val faceForwardNormal = SInt((NumberFormats.normalBits + 1).W)
   val dir               = SInt((new ShaderFormats(config.numbers).shadeBits + 1).W)
 }
 
 /** Components of vectors that are known late: the reflection's origin and the shading normal; and what kind of normal it is. */
-final class BouncePoint(config: ColonnadeConfig) extends Bundle {
+final class BouncePoint(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   val origin   = SInt(formats.pointBits.W)
@@ -31,7 +31,7 @@ final class BouncePoint(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[BounceQueue]]. */
-final class BounceQueueIO(config: ColonnadeConfig) extends Bundle {
+final class BounceQueueIO(config: PathConfig) extends Bundle {
   val materials = Input(Vec(config.frame.materials, new Material(config)))
 
   // Each only while there is space
@@ -47,7 +47,7 @@ final class BounceQueueIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** What a path needs besides the bounce. */
-final private class BounceSurface(config: ColonnadeConfig) extends Bundle {
+final private class BounceSurface(config: PathConfig) extends Bundle {
   val material = UInt(RecordFormats.materialBits.W)
   val backSide = Bool()
   val albedo   = Option.when(config.geometry.cornerColours)(Rgb(FrameRegisters.colour))
@@ -59,7 +59,7 @@ final private class BounceSurface(config: ColonnadeConfig) extends Bundle {
   *
   * @param places of the queues
   */
-final class BounceQueue(config: ColonnadeConfig, places: Int) extends Module {
+final class BounceQueue(config: PathConfig, places: Int) extends Module {
   val io = IO(new BounceQueueIO(config))
 
   private def queue[T <: Data](in: Valid[T]) = {

@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.Decoupled
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.microcode.Microprogram
 
 /** Ports of [[BounceUnit]]. */
-final class BounceUnitIO(config: ColonnadeConfig) extends Bundle {
+final class BounceUnitIO(config: PathConfig) extends Bundle {
 
   /** The register `shading.offset`; constant while the unit is busy. */
   val offset  = Input(UInt((config.numbers.gridBits - 2).W))
@@ -24,7 +24,7 @@ final class BounceUnitIO(config: ColonnadeConfig) extends Bundle {
   * geometric one. At 32b32s64d a mirror takes 44 cycles, glass 104 from behind and about 170 from the front. A restart
   * adds 25 cycles, or all cycles so far and 11.
   */
-final class BounceUnit(config: ColonnadeConfig) extends Module {
+final class BounceUnit(config: PathConfig) extends Module {
   private val formats = new BounceFormats(config.numbers)
 
   val io = IO(new BounceUnitIO(config))

@@ -4,12 +4,12 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.{ModuloSchedule, Timed}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.{Fixed, FoldedDivider, FoldedSquareRoot, Normalise, Rounding, SquareRoot}
 
 /** Ports of [[BrightnessStage]]. */
-final class BrightnessStageIO(config: ColonnadeConfig) extends Bundle {
+final class BrightnessStageIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
@@ -43,7 +43,7 @@ final class BrightnessCycles(numbers: NumberFormats) {
 /** The cosine of an angle, the light's falloff and the light that arrives: docs/numbers.md, 5.7 and 5.8. An angle every three
   * cycles, by a square root, two dividers, a multiplier for the brightness, digit by digit, and one for the three channels.
   */
-final class BrightnessStage(config: ColonnadeConfig) extends Module {
+final class BrightnessStage(config: PathConfig) extends Module {
   private val numbers   = config.numbers
   private val formats   = new ShaderFormats(numbers)
   private val cycles    = new BrightnessCycles(numbers)

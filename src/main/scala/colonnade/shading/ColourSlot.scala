@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.FrameRegisters
 
 /** A bounce or an end in [[ColourUnit]]. */
-final private[shading] class ColourOperation(config: ColonnadeConfig) extends Bundle {
+final private[shading] class ColourOperation(config: PathConfig) extends Bundle {
   val context    = Context(config)
   val isBounce   = Bool()
   val isStraight = Bool()
@@ -20,7 +20,7 @@ final private[shading] class ColourOperation(config: ColonnadeConfig) extends Bu
 }
 
 /** A channel and a light of an operation in the stages of [[ColourUnit]]. */
-final private[shading] class ColourSlot(config: ColonnadeConfig) extends Bundle {
+final private[shading] class ColourSlot(config: PathConfig) extends Bundle {
   private val bits = NumberFormats.colourBits
 
   val context = Context(config)

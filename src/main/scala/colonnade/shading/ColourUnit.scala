@@ -3,12 +3,12 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, MuxLookup, Valid}
 import colonnade.common.ContextTable
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
 import colonnade.numbers.{Fixed, Rounding}
 
 /** Ports of [[ColourUnit]]. */
-final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
+final class ColourUnitIO(config: PathConfig) extends Bundle {
   val ambient    = Input(Rgb(FrameRegisters.intensity))
   val background = Input(Rgb(FrameRegisters.colour))
   val shading    = Input(new Shading(config))
@@ -32,7 +32,7 @@ final class ColourUnitIO(config: ColonnadeConfig) extends Bundle {
   *
   * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights · transmittance))
   */
-final class ColourUnit(config: ColonnadeConfig) extends Module {
+final class ColourUnit(config: PathConfig) extends Module {
   private val lights     = config.frame.lights
   private val hasBounces = config.frame.hasBounces
   private val fraction   = NumberFormats.lightFraction
@@ -289,7 +289,7 @@ final class ColourUnit(config: ColonnadeConfig) extends Module {
 }
 
 /** The surface at which a path ends. */
-final private class TerminalSurface(config: ColonnadeConfig) extends Bundle {
+final private class TerminalSurface(config: PathConfig) extends Bundle {
   val albedo      = Rgb(FrameRegisters.colour)
   val directLight = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
   val emission    = if (config.frame.emission) Some(Rgb(FrameRegisters.colour)) else None

@@ -2,13 +2,13 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{Cat, Decoupled}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.{DigitRecurrence, Fixed, Rounding}
 import colonnade.ray.RayFormats
 
 /** Ports of [[CornerColours]]. */
-final class CornerColoursIO(config: ColonnadeConfig) extends Bundle {
+final class CornerColoursIO(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   /** Takes `weights` and `colours` of a hit; the unit must be done with the hit before, or that must not use it. */
@@ -39,7 +39,7 @@ final class CornerColoursIO(config: ColonnadeConfig) extends Bundle {
   * Latency 23 cycles from `start`, and one for each cycle in which the multiplier takes other operands. No product is
   * asked for when the hit does not use the colours.
   */
-final class CornerColours(config: ColonnadeConfig) extends Module {
+final class CornerColours(config: PathConfig) extends Module {
   private val colourBits = NumberFormats.colourBits
   private val weightBits = config.numbers.barycentricBits
   private val totalBits  = weightBits + 2

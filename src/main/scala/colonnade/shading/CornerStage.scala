@@ -4,12 +4,12 @@ import chisel3._
 import chisel3.util.Cat
 import colonnade.common.ModuloSchedule
 import colonnade.common.ModuloSchedule.{interval, xyz}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.DigitRecurrence
 
 /** Ports of [[CornerStage]]. */
-final class CornerStageIO(config: ColonnadeConfig) extends Bundle {
+final class CornerStageIO(config: PathConfig) extends Bundle {
   val phase = Input(ModuloSchedule.phase())
 
   /** In cycles 0 to 2: the weights of a hit, and the colours of its corners. */
@@ -23,7 +23,7 @@ final class CornerStageIO(config: ColonnadeConfig) extends Bundle {
 /** Interpolates the colours at the corners of a face, as [[CornerColours]] does: a hit every three cycles, by three
   * multipliers, and for each channel a restoring divider that finds four bits a cycle.
   */
-final class CornerStage(config: ColonnadeConfig) extends Module {
+final class CornerStage(config: PathConfig) extends Module {
   private val colourBits = NumberFormats.colourBits
   private val totalBits  = config.numbers.barycentricBits + 2
   private val perCycle   = colourBits / interval

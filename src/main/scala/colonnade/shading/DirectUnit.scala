@@ -2,12 +2,12 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{is, switch, Decoupled, MuxLookup, ShiftRegister}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.{Fixed, Rounding}
 
 /** Ports of [[DirectUnit]]. */
-final class DirectUnitIO(config: ColonnadeConfig) extends Bundle {
+final class DirectUnitIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
@@ -33,7 +33,7 @@ private object DirectStep extends ChiselEnum {
   * One light at a time: four products and three cycles (five with a multiplier of two cycles), more while the
   * multiplier is busy.
   */
-final class DirectUnit(config: ColonnadeConfig) extends Module {
+final class DirectUnit(config: PathConfig) extends Module {
   private val formats = new ShaderFormats(config.numbers)
 
   val io = IO(new DirectUnitIO(config))

@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{Cat, Mux1H, PriorityEncoder, Reverse}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.numbers.Rounding
 
 /** Ports of [[GeometryAccumulator]]. */
-final class GeometryAccumulatorIO(config: ColonnadeConfig) extends Bundle {
+final class GeometryAccumulatorIO(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   // See [[GeometryControl]]
@@ -27,7 +27,7 @@ final class GeometryAccumulatorIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Adds up products, and rounds sums to the nearest even number. */
-final class GeometryAccumulator(config: ColonnadeConfig) extends Module {
+final class GeometryAccumulator(config: PathConfig) extends Module {
   private val formats   = new ShaderFormats(config.numbers)
   private val shadeBits = formats.shadeBits
 

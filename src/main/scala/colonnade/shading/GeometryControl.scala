@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.Valid
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.Light
 
 /** Control signals of the geometry datapath for one cycle. A register that no signal names keeps its value. */
@@ -63,7 +63,7 @@ final class GeometryControl(formats: ShaderFormats) extends Bundle {
 }
 
 /** Ports of [[GeometryDatapath]]. */
-final class GeometryDatapathIO(config: ColonnadeConfig) extends Bundle {
+final class GeometryDatapathIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 

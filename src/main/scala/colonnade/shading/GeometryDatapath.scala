@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{Cat, Mux1H}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.Vec3
 import colonnade.numbers.{Normalise, Rounding}
 import colonnade.ray.PermutedFrame
@@ -10,7 +10,7 @@ import colonnade.ray.PermutedFrame
 /** The shader geometry's datapath: rotating vector registers around one multiplier, one adder and one shifter.
   * [[GeometryProgram]] controls it; see `VectorRegister`.
   */
-final class GeometryDatapath(config: ColonnadeConfig) extends Module {
+final class GeometryDatapath(config: PathConfig) extends Module {
   import VectorRegister.rotate
 
   private val numbers    = config.numbers

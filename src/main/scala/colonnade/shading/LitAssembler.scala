@@ -3,13 +3,13 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.{Context, ReservedQueue}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.formats.{FrameRegisters, Material, RecordFormats, Rgb}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
 /** A surface to light, before its point is known. */
-final class SurfaceLabel(config: ColonnadeConfig) extends Bundle {
+final class SurfaceLabel(config: PathConfig) extends Bundle {
   val context  = Context(config)
   val material = UInt(RecordFormats.materialBits.W)
 
@@ -18,7 +18,7 @@ final class SurfaceLabel(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A light on a surface, without shadows. */
-final class LightOnSurface(config: ColonnadeConfig) extends Bundle {
+final class LightOnSurface(config: PathConfig) extends Bundle {
   val light          = UInt(log2Ceil(config.frame.lights.max(2)).W)
   val isLast         = Bool()
   val direct         = Rgb(FrameRegisters.intensity)
@@ -26,7 +26,7 @@ final class LightOnSurface(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[LitAssembler]]. */
-final class LitAssemblerIO(config: ColonnadeConfig) extends Bundle {
+final class LitAssemblerIO(config: PathConfig) extends Bundle {
   val materials = Input(Vec(config.frame.materials, new Material(config)))
 
   // For each surface a label and its origin's components; for each light its share. All only while there is space
@@ -45,7 +45,7 @@ final class LitAssemblerIO(config: ColonnadeConfig) extends Bundle {
   *
   * @param places of the queues
   */
-final class LitAssembler(config: ColonnadeConfig, places: Int) extends Module {
+final class LitAssembler(config: PathConfig, places: Int) extends Module {
   val io = IO(new LitAssemblerIO(config))
 
   private val labels  = Module(new ReservedQueue(new SurfaceLabel(config), places)).io

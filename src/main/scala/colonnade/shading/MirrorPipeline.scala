@@ -4,12 +4,12 @@ import chisel3._
 import chisel3.util.{log2Ceil, Cat, PriorityEncoder, Reverse}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.{Context, ContextTable, ModuloSchedule, ReservedQueue}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
 
 /** A hit on a mirror in [[MirrorPipeline]]. */
-final private[shading] class MirrorHit(config: ColonnadeConfig) extends Bundle {
+final private[shading] class MirrorHit(config: PathConfig) extends Bundle {
   private val formats = new BounceFormats(config.numbers)
 
   val context           = Context(config)
@@ -28,7 +28,7 @@ final private[shading] class MirrorHit(config: ColonnadeConfig) extends Bundle {
   * The stages follow a [[colonnade.common.ModuloSchedule]], an axis a cycle, and never stall: a hit enters only if it has
   * a place in the queue. A result is offered 14 cycles after its request was taken; a restart takes 12 cycles more.
   */
-final class MirrorPipeline(config: ColonnadeConfig) extends Module {
+final class MirrorPipeline(config: PathConfig) extends Module {
   private val formats   = new BounceFormats(config.numbers)
   private val shadeBits = formats.shadeBits
   private val dotBits   = 2 * shadeBits + 2
@@ -133,7 +133,7 @@ final class MirrorPipeline(config: ColonnadeConfig) extends Module {
 }
 
 /** A reflection that waits. */
-final private[shading] class MirrorResult(config: ColonnadeConfig) extends Bundle {
+final private[shading] class MirrorResult(config: PathConfig) extends Bundle {
   val context = Context(config)
   val origin  = Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W))
   val dir     = Vec(3, SInt(new BounceFormats(config.numbers).bounceBits.W))

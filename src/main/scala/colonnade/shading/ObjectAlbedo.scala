@@ -3,11 +3,11 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{Queue, Valid}
 import colonnade.common.ReservedQueue
-import colonnade.config.{ColonnadeConfig, TextureLayout}
+import colonnade.config.{PathConfig, TextureLayout}
 import colonnade.formats.{FrameRegisters, Material, Rgb}
 
 /** Albedos that do not come from the material: by hit the interpolated colour, by textured hit the texel. */
-final class AlbedoSources(config: ColonnadeConfig) extends Bundle {
+final class AlbedoSources(config: PathConfig) extends Bundle {
   val colour = Option.when(config.geometry.cornerColours)(Valid(Rgb(FrameRegisters.colour)))
   val texel  = config.geometry.texture.map(_ => Valid(Rgb(FrameRegisters.colour)))
 }
@@ -20,7 +20,7 @@ final class AlbedoSources(config: ColonnadeConfig) extends Bundle {
   * @param places       of the queues
   */
 final private[shading] class ObjectAlbedo(
-    config:      ColonnadeConfig,
+    config:      PathConfig,
     sources:     AlbedoSources,
     material:    Material,
     hasMaterial: Bool,
@@ -47,7 +47,7 @@ final private[shading] class ObjectAlbedo(
 }
 
 /** A hit with a texture. */
-final class TexturedHit(config: ColonnadeConfig) extends Bundle {
+final class TexturedHit(config: PathConfig) extends Bundle {
   val position = new TexelPosition(TextureLayout.of(config))
 
   /** Its material is a mirror or glass. */
@@ -55,7 +55,7 @@ final class TexturedHit(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[TexelReader]]. */
-final class TexelReaderIO(config: ColonnadeConfig) extends Bundle {
+final class TexelReaderIO(config: PathConfig) extends Bundle {
 
   /** Only while there is space. */
   val hit  = Flipped(Valid(new TexturedHit(config)))
@@ -70,7 +70,7 @@ final class TexelReaderIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Reads the texels of hits. As many may be under way as have places. */
-final class TexelReader(config: ColonnadeConfig, places: Int) extends Module {
+final class TexelReader(config: PathConfig, places: Int) extends Module {
   val io = IO(new TexelReaderIO(config))
 
   private val waiting = Module(new ReservedQueue(new TexturedHit(config), places)).io

@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.formats.{FrameRegisters, Rgb}
 
 /** The last surface of a path. */
-final class PathTermination(config: ColonnadeConfig) extends Bundle {
+final class PathTermination(config: PathConfig) extends Bundle {
   val context = Context(config)
 
   /** There is no surface: the path ends with the background's colour. */
@@ -23,7 +23,7 @@ final class PathTermination(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The change of a path's throughput at a mirror or glass. */
-final class BounceUpdate(config: ColonnadeConfig) extends Bundle {
+final class BounceUpdate(config: PathConfig) extends Bundle {
   val context = Context(config)
 
   /** The first bounce of its path. */
@@ -41,7 +41,7 @@ final class BounceUpdate(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The colour of a path. */
-final class PathColour(config: ColonnadeConfig) extends Bundle {
+final class PathColour(config: PathConfig) extends Bundle {
   val context = Context(config)
   val colour  = Rgb(FrameRegisters.colour)
 

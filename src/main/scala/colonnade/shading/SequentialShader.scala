@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, RegEnable}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.formats.{FrameRegisters, Material, MaterialKind, Rgb, Vec3}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
@@ -17,7 +17,7 @@ import colonnade.ray.RayFormats
   *
   * A material's number is truncated to the bits that the table needs; beyond the table it means entry 0.
   */
-final class SequentialShader(config: ColonnadeConfig) extends Shader(config) {
+final class SequentialShader(config: PathConfig) extends Shader(config) {
   private val formats = new ShaderFormats(config.numbers)
   private val scene   = new RayFormats(config.numbers).scene
 

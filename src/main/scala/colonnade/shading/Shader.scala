@@ -2,11 +2,11 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.Decoupled
-import colonnade.config.{ColonnadeConfig, NumberFormats, UnitsConfig}
+import colonnade.config.{NumberFormats, PathConfig, UnitsConfig}
 import colonnade.formats.{Light, Material, Shading}
 
 /** Ports of [[Shader]]; the registers are constant while it is busy. */
-final class ShaderIO(config: ColonnadeConfig) extends Bundle {
+final class ShaderIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val lights    = Input(Vec(config.frame.lights, new Light(numbers)))
@@ -36,14 +36,14 @@ final class ShaderIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Shades hits: docs/numbers.md, 5 and 6. Lit surfaces leave in the order of their hits. */
-abstract class Shader(config: ColonnadeConfig) extends Module {
+abstract class Shader(config: PathConfig) extends Module {
   final val io = IO(new ShaderIO(config))
 }
 
 object Shader {
 
   /** The smallest unit that takes a light on a hit every `units.shadeInterval` cycles. */
-  def apply(config: ColonnadeConfig): Shader =
+  def apply(config: PathConfig): Shader =
     if (config.units.shadeInterval >= UnitsConfig.sequentialShadeInterval) new SequentialShader(config)
     else new ShadingPipeline(config)
 }

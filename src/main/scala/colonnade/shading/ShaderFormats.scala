@@ -3,7 +3,7 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{RecordFormats, Vec3}
 
 /** Widths inside the shader, from the bounds in docs/numbers.md. */
@@ -57,7 +57,7 @@ final class ShaderFormats(numbers: NumberFormats) {
 object ShaderFormats {
 
   /** Bits of a shadow ray's origin, signed: on the object or on the environment. */
-  def originBits(config: ColonnadeConfig): Int = {
+  def originBits(config: PathConfig): Int = {
     val ofObject = new ShaderFormats(config.numbers).pointBits
     if (config.hasEnvironment) config.numbers.sceneBits.max(ofObject) else ofObject
   }
@@ -114,7 +114,7 @@ final class FalloffRequest(numbers: NumberFormats) extends Bundle {
 }
 
 /** The geometry of one hit and one light. */
-final class ShadingPoint(config: ColonnadeConfig) extends Bundle {
+final class ShadingPoint(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   /** The light's number, and whether it is the hit's last light. */
@@ -130,7 +130,7 @@ final class ShadingPoint(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A hit and its ray. */
-final class ShadedSurface(config: ColonnadeConfig) extends Bundle {
+final class ShadedSurface(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   val context  = Context(config)

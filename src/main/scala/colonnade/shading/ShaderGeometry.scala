@@ -2,12 +2,12 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{Light, Shading}
 import colonnade.microcode.Microprogram
 
 /** Ports of [[ShaderGeometry]]. */
-final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
+final class ShaderGeometryIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
@@ -38,7 +38,7 @@ final class ShaderGeometryIO(config: ColonnadeConfig) extends Bundle {
   * digit of a shear factor (two digits at 32 bits), see [[GeometryProgram]]; 20 for each further light. A hit whose
   * smooth normal is zero takes 12 cycles more, for a second start with the geometric normal.
   */
-final class ShaderGeometry(config: ColonnadeConfig) extends Module {
+final class ShaderGeometry(config: PathConfig) extends Module {
   private val formats = new ShaderFormats(config.numbers)
 
   val io = IO(new ShaderGeometryIO(config))

@@ -3,7 +3,7 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{Decoupled, ShiftRegister, Valid}
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 
 /** Ports of [[ShaderMultiplier]]. */
 final class ShaderMultiplierIO(formats: ShaderFormats, hasCornerColours: Boolean) extends Bundle {
@@ -41,6 +41,6 @@ final class ShaderMultiplier(formats: ShaderFormats, hasCornerColours: Boolean, 
 object ShaderMultiplier {
 
   /** Cycles from operands to the product. An extra slice registers the operands; corner colours do not wait for it. */
-  def latency(config: ColonnadeConfig): Int =
+  def latency(config: PathConfig): Int =
     if (config.geometry.cornerColours) 1 else 1 + TimingSlice.extra(config).cycles
 }

@@ -2,14 +2,14 @@ package colonnade.shading
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{Face, FrameRegisters, Rgb, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.{RayFormats, TriangleRay}
 import colonnade.traversal.TriangleHit
 
 /** A hit to shade. */
-final class ShadeRequest(config: ColonnadeConfig) extends Bundle {
+final class ShadeRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
   val ray     = new TriangleRay(config.numbers)
   val hit     = new TriangleHit(config)
@@ -17,7 +17,7 @@ final class ShadeRequest(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A point of the environment, to be lit like a diffuse surface. */
-final class EnvironmentSurface(config: ColonnadeConfig) extends Bundle {
+final class EnvironmentSurface(config: PathConfig) extends Bundle {
   val context = Context(config)
   val point   = Vec3(new Fixed(new RayFormats(config.numbers).scene))
   val normal  = Vec3(SInt(NumberFormats.normalBits.W))
@@ -28,7 +28,7 @@ final class EnvironmentSurface(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A diffuse surface and its direct light, before shadow rays from `origin` have been traced. */
-final class LitSurface(config: ColonnadeConfig) extends Bundle {
+final class LitSurface(config: PathConfig) extends Bundle {
   val context = Context(config)
   val albedo  = Rgb(FrameRegisters.colour)
   val origin  = Vec3(new Fixed(new RayFormats(config.numbers).scene))
@@ -42,7 +42,7 @@ final class LitSurface(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A ray that leaves a mirror or glass. */
-final class BouncedRay(config: ColonnadeConfig) extends Bundle {
+final class BouncedRay(config: PathConfig) extends Bundle {
   val bounce = new BounceResult(config)
   val albedo = Rgb(FrameRegisters.colour)
 

@@ -3,11 +3,11 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, RecordFormats, Rgb, Vec3}
 
 /** A hit, or a point of the environment, in the [[ShadingPipeline]]. */
-final class ShadingHit(config: ColonnadeConfig) extends Bundle {
+final class ShadingHit(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val context       = Context(config)
@@ -40,7 +40,7 @@ final class ShadingHit(config: ColonnadeConfig) extends Bundle {
 }
 
 /** What the end of the [[ShadingPipeline]] has to know of a light on a hit. */
-final class LightSlot(config: ColonnadeConfig) extends Bundle {
+final class LightSlot(config: PathConfig) extends Bundle {
   val light  = UInt(log2Ceil(config.frame.lights.max(2)).W)
   val isLast = Bool()
 

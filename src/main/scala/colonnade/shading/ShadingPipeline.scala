@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, RegEnable}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.ModuloSchedule
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.formats.{Material, MaterialKind}
 import colonnade.numbers.Rounding
 
@@ -19,7 +19,7 @@ import colonnade.numbers.Rounding
   * in the queues at the end. Lit surfaces leave in order, and so do bounced rays as far as their units allow. The hit's
   * point and normal are computed again for each light.
   */
-final class ShadingPipeline(config: ColonnadeConfig) extends Shader(config) {
+final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   import ShadingPipeline._
 
   private val numbers = config.numbers
@@ -233,11 +233,11 @@ object ShadingPipeline {
   val bouncePlaces: Int = 6
 
   /** Lights between the entry and the lit surface: what the stages hold and some. */
-  private def places(config: ColonnadeConfig): Int =
+  private def places(config: PathConfig): Int =
     1 << log2Ceil(new BrightnessCycles(config.numbers).direct / ModuloSchedule.interval + 4)
 
   /** The entry of a material's number, truncated to the bits that the table needs; beyond the table it means entry 0. */
-  private[shading] def material(config: ColonnadeConfig, table: Vec[Material], number: UInt): Material = {
+  private[shading] def material(config: PathConfig, table: Vec[Material], number: UInt): Material = {
     val indexBits = log2Ceil(config.frame.materials)
     val entries   = table.padTo(1 << indexBits, table.head)
     if (indexBits == 0) entries.head else VecInit(entries)(number(indexBits - 1, 0))

@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled, Valid}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.numbers.{DigitRecurrence, Fixed}
 
 /** The light that arrives at a surface, in one channel. */
@@ -15,7 +15,7 @@ final class ShadowRatioRequest(bits: Int) extends Bundle {
   *
   * @param bits of the light that arrives at a surface, in one channel
   */
-final class ShadowRatiosIO(config: ColonnadeConfig, bits: Int) extends Bundle {
+final class ShadowRatiosIO(config: PathConfig, bits: Int) extends Bundle {
 
   /** A pixel claims the unit, only while it is not busy. Its channels follow from three cycles later on, then its colour. */
   val claim = Input(Bool())
@@ -35,7 +35,7 @@ final class ShadowRatiosIO(config: ColonnadeConfig, bits: Int) extends Bundle {
 /** Shadow ratios of one pixel at a time, beside the stream of [[ColourUnit]]: three dividers, one quotient bit a cycle
   * each. The result is offered 13 cycles after the last channel.
   */
-final class ShadowRatios(config: ColonnadeConfig, bits: Int) extends Module {
+final class ShadowRatios(config: PathConfig, bits: Int) extends Module {
   private val fraction = NumberFormats.lightFraction
 
   val io = IO(new ShadowRatiosIO(config, bits))

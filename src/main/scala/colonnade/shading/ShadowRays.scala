@@ -3,19 +3,19 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.{Context, ContextTable}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{Light, Vec3}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{RayFormats, RayRequest}
 
 /** A context and a light to trace a shadow ray to. */
-final class ShadowRequest(config: ColonnadeConfig) extends Bundle {
+final class ShadowRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
   val light   = UInt(log2Ceil(config.frame.lights.max(2)).W)
 }
 
 /** Ports of [[ShadowRays]]. */
-final class ShadowRaysIO(config: ColonnadeConfig) extends Bundle {
+final class ShadowRaysIO(config: PathConfig) extends Bundle {
   val lights    = Input(Vec(config.frame.lights, new Light(config.numbers)))
   val unitShift = Input(UInt(NumberFormats.bitLength(config.numbers.sceneBits).W))
 
@@ -31,7 +31,7 @@ final class ShadowRaysIO(config: ColonnadeConfig) extends Bundle {
   * A ray is offered two cycles after its request, in the order of the requests. A request that waits for the ray before it
   * reads its origin again, so no register holds the origin.
   */
-final class ShadowRays(config: ColonnadeConfig) extends Module {
+final class ShadowRays(config: PathConfig) extends Module {
   private val scene = new RayFormats(config.numbers).scene
 
   val io = IO(new ShadowRaysIO(config))

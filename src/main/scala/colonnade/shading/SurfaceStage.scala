@@ -4,11 +4,11 @@ import chisel3._
 import chisel3.util.{Cat, Mux1H}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.{ModuloSchedule, Timed}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.numbers.{Normalise, Rounding}
 
 /** Ports of [[SurfaceStage]]. Vectors come and go a component at a time, x first, in the object's frame. */
-final class SurfaceStageIO(config: ColonnadeConfig) extends Bundle {
+final class SurfaceStageIO(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   val phase  = Input(ModuloSchedule.phase())
@@ -35,7 +35,7 @@ final class SurfaceStageIO(config: ColonnadeConfig) extends Bundle {
   * multipliers for the normal, two for the products of the slopes and the distance, digit by digit, and one for the offset.
   * A smooth normal of zero gives way to the geometric one without a second start.
   */
-final class SurfaceStage(config: ColonnadeConfig) extends Module {
+final class SurfaceStage(config: PathConfig) extends Module {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 

@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
-import colonnade.config.{ColonnadeConfig, TextureLayout}
+import colonnade.config.{PathConfig, TextureLayout}
 import colonnade.formats.{AlbedoEntry, FrameRegisters, Rgb}
 
 /** A texel of the atlas. */
@@ -20,13 +20,13 @@ final class Texel extends Bundle {
 }
 
 /** A render unit's port to the textures. Responses come in the order of the requests and cannot be stalled. */
-final class TexturePort(config: ColonnadeConfig) extends Bundle {
+final class TexturePort(config: PathConfig) extends Bundle {
   val req  = Decoupled(new TexelPosition(TextureLayout.of(config)))
   val resp = Flipped(Valid(new Texel))
 }
 
 /** Ports of [[TextureLookup]]. */
-final class TextureLookupIO(config: ColonnadeConfig) extends Bundle {
+final class TextureLookupIO(config: PathConfig) extends Bundle {
 
   /** A hit enters; the one before must be done, or must not use its texture. */
   val start = Input(Bool())
@@ -48,7 +48,7 @@ final class TextureLookupIO(config: ColonnadeConfig) extends Bundle {
 
 /** Reads the texel of a hit: the one that its position is in. One hit at a time; latency that of the memory and one cycle.
   */
-final class TextureLookup(config: ColonnadeConfig) extends Module {
+final class TextureLookup(config: PathConfig) extends Module {
   val io = IO(new TextureLookupIO(config))
 
   private val layout      = TextureLayout.of(config)

@@ -3,12 +3,12 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.RegEnable
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Rounding
 
 /** The interval of t in which a ray is inside a child's box, relative to its node; empty if `tNear` exceeds `tFar`. */
-final class BoxInterval(config: ColonnadeConfig) extends Bundle {
+final class BoxInterval(config: TraversalConfig) extends Bundle {
   val isOccupied = Bool()
   val tNear      = SInt(config.numbers.nearBits.W)
   val tFar       = SInt(config.numbers.nearBits.W)
@@ -17,7 +17,7 @@ final class BoxInterval(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Converts t of a node's children to units: t · 2^(`exponent` - `nearFraction`) - `toOrigin`, at least 0. */
-final class NodeDistance(config: ColonnadeConfig) extends Bundle {
+final class NodeDistance(config: TraversalConfig) extends Bundle {
   private val numbers = config.numbers
 
   val toOrigin = SInt(numbers.boxDistanceBits.W)
@@ -31,7 +31,7 @@ final class NodeDistance(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[BoxDatapath]]. */
-final class BoxDatapathIO(config: ColonnadeConfig, lanes: Int) extends Bundle {
+final class BoxDatapathIO(config: TraversalConfig, lanes: Int) extends Bundle {
   val node = Input(new NodeOperands(config))
 
   /** New children are at the input. */
@@ -49,7 +49,7 @@ final class BoxDatapathIO(config: ColonnadeConfig, lanes: Int) extends Bundle {
   * the corner of the node; each lane has four short multipliers, because the dominant axis needs none. A box beyond
   * `tMax` has an empty interval. The registers of a lane hold while it has no child to test.
   */
-class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
+class BoxDatapath(config: TraversalConfig, lanes: Int) extends Module {
   private val numbers = config.numbers
   require(
     numbers.boxPadLog <= numbers.vertexBits - 2,
@@ -144,5 +144,5 @@ class BoxDatapath(config: ColonnadeConfig, lanes: Int) extends Module {
 object BoxDatapath {
 
   /** Cycles from operands to intervals. An extra slice registers the sums before they are shifted. */
-  def latency(config: ColonnadeConfig): Int = 4 + TimingSlice.extra(config).cycles
+  def latency(config: TraversalConfig): Int = 4 + TimingSlice.extra(config).cycles
 }

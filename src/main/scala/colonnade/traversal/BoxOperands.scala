@@ -1,12 +1,12 @@
 package colonnade.traversal
 
 import chisel3._
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.{ChildKind, NodeRecord, RecordFormats, Vec3}
 import colonnade.ray.{PermutedFrame, RayFormats}
 
 /** Operands that the box tests of all children of a node share, in the ray's own frame. */
-final class NodeOperands(config: ColonnadeConfig) extends Bundle {
+final class NodeOperands(config: TraversalConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new RayFormats(numbers)
 
@@ -31,14 +31,14 @@ final class NodeOperands(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A child's planes, counted along the ray from the first plane of the node's range: the ray crosses `nearPlanes` first. */
-final class ChildPlanes(config: ColonnadeConfig) extends Bundle {
+final class ChildPlanes(config: TraversalConfig) extends Bundle {
   val isOccupied = Bool()
   val nearPlanes = Vec(3, UInt(config.geometry.boxBits.W))
   val farPlanes  = Vec(3, UInt(config.geometry.boxBits.W))
 }
 
 /** A child as its record stores it, in the object's frame. */
-final class StoredChild(config: ColonnadeConfig) extends Bundle {
+final class StoredChild(config: TraversalConfig) extends Bundle {
   private val plane = UInt(config.geometry.boxBits.W)
 
   val kind = UInt(ChildKind.bits.W)
@@ -49,7 +49,7 @@ final class StoredChild(config: ColonnadeConfig) extends Bundle {
 /** Converts a record and a ray to operands: selections, and one subtraction per axis. */
 object BoxOperands {
 
-  def node(config: ColonnadeConfig, candidate: BoxCandidate): NodeOperands = {
+  def node(config: TraversalConfig, candidate: BoxCandidate): NodeOperands = {
     val numbers  = config.numbers
     val ray      = candidate.ray
     val operands = Wire(new NodeOperands(config))
@@ -71,7 +71,7 @@ object BoxOperands {
     operands
   }
 
-  def child(config: ColonnadeConfig, node: NodeRecord, slot: Int): StoredChild = {
+  def child(config: TraversalConfig, node: NodeRecord, slot: Int): StoredChild = {
     val stored = Wire(new StoredChild(config))
     stored.kind := node.kinds(slot)
     stored.low  := node.low(slot)
@@ -80,7 +80,7 @@ object BoxOperands {
   }
 
   /** The planes in the frame of a ray with this dominant axis and these signs. */
-  def planes(config: ColonnadeConfig, child: StoredChild, axis: UInt, negative: Seq[Bool]): ChildPlanes = {
+  def planes(config: TraversalConfig, child: StoredChild, axis: UInt, negative: Seq[Bool]): ChildPlanes = {
     val result = Wire(new ChildPlanes(config))
     val low    = PermutedFrame(child.low, axis)
     val high   = PermutedFrame(child.high, axis)

@@ -3,19 +3,19 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
 import colonnade.ray.{BoxRay, RayFormats}
 
 /** The record of a node or of a leaf's triangles. */
-final class NodeRef(config: ColonnadeConfig) extends Bundle {
+final class NodeRef(config: TraversalConfig) extends Bundle {
   val isLeaf  = Bool()
   val address = UInt(RecordFormats.addressBits(config).W)
 }
 
 /** A child whose box a ray enters, and the entry distance in units. */
-final class EnteredChild(config: ColonnadeConfig) extends Bundle {
+final class EnteredChild(config: TraversalConfig) extends Bundle {
   val target = new NodeRef(config)
   val tNear  = new Fixed(new RayFormats(config.numbers).units)
 }
@@ -24,7 +24,7 @@ final class EnteredChild(config: ColonnadeConfig) extends Bundle {
   *
   * @note `tMax` is the largest entry distance that may still hold a hit, see [[TMaxUnits]].
   */
-final class BoxCandidate(config: ColonnadeConfig) extends Bundle {
+final class BoxCandidate(config: TraversalConfig) extends Bundle {
   val context = Context(config)
   val node    = new RecordFormats(config).node
   val ray     = new BoxRay(config.numbers)
@@ -32,7 +32,7 @@ final class BoxCandidate(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The children that the ray enters: the first `count` of `children`, sorted by entry distance. */
-final class BoxResult(config: ColonnadeConfig) extends Bundle {
+final class BoxResult(config: TraversalConfig) extends Bundle {
   val context  = Context(config)
   val count    = UInt(log2Ceil(config.geometry.arity + 1).W)
   val children = Vec(config.geometry.arity, new EnteredChild(config))

@@ -3,13 +3,13 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Mux1H, PopCount, Queue, RegEnable, ShiftRegister}
 import colonnade.common.{Context, ReservedQueue}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.{ChildKind, RecordFormats}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
 /** Ports of [[BoxUnit]]. */
-final class BoxUnitIO(config: ColonnadeConfig) extends Bundle {
+final class BoxUnitIO(config: TraversalConfig) extends Bundle {
   val in = Flipped(Decoupled(new BoxCandidate(config)))
 
   /** `in` will be ready in the next cycle. */
@@ -31,7 +31,7 @@ final class BoxUnitIO(config: ColonnadeConfig) extends Bundle {
   * corner. A ray's origin is within half a cube of the object's cube. A reciprocal has at most the digits that set-up
   * computes.
   */
-class BoxUnit(config: ColonnadeConfig) extends Module {
+class BoxUnit(config: TraversalConfig) extends Module {
   private val arity = config.geometry.arity
   private val lanes = config.units.boxLanes
   private val beats = arity / lanes
@@ -100,7 +100,7 @@ class BoxUnit(config: ColonnadeConfig) extends Module {
 }
 
 /** What the result needs of a node besides the sorted children. */
-private[traversal] final class NodeTag(config: ColonnadeConfig) extends Bundle {
+private[traversal] final class NodeTag(config: TraversalConfig) extends Bundle {
   private val arity   = config.geometry.arity
   private val address = UInt(RecordFormats.addressBits(config).W)
 
@@ -126,7 +126,7 @@ private[traversal] final class NodeTag(config: ColonnadeConfig) extends Bundle {
 }
 
 private[traversal] object NodeTag {
-  def apply(config: ColonnadeConfig, candidate: BoxCandidate): NodeTag = {
+  def apply(config: TraversalConfig, candidate: BoxCandidate): NodeTag = {
     val tag = Wire(new NodeTag(config))
     tag.context        := candidate.context
     tag.kinds          := candidate.node.kinds

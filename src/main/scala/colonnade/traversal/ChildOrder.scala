@@ -2,10 +2,10 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Mux1H, PopCount}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 
 /** A child by its slot, and its entry distance. */
-final class OrderedChild(config: ColonnadeConfig) extends Bundle {
+final class OrderedChild(config: TraversalConfig) extends Bundle {
   val slot = UInt(log2Ceil(config.geometry.arity).W)
 
   /** Relative to the node, see [[NodeDistance]]. */
@@ -13,7 +13,7 @@ final class OrderedChild(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The children that the ray enters: the first `count` of `children`, sorted by entry distance, then by slot. */
-final class ChildOrder(config: ColonnadeConfig) extends Bundle {
+final class ChildOrder(config: TraversalConfig) extends Bundle {
   val count    = UInt(log2Ceil(config.geometry.arity + 1).W)
   val children = Vec(config.geometry.arity, new OrderedChild(config))
   val distance = new NodeDistance(config)
@@ -23,7 +23,7 @@ object ChildOrder {
 
   /** Sorts by rank, combinationally: all pairs are compared at once, and a child's rank is its number of predecessors. */
   def apply(
-      config:    ColonnadeConfig,
+      config:    TraversalConfig,
       isEntered: Seq[Bool],
       tNear:     Seq[SInt],
       distance:  NodeDistance

@@ -2,10 +2,10 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.numbers.{Divider, Fixed, Rounding}
 
-final class DistanceStageIO(config: ColonnadeConfig) extends Bundle {
+final class DistanceStageIO(config: PartConfig) extends Bundle {
   val request = Flipped(Decoupled(new DistanceRequest(config)))
 
   /** In the order of requests; t may be negative. */
@@ -18,7 +18,7 @@ final class DistanceStageIO(config: ColonnadeConfig) extends Bundle {
   *
   * @param lanes number of dividers
   */
-final class DistanceStage(config: ColonnadeConfig, lanes: Int) extends Module {
+final class DistanceStage(config: PartConfig, lanes: Int) extends Module {
   require(lanes >= 1, s"$lanes division lanes; a triangle unit needs at least 1")
   val io = IO(new DistanceStageIO(config))
 

@@ -3,14 +3,14 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.{RecordFormats, SceneMap}
 
 /** Traversal without a BVH, as a baseline: every ray visits every triangle record, in memory order.
   *
   * The unit that starts a ray visits the first record. Each `resume` gives the next record one cycle later.
   */
-final class LinearScan(config: ColonnadeConfig) extends Module {
+final class LinearScan(config: TraversalConfig) extends Module {
   val io = IO(new Bundle {
     val scene  = Input(new SceneMap(RecordFormats.idBits(config)))
     val start  = Flipped(Valid(Context(config)))
@@ -19,7 +19,7 @@ final class LinearScan(config: ColonnadeConfig) extends Module {
   })
 
   /** By context: the number of records visited. */
-  private val visited = Reg(Vec(config.array.contexts, UInt(RecordFormats.idBits(config).W)))
+  private val visited = Reg(Vec(config.contexts, UInt(RecordFormats.idBits(config).W)))
 
   private val isNext  = RegInit(false.B)
   private val context = Reg(Context(config))

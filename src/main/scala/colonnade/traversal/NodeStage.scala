@@ -2,7 +2,7 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, RegEnable, UIntToOH}
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, TraversalConfig}
 import colonnade.numbers.Rounding
 
 /** Factors of a child's planes, one cycle after the node's operands. t is as in docs/numbers.md, section 3. */
@@ -31,7 +31,7 @@ final class NodeTerms(numbers: NumberFormats) extends Bundle {
   val tMax   = SInt(numbers.nearBits.W)
 }
 
-final class NodeStageIO(config: ColonnadeConfig) extends Bundle {
+final class NodeStageIO(config: TraversalConfig) extends Bundle {
   private val numbers = config.numbers
 
   val node = Input(new NodeOperands(config))
@@ -51,7 +51,7 @@ final class NodeStageIO(config: ColonnadeConfig) extends Bundle {
   * subtracts the distance of the first z' plane, and shifts to the scale in which the planes of the children are
   * multiples of a short reciprocal.
   */
-final class NodeStage(config: ColonnadeConfig) extends Module {
+final class NodeStage(config: TraversalConfig) extends Module {
   val io = IO(new NodeStageIO(config))
 
   private val numbers  = config.numbers

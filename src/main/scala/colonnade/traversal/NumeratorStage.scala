@@ -2,11 +2,11 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{Cat, Decoupled}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.numbers.{Fixed, Normalise, Rounding}
 import colonnade.ray.RayFormats
 
-final class NumeratorStageIO(config: ColonnadeConfig) extends Bundle {
+final class NumeratorStageIO(config: PartConfig) extends Bundle {
   val weighted = Flipped(Decoupled(new WeightedTriangle(config)))
   val request  = Decoupled(new DistanceRequest(config))
 }
@@ -16,7 +16,7 @@ final class NumeratorStageIO(config: ColonnadeConfig) extends Bundle {
   * One triangle at a time, every 7 cycles: four multiplications of a weight by half a rise, magnitude, leading zeros, and
   * the shift in the output cycle.
   */
-final class NumeratorStage(config: ColonnadeConfig) extends Module {
+final class NumeratorStage(config: PartConfig) extends Module {
   val io = IO(new NumeratorStageIO(config))
 
   private object State extends ChiselEnum { val idle, multiplying, negating, counting, offering = Value }

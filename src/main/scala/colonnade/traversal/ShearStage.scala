@@ -2,12 +2,12 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{RegEnable, Valid}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.formats.Vec3
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PermutedFrame, TriangleRay}
 
-final class ShearStageIO(config: ColonnadeConfig) extends Bundle {
+final class ShearStageIO(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
   /** The pipeline moves by a slot. */
@@ -32,7 +32,7 @@ final class ShearStageIO(config: ColonnadeConfig) extends Bundle {
   *
   * One vertex per slot: select and subtract, multiply, round and subtract. Without a vertex the registers hold.
   */
-final class ShearStage(config: ColonnadeConfig) extends Module {
+final class ShearStage(config: PartConfig) extends Module {
   val io = IO(new ShearStageIO(config))
 
   import TriangleStep._

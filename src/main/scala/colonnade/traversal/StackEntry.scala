@@ -3,10 +3,10 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.{isPow2, log2Ceil, Cat}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 
 /** A child that the ray visits later. */
-private[traversal] final class StackEntry(config: ColonnadeConfig) extends Bundle {
+private[traversal] final class StackEntry(config: TraversalConfig) extends Bundle {
   val target = new NodeRef(config)
 
   /** Its entry distance, in units. */
@@ -14,7 +14,7 @@ private[traversal] final class StackEntry(config: ColonnadeConfig) extends Bundl
 }
 
 private[traversal] object StackEntry {
-  def apply(config: ColonnadeConfig, child: EnteredChild): StackEntry = {
+  def apply(config: TraversalConfig, child: EnteredChild): StackEntry = {
     val entry = Wire(new StackEntry(config))
     entry.target := child.target
     entry.tNear  := child.tNear.integer.asUInt(config.numbers.boxDistanceBits - 2, 0) // never negative
@@ -23,7 +23,7 @@ private[traversal] object StackEntry {
 }
 
 /** A stack operation in its second cycle. */
-private[traversal] final class PendingOperation(config: ColonnadeConfig) extends Bundle {
+private[traversal] final class PendingOperation(config: TraversalConfig) extends Bundle {
   val context = Context(config)
 
   /** An entry was read; otherwise `isDone` and `target` are the result. */
@@ -39,17 +39,17 @@ private[traversal] final class PendingOperation(config: ColonnadeConfig) extends
 
 /** The number of entries on a stack. */
 private[traversal] object StackLevel {
-  def apply(config: ColonnadeConfig): UInt = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
+  def apply(config: TraversalConfig): UInt = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
 }
 
 /** The address of an entry; the stacks of all contexts share one memory. */
 private[traversal] object StackAddress {
-  def apply(config: ColonnadeConfig): UInt = UInt(log2Ceil(size(config)).W)
+  def apply(config: TraversalConfig): UInt = UInt(log2Ceil(size(config)).W)
 
-  def size(config: ColonnadeConfig): Int = config.array.contexts * config.columnBvhMemory.stackDepth
+  def size(config: TraversalConfig): Int = config.contexts * config.columnBvhMemory.stackDepth
 
   /** The address of the entry above `level` others. It is invalid for the level of a full stack. */
-  def apply(config: ColonnadeConfig, context: UInt, level: UInt): UInt = {
+  def apply(config: TraversalConfig, context: UInt, level: UInt): UInt = {
     val stackDepth = config.columnBvhMemory.stackDepth
     val bits       = apply(config).getWidth
     val address    =

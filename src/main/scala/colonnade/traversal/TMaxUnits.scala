@@ -2,12 +2,12 @@ package colonnade.traversal
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, TraversalConfig}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
 
 /** Reads the largest entry distance of a box that may hold a closer hit, of the ray of a context: in the same cycle. */
-final class TMaxReader(config: ColonnadeConfig) extends Bundle {
+final class TMaxReader(config: TraversalConfig) extends Bundle {
   val context = Output(Context(config))
   val units   = Input(new Fixed(new RayFormats(config.numbers).units))
 }

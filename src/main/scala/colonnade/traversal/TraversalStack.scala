@@ -3,11 +3,11 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.{Context, TimingSlice}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.numbers.Rounding
 
 /** The next step of a ray: a record to visit, or the end of traversal. */
-final class TraversalStep(config: ColonnadeConfig) extends Bundle {
+final class TraversalStep(config: TraversalConfig) extends Bundle {
   val context = Context(config)
 
   /** The traversal has ended; `target` is invalid. */
@@ -16,7 +16,7 @@ final class TraversalStep(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[TraversalStack]]. */
-final class TraversalStackIO(config: ColonnadeConfig) extends Bundle {
+final class TraversalStackIO(config: TraversalConfig) extends Bundle {
 
   /** Clears the stack of a context for a new ray; the context has no operation in flight. */
   val start = Flipped(Valid(Context(config)))
@@ -52,9 +52,9 @@ final class TraversalStackIO(config: ColonnadeConfig) extends Bundle {
   * one cycle after the last of these. With `units.extraSlices` each read of an entry, and a step, take a cycle more. A
   * round-robin arbiter selects between results and resumptions.
   */
-class TraversalStack(config: ColonnadeConfig) extends Module {
+class TraversalStack(config: TraversalConfig) extends Module {
   private val arity      = config.geometry.arity
-  private val contexts   = config.array.contexts
+  private val contexts   = config.contexts
   private val stackDepth = config.columnBvhMemory.stackDepth
 
   val io = IO(new TraversalStackIO(config))

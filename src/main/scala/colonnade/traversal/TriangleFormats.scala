@@ -2,7 +2,7 @@ package colonnade.traversal
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.{ColonnadeConfig, NumberFormats}
+import colonnade.config.{NumberFormats, PartConfig}
 import colonnade.formats.RecordFormats
 import colonnade.numbers.{Fixed, FixedPointFormat, Normalise}
 import colonnade.ray.RayFormats
@@ -75,7 +75,7 @@ final class TriangleSlot extends Bundle {
 }
 
 /** Identifies a round's triangle, or its pair of triangles. */
-final class TriangleTag(config: ColonnadeConfig) extends Bundle {
+final class TriangleTag(config: PartConfig) extends Bundle {
   val context = Context(config)
 
   /** Of the first triangle. */
@@ -106,7 +106,7 @@ final class TriangleDepths(formats: TriangleFormats) extends Bundle {
 }
 
 /** A triangle that the ray's line crosses, with the magnitudes of its edge functions. */
-final class CrossedTriangle(config: ColonnadeConfig) extends Bundle {
+final class CrossedTriangle(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
   val magnitudes = Vec(3, UInt(formats.edgeBits.W))
@@ -116,7 +116,7 @@ final class CrossedTriangle(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A crossed triangle with the barycentric weights of the intersection. */
-final class WeightedTriangle(config: ColonnadeConfig) extends Bundle {
+final class WeightedTriangle(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
   val weights = Vec(3, UInt(formats.weightBits.W))
@@ -129,7 +129,7 @@ final class WeightedTriangle(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The division for a distance: t = first ± ((dividend / divisor) >> shiftRight). */
-final class DistanceRequest(config: ColonnadeConfig) extends Bundle {
+final class DistanceRequest(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
   /** Zero, or its top bit is set. */
@@ -139,7 +139,7 @@ final class DistanceRequest(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Operands of a distance besides the quotient. */
-final class DistanceTerms(config: ColonnadeConfig) extends Bundle {
+final class DistanceTerms(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
   /** Depth of vertex 0. */

@@ -3,10 +3,10 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, PopCount, RRArbiter}
 import colonnade.common.Dispatcher
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 
 /** Ports of [[TriangleLanes]]. */
-final class TriangleLanesIO(config: ColonnadeConfig) extends Bundle {
+final class TriangleLanesIO(config: PartConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
 
   /** `candidate` will be ready in the next cycle. */
@@ -22,7 +22,7 @@ final class TriangleLanesIO(config: ColonnadeConfig) extends Bundle {
 /** `units.triangleLanes` parallel [[TriangleUnit]]s with round-robin dispatch and round-robin collection of results.
   * Latency and throughput of a lane are those of the unit.
   */
-final class TriangleLanes(config: ColonnadeConfig) extends Module {
+final class TriangleLanes(config: PartConfig) extends Module {
   val io = IO(new TriangleLanesIO(config))
 
   private val lanes    = Seq.fill(config.units.triangleLanes)(Module(new TriangleUnit(config)).io)

@@ -2,11 +2,11 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.formats.Vec3
 import colonnade.ray.TriangleRay
 
-final class TriangleSequencerIO(config: ColonnadeConfig) extends Bundle {
+final class TriangleSequencerIO(config: PartConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
 
   /** `candidate` will be ready in the next cycle. */
@@ -37,7 +37,7 @@ final class TriangleSequencerIO(config: ColonnadeConfig) extends Bundle {
   * accepted with the last vertex, so no slot is lost between records. Without a record, a candidate is accepted in every
   * second cycle. A record with an illegal `count` gives one absent triangle.
   */
-final class TriangleSequencer(config: ColonnadeConfig) extends Module {
+final class TriangleSequencer(config: PartConfig) extends Module {
   val io = IO(new TriangleSequencerIO(config))
 
   import TriangleStep._

@@ -2,20 +2,20 @@ package colonnade.traversal
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
 import colonnade.ray.{RayFormats, TriangleRay}
 
 /** One ray to test against the triangles of one record. */
-final class TriangleCandidate(config: ColonnadeConfig) extends Bundle {
+final class TriangleCandidate(config: PartConfig) extends Bundle {
   val context = Context(config)
   val record  = new RecordFormats(config).triangles
   val ray     = new TriangleRay(config.numbers)
 }
 
 /** The intersection of a ray with a triangle. */
-final class TriangleHit(config: ColonnadeConfig) extends Bundle {
+final class TriangleHit(config: PartConfig) extends Bundle {
   private val formats = new RayFormats(config.numbers)
 
   val t = new Fixed(formats.grid)
@@ -29,7 +29,7 @@ final class TriangleHit(config: ColonnadeConfig) extends Bundle {
 }
 
 /** The result of one triangle. Results follow the order of candidates, and of triangles in a record. */
-final class TriangleResult(config: ColonnadeConfig) extends Bundle {
+final class TriangleResult(config: PartConfig) extends Bundle {
   val context = Context(config)
 
   /** The ray intersects the triangle at `hit.t` ≥ 0. */

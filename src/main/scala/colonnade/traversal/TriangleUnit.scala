@@ -3,9 +3,9 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 
-final class TriangleUnitIO(config: ColonnadeConfig) extends Bundle {
+final class TriangleUnitIO(config: PartConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
   val result    = Decoupled(new TriangleResult(config))
 
@@ -17,7 +17,7 @@ final class TriangleUnitIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A triangle that waits for its place in the order of results; a crossed one also waits for its distance. */
-final private class PendingTriangle(config: ColonnadeConfig) extends Bundle {
+final private class PendingTriangle(config: PartConfig) extends Bundle {
   val context         = Context(config)
   val isLast          = Bool()
   val isTransmissive  = Bool()
@@ -44,7 +44,7 @@ final private class PendingTriangle(config: ColonnadeConfig) extends Bundle {
   * @param distanceLanes number of dividers
   * @param queueDepth    triangles that may wait for their result or for that of an earlier one
   */
-final class TriangleUnit(config: ColonnadeConfig, distanceLanes: Int = 1, queueDepth: Int = 8) extends Module {
+final class TriangleUnit(config: PartConfig, distanceLanes: Int = 1, queueDepth: Int = 8) extends Module {
   val io = IO(new TriangleUnitIO(config))
 
   private val sequencer = Module(new TriangleSequencer(config))

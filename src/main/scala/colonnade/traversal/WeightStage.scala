@@ -2,10 +2,10 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.Decoupled
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.numbers.Normalise
 
-final class WeightStageIO(config: ColonnadeConfig) extends Bundle {
+final class WeightStageIO(config: PartConfig) extends Bundle {
   val crossed  = Flipped(Decoupled(new CrossedTriangle(config)))
   val weighted = Decoupled(new WeightedTriangle(config))
 }
@@ -15,7 +15,7 @@ final class WeightStageIO(config: ColonnadeConfig) extends Bundle {
   * One triangle at a time, every 7 cycles: two cycles for the sum, one to count its leading zeros, three to shift the
   * edges through one shifter, one for the output, in which the next triangle may enter.
   */
-final class WeightStage(config: ColonnadeConfig) extends Module {
+final class WeightStage(config: PartConfig) extends Module {
   val io = IO(new WeightStageIO(config))
 
   private object State extends ChiselEnum { val idle, adding, counting, shifting, offering = Value }

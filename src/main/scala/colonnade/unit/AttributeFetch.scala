@@ -3,23 +3,23 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Decoupled, Queue, Valid}
 import colonnade.common.{Context, First, TimingSlice}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{AttributeFetchConfig, ColonnadeConfig, PathConfig}
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 
 /** A hit whose attributes are wanted. */
-final class AttributeRequest(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config.ofPaths)
+final class AttributeRequest(config: PathConfig) extends Bundle {
+  val context = Context(config)
   val address = UInt(RecordFormats.idBits(config).W)
 }
 
 /** The attributes of a hit. */
-final class AttributeResponse(config: ColonnadeConfig) extends Bundle {
-  val context = Context(config.ofPaths)
+final class AttributeResponse(config: PathConfig) extends Bundle {
+  val context = Context(config)
   val record  = new RecordFormats(config).record
 }
 
 /** Ports of [[AttributeFetch]]. */
-final class AttributeFetchIO(config: ColonnadeConfig) extends Bundle {
+final class AttributeFetchIO(config: PathConfig) extends Bundle {
 
   /** Invalidates all record buffers. */
   val start      = Input(Bool())
@@ -34,28 +34,27 @@ final class AttributeFetchIO(config: ColonnadeConfig) extends Bundle {
   val readyNext = Input(Bool())
 
   /** The context that gets its attributes in the next cycle. */
-  val grantNext = Output(Valid(Context(config.ofPaths)))
+  val grantNext = Output(Valid(Context(config)))
   val response  = Output(Valid(new AttributeResponse(config)))
 
   /** A context whose address is illegal. */
-  val error  = Output(Valid(Context(config.ofPaths)))
+  val error  = Output(Valid(Context(config)))
   val events = Output(new FetchEvents(AttributeFetch.slotConfig(config)))
 }
 
 /** Fetches the attributes of hits for a path unit. Hits wait in a queue for one of the slots, which are the contexts of a
   * [[RecordFetch]]; so as many records as there are slots may be awaited. Responses come in any order.
   *
-  * @param config of the column
-  * @param most   the largest number of slots
+  * @param most maximum number of slots
   */
-final class AttributeFetch(config: ColonnadeConfig, most: Int = AttributeFetch.slots) extends Module {
+final class AttributeFetch(config: PathConfig, most: Int = AttributeFetch.slots) extends Module {
   val io = IO(new AttributeFetchIO(config))
 
   private val slotConfig = AttributeFetch.slotConfig(config, most)
-  private val slots      = slotConfig.array.contexts
+  private val slots      = slotConfig.contexts
   private val fetch      = Module(new RecordFetch(slotConfig)).io
   private val isUsed     = RegInit(VecInit.fill(slots)(false.B))
-  private val owners     = Reg(Vec(slots, Context(config.ofPaths)))
+  private val owners     = Reg(Vec(slots, Context(config)))
 
   fetch.start      := io.start
   fetch.row        := config.array.rows.U
@@ -66,7 +65,7 @@ final class AttributeFetch(config: ColonnadeConfig, most: Int = AttributeFetch.s
 
   // Queue hits for a slot; there are never more than contexts
   private val waiting =
-    Module(new Queue(new AttributeRequest(config), config.ofPaths.array.contexts, useSyncReadMem = true))
+    Module(new Queue(new AttributeRequest(config), config.contexts, useSyncReadMem = true))
   waiting.io.enq.valid := io.hits.valid
   waiting.io.enq.bits  := io.hits.bits
   assert(!io.hits.valid || waiting.io.enq.ready, "more hits than contexts")
@@ -110,9 +109,7 @@ object AttributeFetch {
   /** Their record buffers: a hit needs a record for two or three cycles of its shading. */
   val buffers: Int = 2
 
-  /** A configuration whose contexts are the slots, with as many record buffers as they have. */
-  def slotConfig(config: ColonnadeConfig, most: Int = slots): ColonnadeConfig = config.copy(
-    array = config.array.copy(contexts = most.min(config.units.pathContexts)),
-    columnBvhMemory = config.columnBvhMemory.copy(recordBuffers = buffers.min(config.columnBvhMemory.recordBuffers))
-  )
+  /** What its [[RecordFetch]] is built for. */
+  def slotConfig(config: ColonnadeConfig, most: Int = slots): AttributeFetchConfig =
+    AttributeFetchConfig(config, maxSlots = most, maxBuffers = buffers)
 }

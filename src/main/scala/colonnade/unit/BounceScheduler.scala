@@ -3,14 +3,14 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.environment.StoredRay
 import colonnade.formats.Shading
 import colonnade.ray.RayRequest
 import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay}
 
 /** Ports of [[BounceScheduler]] that an environment adds. */
-final class DeferredBounceIO(config: ColonnadeConfig) extends Bundle {
+final class DeferredBounceIO(config: PathConfig) extends Bundle {
 
   /** This frame has an environment. */
   val enabled = Input(Bool())
@@ -24,7 +24,7 @@ final class DeferredBounceIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[BounceScheduler]]. */
-final class BounceSchedulerIO(config: ColonnadeConfig) extends Bundle {
+final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val shading = Input(new Shading(config))
 
   /** A context gets a new pixel. */
@@ -47,7 +47,7 @@ final class BounceSchedulerIO(config: ColonnadeConfig) extends Bundle {
   * With an environment, the Fresnel reflection of glass is resolved first. It takes the context, and the bounce waits in
   * a table. Bounces from the table have priority; they are issued three cycles after `resume`.
   */
-final class BounceScheduler(config: ColonnadeConfig) extends Module {
+final class BounceScheduler(config: PathConfig) extends Module {
   val io = IO(new BounceSchedulerIO(config))
 
   private val incoming = Wire(new PendingBounce(config))
@@ -70,7 +70,7 @@ final class BounceScheduler(config: ColonnadeConfig) extends Module {
   io.environment.foreach(deferBounces)
 
   // Trace its ray as long as the path has bounces left
-  private val counts   = Reg(Vec(config.array.contexts, chiselTypeOf(io.shading.bounces.get)))
+  private val counts   = Reg(Vec(config.contexts, chiselTypeOf(io.shading.bounces.get)))
   private val context  = bounce.bits.update.context
   private val isTraced = counts(context) =/= io.shading.bounces.get
   when(bounce.fire && isTraced) { counts(context) := counts(context) + 1.U }
@@ -128,7 +128,7 @@ final class BounceScheduler(config: ColonnadeConfig) extends Module {
 }
 
 /** A bounce to issue: the update of the path, and the next ray. */
-final private class PendingBounce(config: ColonnadeConfig) extends Bundle {
+final private class PendingBounce(config: PathConfig) extends Bundle {
   val update       = new BounceUpdate(config)
   val isRefraction = Bool()
   val origin       = new BounceResult(config).origin.cloneType

@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.environment.{EnvironmentAccepts, EnvironmentRequest}
 import colonnade.shading.{Occlusion, PathTermination, ShadowRequest}
 
@@ -45,7 +45,7 @@ object ContextState extends ChiselEnum {
 }
 
 /** A context whose hit has been shaded. */
-final class Shaded(config: ColonnadeConfig) extends Bundle {
+final class Shaded(config: PathConfig) extends Bundle {
   val context = Context(config)
 
   /** By light, for a surface that ends the path. */
@@ -53,7 +53,7 @@ final class Shaded(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A context whose path continues from a mirror or glass. */
-final class Bounced(config: ColonnadeConfig) extends Bundle {
+final class Bounced(config: PathConfig) extends Bundle {
   val context = Context(config)
 
   /** The ray is traced through the object; otherwise it only meets the background or the environment. */
@@ -64,7 +64,7 @@ final class Bounced(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A context whose deferred Fresnel reflection is complete, so that its bounce may resume. */
-final class ResumedBounce(config: ColonnadeConfig) extends Bundle {
+final class ResumedBounce(config: PathConfig) extends Bundle {
   val context = Context(config)
 
   /** The reflection shows the background. */
@@ -72,7 +72,7 @@ final class ResumedBounce(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Control of rays that miss the object or whose hit may be hidden, if there may be an environment. */
-final class EnvironmentControl(config: ColonnadeConfig) extends Bundle {
+final class EnvironmentControl(config: PathConfig) extends Bundle {
 
   /** This frame has an environment. */
   val enabled = Input(Bool())
@@ -100,7 +100,7 @@ final class EnvironmentControl(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Allocation of a context, seen from the stage that gives it a pixel. */
-final class AllocationControl(config: ColonnadeConfig) extends Bundle {
+final class AllocationControl(config: PathConfig) extends Bundle {
 
   /** An idle context, and whether it gets a pixel. */
   val free     = Flipped(Valid(Context(config)))
@@ -108,7 +108,7 @@ final class AllocationControl(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Control of traces, seen from the stage that traces rays. */
-final class TraceControl(config: ColonnadeConfig) extends Bundle {
+final class TraceControl(config: PathConfig) extends Bundle {
 
   /** A prepared ray that enters the object's box. */
   val entered = Valid(Context(config))
@@ -134,7 +134,7 @@ final class TraceControl(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Retirement of pixels, seen from the stage that assembles them. */
-final class PixelControl(config: ColonnadeConfig) extends Bundle {
+final class PixelControl(config: PathConfig) extends Bundle {
 
   /** A context whose pixel is complete, whether it has an accumulated colour, and whether it retires. */
   val done      = Flipped(Valid(Context(config)))
@@ -143,8 +143,8 @@ final class PixelControl(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[RtController]]. */
-final class RtControllerIO(config: ColonnadeConfig) extends Bundle {
-  private def contextCount = Output(UInt(log2Ceil(config.array.contexts + 1).W))
+final class RtControllerIO(config: PathConfig) extends Bundle {
+  private def contextCount = Output(UInt(log2Ceil(config.contexts + 1).W))
 
   val allocation  = Flipped(new AllocationControl(config))
   val trace       = Flipped(new TraceControl(config))

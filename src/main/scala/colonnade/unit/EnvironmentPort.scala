@@ -2,14 +2,14 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.Decoupled
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.environment.{EnvironmentRays, HitDistance, MarchPort}
 import colonnade.formats.{EnvironmentView, PixelPosition}
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
 
 /** Ports of [[EnvironmentPort]]. */
-final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
+final class EnvironmentPortIO(config: PathConfig) extends Bundle {
   val view    = Input(new EnvironmentView(config.numbers))
   val control = Flipped(new EnvironmentControl(config))
 
@@ -32,7 +32,7 @@ final class EnvironmentPortIO(config: ColonnadeConfig) extends Bundle {
 /** Routes rays to the marches of the environment: every ray that may miss the object is stored. A primary ray that cannot
   * hit the object bypasses ray set-up. The ray of a hit that the environment may hide is marched too.
   */
-final class EnvironmentPort(config: ColonnadeConfig) extends Module {
+final class EnvironmentPort(config: PathConfig) extends Module {
   val io = IO(new EnvironmentPortIO(config))
 
   private val stage   = Module(new EnvironmentRays(config)).io

@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.formats.{NodeRecord, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.ray.BoxRay
 
@@ -13,14 +13,14 @@ object RecordKind extends ChiselEnum {
 }
 
 /** A context that needs a record. */
-final class FetchRequest(config: ColonnadeConfig) extends Bundle {
+final class FetchRequest(config: PartConfig) extends Bundle {
   val context = Context(config)
   val kind    = RecordKind()
   val address = UInt(RecordFormats.idBits(config).W)
 }
 
 /** A record, and the context that requested it. */
-final class FetchResponse(config: ColonnadeConfig) extends Bundle {
+final class FetchResponse(config: PartConfig) extends Bundle {
   val context = Context(config)
   val kind    = RecordKind()
   val address = UInt(RecordFormats.addressBits(config).W)
@@ -28,13 +28,13 @@ final class FetchResponse(config: ColonnadeConfig) extends Bundle {
 }
 
 /** A request whose address lies outside the section of its kind; it gets no record. */
-final class FetchError(config: ColonnadeConfig) extends Bundle {
+final class FetchError(config: PartConfig) extends Bundle {
   val context = Context(config)
   val kind    = RecordKind()
 }
 
 /** A node, and the ray to test against its children. */
-final class NodeCandidate(config: ColonnadeConfig) extends Bundle {
+final class NodeCandidate(config: PartConfig) extends Bundle {
   val context = Context(config)
   val address = UInt(RecordFormats.addressBits(config).W)
   val node    = new NodeRecord(config)
@@ -42,8 +42,8 @@ final class NodeCandidate(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Events of [[FetchStage]]; names as in `Counters`. */
-final class FetchEvents(config: ColonnadeConfig) extends Bundle {
-  private def contextCount = UInt(log2Ceil(config.array.contexts + 1).W)
+final class FetchEvents(config: PartConfig) extends Bundle {
+  private def contextCount = UInt(log2Ceil(config.contexts + 1).W)
 
   val waitRecord    = contextCount
   val waitUnit      = contextCount
@@ -52,8 +52,8 @@ final class FetchEvents(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[RecordFetch]]. */
-final class RecordFetchIO(config: ColonnadeConfig) extends Bundle {
-  private def contextCount = UInt(log2Ceil(config.array.contexts + 1).W)
+final class RecordFetchIO(config: PartConfig) extends Bundle {
+  private def contextCount = UInt(log2Ceil(config.contexts + 1).W)
 
   /** Invalidates all buffers: the memory may have changed. */
   val start = Input(Bool())

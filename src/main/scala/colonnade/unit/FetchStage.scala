@@ -3,14 +3,14 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.{Context, ContextTable, TimingSlice}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.numbers.Fixed
 import colonnade.ray.{PreparedRay, RayFormats, RayOrientation, TracedRay}
 import colonnade.traversal.TriangleCandidate
 
 /** Ports of [[FetchStage]]. */
-final class FetchStageIO(config: ColonnadeConfig) extends Bundle {
+final class FetchStageIO(config: TraversalConfig) extends Bundle {
 
   /** Invalidates all record buffers. */
   val start      = Input(Bool())
@@ -44,7 +44,7 @@ final class FetchStageIO(config: ColonnadeConfig) extends Bundle {
   * The table is read with the context that [[RecordFetch]] grants one cycle early, so it may be a memory with a
   * registered address, and no combinational path connects the units that accept records.
   */
-final class FetchStage(config: ColonnadeConfig) extends Module {
+final class FetchStage(config: TraversalConfig) extends Module {
   private val formats = new RecordFormats(config)
 
   val io = IO(new FetchStageIO(config))
@@ -94,7 +94,7 @@ final class FetchStage(config: ColonnadeConfig) extends Module {
 /** The rays of all contexts: what every test needs, and what only box tests or only triangle tests need. So a read moves
   * 125 bits instead of 173 in `edge`.
   */
-private final class RayTable(config: ColonnadeConfig) {
+private final class RayTable(config: TraversalConfig) {
   private val formats = new RayFormats(config.numbers)
 
   private final class Frame extends Bundle {

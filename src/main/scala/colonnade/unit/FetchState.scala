@@ -2,7 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, UIntToOH}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.formats.RecordFormats
 
 private[unit] object BufferState extends ChiselEnum {
@@ -10,7 +10,7 @@ private[unit] object BufferState extends ChiselEnum {
 }
 
 /** The registers of a record buffer of [[RecordFetch]]. */
-private[unit] final class RecordBuffer(config: ColonnadeConfig) {
+private[unit] final class RecordBuffer(config: PartConfig) {
   val state   = RegInit(BufferState.empty)
   val address = Reg(UInt(RecordFormats.addressBits(config).W))
   val record  = Reg(new RecordFormats(config).record)
@@ -20,7 +20,7 @@ private[unit] final class RecordBuffer(config: ColonnadeConfig) {
 }
 
 /** The registers of a context's fetch in [[RecordFetch]]. */
-private[unit] final class ContextFetch(config: ColonnadeConfig) {
+private[unit] final class ContextFetch(config: PartConfig) {
   private val buffers  = config.columnBvhMemory.recordBuffers
   private val hasCache = config.columnBvhMemory.cache.nonEmpty
 

@@ -3,14 +3,14 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Valid
 import colonnade.common.{Choice, Context}
-import colonnade.config.{ArrayConfig, ColonnadeConfig}
+import colonnade.config.PathConfig
 
 /** Flags of each context, written by one writer and read with choices: registers; or, of many contexts, a memory for each
   * reader, since a choice is then known a cycle before.
   */
-private[unit] final class FlagTable(config: ColonnadeConfig, flags: UInt) {
-  private val contexts  = config.array.contexts
-  private val registers = Option.unless(ArrayConfig.isLarge(contexts))(Reg(Vec(contexts, flags)))
+private[unit] final class FlagTable(config: PathConfig, flags: UInt) {
+  private val contexts  = config.contexts
+  private val registers = Option.unless(config.isLarge)(Reg(Vec(contexts, flags)))
   private val written   = Wire(Valid(flags))
   private val writer    = Wire(Context(config))
   registers.foreach(table => when(written.valid) { table(writer) := written.bits })

@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{RegEnable, Valid}
 import colonnade.common.{Context, ContextTable, TimingSlice}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.RecordFormats
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
@@ -11,13 +11,13 @@ import colonnade.shading.Occlusion
 import colonnade.traversal.{TMaxReader, TMaxUnits, TriangleHit, TriangleResult}
 
 /** A ray whose trace starts: only hits with t < `tMax` count. */
-final class TraceStart(config: ColonnadeConfig) extends Bundle {
+final class TraceStart(config: TraversalConfig) extends Bundle {
   val context = Context(config)
   val tMax    = new Fixed(new RayFormats(config.numbers).grid)
 }
 
 /** Ports of [[HitTable]]. */
-final class HitTableIO(config: ColonnadeConfig) extends Bundle {
+final class HitTableIO(config: TraversalConfig) extends Bundle {
   val start  = Flipped(Valid(new TraceStart(config)))
   val result = Flipped(Valid(new TriangleResult(config)))
 
@@ -39,8 +39,8 @@ final class HitTableIO(config: ColonnadeConfig) extends Bundle {
   * Throughput: one result per cycle, visible in the next cycle. A shadow ray overwrites the hit of its context. With
   * `units.extraSlices` the comparison takes a cycle: a result's bits must be there in the cycle before its `valid`, too.
   */
-final class HitTable(config: ColonnadeConfig) extends Module {
-  private val contexts = config.array.contexts
+final class HitTable(config: TraversalConfig) extends Module {
+  private val contexts = config.contexts
   private val formats  = new RayFormats(config.numbers)
 
   val io = IO(new HitTableIO(config))
@@ -98,13 +98,13 @@ final class HitTable(config: ColonnadeConfig) extends Module {
 }
 
 /** The parts of a hit that no comparison needs. */
-private final class HitDetails(config: ColonnadeConfig) extends Bundle {
+private final class HitDetails(config: TraversalConfig) extends Bundle {
   val weights  = Vec(3, new Fixed(new RayFormats(config.numbers).weight))
   val backSide = Bool()
 }
 
 /** A read port of the [[HitTable]], seen from the reader. */
-final class HitReader(config: ColonnadeConfig) extends Bundle {
+final class HitReader(config: TraversalConfig) extends Bundle {
   val context = Output(Valid(Context(config)))
 
   /** In the next cycle: the ray has a hit; what it has hit as a shadow ray; its hit. */

@@ -3,14 +3,14 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{log2Ceil, Arbiter, Decoupled, DecoupledIO, Pipe, Valid}
 import colonnade.common.{Context, TimingSlice}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.{RecordFormats, SceneMap}
 import colonnade.ray.PreparedRay
 import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanesIO, TriangleResult}
 
 /** Events of [[Intersector]]; names as in `Counters`. */
-final class IntersectorEvents(config: ColonnadeConfig) extends Bundle {
-  private def contextCount = UInt(log2Ceil(config.array.contexts + 1).W)
+final class IntersectorEvents(config: TraversalConfig) extends Bundle {
+  private def contextCount = UInt(log2Ceil(config.contexts + 1).W)
 
   val raysInBox         = Bool()
   val nodeReads         = Bool()
@@ -26,7 +26,7 @@ final class IntersectorEvents(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Ports of [[Intersector]]. */
-final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
+final class IntersectorIO(config: TraversalConfig) extends Bundle {
 
   /** A frame starts. */
   val start = Input(Bool())
@@ -36,7 +36,7 @@ final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
   val rays = Flipped(Valid(new PreparedRay(config)))
 
   /** By context: its ray is a shadow ray. */
-  val isShadow = Input(Vec(config.array.contexts, Bool()))
+  val isShadow = Input(Vec(config.contexts, Bool()))
 
   /** Traces that have ended: no record is left to visit, or the shadow ray is occluded. */
   val ended   = Output(Vec(2, Valid(Context(config))))
@@ -61,7 +61,7 @@ final class IntersectorIO(config: ColonnadeConfig) extends Bundle {
   *
   * A ray requests its next record as soon as the current one is tested. A shadow ray ends at its first opaque hit.
   */
-final class Intersector(config: ColonnadeConfig) extends Module {
+final class Intersector(config: TraversalConfig) extends Module {
   val io = IO(new IntersectorIO(config))
 
   private val traversal = Module(new Traversal(config))

@@ -2,22 +2,22 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, PopCount}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{PartConfig, PathConfig}
 import colonnade.ray.RaySetupIO
 import colonnade.shading.{ShaderIO, ShadowRaysIO}
 
 /** Counts the contexts in a stage, from those that enter and leave it in each cycle. */
 object Occupancy {
-  def apply(config: ColonnadeConfig, enter: Seq[Bool], exit: Seq[Bool]): UInt = {
-    val count = RegInit(0.U(log2Ceil(config.array.contexts + 1).W))
+  def apply(config: PartConfig, enter: Seq[Bool], exit: Seq[Bool]): UInt = {
+    val count = RegInit(0.U(log2Ceil(config.contexts + 1).W))
     count := count + PopCount(enter) - PopCount(exit)
     count
   }
 }
 
 /** Events of a [[PathUnit]] in one cycle; names as in `Counters`. */
-final class PathEvents(config: ColonnadeConfig) extends Bundle {
-  private def contexts = UInt(log2Ceil(config.array.contexts + 1).W)
+final class PathEvents(config: PathConfig) extends Bundle {
+  private def contexts = UInt(log2Ceil(config.contexts + 1).W)
 
   val raysShadow          = Bool()
   val raysReflection      = Bool()
@@ -38,7 +38,7 @@ final class PathEvents(config: ColonnadeConfig) extends Bundle {
 /** Collects the events of a path unit from its stages. */
 object PathCounters {
   def apply(
-      config:     ColonnadeConfig,
+      config:     PathConfig,
       controller: RtControllerIO,
       raySetup:   RaySetupIO,
       trace:      TracePort,

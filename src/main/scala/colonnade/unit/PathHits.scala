@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Choice, Context, ContextTable}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.environment.HitDistance
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.numbers.{Fixed, Rounding}
@@ -15,7 +15,7 @@ import colonnade.traversal.TriangleHit
   *
   * @param config of the paths
   */
-final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
+final class SurfaceHit(config: PathConfig) extends Bundle {
   val context   = Context(config)
   val isPrimary = Bool()
 
@@ -30,11 +30,11 @@ final class SurfaceHit(config: ColonnadeConfig) extends Bundle {
 object SurfaceHit {
 
   /** The distance of a hit at `t` of a ray that enters the object's box at `tEntry`, in whole units. */
-  def distance(config: ColonnadeConfig, tEntry: UInt, t: Fixed): UInt =
+  def distance(config: PathConfig, tEntry: UInt, t: Fixed): UInt =
     Rounding.floor(tEntry, -config.numbers.gridFraction) +& t.integer.asUInt
 
   /** The record with the attributes of a triangle. */
-  def attributeAddress(config: ColonnadeConfig, scene: SceneMap, id: UInt): UInt = {
+  def attributeAddress(config: PathConfig, scene: SceneMap, id: UInt): UInt = {
     val slotBits = RecordFormats.faceSlotBits(config)
     // With one face per record the sum may be too large: all ones is no legal address
     if (slotBits == 0) Rounding.saturate(scene.attributeBase +& id, id.getWidth)
@@ -43,16 +43,16 @@ object SurfaceHit {
 }
 
 /** Ports of [[PathHits]]. */
-final class PathHitsIO(config: ColonnadeConfig) extends Bundle {
+final class PathHitsIO(config: PathConfig) extends Bundle {
   val start = Input(Bool())
   val scene = Input(new SceneMap(RecordFormats.idBits(config)))
 
   /** To the path unit. */
-  val trace = Flipped(new TracePort(config.ofPaths))
+  val trace = Flipped(new TracePort(config))
 
   /** Rays that enter the object's box, to the traversal units; what they have met. */
-  val rays    = Decoupled(new PreparedRay(config.ofPaths))
-  val results = Flipped(Valid(new TraceResult(config.ofPaths)))
+  val rays    = Decoupled(new PreparedRay(config))
+  val results = Flipped(Valid(new TraceResult(config)))
 
   /** To the column's records, for attributes. */
   val requests   = Decoupled(new RecordRequest(config))
@@ -65,8 +65,8 @@ final class PathHitsIO(config: ColonnadeConfig) extends Bundle {
   *
   * @param config of the column
   */
-final class PathHits(config: ColonnadeConfig) extends Module {
-  private val paths = config.ofPaths
+final class PathHits(config: PathConfig) extends Module {
+  private val paths = config
 
   val io = IO(new PathHitsIO(config))
 
@@ -158,7 +158,7 @@ final class PathHits(config: ColonnadeConfig) extends Module {
 }
 
 /** What the resolution of a hit needs. */
-private final class ClosestHit(config: ColonnadeConfig) extends Bundle {
+private final class ClosestHit(config: PathConfig) extends Bundle {
   val id = UInt(RecordFormats.idBits(config).W)
   val t  = new Fixed(new RayFormats(config.numbers).grid)
 }

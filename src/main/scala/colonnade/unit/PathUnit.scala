@@ -3,14 +3,14 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Arbiter, Decoupled, Valid}
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, UnitPosition}
 import colonnade.ray.{RayRequest, RaySetup}
 import colonnade.shading.{ColourUnit, LitSurface, Shader, ShadowRays, TexturePort}
 
 /** Ports of [[PathUnit]]. `registers` is constant while a frame runs. */
-final class PathUnitIO(config: ColonnadeConfig) extends Bundle {
+final class PathUnitIO(config: PathConfig) extends Bundle {
   val registers = Input(new FrameRegisters(config))
   val positions = Flipped(Decoupled(new UnitPosition(config)))
   val pixels    = Decoupled(new Pixel(config))
@@ -42,10 +42,8 @@ final class PathUnitIO(config: ColonnadeConfig) extends Bundle {
   * }}}
   * RtController holds the state of every context and issues it to its next stage. Pixels leave in any order; their order
   * depends on timing, their values do not.
-  *
-  * @param config of the paths, see [[colonnade.config.ColonnadeConfig.ofPaths]]
   */
-final class PathUnit(config: ColonnadeConfig) extends Module {
+final class PathUnit(config: PathConfig) extends Module {
   val io = IO(new PathUnitIO(config))
 
   private val trace       = io.trace
@@ -117,7 +115,7 @@ final class PathUnit(config: ColonnadeConfig) extends Module {
   controller.accumulated.bits            := colourUnit.colour.bits.context
   bounces.foreach(_.start := primaryRays.start)
   environment.foreach(_.control :<>= controller.environment.get)
-  io.isIdle := controller.idleCount === config.array.contexts.U && assembler.isIdle
+  io.isIdle := controller.idleCount === config.contexts.U && assembler.isIdle
   io.events :=
     PathCounters(config, controller, raySetup, trace, shader, shadowRays, bounces)
 

@@ -3,12 +3,12 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
-import colonnade.config.{ArrayConfig, ColonnadeConfig}
+import colonnade.config.PathConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, Rgb, UnitPosition}
 import colonnade.shading.PathColour
 
 /** Ports of [[PixelAssembler]]. */
-final class PixelAssemblerIO(config: ColonnadeConfig) extends Bundle {
+final class PixelAssemblerIO(config: PathConfig) extends Bundle {
   val background = Input(Rgb(FrameRegisters.colour))
   val allocated  = Flipped(Valid(new AllocatedPixel(config)))
 
@@ -32,12 +32,12 @@ final class PixelAssemblerIO(config: ColonnadeConfig) extends Bundle {
   * A context retires when its tables are read; the pixel follows one cycle later, into a queue that has space
   * for it.
   */
-final class PixelAssembler(config: ColonnadeConfig) extends Module {
+final class PixelAssembler(config: PathConfig) extends Module {
   val io = IO(new PixelAssemblerIO(config))
 
   private val pixels   = ContextTable(config, new UnitPosition(config))
   private val colours  = ContextTable(config, new PathColour(config))
-  private val isObject = Reg(Vec(config.array.contexts, Bool()))
+  private val isObject = Reg(Vec(config.contexts, Bool()))
   when(io.allocated.valid) {
     pixels.write(io.allocated.bits.context, io.allocated.bits.pixel)
     isObject(io.allocated.bits.context) := false.B
@@ -46,7 +46,7 @@ final class PixelAssembler(config: ColonnadeConfig) extends Module {
   when(io.colour.valid) { colours.write(io.colour.bits.context, io.colour.bits) }
 
   /** Finished pixels that wait. Many contexts give a pixel a cycle: two wait while one is on its way. */
-  private val places = if (ArrayConfig.isLarge(config.array.contexts)) 3 else 1
+  private val places = if (config.isLarge) 3 else 1
 
   // Retire a context
   private val done     = io.control.done

@@ -3,18 +3,18 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.formats.{PixelPosition, UnitPosition}
 import colonnade.ray.{CameraRegisters, RayGenerator, RayRequest}
 
 /** A context that gets a pixel. */
-final class AllocatedPixel(config: ColonnadeConfig) extends Bundle {
+final class AllocatedPixel(config: PathConfig) extends Bundle {
   val context = Context(config)
   val pixel   = new UnitPosition(config)
 }
 
 /** Ports of [[PrimaryRays]]. */
-final class PrimaryRaysIO(config: ColonnadeConfig) extends Bundle {
+final class PrimaryRaysIO(config: PathConfig) extends Bundle {
   val camera    = Input(new CameraRegisters(config))
   val positions = Flipped(Decoupled(new UnitPosition(config)))
 
@@ -34,7 +34,7 @@ final class PrimaryRaysIO(config: ColonnadeConfig) extends Bundle {
   *
   * Throughput: that of [[colonnade.ray.RayGenerator]], while contexts are idle.
   */
-final class PrimaryRays(config: ColonnadeConfig) extends Module {
+final class PrimaryRays(config: PathConfig) extends Module {
   val io = IO(new PrimaryRaysIO(config))
 
   private val generator = Module(new RayGenerator(config))

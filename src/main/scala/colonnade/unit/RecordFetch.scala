@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Mux1H, MuxLookup, OHToUInt, PopCount, PriorityEncoderOH}
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 
 /** Fetches records for contexts: a small file of fill buffers with miss handling and snooping. {{{
   *
@@ -25,13 +25,13 @@ import colonnade.config.ColonnadeConfig
   * record's broadcast, or two cycles after the request if a buffer holds the record. With `units.extraSlices` it is three,
   * or five.
   */
-final class RecordFetch(config: ColonnadeConfig) extends Module {
+final class RecordFetch(config: PartConfig) extends Module {
   val io = IO(new RecordFetchIO(config))
 
   private val slice    = TimingSlice.extra(config)
   private val snooping = config.columnBvhMemory.snooping.B
   private val buffers  = Seq.fill(config.columnBvhMemory.recordBuffers)(new RecordBuffer(config))
-  private val fetches  = Seq.fill(config.array.contexts)(new ContextFetch(config))
+  private val fetches  = Seq.fill(config.contexts)(new ContextFetch(config))
 
   // What a fetch finds in the buffers, and in full ones: by context and buffer
   private val lookup = Module(new RecordLookup(config)).io

@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Mux1H, PriorityEncoder, PriorityEncoderOH, Valid}
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.formats.{Banks, RecordBroadcast}
 
 /** Fill: a broadcast goes to the buffer that was reserved for it. With snooping it goes to an available buffer otherwise,
@@ -17,7 +17,7 @@ import colonnade.formats.{Banks, RecordBroadcast}
   * @param isAvailable by buffer: no context needs its record
   */
 private[unit] final class RecordFill(
-    config:       ColonnadeConfig,
+    config:       PartConfig,
     row:          UInt,
     val incoming: Seq[Valid[RecordBroadcast]],
     fetches:      Seq[ContextFetch],

@@ -3,18 +3,18 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Mux1H, OHToUInt, PriorityEncoderOH, RegEnable, Valid}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 
 /** A context with its kind of record and the buffer that holds it, one-hot. */
-final class RecordGrantee(config: ColonnadeConfig) extends Bundle {
+final class RecordGrantee(config: PartConfig) extends Bundle {
   val context = Context(config)
   val kind    = RecordKind()
   val buffer  = Vec(config.columnBvhMemory.recordBuffers, Bool())
 }
 
 /** Ports of [[RecordGrant]]. */
-final class RecordGrantIO(config: ColonnadeConfig) extends Bundle {
-  private val contexts = config.array.contexts
+final class RecordGrantIO(config: PartConfig) extends Bundle {
+  private val contexts = config.contexts
 
   /** By context: its record is there; the kind; and the buffer that holds it, one-hot. */
   val isReady = Input(Vec(contexts, Bool()))
@@ -38,7 +38,7 @@ final class RecordGrantIO(config: ColonnadeConfig) extends Bundle {
   * the buffer may be replaced in that cycle. Triangles have priority, because the triangle unit starts only in every
   * fourth cycle. Attributes are second and nodes last.
   */
-final class RecordGrant(config: ColonnadeConfig) extends Module {
+final class RecordGrant(config: PartConfig) extends Module {
   val io = IO(new RecordGrantIO(config))
 
   private val firstOfKind = RecordKind.all.map { kind =>

@@ -3,12 +3,12 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Mux1H, RegEnable, Valid}
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.formats.RecordFormats
 
 /** Ports of [[RecordLookup]]. */
-final class RecordLookupIO(config: ColonnadeConfig) extends Bundle {
-  private val contexts = config.array.contexts
+final class RecordLookupIO(config: PartConfig) extends Bundle {
+  private val contexts = config.contexts
   private val buffers  = config.columnBvhMemory.recordBuffers
 
   val fetches = Flipped(Vec(RecordFetch.ports, Valid(new FetchRequest(config))))
@@ -32,13 +32,13 @@ final class RecordLookupIO(config: ColonnadeConfig) extends Bundle {
   * behind the comparators, and behind the choice of the fetch's port. A buffer that takes another address meanwhile does
   * not match.
   */
-final class RecordLookup(config: ColonnadeConfig) extends Module {
+final class RecordLookup(config: PartConfig) extends Module {
   val io = IO(new RecordLookupIO(config))
 
   private val slice = TimingSlice.extra(config)
 
   // By context and port
-  private val cameFrom = Seq.tabulate(config.array.contexts) { context =>
+  private val cameFrom = Seq.tabulate(config.contexts) { context =>
     VecInit(io.fetches.map(port => RegNext(port.valid && port.bits.context === context.U, false.B)))
   }
 

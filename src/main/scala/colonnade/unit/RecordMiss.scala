@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{DecoupledIO, Mux1H, PriorityEncoder, PriorityEncoderOH}
 import colonnade.common.TimingSlice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PartConfig
 import colonnade.formats.RecordRequest
 
 /** Miss: requests the record of the first context whose record no buffer holds or awaits, and reserves a buffer for it. With
@@ -15,7 +15,7 @@ import colonnade.formats.RecordRequest
   * @param isAvailable by buffer: no context needs its record
   */
 private[unit] final class RecordMiss(
-    config:      ColonnadeConfig,
+    config:      PartConfig,
     requests:    DecoupledIO[RecordRequest],
     fetches:     Seq[ContextFetch],
     buffers:     Seq[RecordBuffer],

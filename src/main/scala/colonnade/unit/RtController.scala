@@ -3,7 +3,7 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Mux1H, PopCount}
 import colonnade.common.{Choice, First}
-import colonnade.config.{ArrayConfig, ColonnadeConfig}
+import colonnade.config.PathConfig
 
 import scala.collection.mutable
 
@@ -23,11 +23,11 @@ import scala.collection.mutable
   * Contexts are tokens: there are `contexts` of them, so no queue for contexts overflows. In each cycle, at most one ended
   * ray is resolved, one context leaves shadowTest, and one pixel retires; other transitions are independent.
   */
-final class RtController(config: ColonnadeConfig) extends Module {
-  private val contexts = config.array.contexts
+final class RtController(config: PathConfig) extends Module {
+  private val contexts = config.contexts
 
   /** The number of contexts takes a cycle, and so does a choice of one of them; the latter with extra slices, too. */
-  private val isLarge = ArrayConfig.isLarge(contexts)
+  private val isLarge = config.isLarge
 
   val io = IO(new RtControllerIO(config))
 

@@ -3,14 +3,14 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{log2Ceil, PriorityEncoder}
 import colonnade.common.Choice
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.shading.Occlusion
 
 /** What [[RtController]] knows of the shadow rays of each context. They follow the lights by their number.
   *
   * Nothing is reset: the results of lights that need no shadow ray are ignored.
   */
-private[unit] final class ShadowProgress(config: ColonnadeConfig) {
+private[unit] final class ShadowProgress(config: PathConfig) {
   private val lights = config.frame.lights
 
   private val needs   = new FlagTable(config, UInt(lights.W))

@@ -3,13 +3,13 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.PathConfig
 import colonnade.ray.PreparedRay
 import colonnade.shading.{Occlusion, ShadeRequest}
 import colonnade.traversal.TriangleHit
 
 /** From rays to hits with their attributes, seen from the unit that follows the paths. */
-final class TracePort(config: ColonnadeConfig) extends Bundle {
+final class TracePort(config: PathConfig) extends Bundle {
   val rays    = Decoupled(new PreparedRay(config))
   val control = Flipped(new TraceControl(config))
 
@@ -28,10 +28,8 @@ final class TracePort(config: ColonnadeConfig) extends Bundle {
 }
 
 /** What a ray has met, from a traversal unit.
-  *
-  * @param config of the paths, see [[colonnade.config.ColonnadeConfig.ofPaths]]
   */
-final class TraceResult(config: ColonnadeConfig) extends Bundle {
+final class TraceResult(config: PathConfig) extends Bundle {
   val context = Context(config)
   val hasHit  = Bool()
 

@@ -3,12 +3,12 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.TraversalConfig
 import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
 import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalStack, TraversalStep}
 
 /** Ports of [[Traversal]]. */
-final class TraversalIO(config: ColonnadeConfig) extends Bundle {
+final class TraversalIO(config: TraversalConfig) extends Bundle {
 
   /** Resets `deepest`. */
   val clear = Input(Bool())
@@ -39,11 +39,11 @@ final class TraversalIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Decides which record each ray visits next: BoxUnit and TraversalStack, or LinearScan without a BVH. */
-final class Traversal(config: ColonnadeConfig) extends Module {
+final class Traversal(config: TraversalConfig) extends Module {
   val io = IO(new TraversalIO(config))
 
   /** Contexts are tokens, so this queue never overflows. */
-  private val resume = Queue(io.resume, config.array.contexts)
+  private val resume = Queue(io.resume, config.contexts)
 
   if (config.geometry.bvh) {
     val boxUnit = Module(new BoxUnit(config))
@@ -93,7 +93,7 @@ final class Traversal(config: ColonnadeConfig) extends Module {
 object Traversal {
 
   /** The first record of every ray: the root node, or without a BVH the first triangle record. */
-  def root(config: ColonnadeConfig, scene: SceneMap): NodeRef = {
+  def root(config: TraversalConfig, scene: SceneMap): NodeRef = {
     val root = Wire(new NodeRef(config))
     root.isLeaf  := (!config.geometry.bvh).B
     root.address := (if (config.geometry.bvh) 0.U else scene.triangleBase)

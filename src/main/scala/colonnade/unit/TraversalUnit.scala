@@ -4,19 +4,19 @@ import chisel3._
 import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{log2Ceil, Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.{Context, First}
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{PathConfig, TraversalConfig}
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.ray.PreparedRay
 import colonnade.traversal.TriangleLanesIO
 
 /** Events of a [[TraversalUnit]] in one cycle. */
-final class TraversalEvents(config: ColonnadeConfig) extends Bundle {
+final class TraversalEvents(config: TraversalConfig) extends Bundle {
   val intersector = new IntersectorEvents(config)
   val fetch       = new FetchEvents(config)
 }
 
 /** Ports of [[TraversalUnit]]. `scene` is constant while a frame runs; `start` precedes the first ray. */
-final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
+final class TraversalUnitIO(config: TraversalConfig) extends Bundle {
   val row        = Input(UInt(log2Ceil(config.recordRequesters).W))
   val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
   val start      = Input(Bool())
@@ -24,7 +24,7 @@ final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
 
   /** A ray that enters the object's box, with the context of its path; only in a cycle with `isFree`. */
-  val rays   = Flipped(Valid(new PreparedRay(config.ofPaths)))
+  val rays   = Flipped(Valid(new PreparedRay(PathConfig(config.device))))
   val isFree = Output(Bool())
 
   /** To the triangle units of the group of rows; a record waits for one. */
@@ -32,7 +32,7 @@ final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
   val waitsForTriangles = Output(Bool())
 
   /** In any order. */
-  val results = Decoupled(new TraceResult(config.ofPaths))
+  val results = Decoupled(new TraceResult(PathConfig(config.device)))
   val events  = Output(new TraversalEvents(config))
 }
 
@@ -45,10 +45,10 @@ final class TraversalUnitIO(config: ColonnadeConfig) extends Bundle {
   * ends, so a unit becomes free as long as `results` are taken.
   */
 @instantiable
-final class TraversalUnit(config: ColonnadeConfig) extends Module {
+final class TraversalUnit(config: TraversalConfig) extends Module {
   @public val io: TraversalUnitIO = IO(new TraversalUnitIO(config))
 
-  private val contexts    = config.array.contexts
+  private val contexts    = config.contexts
   private val fetch       = Module(new FetchStage(config)).io
   private val intersector = Module(new Intersector(config)).io
 
@@ -57,7 +57,7 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   private val isShadow = Reg(Vec(contexts, Bool()))
 
   /** The context of the path whose ray a context traces. */
-  private val owners = Reg(Vec(contexts, Context(config.ofPaths)))
+  private val owners = Reg(Vec(contexts, Context(PathConfig(config.device))))
 
   // Allocate a context
   private val free = First(isUsed.map(!_)).bits
@@ -94,8 +94,8 @@ final class TraversalUnit(config: ColonnadeConfig) extends Module {
   intersector.ended.foreach(ended => when(ended.valid) { hasEnded(ended.bits) := true.B })
 
   // Results: the hit's details are read in one cycle, and the result leaves in the next
-  private val result = Wire(Decoupled(new TraceResult(config.ofPaths)))
-  private val queue  = Module(new Queue(new TraceResult(config.ofPaths), 1))
+  private val result = Wire(Decoupled(new TraceResult(PathConfig(config.device))))
+  private val queue  = Module(new Queue(new TraceResult(PathConfig(config.device)), 1))
   private val ended  = First(hasEnded).bits
   private val reads  = hasEnded.asUInt.orR && queue.io.enq.ready && !result.valid
   private val reader = RegEnable(ended, reads)

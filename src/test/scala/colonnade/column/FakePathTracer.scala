@@ -3,6 +3,7 @@ package colonnade.column
 import chisel3._
 import chisel3.util.random.LFSR
 import chisel3.util.{Decoupled, Mux1H, PopCount, RRArbiter, Valid}
+import colonnade.TestParts._
 import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Pixel, PixelPosition, RecordBroadcast, RecordFormats, RecordRequest, UnitPosition}

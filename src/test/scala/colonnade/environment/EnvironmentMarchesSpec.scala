@@ -3,6 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.common.Context
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{EnvironmentView, Load}
@@ -79,7 +80,7 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
 
     def step(willing: Double): Unit = {
       val free =
-        (0 until config.array.contexts).filterNot(c => inFlight.contains(c) || offered.exists(_.ray.context == c))
+        (0 until config.units.pathContexts).filterNot(c => inFlight.contains(c) || offered.exists(_.ray.context == c))
       val next = Option.when(free.nonEmpty && random.nextInt(6) == 0) {
         nextRay().copy(context = free(random.nextInt(free.size)))
       }
@@ -123,7 +124,7 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   private val base   = TestConfigs.withEnvironment(TestConfigs.environment)
-  private val config = base.copy(array = base.array.copy(contexts = 12), units = base.units.copy(marches = 2))
+  private val config = base.copy(units = base.units.copy(pathContexts = 12, marches = 2))
 
   it should "answer each request as the model does, in two marches and the pipeline" in
     test(new EnvironmentMarchesHarness(config)).withAnnotations(Simulation.verilator) { dut =>

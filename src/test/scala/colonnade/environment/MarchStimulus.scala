@@ -178,7 +178,7 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
   /** See [[ViewCase.stepWidths]]. */
   private def stepWidths(less: Int): Seq[BigInt] = ViewCase.stepWidths(config, frame).map(_ - less)
 
-  private def context(): Int = random.nextInt(config.array.contexts)
+  private def context(): Int = random.nextInt(config.units.pathContexts)
 
   /** Numbers of all sizes, and powers of two. */
   private def signed(bits: Int): BigInt = {

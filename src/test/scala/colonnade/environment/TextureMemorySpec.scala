@@ -3,6 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.config.{ColonnadeConfig, PhysicalAttributeMemoryConfig, TextureLayout}
 import colonnade.formats.{AlbedoEntry, AttributeMemories, Load}
 import colonnade.{Packed, Simulation, TestConfigs}

@@ -4,6 +4,7 @@ import chisel3._
 import chisel3.util.log2Ceil
 import chiseltest._
 import colonnade.TestConfigs
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Vec3
 import org.scalatest.flatspec.AnyFlatSpec
@@ -194,7 +195,7 @@ object RayGeneratorSpec {
     val bits = config.numbers.coordinateBits
     val corners: Seq[BigInt] = Seq(0, (BigInt(1) << bits) - 1)
     val extreme = for (x <- corners; y <- corners) yield Pixel(1, x, y)
-    extreme ++ Seq.fill(count)(Pixel(random.nextInt(config.array.contexts), BigInt(bits, random), BigInt(bits, random)))
+    extreme ++ Seq.fill(count)(Pixel(random.nextInt(config.units.pathContexts), BigInt(bits, random), BigInt(bits, random)))
   }
 
   /** The pixels of a tile in Morton order. */
@@ -203,7 +204,7 @@ object RayGeneratorSpec {
     val corner                          = Seq.fill(2)(BigInt(config.numbers.coordinateBits - levels, random) << levels)
     def bits(code: Int, from: Int): Int = (0 until levels).map(level => (code >> (2 * level + from) & 1) << level).sum
     (0 until 1 << 2 * levels).map { code =>
-      Pixel(random.nextInt(config.array.contexts), corner(0) + bits(code, 0), corner(1) + bits(code, 1))
+      Pixel(random.nextInt(config.units.pathContexts), corner(0) + bits(code, 0), corner(1) + bits(code, 1))
     }
   }
 

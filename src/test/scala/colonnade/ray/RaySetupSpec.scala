@@ -2,6 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.{Always, Matrix, Simulation, TestConfigs}
 import colonnade.config.{ColonnadeConfig, UnitsConfig}
 import colonnade.numbers.Fixed

@@ -63,7 +63,7 @@ final class SetupStimulus(config: ColonnadeConfig, random: Random) {
   private def steps(units: BigInt): BigInt = if (fraction >= 0) units << fraction else units >> -fraction
 
   private def request(origin: Seq[BigInt], dir: Seq[BigInt]): SetupRequest =
-    SetupRequest(random.nextInt(config.array.contexts), random.nextBoolean(), origin, dir)
+    SetupRequest(random.nextInt(config.units.pathContexts), random.nextBoolean(), origin, dir)
 
   private def extremes(low: Seq[BigInt], high: Seq[BigInt]): Seq[SetupRequest] = {
     val least  = -(BigInt(1) << (numbers.sceneBits - 1))

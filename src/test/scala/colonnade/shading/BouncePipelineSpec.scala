@@ -1,6 +1,7 @@
 package colonnade.shading
 
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.{Always, Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -15,7 +16,7 @@ class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "BouncePipeline"
 
   private val configs = Seq(0, 2, 4).map(TestConfigs.formats).map(config =>
-    config.copy(array = config.array.copy(contexts = 40))
+    config.copy(units = config.units.copy(pathContexts = 40))
   )
 
   for (config <- configs)
@@ -57,7 +58,7 @@ class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       stalls: Double
   ): Int = {
     val answers = Model.answers(config, hits.map(_.words(offset)), "bounce")
-    val free    = mutable.Queue.from(0 until config.array.contexts)
+    val free    = mutable.Queue.from(0 until config.units.pathContexts)
     val flying  = mutable.Map.empty[Int, Int]
     var sent    = 0
     var poked   = -1

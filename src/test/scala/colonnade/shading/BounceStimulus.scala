@@ -131,7 +131,7 @@ final class BounceStimulus(config: ColonnadeConfig, random: Random) {
 
   /** Components of any size, independent of each other. */
   def any(): BounceCase = BounceCase(
-    context = random.nextInt(config.array.contexts),
+    context = random.nextInt(config.units.pathContexts),
     axis = random.nextInt(3),
     negative = random.nextBoolean(),
     shear = Seq.fill(2)(if (chance(8)) steepest else natural(numbers.shearFraction)).map(s =>

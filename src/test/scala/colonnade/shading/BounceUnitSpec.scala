@@ -1,6 +1,7 @@
 package colonnade.shading
 
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.StreamTester
 import colonnade.{Model, Simulation, TestConfigs}

@@ -83,7 +83,7 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
 final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
   import ColourEvent._
 
-  private val contexts = config.array.contexts
+  private val contexts = config.units.pathContexts
   private val todo     = Seq.fill(contexts)(mutable.Queue.empty[ColourEvent])
   private val waits    = Array.fill(contexts)(Option.empty[End])
 

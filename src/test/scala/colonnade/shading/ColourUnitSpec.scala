@@ -1,6 +1,7 @@
 package colonnade.shading
 
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.{Always, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -17,7 +18,7 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   } {
     val base   = if (hasEnvironment) TestConfigs.withEnvironment(TestConfigs.environment) else TestConfigs.tiny
     val config = base.copy(
-      array = base.array.copy(contexts = 16),
+      units = base.units.copy(pathContexts = 16),
       frame = base.frame.copy(lights = lights, maxBounces = maxBounces, emission = lights == 3)
     )
     val where = if (hasEnvironment) " in an environment" else ""
@@ -29,7 +30,7 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
         val script = new ColourScript(config, random)
         val driver = new ColourDriver(dut.io, config)
         // By context, and those of the paths that have ended
-        var events  = Seq.fill(config.array.contexts)(Seq.empty[ColourEvent])
+        var events  = Seq.fill(config.units.pathContexts)(Seq.empty[ColourEvent])
         var values  = script.registers()
         var checked = 0
         dut.clock.setTimeout(0)
@@ -60,13 +61,13 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
           script.lights = if (round < 3) lights - round.min(lights) else lights
           driver.registers(values, script.lights)
           events = events.map(_ => Nil)
-          play(Seq.fill(config.array.contexts)(Seq.fill(12)(script.path()).flatten), Seq(0.0, 0.3, 0.9)(round % 3))
+          play(Seq.fill(config.units.pathContexts)(Seq.fill(12)(script.path()).flatten), Seq(0.0, 0.3, 0.9)(round % 3))
         }
 
-        assert(checked == 4 * 12 * config.array.contexts)
+        assert(checked == 4 * 12 * config.units.pathContexts)
 
         // Throughput: one shadowed pixel does not delay the others
-        val contexts = config.array.contexts
+        val contexts = config.units.pathContexts
         val seen     = script.surface()
 
         def cycles(name: String, most: Int)(event: Int => ColourEvent): Unit = {

@@ -3,6 +3,7 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.Queue
 import chisel3.util.random.LFSR
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 
 /** A shader, with a texture whose texels are made of their position and come in order, after a random time. */

@@ -175,7 +175,7 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
 
   /** Anywhere in an environment, at most half as far as the scene's size; with any normal, or none. */
   def environmentPoint(): EnvironmentPointCase = EnvironmentPointCase(
-    context = random.nextInt(config.array.contexts),
+    context = random.nextInt(config.units.pathContexts),
     point = xyz(signed(if (random.nextBoolean()) numbers.gridBits else numbers.sceneBits - 1)),
     normal = if (chance(10)) xyz(signed(NumberFormats.normalBits)) else if (chance(20)) xyz(BigInt(0)) else anyUnit,
     albedo = colour(),
@@ -216,7 +216,7 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
   ): HitCase = {
     val steepest = BigInt(1) << numbers.shearFraction
     HitCase(
-      context = random.nextInt(config.array.contexts),
+      context = random.nextInt(config.units.pathContexts),
       axis = random.nextInt(3),
       negative = xyz(random.nextBoolean()),
       origin = origin,

@@ -2,6 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.common.ModuloSchedule
 import colonnade.config.ColonnadeConfig
 import colonnade.{Always, Simulation, TestConfigs}
@@ -44,7 +45,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       frame = TestConfigs.tiny.frame.copy(lights = 5)
     )),
     TestConfigs.withPrecision(64, 64, 64).copy(frame = TestConfigs.tiny.frame.copy(maxBounces = 0))
-  ).map(config => config.copy(array = config.array.copy(contexts = 16)))
+  ).map(config => config.copy(units = config.units.copy(pathContexts = 16)))
 
   for ((config, seed) <- configs.zipWithIndex)
     it should s"equal the shader with ${config.precision}, ${config.frame.lights} lights and ${config.frame.maxBounces} bounces" taggedAs Always.unless(
@@ -60,7 +61,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
           pokeBounces(dut.registers, config, random)
           abandon(dut, stimulus.surfaceHit(light), random)
           // A context has one hit at a time
-          val inputs = Seq.tabulate(config.array.contexts) { context =>
+          val inputs = Seq.tabulate(config.units.pathContexts) { context =>
             random.nextInt(if (config.hasEnvironment) 8 else 6) match {
               case 0 => Left(stimulus.anyHit().copy(context = context))
               case 1 => Left(stimulus.withoutSmoothNormal().copy(context = context))

@@ -2,6 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.numbers.FixedPorts._
 import colonnade.ray.RayRequest
 import colonnade.{Always, TestConfigs}
@@ -14,11 +15,11 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ShadowRays"
 
   private val configs = Seq(TestConfigs.tiny, TestConfigs.withPrecision(16, 16, 32)).map(config =>
-    config.copy(array = config.array.copy(contexts = 16))
+    config.copy(units = config.units.copy(pathContexts = 16))
   ) :+ TestConfigs.withPrecision(64, 64, 64)
 
   for (config <- configs)
-    it should s"send rays from remembered surfaces at ${config.precision} with ${config.array.contexts} contexts" taggedAs Always.unless(
+    it should s"send rays from remembered surfaces at ${config.precision} with ${config.units.pathContexts} contexts" taggedAs Always.unless(
       config == configs(1)
     ) in
       test(new ShadowRays(config)) { dut =>
@@ -33,7 +34,7 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
           axis.poke(value)
 
         for (stalls <- Seq(0.0, 0.5, 0.5, 0.8)) {
-          val surfaces = Seq.fill(config.array.contexts)(Seq.fill(3)(signed(numbers.sceneBits)))
+          val surfaces = Seq.fill(config.units.pathContexts)(Seq.fill(3)(signed(numbers.sceneBits)))
           for ((surface, context) <- surfaces.zipWithIndex) {
             dut.io.surface.valid.poke(true)
             dut.io.surface.bits.context.poke(context)
@@ -41,7 +42,7 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
             dut.clock.step()
           }
           dut.io.surface.valid.poke(false)
-          val all            = for (c <- 0 until config.array.contexts; l <- 0 until config.frame.lights) yield (c, l)
+          val all            = for (c <- 0 until config.units.pathContexts; l <- 0 until config.frame.lights) yield (c, l)
           val asks           = Seq.fill(4)(random.shuffle(all)).flatten
           val (rays, cycles) = exchange(dut, asks, random, stalls)
           assert(rays == asks.map { case (context, light) =>

@@ -3,6 +3,7 @@ package colonnade.traversal
 import chisel3._
 import chiseltest._
 import colonnade.TestConfigs
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import org.scalatest.flatspec.AnyFlatSpec
 

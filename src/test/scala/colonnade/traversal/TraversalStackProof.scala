@@ -2,6 +2,7 @@ package colonnade.traversal
 
 import chisel3._
 import chisel3.util.{log2Ceil, Fill, PriorityEncoder, RegEnable}
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.Fixed
 

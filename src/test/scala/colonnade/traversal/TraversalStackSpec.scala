@@ -2,6 +2,7 @@ package colonnade.traversal
 
 import chisel3._
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.traversal.StackReference.Child
 import colonnade.{Always, Proofs, TestConfigs}

@@ -2,6 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{log2Ceil, PopCount}
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 
 /** Drives [[AttributeFetch]] with hits of any contexts at any time, one of a context at a time, legal and beyond the last

@@ -2,6 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.StoredRay
 import colonnade.ray.RayRequest
@@ -57,7 +58,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private var deferred = Set.empty[Int]
   private var resumed  = Map.empty[Int, Boolean]
   private var offered  = Option.empty[Int]
-  private val counts   = Array.fill(config.array.contexts)(0)
+  private val counts   = Array.fill(config.units.pathContexts)(0)
   private var issued   = 0
   private var untraced = 0
 

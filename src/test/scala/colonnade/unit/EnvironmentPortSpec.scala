@@ -2,6 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{EnvironmentRay, StoredRay}
 import colonnade.ray.RayRequest
@@ -20,7 +21,7 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
     test(new EnvironmentPortHarness(config)) { dut =>
       val random               = new Random(4)
       val (primary, bounce)    = (new Packed(new RayRequest(config)), new Packed(new StoredRay(config)))
-      val contexts             = config.array.contexts
+      val contexts             = config.units.pathContexts
       val port                 = dut.io
       var stored               = Map.empty[Int, Map[String, BigInt]]
       var (objects, bypassing) = (0, 0)

@@ -2,6 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 import colonnade.ray.TracedRay

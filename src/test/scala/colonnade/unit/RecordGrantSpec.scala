@@ -5,6 +5,7 @@ import colonnade.TestConfigs
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
+import colonnade.TestParts._
 
 /** The first ready context of the kind with the highest priority is served in the next cycle. */
 class RecordGrantSpec extends AnyFlatSpec with ChiselScalatestTester {

@@ -5,6 +5,7 @@ import colonnade.TestConfigs
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
+import colonnade.TestParts._
 
 /** A fetch matches the buffers that have its address from the comparison until the match is used. */
 class RecordLookupSpec extends AnyFlatSpec with ChiselScalatestTester {

@@ -3,7 +3,8 @@ package colonnade.unit
 import chisel3._
 import chisel3.experimental.SourceInfo
 import chisel3.util.{log2Ceil, PopCount, UIntToOH, Valid}
-import colonnade.config.{ArrayConfig, ColonnadeConfig}
+import colonnade.TestParts._
+import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.shading.Occlusion
 
 /** Drives an [[RtController]] with any events of its stages. A stage answers for each context that it holds once, at any
@@ -13,10 +14,10 @@ import colonnade.shading.Occlusion
   * pixels; if there are more, the others stay idle.
   */
 private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Module {
-  private val contexts = config.array.contexts
+  private val contexts = config.units.pathContexts
   private val lights   = config.frame.lights
   private val used     = 2
-  private val isLarge  = ArrayConfig.isLarge(contexts)
+  private val isLarge  = PathConfig(config).isLarge
   require(contexts >= used && lights >= 2)
 
   val io = IO(new RtControllerIO(config))

@@ -11,7 +11,7 @@ class RtControllerProofSpec extends AnyFlatSpec with ChiselScalatestTester with 
   private val environment = TestConfigs.withEnvironment(TestConfigs.environment)
 
   private def config(contexts: Int, base: ColonnadeConfig): ColonnadeConfig =
-    base.copy(array = base.array.copy(contexts = contexts))
+    base.copy(units = base.units.copy(pathContexts = contexts))
 
   for ((contexts, cycles) <- Seq((2, 13), (17, 13)))
     it should s"give each of $contexts paths to its stages, once and in order" in

@@ -1,6 +1,7 @@
 package colonnade.unit
 
 import chiseltest._
+import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -10,7 +11,7 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "RtController"
 
   private def config(contexts: Int, base: ColonnadeConfig = TestConfigs.tiny): ColonnadeConfig =
-    base.copy(array = base.array.copy(contexts = contexts))
+    base.copy(units = base.units.copy(pathContexts = contexts))
 
   for ((contexts, extraSlices) <- Seq((1, false), (3, false), (3, true), (16, false)))
     it should s"follow $contexts contexts through random events, extra slices $extraSlices" in

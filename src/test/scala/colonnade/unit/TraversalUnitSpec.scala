@@ -3,7 +3,8 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import chiseltest._
-import colonnade.config.ColonnadeConfig
+import colonnade.TestParts._
+import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.formats.{RecordBroadcast, RecordFormats, SceneMap}
 import colonnade.ray.{PreparedRay, SetupCase, SetupRequest}
 import colonnade.shading.Occlusion
@@ -174,8 +175,8 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
     }
   }
 
-  private val packedRay = new Packed(new PreparedRay(config.ofPaths))
-  private val result    = new Packed(new TraceResult(config.ofPaths))
+  private val packedRay = new Packed(new PreparedRay(PathConfig(config)))
+  private val result    = new Packed(new TraceResult(PathConfig(config)))
   private val inFlight  = Seq.fill(banks)(mutable.Queue.empty[(Int, Int, Int)]) // (due, address, row)
 
   /** The ray of each context of the path unit that is traced. */
