@@ -41,8 +41,11 @@ final class ColonnadeAxi(
 
   private val streamGuard = streamPins.map(_ => Module(new StreamGuard(shell.busBytes)))
 
-  // What a soft reset resets, by a register: its output reaches all of the device
-  private val clears = TimingSlice.flag(reset.asBool || control.io.resetNext, atReset = true)
+  // What a soft reset resets. An extra slice drives it from a register; the device then runs for a cycle after power-up
+  private val slice  = TimingSlice.extra(config)
+  private val clears =
+    if (slice.isThere) slice.flag(reset.asBool || control.io.resetNext, atReset = true)
+    else reset.asBool || control.io.reset
   private val device = withReset(clears)(Module(new Colonnade(config, pathTracer)))
   private val writer = withReset(clears)(Module(new FramebufferWriter(config, shell)))
   private val loader = withReset(clears)(Module(new ImageLoader(config, shell)))
