@@ -202,7 +202,7 @@ class Manifest:
         if data["version"] > VERSION:
             raise UserError(f"the manifest has version {data['version']}, this host reads {VERSION} at most: update it")
         if ((data.get("attributes") or {}).get("sizes") or {}).get("sliding"):
-            raise UserError("the manifest is of a design with slic maps, which this host cannot pack: generate it again")
+            raise UserError("the manifest is of a design with slic maps, which no host packs: generate it again")
         bits = int(data["records"]["bits"])
         return Manifest(
             config=data["config"],

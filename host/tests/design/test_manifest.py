@@ -64,7 +64,7 @@ def test_a_manifest_is_read_from_its_file(tmp_path: Path, manifest: Manifest, ma
     assert Manifest.load(tmp_path) == manifest
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"version": 1}', '{"version": 99}'])
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"version": 1}'])
 def test_an_invalid_manifest_is_one_line(tmp_path: Path, text: str) -> None:
     file = tmp_path / "manifest.json"
     file.write_text(text)

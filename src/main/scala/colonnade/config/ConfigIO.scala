@@ -2,7 +2,7 @@ package colonnade.config
 
 import java.io.IOException
 import java.nio.charset.StandardCharsets.UTF_8
-import java.nio.file.{Files, InvalidPathException, Path, Paths}
+import java.nio.file.{Files, InvalidPathException, Paths}
 
 /** Configurations as JSON, for which [[ColonnadeConfig]] has the names, types and defaults of all keys; `precision` may also
   * be written in the paper's notation, as in `"32b32s64d"`. No other key is accepted. Files of older versions are
@@ -22,14 +22,12 @@ object ConfigIO {
     * @param overrides `path.to.key=value`, applied in order; a value is JSON, or else a string without quotes
     */
   def load(name: String, overrides: Seq[String] = Nil): ColonnadeConfig = {
-    def preset(name: String) = completed(ConfigMigration(parse(presetText(name), name)))
-    val json                 = name match {
-      case known if presets.contains(known) => preset(known)
-      case PrecisionConfig(bits)            =>
-        Seq(s"precision=$bits", "geometry.triangleBits=null").foldLeft(preset("small"))(withOverride)
-      case file => completed(ConfigMigration(parse(fileText(file), file)))
+    val (base, settings) = name match {
+      case PrecisionConfig(bits) => ("small", Seq(s"precision=$bits", "geometry.triangleBits=null"))
+      case other                 => (other, Nil)
     }
-    built(overrides.foldLeft(json)(withOverride))
+    val text = if (presets.contains(base)) resource(s"$base.json") else fileText(base)
+    built((settings ++ overrides).foldLeft(completed(ConfigMigration(parse(text, base))))(withOverride))
   }
 
   def read(json: ujson.Value): ColonnadeConfig = built(completed(ConfigMigration(json)))
@@ -82,13 +80,9 @@ object ConfigIO {
     if (!Files.isRegularFile(path)) throw missing(s"there is no configuration '$name'")
     if (Files.size(path) > maxBytes)
       throw new ConfigError(s"$name is too large: a configuration may have $maxBytes bytes")
-    try text(path)
+    try Files.readString(path, UTF_8)
     catch { case failure: IOException => throw new ConfigError(s"cannot read $name as text: ${failure.getMessage}") }
   }
-
-  private def text(path: Path): String = Files.readString(path, UTF_8)
-
-  private def presetText(name: String): String = resource(s"$name.json")
 
   /** A file that the build puts beside the classes. */
   private def resource(name: String): String = {

@@ -26,8 +26,8 @@ private[config] object ConfigMigration {
         Seq("rayInterval" -> ujson.Num(ray), "shadeInterval" -> ujson.Num(shade))
       },
       renamed("units", "shortPaths", "extraSlices"),
-      replaced("units", "marches")(unlessZero("marches")),
-      replaced("units", "pathContexts")(unlessZero("pathContexts"))
+      zeroIsDefault("units", "marches"),
+      zeroIsDefault("units", "pathContexts")
     )
   )
 
@@ -60,7 +60,6 @@ private[config] object ConfigMigration {
   private def renamed(section: String, key: String, name: String): Change =
     replaced(section, key)(value => Seq(name -> value))
 
-  /** A number of which 0 stood for a device without the unit: its default. */
-  private def unlessZero(key: String)(value: ujson.Value): Seq[(String, ujson.Value)] =
-    Seq(key -> value).filterNot(_._2 == ujson.Num(0))
+  private def zeroIsDefault(section: String, key: String): Change =
+    replaced(section, key)(value => Seq(key -> value).filterNot(_._2 == ujson.Num(0)))
 }

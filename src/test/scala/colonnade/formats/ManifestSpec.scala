@@ -6,6 +6,8 @@ import org.scalacheck.Prop
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
+import java.nio.file.{Files, Paths}
+
 class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
   behavior of "Manifest"
 
@@ -148,6 +150,13 @@ class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
         settings.map(_.address) == settings.scanLeft(256)((address, register) => address + register.words).init
       }
     }
+
+  it should "keep the formats and addresses of a release's files" in {
+    val release = ujson.read(Files.readString(Paths.get("host/tests/data/formats/manifest.json")))
+    val today   = Manifest(ConfigIO.load("host/tests/data/formats/config.json"))
+    today("formatHash") shouldBe release("formatHash")
+    today("registers")("fields").arr should contain allElementsOf release("registers")("fields").arr
+  }
 
   /** All objects of a part of the manifest that describe a field or a register. */
   private def fieldsOf(json: ujson.Value): Seq[ujson.Obj] = json match {
