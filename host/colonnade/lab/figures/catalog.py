@@ -45,8 +45,8 @@ def _bench(config: str, *options: str) -> Entry:
     return Entry(f"bench-{config}", config, _colonnade("bench", "--config", config, "--reuse", *options))
 
 
-def _area(config: str, library: str) -> Entry:
-    command = _colonnade("ppa", "--config", config, "--liberty", library)
+def _area(config: str, library: str, *options: str) -> Entry:
+    command = _colonnade("ppa", "--config", config, *options, "--liberty", library)
     return Entry(f"area-{config}-{library.lower()}", config, command, libraries=(library,))
 
 
@@ -94,7 +94,7 @@ def catalog() -> dict[str, Entry]:
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),
         _area("tiny", "ASAP7"),
-        _area("textured", "ASAP7"),
+        _area("textured", "ASAP7", "--no-power"),
         _area("edge", "SKY130"),
         _bench("fpga", *_TWO, "--dram-latency", "15", "--dram-interval", "2"),
         _area("fpga", "ASAP7"),
