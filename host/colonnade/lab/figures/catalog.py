@@ -23,7 +23,8 @@ class Entry:
     Attributes:
         name: Its name without ``.json``.
         config: The preset, before `overrides`, that it is of.
-        commands: The command of each part of the result; the part "" is the whole result.
+        commands: The command of each part of the result; the part "" is the whole result, and one that begins with a
+            hyphen only prepares the next ones.
         overrides: Changes to the configuration, ``key.path=value``.
         report: The file that the commands write, below the root, where they take no name of one.
         libraries: Those of `LIBRARIES` that the commands need.
@@ -68,6 +69,27 @@ _TWO = ("--mesh", "bunny", "--mesh", "armadillo")
 _ROOMS = ("scenes/rooms/living", "scenes/rooms/office")
 
 
+#: Samples a pixel of the table of samples.
+SAMPLES = (1, 4, 16, 64)
+
+
+def _samples() -> Entry:
+    """Pictures of the model at several samples a pixel, against the reference at the most."""
+
+    def picture(backend: str, number: int) -> tuple[str, ...]:
+        options = ("--backend", backend, "--size", "320x240", "--samples", str(number))
+        output = ("--output", f"out/{backend}-{number}.png")
+        return ("colonnade", "render", "scenes/soft-shadow.toml", *options, *output, "--json", REPORT)
+
+    reference = f"out/reference-{SAMPLES[-1]}.png"
+    commands = {"-reference": picture("reference", SAMPLES[-1])}
+    for number in SAMPLES:
+        commands[f"-{number}"] = picture("model", number)
+        commands[str(number)] = ("colonnade", "compare", "--no-dists", reference, f"out/model-{number}.png")
+        commands[str(number)] += ("--json", REPORT)
+    return Entry("samples", "small", commands)
+
+
 def catalog() -> dict[str, Entry]:
     """All entries by name. Those that the pages need most come first."""
     entries = (
@@ -90,6 +112,7 @@ def catalog() -> dict[str, Entry]:
                 },
             },
         ),
+        _samples(),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),

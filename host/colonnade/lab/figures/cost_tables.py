@@ -16,27 +16,24 @@ from colonnade.lab.ppa.summary import LIBRARIES, MAX_FO4, TITLES
 Report = Mapping[str, Any]
 
 #: Smallest memory of the table, kbit in the array.
-MIN_KBIT = 10
+MIN_KBIT = 50
+
+#: Smallest unit of the table, kGE.
+MIN_KGE = 1.0
 
 
 def units(data: Data) -> str:
     """Area, slowest path and energy of each unit of `edge`."""
     reports = _edge(data)
     first, *others = reports.values()
-    titles = ["unit", "instances", "kGE", "share", "flip-flops"]
+    titles = ["unit", "instances", "kGE", "flip-flops"]
     titles += [f"FO4, {LIBRARIES[library]}" for library in reports] + ["pJ a ray, without glitches", "with"]
     rows: list[list[str]] = []
     for level in LEVEL_NAMES:
         rows.append([f"**{TITLES[level]}**", *[""] * (len(titles) - 1)])
         for name, unit in first["units"].items():
-            if unit["level"] == level and unit["kge"] >= 0.05:
-                row = [
-                    name,
-                    str(unit["count"]),
-                    f"{unit['kge']:.1f}",
-                    f"{100 * unit['share']:.0f} %",
-                    f"{unit['flops']:,}",
-                ]
+            if unit["level"] == level and unit["kge"] >= MIN_KGE:
+                row = [name, str(unit["count"]), f"{unit['kge']:.1f}", f"{unit['flops']:,}"]
                 row += [_fo4(report["units"].get(name)) for report in (first, *others)]
                 rows.append([*row, *_energies(unit)])
     return markdown(titles, rows)

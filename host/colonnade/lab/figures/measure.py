@@ -66,7 +66,7 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
         "seconds": round(max(seconds, _seconds_before(known, entry, head)), 1),
         "processors": processors(),
         "config": config,
-        "result": _kept(reports.get("", reports)),
+        "result": _kept(reports.get("", {part: each for part, each in reports.items() if part[:1] != "-"})),
     }
     problem = problem_of(entry, {"config": reports.get("", {}).get("config", config)})
     if problem is not None:
@@ -90,6 +90,7 @@ def _seconds_before(known: Mapping[str, Any] | None, entry: Entry, head: str | N
 def _report(entry: Entry, command: tuple[str, ...]) -> Any:
     """Run a command and read its report."""
     root = project_root()
+    (root / "out").mkdir(exist_ok=True)
     with temporary_folder() as folder:
         report = root / entry.report if entry.report else folder / "report.json"
         program, *arguments = _expanded(command, report)

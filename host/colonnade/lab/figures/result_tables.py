@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from colonnade.lab.common.markdown import markdown
-from colonnade.lab.figures.catalog import catalog
+from colonnade.lab.figures.catalog import SAMPLES, catalog
 from colonnade.lab.figures.data import Data, commands_of
 from colonnade.lab.figures.facts import MEGAHERTZ, PRESETS, facts, text
 
@@ -164,6 +164,16 @@ def environments(data: Data) -> str:
     return markdown(["", *names, "command"], rows)
 
 
+def samples(data: Data) -> str:
+    """The error of several samples a pixel."""
+    found = data.result("samples")
+    row = [
+        "model against the reference at the most samples, dB",
+        *(f"{found[str(number)]['psnr']:.1f}" for number in SAMPLES),
+    ]
+    return markdown(["samples a pixel", *map(str, SAMPLES)], [row])
+
+
 def measuring(data: Data) -> str:
     """The time that each part of `tools/figures` takes, its day and commit."""
     rows, total = [], 0.0
@@ -195,5 +205,6 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     "board": board,
     "rooms": rooms,
     "environments": environments,
+    "samples": samples,
     "measuring": measuring,
 }
