@@ -68,7 +68,9 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
         "config": config,
         "result": _kept(reports.get("", {part: each for part, each in reports.items() if part[:1] != "-"})),
     }
-    problem = problem_of(entry, {"config": reports.get("", {}).get("config", config)})
+    reported = reports.get("", {}).get("config")
+    # Some reports have the name of the configuration alone
+    problem = problem_of(entry, {"config": reported}) if isinstance(reported, Mapping) else None
     if problem is not None:
         raise UserError(f"{entry.name}: the report of {text_of(next(iter(entry.commands.values())))}: {problem}")
     (docs / "data").mkdir(parents=True, exist_ok=True)

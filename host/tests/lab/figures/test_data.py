@@ -72,6 +72,15 @@ def test_figures_of_the_same_sources_are_not_measured_again(docs: Path, monkeypa
     assert (content(docs)["commit"], content(docs)["seconds"] < 1000) == ("another", True)
 
 
+def test_a_report_of_other_hardware_is_refused(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measure, "_report", lambda *_: {"config": {"array": {"rows": 9}}})
+    with pytest.raises(UserError, match="another configuration than tiny"):
+        measure.measure(ENTRY, docs)
+    monkeypatch.setattr(measure, "_report", lambda *_: {"config": "tiny", "equal": True})
+    measure.measure(ENTRY, docs)
+    assert content(docs)["result"] == {"equal": True}
+
+
 def test_figures_of_other_hardware_are_refused(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     measure.measure(ENTRY, docs)
     file = docs / "data" / "bench-tiny.json"
