@@ -55,7 +55,7 @@ def configuration_options(command: Command) -> Command:
         default="small",
         show_default=True,
         metavar="CONFIG",
-        help="Hardware configuration: a preset (tiny, small, textured, edge, lean, fpga), a JSON file, "
+        help="Hardware configuration: a preset (tiny, small, textured, fpga, diffuse, lean, edge), a JSON file, "
         "or a precision like 32b32s64d.",
     )(command)
 

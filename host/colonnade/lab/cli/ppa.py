@@ -104,11 +104,11 @@ def ppa(
 
     from colonnade.common import progress
     from colonnade.design.generator import manifest_for
+    from colonnade.lab.ppa.equal_area import at_clock, at_equal_area, rates_of
     from colonnade.lab.ppa.measure import measure
-    from colonnade.lab.ppa.pages.equal_area import at_clock, at_equal_area, rates_of
-    from colonnade.lab.ppa.pages.text import UnitTable, summary
     from colonnade.lab.ppa.power.recording import Stimulus
     from colonnade.lab.ppa.power.report import Operation
+    from colonnade.lab.ppa.summary import UnitTable, summary
 
     terminal = progress.for_terminal()
     faster = None

@@ -4,5 +4,5 @@ A study file names configurations, workloads and measures (`study`, `points`). E
 of its inputs (`jobs`, `frames`, `work`). The jobs run on this machine or on a Dask cluster (`runners`), and their
 results become one table, with a Pareto front and the paper's RenderIndex (`results`, `render_index`).
 
-The benchmark (`bench`) and the gain of the BVH (`tree_cycles`) run the same jobs.
+The benchmark (`bench`) runs the same jobs.
 """

@@ -1,1 +1,1 @@
-"""Plots, and the generated tables of docs/performance.md."""
+"""Plots, and the HTML report of a study."""

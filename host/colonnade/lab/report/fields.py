@@ -22,9 +22,9 @@ LABELS = {
     "array.rows": "rows (render units per column)",
     "array.columns": "columns",
     "array.contexts": "contexts per render unit",
+    "units.pathContexts": "contexts per path unit",
     "columnBvhMemory.banks": "memory banks per column",
     "columnBvhMemory.recordBuffers": "record buffers per render unit",
-    "columnBvhMemory.readLatency": "memory read latency, cycles",
 }
 
 MARKERS = "osD^vP*X"

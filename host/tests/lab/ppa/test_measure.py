@@ -274,9 +274,9 @@ def test_an_invalid_liberty_is_rejected(tmp_path: Path, text: str) -> None:
 @pytest.mark.matrix
 @pytest.mark.skipif(importlib.util.find_spec("pyosys") is None, reason="no Yosys: run tools/ppa-environment")
 def test_gates_of_tiny_match_the_recorded_ones() -> None:
-    """Detects unintended changes of the area; `tools/ppa tiny` records new values."""
+    """Detects unintended changes of the area; `tools/figures gates` records new values."""
 
     changed = differences(json.loads(GUARD.read_text()), gates_of_tiny())
     assert not changed, (
-        f"{'; '.join(changed)}: if that is meant, run tools/ppa tiny and commit host/tests/lab/ppa/tiny.json"
+        f"{'; '.join(changed)}: if that is meant, run tools/figures gates and commit host/tests/lab/ppa/tiny.json"
     )

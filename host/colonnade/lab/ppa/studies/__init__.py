@@ -1,1 +1,1 @@
-"""Area studies: the FPGA, the regression check of gate counts, and cost and gain of the BVH."""
+"""Area studies: the FPGA, and the regression check of gate counts."""

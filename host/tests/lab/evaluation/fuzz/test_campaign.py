@@ -35,7 +35,7 @@ needs_verilator = pytest.mark.skipif(shutil.which("verilator") is None, reason="
 DESIGNS = (("tiny", 120), pytest.param("small", 120, marks=pytest.mark.matrix))
 
 #: The shape of each preset with one column, and frames.
-SHAPES = tuple((config, ("array.columns=1",), 240) for config in ("tiny", "small", "edge", "lean", "fpga"))
+SHAPES = tuple((config, ("array.columns=1",), 240) for config in ("tiny", "small", "edge", "lean", "diffuse", "fpga"))
 
 #: Pipelines for all rays of a column, as in `test_path_unit`.
 PIPELINED = (

@@ -16,7 +16,6 @@ from colonnade.lab.ppa.library import energies
 from colonnade.lab.ppa.library.cells import Library
 from colonnade.lab.ppa.netlist.activity import Activity
 from colonnade.lab.ppa.netlist.mapped import Netlist
-from colonnade.lab.ppa.pages.power import power_table, unit_power_table
 from colonnade.lab.ppa.power.activity import Power, power_of
 from colonnade.lab.ppa.power.frame import Frame
 from colonnade.lab.ppa.power.recording import Stimulus, require_recordable
@@ -128,32 +127,6 @@ def test_the_workload_is_checked_before_synthesis(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(UserError, match="no verilator found, which power"):
         require_recordable(Stimulus.of_benchmark("cube", None, 10), manifest)
-
-
-def test_the_page_shows_power_by_library_and_unit() -> None:
-    figures = dict.fromkeys(("dynamic_mw", "clock_mw", "leakage_mw", "memory_mw", "total_mw"), 2.5)
-    energy = {"energy_per_ray_nj": 0.5, "energy_per_any_ray_nj": 0.25}
-    kind = {**figures, **energy, "at_28nm": {**figures, **energy}}
-    power = {
-        "clock_mhz": 200,
-        "volts": 0.7,
-        "scene": {"mesh": "teapot", "size": [24, 18]},
-        "window": {"cycles": 1000, "rays": 9, "rays_in_box": 7, "hits": 3},
-        "scale_to_28nm": 4.79,
-        "zero_delay": kind,
-        "glitch_aware": kind,
-    }
-    unit = {"power_mw": 1.0, "clock_mw": 0.5}
-    report = {"power": power, "units": {"BoxUnit": unit, "Shader": {**unit, "power_mw": 3.0}, "Column": {}}}
-    table = power_table({"yosys": {"power": None}, "asap7": report})
-    assert (
-        "ASAP7: 200 MHz; teapot at 24×18, 1,000 cycles with 9 rays, 7 in-box rays, 3 hits; scaling to 28 nm: × 4.790"
-        in table
-    )
-    assert "| ASAP7, 0.7 V | with glitches | 2.500 |" in table
-    assert "| chip ÷ 80, total |" in table
-    assert "| Shader | 3.000 | 0.500 | 75 % |" in unit_power_table({"asap7": report})
-    assert power_table({"yosys": {"power": None}}) == ""
 
 
 def test_scaling_is_by_length_and_voltage() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,36 @@ def at_equal_area(report: Mapping[str, Any], faster: float) -> str:
     )
 
 
+@dataclass(frozen=True)
+class Clock:
+    """The clock that the slowest path allows at the chip's node, without wires, skew and margin."""
+
+    fo4: float
+
+    @property
+    def nanoseconds(self) -> float:
+        """The delay of the path."""
+        return self.fo4 * CHIP_FO4_PS / 1e3
+
+    @property
+    def megahertz(self) -> float:
+        """The frequency."""
+        return 1e3 / self.nanoseconds
+
+
+def fastest_clock(report: Mapping[str, Any]) -> Clock | None:
+    """The clock by the slowest path within a unit or across the units of a render unit; None without a liberty.
+
+    Args:
+        report: Of `colonnade.lab.ppa.measure.measure`.
+    """
+    path, across = report["slowest_path"], report["render_unit_paths"]
+    paths = [path["fo4"]] if path["unit"] else []
+    if across and across["register_to_register"]:
+        paths.append(across["register_to_register"]["fo4"])
+    return Clock(max(paths)) if paths else None
+
+
 def at_clock(report: Mapping[str, Any], faster: float) -> str:
     """One line: the clock that the slowest path allows at the chip's node, and the in-box rays per second at it.
 
@@ -59,15 +90,11 @@ def at_clock(report: Mapping[str, Any], faster: float) -> str:
         report: Of `colonnade.lab.ppa.measure.measure`, with a liberty.
         faster: In-box rays per cycle relative to the chip.
     """
-    path, across = report["slowest_path"], report["render_unit_paths"]
-    paths = [path["fo4"]] if path["unit"] else []
-    if across and across["register_to_register"]:
-        paths.append(across["register_to_register"]["fo4"])
-    if not paths:
+    clock = fastest_clock(report)
+    if clock is None:
         return "clock: needs --liberty, since a path has no delay without"
-    ns = max(paths) * CHIP_FO4_PS / 1e3
     return (
-        f"clock at {CHIP_NODE}: the slowest path, {max(paths):.1f} FO4 of {CHIP_FO4_PS:g} ps, takes {ns:.2f} ns, so at "
-        f"most {1e3 / ns:,.0f} MHz without wires, skew and margin; "
-        f"{faster * PAPER_RAYS_PER_CYCLE * 1e3 / ns:,.0f} in-box MRay/s at it"
+        f"clock at {CHIP_NODE}: the slowest path, {clock.fo4:.1f} FO4 of {CHIP_FO4_PS:g} ps, takes "
+        f"{clock.nanoseconds:.2f} ns, so at most {clock.megahertz:,.0f} MHz without wires, skew and margin; "
+        f"{faster * PAPER_RAYS_PER_CYCLE * clock.megahertz:,.0f} in-box MRay/s at it"
     )

@@ -8,7 +8,7 @@ from typing import Any
 from colonnade.lab.common.text_table import Column, Table
 from colonnade.lab.ppa.netlist.hierarchy import LEVEL_NAMES
 from colonnade.lab.ppa.netlist.memories import CHIP_NODE, MIN_SRAM_WORDS, REGISTER_FILE, SRAM, Rate
-from colonnade.lab.ppa.pages.power_text import power_lines
+from colonnade.lab.ppa.power.text import power_lines
 
 #: Design rule: maximum delay between two registers, FO4.
 MAX_FO4 = 100

@@ -1,0 +1,147 @@
+"""What is measured: one data file of ``docs/data`` for each entry, and the commands that print its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from colonnade.design.toolchain import project_root
+from colonnade.lab.explore.study import load_study
+
+#: Stands for the file that a command writes its report to.
+REPORT = "REPORT"
+
+#: Stand for the liberty files of a library in a command, and name the variables that hold their paths.
+LIBRARIES = ("ASAP7", "SKY130")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A data file.
+
+    Attributes:
+        name: Its name without ``.json``.
+        config: The preset, before `overrides`, that it is of.
+        commands: The command of each part of the result; the part "" is the whole result, and one that begins with a
+            hyphen only prepares the next ones.
+        overrides: Changes to the configuration, ``key.path=value``.
+        report: The file that the commands write, below the root, where they take no name of one.
+        libraries: Those of `LIBRARIES` that the commands need.
+    """
+
+    name: str
+    config: str
+    commands: Mapping[str, tuple[str, ...]]
+    overrides: tuple[str, ...] = ()
+    report: str | None = None
+    libraries: tuple[str, ...] = ()
+
+
+def _colonnade(*arguments: str) -> dict[str, tuple[str, ...]]:
+    return {"": ("colonnade", *arguments, "--json", REPORT)}
+
+
+def _bench(config: str, *options: str) -> Entry:
+    return Entry(f"bench-{config}", config, _colonnade("bench", "--config", config, "--reuse", *options))
+
+
+def _area(config: str, library: str, *options: str) -> Entry:
+    command = _colonnade("ppa", "--config", config, *options, "--liberty", library)
+    return Entry(f"area-{config}-{library.lower()}", config, command, libraries=(library,))
+
+
+def _verify(name: str, config: str, *options: str) -> Entry:
+    return Entry(f"{name}-{config}", config, _colonnade("verify", "--config", config, *options))
+
+
+def _study(name: str, *libraries: str) -> Entry:
+    path = Path("scenes") / "studies" / f"{name}.toml"
+    design = load_study(project_root() / path).study.design
+    options = (option for library in libraries for option in ("--library", f"{library.lower()}={library}"))
+    command = ("colonnade", "explore", str(path), *options, "--output", f"out/{name}")
+    return Entry(name, design.config, {"": command}, design.set, f"out/{name}/study.json", libraries)
+
+
+#: Meshes for small arrays, whose frames take millions of cycles.
+_TWO = ("--mesh", "bunny", "--mesh", "armadillo")
+
+_ROOMS = ("scenes/rooms/living", "scenes/rooms/office")
+
+
+#: Samples a pixel of the table of samples.
+SAMPLES = (1, 4, 16, 64)
+
+
+def _samples() -> Entry:
+    """Pictures of the model at several samples a pixel, against the reference at the most."""
+
+    def picture(backend: str, number: int) -> tuple[str, ...]:
+        options = ("--backend", backend, "--size", "320x240", "--samples", str(number))
+        output = ("--output", f"out/{backend}-{number}.png")
+        return ("colonnade", "render", "scenes/soft-shadow.toml", *options, *output, "--json", REPORT)
+
+    reference = f"out/reference-{SAMPLES[-1]}.png"
+    commands = {"-reference": picture("reference", SAMPLES[-1])}
+    for number in SAMPLES:
+        commands[f"-{number}"] = picture("model", number)
+        commands[str(number)] = ("colonnade", "compare", "--no-dists", reference, f"out/model-{number}.png")
+        commands[str(number)] += ("--json", REPORT)
+    return Entry("samples", "small", commands)
+
+
+def catalog() -> dict[str, Entry]:
+    """All entries by name. Those that the pages need most come first."""
+    entries = (
+        _bench("edge"),
+        _area("edge", "ASAP7"),
+        _bench("diffuse"),
+        _area("diffuse", "ASAP7"),
+        Entry("rooms", "edge", {"": ("tools/room-frames", "edge", "640x480", "--compare", f"--json={REPORT}")}),
+        _bench("lean", "--no-mirror"),
+        _area("lean", "ASAP7"),
+        _verify("quality", "edge", "--no-rtl"),
+        _verify("quality", "lean", "--no-rtl"),
+        Entry(
+            "environments",
+            "edge",
+            {
+                "accuracy": ("colonnade", "study", *_ROOMS, "--json", REPORT),
+                **{
+                    Path(room).name: ("colonnade", "inspect", "--background", room, "--json", REPORT) for room in _ROOMS
+                },
+            },
+        ),
+        _samples(),
+        _bench("small", *_TWO, "--no-mirror"),
+        _area("small", "ASAP7"),
+        _bench("tiny", *_TWO),
+        _area("tiny", "ASAP7"),
+        _area("textured", "ASAP7", "--no-power"),
+        _area("edge", "SKY130"),
+        _bench("fpga", *_TWO, "--dram-latency", "15", "--dram-interval", "2"),
+        _area("fpga", "ASAP7"),
+        _verify("equality", "small", "--no-reference", "--size", "320x240"),
+        Entry("fpga", "fpga", {"": ("tools/soc-fpga",)}, report="out/fpga/report.json"),
+        _study("ablation"),
+        _study("scaling"),
+        _study("mixed-precision", "ASAP7"),
+        _study("energy-area", "ASAP7"),
+    )
+    return {entry.name: entry for entry in entries}
+
+
+def selected(parts: tuple[str, ...]) -> list[Entry]:
+    """The entries of parts: a part is the name of an entry or what it begins with before a hyphen; none: all entries.
+
+    Raises:
+        KeyError: A part that names no entry.
+    """
+    entries = catalog()
+    found: dict[str, Entry] = {}
+    for part in parts or tuple(entries):
+        of_part = {name: entry for name, entry in entries.items() if name == part or name.startswith(f"{part}-")}
+        if not of_part:
+            raise KeyError(part)
+        found |= of_part
+    return list(found.values())

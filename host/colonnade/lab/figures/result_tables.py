@@ -1,0 +1,210 @@
+"""The tables of README and of ``docs/results.md``: headline figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from colonnade.lab.common.markdown import markdown
+from colonnade.lab.figures.catalog import SAMPLES, catalog
+from colonnade.lab.figures.data import Data, commands_of
+from colonnade.lab.figures.facts import MEGAHERTZ, PRESETS, facts, text
+
+#: A verified frame of `colonnade verify`.
+Frame = Mapping[str, Any]
+
+
+def presets(data: Data) -> str:
+    """What each preset is for, and its figures."""
+    fpga = data.optional("fpga")
+    rows = []
+    for preset, (purpose, verified) in PRESETS.items():
+        own = facts(data, preset)
+        logic, clock = f"{text(own, 'kge')} kGE", f"{text(own, 'mhz')} MHz"
+        if preset == "fpga" and fpga is not None:
+            logic, clock = f"{fpga['luts']:,} LUTs", f"{fpga['fmax_mhz']:.0f} MHz, routed"
+        figures = (text(own, key) for key in ("raysPerCycle", "mm2", "njGlitches", "framesPerJoule"))
+        rays, area, energy, frames = figures
+        rows.append([f"`{preset}`", purpose, rays, logic, area, clock, energy, frames, verified])
+    titles = ["preset", "for", "in-box rays a cycle", "logic", "mm², 28 nm", "clock", "nJ a ray", "frames/s/W"]
+    return markdown([*titles, "RTL equals the model in"], rows)
+
+
+def headlines(data: Data) -> str:
+    """The figures that matter most."""
+    own = facts(data, "edge")
+    rooms, quality = data.optional("rooms"), data.optional("quality-edge")
+    maps = data.optional("environments")
+    rows = [["RTL against model", _differences(data)]]
+    if quality is not None:
+        values = [mesh["reference"]["psnr"] for mesh in quality["meshes"].values()]
+        largest = max(mesh["triangles"] for mesh in quality["meshes"].values())
+        psnr = f"{min(values):.1f} to {max(values):.1f} dB PSNR on {len(values)} meshes of up to {largest:,} triangles"
+        rows.append(["model against the float scene", psnr])
+    rates = f"{text(own, 'raysPerCycle')} in-box rays per cycle; as mirrors {text(own, 'mirrorRaysPerCycle')}"
+    rows.append(["rays, eight meshes, scene in DRAM", rates])
+    rows.append(["at the area of the paper's chip", f"{text(own, 'equalArea')} times its rays per cycle"])
+    rows.append(["area at 28 nm, every memory counted", f"{text(own, 'mm2')} mm²"])
+    energy = f"{text(own, 'nj')} nJ per in-box ray, {text(own, 'njGlitches')} with glitches"
+    rows.append(["energy at 28 nm, without wires", energy])
+    if rooms is not None:
+        mean = rooms["mean_cycles"]
+        rows.append(["AR frames of 640×480, relit", f"{MEGAHERTZ * 1e6 / mean:,.0f} per second at {MEGAHERTZ:g} MHz"])
+    if maps is not None:
+        own_maps = maps["living"]
+        size, ratio = own_maps["bytes"]["albedo"], own_maps["ratio"]["albedo"]
+        rows.append(["maps of a room", f"{size:,} bytes each, {ratio:.1f} times smaller than the source"])
+    return markdown(["figures of `edge`", ""], rows)
+
+
+def _differences(data: Data) -> str:
+    """What differs between RTL and model in the frames of the data files."""
+    rooms, meshes = data.optional("rooms"), data.optional("equality-small")
+    parts = []
+    if rooms is not None:
+        wrong = sum(frame["differing_pixels"] for frame in rooms["frames"])
+        parts.append(f"{wrong} pixels of {len(rooms['frames'])} frames of rooms differ")
+    if meshes is not None:
+        counts = [sum(mesh["rtl"].values()) for mesh in meshes["meshes"].values()]
+        parts.append(f"{sum(counts)} pixels, hits and counters of {len(counts)} meshes on `small`")
+    return "; ".join(parts) or "–"
+
+
+def equality(data: Data) -> str:
+    """Frames in which the RTL was compared with the model."""
+    rows = []
+    meshes = data.result("equality-small")["meshes"]
+    for key, title in (("pixels", "pixels"), ("triangles", "hit triangles and distances"), ("counters", "counters")):
+        wrong = sum(mesh["rtl"][key] for mesh in meshes.values())
+        rows.append([f"{title} of {len(meshes)} meshes on `small`", f"{wrong}", _command("equality-small")])
+    rooms = data.result("rooms")
+    wrong = sum(frame["differing_pixels"] for frame in rooms["frames"])
+    size = "×".join(map(str, rooms["size"]))
+    rows.append(
+        [f"pixels of {len(rooms['frames'])} relit frames of rooms on `edge`, {size}", f"{wrong}", _command("rooms")]
+    )
+    return markdown(["compared", "differ", "command"], rows)
+
+
+def fidelity(data: Data) -> str:
+    """The model against the float scene by mesh, of `edge` and `lean`."""
+    edge, lean = (data.result(f"quality-{preset}")["meshes"] for preset in ("edge", "lean"))
+    rows = []
+    for name, mesh in edge.items():
+        each: list[Frame] = [mesh["reference"], lean[name]["reference"]]
+        shares = [f"{100 * own['hit_disagreement']:.4f} %" for own in each]
+        others = [f"{100 * own['triangle_disagreement']:.2f} %" for own in each]
+        rows.append([name, f"{mesh['triangles']:,}", shares[0], others[0], *(f"{own['psnr']:.1f}" for own in each)])
+    titles = ["mesh", "triangles", "`edge`: hit or miss differs", "other triangle", "PSNR, dB", "`lean`: PSNR, dB"]
+    return markdown(titles, rows)
+
+
+def rates_of_presets(data: Data) -> str:
+    """Rays per cycle of the presets, relative to the chip."""
+    rows = []
+    for preset in PRESETS:
+        bench = data.optional(f"bench-{preset}")
+        if bench is None:
+            continue
+        own = facts(data, preset)
+        meshes = f"{len(bench['meshes'])}"
+        figures = [text(own, key) for key in ("raysPerCycle", "timesChip", "fewest", "most", "mirrorRaysPerCycle")]
+        rows.append([f"`{preset}`", meshes, f"**{figures[0]}**", *figures[1:], _command(f"bench-{preset}")])
+    titles = ["preset", "meshes", "in-box rays per cycle", "against the chip", "lowest mesh", "highest", "as mirrors"]
+    return markdown([*titles, "command"], rows)
+
+
+def board(data: Data) -> str:
+    """The SoC on an FPGA."""
+    placed, bench = data.result("fpga"), data.result("bench-fpga")
+    available = placed["available"]
+    rows = [
+        ["clock after routing", f"{placed['fmax_mhz']:.1f} MHz", _command("fpga")],
+        ["LUTs", f"{placed['luts']:,} of {available['luts']:,}", "the same"],
+        ["flip-flops", f"{placed['flip_flops']:,}", "the same"],
+        ["multipliers, block RAMs", f"{placed['dsps']:,}, {placed['block_rams']:,}", "the same"],
+    ]
+    for name, mesh in bench["meshes"].items():
+        rate = mesh["rays_per_cycle_in_box"]
+        millions = rate * placed["clock_mhz"]
+        figures = f"{rate:.4f} in-box rays per cycle, {millions:.2f} million a second at {placed['clock_mhz']:g} MHz"
+        rows.append([name, figures, _command("bench-fpga")])
+    return markdown(["`fpga`", "", "command"], rows)
+
+
+def rooms(data: Data) -> str:
+    """Cycles of relit frames in rooms."""
+    found = data.result("rooms")
+    rows = [[frame["room"], frame["object"], f"{frame['cycles']:,}"] for frame in found["frames"]]
+    mean = found["mean_cycles"]
+    rows.append(["mean", f"{MEGAHERTZ * 1e6 / mean:,.0f} frames per second at {MEGAHERTZ:g} MHz", f"{mean:,.0f}"])
+    return markdown(["room", "object", "cycles"], rows)
+
+
+def environments(data: Data) -> str:
+    """Size and accuracy of the rooms' maps, and of the device's march."""
+    found = data.result("environments")
+    accuracy = {name.partition(",")[0]: own for name, own in found["accuracy"].items() if name.endswith(", device")}
+    names = [name for name in found if name != "accuracy"]
+    maps = [found[name] for name in names]
+    marches = [accuracy[each["room"]] for each in maps]
+    study, inspect = (commands_of(catalog()["environments"])[index] for index in (0, 1))
+    rows: list[Sequence[str]] = [
+        ["bytes of albedo, of normals", *(f"{each['bytes']['albedo']:,} each" for each in maps), f"`{inspect}`"],
+        ["reduction from the source maps", *(f"{each['ratio']['albedo']:.1f}×" for each in maps), "the same"],
+        ["PSNR of the albedo, dB", *(f"{each['albedo']['psnr']:.1f}" for each in maps), "the same"],
+        ["normals off by, mean", *(f"{each['normals']['mean_degrees']:.2f}°" for each in maps), "the same"],
+        [
+            "mirror rays whose march is right",
+            *(f"{100 * each['mirror']['ok']:.1f} %" for each in marches),
+            f"`{study}`",
+        ],
+        ["steps of the march, mean", *(f"{each['mean_steps']:.1f}" for each in marches), "the same"],
+    ]
+    return markdown(["", *names, "command"], rows)
+
+
+def samples(data: Data) -> str:
+    """The error of several samples a pixel."""
+    found = data.result("samples")
+    row = [
+        "model against the reference at the most samples, dB",
+        *(f"{found[str(number)]['psnr']:.1f}" for number in SAMPLES),
+    ]
+    return markdown(["samples a pixel", *map(str, SAMPLES)], [row])
+
+
+def measuring(data: Data) -> str:
+    """The time that each part of `tools/figures` takes, its day and commit."""
+    rows, total = [], 0.0
+    for name in catalog():
+        content = data.get(name)
+        if content is not None:
+            total += content["seconds"]
+            commit = f"{content['commit'][:8]}{', modified' if content['is_modified'] else ''}"
+            row = [f"`{name}`", _minutes(content["seconds"]), f"{content['processors']}"]
+            rows.append([*row, content["date"], commit])
+    rows.append(["all", _minutes(total), "", "", ""])
+    return markdown(["part", "minutes", "processors", "day", "commit"], rows)
+
+
+def _minutes(seconds: float) -> str:
+    return f"{seconds / 60:.1f}"
+
+
+def _command(name: str) -> str:
+    return f"`{commands_of(catalog()[name])[0]}`"
+
+
+TABLES: Mapping[str, Callable[[Data], str]] = {
+    "presets": presets,
+    "headlines": headlines,
+    "equality": equality,
+    "fidelity": fidelity,
+    "rates-of-presets": rates_of_presets,
+    "board": board,
+    "rooms": rooms,
+    "environments": environments,
+    "samples": samples,
+    "measuring": measuring,
+}

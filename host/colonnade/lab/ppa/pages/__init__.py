@@ -1,1 +1,0 @@
-"""The text report of ``colonnade ppa``, and the generated tables of docs/ppa.md."""

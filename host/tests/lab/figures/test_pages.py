@@ -1,0 +1,223 @@
+"""Tables and figures of the pages follow from the data, and only they change."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.design import toolchain
+from colonnade.lab.evaluation.bench import design_result, mesh_result
+from colonnade.lab.figures import pages
+from colonnade.lab.figures.catalog import SAMPLES
+from colonnade.lab.figures.data import Data
+
+DOCS = toolchain.project_root() / "docs"
+PATH = {"ns": 1.0, "fo4": 50.0, "from": "a", "to": "b", "gates": 9}
+ENERGY = {"energy_per_ray_nj": 0.5, "at_28nm": {"energy_per_ray_nj": 2.0}}
+POWER = dict.fromkeys((f"{kind}_mw" for kind in ("dynamic", "clock", "leakage", "memory", "total")), 2.5) | ENERGY
+
+
+def area() -> dict[str, Any]:
+    """A report of an array of two columns of three rows; its slowest path takes 0.7 ns, and it has twice the chip."""
+    unit = {"count": 1, "kge": 30.0, "share": 1.0, "flops": 7, "paths": {"register_to_register": PATH}}
+    level = {"logic_kge": 40.0, "logic_um2": 5e6, "memory_bits": 9000, "logic_mm2_28nm": 0.5, "mm2_28nm": 11.06}
+    memory = {"unit": "BoxUnit", "count": 2, "depth": 64, "width": 80, "bits": 10_240, "um2": {"28 nm": 1e3}}
+    return {
+        "technology": {
+            "liberty": ["cells"],
+            "um2_per_gate": 0.5,
+            "fo4_ns": 0.02,
+            "fo4": "an inverter",
+            "delay_target_ns": 1.2,
+        },
+        "chip": {"mm2": 5.53},
+        "units": {
+            "BoxUnit": unit
+            | {"level": "render_unit", "energy_per_ray_nj_at_28nm": {"zero_delay": 1, "glitch_aware": 2}},
+            "PathUnit": unit | {"level": "column"},
+        },
+        "memories": {"words": memory | {"level": "render_unit"}, "few": memory | {"level": "array", "bits": 10}},
+        "levels": {
+            "render_unit": level | {"of_the_level_below": 0},
+            "column": level | {"of_the_level_below": 3},
+            "array": level | {"of_the_level_below": 2},
+        },
+        "slowest_path": PATH | {"unit": "BoxUnit"},
+        "render_unit_paths": {"register_to_register": PATH},
+        "power": {
+            "volts": 0.7,
+            "clock_mhz": 200,
+            "scene": {"mesh": "teapot", "size": [24, 18]},
+            "window": {"cycles": 1000, "rays_in_box": 7, "rays_traced": 3},
+            "scale_to_28nm": 4.79,
+            "zero_delay": POWER,
+            "glitch_aware": POWER,
+        },
+    }
+
+
+def study(axes: list[dict[str, Any]], rates: list[float], **more: Any) -> dict[str, Any]:
+    """A study of a base of one in-box ray per cycle and of points."""
+
+    def point(values: dict[str, Any], rate: float) -> dict[str, Any]:
+        frame = {"rays_per_cycle_in_box": rate, "dists_baseline": 0.001, "psnr": 50.0}
+        keys = (
+            "dists_loss",
+            "dists_loss_max",
+            "psnr_min",
+            "rays_per_cycle",
+            "array_kge.asap7",
+            "fo4.asap7",
+            "mw.asap7",
+        )
+        figures = dict.fromkeys((*keys, "nj.asap7", "render_index.asap7", "area_per_rate.asap7"), rate)
+        name = ", ".join(map(str, values.values())) or "base"
+        return {
+            "name": name,
+            "values": values,
+            "workloads": {mesh: frame for mesh in ("bunny", "teapot")},
+            "figures": figures | {"energy_area.asap7": rate},
+            "on_front": rate > 1,
+        }
+
+    points = [point({}, 1.0), *(point(values, rate) for values, rate in zip(axes, rates, strict=True))]
+    return {"points": points, "libraries": ["asap7"], "baseline": "base", **more}
+
+
+def room(name: str) -> dict[str, Any]:
+    maps = {"bytes": {"albedo": 16384}, "ratio": {"albedo": 56.25}, "albedo": {"psnr": 30.0}}
+    return maps | {"room": name, "normals": {"mean_degrees": 1.5}}
+
+
+@pytest.fixture
+def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
+    """A folder with a data file for every table."""
+    report = rtl_report(1.0)
+    meshes = {name: mesh_result(report) for name in ("bunny", "teapot")}
+    bench = design_result(report["config"], "c0", (15, 10), meshes)
+    fidelity = {"hit_disagreement": 1e-5, "triangle_disagreement": 0.001, "psnr": 50.0}
+    reference = {"triangles": 12, "reference": fidelity}
+    same = {"rtl": {"pixels": 0, "triangles": 1, "counters": 0}}
+    kinds = [(contexts, snooping) for contexts in (4, 12) for snooping in (False, True)]
+    keys = ("array.contexts", "columnBvhMemory.snooping", "columnBvhMemory.banks")
+    ranking = [{"choice": "area", "library": "asap7", "ranking": ["a", "b", "c", "d"]}]
+    index = {"rows": [{"name": "32b32s64d", "index": 0.5}], "sensitivity": ranking}
+    results = {
+        "bench-edge": bench | {"mirror": bench},
+        "bench-fpga": bench | {"mirror": None},
+        "area-edge-asap7": area(),
+        "area-edge-sky130": area(),
+        "quality-edge": {"meshes": {"bunny": reference}},
+        "quality-lean": {"meshes": {"bunny": reference}},
+        "equality-small": {"meshes": {"bunny": same, "teapot": same}},
+        "rooms": {
+            "size": [64, 48],
+            "frames": [{"room": "r", "object": "o", "cycles": 100_000, "differing_pixels": 0}],
+            "mean_cycles": 1e5,
+        },
+        "environments": {
+            "accuracy": {"Room, device": {"mirror": {"ok": 0.97}, "mean_steps": 18.0}},
+            "living": room("Room"),
+        },
+        "samples": {str(number): {"psnr": 30.0 + number} for number in SAMPLES},
+        "fpga": {
+            "fmax_mhz": 50.5,
+            "clock_mhz": 50.0,
+            **{"luts": 43_000, "flip_flops": 22_000, "dsps": 81, "block_rams": 68},
+            "available": {"luts": 83_640},
+        },
+        "scaling": study([{"array.rows": 4}], [2.0]),
+        "ablation": study([dict(zip(keys, (*kind, 1), strict=True)) for kind in kinds], [0.5, 0.75, 1.0, 1.25]),
+        "mixed-precision": study([{"precision": "32b32s64d"}], [0.75], render_index=index),
+        "energy-area": study([{"array.contexts": 8}], [1.1]),
+    }
+    (tmp_path / "docs" / "data").mkdir(parents=True)
+    for name, result in results.items():
+        content = {
+            "seconds": 90.0,
+            "date": "2026-01-31",
+            "commit": "c0ffee00" * 5,
+            "is_modified": False,
+            "processors": 2,
+            "result": result,
+        }
+        (tmp_path / "docs" / "data" / f"{name}.json").write_text(json.dumps(content))
+    return tmp_path / "docs"
+
+
+def table(docs: Path, name: str) -> str:
+    before, after = "before\n", "\nafter\n"
+    text = pages.page(f"{before}<!-- {name} -->\nold\n<!-- end -->{after}", Data(docs))
+    assert text.startswith(before)
+    assert text.endswith(after)
+    assert "old" not in text
+    assert pages.page(text, Data(docs)) == text
+    return text
+
+
+@pytest.mark.parametrize("name", pages.TABLES)
+def test_every_table_is_regular_and_on_a_page(docs: Path, name: str) -> None:
+    text = table(docs, name)
+    assert "Not measured" not in text
+    assert len({line.count("|") for line in text.splitlines() if line.startswith("|")}) == 1
+    assert any(f"<!-- {name} -->" in file.read_text() for file in pages.pages_of(DOCS))
+
+
+@pytest.mark.parametrize("name", pages.TABLES)
+def test_without_data_a_table_is_written_all_the_same(tmp_path: Path, name: str) -> None:
+    table(tmp_path, name)
+
+
+def test_figures_are_those_of_the_data(docs: Path) -> None:
+    assert "| bunny | 12 | 100 | 50 | **1.00** | box unit, 80 % | 100 | **1.00** |" in table(docs, "rates")
+    assert "| rows (render units per column) | 4 | 2.00 | 2.00 | 2.00 |" in table(docs, "scaling")
+    assert "| bunny | 12 | 1.000 | 1.250 |" in table(docs, "ablation")
+    # 5.53 mm² for 11.06: half of 1 / 0.208; 50 FO4 of 14 ps: 1,429 MHz
+    assert "| `edge` | 40 | 11.06 | 50 | 1,429 | 2.00 | 2.00 | 2.4 |" in table(docs, "presets-cost")
+    assert "| `edge`, 200 MHz | 200 | 11.06 | 18 |" in table(docs, "designs")
+    assert "| `words` | BoxUnit | render unit | 2 × 64 × 80 | 61 | 0.006 |" in table(docs, "memories")
+    assert "`few`" not in table(docs, "memories")
+    assert "43,000 LUTs | – | 50 MHz, routed" in table(docs, "presets")
+    assert "| mean | 2,000 frames per second at 200 MHz | 100,000 |" in table(docs, "rooms")
+    assert "| hit triangles and distances of 2 meshes on `small` | 2 |" in table(docs, "equality")
+    assert "| **8** | 1.1 | 1.10 |" in table(docs, "energy-area")
+    assert "**32b32s64d**" in table(docs, "precision")
+    assert "| all | 22.5 |" in table(docs, "measuring")
+
+
+def test_a_single_figure_stands_in_a_sentence(docs: Path) -> None:
+    text = "It has <!-- figure:edge.raysPerCycle -->9.99<!-- end --> rays per cycle.\n"
+    assert pages.page(text, Data(docs)) == text.replace("9.99", "1.00")
+    missing = "<!-- figure:lean.mm2 -->9<!-- end -->\n"
+    assert pages.page(missing, Data(docs)) == missing.replace("9", "–")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("<!-- nothing -->\n<!-- end -->\n", "no table nothing"),
+        ("<!-- figure:edge.beauty -->1<!-- end -->\n", "no figure edge.beauty"),
+        ("<!-- rates -->\n| a |\n", "marker rates has no end"),
+    ],
+)
+def test_a_wrong_marker_is_refused(docs: Path, text: str, reason: str) -> None:
+    with pytest.raises(UserError, match=reason):
+        pages.page(text, Data(docs))
+
+
+def test_a_page_that_differs_from_its_data_is_reported(docs: Path) -> None:
+    text = "".join(f"<!-- {name} -->\n<!-- end -->\n" for name in pages.TABLES)
+    (docs / "all.md").write_text(text)
+    (docs.parent / "README.md").write_text("<!-- figure:edge.mm2 --><!-- end -->\n")
+    assert {line.split()[0] for line in pages.problems(docs)} == {"README.md", "all.md"}
+    pages.write(docs)
+    assert list(pages.problems(docs)) == []
+    (docs / "all.md").write_text((docs / "all.md").read_text().replace("**1.00**", "**1.01**", 1))
+    assert list(pages.problems(docs)) == ["all.md differs from its data: run tools/figures pages"]
+    (docs / "all.md").unlink()
+    assert f"no page shows the table {next(iter(pages.TABLES))}" in list(pages.problems(docs))
