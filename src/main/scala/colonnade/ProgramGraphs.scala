@@ -16,7 +16,8 @@ object ProgramGraphs {
   def main(arguments: Array[String]): Unit = arguments.toSeq match {
     case Seq("--target-dir", directory) =>
       val target = Paths.get(directory).toAbsolutePath.normalize
-      for ((name, graph) <- ProgramGraphs(PathConfig(ConfigIO.load("small")))) OutputFiles.writeFile(target.resolve(name), graph)
+      for ((name, graph) <- ProgramGraphs(PathConfig(ConfigIO.load("small"))))
+        OutputFiles.writeFile(target.resolve(name), graph)
     case _ => throw new ConfigError(usage)
   }
 

@@ -17,8 +17,8 @@ object ArrayConfig {
 
   /** Maximum number of contexts of a traversal unit; a path unit may have more. */
   val maxContexts: Int = 16
-  val maxRows:    Int = 256
-  val maxColumns: Int = 256
+  val maxRows:     Int = 256
+  val maxColumns:  Int = 256
 
   /** Maximum number of traversal units: twelve times `edge`. */
   val maxUnits: Int = 1024

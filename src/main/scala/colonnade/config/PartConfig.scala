@@ -8,7 +8,7 @@ import scala.language.implicitConversions
   * configuration stands for the device's wherever contexts do not matter.
   */
 sealed abstract class PartConfig {
-  def device:   ColonnadeConfig
+  def device: ColonnadeConfig
   def contexts: Int
 
   /** With so many contexts a choice among them takes a cycle of its own. */
@@ -42,8 +42,8 @@ final case class TriangleGroupConfig(device: ColonnadeConfig) extends PartConfig
   * @param maxBuffers  maximum number of record buffers
   */
 final case class AttributeFetchConfig(column: ColonnadeConfig, maxSlots: Int, maxBuffers: Int) extends PartConfig {
-  val contexts: Int           = maxSlots.min(column.units.pathContexts)
-  val device: ColonnadeConfig = column.copy(columnBvhMemory =
+  val contexts: Int             = maxSlots.min(column.units.pathContexts)
+  val device:   ColonnadeConfig = column.copy(columnBvhMemory =
     column.columnBvhMemory.copy(recordBuffers = maxBuffers.min(column.columnBvhMemory.recordBuffers))
   )
 }

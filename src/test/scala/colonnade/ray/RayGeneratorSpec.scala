@@ -195,7 +195,11 @@ object RayGeneratorSpec {
     val bits = config.numbers.coordinateBits
     val corners: Seq[BigInt] = Seq(0, (BigInt(1) << bits) - 1)
     val extreme = for (x <- corners; y <- corners) yield Pixel(1, x, y)
-    extreme ++ Seq.fill(count)(Pixel(random.nextInt(config.units.pathContexts), BigInt(bits, random), BigInt(bits, random)))
+    extreme ++ Seq.fill(count)(Pixel(
+      random.nextInt(config.units.pathContexts),
+      BigInt(bits, random),
+      BigInt(bits, random)
+    ))
   }
 
   /** The pixels of a tile in Morton order. */

@@ -42,8 +42,8 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
             dut.clock.step()
           }
           dut.io.surface.valid.poke(false)
-          val all            = for (c <- 0 until config.units.pathContexts; l <- 0 until config.frame.lights) yield (c, l)
-          val asks           = Seq.fill(4)(random.shuffle(all)).flatten
+          val all  = for (c <- 0 until config.units.pathContexts; l <- 0 until config.frame.lights) yield (c, l)
+          val asks = Seq.fill(4)(random.shuffle(all)).flatten
           val (rays, cycles) = exchange(dut, asks, random, stalls)
           assert(rays == asks.map { case (context, light) =>
             val (from, to) = (surfaces(context), lights(light).map(_ << shift))
