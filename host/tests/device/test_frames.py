@@ -74,7 +74,11 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     ("precision", "units"),
     [
         ("16b16s32d", ()),
-        pytest.param("24b24s64d", ("units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"), marks=pytest.mark.matrix),
+        pytest.param(
+            "24b24s64d",
+            ("units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
+            marks=pytest.mark.matrix,
+        ),
         ("32b32s64d", ()),
     ],
 )

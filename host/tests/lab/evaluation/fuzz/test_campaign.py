@@ -39,7 +39,14 @@ SHAPES = tuple((config, ("array.columns=1",), 240) for config in ("tiny", "small
 
 #: Pipelines for all rays of a column, as in `test_path_unit`.
 PIPELINED = (
-    *("array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3", "units.triangleRows=2", "units.triangleLanes=2"),
+    *(
+        "array.rows=3",
+        "units.pathContexts=24",
+        "units.rayInterval=1",
+        "units.shadeInterval=3",
+        "units.triangleRows=2",
+        "units.triangleLanes=2",
+    ),
     *("columnBvhMemory.holdable=true", "frame.maxBounces=4", "frame.lights=2"),
 )
 

@@ -80,10 +80,11 @@ def test_clock_gates_count_as_clock_power(library: Library, tmp_path: Path) -> N
 
 def test_power_belongs_to_the_innermost_unit() -> None:
     flat = Power(1.0, 2.0, 3.0)
-    owners = ("", "Queue", "Shader", "Shader/CosineUnit", "Shader/BounceUnit", "Shader/BounceUnit/Divider")
+    shader = "SequentialShader"
+    owners = ("", "Queue", shader, f"{shader}/CosineUnit", f"{shader}/BounceUnit", f"{shader}/BounceUnit/Divider")
     for module, rest in (("TraversalUnit", "contexts"), ("PathUnit", "PathUnit")):
         found = by_unit(dict.fromkeys(owners, flat), module)
-        assert {unit: power.clock for unit, power in found.items()} == {rest: 2, "Shader": 2, "BounceUnit": 2}
+        assert {unit: power.clock for unit, power in found.items()} == {rest: 2, shader: 2, "BounceUnit": 2}
 
 
 def test_a_path_unit_counts_with_the_rays_of_the_render_unit() -> None:

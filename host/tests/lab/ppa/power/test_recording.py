@@ -37,7 +37,13 @@ PORTS = {
 
 
 def recorded(cycles: int) -> dict[str, Recording]:
-    overrides = ("array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3", "units.triangleRows=2")
+    overrides = (
+        "array.rows=3",
+        "units.pathContexts=24",
+        "units.rayInterval=1",
+        "units.shadeInterval=3",
+        "units.triangleRows=2",
+    )
     return record("tiny", overrides, PORTS, Stimulus.of_benchmark("cube", (24, 18), cycles))
 
 

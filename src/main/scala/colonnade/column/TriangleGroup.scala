@@ -43,7 +43,7 @@ final class TriangleGroup(config: ColonnadeConfig, count: Int) extends Module {
     queue.enq.valid        := Mux1H(grants.sender, io.rows.map(_.candidate.valid))
     queue.enq.bits         := Mux1H(grants.sender, io.rows.map(_.candidate.bits))
     queue.enq.bits.context :=
-      Cat(OHToUInt(grants.sender).pad(rowBits), Mux1H(grants.sender, io.rows.map(_.candidate.bits.context)))
+      Cat(0.U(rowBits.W) | OHToUInt(grants.sender), Mux1H(grants.sender, io.rows.map(_.candidate.bits.context)))
     for ((row, index) <- io.rows.zipWithIndex) {
       row.readyNext       := grants.grant(index)
       row.candidate.ready := grants.sender(index)

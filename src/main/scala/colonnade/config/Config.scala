@@ -89,9 +89,9 @@ final case class GeometryConfig(
   * @param pathContexts  pixels in flight in a column's path unit
   * @param rayInterval   most cycles between rays that ray set-up takes, while the rays that it has prepared are taken: 1
   *                      chooses a pipeline, 32 one ray after the other
-  * @param shadeInterval most cycles that a light on a hit takes the shader, while what it has shaded is taken and texels
-  *                      come at once: 3 chooses a pipeline, 128 one hit after the other. Hits on mirrors take 3 in the
-  *                      pipeline, those on glass have no limit
+  * @param shadeInterval most cycles of the shader for a light on a diffuse hit, while what it has shaded is taken and
+  *                      texels come at once: 3 chooses a pipeline, 128 one hit after the other. Hits on mirrors and
+  *                      glass take the time of their bounce units
   * @param extraSlices   the optional timing slices of traversal and caches, for FPGAs: some steps take a cycle more
   */
 final case class UnitsConfig(

@@ -109,7 +109,7 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
     Matrix
   )
   render(
-    "an environment, five paths, pipelined ray set-up",
+    "an environment, five paths, a ray set-up pipeline",
     withIntervals(withPaths(TestConfigs.withEnvironment(TestConfigs.environment), 5), ray = 1)
   )
   render("a shading pipeline, eight paths", withIntervals(withPaths(tiny, 8), shade = 3))

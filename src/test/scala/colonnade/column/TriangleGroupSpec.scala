@@ -13,7 +13,7 @@ import scala.util.Random
 class TriangleGroupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "TriangleGroup"
 
-  for ((rows, of, lanes, stalls) <- Seq((3, 3, 2, 3), (1, 3, 1, 0), (1, 1, 2, 3)))
+  for ((rows, of, lanes, stalls) <- Seq((3, 3, 2, 3), (2, 3, 1, 3), (1, 3, 1, 0), (1, 1, 2, 3)))
     it should s"return each result to its row, with $rows of $of rows on $lanes units, stalls $stalls" in {
       val tiny   = TestConfigs.tiny
       val config = tiny.copy(

@@ -16,6 +16,9 @@ import scala.util.Random
 private class RaySetupHarness(config: ColonnadeConfig) extends Module {
   private val setup = Module(RaySetup(config))
 
+  /** The unit that the factory has chosen. */
+  val leaf: String = setup.desiredName
+
   val io       = IO(chiselTypeOf(setup.io))
   val forBoxes = IO(Output(new BoxRay(config.numbers)))
   io :<>= setup.io
@@ -27,7 +30,8 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
   import RaySetupSpec._
 
   for (interval <- UnitsConfig.rayIntervals) {
-    behavior of (if (interval == 1) "RaySetupPipeline" else "SequentialRaySetup")
+    val leaf = if (interval == 1) "RaySetupPipeline" else "SequentialRaySetup"
+    behavior of leaf
 
     formatsOf(interval).foreach { formats =>
       it should s"equal the model under random stalls, also at inverted bounds, ${nameOf(formats, interval)}" taggedAs
@@ -49,6 +53,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       it should s"accept a ray every $limit cycles, ${nameOf(formats, interval)}, and lose none" in {
         val config = withInterval(formats, interval)
         test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
+          setup.leaf shouldBe leaf
           val random   = new Random(3)
           val box      = new SetupStimulus(config, random).all(raysPerBox = 40).head
           val answers  = box.answers(config)

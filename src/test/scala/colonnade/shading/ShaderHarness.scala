@@ -10,8 +10,12 @@ import colonnade.config.ColonnadeConfig
 final class ShaderHarness(config: ColonnadeConfig) extends Module {
   val io = IO(new ShaderIO(config))
 
-  private val shader = Module(Shader(config)).io
+  private val unit   = Module(Shader(config))
+  private val shader = unit.io
   io <> shader
+
+  /** The unit that the factory has chosen. */
+  val leaf: String = unit.desiredName
 
   for ((port, unused) <- shader.texture.zip(io.texture)) {
     val random = LFSR(8)

@@ -165,6 +165,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
     it should s"take a hit every ${ModuloSchedule.interval * shining} cycles with $shining lights" in
       test(new ShaderHarness(TestConfigs.withPipelines(TestConfigs.tiny)))
         .withAnnotations(Simulation.verilator) { dut =>
+          assert(dut.leaf == "ShadingPipeline")
           val stimulus = new ShaderStimulus(TestConfigs.tiny, new Random(3))
           val light    = stimulus.light().copy(shining = shining)
           pokeLight(dut.io, light)
