@@ -143,10 +143,8 @@ object ShellMap {
     )
   )
 
-  /** Writes to the device's registers that the shell takes while a frame runs: at least two of each word, a frame and
-    * one that replaces it.
-    */
-  def postedWrites(config: ColonnadeConfig): Int = 1 << log2Ceil(2 * writableWords(config).size)
+  /** Writes to the device's registers that the shell takes while a frame runs: at least one of each word, and 256. */
+  def postedWrites(config: ColonnadeConfig): Int = (1 << log2Ceil(writableWords(config).size)).max(256)
 
   /** Words of the device's registers that may be written, without `control.start`: the shell starts frames. */
   def writableWords(config: ColonnadeConfig): Seq[Int] =
