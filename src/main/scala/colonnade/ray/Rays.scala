@@ -2,7 +2,7 @@ package colonnade.ray
 
 import chisel3._
 import colonnade.common.Context
-import colonnade.config.{NumberFormats, PartConfig}
+import colonnade.config.{NumberFormats, PartConfig, PathConfig}
 import colonnade.formats.Vec3
 import colonnade.numbers.{Fixed, FixedPointFormat, Rounding}
 
@@ -35,7 +35,7 @@ final class RayFormats(numbers: NumberFormats) {
 }
 
 /** A ray to prepare. `dir` is its direction, of any length. A shadow ray ends at origin + dir, the light. */
-final class RayRequest(config: PartConfig) extends Bundle {
+final class RayRequest(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val context  = Context(config)

@@ -5,7 +5,7 @@ import chisel3.util.{Decoupled, RegEnable, Valid}
 import chiseltest._
 import colonnade.TestParts._
 import colonnade.common.Context
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.formats.{EnvironmentView, Load}
 import colonnade.shading.EnvironmentSurface
 import colonnade.{Model, Packed, Simulation, TestConfigs}
@@ -19,8 +19,8 @@ private class RayPorts(config: ColonnadeConfig) extends Bundle {
   val req         = Flipped(Decoupled(new EnvironmentRequest(config)))
   val hitDistance = Input(HitDistance(config))
   val surface     = Decoupled(UInt(new EnvironmentSurface(config).getWidth.W))
-  val miss        = Valid(Context(config))
-  val visible     = Valid(Context(config))
+  val miss        = Valid(Context(PathConfig(config)))
+  val visible     = Valid(Context(PathConfig(config)))
 }
 
 /** The rays of a path unit, its marches, and slow maps. */
