@@ -78,12 +78,12 @@ def write(docs: Path) -> None:
 
 def problems(docs: Path) -> Iterator[str]:
     """One line for each page that differs from the data, and for each table that no page shows."""
-    shown = set()
+    written = set()
     for file, old, new in _pages(docs, Data(docs)):
-        shown |= set(_MARKER.findall(new))
+        written |= set(_MARKER.findall(new))
         if new != old:
             yield f"{file.name} differs from its data: run tools/figures pages"
-    for name in sorted(TABLES.keys() - shown):
+    for name in sorted(TABLES.keys() - written):
         yield f"no page shows the table {name}"
 
 

@@ -44,7 +44,7 @@ final class ColonnadeAxi(
   // What a soft reset resets. An extra slice drives it from a register; the device then runs for a cycle after power-up
   private val slice  = TimingSlice.extra(config)
   private val clears =
-    if (slice.isThere) slice.flag(reset.asBool || control.io.resetNext, atReset = true)
+    if (slice.isEnabled) slice.flag(reset.asBool || control.io.resetNext, atReset = true)
     else reset.asBool || control.io.reset
   private val device = withReset(clears)(Module(new Colonnade(config, pathTracer)))
   private val writer = withReset(clears)(Module(new FramebufferWriter(config, shell)))

@@ -10,26 +10,26 @@ import colonnade.config.ColonnadeConfig
   * more costs rays per cycle. There a slice exists with `units.extraSlices` only: `TimingSlice.extra(config)` makes it, or
   * what passes everything on as it is.
   */
-sealed class TimingSlice private[common] (val isThere: Boolean) {
+sealed class TimingSlice private[common] (val isEnabled: Boolean) {
 
   /** Latency. */
-  val cycles: Int = if (isThere) 1 else 0
+  val cycles: Int = if (isEnabled) 1 else 0
 
   def apply[T <: Data](signal: T): T = apply(signal, true.B)
 
   /** Holds while it is not enabled. */
-  def apply[T <: Data](signal: T, enable: Bool): T = if (isThere) RegEnable(signal, enable) else signal
+  def apply[T <: Data](signal: T, enable: Bool): T = if (isEnabled) RegEnable(signal, enable) else signal
 
   /** Defined from the reset on. */
-  def flag(signal: Bool, atReset: Boolean = false): Bool = if (isThere) RegNext(signal, atReset.B) else signal
+  def flag(signal: Bool, atReset: Boolean = false): Bool = if (isEnabled) RegNext(signal, atReset.B) else signal
 
-  def valid[T <: Data](signal: Valid[T]): Valid[T] = if (isThere) Pipe(signal.valid, signal.bits) else signal
+  def valid[T <: Data](signal: Valid[T]): Valid[T] = if (isEnabled) Pipe(signal.valid, signal.bits) else signal
 
   /** A queue of two, for one transfer per cycle; `ready` is registered, too. */
-  def queue[T <: Data](stream: DecoupledIO[T]): DecoupledIO[T] = if (isThere) Queue(stream, 2) else stream
+  def queue[T <: Data](stream: DecoupledIO[T]): DecoupledIO[T] = if (isEnabled) Queue(stream, 2) else stream
 }
 
-object TimingSlice extends TimingSlice(isThere = true) {
+object TimingSlice extends TimingSlice(isEnabled = true) {
 
   /** A slice that is there with `units.extraSlices`. */
   def extra(config: ColonnadeConfig): TimingSlice = new TimingSlice(config.units.extraSlices)

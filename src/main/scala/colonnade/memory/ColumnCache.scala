@@ -50,7 +50,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   val io = IO(new ColumnCacheIO(config))
 
   private val slice   = TimingSlice.extra(config)
-  private val tags    = new TagStore(sets, ways, lineBits, inMemory = slice.isThere)
+  private val tags    = new TagStore(sets, ways, lineBits, inMemory = slice.isEnabled)
   private val records = SyncReadMem(sets * ways * Lines.records, Lines.stored(config))
 
   private final class AwaitedLine {
@@ -83,7 +83,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   // An extra slice lies between the comparison and the entry of a line that misses
   private val enters   = WireInit(false.B)
   private val missed   = slice(lineOf(address))
-  private val isMissed = if (slice.isThere) enters else false.B // in the cycle before
+  private val isMissed = if (slice.isEnabled) enters else false.B // in the cycle before
   request.ready := blocked === 0.U && freeCount > accepted +& isMissed
 
   // Cycle c + 1: compare. A line is never both held and awaited

@@ -60,7 +60,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   val io = IO(new SharedCacheIO(config))
 
   private val slice   = TimingSlice.extra(config)
-  private val tags    = new TagStore(sets, ways, lineBits, inMemory = slice.isThere)
+  private val tags    = new TagStore(sets, ways, lineBits, inMemory = slice.isEnabled)
   private val lines   = SyncReadMem(sets * ways, Vec(Lines.records, Lines.stored(config)))
   private val awaited = Module(new AwaitedLines(config, cache.sharedMisses / banks))
 
@@ -99,7 +99,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
     request.valid && willBeFree(SharedCache.busOf(config, column))
   }
   // With extra slices a request enters in the cycle after the last one has left
-  private val isVacant = if (slice.isThere) !isWaiting else !isWaiting || leaves
+  private val isVacant = if (slice.isEnabled) !isWaiting else !isWaiting || leaves
   private val accepts  = isVacant && arbiter.io.requests.orR
   private val next     = Mux1H(arbiter.io.grant, io.requests.map(_.bits))
   arbiter.io.requests := VecInit(eligible).asUInt

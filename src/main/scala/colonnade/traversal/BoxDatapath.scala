@@ -134,7 +134,7 @@ class BoxDatapath(config: TraversalConfig, lanes: Int) extends Module {
 
   /** The third slab waits while the others are shifted. */
   private def held(z: Seq[SInt]): Seq[SInt] =
-    if (slice.isThere) byLane(z, stage = 3)(slice(_, _)) else z
+    if (slice.isEnabled) byLane(z, stage = 3)(slice(_, _)) else z
 
   private def least(a: SInt, b: SInt): SInt = Mux(a < b, a, b)
 

@@ -63,12 +63,12 @@ class TraversalStack(config: TraversalConfig) extends Module {
   private val levels    = RegInit(VecInit.fill(contexts)(0.U.asTypeOf(StackLevel(config))))
   private val slice     = TimingSlice.extra(config)
   private val stepQueue =
-    Module(new Queue(new TraversalStep(config), TraversalStack.stepQueueDepth, flow = !slice.isThere))
+    Module(new Queue(new TraversalStep(config), TraversalStack.stepQueueDepth, flow = !slice.isEnabled))
 
   // An extra slice registers the entry that was read and its comparison, in a cycle between the two of a pop
   private val readsEntry = WireInit(false.B)
   private val isRead     = slice.flag(readsEntry)
-  private val isReading  = if (slice.isThere) isRead else false.B
+  private val isReading  = if (slice.isEnabled) isRead else false.B
 
   // Second cycle of an operation: its result, or the entry that was read
   private val isSecondCycle = RegInit(false.B)

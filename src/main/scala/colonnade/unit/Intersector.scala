@@ -89,7 +89,7 @@ final class Intersector(config: TraversalConfig) extends Module {
   // Test triangles: a result terminates an occluded shadow ray, or the ray resumes after its record.
   // The termination is registered, so that no path leads from the triangle units through the hit table to the results
   private val slice      = TimingSlice.extra(config)
-  private val result     = if (slice.isThere) compared(slice.queue(triangles.result)) else triangles.result
+  private val result     = if (slice.isEnabled) compared(slice.queue(triangles.result)) else triangles.result
   private val isShadow   = slice(io.isShadow(result.bits.context))
   private val isOccluded = isShadow && hitTable.io.hasHitNow
   private val resumes    = Module(new Arbiter(Context(config), 2))

@@ -46,13 +46,13 @@ final class PixelAssembler(config: PathConfig) extends Module {
   when(io.colour.valid) { colours.write(io.colour.bits.context, io.colour.bits) }
 
   /** Finished pixels that wait. Many contexts give a pixel a cycle: two wait while one is on its way. */
-  private val places = if (config.isLarge) 3 else 1
+  private val queueDepth = if (config.isLarge) 3 else 1
 
   // Retire a context
   private val done     = io.control.done
   private val finished = Wire(Decoupled(new Pixel(config)))
-  private val queue    = Module(new Queue(new Pixel(config), places))
-  private val retires  = done.valid && queue.io.count +& finished.valid < places.U
+  private val queue    = Module(new Queue(new Pixel(config), queueDepth))
+  private val retires  = done.valid && queue.io.count +& finished.valid < queueDepth.U
   io.control.retire := retires
   queue.io.enq :<>= finished
   io.pixels :<>= queue.io.deq

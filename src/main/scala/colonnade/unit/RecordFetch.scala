@@ -58,7 +58,7 @@ final class RecordFetch(config: PartConfig) extends Module {
   lookup.isWritten := VecInit(fill.isFilled.zip(miss.isReserved).map { case (filled, reserved) => filled || reserved })
 
   // A context is ready in the cycle of its hit; an extra slice makes it the next one
-  private val readyHits = hits.map(hits => if (slice.isThere) hits.map(_ => false.B) else PriorityEncoderOH(hits))
+  private val readyHits = hits.map(hits => if (slice.isEnabled) hits.map(_ => false.B) else PriorityEncoderOH(hits))
   private val grant     = Module(new RecordGrant(config)).io
   grant.readyNext := io.readyNext
   for ((fetch, context) <- fetches.zipWithIndex) {
@@ -68,14 +68,14 @@ final class RecordFetch(config: PartConfig) extends Module {
     grant.holders(context) := VecInit(holders.map { case (held, hit) => held || (hit && !fetch.hasRecord) })
     when(grant.grantOH(context)) { fetch.hasRecord := false.B }
   }
-  private val served = grant.served.bits
+  private val granted = grant.granted.bits
   io.grantNext             := grant.grantNext
   io.grantsNodeNext        := grant.grantsNodeNext
-  io.response.valid        := grant.served.valid
-  io.response.bits.context := served.context
-  io.response.bits.kind    := served.kind
-  io.response.bits.address := Mux1H(served.buffer, buffers.map(_.address))
-  io.response.bits.record  := Mux1H(served.buffer, buffers.map(_.record))
+  io.response.valid        := grant.granted.valid
+  io.response.bits.context := granted.context
+  io.response.bits.kind    := granted.kind
+  io.response.bits.address := Mux1H(granted.buffer, buffers.map(_.address))
+  io.response.bits.record  := Mux1H(granted.buffer, buffers.map(_.record))
 
   // Report illegal addresses
   private val illegalOH = PriorityEncoderOH(fetches.map(_.isIllegal))

@@ -43,7 +43,7 @@ private[unit] final class RecordFill(
 
   /** By broadcast and context: the context waits for it. The slice compares a new fetch too late. */
   val waiters: Seq[Seq[Bool]] = fetches.zip(isNew).map { case (fetch, isNew) =>
-    val waits = if (slice.isThere) fetch.isPending && !isNew else fetch.isPending
+    val waits = if (slice.isEnabled) fetch.isPending && !isNew else fetch.isPending
     brings(fetch.address).map(_ && waits)
   }.transpose
 

@@ -24,13 +24,13 @@ final class RecordGrantIO(config: PartConfig) extends Bundle {
   /** By kind: its unit accepts a record in the next cycle. */
   val readyNext = Input(Vec(RecordKind.all.size, Bool()))
 
-  /** The context that is served in the next cycle, also one-hot, and whether its record is a node. */
+  /** The context that is granted in the next cycle, also one-hot, and whether its record is a node. */
   val grantNext      = Output(Valid(Context(config)))
   val grantOH        = Output(Vec(contexts, Bool()))
   val grantsNodeNext = Output(Bool())
 
-  /** The one that is served now. */
-  val served = Output(Valid(new RecordGrantee(config)))
+  /** The one that is granted now. */
+  val granted = Output(Valid(new RecordGrantee(config)))
 }
 
 /** Grant: serves the first ready context of the kind with the highest priority whose unit accepts a record. The choice is
@@ -62,8 +62,8 @@ final class RecordGrant(config: PartConfig) extends Module {
   io.grantNext.bits  := next.bits.context
   io.grantOH         := VecInit(grantOH)
   io.grantsNodeNext  := kindOH(RecordKind.node.litValue.toInt)
-  io.served.valid    := RegNext(next.valid, false.B)
-  io.served.bits     := RegEnable(next.bits, next.valid)
+  io.granted.valid    := RegNext(next.valid, false.B)
+  io.granted.bits     := RegEnable(next.bits, next.valid)
 }
 
 private object RecordGrant {

@@ -52,12 +52,12 @@ final class RecordLookup(config: PartConfig) extends Module {
     val isNew = from.asUInt.orR
     val port  = slice(from)
     io.isNew(context)      := isNew
-    io.isUnderWay(context) := (if (slice.isThere) isNew || RegNext(isNew, false.B) else false.B)
+    io.isUnderWay(context) := (if (slice.isEnabled) isNew || RegNext(isNew, false.B) else false.B)
     io.matches(context)    := VecInit(passed(portMatches.transpose.map(Mux1H(port, _))))
   }
 
   /** Matches by buffer, behind a slice. */
-  private def passed(matches: Seq[Bool]): Seq[Bool] = if (slice.isThere)
+  private def passed(matches: Seq[Bool]): Seq[Bool] = if (slice.isEnabled)
     matches.zip(io.isWritten).map { case (isMatch, isWritten) => RegNext(isMatch && !isWritten) }
   else matches
 }

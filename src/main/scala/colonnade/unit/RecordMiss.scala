@@ -29,8 +29,8 @@ private[unit] final class RecordMiss(
 
   // Choose a context
   private val isExpected = fetches.zip(matches).map { case (fetch, matches) =>
-    val isThere = buffers.zip(matches).map { case (buffer, isMatch) => isMatch && buffer.state =/= BufferState.empty }
-    Mux(snooping, fetch.isExpected || isThere.reduce(_ || _), fetch.isIssued)
+    val isEnabled = buffers.zip(matches).map { case (buffer, isMatch) => isMatch && buffer.state =/= BufferState.empty }
+    Mux(snooping, fetch.isExpected || isEnabled.reduce(_ || _), fetch.isIssued)
   }
   private def misses(fetch: ContextFetch, isExpected: Bool): Bool =
     fetch.isPending && !isExpected && !fetch.awaitsFill.getOrElse(false.B)
@@ -44,7 +44,7 @@ private[unit] final class RecordMiss(
 
   // Request its record
   private val (isBlocked, free) =
-    if (slice.isThere) ((fill.broadcasts ++ fill.incoming).map(_.valid).reduce(_ || _), isAvailable)
+    if (slice.isEnabled) ((fill.broadcasts ++ fill.incoming).map(_.valid).reduce(_ || _), isAvailable)
     else {
       val comes = fill.broadcasts.zip(fill.brings(address)).map { case (broadcast, brings) =>
         broadcast.valid && brings

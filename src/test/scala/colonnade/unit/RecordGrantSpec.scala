@@ -7,7 +7,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 import colonnade.TestParts._
 
-/** The first ready context of the kind with the highest priority is served in the next cycle. */
+/** The first ready context of the kind with the highest priority is granted in the next cycle. */
 class RecordGrantSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "RecordGrant"
 
@@ -22,7 +22,7 @@ class RecordGrantSpec extends AnyFlatSpec with ChiselScalatestTester {
     test(new RecordGrant(config)) { dut =>
       val random   = new Random(7)
       val priority = Seq(RecordKind.triangles, RecordKind.attributes, RecordKind.node)
-      var served   = Option.empty[(Int, RecordKind.Type, Int)]
+      var granted   = Option.empty[(Int, RecordKind.Type, Int)]
       for (_ <- 0 until 1000) {
         val ready   = Seq.fill(contexts)(random.nextInt(3) == 0)
         val kinds   = Seq.fill(contexts)(RecordKind.all(random.nextInt(3)))
@@ -34,20 +34,20 @@ class RecordGrantSpec extends AnyFlatSpec with ChiselScalatestTester {
           for (buffer <- 0 until buffers) dut.io.holders(context)(buffer).poke(holders(context) == buffer)
         }
         for ((kind, port) <- RecordKind.all.zip(dut.io.readyNext)) port.poke(accepts(kind.litValue))
-        dut.io.served.valid.expect(served.nonEmpty)
-        for ((context, kind, holder) <- served) {
-          dut.io.served.bits.context.expect(context)
-          dut.io.served.bits.kind.expect(kind)
-          for (buffer <- 0 until buffers) dut.io.served.bits.buffer(buffer).expect(buffer == holder)
+        dut.io.granted.valid.expect(granted.nonEmpty)
+        for ((context, kind, holder) <- granted) {
+          dut.io.granted.bits.context.expect(context)
+          dut.io.granted.bits.kind.expect(kind)
+          for (buffer <- 0 until buffers) dut.io.granted.bits.buffer(buffer).expect(buffer == holder)
         }
-        served = (for {
+        granted = (for {
           kind    <- priority if accepts(kind.litValue)
           context <- 0 until contexts if ready(context) && kinds(context).litValue == kind.litValue
         } yield (context, kind, holders(context))).headOption
-        dut.io.grantNext.valid.expect(served.nonEmpty)
-        dut.io.grantsNodeNext.expect(served.exists(_._2.litValue == RecordKind.node.litValue))
-        for ((context, _, _) <- served) dut.io.grantNext.bits.expect(context)
-        for (context <- 0 until contexts) dut.io.grantOH(context).expect(served.exists(_._1 == context))
+        dut.io.grantNext.valid.expect(granted.nonEmpty)
+        dut.io.grantsNodeNext.expect(granted.exists(_._2.litValue == RecordKind.node.litValue))
+        for ((context, _, _) <- granted) dut.io.grantNext.bits.expect(context)
+        for (context <- 0 until contexts) dut.io.grantOH(context).expect(granted.exists(_._1 == context))
         dut.clock.step()
       }
     }
