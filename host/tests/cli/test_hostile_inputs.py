@@ -180,9 +180,7 @@ CASES |= {
     "set-long": Case(f"generate --config tiny --set array={'x' * 50_000} --print", "characters"),
     "set-digits": Case(f"generate --config tiny --set array.rows={'9' * 1000} --print", "digits"),
     "set-duplicate": Case("""generate --config tiny --set 'array={"rows":1,"rows":2}' --print""", "twice"),
-    "set-old-key": Case(
-        "generate --config small --set physicalAttributeMemory.shellPlanes=4 --print", "it is boundingPlanes now"
-    ),
+    "set-old-key": Case("generate --config small --set physicalAttributeMemory.shellPlanes=4 --print", "unknown key"),
     "set-nothing": Case("generate --config tiny --set =1 --print", "key.path=value"),
     # Studies
     "study-of-many-points": Case(
