@@ -5,17 +5,11 @@ import chisel3.util.log2Ceil
 
 /** Ports of [[DelayLine]]. */
 final class DelayLineIO[T <: Data](value: T) extends Bundle {
-
-  /** The pipeline moves on by one stage. */
-  val moves = Input(Bool())
-
-  /** `in` is valid and must come out later. */
-  val writes = Input(Bool())
+  val moves  = Input(Bool()) // the pipeline moves on by one stage
+  val writes = Input(Bool()) // `in` is valid and must come out later
   val in     = Input(value)
-
-  /** `out` is needed in the next cycle, after this cycle's move if there is one. */
-  val reads = Input(Bool())
-  val out   = Output(value)
+  val reads  = Input(Bool()) // `out` is needed in the next cycle, after this cycle's move if there is one
+  val out    = Output(value)
 }
 
 /** Carries values along a pipeline that may stall, in a memory of `delay` words in place of shift registers.

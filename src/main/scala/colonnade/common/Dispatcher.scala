@@ -5,10 +5,8 @@ import chisel3.util.Decoupled
 
 /** Ports of [[Dispatcher]]. */
 final class DispatcherIO[T <: Data](private val item: T, count: Int) extends Bundle {
-  val items = Flipped(Decoupled(item))
-
-  /** Valid only where ready is set: ready must not depend on valid. */
-  val takers = Vec(count, Decoupled(item))
+  val items  = Flipped(Decoupled(item))
+  val takers = Vec(count, Decoupled(item)) // valid only where ready is set: ready must not depend on valid
 }
 
 /** Dispatches each item to one of the ready takers in round-robin order, so that consecutive items spread.

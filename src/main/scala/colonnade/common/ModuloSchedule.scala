@@ -121,9 +121,7 @@ final class ModuloSchedule(phase: UInt, interval: Int = ModuloSchedule.interval)
 }
 
 object ModuloSchedule {
-
-  /** Cycles from an operation to the next. */
-  val interval: Int = 3
+  val interval: Int = 3 // cycles from an operation to the next
 
   /** A counter of the cycles of an interval. */
   def phase(): UInt = UInt(log2Ceil(interval).W)

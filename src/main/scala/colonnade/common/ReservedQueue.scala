@@ -5,16 +5,13 @@ import chisel3.util.{isPow2, log2Ceil, Decoupled, Valid}
 
 /** Ports of [[ReservedQueue]]. */
 final class ReservedQueueIO[T <: Data](item: T) extends Bundle {
-
-  /** Only while the queue has space. */
-  val in  = Flipped(Valid(item))
+  val in  = Flipped(Valid(item)) // only while the queue has space
   val out = Decoupled(item)
 
   /** `out` may be taken in the next cycle. Otherwise it is not offered then, and the memory is not read. */
   val mayTakeNext = Input(Bool())
 
-  /** `out` is offered in the next cycle, if it may be taken. */
-  val validNext = Output(Bool())
+  val validNext = Output(Bool()) // `out` is offered in the next cycle, if it may be taken
 }
 
 /** A queue in a memory with one read port and one write port, for items that have their place reserved: it has no

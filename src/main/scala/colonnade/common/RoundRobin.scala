@@ -5,12 +5,8 @@ import chisel3._
 /** Ports of [[RoundRobin]]; bit i belongs to requester i. */
 final class RoundRobinIO(count: Int) extends Bundle {
   val requests = Input(UInt(count.W))
-
-  /** One of the requests, one-hot; 0 without requests. */
-  val grant = Output(UInt(count.W))
-
-  /** The grant is accepted: this requester now has the lowest priority. */
-  val isTaken = Input(Bool())
+  val grant    = Output(UInt(count.W)) // one of the requests, one-hot; 0 without requests
+  val isTaken  = Input(Bool())         // the grant is accepted: this requester now has the lowest priority
 }
 
 /** A round-robin arbiter: a requester that stays valid gets one of the next `count` accepted grants.

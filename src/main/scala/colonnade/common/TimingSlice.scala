@@ -11,9 +11,7 @@ import colonnade.config.ColonnadeConfig
   * what passes everything on as it is.
   */
 sealed class TimingSlice private[common] (val isEnabled: Boolean) {
-
-  /** Latency. */
-  val cycles: Int = if (isEnabled) 1 else 0
+  val cycles: Int = if (isEnabled) 1 else 0 // latency
 
   def apply[T <: Data](signal: T): T = apply(signal, true.B)
 

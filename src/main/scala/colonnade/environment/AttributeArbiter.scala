@@ -31,9 +31,7 @@ final class AttributeArbiter[Q <: Data, R <: Data](request: Q, response: R, coun
   granted.bits.content := bits.content
   granted.bits.tag     := (if (count == 1) bits.tag else OHToUInt(arbiter.io.grant) ## bits.tag)
   io.joined.req <> Queue(granted)
-  reqs.zip(arbiter.io.grant.asBools).foreach { case (req, isGranted) =>
-    req.ready := isGranted && granted.ready
-  }
+  for ((req, isGranted) <- reqs.zip(arbiter.io.grant.asBools)) req.ready := isGranted && granted.ready
 
   // Broadcast the response
   private val broadcast = Pipe(io.joined.resp)

@@ -7,13 +7,9 @@ import colonnade.formats.{AttributeMemories, AttributeMemory, Load}
 
 /** Ports of [[AttributeStore]]. */
 final class AttributeStoreIO(config: ColonnadeConfig, memory: AttributeMemory) extends Bundle {
-
-  /** Only while no frame runs. */
-  val load = Flipped(Valid(new Load(config)))
+  val load = Flipped(Valid(new Load(config))) // only while no frame runs
   val read = Flipped(Valid(UInt(log2Ceil(memory.depth).W)))
-
-  /** The word that was read in the cycle before. */
-  val word = Output(UInt(memory.bits.W))
+  val word = Output(UInt(memory.bits.W))      // the word that was read in the cycle before
 }
 
 /** One of the `AttributeMemories`. It has a single port, since reads and loads exclude each other. A load beyond its

@@ -87,18 +87,10 @@ final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
 
 /** A decoded tile mode. */
 private final class TileKind extends Bundle {
-
-  /** The tile has one plane. */
-  val isFlat = Bool()
-
-  /** The tile has four planes, not two. */
-  val hasFour = Bool()
-
-  /** A cell's edge is a sixteenth of the tile's. */
-  val isFinest = Bool()
-
-  /** Otherwise, an eighth, not a quarter. */
-  val isFine = Bool()
+  val isFlat   = Bool() // the tile has one plane
+  val hasFour  = Bool() // the tile has four planes, not two
+  val isFinest = Bool() // a cell's edge is a sixteenth of the tile's
+  val isFine   = Bool() // otherwise, an eighth, not a quarter
 }
 
 private object TileKind {

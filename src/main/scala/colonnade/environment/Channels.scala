@@ -13,9 +13,7 @@ final class TaggedRequest[T <: Data](private val kind: T, tagBits: Int) extends 
 
 /** A response with the tag of its request. */
 final class TaggedResponse[T <: Data](private val kind: T, tagBits: Int) extends Bundle {
-
-  /** A word beyond the map's heap was read as 0. */
-  val isIllegal = Bool()
+  val isIllegal = Bool() // a word beyond the map's heap was read as 0
   val content   = kind.cloneType
   val tag       = UInt(tagBits.W)
 }
@@ -37,29 +35,19 @@ final class MapPixel(layout: TileGrid) extends Bundle {
 
 /** Requests the planes of a tile or a cell. */
 final class CellRequest(layout: AttributeLayout) extends Bundle {
-  val pixel = new MapPixel(layout)
-
-  /** All planes of the pixel's tile; otherwise the plane of its cell. */
-  val wholeTile = Bool()
+  val pixel     = new MapPixel(layout)
+  val wholeTile = Bool() // all planes of the pixel's tile; otherwise the plane of its cell
 }
 
 /** The planes of a tile, or the plane of a cell. */
 final class CellResponse(layout: AttributeLayout) extends Bundle {
-
-  /** Log2 of the edge of the tile's cells in pixels; a flat tile is one cell. */
-  val cellLog = UInt(CellResponse.cellLogBits.W)
-
-  /** Planes: 1, 2 or 4 of a tile, 1 of a cell. */
-  val count = UInt(3.W)
-
-  /** The planes; 0 beyond the count. */
-  val ids = Vec(4, UInt(layout.planeIdBits.W))
+  val cellLog = UInt(CellResponse.cellLogBits.W)   // log2 of the edge of the tile's cells in pixels; a flat tile is one
+  val count   = UInt(3.W)                          // planes: 1, 2 or 4 of a tile, 1 of a cell
+  val ids     = Vec(4, UInt(layout.planeIdBits.W)) // the planes; 0 beyond the count
 }
 
 object CellResponse {
-
-  /** A tile's edge is 2^5 at most. */
-  val cellLogBits: Int = 3
+  val cellLogBits: Int = 3 // a tile's edge is 2^5 at most
 }
 
 /** Requests an entry of the plane table, or a bounding plane. */

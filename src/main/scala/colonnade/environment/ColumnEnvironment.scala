@@ -7,9 +7,7 @@ import colonnade.formats.{AttributeEvents, Load}
 
 /** Ports of [[ColumnEnvironment]]. */
 final class ColumnEnvironmentIO(config: ColonnadeConfig) extends Bundle {
-
-  /** Only while no request is in flight. */
-  val load = Flipped(Valid(new Load(config)))
+  val load = Flipped(Valid(new Load(config))) // only while no request is in flight
 
   /** One for each march, and one for the pipeline of directly seen pixels. */
   val ports = Vec(config.mapRequesters, Flipped(new AttributePort(AttributeLayout.of(config))))

@@ -10,8 +10,7 @@ final class DdaSetup(m: MarchOperations) {
   import m.formats._
   import m.program._
 
-  /** The current tile. */
-  val tile: Vec[UInt] = Reg(Vec(2, UInt(tileBits.W)))
+  val tile: Vec[UInt] = Reg(Vec(2, UInt(tileBits.W))) // the current tile
 
   /** Distances with guard bits: to the next edge, and between edges. */
   val edge:   Vec[UInt] = Reg(Vec(2, UInt(distanceBits.W)))

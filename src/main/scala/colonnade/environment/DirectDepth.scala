@@ -10,8 +10,7 @@ import colonnade.numbers.{Divider, Normalise, Rounding}
 final class DirectDistance(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
-  /** The map shows something there, in front of the camera. */
-  val isHit    = Bool()
+  val isHit    = Bool() // the map shows something there, in front of the camera
   val exponent = SInt(formats.shiftBits.W)
   val distance = UInt((formats.f + 1).W)
 }
@@ -25,11 +24,8 @@ final class DirectDepthIO(config: PathConfig) extends Bundle {
   val rate  = Flipped(Decoupled(new DirectRate(config)))
   val plane = Flipped(Decoupled(new Plane))
 
-  /** The pixel's albedo and its normal are needed. */
-  val albedo, normal = Decoupled(new MapPixel(AttributeLayout.of(config)))
-
-  /** In the order of the pixels. */
-  val distance = Decoupled(new DirectDistance(config))
+  val albedo, normal = Decoupled(new MapPixel(AttributeLayout.of(config))) // the pixel's albedo and normal are needed
+  val distance       = Decoupled(new DirectDistance(config))               // in the order of the pixels
 }
 
 /** The distance of a directly seen point, from the plane of its pixel: 1 / (w · rate). A pixel every four cycles, by one

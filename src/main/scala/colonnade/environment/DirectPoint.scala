@@ -11,19 +11,15 @@ import colonnade.ray.RayFormats
 final class DirectPixel(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
-  val request = new EnvironmentRequest(config)
-
-  /** Scaled to f bits. */
-  val dir         = Vec(3, SInt((formats.f + 1).W))
+  val request     = new EnvironmentRequest(config)
+  val dir         = Vec(3, SInt((formats.f + 1).W)) // scaled to f bits
   val hitDistance = HitDistance(config)
 }
 
 /** Ports of [[DirectPoint]]. */
 final class DirectPointIO(config: PathConfig) extends Bundle {
-  val view = Input(new EnvironmentView(config.numbers))
-
-  /** The camera's position, grid steps. */
-  val origin = Input(Vec3(new Fixed(new RayFormats(config.numbers).scene)))
+  val view   = Input(new EnvironmentView(config.numbers))
+  val origin = Input(Vec3(new Fixed(new RayFormats(config.numbers).scene))) // the camera's position, grid steps
 
   /** Of the same pixel; they are offered until they are taken. Albedo and normal of hits only. */
   val pixel    = Flipped(Decoupled(new DirectPixel(config)))
@@ -31,8 +27,7 @@ final class DirectPointIO(config: PathConfig) extends Bundle {
   val albedo   = Flipped(Decoupled(new AlbedoEntry))
   val normal   = Flipped(Decoupled(new NormalEntry))
 
-  /** Offered until it is taken. */
-  val answer = Decoupled(new MarchAnswer(config))
+  val answer = Decoupled(new MarchAnswer(config)) // offered until it is taken
 }
 
 /** Position and normal of a directly seen point, and whether it hides the object's hit. A pixel every four cycles, by one
@@ -69,10 +64,8 @@ final class DirectPoint(config: PathConfig) extends Module {
   private val product = latch(found.distance.zext * VecInit(pixel.dir :+ pixel.dir(0))(at), advances)
   private val shift   = f.S - found.exponent
   private val limit   = product.getWidth + f
-  private val amount  = latch(Mux(shift < 0.S, 0.U, Mux(shift >= limit.S, limit.U, shift.asUInt))(
-    Normalise.exponentBits(limit) - 1,
-    0
-  ))
+  private val amount  =
+    latch(Mux(shift < 0.S, 0.U, Mux(shift >= limit.S, limit.U, shift.asUInt))(Normalise.exponentBits(limit) - 1, 0))
   private val isNegative = latch(shift < 0.S)
   private val offset     = Reg(SInt(sceneBits.W))
   private val scaled     = (Cat(product, 0.U(f.W)).asSInt >> amount).asSInt

@@ -10,11 +10,8 @@ import colonnade.numbers.{Normalise, Rounding}
 final class DirectPlace(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 
-  /** From the map's centre, in map units. */
-  val u, v = SInt(formats.originBits.W)
-
-  /** The map's pixel. */
-  val pixel = new MapPixel(AttributeLayout.of(config))
+  val u, v  = SInt(formats.originBits.W)               // from the map's centre, in map units
+  val pixel = new MapPixel(AttributeLayout.of(config)) // the map's pixel
 }
 
 /** How fast a pixel's ray goes away from the camera: mantissa · 2^(exponent - f). */
@@ -36,15 +33,13 @@ final class DirectProjectionIO(config: PathConfig) extends Bundle {
   val ray     = Flipped(Valid(new EnvironmentRay(config)))
   val isReady = Output(Bool())
 
-  /** The cycle after this one takes a place. */
-  val hasSpace = Input(Bool())
+  val hasSpace = Input(Bool()) // the cycle after this one takes a place
 
   /** In the fourth cycle after the ray, or later; the direction is scaled to f bits. */
   val place = Valid(new DirectPlace(config))
   val dir   = Output(Vec(3, SInt((formats.f + 1).W)))
 
-  /** Six cycles after the place. */
-  val rate = Valid(new DirectRate(config))
+  val rate = Valid(new DirectRate(config)) // six cycles after the place
 }
 
 /** Finds the map's pixel of a ray from the camera, and the growth of the ray's depth: a ray every four cycles.

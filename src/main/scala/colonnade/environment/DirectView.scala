@@ -8,22 +8,15 @@ import colonnade.formats.{AlbedoEntry, EnvironmentView, NormalEntry, Plane}
 
 /** Ports of [[DirectView]]. */
 final class DirectViewIO(config: PathConfig) extends Bundle {
-
-  /** Constant while a frame runs. */
-  val view = Input(new EnvironmentView(config.numbers))
+  val view = Input(new EnvironmentView(config.numbers)) // constant while a frame runs
 
   /** A direct view, only in a cycle after one with `isReady` and without an order. All origins of a frame are equal. */
   val order   = Flipped(Valid(new MarchOrder(config)))
   val isReady = Output(Bool())
 
-  /** In the order of the orders; offered until it is taken. */
-  val answer = Decoupled(new MarchAnswer(config))
-
-  /** Several requests may be in flight in each channel. */
-  val maps = new AttributePort(AttributeLayout.of(config))
-
-  /** A response is illegal. */
-  val isIllegal = Output(Bool())
+  val answer    = Decoupled(new MarchAnswer(config))            // in the order of the orders; offered until it is taken
+  val maps      = new AttributePort(AttributeLayout.of(config)) // several requests may be in flight in each channel
+  val isIllegal = Output(Bool())                                // a response is illegal
 }
 
 /** Finds the points of the environment that the camera sees directly: a pixel every four cycles, equal to what
@@ -130,11 +123,8 @@ object DirectView {
     register
   }
 
-  /** Pixels in the pipeline. */
-  val places: Int = 16
-
-  /** Cells that are asked for or wait for their plane; planes that are asked for or wait. */
-  val lookups: Int = 4
+  val places:  Int = 16 // pixels in the pipeline
+  val lookups: Int = 4  // cells that are asked for or wait for their plane; planes that are asked for or wait
 
   /** Pixels from the request for their albedo to their answer: one in `DirectDepth` when it asks, one before the dividers,
     * three in them, and two in `DirectPoint`.

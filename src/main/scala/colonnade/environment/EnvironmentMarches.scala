@@ -16,9 +16,7 @@ final class MarchSums(config: PathConfig) extends Bundle {
 
 /** Ports of [[EnvironmentMarches]]. */
 final class EnvironmentMarchesIO(config: PathConfig) extends Bundle {
-
-  /** Constant while a frame runs. */
-  val view  = Input(new EnvironmentView(config.numbers))
+  val view  = Input(new EnvironmentView(config.numbers)) // constant while a frame runs
   val paths = Flipped(new MarchPort(config))
 
   /** One for each march; the last one for the pipeline of directly seen pixels. */

@@ -14,16 +14,10 @@ final class StoredRay(config: PathConfig) extends Bundle {
 
 /** Ports of [[EnvironmentRays]]. */
 final class EnvironmentRaysIO(config: PathConfig) extends Bundle {
-
-  /** Stored in place of the context's previous ray. */
-  val ray = Flipped(Valid(new StoredRay(config)))
-
-  /** Ready as [[accepts]] says of its kind. */
-  val req     = Flipped(Decoupled(new EnvironmentRequest(config)))
-  val accepts = Output(new EnvironmentAccepts)
-
-  /** In the cycle after an occlusion test's `req`: the distance of its hit. */
-  val hitDistance = Input(HitDistance(config))
+  val ray         = Flipped(Valid(new StoredRay(config))) // stored in place of the context's previous ray
+  val req         = Flipped(Decoupled(new EnvironmentRequest(config))) // ready as `accepts` says of its kind
+  val accepts     = Output(new EnvironmentAccepts)
+  val hitDistance = Input(HitDistance(config)) // of an occlusion test, in the cycle after its `req`
 
   /** The result: a point to shade, a context whose ray misses, or one whose occlusion test finds its hit visible. */
   val surface = Decoupled(new EnvironmentSurface(config))
@@ -104,7 +98,6 @@ final class EnvironmentRays(config: PathConfig) extends Module {
     val isTaken = request.fire
     taker :<>= request
 
-    /** Comes in the cycle after the request. */
-    val hitDistance = RegEnable(io.hitDistance, RegNext(enters.fire, false.B))
+    val hitDistance = RegEnable(io.hitDistance, RegNext(enters.fire, false.B)) // comes in the cycle after the request
   }
 }

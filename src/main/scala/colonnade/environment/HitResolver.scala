@@ -20,9 +20,7 @@ final class HitResolver(
 
   val kind:          UInt = Reg(UInt(HitKind.bits.W))
   val boundingPlane: UInt = Reg(UInt(layout.boundingPlaneIndexBits.W))
-
-  /** The distance is quotient · 2^exponent times the scaled direction. */
-  val exponent: SInt = Reg(SInt(shiftBits.W))
+  val exponent:      SInt = Reg(SInt(shiftBits.W)) // the distance is quotient · 2^exponent times the scaled direction
 
   private val index           = Reg(UInt(view.boundingPlanes.getWidth.W))
   private val nearestMantissa = Reg(UInt((f + 1).W))
@@ -72,10 +70,7 @@ final class HitResolver(
     step(m.normalise())
     step {
       set(m.numerator, m.sumMantissa)
-      set(
-        exponent,
-        m.exponent.zext +& (f.S +& view.exponent) - m.exponents(0).zext - m.projectedDirExponent.zext
-      )
+      set(exponent, m.exponent.zext +& (f.S +& view.exponent) - m.exponents(0).zext - m.projectedDirExponent.zext)
     }
     step {
       m.startDivision(m.numerator, m.mantissa)
@@ -115,8 +110,7 @@ final class HitResolver(
       val mantissa = Mux(m.quotient(f), m.quotient, (m.quotient << 1)(f, 0))
       val rate     = m.exponents(0).zext - m.exponent.zext +& Mux(m.quotient(f), (f + 1).S, f.S)
       val isFirst  = kind === HitKind.miss.U
-      val isNearer =
-        isFirst || rate > nearestExponent || (rate === nearestExponent && mantissa > nearestMantissa)
+      val isNearer = isFirst || rate > nearestExponent || (rate === nearestExponent && mantissa > nearestMantissa)
       set(kind, HitKind.boundingPlane.U)
       set(nearestMantissa, mantissa, isNearer)
       set(nearestExponent, rate, isNearer)

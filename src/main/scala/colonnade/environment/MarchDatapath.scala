@@ -18,10 +18,7 @@ final class MarchAddition(bits: Int) extends Bundle {
   val subtract = Bool()
 
   def result: SInt =
-    Rounding.narrow(
-      base + (addend ^ Mux(subtract, (-1).S(bits.W), 0.S(bits.W))) + Cat(0.U(1.W), subtract).asSInt,
-      bits
-    )
+    Rounding.narrow(base + (addend ^ Mux(subtract, (-1).S(bits.W), 0.S(bits.W))) + Cat(0.U(1.W), subtract).asSInt, bits)
 }
 
 /** Ports of [[MarchDatapath]]. */
@@ -41,11 +38,8 @@ final class MarchDatapathIO(formats: MarchFormats) extends Bundle {
   val latchExponent = Input(Bool())
   val exponent      = Output(UInt(exponentBits.W))
 
-  /** Latches the shift amount for the outputs below, which are floor(sum · 2^(f − shift)). */
-  val shift = Flipped(Valid(SInt(shiftBits.W)))
-
-  /** The low bits. */
-  val shifted = Output(SInt(scaledBits.W))
+  val shift   = Flipped(Valid(SInt(shiftBits.W))) // latches the shift for the outputs below, floor(sum · 2^(f − shift))
+  val shifted = Output(SInt(scaledBits.W))        // the low bits
 
   // Saturated; the sum's exponent must be latched. The natural ones are for sums that are not negative
   val coordinate = Output(SInt((alongBits + 1).W))
@@ -57,8 +51,7 @@ final class MarchDatapathIO(formats: MarchFormats) extends Bundle {
   val combine  = Input(new MarchAddition(combineBits))
   val combined = Output(SInt(combineBits.W))
 
-  /** Starts a division of mantissas, one at a time. */
-  val divide       = Flipped(Valid(new Division(f)))
+  val divide       = Flipped(Valid(new Division(f))) // starts a division of mantissas, one at a time
   val quotient     = Valid(UInt((f + 1).W))
   val takeQuotient = Input(Bool())
 }

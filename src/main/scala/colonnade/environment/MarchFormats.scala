@@ -15,30 +15,20 @@ final class MarchFormats(config: ColonnadeConfig) {
   val f:         Int             = numbers.shadeBits
   val sceneBits: Int             = numbers.sceneBits
 
-  /** Log2 of the map's unit in pixels. */
-  val mapLog: Int = 10
-
-  /** Fraction bits of a pixel's coordinate. */
-  val pixelFraction: Int = f - mapLog
-
-  /** Fraction bits of a plane's coefficients with exponent 0. */
-  val planeFraction: Int = 22
-
-  /** Additional fraction bits of a distance along the ray while distances are added up. */
-  val guardBits:    Int = 8
-  val alongBits:    Int = f + 3
-  val distanceBits: Int = alongBits + guardBits
-
-  /** Log2 of a share of w: a ray that is behind a surface by less is on it. */
-  val nearLog: Int = 8
+  val mapLog:        Int = 10 // log2 of the map's unit in pixels
+  val pixelFraction: Int = f - mapLog // fraction bits of a pixel's coordinate
+  val planeFraction: Int = 22 // fraction bits of a plane's coefficients with exponent 0
+  val guardBits:     Int = 8 // additional fraction bits of a distance along the ray while distances are added up
+  val alongBits:     Int = f + 3
+  val distanceBits:  Int = alongBits + guardBits
+  val nearLog:       Int = 8 // log2 of a share of w: a ray that is behind a surface by less is on it
 
   /** A ray that crosses tiles and cells this often ends. A map of the finest cells has 31 on the longest way through a tile.
     */
   val maxSteps: Int = 512
   val stepBits: Int = log2Ceil(maxSteps + 1)
 
-  /** Digits of a factor that is wider than the multiplier; unsigned, except for the highest. */
-  val digitBits: Int = 21
+  val digitBits: Int = 21 // digits of a factor that is wider than the multiplier; unsigned, except for the highest
 
   def digits(bits: Int): Int = (bits - 2) / digitBits + 1
 
@@ -53,22 +43,14 @@ final class MarchFormats(config: ColonnadeConfig) {
   val slopeBits: Int = planeFraction + 2
   val depthBits: Int = valueBits + 2
 
-  /** The model's widest number has 128 bits. */
-  val sumBits: Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits)
-
-  /** A depth in steps of w, or a position in the scene. */
-  val scaledBits:   Int = (depthBits + f - 7).max(sceneBits)
+  val sumBits:      Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits) // the model's widest has 128
+  val scaledBits:   Int = (depthBits + f - 7).max(sceneBits) // a depth in steps of w, or a position in the scene
   val combineBits:  Int = scaledBits + 1
   val exponentBits: Int = 8
+  val shiftBits:    Int = 12 // shift amounts, and exponents that may be negative
+  val tileBits:     Int = 9 // a coordinate in tiles, with one bit to spare
 
-  /** Shift amounts, and exponents that may be negative. */
-  val shiftBits: Int = 12
-
-  /** A coordinate in tiles, with one bit to spare. */
-  val tileBits: Int = 9
-
-  /** Half the map's size in map units. */
-  val centre: Seq[BigInt] = sizes.map(size => BigInt(size) << (pixelFraction - 1))
+  val centre: Seq[BigInt] = sizes.map(size => BigInt(size) << (pixelFraction - 1)) // half the map's size in map units
 
   def sizes: Seq[Int] = Seq(layout.config.width, layout.config.height)
 }

@@ -6,9 +6,7 @@ import colonnade.microcode.Label
 sealed trait MarchLabel extends Label
 
 object MarchLabel {
-
-  /** Waits for a ray. */
-  case object Idle extends MarchLabel
+  case object Idle extends MarchLabel // waits for a ray
 
   // RayProjection: scales the direction, then projects origin and direction, one matrix row at a time
   case object ScaleDir      extends MarchLabel
@@ -37,8 +35,7 @@ object MarchLabel {
   case object CellPassed  extends MarchLabel
   case object CellsPassed extends MarchLabel
 
-  /** PlaneCache: finds or fetches a plane, and computes its depth along the ray. */
-  case object Plane extends MarchLabel
+  case object Plane extends MarchLabel // PlaneCache: finds or fetches a plane, and computes its depth along the ray
 
   // PlaneTest: compares the ray with a plane
   case object PlaneDepth  extends MarchLabel
@@ -57,12 +54,7 @@ object MarchLabel {
   case object NextBoundingPlane  extends MarchLabel
   case object BoundingPlanesDone extends MarchLabel
 
-  /** HitPixel: projects a point of the ray to a pixel. */
-  case object Pixel extends MarchLabel
-
-  /** SurfacePoint: the point and its normal. */
-  case object Point extends MarchLabel
-
-  /** Offers the result. */
-  case object Finish extends MarchLabel
+  case object Pixel  extends MarchLabel // HitPixel: projects a point of the ray to a pixel
+  case object Point  extends MarchLabel // SurfacePoint: the point and its normal
+  case object Finish extends MarchLabel // offers the result
 }

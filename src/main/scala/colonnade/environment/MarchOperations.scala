@@ -13,14 +13,9 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val program = new Microprogram[MarchLabel](StepEncoding.OneHot)
 
   // The ray
-  /** Its direction, scaled to f bits. */
-  val dir: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))
-
-  /** The origin's projection; then u and v from the map's centre, and w. */
-  val uvwOrigin: Vec[SInt] = Reg(Vec(3, SInt(originBits.W)))
-
-  /** The direction's projection. */
-  val projectedDir: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))
+  val dir:          Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))    // its direction, scaled to f bits
+  val uvwOrigin:    Vec[SInt] = Reg(Vec(3, SInt(originBits.W))) // projected; then u and v from the map's centre
+  val projectedDir: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))    // the direction's projection
 
   /** The direction in (u, v, w). For the bounding planes, the direction's projection relative to the map's centre. */
   val uvwDir: Vec[SInt] = Reg(Vec(3, SInt(directionBits.W)))
@@ -52,11 +47,8 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val along:       UInt = datapath.along
   val distance:    UInt = datapath.distance
 
-  /** The product without its fraction bits. */
-  val scaledProduct: SInt = Rounding.floor(product, f)
-
-  /** The shifted sum as a mantissa of f bits; its exponent was measured in the step before. */
-  val sumMantissa: UInt = shifted.asUInt(f - 1, 0)
+  val scaledProduct: SInt = Rounding.floor(product, f) // the product without its fraction bits
+  val sumMantissa:   UInt = shifted.asUInt(f - 1, 0) // the shifted sum, whose exponent was measured in the step before
 
   private val wideFactor       = new Operand(program, wideBits)
   private val narrowFactor     = new Operand(program, narrowBits)

@@ -7,22 +7,16 @@ import colonnade.shading.EnvironmentSurface
 
 /** A ray for a march, and what its path wants to know. */
 final class MarchOrder(config: PathConfig) extends Bundle {
-  val request = new EnvironmentRequest(config)
-  val ray     = new EnvironmentRay(config)
-
-  /** For an occlusion test: the distance of its hit. */
-  val hitDistance = HitDistance(config)
+  val request     = new EnvironmentRequest(config)
+  val ray         = new EnvironmentRay(config)
+  val hitDistance = HitDistance(config) // for an occlusion test: the distance of its hit
 }
 
 /** What a ray has met. */
 final class MarchAnswer(config: PathConfig) extends Bundle {
-
-  /** There is a point to shade; if the request was an occlusion test, it hides the hit. */
-  val isHit           = Bool()
+  val isHit           = Bool() // there is a point to shade; if the request was an occlusion test, it hides the hit
   val isOcclusionTest = Bool()
-
-  /** The request's context; the point, if there is one. */
-  val surface = new EnvironmentSurface(config)
+  val surface         = new EnvironmentSurface(config) // the request's context; the point, if there is one
 }
 
 /** The path unit's port to the marches of its column. */
@@ -32,11 +26,8 @@ final class MarchPort(config: PathConfig) extends Bundle {
   val direct = Decoupled(new EnvironmentRequest(config))
   val march  = Decoupled(new EnvironmentRequest(config))
 
-  /** The order, in the cycle after its request is accepted, and only then. */
-  val order = Output(new MarchOrder(config))
-
-  /** In any order. */
-  val answer = Flipped(Decoupled(new MarchAnswer(config)))
+  val order  = Output(new MarchOrder(config)) // the order, in the cycle after its request is accepted, and only then
+  val answer = Flipped(Decoupled(new MarchAnswer(config))) // in any order
 
   /** Ties off a port without a requester. */
   def tieOff(): Unit = {

@@ -12,24 +12,17 @@ import colonnade.ray.RayFormats
 final class EnvironmentRay(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
-  /** Grid steps. */
-  val origin = Vec3(new Fixed(new RayFormats(numbers).scene))
-
-  /** Of any length. */
-  val dir = Vec3(SInt(numbers.directionBits.W))
-
-  /** The pixel of a ray from the camera. */
-  val pixel = new PixelPosition(config)
+  val origin = Vec3(new Fixed(new RayFormats(numbers).scene)) // grid steps
+  val dir    = Vec3(SInt(numbers.directionBits.W))            // of any length
+  val pixel  = new PixelPosition(config)                      // the pixel of a ray from the camera
 }
 
 /** A ray to march. */
 final class MarchRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
 
-  val ray = new EnvironmentRay(config)
-
-  /** The distance of the object on this ray; see [[MarchResult.hidesObject]]. */
-  val hitDistance = HitDistance(config)
+  val ray         = new EnvironmentRay(config)
+  val hitDistance = HitDistance(config) // the distance of the object on this ray; see `MarchResult.hidesObject`
 }
 
 /** The distance of the object's hit from the ray's origin along its dominant axis, in grid steps. */
@@ -52,29 +45,21 @@ final class MarchResult(config: PathConfig) extends Bundle {
   private val layout  = AttributeLayout.of(config)
 
   val context = Context(config)
-
-  /** See [[HitKind]]. */
-  val kind = UInt(HitKind.bits.W)
+  val kind    = UInt(HitKind.bits.W) // see HitKind
 
   /** `map`: the pixel with the point's albedo and normal. */
   val x = UInt(layout.xBits.W)
   val y = UInt(layout.yBits.W)
 
-  /** `boundingPlane`: the plane with the point's albedo and normal. */
-  val boundingPlane = UInt(layout.boundingPlaneIndexBits.W)
-
-  /** `map`: the point is on the extension of a surface, hidden by another one. */
-  val isHidden = Bool()
+  val boundingPlane = UInt(layout.boundingPlaneIndexBits.W) // `boundingPlane`: the plane with albedo and normal
+  val isHidden      = Bool() // `map`: the point is on the extension of a surface, hidden by another one
 
   /** The point is at distance · 2^distanceExponent times the ray's direction. */
   val distance         = UInt((formats.f + 1).W)
   val distanceExponent = SInt(formats.shiftBits.W)
 
-  /** Tiles and cells that the ray has passed. */
-  val steps = UInt(formats.stepBits.W)
-
-  /** Grid steps; each coordinate is clamped to half the scene's size. */
-  val point = Vec3(new Fixed(new RayFormats(config.numbers).scene))
+  val steps = UInt(formats.stepBits.W)                              // tiles and cells that the ray has passed
+  val point = Vec3(new Fixed(new RayFormats(config.numbers).scene)) // grid steps, clamped to half the scene
 
   /** Of the maps; the normal is in the object's space. */
   val albedo = new AlbedoEntry
@@ -85,31 +70,23 @@ final class MarchResult(config: PathConfig) extends Bundle {
     */
   val hidesObject = Bool()
 
-  /** A response of the maps was illegal. */
-  val isIllegal = Bool()
+  val isIllegal = Bool() // a response of the maps was illegal
 }
 
 /** Events of this cycle, for the counters. */
 final class MarchEvents extends Bundle {
-
-  /** A tile or a cell is passed. */
-  val step = Bool()
-  val busy = Bool()
-
-  /** A response to the current ray was illegal. */
-  val illegal = Bool()
+  val step    = Bool() // a tile or a cell is passed
+  val busy    = Bool()
+  val illegal = Bool() // a response to the current ray was illegal
 }
 
 /** Ports of [[EnvironmentMarch]]. */
 final class EnvironmentMarchIO(config: PathConfig) extends Bundle {
   private val layout = AttributeLayout.of(config)
 
-  /** Constant while a ray is marched. */
-  val view    = Input(new EnvironmentView(config.numbers))
+  val view    = Input(new EnvironmentView(config.numbers)) // constant while a ray is marched
   val request = Flipped(Decoupled(new MarchRequest(config)))
   val result  = Decoupled(new MarchResult(config))
-
-  /** At most one request in flight in each channel. */
-  val maps   = new AttributePort(layout)
-  val events = Output(new MarchEvents)
+  val maps    = new AttributePort(layout)                  // at most one request in flight in each channel
+  val events  = Output(new MarchEvents)
 }

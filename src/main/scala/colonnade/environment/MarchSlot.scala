@@ -7,15 +7,9 @@ import colonnade.formats.EnvironmentView
 
 /** Ports of [[MarchSlot]]. */
 final class MarchSlotIO(config: PathConfig) extends Bundle {
-
-  /** Constant while a frame runs. */
-  val view = Input(new EnvironmentView(config.numbers))
-
-  /** Only in a cycle after one with `isEmpty`. */
-  val order = Flipped(Valid(new MarchOrder(config)))
-
-  /** No order is held. */
-  val isEmpty = Output(Bool())
+  val view    = Input(new EnvironmentView(config.numbers)) // constant while a frame runs
+  val order   = Flipped(Valid(new MarchOrder(config)))     // only in a cycle after one with `isEmpty`
+  val isEmpty = Output(Bool())                             // no order is held
   val answer  = Decoupled(new MarchAnswer(config))
   val maps    = new AttributePort(AttributeLayout.of(config))
   val events  = Output(new MarchEvents)
@@ -49,8 +43,7 @@ final class MarchSlot(config: PathConfig) extends Module {
   surface.point   := result.bits.point
   surface.normal  := result.bits.normal
   surface.shadows := !order.request.isFresnelReflection
-  surface.albedo.channels.zip(Seq(result.bits.albedo.r, result.bits.albedo.g, result.bits.albedo.b)).foreach {
-    case (to, from) => to := from
-  }
+  private val albedo = result.bits.albedo
+  surface.albedo.channels.zip(Seq(albedo.r, albedo.g, albedo.b)).foreach { case (to, from) => to := from }
   result.ready := io.answer.ready
 }

@@ -7,9 +7,7 @@ import colonnade.formats.{AlbedoEntry, AttributeEvents, Load, NormalEntry}
 
 /** Ports of [[PhysicalAttributeMemory]]. */
 final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Bundle {
-
-  /** Only while no request is in flight. */
-  val load   = Flipped(Valid(new Load(config)))
+  val load   = Flipped(Valid(new Load(config))) // only while no request is in flight
   val ports  = Vec(requesters, Flipped(new AttributePort(AttributeLayout.of(config), tagBits)))
   val events = Output(new AttributeEvents)
 }

@@ -23,8 +23,7 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
   val Seq(forTile, forNearest, forFront, forCell, forBoundingPlane) = Enum(5)
   val purpose: UInt = Reg(UInt(3.W))
 
-  /** The plane to look up. */
-  val id: UInt = Reg(UInt(layout.planeIdBits.W))
+  val id: UInt = Reg(UInt(layout.planeIdBits.W)) // the plane to look up
 
   private val slots   = Reg(Vec(4, new PlaneDepth(m.formats)))
   private val isValid = RegInit(VecInit.fill(4)(false.B))
@@ -36,8 +35,7 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
   private val matches = VecInit(slots.zip(isValid).map { case (slot, isValid) => isValid && slot.id === id })
   private val req     = channel.req
 
-  /** The plane that was looked up. */
-  val depth: PlaneDepth = slots(slot)
+  val depth: PlaneDepth = slots(slot) // the plane that was looked up
 
   req.valid                        := false.B
   req.bits.tag                     := 0.U

@@ -11,8 +11,7 @@ final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCac
   private val scaled = Reg(SInt(scaledBits.W))
   private val probe  = Reg(SInt(depthBits.W))
 
-  /** The distance along the ray where it hits the environment. */
-  val hitDistance: UInt = Reg(UInt(alongBits.W))
+  val hitDistance: UInt = Reg(UInt(alongBits.W)) // the distance along the ray where it hits the environment
 
   /** Steps from `PlaneDepth` on; a hit continues at `Meets` or `Crosses`. */
   def describe(): Unit = {

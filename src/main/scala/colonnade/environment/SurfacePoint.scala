@@ -32,10 +32,8 @@ final class SurfacePoint(
   private val distance  = m.quotient.zext
   private val mapNormal = Seq(texel.normal.x, texel.normal.y, texel.normal.z).map(_.integer)
 
-  private val clamped = SurfacePoint.clamped(position)
-
-  /** The length of the offset along its axis. */
-  private val travelled = Mux(offset < 0.S, ~offset, offset).asUInt
+  private val clamped   = SurfacePoint.clamped(position)
+  private val travelled = Mux(offset < 0.S, ~offset, offset).asUInt // the length of the offset along its axis
 
   private val rotated = SurfacePoint.rotated(Rounding.narrow(m.sum, SurfacePoint.rotationBits))
 

@@ -18,8 +18,7 @@ final class TexelFetch(m: MarchOperations, planes: PlaneCache, hitPixel: HitPixe
   private val hasAlbedo           = Reg(Bool())
   private val hasNormal           = Reg(Bool())
 
-  /** Both have arrived. */
-  val isReady: Bool = hasAlbedo && hasNormal
+  val isReady: Bool = hasAlbedo && hasNormal // both have arrived
 
   /** In a step with [[requestBoundingPlane]]: the request is accepted. */
   def isRequested: Bool = maps.planes.req.ready

@@ -8,9 +8,7 @@ import colonnade.shading.TexturePort
 
 /** Ports of [[TextureMemory]]. */
 final class TextureMemoryIO(config: PathConfig) extends Bundle {
-
-  /** Only while no request is in flight. */
-  val load = Flipped(Valid(new Load(config)))
+  val load = Flipped(Valid(new Load(config))) // only while no request is in flight
 
   val port = Flipped(new TexturePort(config))
 }

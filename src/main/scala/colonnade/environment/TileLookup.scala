@@ -54,10 +54,7 @@ final class TileLookup[D <: Data, T <: Data](
   private val inFlight   = RegInit(0.U(log2Ceil(queueDepth + 1).W))
   inFlight       := inFlight + io.pixel.fire - io.tile.fire
   io.pixel.ready := inFlight =/= queueDepth.U
-  assert(
-    !io.pixel.fire || (pixel.x < layout.mapWidth.U && pixel.y < layout.mapHeight.U),
-    "a pixel outside the map"
-  )
+  assert(!io.pixel.fire || (pixel.x < layout.mapWidth.U && pixel.y < layout.mapHeight.U), "a pixel outside the map")
 
   // Read its tile's descriptor
   private val tile    = (pixel.y >> layout.tileLog) * layout.tileColumns.U + (pixel.x >> layout.tileLog)

@@ -10,19 +10,15 @@ final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
   val tEnter: UInt = Reg(UInt(distanceBits.W))
   val tExit:  UInt = Reg(UInt(distanceBits.W))
 
-  /** The axis whose tile edge the ray crosses first. */
-  val isSecondAxis: Bool = Reg(Bool())
+  val isSecondAxis: Bool = Reg(Bool()) // the axis whose tile edge the ray crosses first
 
   /** The plane's depth at both ends of the interval, and w at its exit. */
   val depthEnter: SInt = Reg(SInt(depthBits.W))
   val depthExit:  SInt = Reg(SInt(depthBits.W))
   val wExit:      SInt = Reg(SInt(depthBits.W))
 
-  /** Tiles and cells that the ray has passed. */
-  val steps: UInt = Reg(UInt(stepBits.W))
-
-  /** The ray is behind the surfaces that the map shows. */
-  val isBehind: Bool = Reg(Bool())
+  val steps:    UInt = Reg(UInt(stepBits.W)) // tiles and cells that the ray has passed
+  val isBehind: Bool = Reg(Bool())           // the ray is behind the surfaces that the map shows
 
   /** The last plane that the ray was in front of, if any. It was seen at the distance `frontDistance`, within 2^frontLog
     * pixels of a corner.
@@ -33,18 +29,14 @@ final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
   val frontCorner:   MapPixel   = Reg(new MapPixel(layout))
   val frontLog:      UInt       = Reg(UInt(CellResponse.cellLogBits.W))
 
-  /** The planes of the current tile. */
-  val tile: CellResponse = Reg(new CellResponse(layout))
-
-  /** The current cell of the tile, or 16 or 31 beside it. */
-  val cell: Vec[UInt] = Reg(Vec(2, UInt(5.W)))
+  val tile: CellResponse = Reg(new CellResponse(layout)) // the planes of the current tile
+  val cell: Vec[UInt]    = Reg(Vec(2, UInt(5.W)))        // the current cell of the tile, or 16 or 31 beside it
 
   /** The interval without guard bits. */
   val enter: UInt = tEnter(distanceBits - 1, guardBits)
   val exit:  UInt = tExit(distanceBits - 1, guardBits)
 
-  /** The distance where the ray exits the tile. */
-  val tileExit: UInt = dda.edge(isSecondAxis)
+  val tileExit: UInt = dda.edge(isSecondAxis) // the distance where the ray exits the tile
 
   val isInFront: Bool = !isBehind && depthEnter >= 0.S && depthExit >= 0.S
 

@@ -7,9 +7,7 @@ import chisel3.util.log2Ceil
 sealed trait StepEncoding
 
 object StepEncoding {
-
-  /** One register per step. A step's signals need no decoder. */
-  case object OneHot extends StepEncoding
+  case object OneHot extends StepEncoding // one register per step, so a step's signals need no decoder
 
   /** A counter. Small, but each signal decodes it.
     *

@@ -16,9 +16,7 @@ final class Division(mantissaBits: Int) extends Bundle {
 /** Ports of [[Divider]]. */
 final class DividerIO(mantissaBits: Int, digits: Int) extends Bundle {
   val division = Flipped(Decoupled(new Division(mantissaBits)))
-
-  /** ⌊numerator · 2^digits / denominator⌋ */
-  val quotient = Decoupled(UInt((digits + 1).W))
+  val quotient = Decoupled(UInt((digits + 1).W)) // ⌊numerator · 2^digits / denominator⌋
 }
 
 /** Divides mantissas by restoring digit recurrence in radix 4. Three parallel subtractors try one, two and three times the
@@ -38,16 +36,12 @@ final class Divider(mantissaBits: Int, digits: Int, digitsPerCycle: Int = 1) ext
 
   private val steps        = Divider.steps(digits, digitsPerCycle)
   private val quotientBits = 2 * steps * digitsPerCycle
-
-  /** Bits below the quotient's last bit that the last step computes and drops. */
-  private val spareBits = quotientBits - (digits + 1)
+  private val spareBits    = quotientBits - (digits + 1) // the last step computes and drops them
 
   private val busy      = RegInit(false.B)
   private val stepsLeft = Reg(UInt(log2Ceil(steps + 1).W))
   private val quotient  = Reg(UInt(quotientBits.W))
-
-  /** Always less than four times the denominator. */
-  private val remainder = Reg(UInt((mantissaBits + 2).W))
+  private val remainder = Reg(UInt((mantissaBits + 2).W)) // always less than four times the denominator
   private val once      = Reg(UInt(mantissaBits.W))
   private val thrice    = Reg(UInt((mantissaBits + 2).W))
 
@@ -72,9 +66,7 @@ final class Divider(mantissaBits: Int, digits: Int, digitsPerCycle: Int = 1) ext
     quotient  := found(quotientBits - 1, 0)
     stepsLeft := stepsLeft - 1.U
   }
-  when(io.quotient.fire) {
-    busy := false.B
-  }
+  when(io.quotient.fire)(busy := false.B)
   when(io.division.fire) {
     busy      := true.B
     stepsLeft := steps.U

@@ -10,8 +10,7 @@ final class FoldedSquareRootIO(radicandBits: Int) extends Bundle {
   val isStep   = Input(Bool())
   val radicand = Input(UInt(radicandBits.W))
 
-  /** ⌊√radicand⌋ */
-  val root = Output(UInt(SquareRoot.rootBits(radicandBits).W))
+  val root = Output(UInt(SquareRoot.rootBits(radicandBits).W)) // ⌊√radicand⌋
 }
 
 /** Square roots, one every `interval` cycles, of radicands with an even number of bits.

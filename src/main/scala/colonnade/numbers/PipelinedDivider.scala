@@ -5,16 +5,13 @@ import chisel3.util.{Cat, RegEnable}
 
 /** Ports of [[PipelinedDivider]]. */
 final class PipelinedDividerIO(mantissaBits: Int, digits: Int, lanes: Int) extends Bundle {
-
-  /** Stage i loads the divisions of the stage before it. */
-  val loads = Input(Vec(PipelinedDivider.stages(digits), Bool()))
+  val loads = Input(Vec(PipelinedDivider.stages(digits), Bool())) // stage i loads from the stage before
 
   /** The numerator's top bit is set, or it is zero; the denominator's top bit is set. */
   val numerators  = Input(Vec(lanes, UInt(mantissaBits.W)))
   val denominator = Input(UInt(mantissaBits.W))
 
-  /** ⌊numerator · 2^digits / denominator⌋ */
-  val quotients = Output(Vec(lanes, UInt((digits + 1).W)))
+  val quotients = Output(Vec(lanes, UInt((digits + 1).W))) // ⌊numerator · 2^digits / denominator⌋
 }
 
 /** Divides mantissas as [[Divider]] does, a division a cycle in each lane. The lanes share the denominator.
@@ -46,10 +43,7 @@ final class PipelinedDivider(mantissaBits: Int, digits: Int, lanes: Int) extends
     val bits = bitsPerStage.min(digits + 1 - bitsPerStage * stage)
     val next = partials.map { partial =>
       val stepped = (0 until bits).foldLeft(partial)((each, _) => step(each, denominator))
-      Partial(
-        RegEnable(stepped.remainder, io.loads(stage)),
-        stepped.quotient.map(RegEnable(_, io.loads(stage)))
-      )
+      Partial(RegEnable(stepped.remainder, io.loads(stage)), stepped.quotient.map(RegEnable(_, io.loads(stage))))
     }
     (next, RegEnable(denominator, io.loads(stage)))
   }

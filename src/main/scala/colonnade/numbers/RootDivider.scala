@@ -47,8 +47,7 @@ final class RootDivider(radicandBits: Int, mantissaBits: Int, digits: Int) exten
   /** The radicand's unused bits, left-aligned; or the denominator. */
   private val operand = Reg(chiselTypeOf(io.operation.bits.operand))
 
-  /** At most twice the root, or less than twice the denominator. */
-  private val remainder = Reg(UInt(remainderBits.W))
+  private val remainder = Reg(UInt(remainderBits.W)) // at most twice the root, or less than twice the denominator
 
   private val finished = busy && bitsLeft === 0.U
 

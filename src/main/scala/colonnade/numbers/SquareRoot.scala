@@ -6,9 +6,7 @@ import chisel3.util.{log2Ceil, Cat, Decoupled}
 /** Ports of [[SquareRoot]]. */
 final class SquareRootIO(radicandBits: Int) extends Bundle {
   val radicand = Flipped(Decoupled(UInt(radicandBits.W)))
-
-  /** ⌊√radicand⌋ */
-  val root = Decoupled(UInt(SquareRoot.rootBits(radicandBits).W))
+  val root     = Decoupled(UInt(SquareRoot.rootBits(radicandBits).W)) // ⌊√radicand⌋
 }
 
 /** Square root by restoring digit recurrence. Each cycle takes two bits of the radicand and gives one bit of the root.
@@ -22,15 +20,11 @@ final class SquareRoot(radicandBits: Int) extends Module {
 
   private val rootBits = SquareRoot.rootBits(radicandBits)
 
-  private val busy     = RegInit(false.B)
-  private val bitsLeft = Reg(UInt(log2Ceil(rootBits + 1).W))
-
-  /** The radicand's unused bits, left-aligned. */
-  private val pending = Reg(UInt((2 * rootBits).W))
-  private val root    = Reg(UInt(rootBits.W))
-
-  /** Always at most twice the root. */
-  private val remainder = Reg(UInt((rootBits + 1).W))
+  private val busy      = RegInit(false.B)
+  private val bitsLeft  = Reg(UInt(log2Ceil(rootBits + 1).W))
+  private val pending   = Reg(UInt((2 * rootBits).W)) // the radicand's unused bits, left-aligned
+  private val root      = Reg(UInt(rootBits.W))
+  private val remainder = Reg(UInt((rootBits + 1).W)) // always at most twice the root
 
   private val finished = busy && bitsLeft === 0.U
 
@@ -44,9 +38,7 @@ final class SquareRoot(radicandBits: Int) extends Module {
     pending   := Cat(pending, 0.U(2.W))(2 * rootBits - 1, 0)
     bitsLeft  := bitsLeft - 1.U
   }
-  when(io.root.fire) {
-    busy := false.B
-  }
+  when(io.root.fire)(busy := false.B)
   when(io.radicand.fire) {
     busy      := true.B
     bitsLeft  := rootBits.U

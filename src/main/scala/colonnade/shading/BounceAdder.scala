@@ -10,13 +10,9 @@ final class BounceAdderIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new BounceFormats(numbers)
 
-  val actions = Input(new BounceActions)
-
-  /** Double the sum, to normalise the dot product. */
-  val doubles = Input(Bool())
-
-  /** The root is ready to be subtracted. */
-  val takesRoot = Input(Bool())
+  val actions   = Input(new BounceActions)
+  val doubles   = Input(Bool()) // double the sum, to normalise the dot product
+  val takesRoot = Input(Bool()) // the root is ready to be subtracted
 
   // Operands
   val product        = Input(SInt(formats.productBits.W))

@@ -45,9 +45,7 @@ final class BounceProducts extends Bundle {
 
 /** The other actions of a step; they happen in its first cycle. */
 final class BounceActions extends Bundle {
-
-  /** Double the normal while its largest component is too short. */
-  val normaliseNormal = Bool()
+  val normaliseNormal = Bool() // double the normal while its largest component is too short
 
   // The adder: at most one of these. The two scalings double the sum, depending on the exponent
   val accumulate        = Bool()
@@ -90,10 +88,8 @@ final class BounceActions extends Bundle {
 
 /** Control signals of the bounce datapath for one cycle. A register that no signal names keeps its value. */
 final class BounceControl(formats: BounceFormats) extends Bundle {
-  val load = Bool()
-
-  /** Take the geometric normal. */
-  val startOver = Bool()
+  val load      = Bool()
+  val startOver = Bool() // take the geometric normal
 
   val products = new BounceProducts
 
@@ -110,39 +106,26 @@ final class BounceStatus extends Bundle {
   val isPositive = Bool()
   val isNegative = Bool()
 
-  /** The root or quotient that was started is ready. */
-  val rootIsReady = Bool()
-
-  /** The dot product's top bit is set. */
-  val dotIsNormalised = Bool()
-
-  /** The quotient is in its place. */
-  val quotientIsShifted = Bool()
+  val rootIsReady       = Bool() // the root or quotient that was started is ready
+  val dotIsNormalised   = Bool() // the dot product's top bit is set
+  val quotientIsShifted = Bool() // the quotient is in its place
 }
 
 /** State of the current bounce, written by [[BounceProgram]] and its unit. */
 final class BounceState {
-  val isGlass:  Bool = Reg(Bool())
-  val isSmooth: Bool = Reg(Bool())
-  val backSide: Bool = Reg(Bool())
-
-  /** The ray is refracted, not reflected. */
-  val isRefraction: Bool = Reg(Bool())
-
-  /** The result has a Fresnel term. */
-  val hasFresnel: Bool = Reg(Bool())
+  val isGlass:      Bool = Reg(Bool())
+  val isSmooth:     Bool = Reg(Bool())
+  val backSide:     Bool = Reg(Bool())
+  val isRefraction: Bool = Reg(Bool()) // the ray is refracted, not reflected
+  val hasFresnel:   Bool = Reg(Bool()) // the result has a Fresnel term
 }
 
 /** Ports of [[BounceDatapath]]. */
 final class BounceDatapathIO(config: PathConfig) extends Bundle {
-  val control = Input(new BounceControl(new BounceFormats(config.numbers)))
-  val request = Input(new BounceRequest(config))
-  val offset  = Input(UInt((config.numbers.gridBits - 2).W))
-
-  /** The ray enters the material that it hits. */
-  val isRefraction = Input(Bool())
+  val control      = Input(new BounceControl(new BounceFormats(config.numbers)))
+  val request      = Input(new BounceRequest(config))
+  val offset       = Input(UInt((config.numbers.gridBits - 2).W))
+  val isRefraction = Input(Bool())                    // the ray enters the material that it hits
   val status       = Output(new BounceStatus)
-
-  /** Constant from the program's last step on. */
-  val result = Output(new BounceResult(config))
+  val result       = Output(new BounceResult(config)) // constant from the program's last step on
 }

@@ -44,8 +44,7 @@ final class BounceDatapath(config: PathConfig) extends Module {
   private val square         = Reg(UInt(formats.squareBits.W))
   private val squaredLengths = Reg(UInt(numbers.rootBits.W))
 
-  /** Bits by which |n|² exceeds its least length. */
-  private val exponent = Reg(UInt(2.W))
+  private val exponent = Reg(UInt(2.W)) // bits by which |n|² exceeds its least length
 
   /** First η²; then the cosine while it is shifted; then 2 · (1 − cosine). Schlick's powers have one factor doubled, so
     * that they drop 13 bits like the other products.
@@ -134,11 +133,8 @@ final class BounceDatapath(config: PathConfig) extends Module {
   // The cosine in a light's format. A quotient that would have to move up is more than one
   private val quotient = scalar(numbers.cosineFraction - 1, 0)
   private val isOne    = shiftRight < 3.U || scalar(numbers.cosineFraction)
-  private val cosine   = Mux(
-    isOne,
-    (1 << oneBits).U,
-    Rounding.floor(quotient, numbers.cosineFraction - oneBits).pad(oneBits + 1)
-  )
+  private val cosine   =
+    Mux(isOne, (1 << oneBits).U, Rounding.floor(quotient, numbers.cosineFraction - oneBits).pad(oneBits + 1))
 
   // Adder
   adder.io.actions        := actions
@@ -166,10 +162,9 @@ final class BounceDatapath(config: PathConfig) extends Module {
   }
   when(actions.latchCosine)(normalScale            := Mux(sum < 0.S, 0.U, scaled(formats.cosineBits - 1, 0)).zext)
   when(actions.latchRaySquared)(square             := Rounding.floor(dot, shadeBits - 1)(formats.squareBits - 1, 0))
-  when(actions.latchSquaredLengths)(squaredLengths := Rounding.floor(
-    sum.asUInt(formats.lengthBits - 1, 0),
-    formats.low
-  ))
+  when(actions.latchSquaredLengths) {
+    squaredLengths := Rounding.floor(sum.asUInt(formats.lengthBits - 1, 0), formats.low)
+  }
   when(actions.latchDirectionScale)(directionScale := floored.asUInt(formats.directionScaleBits - 1, 0))
   when(actions.latchNormalScale)(normalScale       := Rounding.narrow(sum, formats.normalScaleBits))
   when(actions.latchEtaSquared)(scalar             := floored.asUInt(formats.etaSquareBits - 1, 0))
@@ -189,10 +184,9 @@ final class BounceDatapath(config: PathConfig) extends Module {
   private val outgoing = Rounding.floor(sum, shadeBits - 4)
 
   private def uses(by: Bool*): Bool = control.digit === 0.U && by.reduce(_ || _)
-  when(uses(products.squareNormal, products.dotNormalRay, products.twiceNormalScale, products.normalScale))(rotate(
-    normal,
-    normal(0)
-  ))
+  when(uses(products.squareNormal, products.dotNormalRay, products.twiceNormalScale, products.normalScale)) {
+    rotate(normal, normal(0))
+  }
   when(uses(products.dotNormalRay, products.squareRay, products.directionScale))(rotate(rayDir, rayDir(0)))
   when(uses(products.hemisphereCheck, products.scaleOffset))(rotate(faceForwardNormal, faceForwardNormal(0)))
   when(actions.shiftInReflection || actions.shiftInRefraction || uses(products.hemisphereCheck)) {
@@ -207,10 +201,9 @@ final class BounceDatapath(config: PathConfig) extends Module {
     sign =/= next || (sign && !x.asUInt(shadeBits - 2, 0).orR)
   }.reduce(_ || _)
   for (axis <- 0 until 3) {
-    when(actions.normaliseNormal && !isLongest)(normal(axis) := Rounding.narrow(
-      (normal(axis) << 1).asSInt,
-      formats.componentBits
-    ))
+    when(actions.normaliseNormal && !isLongest) {
+      normal(axis) := Rounding.narrow((normal(axis) << 1).asSInt, formats.componentBits)
+    }
     when(control.startOver) {
       normal(axis) := (faceForwardNormal(axis) << (shadeBits - NumberFormats.normalBits)).asSInt
     }

@@ -9,16 +9,10 @@ import colonnade.ray.RayFormats
 
 /** Widths of reflection and refraction, from the bounds in docs/bounce.md. */
 final class BounceFormats(numbers: NumberFormats) {
-  val shadeBits: Int = numbers.shadeBits
-
-  /** A component of a scaled normal or of the ray's direction, signed. */
-  val componentBits: Int = shadeBits + 1
-
-  /** A component of a normal that is turned against the ray, signed. */
-  val faceForwardBits: Int = NumberFormats.normalBits + 1
-
-  /** A component of the outgoing ray's direction, signed. */
-  val bounceBits: Int = shadeBits + 5
+  val shadeBits:       Int = numbers.shadeBits
+  val componentBits:   Int = shadeBits + 1 // a component of a scaled normal or of the ray's direction, signed
+  val faceForwardBits: Int = NumberFormats.normalBits + 1 // a component of a normal turned against the ray, signed
+  val bounceBits:      Int = shadeBits + 5 // a component of the outgoing ray's direction, signed
 
   /** Factors of the ray's direction (unsigned) and of the normal (signed) in the outgoing direction. A refraction needs
     * three bits more than a reflection, for the integer part of the index.
@@ -30,8 +24,7 @@ final class BounceFormats(numbers: NumberFormats) {
   val cosineBits: Int = shadeBits + 1
   val squareBits: Int = shadeBits + 1
 
-  /** A squared relative index of refraction, unsigned. */
-  val etaSquareBits: Int = 2 * NumberFormats.etaBits - NumberFormats.etaFraction
+  val etaSquareBits: Int = 2 * NumberFormats.etaBits - NumberFormats.etaFraction // a squared relative index, unsigned
 
   /** The product of two squared lengths, unsigned; and the low bits that it drops to fit the multiplier. */
   val lengthBits: Int = 2 * shadeBits + 1
@@ -70,26 +63,16 @@ final class BounceRequest(config: PathConfig) extends Bundle {
   /** The shading normal, turned against the ray; its largest component has `shadeBits` bits, or it is zero. */
   val normal = Vec3(SInt(formats.componentBits.W))
 
-  /** `normal` is interpolated from the vertices' normals; otherwise it is the geometric one. */
-  val isSmooth = Bool()
-
-  /** The geometric normal, turned against the ray. */
-  val faceForwardNormal = Vec3(SInt(formats.faceForwardBits.W))
-
-  /** The ray's direction, its dominant component ±2^(shadeBits − 1). */
-  val dir = Vec3(SInt(formats.componentBits.W))
-
-  /** The ray hits the back of the triangle. */
-  val backSide = Bool()
-
-  /** Glass, or a mirror, which ignores the fields below. */
-  val isGlass = Bool()
+  val isSmooth          = Bool() // `normal` is interpolated from the vertices' normals; otherwise it is geometric
+  val faceForwardNormal = Vec3(SInt(formats.faceForwardBits.W)) // the geometric normal, turned against the ray
+  val dir               = Vec3(SInt(formats.componentBits.W)) // of the ray; dominant component ±2^(shadeBits − 1)
+  val backSide          = Bool() // the ray hits the back of the triangle
+  val isGlass           = Bool() // glass, or a mirror, which ignores the fields below
 
   /** The relative index of refraction, for a ray from this side. */
   val eta = new Fixed(FixedPointFormat.unsigned(NumberFormats.etaBits, NumberFormats.etaFraction))
 
-  /** At normal incidence. */
-  val reflectance = FrameRegisters.weight
+  val reflectance = FrameRegisters.weight // at normal incidence
 }
 
 /** The ray that leaves a mirror or glass. */
@@ -99,9 +82,7 @@ final class BounceResult(config: PathConfig) extends Bundle {
   val context      = Context(config)
   val isRefraction = Bool()
   val origin       = Vec3(new Fixed(new RayFormats(numbers).scene))
-
-  /** The direction, of any scale. */
-  val dir = Vec3(SInt(numbers.directionBits.W))
+  val dir          = Vec3(SInt(numbers.directionBits.W)) // the direction, of any scale
 
   /** The direction of a refracted ray's reflection, and its Fresnel term; a term of 0: there is no reflection. */
   val reflection = Vec3(SInt(new BounceFormats(numbers).bounceBits.W))

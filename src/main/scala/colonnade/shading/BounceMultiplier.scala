@@ -12,11 +12,9 @@ final class BounceMultiplierIO(formats: BounceFormats) extends Bundle {
   val digit   = Input(UInt(log2Ceil(formats.longDigits).W))
   val isFirst = Input(Bool())
 
-  val wide = Input(SInt(formats.wideBits.W))
-  val long = Input(SInt((formats.longDigits * formats.digitBits).W))
-
-  /** Valid from the cycle after digit 0 until the next product begins. */
-  val product = Output(SInt(formats.productBits.W))
+  val wide    = Input(SInt(formats.wideBits.W))
+  val long    = Input(SInt((formats.longDigits * formats.digitBits).W))
+  val product = Output(SInt(formats.productBits.W)) // valid from the cycle after digit 0 to the next product
 }
 
 /** Multiplies by one digit a cycle; exact products, each in `digits` or more cycles. */

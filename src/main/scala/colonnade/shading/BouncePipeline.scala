@@ -36,7 +36,5 @@ final class BouncePipeline(config: PathConfig) extends Module {
 }
 
 object BouncePipeline {
-
-  /** Units for glass: a hit at its front takes some 170 cycles in each. */
-  val units: Int = 4
+  val units: Int = 4 // units for glass: a hit at its front takes some 170 cycles in each
 }

@@ -14,11 +14,8 @@ final class BounceRootsIO(numbers: NumberFormats) extends Bundle {
   val startCosine = Input(Bool())
   val divide      = Input(Bool())
 
-  /** The root or quotient is ready. */
-  val isReady = Output(Bool())
-
-  /** Takes the result. */
-  val take = Input(Bool())
+  val isReady = Output(Bool()) // the root or quotient is ready
+  val take    = Input(Bool())  // takes the result
 
   val discriminant = Input(UInt(formats.lengthBits.W))
   val root         = Output(UInt(formats.cosineBits.W))
@@ -27,8 +24,7 @@ final class BounceRootsIO(numbers: NumberFormats) extends Bundle {
   val normProduct = Input(UInt((2 * numbers.shadeBits).W))
   val exponent    = Input(UInt(3.W))
 
-  /** n·d, with its top bit set. */
-  val dot      = Input(UInt((2 * numbers.shadeBits + 2).W))
+  val dot      = Input(UInt((2 * numbers.shadeBits + 2).W)) // n·d, with its top bit set
   val quotient = Output(UInt((numbers.cosineFraction + 1).W))
 
   /** Three more than the bits by which the quotient has to move down, without those by which `dot` moved up. */

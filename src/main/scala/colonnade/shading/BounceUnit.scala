@@ -13,8 +13,7 @@ final class BounceUnitIO(config: PathConfig) extends Bundle {
   val request = Flipped(Decoupled(new BounceRequest(config)))
   val result  = Decoupled(new BounceResult(config))
 
-  /** Holds a bounce. */
-  val busy = Output(Bool())
+  val busy = Output(Bool()) // holds a bounce
 }
 
 /** Reflection at mirrors; refraction and Schlick's Fresnel term at glass: docs/numbers.md, section 6, and docs/bounce.md.

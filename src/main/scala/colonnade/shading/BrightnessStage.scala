@@ -19,11 +19,8 @@ final class BrightnessStageIO(config: PathConfig) extends Bundle {
   val angle   = Input(new Angle(formats))
   val falloff = Input(new FalloffRequest(numbers))
 
-  /** The light's intensity, in three cycles from `colour` of [[BrightnessCycles]] on. */
-  val colour = Input(Rgb(FrameRegisters.intensity))
-
-  /** In the third cycle after. */
-  val direct = Output(Rgb(FrameRegisters.intensity))
+  val colour = Input(Rgb(FrameRegisters.intensity))  // of the light, in three cycles from `BrightnessCycles.colour` on
+  val direct = Output(Rgb(FrameRegisters.intensity)) // in the third cycle after
 }
 
 /** Cycles of [[BrightnessStage]]. */
@@ -123,8 +120,7 @@ final class BrightnessStage(config: PathConfig) extends Module {
 
   /** The quotient of two mantissas that are there in a cycle. */
   private def divide(cycle: Int, numerator: UInt, denominator: UInt): UInt = {
-    val divider =
-      Module(new FoldedDivider(numerator.getWidth, denominator.getWidth, fraction, interval)).io
+    val divider = Module(new FoldedDivider(numerator.getWidth, denominator.getWidth, fraction, interval)).io
     divider.isStep      := isAt(cycle)
     divider.numerator   := numerator
     divider.denominator := denominator

@@ -12,12 +12,10 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   val ambient    = Input(Rgb(FrameRegisters.intensity))
   val background = Input(Rgb(FrameRegisters.colour))
   val shading    = Input(new Shading(config))
-
-  /** The surface at which a context's path ends; remembered. */
-  val surface = Flipped(Valid(new LitSurface(config)))
-  val bounce  = if (config.frame.hasBounces) Some(Flipped(Decoupled(new BounceUpdate(config)))) else None
-  val end     = Flipped(Decoupled(new PathTermination(config)))
-  val colour  = Valid(new PathColour(config))
+  val surface    = Flipped(Valid(new LitSurface(config))) // the surface at which a context's path ends; remembered
+  val bounce     = if (config.frame.hasBounces) Some(Flipped(Decoupled(new BounceUpdate(config)))) else None
+  val end        = Flipped(Decoupled(new PathTermination(config)))
+  val colour     = Valid(new PathColour(config))
 }
 
 /** Colours of paths: docs/numbers.md, 5.9 and 6. A path has a radiance so far, and a throughput that weights what it still
@@ -187,10 +185,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val fresnel  = operation.fresnel.map(_.natural).getOrElse(0.U(weightBits.W))
   private val direct   = of(at(directLight))
   private val arriving = Reg(UInt(NumberFormats.lightBits.W))
-  arriving := drop(
-    Mux(ofSurface, direct, of(throughput)) * Mux(ofSurface, transmittance, tint),
-    NumberFormats.lightBits
-  )
+  arriving :=
+    drop(Mux(ofSurface, direct, of(throughput)) * Mux(ofSurface, transmittance, tint), NumberFormats.lightBits)
 
   // The sum of the lights
   private val arrival = after(slot)()
@@ -297,10 +293,6 @@ final private class TerminalSurface(config: PathConfig) extends Bundle {
 
 /** A path after its bounces so far. */
 final private class PathState extends Bundle {
-
-  /** The weight of what the path still hits, by channel. */
-  val throughput = Vec(3, FrameRegisters.weight)
-
-  /** The colour so far. */
-  val radiance = Rgb(FrameRegisters.colour)
+  val throughput = Vec(3, FrameRegisters.weight) // the weight of what the path still hits, by channel
+  val radiance   = Rgb(FrameRegisters.colour)    // the colour so far
 }

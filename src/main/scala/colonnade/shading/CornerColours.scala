@@ -15,18 +15,14 @@ final class CornerColoursIO(config: PathConfig) extends Bundle {
   val start   = Input(Bool())
   val weights = Input(Vec(3, new Fixed(new RayFormats(config.numbers).weight)))
 
-  /** One per corner. */
-  val colours = Input(Vec(3, Rgb(FrameRegisters.colour)))
-
-  /** The hit in work shows its corner colours; constant from the cycle after `start` to the next `start`. */
-  val isUsed = Input(Bool())
+  val colours = Input(Vec(3, Rgb(FrameRegisters.colour))) // one per corner
+  val isUsed  = Input(Bool()) // the hit shows its corner colours; constant from the cycle after `start` to the next
 
   /** To the multiplier, whose product comes in the cycle after it took them. */
   val operands = Decoupled(new MultiplierOperands(formats))
   val product  = Input(SInt(formats.productBits.W))
 
-  /** `colour` is complete; it holds until the next `start`. */
-  val isDone = Output(Bool())
+  val isDone = Output(Bool()) // `colour` is complete; it holds until the next `start`
   val colour = Output(Rgb(FrameRegisters.colour))
 }
 
@@ -47,8 +43,7 @@ final class CornerColours(config: PathConfig) extends Module {
 
   val io = IO(new CornerColoursIO(config))
 
-  /** They rotate; component 0 is used. */
-  private val weights = Reg(Vec(3, UInt(weightBits.W)))
+  private val weights = Reg(Vec(3, UInt(weightBits.W))) // they rotate; component 0 is used
 
   /** Channel by channel; component 0 is used, then the others move down. */
   private val colours = Reg(Vec(products, UInt(colourBits.W)))

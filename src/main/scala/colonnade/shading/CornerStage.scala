@@ -16,8 +16,7 @@ final class CornerStageIO(config: PathConfig) extends Bundle {
   val weights = Input(Vec(3, UInt(config.numbers.barycentricBits.W)))
   val colours = Input(Vec(3, Rgb(FrameRegisters.colour)))
 
-  /** In cycle 8. */
-  val colour = Output(Rgb(FrameRegisters.colour))
+  val colour = Output(Rgb(FrameRegisters.colour)) // in cycle 8
 }
 
 /** Interpolates the colours at the corners of a face, as [[CornerColours]] does: a hit every three cycles, by three

@@ -7,22 +7,16 @@ import colonnade.numbers.{Divider, Rounding, SquareRoot}
 
 /** The brightness of a light on a surface. */
 final class Brightness(numbers: NumberFormats) extends Bundle {
-
-  /** `cosineFraction` fraction bits, from 0 to 1. */
-  val cosine = UInt(new ShaderFormats(numbers).cosineBits.W)
-
-  /** See [[Falloff]]; meaningless if the cosine is 0. */
-  val falloff = Falloff()
+  val cosine  = UInt(new ShaderFormats(numbers).cosineBits.W) // `cosineFraction` fraction bits, from 0 to 1
+  val falloff = Falloff()                                     // see Falloff; meaningless if the cosine is 0
 }
 
 /** Ports of [[CosineUnit]]. */
 final class CosineUnitIO(numbers: NumberFormats) extends Bundle {
   private val formats = new ShaderFormats(numbers)
 
-  val angle = Flipped(Decoupled(new Angle(formats)))
-
-  /** Taken together with `angle`. */
-  val falloff    = Input(new FalloffRequest(numbers))
+  val angle      = Flipped(Decoupled(new Angle(formats)))
+  val falloff    = Input(new FalloffRequest(numbers)) // taken together with `angle`
   val brightness = Decoupled(new Brightness(numbers))
 }
 
@@ -45,14 +39,10 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
   private val squareRoot = Module(new SquareRoot(numbers.radicandBits))
   private val divider    = Module(new Divider(numbers.mantissaBits, numbers.cosineFraction))
 
-  private val step = RegInit(CosineStep.idle)
-  private val dot  = Reg(UInt(formats.dotBits.W))
-
-  /** Twice the quotient. */
-  private val cosine = Reg(UInt((numbers.cosineFraction + 2).W))
-
-  /** Two more than the bits by which [[cosine]] has to move down. */
-  private val shiftRight = Reg(UInt(log2Ceil(formats.dotBits + 4).W))
+  private val step       = RegInit(CosineStep.idle)
+  private val dot        = Reg(UInt(formats.dotBits.W))
+  private val cosine     = Reg(UInt((numbers.cosineFraction + 2).W))  // twice the quotient
+  private val shiftRight = Reg(UInt(log2Ceil(formats.dotBits + 4).W)) // two more than the bits that `cosine` moves down
 
   // The falloff's quotient has guard bits below, so that it only has to move down, by `falloffShift`
   private val guardBits    = (NumberFormats.lightFraction + 3 - numbers.cosineFraction).max(0)
@@ -106,9 +96,7 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
         step := Mux(reference === 0.U || cosine === 0.U, CosineStep.done, CosineStep.divideFalloff)
       }
     }
-    is(CosineStep.divideFalloff) {
-      when(divider.io.division.fire)(step := CosineStep.falloffQuotient)
-    }
+    is(CosineStep.divideFalloff) { when(divider.io.division.fire)(step := CosineStep.falloffQuotient) }
     is(CosineStep.falloffQuotient) {
       falloff := divider.io.quotient.bits << guardBits
       when(divider.io.quotient.fire)(step := CosineStep.shiftFalloff)
@@ -128,9 +116,7 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
         step    := CosineStep.done
       }
     }
-    is(CosineStep.done) {
-      when(io.brightness.fire)(step := CosineStep.idle)
-    }
+    is(CosineStep.done) { when(io.brightness.fire)(step := CosineStep.idle) }
   }
 
   // The root is taken before the next angle comes: its own `ready` would add a path from the divider to the geometry
@@ -154,7 +140,6 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
 
   private val one = 1.U << numbers.cosineFraction
   io.brightness.valid       := step === CosineStep.done
-  io.brightness.bits.cosine :=
-    Mux(cosine(numbers.cosineFraction + 1, numbers.cosineFraction).orR, one, cosine)
+  io.brightness.bits.cosine := Mux(cosine(numbers.cosineFraction + 1, numbers.cosineFraction).orR, one, cosine)
   io.brightness.bits.falloff := falloff
 }

@@ -12,9 +12,7 @@ final class DirectUnitIO(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(numbers)
 
   val brightness = Flipped(Decoupled(new Brightness(numbers)))
-
-  /** The light's intensity, constant while the unit works on it. */
-  val colour = Input(Rgb(FrameRegisters.intensity))
+  val colour     = Input(Rgb(FrameRegisters.intensity)) // the light's intensity, constant while the unit works on it
 
   /** To the multiplier, whose product comes `ShaderMultiplier.latency` cycles after it took them. */
   val operands = Decoupled(new MultiplierOperands(formats))
@@ -69,14 +67,10 @@ final class DirectUnit(config: PathConfig) extends Module {
       brightness := io.brightness.bits.cosine
       when(io.brightness.fire)(step := DirectStep.applyFalloff)
     }
-    is(DirectStep.applyFalloff) {
-      when(io.operands.fire)(step := DirectStep.awaitFalloff)
-    }
+    is(DirectStep.applyFalloff) { when(io.operands.fire)(step := DirectStep.awaitFalloff) }
     is(DirectStep.awaitFalloff) {
-      brightness := Rounding.narrow(
-        Rounding.floor(io.product.asUInt, NumberFormats.lightFraction),
-        formats.brightnessBits
-      )
+      brightness :=
+        Rounding.narrow(Rounding.floor(io.product.asUInt, NumberFormats.lightFraction), formats.brightnessBits)
       when(hasArrived)(step := DirectStep.scaleColour)
     }
     is(DirectStep.scaleColour) {
@@ -88,9 +82,7 @@ final class DirectUnit(config: PathConfig) extends Module {
     is(DirectStep.awaitColour) {
       when(if (latency == 1) true.B else isArriving && arrivingChannel === 2.U)(step := DirectStep.done)
     }
-    is(DirectStep.done) {
-      when(io.direct.fire)(step := DirectStep.idle)
-    }
+    is(DirectStep.done) { when(io.direct.fire)(step := DirectStep.idle) }
   }
 
   io.brightness.ready := step === DirectStep.idle

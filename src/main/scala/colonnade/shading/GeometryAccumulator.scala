@@ -17,9 +17,7 @@ final class GeometryAccumulatorIO(config: PathConfig) extends Bundle {
 
   val product = Input(SInt(formats.productBits.W))
   val sum     = Output(SInt((formats.productBits + 1).W))
-
-  /** The sum of the cycle before, rounded. */
-  val rounded = Output(SInt(ShaderFormats.originBits(config).W))
+  val rounded = Output(SInt(ShaderFormats.originBits(config).W)) // the sum of the cycle before, rounded
 
   /** The sum as a squared length, see [[Angle]]. */
   val mantissa = Output(UInt(formats.shadeBits.W))
@@ -61,7 +59,6 @@ final class GeometryAccumulator(config: PathConfig) extends Module {
   // The highest bit of a squared length is one of the top four
   private val top = sum.asUInt(formats.dotBits - 1, formats.dotBits - 4)
   io.exponent := Mux(top(3, 1).orR, 3.U - PriorityEncoder(Reverse(top(3, 1))), 0.U)
-  io.mantissa := Mux1H(
-    (0 to 3).map(k => (io.exponent === k.U) -> sum.asUInt(k + 2 * shadeBits - 2, k + shadeBits - 1))
-  )
+  io.mantissa :=
+    Mux1H((0 to 3).map(k => (io.exponent === k.U) -> sum.asUInt(k + 2 * shadeBits - 2, k + shadeBits - 1)))
 }

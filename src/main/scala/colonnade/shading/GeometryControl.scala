@@ -23,8 +23,7 @@ final class GeometryControl(formats: ShaderFormats) extends Bundle {
   val startSum         = Bool()
   val shiftAccumulator = Bool()
 
-  /** The sum to round consists of a shear factor's digits; otherwise it is a normal's component. */
-  val roundShear = Bool()
+  val roundShear = Bool() // round the sum of a shear factor's digits; otherwise a normal's component
 
   // The adder: at most one of these
   val addShear      = Bool()
@@ -67,25 +66,20 @@ final class GeometryDatapathIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)
 
-  val control = Input(new GeometryControl(formats))
-  val request = Input(new ShadeRequest(config))
-
-  /** Load `environment` instead of `request`. */
-  val isEnvironment = Input(Bool())
+  val control       = Input(new GeometryControl(formats))
+  val request       = Input(new ShadeRequest(config))
+  val isEnvironment = Input(Bool()) // load `environment` instead of `request`
   val environment   = if (config.hasEnvironment) Some(Input(new EnvironmentSurface(config))) else None
-
-  /** Shade with the geometric normal. */
-  val isFlat    = Input(Bool())
-  val light     = Input(new Light(numbers))
-  val offset    = Input(UInt((numbers.gridBits - 2).W))
-  val unitShift = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
+  val isFlat        = Input(Bool()) // shade with the geometric normal
+  val light         = Input(new Light(numbers))
+  val offset        = Input(UInt((numbers.gridBits - 2).W))
+  val unitShift     = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
 
   /** To the multiplier, whose product comes in the next cycle. */
   val operands = Valid(new MultiplierOperands(formats))
   val product  = Input(SInt(formats.productBits.W))
 
-  /** In the step that latches the normal's leading zeros: the normal is zero. */
-  val normalIsZero = Output(Bool())
+  val normalIsZero = Output(Bool()) // in the step that latches the normal's leading zeros: the normal is zero
 
   // Results for the current light
   val angle   = Output(new Angle(formats))

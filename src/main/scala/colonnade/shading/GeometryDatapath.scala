@@ -20,9 +20,7 @@ final class GeometryDatapath(config: PathConfig) extends Module {
   val io = IO(new GeometryDatapathIO(config))
 
   private val control = io.control
-
-  /** In the ray's frame until it is unpermuted. */
-  private val point = VectorRegister(ShaderFormats.originBits(config))
+  private val point   = VectorRegister(ShaderFormats.originBits(config)) // in the ray's frame until it is unpermuted
 
   /** First the three vertex normals, vertex 0 in each axis' low bits; then the vector to the light. */
   private val normalsOrLight  = VectorRegister(formats.vectorBits.max(3 * normalBits))
@@ -89,23 +87,19 @@ final class GeometryDatapath(config: PathConfig) extends Module {
 
   // Adder: point ± rounded, point ± distance, light - point, or 0 - the number to measure
   private val addToPoint = control.addShear || control.addDistance || control.addOffset
-  private val subtract   = Mux1H(
-    Seq(
-      control.addDistance                                                     -> isNegative,
-      control.addOffset                                                       -> backSide,
-      (control.shiftInNormal || control.shiftInLight || control.measureLight) -> true.B
-    )
-  )
+  private val subtract   = Mux1H(Seq(
+    control.addDistance                                                     -> isNegative,
+    control.addOffset                                                       -> backSide,
+    (control.shiftInNormal || control.shiftInLight || control.measureLight) -> true.B
+  ))
   private val left  = Mux1H(Seq(addToPoint -> point(0).pad(formats.vectorBits), control.shiftInLight -> shifted))
-  private val right = Mux1H(
-    Seq(
-      (control.addShear || control.addOffset) -> rounded,
-      control.addDistance                     -> distance,
-      control.shiftInLight                    -> point(0),
-      control.shiftInNormal                   -> Rounding.narrow(sum, formats.normalSumBits),
-      control.measureLight                    -> Rounding.narrow(normalsOrLight(0), formats.vectorBits)
-    ).map { case (when, operand) => when -> operand.pad(formats.vectorBits) }
-  )
+  private val right = Mux1H(Seq(
+    (control.addShear || control.addOffset) -> rounded,
+    control.addDistance                     -> distance,
+    control.shiftInLight                    -> point(0),
+    control.shiftInNormal                   -> Rounding.narrow(sum, formats.normalSumBits),
+    control.measureLight                    -> Rounding.narrow(normalsOrLight(0), formats.vectorBits)
+  ).map { case (when, operand) => when -> operand.pad(formats.vectorBits) })
   private val addend = Mux(subtract, ~right, right)
   private val total  = (Cat(left.asUInt, true.B) + Cat(addend.asUInt, subtract))(formats.vectorBits, 1).asSInt
 

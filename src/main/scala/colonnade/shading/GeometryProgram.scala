@@ -7,34 +7,18 @@ import colonnade.microcode.{Label, Microprogram, Overlap, Repeat, StepEncoding}
 sealed trait GeometryLabel extends Label
 
 object GeometryLabel {
-
-  /** Waits for a hit. */
-  case object Idle extends GeometryLabel
-
-  /** Interpolates the shading normal. */
-  case object Normal extends GeometryLabel
-
-  /** Computes the hit point and the shadow rays' origin. */
-  case object Point extends GeometryLabel
-
-  /** Computes the direction to a light, and its angle to the normal. */
-  case object LightAngle extends GeometryLabel
-
-  /** Offers the result. */
-  case object Done extends GeometryLabel
+  case object Idle       extends GeometryLabel // waits for a hit
+  case object Normal     extends GeometryLabel // interpolates the shading normal
+  case object Point      extends GeometryLabel // computes the hit point and the shadow rays' origin
+  case object LightAngle extends GeometryLabel // computes the direction to a light, and its angle to the normal
+  case object Done       extends GeometryLabel // offers the result
 }
 
 /** Inputs of [[GeometryProgram]]. */
 final class GeometryConditions {
-
-  /** A hit is taken. */
-  val takes: Bool = Wire(Bool())
-
-  /** The smooth normal is zero: start over with the geometric one. */
-  val startsOver: Bool = Wire(Bool())
-
-  /** The first light of the hit is in work; further lights find the normal scaled and measured. */
-  val isFirstLight: Bool = Wire(Bool())
+  val takes:        Bool = Wire(Bool()) // a hit is taken
+  val startsOver:   Bool = Wire(Bool()) // the smooth normal is zero: start over with the geometric one
+  val isFirstLight: Bool = Wire(Bool()) // the hit's first light; further ones find the normal scaled and measured
 
   /** The result is taken, and whether it is that of the hit's last light. */
   val isTaken: Bool = Wire(Bool())
@@ -116,11 +100,7 @@ final class GeometryProgram(
     angle(at)
   }
   program.step(Done) {
-    branch(
-      Repeat.until(isTaken, "the result is taken"),
-      Idle.when(isLast, "last light"),
-      LightAngle.otherwise
-    )
+    branch(Repeat.until(isTaken, "the result is taken"), Idle.when(isLast, "last light"), LightAngle.otherwise)
   }
 
   private def normal(at: Overlap[GeometryLabel]): Unit = {

@@ -35,8 +35,7 @@ final class LitAssemblerIO(config: PathConfig) extends Bundle {
   val light  = Flipped(Valid(new LightOnSurface(config)))
   val albedo = Flipped(new AlbedoSources(config))
 
-  /** A light has left. */
-  val isTaken = Output(Bool())
+  val isTaken = Output(Bool()) // a light has left
   val lit     = Decoupled(new LitSurface(config))
 }
 
@@ -96,7 +95,5 @@ final class LitAssembler(config: PathConfig, places: Int) extends Module {
   for (albedo <- label.environment) when(albedo.valid)(lit.albedo := albedo.bits)
   for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
     channel := Mux(isEnvironment, 0.U, value)
-  lit.origin.axes.zip(origins).foreach { case (to, from) =>
-    to := Fixed(new RayFormats(config.numbers).scene, from.bits)
-  }
+  for ((to, from) <- lit.origin.axes.zip(origins)) to := Fixed(new RayFormats(config.numbers).scene, from.bits)
 }

@@ -34,8 +34,7 @@ final class MirrorPipeline(config: PathConfig) extends Module {
   private val dotBits   = 2 * shadeBits + 2
   private val scene     = new RayFormats(config.numbers).scene
 
-  /** `request.bits.isGlass` is false; the ports of glass have no effect. */
-  val io = IO(new BounceUnitIO(config))
+  val io = IO(new BounceUnitIO(config)) // `request.bits.isGlass` is false; the ports of glass have no effect
 
   private val phase    = RegInit(0.U.asTypeOf(ModuloSchedule.phase()))
   private val schedule = new ModuloSchedule(phase)
@@ -140,9 +139,7 @@ final private[shading] class MirrorResult(config: PathConfig) extends Bundle {
 }
 
 object MirrorPipeline {
-
-  /** Reflections that are computed or wait, so many that the queue never delays one that is taken at once. */
-  val places: Int = 8
+  val places: Int = 8 // reflections in work or waiting: the queue never delays one that is taken at once
 
   /** A stored normal whose largest component gets `bits` bits. */
   private def normalised(normal: Seq[SInt], bits: Int): Seq[SInt] = {

@@ -49,24 +49,19 @@ final private[shading] class ObjectAlbedo(
 /** A hit with a texture. */
 final class TexturedHit(config: PathConfig) extends Bundle {
   val position = new TexelPosition(TextureLayout.of(config))
-
-  /** Its material is a mirror or glass. */
-  val isBounce = Bool()
+  val isBounce = Bool() // its material is a mirror or glass
 }
 
 /** Ports of [[TexelReader]]. */
 final class TexelReaderIO(config: PathConfig) extends Bundle {
-
-  /** Only while there is space. */
-  val hit  = Flipped(Valid(new TexturedHit(config)))
+  val hit  = Flipped(Valid(new TexturedHit(config))) // only while there is space
   val port = new TexturePort(config)
 
   // In the order of the hits of each kind
   val lit     = Valid(Rgb(FrameRegisters.colour))
   val bounced = Valid(Rgb(FrameRegisters.colour))
 
-  /** A word beyond the heap was read, for one cycle. */
-  val isIllegal = Output(Bool())
+  val isIllegal = Output(Bool()) // a word beyond the heap was read, for one cycle
 }
 
 /** Reads the texels of hits. As many may be under way as have places. */

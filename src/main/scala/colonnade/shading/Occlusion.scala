@@ -4,11 +4,7 @@ import chisel3._
 
 /** The outcome of a shadow ray. */
 object Occlusion extends ChiselEnum {
-
-  /** The ray hits nothing, or no ray was sent. */
-  val none = Value
-
-  /** The ray hits transmissive triangles only. */
-  val transmissive = Value
+  val none         = Value // the ray hits nothing, or no ray was sent
+  val transmissive = Value // the ray hits transmissive triangles only
   val opaque       = Value
 }

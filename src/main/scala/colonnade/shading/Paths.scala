@@ -7,16 +7,10 @@ import colonnade.formats.{FrameRegisters, Rgb}
 
 /** The last surface of a path. */
 final class PathTermination(config: PathConfig) extends Bundle {
-  val context = Context(config)
-
-  /** There is no surface: the path ends with the background's colour. */
-  val isBackground = Bool()
-
-  /** The path has hit neither mirror nor glass. */
-  val isStraight = Option.when(config.frame.hasBounces)(Bool())
-
-  /** By light: the shadow rays' outcomes. */
-  val occlusions = Vec(config.frame.lights, Occlusion())
+  val context      = Context(config)
+  val isBackground = Bool() // there is no surface: the path ends with the background's colour
+  val isStraight   = Option.when(config.frame.hasBounces)(Bool()) // the path has hit neither mirror nor glass
+  val occlusions   = Vec(config.frame.lights, Occlusion()) // by light: the shadow rays' outcomes
 
   /** The camera sees the environment's surface directly: the shadow ratio is needed as well. */
   val isDirectView = if (config.hasEnvironment) Some(Bool()) else None
@@ -24,17 +18,11 @@ final class PathTermination(config: PathConfig) extends Bundle {
 
 /** The change of a path's throughput at a mirror or glass. */
 final class BounceUpdate(config: PathConfig) extends Bundle {
-  val context = Context(config)
-
-  /** The first bounce of its path. */
-  val isFirst = Bool()
-  val albedo  = Rgb(FrameRegisters.colour)
-
-  /** The path is tinted by the albedo. */
-  val isTinted = Bool()
-
-  /** The Fresnel term: the weight of the deferred reflection. */
-  val fresnel = FrameRegisters.weight
+  val context  = Context(config)
+  val isFirst  = Bool()                // the first bounce of its path
+  val albedo   = Rgb(FrameRegisters.colour)
+  val isTinted = Bool()                // the path is tinted by the albedo
+  val fresnel  = FrameRegisters.weight // the Fresnel term: the weight of the deferred reflection
 
   /** The reflection shows the remembered surface, lit by all lights; otherwise the background's colour. */
   val hasSurface = if (config.hasEnvironment) Some(Bool()) else None

@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{log2Ceil, RegEnable}
+import chisel3.util.RegEnable
 import colonnade.config.PathConfig
 import colonnade.formats.{FrameRegisters, Material, MaterialKind, Rgb, Vec3}
 import colonnade.numbers.{Fixed, Rounding}
@@ -31,11 +31,7 @@ final class SequentialShader(config: PathConfig) extends Shader(config) {
   private val point    = geometry.io.result
   private val surface  = point.bits.surface
   private val material = Wire(new Material(config))
-  material := {
-    val indexBits = log2Ceil(config.frame.materials)
-    val entries   = io.materials.padTo(1 << indexBits, io.materials.head)
-    if (indexBits == 0) entries.head else VecInit(entries)(surface.material(indexBits - 1, 0))
-  }
+  material := ShadingPipeline.material(config, io.materials, surface.material)
   private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse && !surface.isEnvironment).getOrElse(false.B)
   geometry.io.request <> io.request
   io.readyNext           := geometry.io.readyNext
@@ -171,8 +167,4 @@ final class SequentialShader(config: PathConfig) extends Shader(config) {
       val isDone = texture.map(texel => Mux(isTextured, texel.io.isDone, unit.io.isDone)).getOrElse(unit.io.isDone)
       condition && (isDone || !unit.io.isUsed)
     }.getOrElse(condition)
-
-  /** A light's entry; a single light needs no index. */
-  private def at[T <: Data](entries: Vec[T], index: UInt): T =
-    if (config.frame.lights == 1) entries.head else entries(index)
 }

@@ -18,26 +18,24 @@ final class ShaderIO(config: PathConfig) extends Bundle {
   /** Points of the environment; taken when there is no request. */
   val environment = if (config.hasEnvironment) Some(Flipped(Decoupled(new EnvironmentSurface(config)))) else None
 
-  /** `request` is ready in the next cycle. */
-  val readyNext = Output(Bool())
+  val readyNext = Output(Bool()) // `request` is ready in the next cycle
 
   /** To the textures, and whether a texel was illegal. */
   val texture        = config.geometry.texture.map(_ => new TexturePort(config))
   val isIllegalTexel = config.geometry.texture.map(_ => Output(Bool()))
 
-  /** Hits on diffuse surfaces. */
-  val lit = Decoupled(new LitSurface(config))
-
-  /** Hits on mirrors and glass. */
-  val bounced = if (config.frame.hasBounces) Some(Decoupled(new BouncedRay(config))) else None
-
-  /** The entry holds a hit: a cycle of the narrowest stage. */
-  val busy = Output(Bool())
+  val lit     = Decoupled(new LitSurface(config)) // hits on diffuse surfaces
+  val bounced = Option.when(config.frame.hasBounces)(Decoupled(new BouncedRay(config))) // hits on mirrors and glass
+  val busy    = Output(Bool()) // the entry holds a hit: a cycle of the narrowest stage
 }
 
 /** Shades hits: docs/numbers.md, 5 and 6. Lit surfaces leave in the order of their hits. */
 abstract class Shader(config: PathConfig) extends Module {
   final val io = IO(new ShaderIO(config))
+
+  /** A light's entry; a single light needs no index. */
+  protected def at[T <: Data](entries: Vec[T], index: UInt): T =
+    if (config.frame.lights == 1) entries.head else entries(index)
 }
 
 object Shader {

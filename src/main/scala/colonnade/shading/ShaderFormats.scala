@@ -15,23 +15,12 @@ final class ShaderFormats(numbers: NumberFormats) {
     */
   val pointBits: Int = numbers.gridBits + 2
 
-  /** The vector to the light, signed: a difference of scene positions. */
-  val toLightBits: Int = numbers.sceneBits + 1
-
-  /** The sum of three weighted normals, signed. */
-  val normalSumBits: Int = numbers.barycentricBits + NumberFormats.normalBits + 2
-
-  /** A shading normal before and after scaling, signed. */
-  val normalBits: Int = normalSumBits.max(shadeBits + 1)
-
-  /** The widest component of a vector, signed. */
-  val vectorBits: Int = toLightBits.max(normalBits)
-
-  /** A cosine, from 0 to 1 inclusive. */
-  val cosineBits: Int = numbers.cosineFraction + 1
-
-  /** A cosine multiplied by a falloff. */
-  val brightnessBits: Int = cosineBits + Falloff.integerBits
+  val toLightBits:    Int = numbers.sceneBits + 1 // the vector to the light, signed: a difference of scene positions
+  val normalSumBits:  Int = numbers.barycentricBits + NumberFormats.normalBits + 2 // of three weighted normals, signed
+  val normalBits:     Int = normalSumBits.max(shadeBits + 1) // a shading normal before and after scaling, signed
+  val vectorBits:     Int = toLightBits.max(normalBits) // the widest component of a vector, signed
+  val cosineBits:     Int = numbers.cosineFraction + 1 // a cosine, from 0 to 1 inclusive
+  val brightnessBits: Int = cosineBits + Falloff.integerBits // a cosine multiplied by a falloff
 
   /** Multiplier operands, signed. The narrow one holds a scaled component or a light's intensity, the wide one also a
     * distance or a brightness.
@@ -43,11 +32,8 @@ final class ShaderFormats(numbers: NumberFormats) {
   /** A shear factor is multiplied digit by digit. A digit has `shadeBits` bits, the highest one is signed. */
   val shearDigits: Int = (numbers.gridBits - 2) / shadeBits + 1
 
-  /** A dot product of two scaled vectors: three products of components of at most 2^shadeBits. */
-  val dotBits: Int = 2 * shadeBits + 2
-
-  /** The product of both lengths' mantissas; one of its two highest bits is set. */
-  val normProductBits: Int = 2 * shadeBits
+  val dotBits:         Int = 2 * shadeBits + 2 // three products of components of at most 2^shadeBits
+  val normProductBits: Int = 2 * shadeBits     // the product of both mantissas; one of its two highest bits is set
 
   /** Log2 of a light's reference distance over its distance, both squared. */
   val falloffExponentBits: Int =
@@ -74,16 +60,10 @@ final class MultiplierOperands(formats: ShaderFormats) extends Bundle {
   * @note a·a = u · 2^(k - 1 + shadeBits) with a mantissa u of `shadeBits` bits and k from 0 to 3; b·b likewise.
   */
 final class Angle(formats: ShaderFormats) extends Bundle {
-
-  /** a·b is positive. Otherwise the other fields are meaningless. */
-  val isAcute = Bool()
-  val dot     = UInt(formats.dotBits.W)
-
-  /** The product of both mantissas u. */
-  val normProduct = UInt(formats.normProductBits.W)
-
-  /** The sum of both k. */
-  val exponent = UInt(3.W)
+  val isAcute     = Bool()                          // a·b is positive. Otherwise the other fields are meaningless
+  val dot         = UInt(formats.dotBits.W)
+  val normProduct = UInt(formats.normProductBits.W) // the product of both mantissas u
+  val exponent    = UInt(3.W)                       // the sum of both k
 }
 
 /** The share of a light's intensity that arrives at a distance, from 0 to 4. */
@@ -105,8 +85,7 @@ object Falloff {
 final class FalloffRequest(numbers: NumberFormats) extends Bundle {
   private val formats = new ShaderFormats(numbers)
 
-  /** Mantissa of the squared reference distance. 0: the light has no falloff. */
-  val reference = UInt(numbers.mantissaBits.W)
+  val reference = UInt(numbers.mantissaBits.W) // mantissa of the squared reference distance; 0 without a falloff
 
   /** Of the squared distance. */
   val mantissa = UInt(formats.shadeBits.W)
@@ -125,19 +104,16 @@ final class ShadingPoint(config: PathConfig) extends Bundle {
   val angle   = new Angle(formats)
   val falloff = new FalloffRequest(config.numbers)
 
-  /** The same for all lights of the hit. */
-  val surface = new ShadedSurface(config)
+  val surface = new ShadedSurface(config) // the same for all lights of the hit
 }
 
 /** A hit and its ray. */
 final class ShadedSurface(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
-  val context  = Context(config)
-  val material = UInt(RecordFormats.materialBits.W)
-
-  /** The surface belongs to the environment, not to the object. */
-  val isEnvironment = Bool()
+  val context       = Context(config)
+  val material      = UInt(RecordFormats.materialBits.W)
+  val isEnvironment = Bool() // the surface belongs to the environment, not to the object
 
   /** Origin of shadow rays and reflections: the hit point, moved off the surface; grid steps. */
   val origin = Vec3(SInt(ShaderFormats.originBits(config).W))
@@ -145,15 +121,8 @@ final class ShadedSurface(config: PathConfig) extends Bundle {
   /** The shading normal, turned against the ray; its largest component has `shadeBits` bits. */
   val normal = Vec3(SInt(formats.narrowBits.W))
 
-  /** `normal` is interpolated from the vertices' normals; otherwise it is the geometric one. */
-  val isSmooth = Bool()
-
-  /** The geometric normal, turned against the ray. */
-  val faceForwardNormal = Vec3(SInt((NumberFormats.normalBits + 1).W))
-
-  /** The ray's direction; its dominant component is ±2^(shadeBits − 1). */
-  val dir = Vec3(SInt((formats.shadeBits + 1).W))
-
-  /** The ray hits the back of the triangle. */
-  val backSide = Bool()
+  val isSmooth          = Bool() // `normal` is interpolated from the vertices' normals; otherwise it is geometric
+  val faceForwardNormal = Vec3(SInt((NumberFormats.normalBits + 1).W)) // the geometric normal, turned against the ray
+  val dir               = Vec3(SInt((formats.shadeBits + 1).W)) // of the ray; dominant component ±2^(shadeBits − 1)
+  val backSide          = Bool() // the ray hits the back of the triangle
 }

@@ -16,8 +16,7 @@ final class ShaderGeometryIO(config: PathConfig) extends Bundle {
   /** Points of the environment; taken when there is no request. */
   val environment = if (config.hasEnvironment) Some(Flipped(Decoupled(new EnvironmentSurface(config)))) else None
 
-  /** `request` is ready in the next cycle. */
-  val readyNext = Output(Bool())
+  val readyNext = Output(Bool()) // `request` is ready in the next cycle
   val lights    = Input(Vec(config.frame.lights, new Light(numbers)))
   val shading   = Input(new Shading(config))
 

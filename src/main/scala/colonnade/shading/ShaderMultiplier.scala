@@ -7,18 +7,13 @@ import colonnade.config.PathConfig
 
 /** Ports of [[ShaderMultiplier]]. */
 final class ShaderMultiplierIO(formats: ShaderFormats, hasCornerColours: Boolean) extends Bundle {
-
-  /** Has priority; never waits. */
-  val geometry = Flipped(Valid(new MultiplierOperands(formats)))
-
-  /** Uses the cycles that the geometry leaves free. */
-  val colour = Flipped(Decoupled(new MultiplierOperands(formats)))
+  val geometry = Flipped(Valid(new MultiplierOperands(formats)))     // has priority; never waits
+  val colour   = Flipped(Decoupled(new MultiplierOperands(formats))) // uses the cycles that the geometry leaves free
 
   /** Uses the cycles that both leave free. */
   val corners = if (hasCornerColours) Some(Flipped(Decoupled(new MultiplierOperands(formats)))) else None
 
-  /** Of the operands of `ShaderMultiplier.latency` cycles before; valid for one cycle. */
-  val product = Output(SInt(formats.productBits.W))
+  val product = Output(SInt(formats.productBits.W)) // of the operands `latency` cycles before; for one cycle
 }
 
 /** The shader's only multiplier; exact products.

@@ -22,9 +22,7 @@ final class EnvironmentSurface(config: PathConfig) extends Bundle {
   val point   = Vec3(new Fixed(new RayFormats(config.numbers).scene))
   val normal  = Vec3(SInt(NumberFormats.normalBits.W))
   val albedo  = Rgb(FrameRegisters.colour)
-
-  /** Send shadow rays. */
-  val shadows = Bool()
+  val shadows = Bool() // send shadow rays
 }
 
 /** A diffuse surface and its direct light, before shadow rays from `origin` have been traced. */
@@ -37,17 +35,14 @@ final class LitSurface(config: PathConfig) extends Bundle {
   val directLight     = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
   val needsShadowRays = Vec(config.frame.lights, Bool())
 
-  /** The light that the surface adds. */
-  val emission = if (config.frame.emission) Some(Rgb(FrameRegisters.colour)) else None
+  val emission = Option.when(config.frame.emission)(Rgb(FrameRegisters.colour)) // the light that the surface adds
 }
 
 /** A ray that leaves a mirror or glass. */
 final class BouncedRay(config: PathConfig) extends Bundle {
-  val bounce = new BounceResult(config)
-  val albedo = Rgb(FrameRegisters.colour)
-
-  /** The path is tinted by the albedo. */
-  val isTinted = Bool()
+  val bounce   = new BounceResult(config)
+  val albedo   = Rgb(FrameRegisters.colour)
+  val isTinted = Bool() // the path is tinted by the albedo
 
   /** Where there may be an environment: the origin of the Fresnel reflection, off the surface on the ray's side. */
   val fresnelOrigin = if (config.hasEnvironment) Some(Vec3(new Fixed(new RayFormats(config.numbers).scene))) else None

@@ -13,13 +13,9 @@ final class ShadingHit(config: PathConfig) extends Bundle {
   val context       = Context(config)
   val material      = UInt(RecordFormats.materialBits.W)
   val isEnvironment = Bool()
-
-  /** Its material is a mirror or glass. */
-  val isBounce = Bool()
-
-  /** Shade with the geometric normal. */
-  val isFlat   = Bool()
-  val backSide = Bool()
+  val isBounce      = Bool() // its material is a mirror or glass
+  val isFlat        = Bool() // shade with the geometric normal
+  val backSide      = Bool()
 
   /** The ray's dominant axis, and whether it goes down there. */
   val axis       = UInt(2.W)
@@ -35,18 +31,13 @@ final class ShadingHit(config: PathConfig) extends Bundle {
   val normals         = Vec(3, Vec3(SInt(NumberFormats.normalBits.W)))
   val geometricNormal = Vec3(SInt(NumberFormats.normalBits.W))
 
-  /** By corner. */
-  val colours = Option.when(config.geometry.cornerColours)(Vec(3, Rgb(FrameRegisters.colour)))
+  val colours = Option.when(config.geometry.cornerColours)(Vec(3, Rgb(FrameRegisters.colour))) // by corner
 }
 
 /** What the end of the [[ShadingPipeline]] has to know of a light on a hit. */
 final class LightSlot(config: PathConfig) extends Bundle {
-  val light  = UInt(log2Ceil(config.frame.lights.max(2)).W)
-  val isLast = Bool()
-
-  /** A shadow ray is needed if the surface faces the light. */
-  val shadows = Bool()
-
-  /** The light is on. */
-  val isOn = Bool()
+  val light   = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val isLast  = Bool()
+  val shadows = Bool() // a shadow ray is needed if the surface faces the light
+  val isOn    = Bool() // the light is on
 }

@@ -117,7 +117,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   }
   private val atColour = latch(cycles.colour - 1)(carry(facing, cycles.colour - 1).at(cycles.colour - 1))
   private val ended    = carry(atColour, cycles.direct).at(cycles.direct)
-  bright.colour                       := entry(io.lights, atColour.at(xyz(cycles.colour)).light).colour
+  bright.colour                       := at(io.lights, atColour.at(xyz(cycles.colour)).light).colour
   assembler.light.valid               := isAt(cycles.direct) && lightAtEnd.at(cycles.direct)
   assembler.light.bits.light          := ended.light
   assembler.light.bits.isLast         := ended.isLast
@@ -221,16 +221,10 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     }
     to
   }
-
-  /** A light's entry; a single light needs no index. */
-  private def entry[T <: Data](entries: Vec[T], index: UInt): T =
-    if (config.frame.lights == 1) entries.head else entries(index)
 }
 
 object ShadingPipeline {
-
-  /** Mirrors and glass between the entry and their unit. */
-  val bouncePlaces: Int = 6
+  val bouncePlaces: Int = 6 // mirrors and glass between the entry and their unit
 
   /** Lights between the entry and the lit surface: what the stages hold and some. */
   private def places(config: PathConfig): Int =

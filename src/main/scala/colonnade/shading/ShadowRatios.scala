@@ -25,11 +25,8 @@ final class ShadowRatiosIO(config: PathConfig, bits: Int) extends Bundle {
   val load  = Flipped(Valid(new ShadowRatioRequest(bits)))
   val whole = Input(UInt(bits.W))
 
-  /** Within 12 cycles after the last channel; its ratio is ignored. */
-  val colour = Flipped(Valid(new PathColour(config)))
-
-  /** The pixel with its ratio; taken in the cycle in which it is offered, or in the next. */
-  val result = Decoupled(new PathColour(config))
+  val colour = Flipped(Valid(new PathColour(config))) // within 12 cycles after the last channel; its ratio is ignored
+  val result = Decoupled(new PathColour(config))      // with its ratio; taken in the cycle of its offer, or in the next
 }
 
 /** Shadow ratios of one pixel at a time, beside the stream of [[ColourUnit]]: three dividers, one quotient bit a cycle
@@ -59,8 +56,7 @@ final class ShadowRatios(config: PathConfig, bits: Int) extends Module {
     val remainder = Reg(UInt(bits.W))
     val ratio     = Reg(UInt((fraction + 1).W))
 
-    /** The ratio is one, and needs no division. */
-    val isOne        = Reg(Bool())
+    val isOne = Reg(Bool()) // the ratio is one, and needs no division
     val (fits, rest) = DigitRecurrence.step((remainder << 1).asUInt, whole, bits)
     when(divides && !isOne) {
       remainder := rest

@@ -13,9 +13,7 @@ final class TexelPosition(layout: TextureLayout) extends Bundle {
 
 /** The colour of a texel. */
 final class Texel extends Bundle {
-
-  /** A word beyond the heap was read as 0. */
-  val isIllegal = Bool()
+  val isIllegal = Bool() // a word beyond the heap was read as 0
   val colour    = new AlbedoEntry
 }
 
@@ -27,9 +25,7 @@ final class TexturePort(config: PathConfig) extends Bundle {
 
 /** Ports of [[TextureLookup]]. */
 final class TextureLookupIO(config: PathConfig) extends Bundle {
-
-  /** A hit enters; the one before must be done, or must not use its texture. */
-  val start = Input(Bool())
+  val start = Input(Bool()) // a hit enters; the one before must be done, or must not use its texture
 
   /** The position is known and the hit uses it; never in the cycle after reset's end, or with `start`'s hit before. */
   val isKnown = Input(Bool())
@@ -38,12 +34,9 @@ final class TextureLookupIO(config: PathConfig) extends Bundle {
   val position = Input(Rgb(FrameRegisters.colour))
   val port     = new TexturePort(config)
 
-  /** `colour` is complete; it holds until the next `start`. */
-  val isDone = Output(Bool())
-  val colour = Output(Rgb(FrameRegisters.colour))
-
-  /** A word beyond the heap was read, for one cycle. */
-  val isIllegal = Output(Bool())
+  val isDone    = Output(Bool()) // `colour` is complete; it holds until the next `start`
+  val colour    = Output(Rgb(FrameRegisters.colour))
+  val isIllegal = Output(Bool()) // a word beyond the heap was read, for one cycle
 }
 
 /** Reads the texel of a hit: the one that its position is in. One hit at a time; latency that of the memory and one cycle.
