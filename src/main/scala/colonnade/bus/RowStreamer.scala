@@ -4,10 +4,7 @@ import chisel3._
 import chisel3.util._
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
-/** A beat of the pixel stream.
-  *
-  * @param busBytes of `data`
-  */
+/** A beat of the pixel stream. */
 final class PixelBeat(busBytes: Int) extends Bundle {
 
   /** Line and column of the first pixel of the packet: y in bits 31 to 16, x in bits 15 to 0. */

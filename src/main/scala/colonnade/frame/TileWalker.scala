@@ -6,7 +6,6 @@ import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
 
-/** Ports of [[TileWalker]]. */
 final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
   val tiles = Flipped(Decoupled(new ObjectTile(config)))
@@ -36,8 +35,6 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   * Throughput: one pixel per cycle, the first one five cycles after its tile is accepted. Of the others
   * [[TileWalker.maxOthers]] wait in a queue, so that they do not hold up those behind them. The next tile is accepted when
   * only the queues and two more pixels are left, so tiles follow each other without a gap, and no column takes tiles early.
-  *
-  * @param config of the column
   */
 final class TileWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new TileWalkerIO(config))

@@ -6,7 +6,6 @@ import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.SceneInDram
 
-/** Ports of [[SceneMemory]]. */
 final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 
@@ -26,14 +25,10 @@ final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
   val events     = Output(new SceneMemoryEvents(config))
 }
 
-/** Events of [[SceneMemory]] in one cycle. */
+/** Events of [[SceneMemory]] in one cycle: lines that are read from DRAM; a read failed. */
 final class SceneMemoryEvents(config: ColonnadeConfig) extends Bundle {
-
-  /** Lines that are read from DRAM. */
   val dramReads = UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)
-
-  /** A read from DRAM failed. */
-  val error = Bool()
+  val error     = Bool()
 }
 
 /** The shared cache, or a [[LineForwarder]] without one, and the DRAM port. A reset of the columns does not reset it: reads

@@ -10,9 +10,7 @@ import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
 final class DirectionMantissas(numbers: NumberFormats) extends Bundle {
 
   /** 0 for a component that is 0; otherwise the top bit is set. */
-  val minor = Vec(2, UInt(numbers.mantissaBits.W))
-
-  /** See [[minor]]. */
+  val minor    = Vec(2, UInt(numbers.mantissaBits.W))
   val dominant = UInt(numbers.mantissaBits.W)
 }
 

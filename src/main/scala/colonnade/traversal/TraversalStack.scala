@@ -15,7 +15,6 @@ final class TraversalStep(config: TraversalConfig) extends Bundle {
   val target = new NodeRef(config)
 }
 
-/** Ports of [[TraversalStack]]. */
 final class TraversalStackIO(config: TraversalConfig) extends Bundle {
 
   /** Clears the stack of a context for a new ray; the context has no operation in flight. */
@@ -145,12 +144,9 @@ class TraversalStack(config: TraversalConfig) extends Module {
   io.overflow := starts && needsPush && isFull
   io.busy := isSecondCycle || isReading || stepQueue.io.deq.valid || pushesDone =/= 0.U
 
-  private def element[T <: Data](all: Vec[T], context: UInt): T =
-    if (contexts == 1) all.head else all(context)
+  private def element[T <: Data](all: Vec[T], context: UInt): T = if (contexts == 1) all.head else all(context)
 }
 
 object TraversalStack {
-
-  /** Queued steps: enough for one operation per cycle. */
-  private val stepQueueDepth: Int = 3
+  private val stepQueueDepth: Int = 3 // queued steps: enough for one operation per cycle
 }

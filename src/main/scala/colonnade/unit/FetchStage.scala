@@ -9,7 +9,6 @@ import colonnade.numbers.Fixed
 import colonnade.ray.{PreparedRay, RayFormats, RayOrientation, TracedRay}
 import colonnade.traversal.TriangleCandidate
 
-/** Ports of [[FetchStage]]. */
 final class FetchStageIO(config: TraversalConfig) extends Bundle {
 
   /** Invalidates all record buffers. */

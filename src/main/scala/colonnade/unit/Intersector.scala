@@ -25,7 +25,6 @@ final class IntersectorEvents(config: TraversalConfig) extends Bundle {
   val illegalRecord     = Bool()
 }
 
-/** Ports of [[Intersector]]. */
 final class IntersectorIO(config: TraversalConfig) extends Bundle {
 
   /** A frame starts. */

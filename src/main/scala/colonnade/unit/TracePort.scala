@@ -27,8 +27,7 @@ final class TracePort(config: PathConfig) extends Bundle {
   val attributeError = Flipped(Valid(Context(config)))
 }
 
-/** What a ray has met, from a traversal unit.
-  */
+/** What a ray has met, from a traversal unit. */
 final class TraceResult(config: PathConfig) extends Bundle {
   val context = Context(config)
   val hasHit  = Bool()

@@ -7,7 +7,6 @@ import colonnade.config.TraversalConfig
 import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
 import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalStack, TraversalStep}
 
-/** Ports of [[Traversal]]. */
 final class TraversalIO(config: TraversalConfig) extends Bundle {
 
   /** Resets `deepest`. */
@@ -41,9 +40,7 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
 /** Decides which record each ray visits next: BoxUnit and TraversalStack, or LinearScan without a BVH. */
 final class Traversal(config: TraversalConfig) extends Module {
   val io = IO(new TraversalIO(config))
-
-  /** Contexts are tokens, so this queue never overflows. */
-  private val resume = Queue(io.resume, config.contexts)
+  private val resume = Queue(io.resume, config.contexts) // contexts are tokens, so this queue never overflows
 
   if (config.geometry.bvh) {
     val boxUnit = Module(new BoxUnit(config))
