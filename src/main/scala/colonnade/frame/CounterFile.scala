@@ -14,10 +14,8 @@ final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
   val dramReads   = config.columnBvhMemory.cache.map(_ => Input(UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)))
   val memoryError = config.columnBvhMemory.cache.map(_ => Input(Bool()))
 
-  /** A frame starts. */
-  val clear = Input(Bool())
-
-  /** Count the events of this cycle. */
+  /** A frame starts; count the events of this cycle. */
+  val clear      = Input(Bool())
   val isCounting = Input(Bool())
 
   val counters = Output(new Counters(config))

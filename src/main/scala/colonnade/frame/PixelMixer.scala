@@ -7,10 +7,8 @@ import colonnade.formats.{PixelPosition, UnitPosition}
 
 final class PixelMixerIO(config: ColonnadeConfig) extends Bundle {
 
-  /** Pixels of a tile that may show the object. */
-  val objects = Flipped(Decoupled(new UnitPosition(config)))
-
-  /** Pixels of a tile that shows the environment only. */
+  /** Pixels of a tile that may show the object, and of one that shows the environment only. */
+  val objects     = Flipped(Decoupled(new UnitPosition(config)))
   val environment = Flipped(Decoupled(new PixelPosition(config)))
   val positions   = Decoupled(new UnitPosition(config))
 

@@ -10,17 +10,13 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
   val tiles = Flipped(Decoupled(new ObjectTile(config)))
 
-  /** Pixels of another tile, which shows the environment only. */
-  val environment = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
-
-  /** A pixel of `environment` has left the column. */
+  /** Pixels of another tile, which shows the environment only; one of them has left the column. */
+  val environment       = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
   val environmentLeaves = Input(Bool())
 
-  /** Pixels to render. */
+  /** Pixels to render, those of the window included. */
   val positions = Decoupled(new UnitPosition(config))
-
-  /** Pixels of this window are rendered, too. */
-  val window = Input(new EnvironmentWindow(config))
+  val window    = Input(new EnvironmentWindow(config))
 
   /** Pixels that show the background. */
   val others = Decoupled(new PixelPosition(config))

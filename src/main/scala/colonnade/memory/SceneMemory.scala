@@ -12,12 +12,10 @@ final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
   /** The scene's page of 4 KB in DRAM; constant while a frame runs. */
   val page = Input(UInt(SceneInDram.pageBits.W))
 
-  /** By column and bank. */
+  /** By column and bank; by bus and bank. */
   val requests = Vec(config.array.columns, Vec(banks, Flipped(Decoupled(UInt(Lines.lineBits(config).W)))))
-
-  /** By bus and bank. */
-  val lines = Output(Vec(SharedCache.buses(config), Vec(banks, new LineBroadcast(config))))
-  val axi   = DramPort(config)
+  val lines    = Output(Vec(SharedCache.buses(config), Vec(banks, new LineBroadcast(config))))
+  val axi      = DramPort(config)
 
   /** Forgets all lines; only while idle. */
   val invalidate = Input(Bool())

@@ -15,11 +15,9 @@ final class ReadLine(config: ColonnadeConfig) extends Bundle {
 
 final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
 
-  /** By column; may be withdrawn. */
+  /** By column, may be withdrawn; by bus. */
   val requests = Vec(config.array.columns, Flipped(Decoupled(UInt(Lines.lineBits(config).W))))
-
-  /** By bus. */
-  val lines = Output(Vec(SharedCache.buses(config), new LineBroadcast(config)))
+  val lines    = Output(Vec(SharedCache.buses(config), new LineBroadcast(config)))
 
   /** Lines to read from DRAM, and the lines that were read, in the same order. A line's records are stable until taken. */
   val reads = Decoupled(UInt(Lines.lineBits(config).W))
@@ -174,9 +172,7 @@ object SharedCache {
   /** Columns that one bus serves: more of them share lines, fewer of them wait less for the bus. */
   private val columnsPerBus = 4
 
-  /** Buses from a bank of the shared cache to the columns. */
-  def buses(config: ColonnadeConfig): Int = (config.array.columns + columnsPerBus - 1) / columnsPerBus
-
-  /** The bus that serves a column. */
+  /** Buses from a bank of the shared cache to the columns; the one that serves a column. */
+  def buses(config: ColonnadeConfig): Int              = (config.array.columns + columnsPerBus - 1) / columnsPerBus
   def busOf(config: ColonnadeConfig, column: Int): Int = column / columnsPerBus
 }

@@ -20,11 +20,9 @@ final class TraversalStackIO(config: TraversalConfig) extends Bundle {
   /** Clears the stack of a context for a new ray; the context has no operation in flight. */
   val start = Flipped(Valid(Context(config)))
 
-  /** The box test of a node; constant while it waits. */
+  /** The box test of a node, constant while it waits; a context that has finished a leaf. */
   val results = Flipped(Decoupled(new BoxResult(config)))
-
-  /** A context that has finished a leaf. */
-  val resume = Flipped(Decoupled(Context(config)))
+  val resume  = Flipped(Decoupled(Context(config)))
 
   /** Of the operation that starts; up to date for an offered operation. */
   val tMax  = new TMaxReader(config)

@@ -138,10 +138,8 @@ final class DistanceRequest(config: PartConfig) extends Bundle {
 final class DistanceTerms(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
-  /** Depth of vertex 0. */
-  val first = new Fixed(formats.grid)
-
-  /** The quotient is subtracted. */
+  /** Depth of vertex 0; the quotient is subtracted from it. */
+  val first      = new Fixed(formats.grid)
   val isNegative = Bool()
   val shiftRight = UInt(formats.shiftBits.W)
   val id         = UInt(RecordFormats.idBits(config).W)

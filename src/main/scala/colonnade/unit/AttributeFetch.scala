@@ -29,10 +29,8 @@ final class AttributeFetchIO(config: PathConfig) extends Bundle {
   /** Never refused; at most one of a context at a time. */
   val hits = Flipped(Valid(new AttributeRequest(config)))
 
-  /** A response is accepted in the next cycle. */
+  /** A response is accepted in the next cycle; the context that gets its attributes then. */
   val readyNext = Input(Bool())
-
-  /** The context that gets its attributes in the next cycle. */
   val grantNext = Output(Valid(Context(config)))
   val response  = Output(Valid(new AttributeResponse(config)))
 

@@ -26,10 +26,8 @@ final class HitTableIO(config: TraversalConfig) extends Bundle {
   /** The ray of `result` has a hit, this result included; for a shadow ray only opaque hits count. */
   val hasHitNow = Output(Bool())
 
-  /** For box unit and stack. */
-  val tMax = Vec(2, Flipped(new TMaxReader(config)))
-
-  /** What the ray of a context has met. */
+  /** For box unit and stack; what the ray of a context has met. */
+  val tMax    = Vec(2, Flipped(new TMaxReader(config)))
   val outcome = Flipped(new HitReader(config))
 }
 

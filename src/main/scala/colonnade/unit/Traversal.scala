@@ -17,11 +17,9 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
   val start = Flipped(Valid(Context(config)))
   val nodes = Flipped(Decoupled(new NodeCandidate(config)))
 
-  /** `nodes` is ready in the next cycle. */
+  /** `nodes` is ready in the next cycle; contexts that have finished a triangle record. */
   val readyNext = Output(Bool())
-
-  /** Contexts that have finished a triangle record. */
-  val resume = Flipped(Decoupled(Context(config)))
+  val resume    = Flipped(Decoupled(Context(config)))
 
   /** Of the context of `nodes`, and of that whose stack is used. */
   val tMax  = Vec(2, new TMaxReader(config))
