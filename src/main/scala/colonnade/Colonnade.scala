@@ -11,7 +11,6 @@ import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, EnvironmentWindow, FrameController}
 import colonnade.memory.{DramPort, SceneMemory, SharedCache}
 
-/** Ports of [[Colonnade]]. */
 final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   val register = new RegisterPort(RegisterFile.addressBits(config))
 
@@ -41,10 +40,8 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   *
   * @param pathTracer makes the path tracer of a column; specs pass another one with the same ports
   */
-final class Colonnade(
-    config:     ColonnadeConfig,
-    pathTracer: ColonnadeConfig => PathTracerModule = new PathTracer(_)
-) extends Module {
+final class Colonnade(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathTracerModule = new PathTracer(_))
+    extends Module {
   val io = IO(new ColonnadeIO(config))
 
   private val registers  = Module(new RegisterFile(config))

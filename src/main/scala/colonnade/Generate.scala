@@ -101,8 +101,7 @@ object Generate {
     private val names = Set("--config", "--set", "--output", "--axi", "--formats-page")
 
     def unapply(arguments: List[String]): Option[(String, String, List[String])] = arguments match {
-      case name :: rest if names(name) =>
-        Some((name, rest.headOption.getOrElse(""), rest.drop(1)))
+      case name :: rest if names(name) => Some((name, rest.headOption.getOrElse(""), rest.drop(1)))
       case joined :: rest if names(joined.takeWhile(_ != '=')) =>
         Some((joined.takeWhile(_ != '='), joined.dropWhile(_ != '=').drop(1), rest))
       case _ => None
@@ -111,9 +110,7 @@ object Generate {
 
   private def path(name: String): Path =
     try Paths.get(name).toAbsolutePath.normalize
-    catch {
-      case error: InvalidPathException => throw new ConfigError(s"'$name' is no path: ${error.getReason}")
-    }
+    catch { case error: InvalidPathException => throw new ConfigError(s"'$name' is no path: ${error.getReason}") }
 
   /** A message for an I/O error; the JDK's own often contain only the file's name. */
   private def reason(error: IOException): String = error match {

@@ -73,11 +73,10 @@ object AxiPins {
   def stream(payload: => Bundle): AxiPins = new AxiPins(AxiChannels(Seq("t" -> payload), Nil), isMaster = true)
 
   /** Of the device as a master that reads. */
-  def reads(idBits: Int, busBytes: Int): AxiPins =
-    new AxiPins(
-      AxiChannels(Seq("ar" -> new AxiAddress(idBits)), Seq("r" -> new AxiReadData(idBits, busBytes))),
-      isMaster = true
-    )
+  def reads(idBits: Int, busBytes: Int): AxiPins = new AxiPins(
+    AxiChannels(Seq("ar" -> new AxiAddress(idBits)), Seq("r" -> new AxiReadData(idBits, busBytes))),
+    isMaster = true
+  )
 
   /** Of the device as a master that reads and writes. */
   def readsAndWrites(idBits: Int, busBytes: Int): AxiPins = new AxiPins(

@@ -80,8 +80,6 @@ final class AxiLiteSlave(addressBits: Int) extends Module {
         response := access.response.bits
       }
     }
-    is(State.responding) {
-      when(axi.b.fire || axi.r.fire) { state := State.idle }
-    }
+    is(State.responding) { when(axi.b.fire || axi.r.fire) { state := State.idle } }
   }
 }

@@ -10,9 +10,7 @@ final class AxiReadGuardIO(idBits: Int, busBytes: Int) extends Bundle {
 
   /** Takes nothing more from the master, and discards the data of its bursts. */
   val abandon = Input(Bool())
-
-  /** No burst is under way. */
-  val isIdle = Output(Bool())
+  val isIdle  = Output(Bool()) // no burst is under way
 }
 
 /** Ends the read bursts of a master that is reset: their data are taken and discarded. See [[AxiWriteGuard]].

@@ -14,15 +14,14 @@ final class AxiWriteGuardIO(idBits: Int, busBytes: Int) extends Bundle {
 
   /** Takes nothing more from the master, and ends its bursts. */
   val abandon = Input(Bool())
-
-  /** No burst is under way. */
-  val isIdle = Output(Bool())
+  val isIdle  = Output(Bool()) // no burst is under way
 }
 
 /** Ends the write bursts of a master that is reset: their remaining beats write no bytes, and their answers are taken.
   *
   * It outlives the reset of the master, so the bus always sees whole bursts, and valid signals that hold. A beat passes in
-  * one cycle. Data are offered from the second cycle after their address on, whether it has been accepted or not. At most [[AxiWriteGuard.maxBursts]] bursts wait for their answers.
+  * one cycle. Data are offered from the second cycle after their address on, whether it has been accepted or not. At most
+  * [[AxiWriteGuard.maxBursts]] bursts wait for their answers.
   */
 final class AxiWriteGuard(idBits: Int, busBytes: Int) extends Module {
   val io = IO(new AxiWriteGuardIO(idBits, busBytes))

@@ -9,17 +9,15 @@ object Interrupts {
   def count: Int = names.size
 }
 
-/** Bits of `framebuffer.errors`. */
+/** Bits of `framebuffer.errors`, bit 0 first. */
 object FramebufferError {
   val names: Seq[String] =
     Seq("window", "response", "alignment", "format", "photoWindow", "photoResponse")
   def count: Int = names.size
 }
 
-/** Errors of a frame's way to memory. */
+/** Errors of a frame's way to memory, bit 0 last. */
 final class FramebufferError extends Bundle {
-
-  /** In the order of [[FramebufferError.names]], bit 0 last. */
   val photoResponse = Bool()
   val photoWindow   = Bool()
   val format        = Bool()
@@ -28,17 +26,15 @@ final class FramebufferError extends Bundle {
   val window        = Bool()
 }
 
-/** Bits of `image.errors`. */
+/** Bits of `image.errors`, bit 0 first. */
 object ImageError {
   val names: Seq[String] =
     Seq("window", "response", "alignment", "magic", "formatHash", "section", "length")
   def count: Int = names.size
 }
 
-/** Why an image was refused. Sticky until the next load starts. */
+/** Why an image was refused, bit 0 last. Sticky until the next load starts. */
 final class ImageError extends Bundle {
-
-  /** In the order of [[ImageError.names]], bit 0 last. */
   val length     = Bool()
   val section    = Bool()
   val formatHash = Bool()

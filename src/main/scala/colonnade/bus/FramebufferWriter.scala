@@ -22,10 +22,8 @@ final class FramebufferWriterIO(config: ColonnadeConfig, shell: ShellConfig) ext
   val pixels   = Vec(config.array.columns, Flipped(Decoupled(new Pixel(config))))
   val axi      = new AxiWritePort(BurstWriter.idBits, shell.busBytes)
 
-  /** With an environment: reads of the photo. */
-  val photo = Option.when(config.hasEnvironment)(new AxiReadPort(BurstWriter.idBits, shell.busBytes))
-
-  /** With a pixel stream: rows of frames that go there. */
+  /** With an environment, reads of the photo; with a pixel stream, rows of frames that go there. */
+  val photo  = Option.when(config.hasEnvironment)(new AxiReadPort(BurstWriter.idBits, shell.busBytes))
   val stream = Option.when(shell.pixelStream)(Decoupled(new PixelBeat(shell.busBytes)))
 
   /** A pulse, while idle. */

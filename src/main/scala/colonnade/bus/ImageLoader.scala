@@ -144,9 +144,7 @@ final class ImageLoader(config: ColonnadeConfig, shell: ShellConfig) extends Mod
         state    := Mux(address + 1.U === count, State.section, State.record)
       }
     }
-    is(State.end) {
-      when(reader.io.isIdle) { state := State.idle }
-    }
+    is(State.end) { when(reader.io.isIdle) { state := State.idle } }
   }
   when(reader.io.isError) { refuse(_.response) }
 

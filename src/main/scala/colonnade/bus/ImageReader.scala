@@ -18,10 +18,8 @@ final class ImageReaderIO(shell: ShellConfig) extends Bundle {
   val words = Decoupled(UInt(32.W))
   val axi   = new AxiReadPort(BurstWriter.idBits, shell.busBytes)
 
-  /** All words have been taken or discarded. */
-  val isIdle = Output(Bool())
-
-  /** A pulse: a read has failed. */
+  /** All words have been taken or discarded; a pulse: a read has failed. */
+  val isIdle  = Output(Bool())
   val isError = Output(Bool())
 }
 

@@ -9,9 +9,8 @@ final class InterruptControllerIO extends Bundle {
   val events = Input(bits)
 
   /** Writes of the host, 0 without one: status bits to clear, status bits to set. */
-  val clear = Input(bits)
-  val test  = Input(bits)
-
+  val clear  = Input(bits)
+  val test   = Input(bits)
   val enable = Input(bits)
   val status = Output(bits)
 

@@ -13,12 +13,10 @@ final class PhotoCompositorIO(config: ColonnadeConfig, shell: ShellConfig) exten
   val out      = Decoupled(new TileRow(config))
   val axi      = new AxiReadPort(BurstWriter.idBits, shell.busBytes)
 
-  /** A pulse: a row of the photo lies outside its window; its pixels are dropped. */
+  /** Pulses: a row of the photo lies outside its window, and its pixels are dropped; a read has failed. */
   val isOutside = Output(Bool())
-
-  /** A pulse: a read has failed. */
-  val isError = Output(Bool())
-  val isIdle  = Output(Bool())
+  val isError   = Output(Bool())
+  val isIdle    = Output(Bool())
 }
 
 /** Puts the camera's photo, darkened by the shadow ratios, into the pixels of a row that do not show the object.

@@ -60,9 +60,7 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
     tags(index)  := tagOf(pixel)
     masks(index) := Mux(isHit, masks(index), 0.U) | column
   }
-  when(joins.orR) {
-    data.write(OHToUInt(joins), VecInit.fill(config.frame.tileSize)(pixel.data), column.asBools)
-  }
+  when(joins.orR) { data.write(OHToUInt(joins), VecInit.fill(config.frame.tileSize)(pixel.data), column.asBools) }
 
   // A row leaves. It is chosen in the cycle before: no other one leaves then
   private val isReading = RegInit(false.B)

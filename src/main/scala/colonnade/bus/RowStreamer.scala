@@ -4,19 +4,14 @@ import chisel3._
 import chisel3.util._
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
-/** A beat of the pixel stream.
-  *
-  * @param busBytes of `data`
-  */
+/** A beat of the pixel stream. */
 final class PixelBeat(busBytes: Int) extends Bundle {
 
   /** Line and column of the first pixel of the packet: y in bits 31 to 16, x in bits 15 to 0. */
   val user = UInt(32.W)
 
-  /** The last beat of a packet, which is a row of a tile. */
+  /** The last beat of a packet, which is a row of a tile; the bytes that are there. */
   val last = Bool()
-
-  /** Bytes that are there. */
   val keep = UInt(busBytes.W)
   val data = UInt((8 * busBytes).W)
 }

@@ -11,15 +11,12 @@ final class ShellControlIO extends Bundle {
 
   /** The device has all of its registers. */
   val writesAreDone = Input(Bool())
+  val status        = Output(new ShellStatus)
+  val events        = Output(UInt(Interrupts.count.W))
 
-  val status = Output(new ShellStatus)
-  val events = Output(UInt(Interrupts.count.W))
-
-  /** Of the frame that runs: constant until its end. */
+  /** Of the frame that runs, constant until its end; of the last frame that has ended. */
   val framebuffer = Output(new FramebufferSettings)
-
-  /** Of the last frame that has ended. */
-  val errors = Output(new FramebufferError)
+  val errors      = Output(new FramebufferError)
 
   /** A pulse: a frame begins or is refused, and the writer forgets the errors of the last one. */
   val clearErrors = Output(Bool())
@@ -27,8 +24,7 @@ final class ShellControlIO extends Bundle {
   /** A pulse: the device starts a frame. `deviceDone` is low in the next cycle. */
   val start      = Output(Bool())
   val deviceDone = Input(Bool())
-
-  val flush = Output(Bool())
+  val flush      = Output(Bool())
 
   /** All rows are written, and all writes answered. */
   val writerIsIdle = Input(Bool())
@@ -39,10 +35,8 @@ final class ShellControlIO extends Bundle {
   val loaderIsIdle = Input(Bool())
   val loadError    = Input(Bool())
 
-  /** Resets the device, the writer and the loader, and abandons their bursts, until the bus is idle. */
-  val reset = Output(Bool())
-
-  /** `reset` in the next cycle. */
+  /** Resets the device, the writer and the loader, and abandons their bursts, until the bus is idle; the same a cycle early. */
+  val reset     = Output(Bool())
   val resetNext = Output(Bool())
   val busIsIdle = Input(Bool())
 }
@@ -94,18 +88,10 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
         takes    := true.B
       }.elsewhen(io.commands.load) { state := State.loading }
     }
-    is(State.begin) {
-      state := Mux(io.start, State.running, State.idle)
-    }
-    is(State.running) {
-      when(io.deviceDone) { state := State.flushing }
-    }
-    is(State.flushing) {
-      when(frameDone) { state := State.idle }
-    }
-    is(State.loading) {
-      when(loadDone) { state := State.idle }
-    }
+    is(State.begin) { state := Mux(io.start, State.running, State.idle) }
+    is(State.running) { when(io.deviceDone) { state := State.flushing } }
+    is(State.flushing) { when(frameDone) { state := State.idle } }
+    is(State.loading) { when(loadDone) { state := State.idle } }
     is(State.resetting) {
       when(resets =/= 0.U) { resets := resets - 1.U }
         .elsewhen(io.busIsIdle) { state := State.idle }
@@ -126,9 +112,7 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
   errors.window        := !begins && io.writerErrors.window
   errors.photoResponse := !begins && io.writerErrors.photoResponse
   errors.photoWindow   := !begins && io.writerErrors.photoWindow
-  when(io.commands.reset) {
-    lastFrame := 0.U.asTypeOf(errors)
-  }.elsewhen(frameDone) { lastFrame := errors }
+  when(io.commands.reset) { lastFrame := 0.U.asTypeOf(errors) }.elsewhen(frameDone) { lastFrame := errors }
 
   io.start              := begins && isLegal && isAligned
   io.clearErrors        := begins
@@ -148,7 +132,5 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
 }
 
 object ShellControl {
-
-  /** Shortest soft reset. */
-  val resetCycles: Int = 8
+  val resetCycles: Int = 8 // of the shortest soft reset
 }

@@ -14,20 +14,14 @@ final class ShellCommands extends Bundle {
   val start = Bool()
 }
 
-/** The state of the shell, in the order of `status`, bit 0 last. */
+/** The state of the shell, in the order of `status`, bit 0 last: it is in a soft reset, loads an image, has a frame that
+  * waits for the end of the running one, runs a frame.
+  */
 final class ShellStatus extends Bundle {
-
-  /** The shell is in a soft reset. */
   val isResetting = Bool()
-
-  /** An image is being loaded. */
-  val isLoading = Bool()
-
-  /** A frame waits for the end of the running one. */
-  val isQueued = Bool()
-
-  /** A frame runs. */
-  val isRunning = Bool()
+  val isLoading   = Bool()
+  val isQueued    = Bool()
+  val isRunning   = Bool()
 }
 
 /** A write to a register of the device. */
@@ -125,9 +119,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private val isWritable                               = writable.toMap
   private def written(name:     String, word: Int = 0) = writes && isWritable((name, word))
   private def writtenBits(name: String, bits: Int)     = Mux(written(name), request.data(bits - 1, 0), 0.U)
-  for ((name, words) <- values; (word, index) <- words.zipWithIndex) when(written(name, index)) {
-    word := request.data
-  }
+  for ((name, words) <- values; (word, index) <- words.zipWithIndex) when(written(name, index)) { word := request.data }
 
   // Before the answer
   io.commands := RegNext(writtenBits("control", 3), 0.U).asTypeOf(io.commands)

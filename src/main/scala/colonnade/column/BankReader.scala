@@ -8,7 +8,6 @@ import colonnade.formats.{Banks, RecordBroadcast, RecordRequest}
 import colonnade.frame.ColumnBvhEvents
 import colonnade.memory.BankPort
 
-/** Ports of [[BankReader]]. */
 final class BankReaderIO(config: ColonnadeConfig) extends Bundle {
 
   /** By row; ready only where valid is set. */

@@ -18,18 +18,15 @@ import colonnade.frame.{
 }
 import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
 
-/** Ports of [[Column]]. */
 final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 
   /** Constant while a frame runs. */
   val registers = Input(new FrameRegisters(config))
 
-  /** A frame starts; precedes its first tile. */
+  /** A frame starts, before its first tile. A load comes only while idle. */
   val start = Input(Bool())
-
-  /** Only while idle. */
-  val load = Flipped(Valid(new Load(config)))
+  val load  = Flipped(Valid(new Load(config)))
 
   /** See [[colonnade.memory.ColumnBvhMemoryIO]]. */
   val holds = if (config.columnBvhMemory.holdable) Some(Input(UInt(config.columnBvhMemory.banks.W))) else None
@@ -62,10 +59,8 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   * @param pathTracer makes the path tracer; specs pass another one with the same ports
   */
 @instantiable
-final class Column(
-    config:     ColonnadeConfig,
-    pathTracer: ColonnadeConfig => PathTracerModule = new PathTracer(_)
-) extends Module {
+final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathTracerModule = new PathTracer(_))
+    extends Module {
   @public val io = IO(new ColumnIO(config))
 
   private val hasCache   = config.columnBvhMemory.cache.nonEmpty

@@ -7,7 +7,6 @@ import colonnade.formats.{Banks, RecordBroadcast, RecordRequest}
 import colonnade.frame.ColumnBvhEvents
 import colonnade.memory.BankPort
 
-/** Ports of [[ColumnBvhController]]. */
 final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 

@@ -20,7 +20,7 @@ final class PathTracerEvents(config: ColonnadeConfig) extends Bundle {
   def parts: Seq[Bundle] = traversal.flatMap(unit => Seq(unit.intersector, unit.fetch)) ++ Seq(paths, attributes)
 }
 
-/** Ports of a [[PathTracer]]. `registers` is constant while a frame runs; `start` precedes the first position. */
+/** `registers` is constant while a frame runs; `start` precedes the first position. */
 final class PathTracerIO(config: ColonnadeConfig) extends Bundle {
   val registers = Input(new FrameRegisters(config))
   val start     = Input(Bool())
@@ -33,18 +33,14 @@ final class PathTracerIO(config: ColonnadeConfig) extends Bundle {
   val requests   = Vec(config.recordRequesters, Decoupled(new RecordRequest(config)))
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
 
-  /** To the marches of the environment. */
+  /** To the marches of the environment, and to the textures. */
   val marches = Option.when(config.hasEnvironment)(new MarchPort(PathConfig(config)))
-
-  /** To the textures. */
   val texture = config.geometry.texture.map(_ => new TexturePort(PathConfig(config)))
 
-  /** A pixel of a tile of the environment leaves. */
+  /** A pixel of a tile of the environment leaves; no pixel is in flight, and no request waits. */
   val environmentLeaves = Output(Bool())
-
-  /** No pixel is in flight, and no request waits. */
-  val isIdle = Output(Bool())
-  val events = Output(new PathTracerEvents(config))
+  val isIdle            = Output(Bool())
+  val events            = Output(new PathTracerEvents(config))
 }
 
 /** A module with the ports of a path tracer: [[PathTracer]], or what specs put in its place. */
@@ -52,13 +48,7 @@ abstract class PathTracerModule(config: ColonnadeConfig) extends Module {
   final val io: PathTracerIO = IO(new PathTracerIO(config))
 }
 
-/** Turns pixel positions into pixels: a path unit, and the traversal units that trace its rays: docs/path-tracer.md. {{{
-  * positions ─▶ PathUnit ─ rays ─▶ PathHits ─▶ RayBus ─▶ TraversalUnit ×rows ◀─▶ records
-  *    pixels ◀─┘    ▲               │  ▲  ▲                  │    ▲
-  *                  └─── hits ◀─────┘  │  └── ResultBus ◀────┘    └─▶ TriangleGroup
-  *                                     └─▶ records (attributes)
-  * }}}
-  */
+/** Turns pixel positions into pixels: a path unit, and the traversal units that trace its rays: docs/path-tracer.md. */
 final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config) {
   private val pathConfig = PathConfig(config)
 

@@ -6,7 +6,6 @@ import colonnade.common.RoundRobin
 import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.ray.PreparedRay
 
-/** Ports of [[RayBus]]. */
 final class RayBusIO(config: ColonnadeConfig) extends Bundle {
   val rays = Flipped(Decoupled(new PreparedRay(PathConfig(config))))
 

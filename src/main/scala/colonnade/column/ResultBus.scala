@@ -6,7 +6,6 @@ import colonnade.common.RoundRobin
 import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.unit.TraceResult
 
-/** Ports of [[ResultBus]]. */
 final class ResultBusIO(config: ColonnadeConfig) extends Bundle {
 
   /** By row. */

@@ -5,7 +5,6 @@ import chisel3.util.{log2Ceil, Cat, Mux1H, OHToUInt, Queue}
 import colonnade.config.{ColonnadeConfig, TraversalConfig, TriangleGroupConfig}
 import colonnade.traversal.{TriangleCandidate, TriangleLanes, TriangleLanesIO}
 
-/** Ports of [[TriangleGroup]]. */
 final class TriangleGroupIO(config: ColonnadeConfig, count: Int) extends Bundle {
 
   /** By row. `busy` of the first row counts for all. */
@@ -15,12 +14,9 @@ final class TriangleGroupIO(config: ColonnadeConfig, count: Int) extends Bundle 
   val waits = Input(Vec(count, Bool()))
 }
 
-/** Triangle units of a group of rows: docs/triangle.md. {{{
-  * rows ─ candidate, row ─▶ queue ─▶ TriangleLanes ─ result, row ─▶ register ─▶ rows
-  * }}}
-  * A row is chosen one cycle before it may grant a record to a context, so a record takes three cycles more than in a group
-  * of one row, and its results one. Throughput: a record and a result per cycle. A row that keeps waiting is one of the
-  * next `count` chosen. With `units.triangleRows` 1 the row has the units for itself, and the group is wires.
+/** Triangle units of a group of rows: docs/triangle.md, triangle groups. A row is chosen one cycle before it may grant a
+  * record to a context, so a record takes three cycles more than in a group of one row, and its results one. Throughput: a
+  * record and a result per cycle. A row that keeps waiting is one of the next `count` chosen.
   *
   * @param count rows
   */

@@ -12,9 +12,7 @@ object ConfigIO {
 
   /** The names of the presets: the files of `configs`. */
   lazy val presets: Seq[String] = resource("names").linesIterator.toSeq
-
-  /** Maximum size of a configuration file. */
-  private val maxBytes = 1 << 20
+  private val maxBytes = 1 << 20 // maximum size of a configuration file
 
   /** The configuration of a preset's name, of a file, or of a precision such as `16b16s32d`: `small` with that precision
     * and with triangle tests as wide as `precision.mac`.

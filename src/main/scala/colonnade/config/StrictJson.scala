@@ -6,10 +6,8 @@ import upickle.core.{ObjVisitor, Visitor}
 /** Reads JSON without its traps: an object with a key twice, deep nesting and overlong numbers are refused. */
 private[config] object StrictJson {
 
-  /** Nested arrays and objects. */
-  val maxDepth: Int = 64
-
-  /** Characters of a number. */
+  /** Nested arrays and objects; characters of a number. */
+  val maxDepth:  Int = 64
   val maxDigits: Int = 40
 
   /** @param source for messages

@@ -28,11 +28,11 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
   /** Number of bounding planes, clamped to the size of their table. */
   val boundingPlanes = UInt(8.W)
 
-  /** Rays that miss the object meet the environment; otherwise they have the background's colour. */
+  /** Rays that miss the object meet the environment; otherwise they have the background's colour. Only the pixels of
+    * `window` show it directly; other background pixels have the background's colour and ratio 1.
+    */
   val enabled = Bool()
-
-  /** The pixels that show the environment directly. Other background pixels have the background's colour and ratio 1. */
-  val window = new PixelRect(numbers.coordinateBits)
+  val window  = new PixelRect(numbers.coordinateBits)
 
   /** The environment hides the object where its point is nearer by more than the tolerance, in grid steps along the ray's
     * dominant axis.

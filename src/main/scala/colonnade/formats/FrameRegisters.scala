@@ -111,10 +111,8 @@ final class SceneInDram extends Bundle {
 object SceneLines {
   val records: Int = SceneCacheConfig.lineRecords
 
-  /** Bytes of a line. */
+  /** Bytes of a line; distance of consecutive lines in bytes. */
   def bytes(config: ColonnadeConfig): Int = records * new RecordFormats(config).recordBits / 8
-
-  /** Distance of consecutive lines in bytes. */
   def pitch(config: ColonnadeConfig): Int = 1 << log2Ceil(bytes(config))
 }
 
@@ -166,11 +164,9 @@ object FrameRegisters {
   /** A light's intensity in one channel. */
   def intensity: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightBits, NumberFormats.lightFraction))
 
-  /** A weight from 0 to 1: 2^fraction is 1. */
+  /** A weight from 0 to 1: 2^fraction is 1; the weight 1. */
   def weight: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightFraction + 1, NumberFormats.lightFraction))
-
-  /** The weight 1. */
-  def one: Fixed = Fixed.literal(weight.format, BigInt(1) << NumberFormats.lightFraction)
+  def one:    Fixed = Fixed.literal(weight.format, BigInt(1) << NumberFormats.lightFraction)
 
   /** A linear colour channel; all ones is 1.0. */
   def colour: UInt = UInt(NumberFormats.colourBits.W)
@@ -278,9 +274,7 @@ final class DeviceStatus(config: ColonnadeConfig) extends Bundle {
 /** The registers that the host pulses. A new one comes last. */
 final class Control(config: ColonnadeConfig) extends Bundle {
 
-  /** A write of 1 starts a frame. */
-  val start = Bool()
-
-  /** A write of 1 makes the caches forget the scene. */
+  /** A write of 1 starts a frame; makes the caches forget the scene. */
+  val start      = Bool()
   val invalidate = config.columnBvhMemory.cache.map(_ => Bool())
 }

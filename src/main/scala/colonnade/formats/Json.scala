@@ -13,8 +13,7 @@ object Json {
       value match {
         case flat if children(flat).forall(children(_).isEmpty) => oneLine(flat)
         case ujson.Obj(fields)                                  =>
-          fields
-            .map { case (key, field) => s"$inner${ujson.Str(key).render()}: ${render(field, inner)}" }
+          fields.map { case (key, field) => s"$inner${ujson.Str(key).render()}: ${render(field, inner)}" }
             .mkString("{\n", ",\n", s"\n$indent}")
         case list => list.arr.map(inner + render(_, inner)).mkString("[\n", ",\n", s"\n$indent]")
       }

@@ -12,9 +12,7 @@ class PixelPosition(config: ColonnadeConfig) extends Bundle {
 /** A pixel to render in a render unit. */
 final class UnitPosition(config: ColonnadeConfig) extends PixelPosition(config) {
 
-  /** Its primary ray may hit the object; always so without an environment. */
-  val meetsObject = if (config.hasEnvironment) Some(Bool()) else None
-
-  /** It is of a tile that may show the object, and not of one that only shows the environment. */
+  /** With an environment: its primary ray may hit the object; it is of a tile that may show the object. */
+  val meetsObject  = if (config.hasEnvironment) Some(Bool()) else None
   val inObjectTile = if (config.hasEnvironment) Some(Bool()) else None
 }

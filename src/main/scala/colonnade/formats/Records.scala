@@ -9,12 +9,9 @@ import colonnade.numbers.{Fixed, FixedPointFormat}
 object ChildKind {
   val bits = 2
 
-  def empty: UInt = 0.U(bits.W)
-
-  def node: UInt = 1.U(bits.W)
-
-  def leaf: UInt = 2.U(bits.W)
-
+  def empty:   UInt = 0.U(bits.W)
+  def node:    UInt = 1.U(bits.W)
+  def leaf:    UInt = 2.U(bits.W)
   def illegal: UInt = 3.U(bits.W)
 }
 
@@ -89,9 +86,7 @@ final class Face(config: ColonnadeConfig) extends Bundle {
   val material = UInt(RecordFormats.materialBits.W)
 }
 
-/** Faces in the order of packed ids: face t lies in record `attributeBase + t / facesPerRecord`, slot
-  * `t % facesPerRecord`.
-  */
+/** Faces in the order of packed ids: face t is in record `attributeBase + t / facesPerRecord`, slot `t % facesPerRecord`. */
 final class AttributesRecord(config: ColonnadeConfig) extends Bundle {
   val faces = Vec(RecordFormats.facesPerRecord(config), new Face(config))
 }
@@ -105,10 +100,8 @@ final class RecordFormats(config: ColonnadeConfig) {
   /** Width of a number of records, and of a packed triangle id. */
   val idBits: Int = RecordFormats.idBits(config)
 
-  def node: NodeRecord = new NodeRecord(config)
-
-  def triangles: TrianglesRecord = new TrianglesRecord(config)
-
+  def node:       NodeRecord       = new NodeRecord(config)
+  def triangles:  TrianglesRecord  = new TrianglesRecord(config)
   def attributes: AttributesRecord = new AttributesRecord(config)
 
   /** The widest kind, rounded up to whole 32-bit words. */
@@ -117,10 +110,8 @@ final class RecordFormats(config: ColonnadeConfig) {
   /** A record in memory. */
   def record: UInt = UInt(recordBits.W)
 
-  def asNode(record: UInt): NodeRecord = as(record, node)
-
-  def asTriangles(record: UInt): TrianglesRecord = as(record, triangles)
-
+  def asNode(record:       UInt): NodeRecord       = as(record, node)
+  def asTriangles(record:  UInt): TrianglesRecord  = as(record, triangles)
   def asAttributes(record: UInt): AttributesRecord = as(record, attributes)
 
   private def as[T <: Data](record: UInt, kind: T): T = record(kind.getWidth - 1, 0).asTypeOf(kind)
@@ -136,8 +127,7 @@ object RecordFormats {
   def faceSlotBits(config:   ColonnadeConfig): Int = log2Ceil(facesPerRecord(config))
 
   def addressBits(config: ColonnadeConfig): Int = log2Ceil(config.columnBvhMemory.depth)
-
-  def idBits(config: ColonnadeConfig): Int = addressBits(config) + 1
+  def idBits(config:      ColonnadeConfig): Int = addressBits(config) + 1
 
   /** The largest exponent lets a box coordinate reach across the cube. */
   def exponentBits(config: ColonnadeConfig): Int = NumberFormats.bitLength(config.numbers.maxExponent)

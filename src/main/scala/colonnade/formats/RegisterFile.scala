@@ -22,10 +22,8 @@ final class RegisterFileIO(config: ColonnadeConfig) extends Bundle {
   val frame    = Output(new FrameRegisters(config))
   val device   = Input(new DeviceStatus(config))
 
-  /** A pulse: a frame starts. */
-  val start = Output(Bool())
-
-  /** A pulse: caches forget the scene. */
+  /** Pulses: a frame starts; caches forget the scene. */
+  val start      = Output(Bool())
   val invalidate = if (config.columnBvhMemory.cache.nonEmpty) Some(Output(Bool())) else None
 }
 

@@ -12,9 +12,7 @@ final class PixelHit(config: ColonnadeConfig) extends Bundle {
   val triangle = UInt(RecordFormats.idBits(config).W)
 
   /** Distance from the camera along the ray's dominant axis, in grid steps: the entry distance plus t. */
-  val distance = new Fixed(
-    FixedPointFormat.unsigned(config.numbers.sceneBits + 1, config.numbers.gridFraction)
-  )
+  val distance = new Fixed(FixedPointFormat.unsigned(config.numbers.sceneBits + 1, config.numbers.gridFraction))
 }
 
 /** A finished pixel. */

@@ -20,10 +20,8 @@ final class Light(numbers: NumberFormats) extends Bundle {
 final class Shading(config: ColonnadeConfig) extends Record {
   private def ifBounces[T](field: => T): Option[T] = if (config.frame.hasBounces) Some(field) else None
 
-  /** Shade with geometric normals instead of vertex normals. */
-  val flat = Bool()
-
-  /** Send shadow rays. */
+  /** Shade with geometric normals instead of vertex normals; send shadow rays. */
+  val flat    = Bool()
   val shadows = Bool()
 
   /** Number of lights that are on, from the first one. */
@@ -50,8 +48,7 @@ object MaterialKind {
 
   /** Lambertian reflection of the lights. */
   def diffuse: UInt = 0.U(bits.W)
-
-  def mirror: UInt = 1.U(bits.W)
+  def mirror:  UInt = 1.U(bits.W)
 
   /** Refracts, and reflects by Schlick's approximation. */
   def glass: UInt = last.U(bits.W)

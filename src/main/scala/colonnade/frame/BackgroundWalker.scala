@@ -6,7 +6,6 @@ import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameRegisters, FrameSettings, Pixel, PixelHit, PixelPosition, Rgb}
 
-/** Ports of [[BackgroundWalker]]. */
 final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame  = Input(new FrameSettings(config.numbers))
   val colour = Input(Rgb(FrameRegisters.colour))

@@ -5,7 +5,6 @@ import chisel3.util.{log2Ceil, ShiftRegister}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Counters
 
-/** Ports of [[CounterFile]]. */
 final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
 
   /** By column, delayed by one cycle. */
@@ -15,10 +14,8 @@ final class CounterFileIO(config: ColonnadeConfig) extends Bundle {
   val dramReads   = config.columnBvhMemory.cache.map(_ => Input(UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)))
   val memoryError = config.columnBvhMemory.cache.map(_ => Input(Bool()))
 
-  /** A frame starts. */
-  val clear = Input(Bool())
-
-  /** Count the events of this cycle. */
+  /** A frame starts; count the events of this cycle. */
+  val clear      = Input(Bool())
   val isCounting = Input(Bool())
 
   val counters = Output(new Counters(config))
@@ -57,9 +54,7 @@ final class CounterFile(config: ColonnadeConfig) extends Module {
     illegal  := false.B
   }.otherwise {
     when(io.isCounting) { counters.cycles := counters.cycles + 1.U }
-    when(countsEvents) {
-      for ((name, sum) <- sums) { held(name) := held(name).asUInt + sum.asUInt }
-    }
+    when(countsEvents) { for ((name, sum) <- sums) { held(name) := held(name).asUInt + sum.asUInt } }
     when(countsLevels && events.deepestStack > counters.deepestStack) { counters.deepestStack := events.deepestStack }
     when(countsEvents || countsLevels) {
       overflow := overflow || events.stackOverflow
@@ -83,12 +78,8 @@ final class CounterFile(config: ColonnadeConfig) extends Module {
 }
 
 object CounterFile {
-
-  /** Pipeline registers of the sums of events. */
-  private val eventStages = 2
-
-  /** Cycles by which a unit's levels may lag behind its events. */
-  private val levelStages = 2
+  private val eventStages = 2 // pipeline registers of the sums of events
+  private val levelStages = 2 // cycles by which a unit's levels may lag behind its events
 
   private val levels = Set("deepestStack", "stackOverflow", "illegalRecord")
 

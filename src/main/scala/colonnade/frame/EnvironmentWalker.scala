@@ -6,17 +6,14 @@ import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition}
 
-/** Ports of [[EnvironmentWalker]]. */
 final class EnvironmentWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame  = Input(new FrameSettings(config.numbers))
   val window = Input(new EnvironmentWindow(config))
   val tiles  = Flipped(Decoupled(new Tile(config)))
 
-  /** Pixels that show the environment. */
+  /** Pixels that show the environment, and those that show the background. */
   val positions = Decoupled(new PixelPosition(config))
-
-  /** Pixels that show the background. */
-  val others = Decoupled(new PixelPosition(config))
+  val others    = Decoupled(new PixelPosition(config))
 
   /** No pixel of a tile is left. */
   val isIdle = Output(Bool())

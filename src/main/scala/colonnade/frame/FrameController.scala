@@ -10,30 +10,21 @@ final class ColumnProgress extends Bundle {
 
   /** Every pixel of the accepted tiles has retired, including the one that retires in this cycle. */
   val isDrained = Bool()
-
-  /** The column is idle. */
-  val isIdle = Bool()
+  val isIdle    = Bool()
 }
 
-/** The state of the pixel streams in a cycle. */
+/** The state of the pixel streams in a cycle: a pixel leaves the device; a pixel waits for the sink. */
 final class PixelTraffic extends Bundle {
-
-  /** A pixel leaves the device. */
   val retires = Bool()
-
-  /** A pixel waits for the sink. */
-  val stalls = Bool()
+  val stalls  = Bool()
 }
 
-/** Ports of [[FrameController]]. */
 final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   private val columns = config.array.columns
 
   /** Starts a frame; ignored while one runs. */
-  val start = Input(Bool())
-  val frame = Input(new FrameSettings(config.numbers))
-
-  /** Where pixels show the environment. */
+  val start  = Input(Bool())
+  val frame  = Input(new FrameSettings(config.numbers))
   val window = Input(new EnvironmentWindow(config))
 
   /** By column. Valid only where ready is set, see `Dispatcher`. */
@@ -98,16 +89,10 @@ final class FrameController(config: ColonnadeConfig) extends Module {
         error := false.B
       }
     }
-    is(State.draining) {
-      when(io.memoryIsIdle) { state := State.running }
-    }
+    is(State.draining) { when(io.memoryIsIdle) { state := State.running } }
     is(State.running) {
       settling := settleCycles.U
-      when(isFinished) {
-        state := State.settling
-      }.elsewhen(watchdog.io.isExpired) {
-        state := State.aborting
-      }
+      when(isFinished) { state := State.settling }.elsewhen(watchdog.io.isExpired) { state := State.aborting }
     }
     is(State.aborting) {
       state := State.settling
@@ -118,9 +103,7 @@ final class FrameController(config: ColonnadeConfig) extends Module {
       when(isSettled && io.memoryIsIdle) {
         state := State.waiting
         done  := true.B
-      }.elsewhen(watchdog.io.isExpired) {
-        state := State.aborting
-      }
+      }.elsewhen(watchdog.io.isExpired) { state := State.aborting }
     }
   }
   when(io.memoryTimeout) {

@@ -14,7 +14,6 @@ final class GridCell(levels: Int) extends Bundle {
   val y = UInt(levels.W)
 }
 
-/** Ports of [[MortonScan]]. */
 final class MortonScanIO(levels: Int) extends Bundle {
   val size  = Flipped(Decoupled(new GridSize(levels)))
   val cells = Decoupled(new GridCell(levels))

@@ -48,7 +48,6 @@ private[frame] final class TwoStages(in: DecoupledIO[Data], out: DecoupledIO[Dat
   out.valid := isInSecond
 }
 
-/** Ports of [[OutlineTest]]. */
 final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
   val frame  = Input(new FrameSettings(config.numbers))
   val window = Input(new EnvironmentWindow(config))

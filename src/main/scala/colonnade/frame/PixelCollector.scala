@@ -6,7 +6,6 @@ import colonnade.common.RoundRobin
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Pixel
 
-/** Ports of [[PixelCollector]]. */
 final class PixelCollectorIO(config: ColonnadeConfig, count: Int) extends Bundle {
   val sources = Vec(count, Flipped(Decoupled(new Pixel(config))))
   val pixels  = Decoupled(new Pixel(config))

@@ -5,13 +5,10 @@ import chisel3.util.{log2Ceil, Decoupled}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{PixelPosition, UnitPosition}
 
-/** Ports of [[PixelMixer]]. */
 final class PixelMixerIO(config: ColonnadeConfig) extends Bundle {
 
-  /** Pixels of a tile that may show the object. */
-  val objects = Flipped(Decoupled(new UnitPosition(config)))
-
-  /** Pixels of a tile that shows the environment only. */
+  /** Pixels of a tile that may show the object, and of one that shows the environment only. */
+  val objects     = Flipped(Decoupled(new UnitPosition(config)))
   val environment = Flipped(Decoupled(new PixelPosition(config)))
   val positions   = Decoupled(new UnitPosition(config))
 
@@ -22,8 +19,7 @@ final class PixelMixerIO(config: ColonnadeConfig) extends Bundle {
 /** Mixes the pixels of two tiles: those of the environment use units that those of the object leave idle, and the other
   * way round. Combinational, one pixel per cycle.
   *
-  * @param maxEnvironment
-  *   pixels of the environment go first while fewer of them are in flight, and wait otherwise
+  * @param maxEnvironment pixels of the environment go first while fewer of them are in flight, and wait otherwise
   */
 final class PixelMixer(config: ColonnadeConfig, maxEnvironment: Int) extends Module {
   val io = IO(new PixelMixerIO(config))

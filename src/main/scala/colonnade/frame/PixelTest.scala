@@ -5,7 +5,6 @@ import chisel3.util.{Decoupled, RegEnable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition}
 
-/** Ports of [[PixelTest]]. */
 final class PixelTestIO(config: ColonnadeConfig) extends Bundle {
   val frame  = Input(new FrameSettings(config.numbers))
   val window = Input(new EnvironmentWindow(config))

@@ -30,15 +30,9 @@ object Tile {
 
 /** What the pixels of a tile may show. */
 object TileKind extends Enumeration {
-
-  /** The object in some pixel. */
-  val OfObject = Value
-
-  /** The environment in some pixel, the object in none. */
-  val OfEnvironment = Value
-
-  /** The background only. */
-  val OfBackground = Value
+  val OfObject      = Value // the object in some pixel
+  val OfEnvironment = Value // the environment in some pixel, the object in none
+  val OfBackground  = Value // the background only
 
   /** Those of a device. */
   def all(config: ColonnadeConfig): Seq[TileKind.Value] =

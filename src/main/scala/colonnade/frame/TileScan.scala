@@ -5,7 +5,6 @@ import chisel3.util.{Decoupled, RegEnable}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition}
 
-/** Ports of [[TileScan]]. */
 final class TileScanIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 

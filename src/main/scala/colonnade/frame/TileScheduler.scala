@@ -6,11 +6,8 @@ import colonnade.common.Dispatcher
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.FrameSettings
 
-/** Ports of [[TileScheduler]]. */
 final class TileSchedulerIO(config: ColonnadeConfig, kind: TileKind.Value) extends Bundle {
-  val frame = Input(new FrameSettings(config.numbers))
-
-  /** Where pixels show the environment. */
+  val frame  = Input(new FrameSettings(config.numbers))
   val window = Input(new EnvironmentWindow(config))
 
   /** Starts the tiles of a frame; only while idle. */

@@ -6,22 +6,17 @@ import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
 
-/** Ports of [[TileWalker]]. */
 final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
   val tiles = Flipped(Decoupled(new ObjectTile(config)))
 
-  /** Pixels of another tile, which shows the environment only. */
-  val environment = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
-
-  /** A pixel of `environment` has left the column. */
+  /** Pixels of another tile, which shows the environment only; one of them has left the column. */
+  val environment       = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
   val environmentLeaves = Input(Bool())
 
-  /** Pixels to render. */
+  /** Pixels to render, those of the window included. */
   val positions = Decoupled(new UnitPosition(config))
-
-  /** Pixels of this window are rendered, too. */
-  val window = Input(new EnvironmentWindow(config))
+  val window    = Input(new EnvironmentWindow(config))
 
   /** Pixels that show the background. */
   val others = Decoupled(new PixelPosition(config))
@@ -36,8 +31,6 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   * Throughput: one pixel per cycle, the first one five cycles after its tile is accepted. Of the others
   * [[TileWalker.maxOthers]] wait in a queue, so that they do not hold up those behind them. The next tile is accepted when
   * only the queues and two more pixels are left, so tiles follow each other without a gap, and no column takes tiles early.
-  *
-  * @param config of the column
   */
 final class TileWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new TileWalkerIO(config))

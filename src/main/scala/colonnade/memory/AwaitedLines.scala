@@ -12,7 +12,6 @@ private[memory] final class AwaitedLine(config: ColonnadeConfig) extends Bundle 
   val buses = UInt(SharedCache.buses(config).W)
 }
 
-/** Ports of [[AwaitedLines]]. */
 private[memory] final class AwaitedLinesIO(config: ColonnadeConfig) extends Bundle {
 
   /** A line that is looked up; whether it is awaited. */

@@ -5,7 +5,6 @@ import chisel3.util.{Decoupled, Pipe, Queue, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Banks, Load, LoadTarget, RecordFormats}
 
-/** Ports of [[ColumnBvhMemory]]. */
 final class ColumnBvhMemoryIO(config: ColonnadeConfig) extends Bundle {
 
   /** Only while no read is in flight. */

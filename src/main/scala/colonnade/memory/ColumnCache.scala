@@ -5,7 +5,6 @@ import chisel3.util._
 import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 
-/** Ports of [[ColumnCache]]. */
 final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
   val port = Flipped(new BankPort(config))
 
@@ -23,22 +22,12 @@ final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** One bank of a column's cache.
+/** One bank of a column's cache; docs/scene-cache.md has a table of its cycles.
   *
-  * {{{
-  * cycle      c        c+1                  c+2        |  cycle       a         a+1      a+2   a+3 … a+6
-  * request    accept   tags, awaited lines  response   |  line        announced  victim        records: written, filled
-  *            read     read of the record              |  requests              blocked ────────────── a+5
-  * }}}
-  *
-  * A request that misses is answered "later", and its line is entered among the awaited ones, once. So hits pass misses.
-  * The cache takes every line that is announced and awaited here, whichever column has requested it. A line that nobody
-  * awaits here is ignored. While records of a line arrive, no request is accepted: they use the same memory and the same
-  * broadcast.
-  *
-  * A record follows a "later" for certain: the line is awaited before the answer, until it is announced.
-  *
-  * With parity, a record with a wrong one becomes zeros: a node without children, or a leaf without triangles.
+  * A request that misses is answered "later", and its line is entered among the awaited ones, once. So hits pass misses. A
+  * record follows a "later" for certain: the line is awaited before the answer, until it is announced. While records of a
+  * line arrive, no request is accepted: they use the same memory and the same broadcast. With parity, a record with a wrong
+  * one becomes zeros: a node without children, or a leaf without triangles.
   */
 final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val cache    = config.columnBvhMemory.cache.get
@@ -89,8 +78,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   // Cycle c + 1: compare. A line is never both held and awaited
   private val hitOH  = tags.hitOH(lineOf(address))
   private val isHit  = accepted && hitOH.orR
-  private val awaits =
-    awaited.map(_.is(lineOf(address))).reduce(_ || _) || (isMissed && missed === lineOf(address))
+  private val awaits = awaited.map(_.is(lineOf(address))).reduce(_ || _) || (isMissed && missed === lineOf(address))
   private val hitWay = OHToUInt(hitOH)
   private val freeOH = PriorityEncoderOH(awaited.map(!_.isUsed))
   private val isMiss = accepted && !hitOH.orR

@@ -17,7 +17,6 @@ object DramPort {
     new AxiReadPort(idBits(config), config.columnBvhMemory.cache.get.busBytes)
 }
 
-/** Ports of [[DramReader]]. */
 final class DramReaderIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 

@@ -7,7 +7,6 @@ import colonnade.common.RoundRobin
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RecordFormats
 
-/** Ports of [[LineForwarder]]. */
 final class LineForwarderIO(config: ColonnadeConfig) extends Bundle {
 
   /** By column; may be withdrawn. */
@@ -23,15 +22,8 @@ final class LineForwarderIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** In the place of a [[SharedCache]] without lines: passes one bank's lines from DRAM to the columns.
-  *
-  * {{{
-  * cycle     b          b+1    b+2        b+5 … b+8
-  * line      last beat  whole  announced  records on the bus
-  * }}}
-  *
-  * Every column hears every line. Two columns that request a line before it comes read it twice, and the second copy is
-  * ignored. Beats are gathered in a memory of two lines, whose rows are records: nothing is as wide as a line.
+/** In the place of a [[SharedCache]] without lines: passes one bank's lines from DRAM to the columns; docs/scene-cache.md.
+  * Beats are gathered in a memory of two lines, whose rows are records: nothing is as wide as a line.
   */
 final class LineForwarder(config: ColonnadeConfig) extends Module {
   private val cache    = config.columnBvhMemory.cache.get

@@ -22,8 +22,7 @@ object Lines {
     UInt((new RecordFormats(config).recordBits + (if (hasParity(config)) 1 else 0)).W)
 
   /** Adds the parity to a record. */
-  def withParity(config: ColonnadeConfig, record: UInt): UInt =
-    if (hasParity(config)) record.xorR ## record else record
+  def withParity(config: ColonnadeConfig, record: UInt): UInt = if (hasParity(config)) record.xorR ## record else record
 }
 
 /** From a bank of the shared cache to the same bank of every column: a line that was read.

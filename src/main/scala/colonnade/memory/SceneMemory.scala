@@ -6,19 +6,16 @@ import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.SceneInDram
 
-/** Ports of [[SceneMemory]]. */
 final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 
   /** The scene's page of 4 KB in DRAM; constant while a frame runs. */
   val page = Input(UInt(SceneInDram.pageBits.W))
 
-  /** By column and bank. */
+  /** By column and bank; by bus and bank. */
   val requests = Vec(config.array.columns, Vec(banks, Flipped(Decoupled(UInt(Lines.lineBits(config).W)))))
-
-  /** By bus and bank. */
-  val lines = Output(Vec(SharedCache.buses(config), Vec(banks, new LineBroadcast(config))))
-  val axi   = DramPort(config)
+  val lines    = Output(Vec(SharedCache.buses(config), Vec(banks, new LineBroadcast(config))))
+  val axi      = DramPort(config)
 
   /** Forgets all lines; only while idle. */
   val invalidate = Input(Bool())
@@ -26,14 +23,10 @@ final class SceneMemoryIO(config: ColonnadeConfig) extends Bundle {
   val events     = Output(new SceneMemoryEvents(config))
 }
 
-/** Events of [[SceneMemory]] in one cycle. */
+/** Events of [[SceneMemory]] in one cycle: lines that are read from DRAM; a read failed. */
 final class SceneMemoryEvents(config: ColonnadeConfig) extends Bundle {
-
-  /** Lines that are read from DRAM. */
   val dramReads = UInt(log2Ceil(config.columnBvhMemory.banks + 1).W)
-
-  /** A read from DRAM failed. */
-  val error = Bool()
+  val error     = Bool()
 }
 
 /** The shared cache, or a [[LineForwarder]] without one, and the DRAM port. A reset of the columns does not reset it: reads

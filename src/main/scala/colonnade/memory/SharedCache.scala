@@ -13,14 +13,11 @@ final class ReadLine(config: ColonnadeConfig) extends Bundle {
   val isError = Bool()
 }
 
-/** Ports of [[SharedCache]]. */
 final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
 
-  /** By column; may be withdrawn. */
+  /** By column, may be withdrawn; by bus. */
   val requests = Vec(config.array.columns, Flipped(Decoupled(UInt(Lines.lineBits(config).W))))
-
-  /** By bus. */
-  val lines = Output(Vec(SharedCache.buses(config), new LineBroadcast(config)))
+  val lines    = Output(Vec(SharedCache.buses(config), new LineBroadcast(config)))
 
   /** Lines to read from DRAM, and the lines that were read, in the same order. A line's records are stable until taken. */
   val reads = Decoupled(UInt(Lines.lineBits(config).W))
@@ -33,19 +30,11 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())
 }
 
-/** One bank of the cache that all columns share, behind the same bank of every [[ColumnCache]].
-  *
-  * {{{
+/** One bank of the cache that all columns share, behind the same bank of every [[ColumnCache]]: docs/scene-cache.md. {{{
   * cycle    d−1     d                     d+1        d+2             d+3              d+4 … d+7
   * request  accept  tags, awaited lines   announced  line read                        records on the bus
   * line             victim                announced  line written    taken from DRAM  records on the bus
   * }}}
-  *
-  * A bus serves some of the columns. A held line is announced on the bus of the column that requested it, and every column
-  * of the bus that awaits the line takes it. Other buses join if they are free, and if their columns request nothing else.
-  * A line that is awaited from DRAM is announced on the buses of all columns that have requested it. So the cache does not
-  * remember columns.
-  *
   * Reads from DRAM are announced in their order. They precede requests that hit, which keep their place and are looked up
   * again.
   */
@@ -183,9 +172,7 @@ object SharedCache {
   /** Columns that one bus serves: more of them share lines, fewer of them wait less for the bus. */
   private val columnsPerBus = 4
 
-  /** Buses from a bank of the shared cache to the columns. */
-  def buses(config: ColonnadeConfig): Int = (config.array.columns + columnsPerBus - 1) / columnsPerBus
-
-  /** The bus that serves a column. */
+  /** Buses from a bank of the shared cache to the columns; the one that serves a column. */
+  def buses(config: ColonnadeConfig): Int              = (config.array.columns + columnsPerBus - 1) / columnsPerBus
   def busOf(config: ColonnadeConfig, column: Int): Int = column / columnsPerBus
 }

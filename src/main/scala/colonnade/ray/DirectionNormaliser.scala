@@ -10,9 +10,7 @@ import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
 final class DirectionMantissas(numbers: NumberFormats) extends Bundle {
 
   /** 0 for a component that is 0; otherwise the top bit is set. */
-  val minor = Vec(2, UInt(numbers.mantissaBits.W))
-
-  /** See [[minor]]. */
+  val minor    = Vec(2, UInt(numbers.mantissaBits.W))
   val dominant = UInt(numbers.mantissaBits.W)
 }
 
@@ -22,11 +20,9 @@ final class DirectionInfo(config: PathConfig) extends Bundle {
   val isShadow    = Bool()
   val orientation = new RayOrientation
 
-  /** Bits by which x' and y' are shorter than the dominant component. */
+  /** Bits by which x' and y' are shorter than the dominant component; components that are 0. */
   val exponent = Vec(2, UInt(Normalise.exponentBits(config.numbers.directionBits).W))
-
-  /** Components of the direction that are 0. */
-  val isZero = Vec(3, Bool())
+  val isZero   = Vec(3, Bool())
 
   /** Whether x' and y' are so short that the largest reciprocal stands for theirs. */
   def isTiny: Seq[Bool] = isZero.take(2).zip(exponent).map { case (zero, by) =>

@@ -10,10 +10,8 @@ final class EntryCommand(slices: Int) extends Bundle {
   /** Load a new ray. */
   val loads = Bool()
 
-  /** Round the first axis of the origin to units. */
-  val roundsOrigin = Bool()
-
-  /** Rotate the axes of the origin without a change. */
+  /** Round the first axis of the origin to units; rotate its axes without a change. */
+  val roundsOrigin  = Bool()
   val rotatesOrigin = Bool()
 
   /** Compute the distance to the near (`crossesFar`: far) plane of the axis whose origin was rounded. */

@@ -12,10 +12,8 @@ final class EntryStagesIO(config: PathConfig) extends Bundle {
   val loads  = Input(Vec(new SetupStages(numbers).count, Bool()))
   val bounds = Input(new Bounds(numbers))
 
-  /** In [[SetupStages.fetchedRay]]. */
-  val ray = Input(new PermutedRay(config))
-
-  /** In [[SetupStages.reciprocals]]. */
+  /** In [[SetupStages.fetchedRay]], and in [[SetupStages.reciprocals]]. */
+  val ray         = Input(new PermutedRay(config))
   val reciprocals = Input(Vec(2, UInt(new RayFormats(numbers).reciprocal.width.W)))
 
   /** The entry, in units along z', in [[SetupStages.entry]]; a grid step may be longer than a unit. */

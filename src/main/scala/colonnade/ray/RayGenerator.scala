@@ -36,13 +36,11 @@ final class RayGeneratorIO(config: PathConfig) extends Bundle {
 }
 
 /** Generates primary rays: `dir = (camera.dir << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
-  * A ray per cycle while each pixel follows the one before it in the Morton order of a tile.
   *
-  * Such a pixel needs one addition to the direction before. Pixels of two tiles may be mixed, `inObjectTile` tells them
-  * apart; the direction before is kept for both. The direction of another pixel is summed up bit by bit, in
-  * `coordinateBits` + 1 cycles. Any order gives the same rays. Latency: a ray is offered 2 cycles after its pixel was
-  * accepted, later by the cycles of a sum bit by bit, and if another ray waits before it. The registers may change when
-  * the unit has been empty for [[RayGenerator.emptyCycles]] cycles. Source: docs/ray-setup.md, pipelines.
+  * Throughput: a ray per cycle while each pixel follows the one before it in the Morton order of its tile; pixels of two
+  * tiles may be mixed, `inObjectTile` tells them apart. Another pixel takes `coordinateBits` + 1 cycles. Any order gives the
+  * same rays. Latency: 2 cycles, later by the cycles of a sum bit by bit, and if another ray waits before it. The registers
+  * may change when the unit has been empty for [[RayGenerator.emptyCycles]] cycles. Source: docs/ray-setup.md.
   */
 final class RayGenerator(config: PathConfig) extends Module {
   val io = IO(new RayGeneratorIO(config))
@@ -79,11 +77,9 @@ final class RayGenerator(config: PathConfig) extends Module {
   when(sums && !follows) { bit := Mux(bit === 0.U, topBit.U, bit - 1.U) }
   when(inFront || inBack) { empty := 0.U }.elsewhen(!isNew) { empty := empty + 1.U }
 
-  // What is added. A pixel that follows sets the lowest clear bit of the Morton code before, and clears those below it. If
-  // it sets bit n of x, it adds stepX + stepY - (stepY << n); if bit n of y, stepX + stepY - (stepX << n + 1).
-  //
-  // For another pixel, the sum starts with 0 and goes through the bits of x and y from the top: it is doubled, and the
-  // steps whose bit is set are added. The camera's direction joins in at bit stepShift, so it needs no shifter.
+  // What is added, by the table in docs/ray-setup.md: a pixel that follows sets the lowest clear bit of the Morton code
+  // before. For another pixel, the sum goes through the bits of x and y from the top, and takes in the camera's direction
+  // at bit stepShift, so that needs no shifter.
   private val code     = tileCode(position).asBools
   private val sets     = code.indices.map(n => follows && code(n) && !code.take(n).fold(false.B)(_ || _))
   private val clears   = sets.tail.reduce(_ || _)
@@ -156,8 +152,6 @@ final class RayGenerator(config: PathConfig) extends Module {
 
 object RayGenerator {
 
-  /** Cycles that a [[RayGenerator]] must have been empty before the registers may change. A primary ray takes
-    * longer to become a pixel.
-    */
+  /** Cycles without a pixel before the registers may change. A primary ray takes longer to become a pixel. */
   val emptyCycles = 8
 }

@@ -6,13 +6,10 @@ import colonnade.common.DelayLine
 import colonnade.config.PathConfig
 import colonnade.numbers.PipelinedDivider
 
-/** Prepares a ray a cycle for traversal: {{{
-  * request ─▶ DirectionStages ─ mantissas ─▶ 3 × PipelinedDivider ─ quotients ─▶ EntryStages ─ entry ─▶ AdvanceStages ─▶ ray
-  *                    └──────── DelayLine ── the ray in its own frame ─────────────▲ └─── DelayLine ───────▲
-  * }}}
-  * In order and bit for bit as [[SequentialRaySetup]]. Latency: [[SetupStages.count]] cycles, 18 with 24-bit triangle tests. All
-  * stages stall together while the offered ray is not taken; a stage without a ray keeps its values. `busy`: a ray enters.
-  * Source: docs/numbers.md, section 2.
+/** Prepares a ray a cycle for traversal, in order and bit for bit as [[SequentialRaySetup]]: docs/ray-setup.md, pipeline.
+  *
+  * Latency: [[SetupStages.count]] cycles, 18 with 24-bit triangle tests. All stages stall together while the offered ray is
+  * not taken; a stage without a ray keeps its values. `busy`: a ray enters. Source: docs/numbers.md, section 2.
   */
 final class RaySetupPipeline(config: PathConfig) extends RaySetup(config) {
   private val numbers = config.numbers

@@ -9,10 +9,8 @@ import colonnade.numbers.{Fixed, FixedPointFormat, Rounding}
 /** Number formats of a ray (docs/numbers.md). */
 final class RayFormats(numbers: NumberFormats) {
 
-  /** A position or distance near the object. */
-  val grid: FixedPointFormat = FixedPointFormat.signed(numbers.gridBits, numbers.gridFraction)
-
-  /** A position anywhere in the scene. */
+  /** A position or distance near the object; a position anywhere in the scene. */
+  val grid:  FixedPointFormat = FixedPointFormat.signed(numbers.gridBits, numbers.gridFraction)
   val scene: FixedPointFormat = FixedPointFormat.signed(numbers.sceneBits, numbers.gridFraction)
 
   /** Slope against the dominant axis, magnitude at most 1. */

@@ -5,14 +5,11 @@ import chisel3.util.Cat
 import colonnade.config.PathConfig
 import colonnade.numbers.Divider
 
-/** Prepares rays for traversal, one after the other: {{{
-  * request ─▶ DirectionNormaliser ─ mantissas ─▶ 4 × Divider ─ quotients ─▶ RayEntry ─▶ ray
-  *                    └────────────────── the ray in its own frame ───────────▲
-  * }}}
-  * In order, with up to three rays in flight. With quotients of 31 and 19 bits, the latency is about 30 cycles and the
-  * throughput at least one ray every 16 cycles; it is one every 27 cycles at the widest formats with extra slices. The
-  * quotients of a component that is 0 are computed, then replaced. A direction of 0 gives a ray that does not enter the
-  * box. Source: docs/numbers.md, section 2.
+/** Prepares rays for traversal, one after the other and in order, with up to three rays in flight: docs/ray-setup.md.
+  *
+  * With quotients of 31 and 19 bits, the latency is about 30 cycles and the throughput at least one ray every 16 cycles; it
+  * is one every 27 cycles at the widest formats with extra slices. The quotients of a component that is 0 are computed,
+  * then replaced. A direction of 0 gives a ray that does not enter the box. Source: docs/numbers.md, section 2.
   */
 final class SequentialRaySetup(config: PathConfig) extends RaySetup(config) {
   private val numbers = config.numbers

@@ -30,7 +30,6 @@ final class NodeDistance(config: TraversalConfig) extends Bundle {
   }
 }
 
-/** Ports of [[BoxDatapath]]. */
 final class BoxDatapathIO(config: TraversalConfig, lanes: Int) extends Bundle {
   val node = Input(new NodeOperands(config))
 
@@ -133,11 +132,9 @@ class BoxDatapath(config: TraversalConfig, lanes: Int) extends Module {
     operands.zip(isTested).map { case (lane, flags) => register(lane, flags(stage)) }
 
   /** The third slab waits while the others are shifted. */
-  private def held(z: Seq[SInt]): Seq[SInt] =
-    if (slice.isEnabled) byLane(z, stage = 3)(slice(_, _)) else z
+  private def held(z: Seq[SInt]): Seq[SInt] = if (slice.isEnabled) byLane(z, stage = 3)(slice(_, _)) else z
 
-  private def least(a: SInt, b: SInt): SInt = Mux(a < b, a, b)
-
+  private def least(a: SInt, b: SInt): SInt    = Mux(a < b, a, b)
   private def greatest(a: SInt, b: SInt): SInt = Mux(a < b, b, a)
 }
 

@@ -8,7 +8,6 @@ import colonnade.formats.{ChildKind, RecordFormats}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
-/** Ports of [[BoxUnit]]. */
 final class BoxUnitIO(config: TraversalConfig) extends Bundle {
   val in = Flipped(Decoupled(new BoxCandidate(config)))
 

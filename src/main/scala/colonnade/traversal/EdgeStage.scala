@@ -14,13 +14,11 @@ final class EdgeStageIO(formats: TriangleFormats) extends Bundle {
   /** x and y of the vertex of `slot`. */
   val sheared = Input(Vec(2, new Fixed(formats.grid)))
 
-  /** All edges of a triangle are known; the other outputs are valid. */
-  val decides = Output(Bool())
-
-  /** The triangle is the second one of a pair. */
-  val isSecond = Output(Bool())
-
-  /** The ray's line crosses the triangle. */
+  /** All edges of a triangle are known, and the other outputs valid: it is the second one of a pair; the ray's line crosses
+    * it.
+    */
+  val decides         = Output(Bool())
+  val isSecond        = Output(Bool())
   val crossesTriangle = Output(Bool())
   val isPositive      = Output(Bool())
   val magnitudes      = Output(Vec(3, UInt(formats.edgeBits.W)))

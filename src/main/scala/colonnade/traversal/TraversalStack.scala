@@ -15,17 +15,14 @@ final class TraversalStep(config: TraversalConfig) extends Bundle {
   val target = new NodeRef(config)
 }
 
-/** Ports of [[TraversalStack]]. */
 final class TraversalStackIO(config: TraversalConfig) extends Bundle {
 
   /** Clears the stack of a context for a new ray; the context has no operation in flight. */
   val start = Flipped(Valid(Context(config)))
 
-  /** The box test of a node; constant while it waits. */
+  /** The box test of a node, constant while it waits; a context that has finished a leaf. */
   val results = Flipped(Decoupled(new BoxResult(config)))
-
-  /** A context that has finished a leaf. */
-  val resume = Flipped(Decoupled(Context(config)))
+  val resume  = Flipped(Decoupled(Context(config)))
 
   /** Of the operation that starts; up to date for an offered operation. */
   val tMax  = new TMaxReader(config)
@@ -145,12 +142,9 @@ class TraversalStack(config: TraversalConfig) extends Module {
   io.overflow := starts && needsPush && isFull
   io.busy := isSecondCycle || isReading || stepQueue.io.deq.valid || pushesDone =/= 0.U
 
-  private def element[T <: Data](all: Vec[T], context: UInt): T =
-    if (contexts == 1) all.head else all(context)
+  private def element[T <: Data](all: Vec[T], context: UInt): T = if (contexts == 1) all.head else all(context)
 }
 
 object TraversalStack {
-
-  /** Queued steps: enough for one operation per cycle. */
-  private val stepQueueDepth: Int = 3
+  private val stepQueueDepth: Int = 3 // queued steps: enough for one operation per cycle
 }

@@ -81,19 +81,15 @@ final class TriangleTag(config: PartConfig) extends Bundle {
   /** Of the first triangle. */
   val id = UInt(RecordFormats.idBits(config).W)
 
-  /** The round is the last of its record. */
+  /** The round is the last of its record; it tests a pair, whose second triangle has the next id. */
   val isLast = Bool()
-
-  /** The round tests a pair; its second triangle has the next id. */
   val isPair = Bool()
 
   /** The material transmits light; of the first triangle, and of the second one of a pair. */
   val isTransmissive = Vec(2, Bool())
 
-  /** Stands for a record without triangles; it always misses. */
-  val isAbsent = Bool()
-
-  /** The ray's direction is negative on its dominant axis. */
+  /** Stands for a record without triangles and always misses; the ray's direction is negative on its dominant axis. */
+  val isAbsent   = Bool()
   val isNegative = Bool()
 }
 
@@ -142,10 +138,8 @@ final class DistanceRequest(config: PartConfig) extends Bundle {
 final class DistanceTerms(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
-  /** Depth of vertex 0. */
-  val first = new Fixed(formats.grid)
-
-  /** The quotient is subtracted. */
+  /** Depth of vertex 0; the quotient is subtracted from it. */
+  val first      = new Fixed(formats.grid)
   val isNegative = Bool()
   val shiftRight = UInt(formats.shiftBits.W)
   val id         = UInt(RecordFormats.idBits(config).W)

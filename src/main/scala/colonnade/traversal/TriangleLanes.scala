@@ -5,7 +5,6 @@ import chisel3.util.{log2Ceil, Decoupled, PopCount, RRArbiter}
 import colonnade.common.Dispatcher
 import colonnade.config.PartConfig
 
-/** Ports of [[TriangleLanes]]. */
 final class TriangleLanesIO(config: PartConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
 

@@ -24,18 +24,12 @@ final class TriangleSequencerIO(config: PartConfig) extends Bundle {
   val tag = Valid(new TriangleTag(config))
 }
 
-/** Sequences the triangles of a record in rounds: 4 slots for a triangle, 5 for a pair that shares an edge.
+/** Sequences the triangles of a record in rounds: 4 slots for a triangle, 5 for a pair that shares an edge;
+  * docs/triangle.md, slots and pairs.
   *
-  * {{{
-  * slot            first   second   third   gap   last
-  * one triangle    v0      v1               –     v2
-  * a pair          v0      v1       v2      –     v2 of the other triangle
-  * }}}
-  *
-  * In a pair the second triangle starts with the first one's vertices 1 and 0. The gap frees the first register of the
-  * pipeline, so the last vertex never waits, and a record's end is known one cycle before. The next candidate is
-  * accepted with the last vertex, so no slot is lost between records. Without a record, a candidate is accepted in every
-  * second cycle. A record with an illegal `count` gives one absent triangle.
+  * The gap frees the first register of the pipeline, so the last vertex never waits, and a record's end is known one cycle
+  * before. The next candidate is accepted with the last vertex, so no slot is lost between records. Without a record, a
+  * candidate is accepted in every second cycle. A record with an illegal `count` gives one absent triangle.
   */
 final class TriangleSequencer(config: PartConfig) extends Module {
   val io = IO(new TriangleSequencerIO(config))
@@ -49,9 +43,7 @@ final class TriangleSequencer(config: PartConfig) extends Module {
   private val record    = candidate.record
   private val triangles = record.vertices.grouped(3).toSeq
   private val index     = Reg(UInt(indexBits.W))
-
-  /** The candidate has vertices to issue. */
-  private val hasRecord = RegInit(false.B)
+  private val hasRecord = RegInit(false.B) // the candidate has vertices to issue
 
   // The second triangle of the record starts with an edge of the first one, reversed
   private val sharesEdge = triangles match {

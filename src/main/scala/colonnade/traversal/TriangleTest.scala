@@ -36,9 +36,7 @@ final class TriangleResult(config: PartConfig) extends Bundle {
   val isHit = Bool()
   val hit   = new TriangleHit(config)
 
-  /** The material transmits light. */
+  /** The material transmits light; this is the last triangle of the record. */
   val isTransmissive = Bool()
-
-  /** This is the last triangle of the record. */
-  val isLast = Bool()
+  val isLast         = Bool()
 }

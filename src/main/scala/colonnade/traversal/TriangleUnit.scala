@@ -25,19 +25,13 @@ final private class PendingTriangle(config: PartConfig) extends Bundle {
 }
 
 /** Watertight test of a ray against the triangles of a record (after Woop, Benthin and Wald 2013, in integers);
-  * docs/numbers.md, section 4. The hit table compares the result with the closest hit so far.
+  * docs/triangle.md. The hit table compares the result with the closest hit so far.
   *
   * Throughput: a record whose two triangles share an edge every 5 cycles, any other triangle every 4 cycles; one result
-  * for each triangle, in order. Latency of a miss: 10 cycles. A triangle that the ray's line crosses continues to
-  * weights, numerator and division. Its latency is about 30 cycles plus a quarter of the quotient's digits; its
-  * throughput is one every 7 cycles or one per rotation of the dividers, whichever is longer.
-  *
-  * {{{
-  * candidate ▸ sequencer ▸ shear ▸ edges ▸ (crossed: weights ▸ numerator ▸ distance) ▸ result
-  * }}}
-  *
-  * Sequencer, shear and edges move together, by one slot per cycle. They stall only when a triangle's edges are known
-  * and the next stage is full. The stages ahead share nothing with them, so these always make progress.
+  * for each triangle, in order. Latency of a miss: 10 cycles. A triangle that the ray's line crosses takes about 30 cycles
+  * plus a quarter of the quotient's digits, one every 7 cycles or one per rotation of the dividers, whichever is longer.
+  * Sequencer, shear and edges stall together, when a triangle's edges are known and the next stage is full. The stages
+  * ahead share nothing with them, so these always make progress.
   *
   * A record with an illegal `count` gives one miss, its last. A triangle in a plane through the ray misses.
   *

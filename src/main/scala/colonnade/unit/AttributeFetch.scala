@@ -18,7 +18,6 @@ final class AttributeResponse(config: PathConfig) extends Bundle {
   val record  = new RecordFormats(config).record
 }
 
-/** Ports of [[AttributeFetch]]. */
 final class AttributeFetchIO(config: PathConfig) extends Bundle {
 
   /** Invalidates all record buffers. */
@@ -30,10 +29,8 @@ final class AttributeFetchIO(config: PathConfig) extends Bundle {
   /** Never refused; at most one of a context at a time. */
   val hits = Flipped(Valid(new AttributeRequest(config)))
 
-  /** A response is accepted in the next cycle. */
+  /** A response is accepted in the next cycle; the context that gets its attributes then. */
   val readyNext = Input(Bool())
-
-  /** The context that gets its attributes in the next cycle. */
   val grantNext = Output(Valid(Context(config)))
   val response  = Output(Valid(new AttributeResponse(config)))
 
@@ -64,8 +61,7 @@ final class AttributeFetch(config: PathConfig, most: Int = AttributeFetch.slots)
   io.requests :<>= TimingSlice.queue(fetch.requests)
 
   // Queue hits for a slot; there are never more than contexts
-  private val waiting =
-    Module(new Queue(new AttributeRequest(config), config.contexts, useSyncReadMem = true))
+  private val waiting = Module(new Queue(new AttributeRequest(config), config.contexts, useSyncReadMem = true))
   waiting.io.enq.valid := io.hits.valid
   waiting.io.enq.bits  := io.hits.bits
   assert(!io.hits.valid || waiting.io.enq.ready, "more hits than contexts")

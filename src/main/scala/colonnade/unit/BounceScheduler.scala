@@ -23,7 +23,6 @@ final class DeferredBounceIO(config: PathConfig) extends Bundle {
   val ray = Valid(new StoredRay(config))
 }
 
-/** Ports of [[BounceScheduler]]. */
 final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val shading = Input(new Shading(config))
 
@@ -121,9 +120,7 @@ final class BounceScheduler(config: PathConfig) extends Module {
     ray.pixel  := DontCare
     ray.origin := Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get)
     ray.dir    := bounce.bits.dir
-    when(!bounce.fire) {
-      ray.dir.axes.zip(result.reflection.axes).foreach { case (to, from) => to := from }
-    }
+    when(!bounce.fire) { ray.dir.axes.zip(result.reflection.axes).foreach { case (to, from) => to := from } }
   }
 }
 

@@ -9,24 +9,12 @@ import colonnade.shading.{Occlusion, PathTermination, ShadowRequest}
 
 /** The state of a context. */
 object ContextState extends ChiselEnum {
-
-  /** It holds no pixel. */
-  val idle = Value
-
-  /** Its ray is generated or prepared. */
-  val raySetup = Value
-
-  /** Its ray visits records. */
-  val traversing = Value
-
-  /** Its trace has ended; the controller has not yet resolved the result. */
-  val resolve = Value
-
-  /** Its hit, or its point of the environment, waits for attributes or is in the shader. */
-  val shading = Value
-
-  /** Its surface is known; a shadow ray is left to trace. */
-  val shadowTest = Value
+  val idle       = Value // it holds no pixel
+  val raySetup   = Value // its ray is generated or prepared
+  val traversing = Value // its ray visits records
+  val resolve    = Value // its trace has ended; the controller has not yet resolved the result
+  val shading    = Value // its hit, or its point of the environment, waits for attributes or is in the shader
+  val shadowTest = Value // its surface is known; a shadow ray is left to trace
 
   /** Its ray has missed the object: it waits for the environment march, or is in it. */
   val environmentPending, environmentMarch = Value
@@ -37,11 +25,8 @@ object ContextState extends ChiselEnum {
   /** Its path has ended; its colour waits to be accumulated, or is being accumulated. */
   val accumulatePending, accumulating = Value
 
-  /** The colour of its pixel is complete. */
-  val done = Value
-
-  /** Its surface and all shadow rays of it are known; the path ends, or the bounce of the surface resumes. */
-  val lit = Value
+  val done = Value // the colour of its pixel is complete
+  val lit  = Value // its surface and all shadow rays are known; the path ends, or the surface's bounce resumes
 }
 
 /** A context whose hit has been shaded. */
@@ -56,10 +41,8 @@ final class Shaded(config: PathConfig) extends Bundle {
 final class Bounced(config: PathConfig) extends Bundle {
   val context = Context(config)
 
-  /** The ray is traced through the object; otherwise it only meets the background or the environment. */
+  /** The ray is traced through the object; it is inside glass, where the environment hides nothing. */
   val isTraced = Bool()
-
-  /** The ray is inside glass, where the environment hides nothing. */
   val isInside = Bool()
 }
 
@@ -74,10 +57,8 @@ final class ResumedBounce(config: PathConfig) extends Bundle {
 /** Control of rays that miss the object or whose hit may be hidden, if there may be an environment. */
 final class EnvironmentControl(config: PathConfig) extends Bundle {
 
-  /** This frame has an environment. */
-  val enabled = Input(Bool())
-
-  /** The environment may hide the object. */
+  /** This frame has an environment; it may hide the object. */
+  val enabled   = Input(Bool())
   val occlusion = Input(Bool())
 
   /** A primary ray that cannot hit the object. */
@@ -142,7 +123,6 @@ final class PixelControl(config: PathConfig) extends Bundle {
   val retire    = Output(Bool())
 }
 
-/** Ports of [[RtController]]. */
 final class RtControllerIO(config: PathConfig) extends Bundle {
   private def contextCount = Output(UInt(log2Ceil(config.contexts + 1).W))
 

@@ -8,7 +8,6 @@ import colonnade.formats.{EnvironmentView, PixelPosition}
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
 
-/** Ports of [[EnvironmentPort]]. */
 final class EnvironmentPortIO(config: PathConfig) extends Bundle {
   val view    = Input(new EnvironmentView(config.numbers))
   val control = Flipped(new EnvironmentControl(config))

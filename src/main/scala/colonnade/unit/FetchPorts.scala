@@ -51,7 +51,6 @@ final class FetchEvents(config: PartConfig) extends Bundle {
   val illegalRecord = Bool()
 }
 
-/** Ports of [[RecordFetch]]. */
 final class RecordFetchIO(config: PartConfig) extends Bundle {
   private def contextCount = UInt(log2Ceil(config.contexts + 1).W)
 

@@ -9,7 +9,6 @@ import colonnade.numbers.Fixed
 import colonnade.ray.{PreparedRay, RayFormats, RayOrientation, TracedRay}
 import colonnade.traversal.TriangleCandidate
 
-/** Ports of [[FetchStage]]. */
 final class FetchStageIO(config: TraversalConfig) extends Bundle {
 
   /** Invalidates all record buffers. */
@@ -31,12 +30,10 @@ final class FetchStageIO(config: TraversalConfig) extends Bundle {
   val nodesReadyNext     = Input(Bool())
   val trianglesReadyNext = Input(Bool())
 
-  /** A record waits for a triangle unit. */
+  /** A record waits for a triangle unit; a context gets no record because its address is illegal. */
   val waitsForTriangles = Output(Bool())
-
-  /** A context that gets no record because its address is illegal. */
-  val error  = Output(Valid(Context(config)))
-  val events = Output(new FetchEvents(config))
+  val error             = Output(Valid(Context(config)))
+  val events            = Output(new FetchEvents(config))
 }
 
 /** Fetches records and joins each one with the ray of its context, which a table holds.

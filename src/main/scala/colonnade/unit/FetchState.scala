@@ -24,30 +24,20 @@ private[unit] final class ContextFetch(config: PartConfig) {
   private val buffers  = config.columnBvhMemory.recordBuffers
   private val hasCache = config.columnBvhMemory.cache.nonEmpty
 
-  val kind    = Reg(RecordKind())
-  val address = Reg(UInt(RecordFormats.addressBits(config).W))
-
-  /** The context waits for the record. */
-  val isPending = RegInit(false.B)
-
-  /** The address is illegal: the fetch waits to report its error and takes no record, whatever the buffers hold. */
-  val isIllegal = RegInit(false.B)
-
-  /** `buffer` has the record. */
-  val hasRecord = RegInit(false.B)
-
-  /** The context has requested its own read, which fills `buffer`. */
-  val isIssued = Reg(Bool())
-  val buffer   = Reg(UInt(log2Ceil(buffers.max(2)).W))
+  val kind      = Reg(RecordKind())
+  val address   = Reg(UInt(RecordFormats.addressBits(config).W))
+  val isPending = RegInit(false.B) // the context waits for the record
+  val isIllegal = RegInit(false.B) // the fetch waits to report its error and takes no record, whatever the buffers hold
+  val hasRecord = RegInit(false.B) // `buffer` has the record
+  val isIssued  = Reg(Bool())      // the context has requested its own read, which fills `buffer`
+  val buffer    = Reg(UInt(log2Ceil(buffers.max(2)).W))
 
   /** A reserved buffer, of any context, awaits the record. */
   val isExpected = Reg(Bool())
 
-  /** With a cache: the record comes later, without a request. */
+  /** With a cache: the record comes later, without a request; the context has missed the broadcast that it awaited. */
   val awaitsFill = Option.when(hasCache)(RegInit(false.B))
-
-  /** With a cache: the context has missed the broadcast that it awaited. */
-  val retries = Option.when(hasCache)(Reg(Bool()))
+  val retries    = Option.when(hasCache)(Reg(Bool()))
 
   /** `buffer` by its bit. */
   val bufferOH: Seq[Bool] = UIntToOH(buffer, buffers).asBools

@@ -16,7 +16,6 @@ final class TraceStart(config: TraversalConfig) extends Bundle {
   val tMax    = new Fixed(new RayFormats(config.numbers).grid)
 }
 
-/** Ports of [[HitTable]]. */
 final class HitTableIO(config: TraversalConfig) extends Bundle {
   val start  = Flipped(Valid(new TraceStart(config)))
   val result = Flipped(Valid(new TriangleResult(config)))
@@ -27,10 +26,8 @@ final class HitTableIO(config: TraversalConfig) extends Bundle {
   /** The ray of `result` has a hit, this result included; for a shadow ray only opaque hits count. */
   val hasHitNow = Output(Bool())
 
-  /** For box unit and stack. */
-  val tMax = Vec(2, Flipped(new TMaxReader(config)))
-
-  /** What the ray of a context has met. */
+  /** For box unit and stack; what the ray of a context has met. */
+  val tMax    = Vec(2, Flipped(new TMaxReader(config)))
   val outcome = Flipped(new HitReader(config))
 }
 
@@ -48,9 +45,7 @@ final class HitTable(config: TraversalConfig) extends Module {
   private val closestT = Reg(Vec(contexts, new Fixed(formats.grid)))
   private val ids      = Reg(Vec(contexts, UInt(RecordFormats.idBits(config).W)))
   private val hasHit   = Reg(Vec(contexts, Bool()))
-
-  /** The shadow ray has hit a transmissive triangle. */
-  private val hasTransmissiveHit = Reg(Vec(contexts, Bool()))
+  private val hasTransmissiveHit = Reg(Vec(contexts, Bool())) // the shadow ray has hit a transmissive triangle
   private val details            = ContextTable(config, new HitDetails(config))
 
   // Compare the result with the closest hit so far
@@ -59,8 +54,7 @@ final class HitTable(config: TraversalConfig) extends Module {
   private val hit      = io.result.bits.hit
   private val best     = closestT(context)
   private val hadHit   = compared(hasHit(context))
-  private val isTied   =
-    compared(hit.t.integer === best.integer) && hadHit && compared(hit.id < ids(context))
+  private val isTied   = compared(hit.t.integer === best.integer) && hadHit && compared(hit.id < ids(context))
   private val isCloser       = io.result.bits.isHit && (compared(hit.t < best) || (isTied && !io.isShadow))
   private val isTransmissive = io.isShadow && io.result.bits.isTransmissive && config.frame.hasBounces.B
   io.hasHitNow := hadHit || (isCloser && !isTransmissive)

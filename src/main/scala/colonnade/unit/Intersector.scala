@@ -25,17 +25,14 @@ final class IntersectorEvents(config: TraversalConfig) extends Bundle {
   val illegalRecord     = Bool()
 }
 
-/** Ports of [[Intersector]]. */
 final class IntersectorIO(config: TraversalConfig) extends Bundle {
 
   /** A frame starts. */
   val start = Input(Bool())
   val scene = Input(new SceneMap(RecordFormats.idBits(config)))
 
-  /** A ray that enters the object's box, for an idle context. */
-  val rays = Flipped(Valid(new PreparedRay(config)))
-
-  /** By context: its ray is a shadow ray. */
+  /** A ray that enters the object's box, for an idle context; by context: its ray is a shadow ray. */
+  val rays     = Flipped(Valid(new PreparedRay(config)))
   val isShadow = Input(Vec(config.contexts, Bool()))
 
   /** Traces that have ended: no record is left to visit, or the shadow ray is occluded. */

@@ -11,10 +11,7 @@ import colonnade.ray.{PreparedRay, RayFormats, TriangleRay}
 import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleHit
 
-/** The closest hit of a ray that is to be shaded.
-  *
-  * @param config of the paths
-  */
+/** The closest hit of a ray that is to be shaded. */
 final class SurfaceHit(config: PathConfig) extends Bundle {
   val context   = Context(config)
   val isPrimary = Bool()
@@ -42,7 +39,6 @@ object SurfaceHit {
   }
 }
 
-/** Ports of [[PathHits]]. */
 final class PathHitsIO(config: PathConfig) extends Bundle {
   val start = Input(Bool())
   val scene = Input(new SceneMap(RecordFormats.idBits(config)))
@@ -62,8 +58,6 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
 
 /** Stands between a path unit and the traversal units that trace its rays: forwards rays, keeps the hit of each context,
   * and joins a hit that is to be shaded with its ray and its attributes.
-  *
-  * @param config of the column
   */
 final class PathHits(config: PathConfig) extends Module {
   private val paths = config

@@ -9,38 +9,24 @@ import colonnade.formats.{FrameRegisters, Pixel, UnitPosition}
 import colonnade.ray.{RayRequest, RaySetup}
 import colonnade.shading.{ColourUnit, LitSurface, Shader, ShadowRays, TexturePort}
 
-/** Ports of [[PathUnit]]. `registers` is constant while a frame runs. */
+/** `registers` is constant while a frame runs. */
 final class PathUnitIO(config: PathConfig) extends Bundle {
   val registers = Input(new FrameRegisters(config))
   val positions = Flipped(Decoupled(new UnitPosition(config)))
   val pixels    = Decoupled(new Pixel(config))
   val trace     = new TracePort(config)
 
-  /** To the marches of the environment. */
+  /** To the marches of the environment, and to the textures. */
   val marches = Option.when(config.hasEnvironment)(new MarchPort(config))
-
-  /** To the textures. */
   val texture = config.geometry.texture.map(_ => new TexturePort(config))
 
-  /** A pixel of a tile of the environment leaves. */
+  /** A pixel of a tile of the environment leaves; no pixel is in flight. */
   val environmentLeaves = Output(Bool())
-
-  /** No pixel is in flight. */
-  val isIdle = Output(Bool())
-  val events = Output(new PathEvents(config))
+  val isIdle            = Output(Bool())
+  val events            = Output(new PathEvents(config))
 }
 
-/** Follows the path of each pixel in flight, one per context: {{{
-  *
-  * positions ─▶ PrimaryRays ─▶ RaySetup ─▶ trace: rays
-  *                               ▲   ▲
-  *                 bounced rays  │   │ shadow rays
-  *              BounceScheduler ─┘   └─ ShadowRays ◀──────── Shader ◀─ trace: hits with attributes
-  *                     └──────────────┬──────────────────────┘  ▲
-  *                                    ▼                         └─ EnvironmentPort ◀─▶ marches
-  *                                ColourUnit ─▶ PixelAssembler ─▶ pixels
-  * }}}
-  * RtController holds the state of every context and issues it to its next stage. Pixels leave in any order; their order
+/** Follows the path of each pixel in flight, one per context: docs/path-tracer.md. Pixels leave in any order; their order
   * depends on timing, their values do not.
   */
 final class PathUnit(config: PathConfig) extends Module {
@@ -116,8 +102,7 @@ final class PathUnit(config: PathConfig) extends Module {
   bounces.foreach(_.start := primaryRays.start)
   environment.foreach(_.control :<>= controller.environment.get)
   io.isIdle := controller.idleCount === config.contexts.U && assembler.isIdle
-  io.events :=
-    PathCounters(config, controller, raySetup, trace, shader, shadowRays, bounces)
+  io.events := PathCounters(config, controller, raySetup, trace, shader, shadowRays, bounces)
 
   // Registers
   private val registers = io.registers

@@ -7,7 +7,6 @@ import colonnade.config.PathConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, Rgb, UnitPosition}
 import colonnade.shading.PathColour
 
-/** Ports of [[PixelAssembler]]. */
 final class PixelAssemblerIO(config: PathConfig) extends Bundle {
   val background = Input(Rgb(FrameRegisters.colour))
   val allocated  = Flipped(Valid(new AllocatedPixel(config)))
@@ -16,21 +15,16 @@ final class PixelAssemblerIO(config: PathConfig) extends Bundle {
   val hasSurface = Flipped(Valid(Context(config)))
   val surfaceHit = Flipped(Valid(new SurfaceHit(config)))
   val colour     = Flipped(Valid(new PathColour(config)))
+  val control    = new PixelControl(config)
+  val pixels     = Decoupled(new Pixel(config))
 
-  val control = new PixelControl(config)
-  val pixels  = Decoupled(new Pixel(config))
-
-  /** The pixel of a context that retires is of a tile of the environment. */
+  /** The pixel of a context that retires is of a tile of the environment; no pixel waits here. */
   val environmentLeaves = Output(Bool())
-
-  /** No pixel waits here. */
-  val isIdle = Output(Bool())
+  val isIdle            = Output(Bool())
 }
 
-/** Keeps what each context knows of its pixel, and assembles the pixel when it is done.
-  *
-  * A context retires when its tables are read; the pixel follows one cycle later, into a queue that has space
-  * for it.
+/** Keeps what each context knows of its pixel, and assembles the pixel when it is done. A context retires when its tables
+  * are read; the pixel follows one cycle later, into a queue that has space for it.
   */
 final class PixelAssembler(config: PathConfig) extends Module {
   val io = IO(new PixelAssemblerIO(config))
@@ -69,8 +63,7 @@ final class PixelAssembler(config: PathConfig) extends Module {
   finished.bits.colour   := Mux(hasColour, colour.colour, io.background)
   finished.bits.isObject := RegEnable(isObject(done.bits), retires)
   for (ratio <- finished.bits.ratio; shadow <- colour.ratio; channel <- 0 until 3)
-    ratio.channels(channel) :=
-      Mux(hasColour && !finished.bits.isObject, shadow.channels(channel), FrameRegisters.one)
+    ratio.channels(channel) := Mux(hasColour && !finished.bits.isObject, shadow.channels(channel), FrameRegisters.one)
 
   // The primary ray's hit
   for (hit <- finished.bits.hit; distance <- io.surfaceHit.bits.distance) {

@@ -13,7 +13,6 @@ final class AllocatedPixel(config: PathConfig) extends Bundle {
   val pixel   = new UnitPosition(config)
 }
 
-/** Ports of [[PrimaryRays]]. */
 final class PrimaryRaysIO(config: PathConfig) extends Bundle {
   val camera    = Input(new CameraRegisters(config))
   val positions = Flipped(Decoupled(new UnitPosition(config)))
@@ -30,9 +29,8 @@ final class PrimaryRaysIO(config: PathConfig) extends Bundle {
   val meetsObject = Output(Bool())
 }
 
-/** Allocates an idle context to each pixel position, and generates its primary ray.
-  *
-  * Throughput: that of [[colonnade.ray.RayGenerator]], while contexts are idle.
+/** Allocates an idle context to each pixel position, and generates its primary ray. Throughput: that of [[RayGenerator]],
+  * while contexts are idle.
   */
 final class PrimaryRays(config: PathConfig) extends Module {
   val io = IO(new PrimaryRaysIO(config))

@@ -5,21 +5,8 @@ import chisel3.util.{Mux1H, MuxLookup, OHToUInt, PopCount, PriorityEncoderOH}
 import colonnade.common.TimingSlice
 import colonnade.config.PartConfig
 
-/** Fetches records for contexts: a small file of fill buffers with miss handling and snooping. {{{
-  *
-  *               ┌─ matches ─▶ RecordMiss ────────────────────────────────▶ requests
-  * fetches ─▶ RecordLookup         │ reserves, releases
-  *    │          │ hits            ▼                       LaterRecords
-  *    │          ▼              buffers ◀─── RecordFill ◀──────┴────────── broadcasts
-  *    └─────▶ contexts ◀───────────┼─────────────┘
-  *               │ ready           │ record
-  *               ▼                 ▼
-  *          RecordGrant ───────────┴───────────────────────▶ grantNext, response
-  * }}}
-  * A buffer is reserved before a read is requested, so a broadcast never stalls. With snooping, every waiting context
-  * takes a matching record, from a broadcast or from a buffer, whichever row requested it. A buffer also captures any
-  * broadcast that a context waits for, and keeps its record until another read needs the buffer. Without snooping, a
-  * context takes only the response to its own read.
+/** Fetches records for contexts: a small file of fill buffers with miss handling and snooping; docs/path-tracer.md, fetching
+  * records. A buffer is reserved before a read is requested, so a broadcast never stalls.
   *
   * A unit says one cycle ahead that it accepts a record (`readyNext`). A response comes at the earliest two cycles after the
   * record's broadcast, or two cycles after the request if a buffer holds the record. With `units.extraSlices` it is three,

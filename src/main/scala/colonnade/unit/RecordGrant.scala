@@ -12,7 +12,6 @@ final class RecordGrantee(config: PartConfig) extends Bundle {
   val buffer  = Vec(config.columnBvhMemory.recordBuffers, Bool())
 }
 
-/** Ports of [[RecordGrant]]. */
 final class RecordGrantIO(config: PartConfig) extends Bundle {
   private val contexts = config.contexts
 

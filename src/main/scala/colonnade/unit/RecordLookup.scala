@@ -6,7 +6,6 @@ import colonnade.common.TimingSlice
 import colonnade.config.PartConfig
 import colonnade.formats.RecordFormats
 
-/** Ports of [[RecordLookup]]. */
 final class RecordLookupIO(config: PartConfig) extends Bundle {
   private val contexts = config.contexts
   private val buffers  = config.columnBvhMemory.recordBuffers
@@ -20,10 +19,8 @@ final class RecordLookupIO(config: PartConfig) extends Bundle {
   /** By context and buffer, in one cycle after a fetch: the buffer has its address. */
   val matches = Output(Vec(contexts, Vec(buffers, Bool())))
 
-  /** By context: its fetch came in the cycle before. */
-  val isNew = Output(Vec(contexts, Bool()))
-
-  /** By context: the matches of its fetch are still to come. */
+  /** By context: its fetch came in the cycle before; the matches of its fetch are still to come. */
+  val isNew      = Output(Vec(contexts, Bool()))
   val isUnderWay = Output(Vec(contexts, Bool()))
 }
 

@@ -7,18 +7,8 @@ import colonnade.config.PathConfig
 
 import scala.collection.mutable
 
-/** Holds the state of every context and issues each one to its next stage; contains no arithmetic.
-  *
-  * A context goes idle → raySetup → traversing → resolve → shading. From a mirror or glass it returns to raySetup. Other
-  * surfaces go to shadowTest, and for each shadow ray → raySetup → traversing → resolve → shadowTest. Then they are lit, and
-  * the path ends: accumulatePending → accumulating → done → idle. A primary ray that misses goes to done at once; a later ray that
-  * misses goes to accumulatePending.
-  *
-  * With an environment, a ray that misses goes environmentPending → environmentMarch → shading; if it hits nothing there
-  * either, it continues as above. A hit that the environment may hide is tested there as well: resolve →
-  * environmentPending → environmentMarch, and back to resolve if it is visible. At glass, the Fresnel reflection is resolved first: shading → environmentPending →
-  * environmentMarch → shading → lit, then the deferred bounce resumes. If the reflection misses, the context waits
-  * in resumeBounce.
+/** Holds the state of every context and issues each one to its next stage, by the table of states in docs/path-tracer.md;
+  * contains no arithmetic.
   *
   * Contexts are tokens: there are `contexts` of them, so no queue for contexts overflows. In each cycle, at most one ended
   * ray is resolved, one context leaves shadowTest, and one pixel retires; other transitions are independent.
@@ -31,7 +21,7 @@ final class RtController(config: PathConfig) extends Module {
 
   val io = IO(new RtControllerIO(config))
 
-  /** What moves a context to another state: whether it happens, the context, the state. */
+  // What moves a context to another state: whether it happens, the context, the state
   private val moves = mutable.Buffer.empty[(Bool, UInt, ContextState.Type)]
 
   private val state     = RegInit(VecInit(Seq.fill(contexts)(ContextState.idle)))
@@ -88,8 +78,7 @@ final class RtController(config: PathConfig) extends Module {
   io.trace.readsDistance := 0.U.asTypeOf(io.trace.readsDistance)
   private val afterTrace = Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
-  private val lightsLeft =
-    shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusion)
+  private val lightsLeft = shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusion)
   move(ended.now.valid, resolved, Mux(isShadow(resolved), afterLights(lightsLeft), afterHit))
   if (config.hasEnvironment) when(ended.now.valid) {
     mayBeHidden(resolved)     := false.B
@@ -186,11 +175,7 @@ final class RtController(config: PathConfig) extends Module {
       isOcclusionTest(environment.visible.bits) := false.B
     }
     val missed = environment.miss.bits
-    move(
-      environment.miss.valid,
-      missed,
-      Mux(isFresnelReflection(missed), ContextState.resumeBounce, afterMiss(missed))
-    )
+    move(environment.miss.valid, missed, Mux(isFresnelReflection(missed), ContextState.resumeBounce, afterMiss(missed)))
     val isResumable = state.zip(isFresnelReflection).map { case (at, reflection) =>
       at === ContextState.resumeBounce || (at === ContextState.lit && reflection)
     }
@@ -226,6 +211,7 @@ final class RtController(config: PathConfig) extends Module {
   private def choose(claims: Seq[Bool], isServed: => Bool): Choice =
     if (isLarge || config.units.extraSlices) First.registered(claims, isServed) else Choice(First(claims))
 
+  /** Of many contexts, the number is that of the cycle before. */
   private def count(claims: Seq[Bool], atReset: Int = 0): UInt = {
     val number = PopCount(claims)
     if (isLarge) RegNext(number, atReset.U) else number

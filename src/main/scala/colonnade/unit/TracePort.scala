@@ -27,15 +27,12 @@ final class TracePort(config: PathConfig) extends Bundle {
   val attributeError = Flipped(Valid(Context(config)))
 }
 
-/** What a ray has met, from a traversal unit.
-  */
+/** What a ray has met, from a traversal unit. */
 final class TraceResult(config: PathConfig) extends Bundle {
   val context = Context(config)
   val hasHit  = Bool()
 
-  /** Of a shadow ray. */
+  /** What a shadow ray has met; the hit of another ray, if `hasHit`. */
   val occlusion = Occlusion()
-
-  /** If `hasHit`, and the ray is no shadow ray. */
-  val hit = new TriangleHit(config)
+  val hit       = new TriangleHit(config)
 }

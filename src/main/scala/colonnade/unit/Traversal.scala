@@ -7,7 +7,6 @@ import colonnade.config.TraversalConfig
 import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
 import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalStack, TraversalStep}
 
-/** Ports of [[Traversal]]. */
 final class TraversalIO(config: TraversalConfig) extends Bundle {
 
   /** Resets `deepest`. */
@@ -18,11 +17,9 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
   val start = Flipped(Valid(Context(config)))
   val nodes = Flipped(Decoupled(new NodeCandidate(config)))
 
-  /** `nodes` is ready in the next cycle. */
+  /** `nodes` is ready in the next cycle; contexts that have finished a triangle record. */
   val readyNext = Output(Bool())
-
-  /** Contexts that have finished a triangle record. */
-  val resume = Flipped(Decoupled(Context(config)))
+  val resume    = Flipped(Decoupled(Context(config)))
 
   /** Of the context of `nodes`, and of that whose stack is used. */
   val tMax  = Vec(2, new TMaxReader(config))
@@ -41,9 +38,7 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
 /** Decides which record each ray visits next: BoxUnit and TraversalStack, or LinearScan without a BVH. */
 final class Traversal(config: TraversalConfig) extends Module {
   val io = IO(new TraversalIO(config))
-
-  /** Contexts are tokens, so this queue never overflows. */
-  private val resume = Queue(io.resume, config.contexts)
+  private val resume = Queue(io.resume, config.contexts) // contexts are tokens, so this queue never overflows
 
   if (config.geometry.bvh) {
     val boxUnit = Module(new BoxUnit(config))

@@ -15,7 +15,7 @@ final class TraversalEvents(config: TraversalConfig) extends Bundle {
   val fetch       = new FetchEvents(config)
 }
 
-/** Ports of [[TraversalUnit]]. `scene` is constant while a frame runs; `start` precedes the first ray. */
+/** `scene` is constant while a frame runs; `start` precedes the first ray. */
 final class TraversalUnitIO(config: TraversalConfig) extends Bundle {
   val row        = Input(UInt(log2Ceil(config.recordRequesters).W))
   val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
@@ -36,13 +36,9 @@ final class TraversalUnitIO(config: TraversalConfig) extends Bundle {
   val events  = Output(new TraversalEvents(config))
 }
 
-/** Traces rays for a path unit: {{{
-  * rays ─▶ Intersector ◀─▶ FetchStage ◀─▶ column (requests, broadcasts)
-  *              └─▶ results
-  * }}}
-  * A ray takes an idle context, and leaves it when its result enters the queue of one result. The context that ended and
-  * has the lowest number goes first; a result every other cycle. There are only as many rays as contexts, and each one
-  * ends, so a unit becomes free as long as `results` are taken.
+/** Traces rays for a path unit. A ray takes an idle context, and leaves it when its result enters the queue of one result.
+  * The context that ended and has the lowest number goes first; a result every other cycle. There are only as many rays as
+  * contexts, and each one ends, so a unit becomes free as long as `results` are taken.
   */
 @instantiable
 final class TraversalUnit(config: TraversalConfig) extends Module {
