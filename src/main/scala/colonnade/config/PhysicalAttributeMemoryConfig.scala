@@ -39,5 +39,5 @@ final case class PhysicalAttributeMemoryConfig(
 
 object PhysicalAttributeMemoryConfig {
   private[config] val section = "physicalAttributeMemory"
-  private val powers = Seq(16, 32, 64, 128, 256) // an index has one byte at most
+  private val powers          = Seq(16, 32, 64, 128, 256) // an index has one byte at most
 }

@@ -14,9 +14,9 @@ final class StoredRay(config: PathConfig) extends Bundle {
 
 /** Ports of [[EnvironmentRays]]. */
 final class EnvironmentRaysIO(config: PathConfig) extends Bundle {
-  val ray         = Flipped(Valid(new StoredRay(config))) // stored in place of the context's previous ray
-  val req         = Flipped(Decoupled(new EnvironmentRequest(config))) // ready as `accepts` says of its kind
-  val accepts     = Output(new EnvironmentAccepts)
+  val ray     = Flipped(Valid(new StoredRay(config)))              // stored in place of the context's previous ray
+  val req     = Flipped(Decoupled(new EnvironmentRequest(config))) // ready as `accepts` says of its kind
+  val accepts = Output(new EnvironmentAccepts)
   val hitDistance = Input(HitDistance(config)) // of an occlusion test, in the cycle after its `req`
 
   /** The result: a point to shade, a context whose ray misses, or one whose occlusion test finds its hit visible. */

@@ -15,13 +15,13 @@ final class MarchFormats(config: ColonnadeConfig) {
   val f:         Int             = numbers.shadeBits
   val sceneBits: Int             = numbers.sceneBits
 
-  val mapLog:        Int = 10 // log2 of the map's unit in pixels
+  val mapLog:        Int = 10         // log2 of the map's unit in pixels
   val pixelFraction: Int = f - mapLog // fraction bits of a pixel's coordinate
-  val planeFraction: Int = 22 // fraction bits of a plane's coefficients with exponent 0
-  val guardBits:     Int = 8 // additional fraction bits of a distance along the ray while distances are added up
-  val alongBits:     Int = f + 3
-  val distanceBits:  Int = alongBits + guardBits
-  val nearLog:       Int = 8 // log2 of a share of w: a ray that is behind a surface by less is on it
+  val planeFraction: Int = 22         // fraction bits of a plane's coefficients with exponent 0
+  val guardBits:    Int = 8 // additional fraction bits of a distance along the ray while distances are added up
+  val alongBits:    Int = f + 3
+  val distanceBits: Int = alongBits + guardBits
+  val nearLog:      Int = 8 // log2 of a share of w: a ray that is behind a surface by less is on it
 
   /** A ray that crosses tiles and cells this often ends. A map of the finest cells has 31 on the longest way through a tile.
     */
@@ -43,12 +43,12 @@ final class MarchFormats(config: ColonnadeConfig) {
   val slopeBits: Int = planeFraction + 2
   val depthBits: Int = valueBits + 2
 
-  val sumBits:      Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits) // the model's widest has 128
+  val sumBits: Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits) // the model's widest has 128
   val scaledBits:   Int = (depthBits + f - 7).max(sceneBits) // a depth in steps of w, or a position in the scene
   val combineBits:  Int = scaledBits + 1
   val exponentBits: Int = 8
-  val shiftBits:    Int = 12 // shift amounts, and exponents that may be negative
-  val tileBits:     Int = 9 // a coordinate in tiles, with one bit to spare
+  val shiftBits:    Int = 12                                 // shift amounts, and exponents that may be negative
+  val tileBits:     Int = 9                                  // a coordinate in tiles, with one bit to spare
 
   val centre: Seq[BigInt] = sizes.map(size => BigInt(size) << (pixelFraction - 1)) // half the map's size in map units
 

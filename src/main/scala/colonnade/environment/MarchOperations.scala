@@ -48,7 +48,7 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val distance:    UInt = datapath.distance
 
   val scaledProduct: SInt = Rounding.floor(product, f) // the product without its fraction bits
-  val sumMantissa:   UInt = shifted.asUInt(f - 1, 0) // the shifted sum, whose exponent was measured in the step before
+  val sumMantissa: UInt = shifted.asUInt(f - 1, 0) // the shifted sum, whose exponent was measured in the step before
 
   private val wideFactor       = new Operand(program, wideBits)
   private val narrowFactor     = new Operand(program, narrowBits)

@@ -16,7 +16,7 @@ final class MarchOrder(config: PathConfig) extends Bundle {
 final class MarchAnswer(config: PathConfig) extends Bundle {
   val isHit           = Bool() // there is a point to shade; if the request was an occlusion test, it hides the hit
   val isOcclusionTest = Bool()
-  val surface         = new EnvironmentSurface(config) // the request's context; the point, if there is one
+  val surface = new EnvironmentSurface(config) // the request's context; the point, if there is one
 }
 
 /** The path unit's port to the marches of its column. */
@@ -26,7 +26,7 @@ final class MarchPort(config: PathConfig) extends Bundle {
   val direct = Decoupled(new EnvironmentRequest(config))
   val march  = Decoupled(new EnvironmentRequest(config))
 
-  val order  = Output(new MarchOrder(config)) // the order, in the cycle after its request is accepted, and only then
+  val order = Output(new MarchOrder(config)) // the order, in the cycle after its request is accepted, and only then
   val answer = Flipped(Decoupled(new MarchAnswer(config))) // in any order
 
   /** Ties off a port without a requester. */

@@ -52,7 +52,7 @@ final class MarchResult(config: PathConfig) extends Bundle {
   val y = UInt(layout.yBits.W)
 
   val boundingPlane = UInt(layout.boundingPlaneIndexBits.W) // `boundingPlane`: the plane with albedo and normal
-  val isHidden      = Bool() // `map`: the point is on the extension of a surface, hidden by another one
+  val isHidden = Bool() // `map`: the point is on the extension of a surface, hidden by another one
 
   /** The point is at distance · 2^distanceExponent times the ray's direction. */
   val distance         = UInt((formats.f + 1).W)

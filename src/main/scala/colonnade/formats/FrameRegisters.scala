@@ -166,7 +166,7 @@ object FrameRegisters {
 
   /** A weight from 0 to 1: 2^fraction is 1; the weight 1. */
   def weight: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightFraction + 1, NumberFormats.lightFraction))
-  def one:    Fixed = Fixed.literal(weight.format, BigInt(1) << NumberFormats.lightFraction)
+  def one: Fixed    = Fixed.literal(weight.format, BigInt(1) << NumberFormats.lightFraction)
 
   /** A linear colour channel; all ones is 1.0. */
   def colour: UInt = UInt(NumberFormats.colourBits.W)

@@ -9,9 +9,9 @@ import colonnade.numbers.{Fixed, FixedPointFormat}
 object ChildKind {
   val bits = 2
 
-  def empty:   UInt = 0.U(bits.W)
-  def node:    UInt = 1.U(bits.W)
-  def leaf:    UInt = 2.U(bits.W)
+  def empty: UInt   = 0.U(bits.W)
+  def node: UInt    = 1.U(bits.W)
+  def leaf: UInt    = 2.U(bits.W)
   def illegal: UInt = 3.U(bits.W)
 }
 
@@ -100,8 +100,8 @@ final class RecordFormats(config: ColonnadeConfig) {
   /** Width of a number of records, and of a packed triangle id. */
   val idBits: Int = RecordFormats.idBits(config)
 
-  def node:       NodeRecord       = new NodeRecord(config)
-  def triangles:  TrianglesRecord  = new TrianglesRecord(config)
+  def node: NodeRecord             = new NodeRecord(config)
+  def triangles: TrianglesRecord   = new TrianglesRecord(config)
   def attributes: AttributesRecord = new AttributesRecord(config)
 
   /** The widest kind, rounded up to whole 32-bit words. */

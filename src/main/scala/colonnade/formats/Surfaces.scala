@@ -48,7 +48,7 @@ object MaterialKind {
 
   /** Lambertian reflection of the lights. */
   def diffuse: UInt = 0.U(bits.W)
-  def mirror:  UInt = 1.U(bits.W)
+  def mirror: UInt  = 1.U(bits.W)
 
   /** Refracts, and reflects by Schlick's approximation. */
   def glass: UInt = last.U(bits.W)

@@ -96,7 +96,7 @@ final class AdvanceStages(config: PathConfig) extends Module {
   }
   prepared.tEntry := Fixed(formats.entry, entrySteps << (-fraction).max(0))
   prepared.tMax   := Fixed(formats.grid, Rounding.saturate(io.ray.tMax.zext -& along.zext, 0, formats.grid.highest))
-  io.output := load(prepared, stages.preparedRay)
+  io.output       := load(prepared, stages.preparedRay)
 
   /** A product in grid steps, towards 0, and whether the nearest one is the next. */
   private def roundedDown(product: UInt): (UInt, Bool) = {

@@ -40,6 +40,6 @@ final class SetupStages(numbers: NumberFormats) {
 final class StageRegisters(loads: Vec[Bool]) {
 
   /** A value as a register of a stage; a register of stage `from` as one of stage `to`. */
-  def load[T <: Data](value: T, stage: Int): T         = RegEnable(value, loads(stage))
-  def hold[T <: Data](value: T, from: Int, to: Int): T = (from + 1 to to).foldLeft(value)(load(_, _))
+  def load[T <: Data](value: T, stage: Int): T          = RegEnable(value, loads(stage))
+  def hold[T <: Data](value: T, from:  Int, to: Int): T = (from + 1 to to).foldLeft(value)(load(_, _))
 }

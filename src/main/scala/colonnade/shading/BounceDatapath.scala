@@ -160,8 +160,8 @@ final class BounceDatapath(config: PathConfig) extends Module {
     exponent       := topExponent
     directionScale := scaled(shadeBits - 1, 0)
   }
-  when(actions.latchCosine)(normalScale            := Mux(sum < 0.S, 0.U, scaled(formats.cosineBits - 1, 0)).zext)
-  when(actions.latchRaySquared)(square             := Rounding.floor(dot, shadeBits - 1)(formats.squareBits - 1, 0))
+  when(actions.latchCosine)(normalScale := Mux(sum < 0.S, 0.U, scaled(formats.cosineBits - 1, 0)).zext)
+  when(actions.latchRaySquared)(square  := Rounding.floor(dot, shadeBits - 1)(formats.squareBits - 1, 0))
   when(actions.latchSquaredLengths) {
     squaredLengths := Rounding.floor(sum.asUInt(formats.lengthBits - 1, 0), formats.low)
   }

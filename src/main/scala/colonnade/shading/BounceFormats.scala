@@ -9,10 +9,10 @@ import colonnade.ray.RayFormats
 
 /** Widths of reflection and refraction, from the bounds in docs/bounce.md. */
 final class BounceFormats(numbers: NumberFormats) {
-  val shadeBits:       Int = numbers.shadeBits
-  val componentBits:   Int = shadeBits + 1 // a component of a scaled normal or of the ray's direction, signed
+  val shadeBits:     Int = numbers.shadeBits
+  val componentBits: Int = shadeBits + 1 // a component of a scaled normal or of the ray's direction, signed
   val faceForwardBits: Int = NumberFormats.normalBits + 1 // a component of a normal turned against the ray, signed
-  val bounceBits:      Int = shadeBits + 5 // a component of the outgoing ray's direction, signed
+  val bounceBits:      Int = shadeBits + 5                // a component of the outgoing ray's direction, signed
 
   /** Factors of the ray's direction (unsigned) and of the normal (signed) in the outgoing direction. A refraction needs
     * three bits more than a reflection, for the integer part of the index.
@@ -63,11 +63,11 @@ final class BounceRequest(config: PathConfig) extends Bundle {
   /** The shading normal, turned against the ray; its largest component has `shadeBits` bits, or it is zero. */
   val normal = Vec3(SInt(formats.componentBits.W))
 
-  val isSmooth          = Bool() // `normal` is interpolated from the vertices' normals; otherwise it is geometric
+  val isSmooth = Bool() // `normal` is interpolated from the vertices' normals; otherwise it is geometric
   val faceForwardNormal = Vec3(SInt(formats.faceForwardBits.W)) // the geometric normal, turned against the ray
-  val dir               = Vec3(SInt(formats.componentBits.W)) // of the ray; dominant component ±2^(shadeBits − 1)
-  val backSide          = Bool() // the ray hits the back of the triangle
-  val isGlass           = Bool() // glass, or a mirror, which ignores the fields below
+  val dir               = Vec3(SInt(formats.componentBits.W))   // of the ray; dominant component ±2^(shadeBits − 1)
+  val backSide          = Bool()                                // the ray hits the back of the triangle
+  val isGlass           = Bool()                                // glass, or a mirror, which ignores the fields below
 
   /** The relative index of refraction, for a ray from this side. */
   val eta = new Fixed(FixedPointFormat.unsigned(NumberFormats.etaBits, NumberFormats.etaFraction))

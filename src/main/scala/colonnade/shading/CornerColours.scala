@@ -16,7 +16,7 @@ final class CornerColoursIO(config: PathConfig) extends Bundle {
   val weights = Input(Vec(3, new Fixed(new RayFormats(config.numbers).weight)))
 
   val colours = Input(Vec(3, Rgb(FrameRegisters.colour))) // one per corner
-  val isUsed  = Input(Bool()) // the hit shows its corner colours; constant from the cycle after `start` to the next
+  val isUsed = Input(Bool()) // the hit shows its corner colours; constant from the cycle after `start` to the next
 
   /** To the multiplier, whose product comes in the cycle after it took them. */
   val operands = Decoupled(new MultiplierOperands(formats))

@@ -139,7 +139,7 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
   divider.io.quotient.ready := step === CosineStep.quotient || step === CosineStep.falloffQuotient
 
   private val one = 1.U << numbers.cosineFraction
-  io.brightness.valid       := step === CosineStep.done
-  io.brightness.bits.cosine := Mux(cosine(numbers.cosineFraction + 1, numbers.cosineFraction).orR, one, cosine)
+  io.brightness.valid        := step === CosineStep.done
+  io.brightness.bits.cosine  := Mux(cosine(numbers.cosineFraction + 1, numbers.cosineFraction).orR, one, cosine)
   io.brightness.bits.falloff := falloff
 }

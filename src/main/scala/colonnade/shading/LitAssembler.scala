@@ -94,6 +94,6 @@ final class LitAssembler(config: PathConfig, places: Int) extends Module {
   lit.albedo  := albedo.albedo
   for (albedo <- label.environment) when(albedo.valid)(lit.albedo := albedo.bits)
   for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
-    channel := Mux(isEnvironment, 0.U, value)
+    channel                                           := Mux(isEnvironment, 0.U, value)
   for ((to, from) <- lit.origin.axes.zip(origins)) to := Fixed(new RayFormats(config.numbers).scene, from.bits)
 }

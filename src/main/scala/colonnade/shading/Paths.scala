@@ -9,8 +9,8 @@ import colonnade.formats.{FrameRegisters, Rgb}
 final class PathTermination(config: PathConfig) extends Bundle {
   val context      = Context(config)
   val isBackground = Bool() // there is no surface: the path ends with the background's colour
-  val isStraight   = Option.when(config.frame.hasBounces)(Bool()) // the path has hit neither mirror nor glass
-  val occlusions   = Vec(config.frame.lights, Occlusion()) // by light: the shadow rays' outcomes
+  val isStraight = Option.when(config.frame.hasBounces)(Bool()) // the path has hit neither mirror nor glass
+  val occlusions = Vec(config.frame.lights, Occlusion())        // by light: the shadow rays' outcomes
 
   /** The camera sees the environment's surface directly: the shadow ratio is needed as well. */
   val isDirectView = if (config.hasEnvironment) Some(Bool()) else None

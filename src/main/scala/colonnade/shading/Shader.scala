@@ -24,9 +24,9 @@ final class ShaderIO(config: PathConfig) extends Bundle {
   val texture        = config.geometry.texture.map(_ => new TexturePort(config))
   val isIllegalTexel = config.geometry.texture.map(_ => Output(Bool()))
 
-  val lit     = Decoupled(new LitSurface(config)) // hits on diffuse surfaces
+  val lit     = Decoupled(new LitSurface(config))                                       // hits on diffuse surfaces
   val bounced = Option.when(config.frame.hasBounces)(Decoupled(new BouncedRay(config))) // hits on mirrors and glass
-  val busy    = Output(Bool()) // the entry holds a hit: a cycle of the narrowest stage
+  val busy = Output(Bool()) // the entry holds a hit: a cycle of the narrowest stage
 }
 
 /** Shades hits: docs/numbers.md, 5 and 6. Lit surfaces leave in the order of their hits. */

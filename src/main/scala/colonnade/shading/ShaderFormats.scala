@@ -15,11 +15,11 @@ final class ShaderFormats(numbers: NumberFormats) {
     */
   val pointBits: Int = numbers.gridBits + 2
 
-  val toLightBits:    Int = numbers.sceneBits + 1 // the vector to the light, signed: a difference of scene positions
-  val normalSumBits:  Int = numbers.barycentricBits + NumberFormats.normalBits + 2 // of three weighted normals, signed
+  val toLightBits: Int = numbers.sceneBits + 1 // the vector to the light, signed: a difference of scene positions
+  val normalSumBits: Int = numbers.barycentricBits + NumberFormats.normalBits + 2 // of three weighted normals, signed
   val normalBits:     Int = normalSumBits.max(shadeBits + 1) // a shading normal before and after scaling, signed
-  val vectorBits:     Int = toLightBits.max(normalBits) // the widest component of a vector, signed
-  val cosineBits:     Int = numbers.cosineFraction + 1 // a cosine, from 0 to 1 inclusive
+  val vectorBits:     Int = toLightBits.max(normalBits)      // the widest component of a vector, signed
+  val cosineBits:     Int = numbers.cosineFraction + 1       // a cosine, from 0 to 1 inclusive
   val brightnessBits: Int = cosineBits + Falloff.integerBits // a cosine multiplied by a falloff
 
   /** Multiplier operands, signed. The narrow one holds a scaled component or a light's intensity, the wide one also a
@@ -121,8 +121,8 @@ final class ShadedSurface(config: PathConfig) extends Bundle {
   /** The shading normal, turned against the ray; its largest component has `shadeBits` bits. */
   val normal = Vec3(SInt(formats.narrowBits.W))
 
-  val isSmooth          = Bool() // `normal` is interpolated from the vertices' normals; otherwise it is geometric
+  val isSmooth = Bool() // `normal` is interpolated from the vertices' normals; otherwise it is geometric
   val faceForwardNormal = Vec3(SInt((NumberFormats.normalBits + 1).W)) // the geometric normal, turned against the ray
-  val dir               = Vec3(SInt((formats.shadeBits + 1).W)) // of the ray; dominant component ±2^(shadeBits − 1)
-  val backSide          = Bool() // the ray hits the back of the triangle
+  val dir      = Vec3(SInt((formats.shadeBits + 1).W)) // of the ray; dominant component ±2^(shadeBits − 1)
+  val backSide = Bool()                                // the ray hits the back of the triangle
 }

@@ -56,7 +56,7 @@ final class ShadowRatios(config: PathConfig, bits: Int) extends Module {
     val remainder = Reg(UInt(bits.W))
     val ratio     = Reg(UInt((fraction + 1).W))
 
-    val isOne = Reg(Bool()) // the ratio is one, and needs no division
+    val isOne        = Reg(Bool()) // the ratio is one, and needs no division
     val (fits, rest) = DigitRecurrence.step((remainder << 1).asUInt, whole, bits)
     when(divides && !isOne) {
       remainder := rest

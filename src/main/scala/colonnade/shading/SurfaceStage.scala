@@ -19,9 +19,9 @@ final class SurfaceStageIO(config: PathConfig) extends Bundle {
   val faceForwardNormal = Output(SInt((NumberFormats.normalBits + 1).W))
   val dir               = Output(SInt((formats.shadeBits + 1).W))
 
-  val origin   = Output(SInt(ShaderFormats.originBits(config).W)) // from cycle 6 on: the point, off the surface
+  val origin = Output(SInt(ShaderFormats.originBits(config).W)) // from cycle 6 on: the point, off the surface
   val normal   = Output(SInt(formats.narrowBits.W)) // from cycle 7 on: the shading normal, scaled to `shadeBits` bits
-  val isSmooth = Output(Bool()) // in cycles 7 and 8: the normal is the smooth one
+  val isSmooth = Output(Bool())                     // in cycles 7 and 8: the normal is the smooth one
 }
 
 /** The point and the shading normal of a hit: docs/numbers.md, 5.1 to 5.3 and 5.5. A hit every three cycles, by three

@@ -134,7 +134,7 @@ class BoxDatapath(config: TraversalConfig, lanes: Int) extends Module {
   /** The third slab waits while the others are shifted. */
   private def held(z: Seq[SInt]): Seq[SInt] = if (slice.isEnabled) byLane(z, stage = 3)(slice(_, _)) else z
 
-  private def least(a: SInt, b: SInt): SInt    = Mux(a < b, a, b)
+  private def least(a:    SInt, b: SInt): SInt = Mux(a < b, a, b)
   private def greatest(a: SInt, b: SInt): SInt = Mux(a < b, b, a)
 }
 

@@ -101,7 +101,7 @@ final class NodeStage(config: TraversalConfig) extends Module {
     for (axis <- 0 until 2) {
       val whole = numbers.reciprocalDigits - numbers.stepFraction
       val short = if (whole >= 0) node.reciprocal(axis) >> whole else (node.reciprocal(axis) << -whole).asUInt
-      val step = Rounding.narrow(short >> scales(axis)._1, numbers.stepFraction + 1)
+      val step  = Rounding.narrow(short >> scales(axis)._1, numbers.stepFraction + 1)
       steps.down(axis) := step
       steps.up(axis)   := step +& 1.U
     }

@@ -42,19 +42,19 @@ final class HitTable(config: TraversalConfig) extends Module {
 
   val io = IO(new HitTableIO(config))
 
-  private val closestT = Reg(Vec(contexts, new Fixed(formats.grid)))
-  private val ids      = Reg(Vec(contexts, UInt(RecordFormats.idBits(config).W)))
-  private val hasHit   = Reg(Vec(contexts, Bool()))
+  private val closestT           = Reg(Vec(contexts, new Fixed(formats.grid)))
+  private val ids                = Reg(Vec(contexts, UInt(RecordFormats.idBits(config).W)))
+  private val hasHit             = Reg(Vec(contexts, Bool()))
   private val hasTransmissiveHit = Reg(Vec(contexts, Bool())) // the shadow ray has hit a transmissive triangle
   private val details            = ContextTable(config, new HitDetails(config))
 
   // Compare the result with the closest hit so far
-  private val compared = TimingSlice.extra(config)
-  private val context  = io.result.bits.context
-  private val hit      = io.result.bits.hit
-  private val best     = closestT(context)
-  private val hadHit   = compared(hasHit(context))
-  private val isTied   = compared(hit.t.integer === best.integer) && hadHit && compared(hit.id < ids(context))
+  private val compared       = TimingSlice.extra(config)
+  private val context        = io.result.bits.context
+  private val hit            = io.result.bits.hit
+  private val best           = closestT(context)
+  private val hadHit         = compared(hasHit(context))
+  private val isTied         = compared(hit.t.integer === best.integer) && hadHit && compared(hit.id < ids(context))
   private val isCloser       = io.result.bits.isHit && (compared(hit.t < best) || (isTied && !io.isShadow))
   private val isTransmissive = io.isShadow && io.result.bits.isTransmissive && config.frame.hasBounces.B
   io.hasHitNow := hadHit || (isCloser && !isTransmissive)

@@ -61,8 +61,8 @@ final class RecordGrant(config: PartConfig) extends Module {
   io.grantNext.bits  := next.bits.context
   io.grantOH         := VecInit(grantOH)
   io.grantsNodeNext  := kindOH(RecordKind.node.litValue.toInt)
-  io.granted.valid    := RegNext(next.valid, false.B)
-  io.granted.bits     := RegEnable(next.bits, next.valid)
+  io.granted.valid   := RegNext(next.valid, false.B)
+  io.granted.bits    := RegEnable(next.bits, next.valid)
 }
 
 private object RecordGrant {

@@ -37,7 +37,7 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
 
 /** Decides which record each ray visits next: BoxUnit and TraversalStack, or LinearScan without a BVH. */
 final class Traversal(config: TraversalConfig) extends Module {
-  val io = IO(new TraversalIO(config))
+  val io             = IO(new TraversalIO(config))
   private val resume = Queue(io.resume, config.contexts) // contexts are tokens, so this queue never overflows
 
   if (config.geometry.bvh) {

@@ -22,7 +22,7 @@ class RecordGrantSpec extends AnyFlatSpec with ChiselScalatestTester {
     test(new RecordGrant(config)) { dut =>
       val random   = new Random(7)
       val priority = Seq(RecordKind.triangles, RecordKind.attributes, RecordKind.node)
-      var granted   = Option.empty[(Int, RecordKind.Type, Int)]
+      var granted  = Option.empty[(Int, RecordKind.Type, Int)]
       for (_ <- 0 until 1000) {
         val ready   = Seq.fill(contexts)(random.nextInt(3) == 0)
         val kinds   = Seq.fill(contexts)(RecordKind.all(random.nextInt(3)))
