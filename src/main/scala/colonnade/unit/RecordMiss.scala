@@ -29,8 +29,8 @@ private[unit] final class RecordMiss(
 
   // Choose a context
   private val isExpected = fetches.zip(matches).map { case (fetch, matches) =>
-    val isEnabled = buffers.zip(matches).map { case (buffer, isMatch) => isMatch && buffer.state =/= BufferState.empty }
-    Mux(snooping, fetch.isExpected || isEnabled.reduce(_ || _), fetch.isIssued)
+    val isPresent = buffers.zip(matches).map { case (buffer, isMatch) => isMatch && buffer.state =/= BufferState.empty }
+    Mux(snooping, fetch.isExpected || isPresent.reduce(_ || _), fetch.isIssued)
   }
   private def misses(fetch: ContextFetch, isExpected: Bool): Bool =
     fetch.isPending && !isExpected && !fetch.awaitsFill.getOrElse(false.B)
