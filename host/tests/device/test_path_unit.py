@@ -95,7 +95,7 @@ def test_a_frame_after_an_abort_is_right() -> None:
         scene = replace(TEAPOT, material=material, more_lights=LIGHTS)
         settings = frame_registers(scene, image.header, design.manifest, 17, 9)
         expected = render_model(design.manifest, image, settings)
-        limits = range(30, 350, 20)
+        limits = range(30, 270, 15)
         registers = [frame for limit in limits for frame in (settings | {"frame.watchdogCycles": limit}, settings)]
         frames = render_rtl(design, image, registers, Stalls(percent=20, memory_percent=40, seed=3)).frames
         aborted = [frame.errors == ["watchdog"] for frame in frames[::2]]
