@@ -76,7 +76,7 @@ def world(folder: Path) -> None:
     environment = folder / "room"
     environment.mkdir()
     (environment / "meta.json").write_text(json.dumps(meta()))
-    for name, colour in (("albedo.png", (128, 128, 128)), ("normal.png", (128, 128, 255))):
+    for name, colour in (("albedo.png", (128, 128, 128)), ("normal.png", (128, 128, 0))):
         Image.new("RGB", (64, 48), colour).save(environment / name)
     np.save(environment / "depth.npy", np.full((48, 64), 2.0))
     with inside(folder):
@@ -86,7 +86,7 @@ def world(folder: Path) -> None:
 
 def meta(**changes: Any) -> dict[str, Any]:
     """The content of a room's ``meta.json``."""
-    pose = [[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 1.5], [0.0, 0.0, -1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    pose = [[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.5], [0.0, 0.0, -1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
     return {"fx": 60.0, "fy": 60.0, "cx": 32.0, "cy": 24.0, "cam_to_world": pose} | changes
 
 

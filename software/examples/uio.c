@@ -1,9 +1,10 @@
 /* Renders a frame under Linux by UIO: map 0 is the registers, map 1 a piece of memory that the device may use.
  *
  * usage: uio /dev/uio0 IMAGE FRAME OUTPUT
+ *        uio /dev/uio0 IMAGE VIEW OUTPUT X Y Z     moves the object by whole millimetres
  *
- * IMAGE and FRAME come from `colonnade pack`; OUTPUT receives lines of XRGB8888. colonnade_design.h comes from `colonnade
- * registers`, for the design in the chip. */
+ * IMAGE, FRAME and VIEW come from `colonnade pack`; OUTPUT receives lines of XRGB8888. colonnade_design.h comes from
+ * `colonnade registers`, for the design in the chip. */
 #define _POSIX_C_SOURCE 200809L
 
 #include <fcntl.h>
@@ -16,6 +17,7 @@
 
 #include "colonnade.h"
 #include "colonnade_design.h"
+#include "colonnade_view.h"
 
 enum { REGISTER_BYTES = 0x10000, ATTEMPTS = 100 };
 
@@ -70,8 +72,27 @@ static size_t read_file(const char *name, uint8_t *to, size_t most) {
     return bytes;
 }
 
+/* The frame of a view file, with the object moved by whole millimetres; or a frame file. */
+static struct colonnade_frame read_frame(char **argv, bool is_moved) {
+    static uint8_t file[65536], writes[8 * 4096];
+    static struct colonnade_view view;
+    struct colonnade_frame frame;
+    const size_t bytes = read_file(argv[3], file, sizeof file);
+    if (!is_moved) {
+        check(argv[3], colonnade_open_frame(&colonnade_design, file, bytes, &frame));
+        return frame;
+    }
+    check(argv[3], colonnade_view_open(&view, &colonnade_design, file, bytes));
+    struct colonnade_pose pose = view.object;
+    for (int axis = 0; axis < 3; ++axis)
+        pose.position[axis] += strtol(argv[5 + axis], NULL, 10) * (INT64_C(1) << 32) / 1000;
+    check("pose", colonnade_view_set_object(&view, &pose));
+    check("pose", colonnade_view_frame(&view, writes, sizeof writes / 8, &frame));
+    return frame;
+}
+
 int main(int argc, char **argv) {
-    if (argc != 5) fail("usage", "uio /dev/uio0 IMAGE FRAME OUTPUT");
+    if (argc != 5 && argc != 8) fail("usage", "uio /dev/uio0 IMAGE FRAME OUTPUT, or IMAGE VIEW OUTPUT X Y Z millimetres");
     struct uio uio = {NULL, open(argv[1], O_RDWR)};
     if (uio.file < 0) fail(argv[1], "cannot be opened");
     const uint64_t base = memory_number(argv[1], "addr"), size = memory_number(argv[1], "size");
@@ -87,9 +108,7 @@ int main(int argc, char **argv) {
     const struct colonnade_image image = {memory, bytes, base, {base, base + size}};
     check(argv[2], colonnade_load(&device, &image, ATTEMPTS));
 
-    static uint8_t file[65536];
-    struct colonnade_frame frame;
-    check(argv[3], colonnade_open_frame(&colonnade_design, file, read_file(argv[3], file, sizeof file), &frame));
+    const struct colonnade_frame frame = read_frame(argv, argc == 8);
     check(argv[3], colonnade_set_frame(&device, &frame));
 
     /* The image is not needed any more: the framebuffer takes its place */

@@ -35,7 +35,14 @@ enum colonnade_error {
     COLONNADE_BAD_LENGTH,      /* an image's sections do not fill it */
     COLONNADE_NO_PHOTO,        /* the device cannot composite a photo */
     COLONNADE_FRAME_INVALID,   /* the device has an error bit: colonnade_device_errors */
-    COLONNADE_NO_SCENE         /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not */
+    COLONNADE_NO_SCENE,        /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not */
+    /* Of colonnade_view.h */
+    COLONNADE_NOT_A_VIEW, /* no view file, or one of another version, or numbers that no design has */
+    COLONNADE_BAD_POSE,   /* a rotation is none, or a position is beyond 2^28 metres */
+    COLONNADE_BAD_LENS,   /* a focal length, a principal point or a size out of bounds */
+    COLONNADE_TOO_FAR,    /* camera or light is out of the hardware's range, or the object is too small for the room */
+    COLONNADE_MAP_CAMERA, /* in a room the camera is that of its maps */
+    COLONNADE_NO_LIGHT    /* the scene has no such light */
 };
 
 /* Bits of `interrupt.status` and `interrupt.enable`. */

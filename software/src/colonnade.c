@@ -226,7 +226,8 @@ const char *colonnade_error_name(enum colonnade_error error) {
         "ok",          "noDevice",    "unknownVersion", "otherFormat", "notAnImage", "notAFrame",
         "truncated",   "tooLarge",    "misaligned",     "badRegister", "badFormat",  "noFrame",
         "busy",        "timeout",     "busResponse",    "badSection",  "badLength",  "noPhoto",
-        "frameInvalid", "noScene",
+        "frameInvalid", "noScene",    "notAView",       "badPose",     "badLens",    "tooFar",
+        "mapCamera",   "noLight",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }

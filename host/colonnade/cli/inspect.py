@@ -6,7 +6,16 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import FILE, dists_option, echo, finish, json_option, require_outputs
+from colonnade.cli.options import (
+    FILE,
+    dists_option,
+    echo,
+    encoder_option,
+    finish,
+    json_option,
+    require_outputs,
+)
+from colonnade.maps.encoders import Encoder
 
 
 @click.command(short_help="Describe a scene image, or the encoded maps of a room.")
@@ -25,6 +34,7 @@ from colonnade.cli.options import FILE, dists_option, echo, finish, json_option,
     show_default=True,
     help="Encoding of the room's albedo and normal maps.",
 )
+@encoder_option
 @click.option(
     "--output", type=FILE, metavar="DIR", help="Write pictures of the room's maps: source, decoded, difference."
 )
@@ -36,6 +46,7 @@ def inspect(
     overrides: tuple[str, ...],
     background: Path | None,
     encoding: str,
+    encoder: Encoder,
     output: Path | None,
     no_dists: bool,
     json_file: Path | None,
@@ -51,11 +62,13 @@ def inspect(
         raise click.UsageError("--set needs --config", context)
     if (directory is None) == (background is None):
         raise click.UsageError("give either the folder of a scene image or --background DIR", context)
+    if encoder == "live" and (background is None or encoding == "slic"):
+        raise click.UsageError("--encoder live needs --background and the encoding twoLevel", context)
     if output is not None and background is None:
         raise click.UsageError("--output needs --background", context)
     require_outputs(json_file, folders=[output])
     if background is not None:
-        _inspect_environment(background, encoding, output, not no_dists, json_file)
+        _inspect_environment(background, encoding, encoder, output, not no_dists, json_file)
     elif directory is not None:
         _inspect_image(directory, config, overrides, json_file)
 
@@ -75,7 +88,12 @@ def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ..
 
 
 def _inspect_environment(
-    background: Path, encoding: str, output: Path | None, with_dists: bool, json_file: Path | None
+    background: Path,
+    encoding: str,
+    encoder: Encoder,
+    output: Path | None,
+    with_dists: bool,
+    json_file: Path | None,
 ) -> None:
     from colonnade.common import progress
     from colonnade.common.extras import require_extra
@@ -90,7 +108,8 @@ def _inspect_environment(
     for note in environment.notes:
         echo(f"colonnade: note: {environment.name}: {note}", err=True)
     with progress.for_terminal().step("encoding the room"):
-        image = encoded_environment(environment, AttributeLayout(environment.width, environment.height, encoding))
+        layout = AttributeLayout(environment.width, environment.height, encoding)
+        image = encoded_environment(environment, layout, encoder=encoder)
         report = measure(environment, image, with_dists)
     for line in report_lines(report):
         echo(line)

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from colonnade import __version__
+from colonnade.cli.capture import capture
 from colonnade.cli.compare import compare
 from colonnade.cli.generate import generate
 from colonnade.cli.inspect import inspect
@@ -149,5 +150,5 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, registers, pack, inspect, light, render, compare):
+for command in (generate, registers, pack, inspect, capture, light, render, compare):
     cli.add_command(command)

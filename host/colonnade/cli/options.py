@@ -11,6 +11,7 @@ import click
 
 from colonnade.common.errors import UserError
 from colonnade.common.terminal_text import plain
+from colonnade.maps.encoders import ENCODERS
 
 if TYPE_CHECKING:
     _NumberType = click.ParamType[float]
@@ -114,6 +115,18 @@ def background_option(command: Command) -> Command:
     """Add ``--background``, which replaces the scene's background by a room."""
     return click.option(
         "--background", type=FILE, metavar="DIR", help="Replace the scene's background by the room in this folder."
+    )(command)
+
+
+def encoder_option(command: Command) -> Command:
+    """Add ``--encoder``."""
+    return click.option(
+        "--encoder",
+        type=click.Choice(ENCODERS),
+        default="offline",
+        show_default=True,
+        help="Encoder of a room's maps and of textures. offline: the best maps; live: the encoder of a moving camera,"
+        " much faster.",
     )(command)
 
 

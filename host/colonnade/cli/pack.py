@@ -11,6 +11,7 @@ from colonnade.cli.options import (
     background_option,
     configuration_options,
     echo,
+    encoder_option,
     finish,
     json_option,
     mesh_option,
@@ -18,6 +19,7 @@ from colonnade.cli.options import (
     size_option,
     strict_option,
 )
+from colonnade.maps.encoders import Encoder
 
 
 @click.command(short_help="Pack a scene into the image that the hardware loads.")
@@ -25,6 +27,7 @@ from colonnade.cli.options import (
 @configuration_options
 @mesh_option
 @background_option
+@encoder_option
 @click.option(
     "--output", type=FILE, required=True, metavar="DIR", help="Folder for the scene image; created if missing."
 )
@@ -36,7 +39,8 @@ from colonnade.cli.options import (
     help="Also write the records as a design with a cache reads them from DRAM.",
 )
 @click.option("--frame-file", type=FILE, metavar="FILE", help="Also write the registers of a frame, for a driver.")
-@size_option("Frame size of --frame-file, e.g. 640x480.  [default: that of the scene]")
+@click.option("--view-file", type=FILE, metavar="FILE", help="Also write what a processor needs to move the object.")
+@size_option("Frame size of --frame-file and --view-file, e.g. 640x480.  [default: that of the scene]")
 @strict_option
 @json_option
 def pack(
@@ -45,16 +49,18 @@ def pack(
     overrides: tuple[str, ...],
     mesh: str | None,
     background: Path | None,
+    encoder: Encoder,
     output: Path,
     device_image: Path | None,
     dram_image: Path | None,
     frame_file: Path | None,
+    view_file: Path | None,
     size: str | None,
     json_file: Path | None,
 ) -> None:
     """Pack SCENE, a TOML file, for one configuration, and print its use of each memory."""
-    if size is not None and frame_file is None:
-        raise click.UsageError("--size is that of --frame-file", click.get_current_context())
+    if size is not None and frame_file is None and view_file is None:
+        raise click.UsageError("--size is that of --frame-file and --view-file", click.get_current_context())
 
     from colonnade.common import progress
     from colonnade.common.atomic_files import replacing
@@ -73,7 +79,7 @@ def pack(
 
     file = image_file(output)
     check_image_file(file)
-    require_outputs(json_file, device_image, dram_image, frame_file, folders=[file.parent])
+    require_outputs(json_file, device_image, dram_image, frame_file, view_file, folders=[file.parent])
     declare_output(file)
     terminal = progress.for_terminal()
     pixels = parse_size(size) if size is not None else None
@@ -86,7 +92,7 @@ def pack(
     if dram_image is not None:
         line_layout(manifest)
     with terminal.step("packing"):
-        prepared = DeviceScene.of(described, manifest, progress=terminal)
+        prepared = DeviceScene.of(described, manifest, encoder=encoder, progress=terminal)
         image = prepared.image
         # Everything is encoded before anything is written: a refusal leaves no file
         others: list[tuple[str, Path, bytes]] = []
@@ -94,15 +100,17 @@ def pack(
             others.append(("for a bus", device_image, encode_device_image(image, manifest)))
         if dram_image is not None:
             others.append(("for DRAM", dram_image, encode_dram_image(image, manifest)))
+        width, height = pixels or (described.frame.width, described.frame.height)
         if frame_file is not None:
-            width, height = pixels or (described.frame.width, described.frame.height)
             others.append(("a frame", frame_file, encode_frame_file(prepared.registers((width, height)), manifest)))
+        if view_file is not None:
+            others.append(("a view", view_file, prepared.view_file((width, height), composited=True)))
     image.save(output)
     echo(f"packed      {file}")
     for title, path, content in others:
         with replacing(path) as stream:
             stream.write(content)
-        size_of_frame = f", {width}x{height}" if path == frame_file else ""
+        size_of_frame = f", {width}x{height}" if path in (frame_file, view_file) else ""
         echo(f"{title:<11} {path}{size_of_frame}")
     print_report(image.header, manifest, echo)
     finish({"file": str(file), **describe(image), "use": memory_use(image.header, manifest)}, json_file)

@@ -12,6 +12,7 @@ from colonnade.cli.options import (
     background_option,
     configuration_options,
     echo,
+    encoder_option,
     finish,
     json_option,
     mesh_option,
@@ -21,6 +22,7 @@ from colonnade.cli.options import (
     strict_option,
 )
 from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
+from colonnade.maps.encoders import Encoder
 
 if TYPE_CHECKING:
     from colonnade.render.report import FrameReport
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
 @size_option("Frame size in pixels, e.g. 640x480.  [default: that of the scene]")
 @mesh_option
 @background_option
+@encoder_option
 @click.option("--relit", is_flag=True, help="Show the room shaded by the scene's lights instead of its photo.")
 @click.option(
     "--truth",
@@ -78,6 +81,7 @@ def render(
     size: str | None,
     mesh: str | None,
     background: Path | None,
+    encoder: Encoder,
     relit: bool,
     truth: Path | None,
     frames: int | None,
@@ -124,6 +128,7 @@ def render(
         samples=samples,
         mesh=mesh,
         background=background,
+        encoder=encoder,
         hits=hits_file is not None,
         relit=relit,
         truth=truth,

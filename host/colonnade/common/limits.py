@@ -22,6 +22,14 @@ MAX_WAVEFORM_PIXELS = 4096
 #: Points of a study.
 MAX_DESIGNS = 1_000
 
+#: Frames of a capture, and pixels of its depth.
+MAX_CAPTURE_FRAMES = 100_000
+MAX_DEPTH_PIXELS = 1 << 22
+
+#: Bytes of a text file of a capture, and of a picture or stream in it.
+MAX_CAPTURE_TEXT_BYTES = 1 << 25
+MAX_MEMBER_BYTES = 1 << 26
+
 #: Bytes of a scene, a configuration or a room's ``meta.json``.
 MAX_TEXT_BYTES = 1 << 20
 #: Bytes of a picture, array or hits file.

@@ -6,6 +6,7 @@ import contextlib
 import re
 import resource
 import signal
+from pathlib import Path
 
 from colonnade.common.errors import UserError
 
@@ -69,6 +70,21 @@ def reached(status: int, text: str) -> str | None:
     if status < 0 and -status in _SIGNALS:
         return _SIGNALS[signal.Signals(-status)]
     return next((limit for sign, limit in _SIGNS if sign.search(text)), None) if status else None
+
+
+def limit_this_process(memory: int, seconds: int) -> None:
+    """Limit this process, where the system can: memory, bytes beside what it has now, and processor time."""
+    pages = Path("/proc/self/statm")
+    own = int(pages.read_text().split()[0]) * resource.getpagesize() if pages.exists() else 0
+    for kind, limit in (
+        (resource.RLIMIT_AS, own + memory),
+        (resource.RLIMIT_CPU, seconds),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(kind, (limit, limit))
 
 
 def _is_below(limit: int, needed: int) -> bool:

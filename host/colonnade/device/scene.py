@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from colonnade.common.progress import QUIET, Progress
 from colonnade.maps.encoded import EncodedEnvironment, check_layout
+from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import frame_registers
+from colonnade.registers.view_file import view_file
 from colonnade.scene.cameras import environment_camera
 from colonnade.scene.lit_room import device_room, lit_room
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
-from colonnade.scene.view import View, make_view, with_overrides
+from colonnade.scene.view import View, make_view, place, with_overrides
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 
@@ -48,6 +50,7 @@ class DeviceScene:
         *,
         size: tuple[int, int] | None = None,
         relit: bool = False,
+        encoder: Encoder = "offline",
         progress: Progress = QUIET,
     ) -> DeviceScene:
         """Load a scene's room and mesh, light them, encode the room's maps and pack the mesh.
@@ -58,6 +61,7 @@ class DeviceScene:
             mesh: A mesh that replaces the scene's own, which is not read.
             size: Width and height of frames, pixels; a size that the room cannot have is refused before long work.
             relit: Frames show the room under the scene's lights, not its photo.
+            encoder: Of the room's maps and of textures.
             progress: Shows the fit of lights, and notes what was fitted.
 
         Raises:
@@ -71,9 +75,10 @@ class DeviceScene:
             if size is not None:
                 environment_camera(room, *size)
         lit = lit_room(scene, room, mesh.extent, int(manifest.config["frame"]["lights"]), relit, progress)
-        maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest)
+        maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest, encoder)
         mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
-        image = pack(mesh, manifest, with_overrides(mesh.materials, lit.scene.material), lit.scene.headroom)
+        materials = with_overrides(mesh.materials, lit.scene.material)
+        image = pack(mesh, manifest, materials, lit.scene.headroom, encoder)
         if maps is not None:
             image = with_environment(image, maps, manifest)
         return cls(lit.scene, manifest, image, maps)
@@ -100,6 +105,13 @@ class DeviceScene:
         room = self.environment
         shows_room = not composited or room is None or room.photo is None
         return frame_registers(scene or self.scene, self.image.header, self.manifest, *size, self.maps, shows_room)
+
+    def view_file(self, size: tuple[int, int], *, composited: bool = False) -> bytes:
+        """The file with which a processor computes frames of other poses (`view_file`); arguments as in `registers`."""
+        placed = place(self.scene, self.image.header.extent, *size, self.environment)
+        registers = self.registers(size, composited=composited)
+        occlusion = self.scene.background.occlusion
+        return view_file(placed, registers, size, self.image.header, self.manifest, self.maps, occlusion)
 
     def view(self, size: tuple[int, int], scene: Scene | None = None) -> View:
         """The view of a frame; arguments as in `registers`."""

@@ -23,8 +23,7 @@ _AXES_TOLERANCE = 1e-3
 def read_camera(data: dict[str, Any], file: Path) -> EnvironmentCamera:
     """Read focal lengths, principal point and pose.
 
-    ``cam_to_world`` is the 4x4 or 3x4 pose of a camera with x left, y up, z forward, as in Mitsuba; view space negates
-    the first two axes.
+    ``cam_to_world`` is 4x4 or 3x4: from view space, x right, y down, z forward, to the world.
 
     Raises:
         UserError: A value is missing or invalid.
@@ -36,8 +35,7 @@ def read_camera(data: dict[str, Any], file: Path) -> EnvironmentCamera:
         if values[key] < _MIN_FOCAL:
             raise UserError(f"{file}: {key} is {values[key]:g}, a focal length must be at least {_MIN_FOCAL:g}")
     pose = _pose(data, file)
-    to_world = pose[:3] * np.array([-1.0, -1.0, 1.0, 1.0])
-    return EnvironmentCamera(values["fx"], values["fy"], values["cx"], values["cy"], to_world)
+    return EnvironmentCamera(values["fx"], values["fy"], values["cx"], values["cy"], pose[:3])
 
 
 def check_size(data: dict[str, Any], size: tuple[int, int], file: Path, map_file: Path) -> None:
@@ -62,7 +60,7 @@ def _number(data: dict[str, Any], key: str, file: Path) -> float:
 def _pose(data: dict[str, Any], file: Path) -> NDArray[np.float64]:
     """Read and check the pose, float64 [3 or 4, 4]: a right-handed rotation and a position."""
     if "cam_to_world" not in data:
-        raise UserError(f"{file} lacks cam_to_world: the camera's 4x4 pose, x left, y up, z forward")
+        raise UserError(f"{file} lacks cam_to_world: the camera's 4x4 pose, x right, y down, z forward")
     try:
         pose = np.array(data["cam_to_world"], dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

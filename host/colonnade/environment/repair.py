@@ -17,7 +17,7 @@ _LENGTH_TOLERANCE = 0.1
 _MAX_BAD_NORMALS = 0.05
 _MAX_FACING_AWAY = 0.1
 #: Largest fraction of pixels without depth.
-_MAX_HOLES = 0.5
+MAX_HOLES = 0.5
 
 
 def repair_normals(
@@ -45,7 +45,7 @@ def repair_normals(
         )
     notes = []
     if bad.any():
-        normals = _filled(normals, bad)
+        normals = filled(normals, bad)
         lengths = np.linalg.norm(normals, axis=2)
         notes.append(f"{np.count_nonzero(bad):,} normals were not unit vectors and were replaced by their neighbours'")
     normals = normals / lengths[..., np.newaxis]
@@ -53,7 +53,7 @@ def repair_normals(
     if away.mean() > _MAX_FACING_AWAY:
         raise UserError(
             f"{file}: {np.count_nonzero(away):,} of {away.size:,} normals face away from the camera: they must be in"
-            " its space, x right, y up, z towards the viewer"
+            " its axes, x right, y down, z forward (a map with y up and z towards the viewer: invert green and blue)"
         )
     return normals, notes
 
@@ -71,21 +71,26 @@ def repair_depth(depth: NDArray[np.float64], file: Path) -> tuple[NDArray[np.flo
     Raises:
         UserError: Too many pixels are holes.
     """
-    holes = ~(np.isfinite(depth) & (depth > 0))
+    holes = holes_of(depth)
     count = int(np.count_nonzero(holes))
-    if count > _MAX_HOLES * holes.size:
+    if count > MAX_HOLES * holes.size:
         raise UserError(
             f"{file}: {count:,} of {holes.size:,} pixels have no depth (zero, negative or not finite): give a denser"
             " map, or none, to estimate depth from the normals"
         )
     if not count:
         return depth, []
-    return _filled(depth, holes), [
+    return filled(depth, holes), [
         f"{count:,} of {holes.size:,} pixels had no depth and were filled from their neighbours"
     ]
 
 
-def _filled(values: NDArray[np.float64], holes: NDArray[np.bool_]) -> NDArray[np.float64]:
+def holes_of(depth: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Pixels without depth: NaN, infinite, zero or negative, bool [height, width]."""
+    return np.asarray(~(np.isfinite(depth) & (depth > 0)))
+
+
+def filled(values: NDArray[np.float64], holes: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Copy ``values`` [height, width, ...] with each hole replaced by the nearest other pixel."""
     nearest = ndimage.distance_transform_edt(holes, return_distances=False, return_indices=True)
     filled: NDArray[np.float64] = values[tuple(nearest)]

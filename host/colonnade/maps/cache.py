@@ -13,17 +13,27 @@ import numpy as np
 from colonnade.common import cache
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.environment.model import Environment
+from colonnade.maps.encoders import Encoder
 from colonnade.maps.image import AttributeImage, encode_environment
 from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.live import encode_still
 
 #: File name in a cache entry.
 FILE = "room.npz"
 
 
 def encoded_environment(
-    environment: Environment, layout: AttributeLayout, folder: Path | None = None
+    environment: Environment, layout: AttributeLayout, folder: Path | None = None, encoder: Encoder = "offline"
 ) -> AttributeImage:
-    """Encode an environment, or take it from the cache ``folder``, by default the project's."""
+    """Encode an environment, or take it from the cache ``folder``, by default the project's.
+
+    The maps of the live encoder are not cached.
+
+    Raises:
+        UserError: The live encoder does not support the layout.
+    """
+    if encoder == "live":
+        return encode_still(environment, layout)
     rooms = folder or cache_directory(project_root()) / "rooms"
 
     def make(entry: Path) -> None:

@@ -10,6 +10,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
 from colonnade.maps.cache import encoded_environment
+from colonnade.maps.encoders import Encoder
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.layout import AttributeLayout
 
@@ -31,14 +32,15 @@ class EncodedEnvironment:
         return EncodedEnvironment.of(load_environment(folder), manifest)
 
     @staticmethod
-    def of(environment: Environment, manifest: Manifest) -> EncodedEnvironment:
+    def of(environment: Environment, manifest: Manifest, encoder: Encoder = "offline") -> EncodedEnvironment:
         """Encode a room's maps for a design.
 
         Raises:
             UserError: The design has no memory for maps of this size.
         """
         check_layout(environment, manifest)
-        return EncodedEnvironment(environment, encoded_environment(environment, layout_of(manifest)))
+        image = encoded_environment(environment, layout_of(manifest), encoder=encoder)
+        return EncodedEnvironment(environment, image)
 
 
 def check_layout(environment: Environment, manifest: Manifest) -> None:

@@ -60,8 +60,8 @@ def _grey(values: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 def _normal_map(normals: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Draw normals in the file format: x right, y up, z towards the viewer."""
-    return _levels(normals * np.array([0.5, -0.5, -0.5]) + 0.5)
+    """Draw normals as `normal.png` stores them."""
+    return _levels(normals * 0.5 + 0.5)
 
 
 def _coloured(ids: NDArray[np.int64]) -> NDArray[np.uint8]:

@@ -7,20 +7,18 @@ limits of both in proportion to the streams, and what ends it is one line of an 
 from __future__ import annotations
 
 import io
-import resource
 import struct
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.errors import UserError
+from colonnade.common.machine_limits import limit_this_process
 
 #: Memory of the process beside its libraries, bytes, more for each byte of the streams, and the most. A vertex with a
 #: normal, a texture coordinate and a colour takes 120 bytes, of 4 to 20 in the stream.
@@ -77,28 +75,13 @@ def decode_draco(streams: Sequence[bytes]) -> list[DracoMesh]:
     return [DracoMesh(each.pop("faces"), {int(key): values for key, values in each.items()}) for each in found]
 
 
-def _limit(memory: int, seconds: int) -> None:
-    """Limit this process, where the system can; memory is beside what it has now."""
-    pages = Path("/proc/self/statm")
-    own = int(pages.read_text().split()[0]) * resource.getpagesize() if pages.exists() else 0
-    for kind, limit in (
-        (resource.RLIMIT_AS, own + memory),
-        (resource.RLIMIT_CPU, seconds),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        hard = resource.getrlimit(kind)[1]
-        limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
-        with suppress(OSError, ValueError):
-            resource.setrlimit(kind, (limit, limit))
-
-
 def _main() -> None:
     """Decode the streams of standard input, each after its length, to an NPZ file on standard output."""
     import DracoPy
 
     memory, seconds = map(int, sys.argv[1:])
     data = sys.stdin.buffer.read()
-    _limit(memory, seconds)
+    limit_this_process(memory, seconds)
     try:
         arrays: dict[str, npt.NDArray[Any]] = {}
         at = number = 0

@@ -81,6 +81,8 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
         _check_waveform(request, size)
     if request.truth is not None and request.backend != "reference":
         raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
+    if request.encoder == "live" and request.backend == "reference":
+        raise UserError("--encoder is for the rtl and the model backend: the reference sees the full maps")
     if request.hits and request.backend == "rtl":
         from colonnade.device.verilator import require_hits
 
@@ -106,7 +108,9 @@ def _device_frames(
     """The frames of the model or the RTL."""
     begun = time.perf_counter()
     with progress.step("packing the scene"):
-        prepared = DeviceScene.of(scene, manifest, size=size, relit=request.relit, progress=progress)
+        prepared = DeviceScene.of(
+            scene, manifest, size=size, relit=request.relit, encoder=request.encoder, progress=progress
+        )
         if (line := coarse_line(prepared.image.header)) is not None:
             progress.note(line)
         motion = scene.motion

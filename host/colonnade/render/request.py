@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from colonnade.maps.encoders import Encoder
+
 Backend = Literal["rtl", "model", "reference"]
 BACKENDS: tuple[Backend, ...] = get_args(Backend)
 
@@ -29,6 +31,7 @@ class RenderRequest:
         relit: Whether the scene's lights shade the room even if it has a photo.
         truth: Mesh file of the room's real geometry, in its world space; for the reference.
         waveform: VCD file for the signals of one small RTL frame.
+        encoder: Of the room's maps and of textures.
     """
 
     scene: Path
@@ -44,3 +47,4 @@ class RenderRequest:
     relit: bool = False
     truth: Path | None = None
     waveform: Path | None = None
+    encoder: Encoder = "offline"

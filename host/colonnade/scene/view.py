@@ -27,12 +27,12 @@ _UP = (0.0, 1.0, 0.0)
 
 @dataclass(frozen=True)
 class PlacedLight:
-    """A point light in mesh space.
+    """A point light, in mesh space or in world space.
 
     Attributes:
         position: float64 [3].
         colour: float64 [3], linear.
-        reach: Distance of that intensity, mesh units; None for constant intensity.
+        reach: Distance of that intensity; None for constant intensity.
     """
 
     position: Floats
@@ -99,25 +99,26 @@ class View:
         return np.array(self.materials[0].albedo)
 
 
-def make_view(
-    scene: Scene,
-    extent: Extent,
-    width: int,
-    height: int,
-    materials: tuple[MeshMaterial, ...] = (PLAIN,),
-    environment: Environment | None = None,
-) -> View:
-    """Make the view of a scene at its motion's progress and its sample.
+@dataclass(frozen=True)
+class PlacedScene:
+    """Object, camera and lights of one frame in world space.
+
+    Attributes:
+        pose: The object's pose.
+        camera: The camera; its corner is that of the sample's rays.
+        lights: At least one; reach in world units.
+    """
+
+    pose: Pose
+    camera: WorldCamera
+    lights: tuple[PlacedLight, ...]
+
+
+def place(scene: Scene, extent: Extent, width: int, height: int, environment: Environment | None = None) -> PlacedScene:
+    """Place object, camera and lights of a scene at its motion's progress and its sample.
 
     Cameras and lights that are relative to the object keep their positions from the start of the motion.
-
-    Args:
-        scene: What to render.
-        extent: Bounds of the mesh (`Mesh.extent`, or that of an image's header).
-        width: Width of the frame, pixels.
-        height: Height of the frame, pixels.
-        materials: Materials of the mesh; the scene's values override them.
-        environment: The room of `scene.background`, whose camera is then used.
+    Arguments are as in `make_view`.
     """
     pose = object_pose(scene, extent, environment)
     start = object_pose(scene.at(0.0), extent, environment)
@@ -128,17 +129,47 @@ def make_view(
         camera = scene_camera(scene.camera, start, extent, width, height)
         if scene.camera.aperture > 0:
             camera = through_lens(camera, scene.camera, centre, scene.sample.lens)
+    lights = tuple(
+        _placed(light, camera, centre, edge, scene.sample.light(index), scene.headroom)
+        for index, light in enumerate(scene.lights)
+    )
     shift_x, shift_y = scene.sample.pixel
+    corner = camera.corner + shift_x * camera.step_x + shift_y * camera.step_y
+    return PlacedScene(pose, replace(camera, corner=corner), lights)
+
+
+def make_view(
+    scene: Scene,
+    extent: Extent,
+    width: int,
+    height: int,
+    materials: tuple[MeshMaterial, ...] = (PLAIN,),
+    environment: Environment | None = None,
+) -> View:
+    """Make the view of a scene at its motion's progress and its sample.
+
+    Args:
+        scene: What to render.
+        extent: Bounds of the mesh (`Mesh.extent`, or that of an image's header).
+        width: Width of the frame, pixels.
+        height: Height of the frame, pixels.
+        materials: Materials of the mesh; the scene's values override them.
+        environment: The room of `scene.background`, whose camera is then used.
+    """
+    placed = place(scene, extent, width, height, environment)
+    pose, camera = placed.pose, placed.camera
     return View(
         width=width,
         height=height,
         origin=pose.to_mesh(camera.position),
-        direction=(camera.corner + shift_x * camera.step_x + shift_y * camera.step_y) @ pose.rotation,
+        direction=camera.corner @ pose.rotation,
         step_x=camera.step_x @ pose.rotation,
         step_y=camera.step_y @ pose.rotation,
         lights=tuple(
-            _placed(light, camera, centre, edge, pose, scene.sample.light(index), scene.headroom)
-            for index, light in enumerate(scene.lights)
+            PlacedLight(
+                pose.to_mesh(light.position), light.colour, None if light.reach is None else light.reach / pose.scale
+            )
+            for light in placed.lights
         ),
         materials=_dimmed(with_overrides(materials, scene.material), scene.headroom),
         ambient=np.array(scene.ambient.colour) * scene.headroom,
@@ -180,16 +211,15 @@ def _world_position(light: PointLight, camera: WorldCamera, centre: Floats, edge
 
 
 def _placed(
-    light: PointLight, camera: WorldCamera, centre: Floats, edge: float, pose: Pose, on_disc: Point, headroom: float
+    light: PointLight, camera: WorldCamera, centre: Floats, edge: float, on_disc: Point, headroom: float
 ) -> PlacedLight:
-    """A light in mesh space; of one with a radius the point ``on_disc``, of a disc that faces `centre`."""
+    """A light in world space; of one with a radius the point ``on_disc``, of a disc that faces `centre`."""
     position = _world_position(light, camera, centre, edge)
     if light.radius > 0:
         away = position - centre
         right, up, _ = camera_axes(away if away.any() else camera.axes[2], _UP)
         position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
-    reach = None if light.falloff is None else light.falloff / pose.scale
-    return PlacedLight(pose.to_mesh(position), np.array(light.colour) * headroom, reach)
+    return PlacedLight(position, np.array(light.colour) * headroom, light.falloff)
 
 
 def _dimmed(materials: tuple[MeshMaterial, ...], headroom: float) -> tuple[MeshMaterial, ...]:

@@ -18,6 +18,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Bytes, Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.design.manifest import Manifest
+from colonnade.maps.encoders import Encoder
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.palette import TEXTURE_SETTINGS, table_entries
@@ -77,7 +78,11 @@ def quantise(mesh: Mesh, vertex_bits: int) -> QuantisedMesh:
 
 
 def pack(
-    mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial] | None = None, headroom: float = 1.0
+    mesh: Mesh,
+    manifest: Manifest,
+    materials: Sequence[MeshMaterial] | None = None,
+    headroom: float = 1.0,
+    encoder: Encoder = "offline",
 ) -> SceneImage:
     """Pack a mesh into a scene image for a design.
 
@@ -86,6 +91,7 @@ def pack(
         manifest: The design's manifest.
         materials: Materials that replace the mesh's. The records only contain which faces are glass.
         headroom: Factor of the scene's lights, by which the corner colours of diffuse faces are darker.
+        encoder: Of textures.
 
     Raises:
         UserError: The mesh does not fit, or has corner colours or textures that the design lacks; the message names the
@@ -145,7 +151,7 @@ def pack(
         parts=mesh.parts,
     )
     image = SceneImage(header, np.concatenate(sections), mesh.source_faces[quantised.mesh_faces[bvh.order]])
-    return with_textures(image, atlas, len({material.texture for material in materials} - {None}), manifest)
+    return with_textures(image, atlas, len({material.texture for material in materials} - {None}), manifest, encoder)
 
 
 def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:

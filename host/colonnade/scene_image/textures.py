@@ -13,8 +13,10 @@ from colonnade.common.types import Floats
 from colonnade.design.manifest import AttributeFormats, Manifest
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.maps.cache import encoder_sources
+from colonnade.maps.encoders import Encoder
 from colonnade.maps.image import words_of
 from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.live import encode_colours
 from colonnade.maps.two_level import TwoLevelMap
 from colonnade.maps.two_level_encoder import encode_two_level
 from colonnade.maps.vectors import AlbedoSpace
@@ -40,7 +42,9 @@ def layout_of_texture(formats: AttributeFormats) -> AttributeLayout:
     )
 
 
-def with_textures(image: SceneImage, atlas: Atlas | None, textures: int, manifest: Manifest) -> SceneImage:
+def with_textures(
+    image: SceneImage, atlas: Atlas | None, textures: int, manifest: Manifest, encoder: Encoder = "offline"
+) -> SceneImage:
     """Add an atlas to a mesh's image, or zeros without one; the image itself for a design without textures.
 
     Args:
@@ -48,12 +52,14 @@ def with_textures(image: SceneImage, atlas: Atlas | None, textures: int, manifes
         atlas: The atlas of its mesh.
         textures: Number of its textures.
         manifest: The design's manifest.
+        encoder: Of the atlas.
     """
     if manifest.texture is None:
         return image
     layout = layout_of_texture(manifest.texture)
     sections = []
-    encoded = None if atlas is None else _encoded(atlas.colours, layout)
+    encode = encode_colours if encoder == "live" else _encoded
+    encoded = None if atlas is None else encode(atlas.colours, layout)
     for name, shape in manifest.memories.items():
         if not name.startswith("texture."):
             continue

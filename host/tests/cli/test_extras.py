@@ -54,6 +54,11 @@ cli.main(["render", "scenes/object.toml", "--mesh", "teapot:2", "--config", "tin
             "peakrdl_html",
             "no package peakrdl_html found, which colonnade registers needs: pip install 'colonnade[integration]'",
         ),
+        (
+            ["capture", "README.md", "--output", "OUT"],
+            "lzfse",
+            "no package lzfse found, which a Record3D capture needs: pip install 'colonnade[capture]'",
+        ),
     ],
 )
 def test_a_missing_package_is_one_line(

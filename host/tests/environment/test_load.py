@@ -20,7 +20,7 @@ from colonnade.environment.load import load_environment
 
 ROOMS = Path(__file__).resolve().parents[3] / "scenes" / "rooms"
 SIZE = (64, 48)
-POSE = [[-1, 0, 0, 0.5], [0, 1, 0, 1.2], [0, 0, -1, 2], [0, 0, 0, 1]]
+POSE = [[1, 0, 0, 0.5], [0, -1, 0, 1.2], [0, 0, -1, 2], [0, 0, 0, 1]]
 
 
 def camera_directions() -> NDArray[np.float64]:
@@ -38,7 +38,7 @@ def corner() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def coded(normals: NDArray[np.float64]) -> NDArray[np.uint8]:
-    return np.rint((normals * [1, -1, -1] * 0.5 + 0.5) * 255).astype(np.uint8)
+    return np.rint((normals * 0.5 + 0.5) * 255).astype(np.uint8)
 
 
 @pytest.fixture
@@ -172,8 +172,12 @@ def break_file(name: str, content: bytes) -> Callable[[Path], None]:
     return lambda environment: (environment / name).write_bytes(content) and None
 
 
-def remove(name: str) -> Callable[[Path], None]:
-    return lambda environment: (environment / name).unlink()
+def remove(*names: str) -> Callable[[Path], None]:
+    def change(environment: Path) -> None:
+        for name in names:
+            (environment / name).unlink()
+
+    return change
 
 
 def resize(name: str) -> Callable[[Path], None]:
@@ -230,7 +234,7 @@ def test_float_pictures_are_rejected(environment: Path) -> None:
         (meta(width=640), "is 64x48 pixels, but .*meta.json says width 640"),
         (meta(albedo_encoding="gamma"), "albedo_encoding must be linear or srgb"),
         (remove("albedo.png"), "lacks albedo.png"),
-        (remove("normal.png"), "lacks normal.png"),
+        (remove("normal.png", "depth.npy"), "lacks normal.png"),
         (break_file("albedo.png", b"no picture"), "albedo.png is not a readable picture"),
         (break_file("depth.npy", b"no array"), "depth.npy is not a readable array"),
         (save("depth.npy", np.ones((48, 64, 3))), "one number per pixel"),
@@ -245,6 +249,39 @@ def test_float_pictures_are_rejected(environment: Path) -> None:
 def test_refusals(environment: Path, damage: Callable[[Path], None], message: str) -> None:
     damage(environment)
     with pytest.raises(UserError, match=message):
+        load_environment(environment)
+
+
+def test_photo_depth_and_pose_alone_are_a_room(tmp_path: Path) -> None:
+    """Normals and albedo are derived, with a note for each."""
+    truth = load_environment(ROOMS / "attic")
+    folder = tmp_path / "attic"
+    shutil.copytree(ROOMS / "attic", folder)
+    remove("albedo.png", "normal.png")(folder)
+    room = load_environment(folder)
+    assert [note for note in room.notes if "no normal.png" in note]
+    assert [note for note in room.notes if "no albedo.png" in note]
+    assert np.degrees(np.arccos((room.normals * truth.normals).sum(axis=2).clip(-1, 1))).mean() < 1.5
+    assert np.median(np.abs(room.albedo - truth.albedo)) < 0.1
+    assert room.photo is not None
+    # Under the lights that were fitted, the albedo shows the photo
+    from colonnade.environment.fitted_lights import fitted_lights
+
+    assert fitted_lights(room).psnr > 30.0
+
+
+def test_normals_alone_are_derived(environment: Path) -> None:
+    """Of the corner, whose planes are known; its floor is lower than a window."""
+    remove("normal.png")(environment)
+    found = load_environment(environment)
+    _, truth = corner()
+    assert (np.abs(found.normals - truth).max(axis=2) < 0.01).mean() > 0.91
+    assert any("on large planes" in note for note in found.notes)
+
+
+def test_a_room_without_photo_and_albedo_is_refused(environment: Path) -> None:
+    remove("albedo.png")(environment)
+    with pytest.raises(UserError, match=r"lacks albedo\.png: it needs meta\.json, albedo\.png or a photo"):
         load_environment(environment)
 
 

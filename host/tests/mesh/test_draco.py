@@ -269,7 +269,9 @@ def test_the_limits_grow_with_the_streams_up_to_a_most() -> None:
 
 
 def test_the_process_ends_at_its_limit_of_time() -> None:
-    program = "from colonnade.mesh.draco import _limit\n_limit(1 << 28, 1)\nwhile True: pass"
+    program = (
+        "from colonnade.common.machine_limits import limit_this_process as limit\nlimit(1 << 28, 1)\nwhile True: pass"
+    )
     assert subprocess.run([sys.executable, "-I", "-c", program], check=False).returncode < 0
 
 

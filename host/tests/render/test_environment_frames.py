@@ -65,6 +65,7 @@ def test_the_reference_shows_object_and_room(scene: Path, make_manifest: Callabl
 def test_a_wrong_room_is_one_line(scene: Path, make_manifest: Callable[..., Manifest]) -> None:
     with pytest.raises(UserError, match="64x64 pixels does not have the proportions of room attic, 64x48"):
         list(reference_frames([load_scene(scene)], make_manifest(), (64, 64), QUIET))
-    (scene.parent / "rooms" / "attic" / "normal.png").unlink()
+    for name in ("normal.png", "depth.png"):
+        (scene.parent / "rooms" / "attic" / name).unlink()
     with pytest.raises(UserError, match=r"lacks normal\.png"):
         list(reference_frames([load_scene(scene)], make_manifest(), (64, 48), QUIET))

@@ -15,6 +15,7 @@ import numpy as np
 from conftest import manifest_data
 
 from colonnade.design.manifest import Manifest
+from colonnade.environment.depth_normals import normals_of_depth
 from colonnade.environment.light_fit import fit_lights
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
@@ -58,6 +59,8 @@ def small_inputs() -> Iterator[tuple[str, bytes]]:
     room = small_room("office")
     yield from maps_of(room, map_bytes=3000, palette_size=64, plane_bytes=1600, planes=64)
     yield from lights_of(room)
+    found = normals_of_depth(room.depth, np.zeros(room.depth.shape, bool), room.camera)
+    yield f"{room.name} normals of depth", found.normals.tobytes()
     texture = room.photo[:64, :64] / 255.0 if room.photo is not None else np.zeros((64, 64, 3))
     layout = AttributeLayout(width=64, height=64, tile_size=16, palette_size=64, map_bytes=1200)
     for name, words in encode_two_level(texture, AlbedoSpace(layout.field_bits), layout).memories().items():

@@ -15,7 +15,8 @@ SOURCES = HERE.parents[1] / "colonnade"
 #: What decides words: files and folders.
 DECIDING = (
     "common/srgb.py", "common/vectors.py", "maps", "environment/light_fit.py", "environment/lights.py",
-    "environment/photo_colours.py", "environment/repair.py", "mesh", "scene/joined_mesh.py", "scene/object_pose.py",
+    "environment/photo_colours.py", "environment/repair.py", "environment/depth_normals.py",
+    "environment/derived_albedo.py", "mesh", "scene/joined_mesh.py", "scene/object_pose.py",
     "scene_image",
 )  # fmt: skip
 #: Reports, which decide nothing.

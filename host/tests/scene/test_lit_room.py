@@ -109,7 +109,7 @@ def test_corners_of_faces_are_packed_darker_by_the_headroom(folder: Path, monkey
     (folder / "scene.toml").write_text(MIRROR.replace("mirror", "diffuse") + LAMP)
     packed: list[object] = []
     whole = device_scene.pack
-    monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given[-1]) or whole(*given))
+    monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given[-2]) or whole(*given))
     prepared = DeviceScene.of(load_scene(folder / "scene.toml"), manifest_for("small", ROOM).manifest)
     assert packed == [prepared.scene.headroom] and prepared.scene.headroom > 1
 

@@ -21,6 +21,9 @@ from colonnade.cli.options import FILE, dists_option, echo_lines, finish, json_o
     help="Measure objects behind furniture in synthetic rooms, without ROOMS; with --rooms, behind thin things.",
 )
 @click.option("--light", is_flag=True, help="Measure relit rooms and mirrors against the photo.")
+@click.option("--live", is_flag=True, help="Measure the live encoder against the offline encoder.")
+@click.option("--path", is_flag=True, help="With --live and --rooms: the live encoder along a path through each room.")
+@click.option("--capture", is_flag=True, help="Measure rays in the rooms as a phone would capture them.")
 @click.option("--rooms", "seeds", metavar="SEEDS", help="Measure generated rooms, such as 0-9,100, without ROOMS.")
 @dists_option
 @click.option("--output", type=FILE, metavar="DIR", help="Not for rays: write the frames as pictures.")
@@ -30,6 +33,9 @@ def study(
     frames: bool,
     occlusion: bool,
     light: bool,
+    live: bool,
+    path: bool,
+    capture: bool,
     seeds: str | None,
     no_dists: bool,
     output: Path | None,
@@ -43,13 +49,18 @@ def study(
     With --occlusion it prints the share of an object's pixels that correctly show the object, or the room before it:
     behind furniture, or with --rooms behind a stool, a plant or a lamp in rooms that a seed generates.
     With --light it prints the PSNR of relit rooms and of a mirror against the photo, for default and for fitted lights.
+    With --capture it takes depth of 256x192 from each room, adds noise, derives normals, and prints the share of mirror
+    rays that are right in the room itself.
     With --rooms it measures rays and encoded maps in rooms that a seed generates, and counts why rays are wrong.
+    With --live it measures the encoder of a moving camera: time, loss and rays, in ROOMS or in the rooms of --rooms.
     Tables are in Markdown.
     """
     context = click.get_current_context()
     generated = seeds is not None
-    if frames + occlusion + light > 1 or (generated and (frames or light)):
-        raise click.UsageError("give one of --frames, --occlusion, --light and --rooms", context)
+    if frames + occlusion + light + live + capture > 1 or (generated and (frames or light or capture)):
+        raise click.UsageError("give one of --frames, --occlusion, --light, --live, --capture and --rooms", context)
+    if path and not (live and generated):
+        raise click.UsageError("--path needs --live and --rooms", context)
     if output is not None and not (frames or occlusion or light):
         raise click.UsageError("--output needs --frames, --occlusion or --light", context)
     if (occlusion or generated) and rooms:
@@ -72,6 +83,22 @@ def study(
             results = study_of_occlusion.study(progress.for_terminal(), output, chosen)
             echo_lines(study_of_occlusion.table(results))
             report = {name: asdict(value) for name, value in results.items()}
+        elif live:
+            from colonnade.lab.evaluation.studies import live_maps
+
+            terminal = progress.for_terminal()
+            if path and seeds is not None:
+                paths = live_maps.study_paths(parse_seeds(seeds), terminal)
+                echo_lines(live_maps.path_table(paths))
+                report = {name: asdict(value) for name, value in paths.items()}
+            else:
+                maps = (
+                    live_maps.study_rooms(rooms, not no_dists, terminal)
+                    if seeds is None
+                    else live_maps.study_seeds(parse_seeds(seeds), not no_dists, terminal)
+                )
+                echo_lines(live_maps.table(maps))
+                report = {name: asdict(value) for name, value in maps.items()}
         elif frames:
             from colonnade.lab.evaluation.studies import ar_losses
 
@@ -97,6 +124,12 @@ def study(
                 qualities = room_light.study_light(rooms, terminal, output)
             echo_lines(room_light.table(qualities))
             report = {name: asdict(value) for name, value in qualities.items()}
+        elif capture:
+            from colonnade.lab.evaluation.studies import captured_rooms
+
+            captures = captured_rooms.study_captures(rooms, progress.for_terminal())
+            echo_lines(captured_rooms.table(captures))
+            report = {name: asdict(value) for name, value in captures.items()}
         else:
             from colonnade.lab.evaluation.studies import environment_accuracy
 

@@ -43,15 +43,16 @@ CLEARANCE = 1.2
 OVERLAP = 0.05
 
 
-def generated_room(seed: int, width: int = 640, height: int = 480) -> SyntheticRoom:
-    """Render the maps of the room of a seed."""
+def generated_room(seed: int, width: int = 640, height: int = 480, walked: float = 0.0) -> SyntheticRoom:
+    """Render the maps of the room of a seed; the camera has ``walked`` so many metres to the right, and turned left."""
     plan = Plan(seed)
     eye = np.array([plan.uniform(-0.25, 0.25) * plan.width, plan.uniform(1.25, 1.7), plan.length / 2 - 0.3])
     target = np.array([plan.uniform(-0.2, 0.2) * plan.width, plan.uniform(0.35, 0.9), eye[2] - plan.uniform(3.0, 4.5)])
     focal = 0.5 / np.tan(np.radians(plan.uniform(*LENSES)) / 2)
     parts = [*plan.shell(), *plan.furniture(), *plan.thin_things(), *plan.clutter(), *plan.pictures()]
     lamp = np.array([plan.uniform(-0.2, 0.2) * plan.width, 0.8 * plan.top(0.0), plan.uniform(0.0, 0.25) * plan.length])
-    camera = camera_at(eye, target, width, height, float(focal))
+    aside = np.array([walked, 0.0, 0.0])
+    camera = camera_at(eye + aside, target + 0.4 * aside, width, height, float(focal))
     return synthetic_room(f"seed-{seed}", parts, camera, width, height, lamp)
 
 

@@ -120,7 +120,6 @@ def write_room(folder: Path, environment: Environment) -> None:
     from PIL import Image
 
     folder.mkdir(parents=True, exist_ok=True)
-    pose = environment.camera_to_world * np.array([-1.0, -1.0, 1.0, 1.0])
     meta: dict[str, Any] = {
         "width": environment.width,
         "height": environment.height,
@@ -129,11 +128,11 @@ def write_room(folder: Path, environment: Environment) -> None:
         "cx": environment.cx,
         "cy": environment.cy,
     }
-    meta |= {"cam_to_world": [*pose.tolist(), [0.0, 0.0, 0.0, 1.0]], "albedo_encoding": "srgb"}
+    meta |= {"cam_to_world": [*environment.camera_to_world.tolist(), [0.0, 0.0, 0.0, 1.0]], "albedo_encoding": "srgb"}
     meta |= {"depth_step": DEPTH_STEP, "licence": "CC0: made by colonnade.lab.evaluation.studies"}
     write_png(folder / "albedo.png", environment.albedo)
-    pictures = {
-        "normal.png": np.rint((environment.normals * np.array([1.0, -1.0, -1.0]) * 0.5 + 0.5) * 255).astype(np.uint8),
+    pictures: dict[str, Any] = {
+        "normal.png": np.rint((environment.normals * 0.5 + 0.5) * 255).astype(np.uint8),
         "depth.png": np.rint(environment.depth / DEPTH_STEP).astype(np.uint16),
         "photo.png": environment.photo,
     }

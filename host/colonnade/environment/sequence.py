@@ -1,0 +1,155 @@
+"""A sequence: a room seen by a moving camera, in a file ``sequence.toml`` beside its pictures.
+
+The schema is `Sequence` and `SequenceFrame`: keys, ranges and defaults. Unknown keys are refused.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from annotated_types import Gt, Interval, Len
+from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from colonnade.common.errors import UserError
+from colonnade.common.input_files import check_values, read_input
+from colonnade.common.limits import MAX_CAPTURE_TEXT_BYTES, MAX_DEPTH, MAX_FRAMES
+from colonnade.environment.camera import read_camera
+from colonnade.environment.load import DEFAULT_DEPTH_STEP, MAX_DEPTH_STEP, MAX_EDGE, RoomFiles, load_maps
+from colonnade.environment.model import Environment, EnvironmentCamera
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_STRICT = ConfigDict(extra="forbid")
+_Float = Annotated[float, Strict()]
+_Pixels = Annotated[int, Strict(), Interval(ge=16, le=MAX_EDGE)]
+_Name = Annotated[str, Field(min_length=1)]
+_Row = tuple[_Float, _Float, _Float, _Float]
+
+
+@dataclass(frozen=True, config=_STRICT)
+class SequenceFrame:
+    """A frame.
+
+    Attributes:
+        time: Seconds.
+        photo, depth: Pictures, relative to the file; depth is grey of 16 bits or a ``.npy`` array.
+        fx, fy, cx, cy: The lens, pixels.
+        cam_to_world: Three rows of the pose, as in ``meta.json``.
+        albedo, normal: Pictures as those of a room; derived if they are missing.
+    """
+
+    time: _Float
+    photo: _Name
+    depth: _Name
+    fx: _Float
+    fy: _Float
+    cx: _Float
+    cy: _Float
+    cam_to_world: tuple[_Row, _Row, _Row]
+    albedo: _Name | None = None
+    normal: _Name | None = None
+
+
+@dataclass(frozen=True, config=_STRICT)
+class SequenceFile:
+    """The content of the file.
+
+    Attributes:
+        width, height: Of all pictures, pixels.
+        frame: The frames, by ascending time.
+        rate: Frames a second.
+        depth_step: Metres of a step of a depth picture.
+        depth_noise: Error of the depth on flat surfaces, as a share of it.
+    """
+
+    width: _Pixels
+    height: _Pixels
+    frame: Annotated[tuple[SequenceFrame, ...], Len(1, MAX_FRAMES)]
+    rate: Annotated[_Float, Interval(gt=0, le=1e6)] = 30.0
+    depth_step: Annotated[_Float, Gt(0), Interval(le=MAX_DEPTH_STEP)] = DEFAULT_DEPTH_STEP
+    depth_noise: Annotated[_Float, Interval(ge=0.0, le=1.0)] = 0.005
+
+
+_SCHEMA = TypeAdapter(SequenceFile)
+
+
+class Sequence:
+    """A sequence's file and the cameras of its frames.
+
+    Attributes:
+        path: Of the file.
+        content: What it holds.
+        cameras: Of the frames.
+    """
+
+    def __init__(self, path: Path, content: SequenceFile) -> None:
+        self.path, self.content = path, content
+        self.cameras: list[EnvironmentCamera] = []
+        for number, frame in enumerate(content.frame):
+            values: dict[str, Any] = {name: getattr(frame, name) for name in ("fx", "fy", "cx", "cy", "cam_to_world")}
+            self.cameras.append(read_camera(values, Path(f"{path}, frame {number}")))
+
+    def __len__(self) -> int:
+        return len(self.content.frame)
+
+    def room(self, number: int) -> Environment:
+        """The maps of a frame; those that the sequence does not hold are derived.
+
+        Raises:
+            UserError: A picture is missing, unreadable or of another size.
+        """
+        frame = self.content.frame[number]
+        maps = RoomFiles(
+            self._file(frame.albedo),
+            self._file(frame.normal),
+            self._file(frame.depth),
+            self._file(frame.photo),
+            self.content.depth_step,
+            "srgb",
+        )
+        sizes = {"width": self.content.width, "height": self.content.height}
+        return load_maps(f"{self.path.parent.name} {number}", self.cameras[number], maps, (sizes, self.path))
+
+    def _file(self, name: str | None) -> Path | None:
+        return None if name is None else self.path.parent / name
+
+
+def load_sequence(path: Path) -> Sequence:
+    """Read a sequence's file; pictures are read frame by frame.
+
+    Raises:
+        UserError: The file is missing, is not TOML, or has an invalid key or value.
+    """
+    content = read_input(path, "the sequence", MAX_CAPTURE_TEXT_BYTES, f"sequence {path} does not exist")
+    try:
+        data: dict[str, Any] = tomllib.loads(content.decode("utf-8"))
+    except RecursionError:
+        raise UserError(f"sequence {path} is nested too deeply: {MAX_DEPTH} levels at most") from None
+    except ValueError as error:  # invalid TOML or UTF-8, or too many digits
+        raise UserError(f"sequence {path} is not TOML: {error}") from None
+    check_values(data, f"sequence {path}")
+    try:
+        # Lists become the tuples of the schema
+        found = _SCHEMA.validate_python(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "unexpected_keyword_argument":
+            raise UserError(f"sequence {path}: unknown key {place}") from None
+        problem = "is missing" if first["type"] in ("missing", "missing_argument") else f": {first['msg']}"
+        raise UserError(f"sequence {path}: {place} {problem}".replace(" :", ":")) from None
+    times = [frame.time for frame in found.frame]
+    if not np.isfinite(times).all() or sorted(set(times)) != times:
+        raise UserError(f"sequence {path}: the times of its frames must ascend")
+    for number, frame in enumerate(found.frame):
+        for name in (frame.photo, frame.depth, frame.albedo, frame.normal):
+            if name is not None and (Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name):
+                raise UserError(f"sequence {path}, frame {number}: {name} must lie beside the sequence")
+    return Sequence(path, found)

@@ -1,0 +1,9 @@
+"""The encoders of maps, by name."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+#: ``offline``: the best maps, in 20 seconds. ``live``: in 20 milliseconds.
+Encoder = Literal["offline", "live"]
+ENCODERS: tuple[Encoder, ...] = get_args(Encoder)

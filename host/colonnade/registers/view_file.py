@@ -1,0 +1,270 @@
+"""The view file: what a target needs to compute a scene's registers from poses (docs/view.md), words of 32 bits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.maps.planes import SLOPE_PIXELS, PlaneProjection
+from colonnade.registers.occlusion import PERCENTILE
+
+if TYPE_CHECKING:
+    from colonnade.design.manifest import Manifest
+    from colonnade.environment.model import Environment
+    from colonnade.maps.encoded import EncodedEnvironment
+    from colonnade.scene.cameras import WorldCamera
+    from colonnade.scene.object_pose import Pose
+    from colonnade.scene.view import PlacedLight, PlacedScene
+    from colonnade.scene_image.header import ImageHeader
+
+MAGIC = b"CLNDVIEW"
+VERSION = 1
+AXES = "xyz"
+
+#: Fraction bits of positions in metres, of rotations, of lenses and lights, of depths in a tile.
+POSITION_FRACTION, ROTATION_FRACTION, LENS_FRACTION, DEPTH_FRACTION = 32, 30, 16, 10
+WORLD_BITS = 60
+#: Contents of `environment.window`, and the largest error of a tile, 2^-16 m.
+WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE = range(3)
+MAX_TILE_ERROR = (1 << 24) - 1
+
+_NUMBERS = ("macBits", "sceneBits", "gridFraction", "coordinateBits", "boxPadLog", "mantissaBits", "vertexBits")
+
+
+def frame_names() -> list[str]:
+    """Registers that the target computes, in the order of their addresses: those of ``frame``."""
+    rectangle = [f"frame.objectRect.{edge}" for edge in ("x0", "y0", "x1", "y1")]
+    outline = [f"frame.objectOutline[{i}].{part}" for i in range(6) for part in ("x", "y", "offset")]
+    return ["frame.width", "frame.height", *rectangle, *outline, "frame.unitShift"]
+
+
+def camera_names() -> list[str]:
+    """As `frame_names`, those of ``camera``."""
+    vectors = [f"camera.{name}.{axis}" for name in ("position", "direction", "stepX", "stepY") for axis in AXES]
+    return [*vectors, "camera.stepShift"]
+
+
+def light_names(count: int) -> list[str]:
+    """As `frame_names`, those of the first lights."""
+    parts = [*(f"position.{axis}" for axis in AXES), *(f"colour.{channel}" for channel in "rgb")]
+    return [f"lights[{i}].{part}" for i in range(count) for part in (*parts, "reachMantissa", "reachExponent")]
+
+
+def environment_names() -> list[str]:
+    """As `frame_names`, those of the projection to a room's maps."""
+    rows = {
+        name: [f"environment.{name}[{i}].{axis}" for i in range(3) for axis in AXES] for name in ("matrix", "rotation")
+    }
+    offset = [f"environment.offset.{axis}" for axis in AXES]
+    return [*rows["matrix"], *offset, "environment.offsetShift", "environment.exponent", *rows["rotation"]]
+
+
+def window_names() -> list[str]:
+    """As `frame_names`, those of a room's window and occlusion."""
+    window = [f"environment.window.{edge}" for edge in ("x0", "y0", "x1", "y1")]
+    return [*window, "environment.occlusion", "environment.occlusionTolerance"]
+
+
+def computed_blocks(lights: int, has_room: bool) -> list[list[str]]:
+    """The registers that the target computes, in blocks without a gap."""
+    room = [environment_names(), window_names()] if has_room else []
+    return [frame_names(), camera_names(), light_names(lights), *room]
+
+
+def view_file(
+    placed: PlacedScene,
+    registers: Mapping[str, int],
+    size: tuple[int, int],
+    header: ImageHeader,
+    manifest: Manifest,
+    room: EncodedEnvironment | None = None,
+    occlusion: bool = True,
+) -> bytes:
+    """The file for a scene whose object, lights and, without a room, camera may move.
+
+    Args:
+        placed: Poses and lights of the start.
+        registers: All registers of the start; those that the target does not compute stay.
+        size: Width and height of the start, pixels; in a room of all frames.
+        header: Header of the mesh's scene image.
+        manifest: The design's manifest.
+        room: The scene's room and its encoded maps.
+        occlusion: The room hides the object where it is nearer.
+
+    Raises:
+        UserError: The design's numbers or the scene's places are out of the target's range.
+    """
+    numbers = manifest.numbers
+    if numbers["macBits"] > 32 or numbers["sceneBits"] > 40:
+        raise UserError("a target computes registers of at most 32 bits: lower precision.mac and geometry.triangleBits")
+    frame, lights = manifest.config["frame"], placed.lights
+    blocks = computed_blocks(len(lights), room is not None)
+    addresses = [_address(manifest, block) for block in blocks]
+    computed = {name for block in blocks for name in block}
+    others = {name: value for name, value in registers.items() if name not in computed}
+    constants = [pair for name, value in others.items() for pair in manifest.registers[name].encode(value)]
+    step = header.frame.scale * 2.0 ** numbers["gridFraction"]
+    words = [
+        *(numbers[name] for name in _NUMBERS),
+        *(int(frame["maxWidth"]), int(frame["maxHeight"]), 1 << LENS_FRACTION),
+        *(addresses + [0] * 5)[:5],
+        *(len(lights), len(constants)),
+        *_factor(step / placed.pose.scale),
+        *_position(np.array(header.frame.offset) * step * 2.0 ** (16 - POSITION_FRACTION), "the mesh's origin"),
+        *header.bounds_low,
+        *header.bounds_high,
+        *object_words(placed.pose),
+        *camera_words(placed.camera, size),
+        *(word for light in lights for word in light_words(light)),
+    ]
+    if room is not None:
+        words += _room(placed, registers, size, room, header, manifest, occlusion)
+    words += [word for pair in constants for word in pair]
+    content = np.zeros(12 + len(words), dtype="<u4")
+    content[:2] = np.frombuffer(MAGIC, dtype="<u4")
+    content[2:4] = VERSION, content.nbytes
+    content[4:12] = manifest.format_words
+    content[12:] = [word & 0xFFFFFFFF for word in words]
+    return content.tobytes()
+
+
+def object_words(pose: Pose) -> list[int]:
+    """The object's position and rotation; its scale is in the number of grid steps in a metre."""
+    return [*_position(pose.translate, "the object"), *rotation_values(pose.rotation)]
+
+
+def camera_words(camera: WorldCamera, size: tuple[int, int]) -> list[int]:
+    """Position, rotation, lens and size."""
+    axes, lens = camera_values(camera)
+    return [*_position(camera.position, "the camera"), *rotation_values(axes), *lens, *size]
+
+
+def camera_values(camera: WorldCamera) -> tuple[Floats, list[int]]:
+    """The rotation from right, down, forward to world space, float64 [3, 3], and fx, fy, cx, cy, 2^-16 pixels."""
+    right, up, toward = camera.axes
+    x, y = 1 / float(np.linalg.norm(camera.step_x)), 1 / float(np.linalg.norm(camera.step_y))
+    depth = -float(camera.corner @ toward)
+    lens = (
+        *(x * depth, y * depth),
+        *(0.5 - x * float(camera.corner @ right), 0.5 + y * float(camera.corner @ up)),
+    )
+    values = [round(value * 2.0**LENS_FRACTION) for value in lens]
+    if not all(1 << LENS_FRACTION <= value < (1 << 31) - (1 << LENS_FRACTION) for value in values[:2]):
+        raise UserError("the camera's focal length is out of the target's range, 1 to 32767 pixels")
+    return np.column_stack([right, -up, -toward]), values
+
+
+def light_words(light: PlacedLight) -> list[int]:
+    """Position, colour and reach."""
+    colour = [min(0xFFFFFFFF, round(float(value) * 2.0**LENS_FRACTION)) for value in light.colour]
+    reach = 0 if light.reach is None else max(1, round(light.reach * 2.0**POSITION_FRACTION))
+    return [*_position(light.position, "a light"), *colour, *_wide(reach)]
+
+
+def position_values(position: Floats, what: str) -> list[int]:
+    """A position in world space, 2^-32 m."""
+    values = [round(float(value) * 2.0**POSITION_FRACTION) for value in position]
+    if not all(abs(value) < 1 << WORLD_BITS for value in values):
+        raise UserError(f"{what} is out of the target's range, 2^28 metres")
+    return values
+
+
+def rotation_values(rotation: Floats) -> list[int]:
+    """A rotation, row by row, 2^-30."""
+    return [round(float(value) * 2.0**ROTATION_FRACTION) for value in rotation.ravel()]
+
+
+def _position(position: Floats, what: str) -> Iterator[int]:
+    return (word for value in position_values(position, what) for word in _wide(value))
+
+
+def _wide(value: int) -> tuple[int, int]:
+    return value & 0xFFFFFFFF, value >> 32 & 0xFFFFFFFF
+
+
+def _factor(value: float) -> tuple[int, int, int]:
+    """A positive number as mantissa, of two words, and exponent."""
+    mantissa, exponent = math.frexp(value)
+    return *_wide(int(math.ldexp(mantissa, 64))), exponent - 64
+
+
+def _address(manifest: Manifest, names: Iterable[str]) -> int:
+    """Address of the first of registers that follow each other, a word each."""
+    registers = [manifest.registers[name] for name in names]
+    for index, register in enumerate(registers):
+        if register.address != registers[0].address + index or register.words != 1:
+            raise ValueError(f"{register.name} does not follow {registers[0].name}")
+    return registers[0].address
+
+
+def _room(
+    placed: PlacedScene,
+    registers: Mapping[str, int],
+    size: tuple[int, int],
+    room: EncodedEnvironment,
+    header: ImageHeader,
+    manifest: Manifest,
+    occlusion: bool,
+) -> list[int]:
+    environment, unit = room.environment, room.image.depth_unit
+    depth = room.image.decoded_depth(PlaneProjection.of(environment, unit))
+    step = header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
+    metres = placed.pose.scale / step
+    lens = (environment.fx, environment.fy, environment.cx, environment.cy)
+    low, high = _bounds(environment, depth, size)
+    shadowed = WINDOW_SHADOW if registers["shading.shadows"] else WINDOW_NONE
+    window = [registers[name] for name in window_names()[:4]]
+    limit = (1 << manifest.registers["environment.occlusionTolerance"].width) - 1
+    tile = int(manifest.config["physicalAttributeMemory"]["tileSize"])
+    tiles = tile_errors(environment, depth, tile)
+    return [
+        *_factor(metres),
+        *_factor(metres / (SLOPE_PIXELS * unit)),
+        *(round(value * 2.0**LENS_FRACTION) for value in lens),
+        *_position(low, "the room"),
+        *_position(high, "the room"),
+        WINDOW_WHOLE if window == [0, 0, *size] else shadowed,
+        int(occlusion),
+        round(header.extent.edge * step),
+        *(limit, tile, tiles.shape[1], tiles.shape[0]),
+        *(int(word) for word in tiles.ravel()),
+    ]
+
+
+def _bounds(environment: Environment, depth: Floats, size: tuple[int, int]) -> tuple[Floats, Floats]:
+    """A box around the decoded surface in world space, wider by the way of rays that miss a pixel's middle."""
+    directions = environment.camera.directions(environment.width, environment.height)
+    seen, to_world = np.isfinite(depth), environment.camera_to_world
+    if not seen.any():
+        return to_world[:, 3], to_world[:, 3]
+    points = (directions[seen] * depth[seen][:, None]) @ to_world[:, :3].T + to_world[:, 3]
+    pixel = max(environment.width / size[0], environment.height / size[1]) / min(environment.fx, environment.fy)
+    margin, furthest = float(depth[seen].max()) * pixel, 2.0 ** (WORLD_BITS - POSITION_FRACTION - 1)
+    return np.maximum(points.min(axis=0) - margin, -furthest), np.minimum(points.max(axis=0) + margin, furthest)
+
+
+def tile_errors(environment: Environment, depth: Floats, tile: int) -> NDArray[np.uint32]:
+    """Depths and errors of each tile of a room's maps: uint32 [rows, columns, 2].
+
+    The first word has the least and the largest depth, 2^-10 m, 16 bits each; the second one the 90th percentile of the
+    error along the view rays, 2^-16 m.
+    """
+    rays = environment.camera.directions(environment.width, environment.height)
+    with np.errstate(invalid="ignore"):
+        errors = np.abs(depth - environment.depth) * np.linalg.norm(rays, axis=2)
+    rows, columns = -(-environment.height // tile), -(-environment.width // tile)
+    result = np.zeros((rows, columns, 2), dtype=np.uint32)
+    for row in range(rows):
+        for column in range(columns):
+            part = np.s_[row * tile : (row + 1) * tile, column * tile : (column + 1) * tile]
+            near, far = depth[part].min() * 2.0**DEPTH_FRACTION, depth[part].max() * 2.0**DEPTH_FRACTION
+            limits = min(0xFFFF, math.floor(min(near, 0xFFFF))), math.ceil(min(far, 0xFFFF))
+            error = float(np.percentile(np.nan_to_num(errors[part], posinf=1e6), PERCENTILE))
+            result[row, column] = limits[0] | limits[1] << 16, min(MAX_TILE_ERROR, math.ceil(error * 2.0**16))
+    return result

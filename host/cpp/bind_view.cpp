@@ -1,0 +1,99 @@
+// colonnade._core.TargetView: software/src/colonnade_view.c, which computes registers on a target, for Python.
+// Without the model's headers: its namespace has the name of the driver's structure.
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/array.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "colonnade_view.h"
+
+namespace nb = nanobind;
+using namespace nanobind::literals;
+
+namespace {
+
+using Position = std::array<std::int64_t, 3>;
+using Rotation = std::array<std::int32_t, 9>;
+
+constexpr std::uint32_t deviceBase = 0x8000;
+
+void check(colonnade_error error) {
+    if (error != COLONNADE_OK) throw std::invalid_argument(colonnade_error_name(error));
+}
+
+colonnade_pose poseOf(const Position& position, const Rotation& rotation) {
+    colonnade_pose pose;
+    std::copy(position.begin(), position.end(), pose.position);
+    std::copy(rotation.begin(), rotation.end(), &pose.rotation[0][0]);
+    return pose;
+}
+
+class TargetView {
+public:
+    TargetView(const std::array<std::uint32_t, 8>& formatHash, std::uint32_t first, std::uint32_t end, const nb::bytes& file)
+        : file_(file.c_str(), file.size()) {
+        colonnade_design design{};
+        std::copy(formatHash.begin(), formatHash.end(), design.format_hash);
+        design.frame_registers = deviceBase + 4 * first;
+        design.device_end = deviceBase + 4 * end;
+        check(colonnade_view_open(&view_, &design, file_.data(), file_.size()));
+        writes_.resize(8 * std::size_t{colonnade_view_most_writes(&view_)});
+    }
+
+    void setCamera(const Position& position, const Rotation& rotation, std::uint32_t fx, std::uint32_t fy, std::int32_t cx, std::int32_t cy, std::uint32_t width,
+                   std::uint32_t height) {
+        const colonnade_camera camera{poseOf(position, rotation), fx, fy, cx, cy, width, height};
+        check(colonnade_view_set_camera(&view_, &camera));
+    }
+
+    void setObject(const Position& position, const Rotation& rotation) {
+        const colonnade_pose pose = poseOf(position, rotation);
+        check(colonnade_view_set_object(&view_, &pose));
+    }
+
+    void setLight(std::uint32_t index, const Position& position, const std::array<std::uint32_t, 3>& colour, std::uint64_t reach) {
+        colonnade_light light{{}, {}, reach};
+        std::copy(position.begin(), position.end(), light.position);
+        std::copy(colour.begin(), colour.end(), light.colour);
+        check(colonnade_view_set_light(&view_, index, &light));
+    }
+
+    nb::bytes frame() {
+        colonnade_frame frame;
+        check(colonnade_view_frame(&view_, writes_.data(), static_cast<std::uint32_t>(writes_.size() / 8), &frame));
+        return nb::bytes(reinterpret_cast<const char*>(writes_.data()), 8 * std::size_t{frame.count});
+    }
+
+    void accept() { colonnade_view_accept(&view_); }
+    void forget() { colonnade_view_forget(&view_); }
+
+private:
+    std::string file_;
+    colonnade_view view_;
+    std::vector<std::uint8_t> writes_;
+};
+
+Rotation rotationOf(const std::array<std::int32_t, 4>& quaternion) {
+    std::int32_t rotation[3][3];
+    check(colonnade_rotation(rotation, quaternion.data()));
+    Rotation result;
+    std::copy(&rotation[0][0], &rotation[0][0] + 9, result.begin());
+    return result;
+}
+
+} // namespace
+
+void bind_view(nb::module_& module) {
+    nb::class_<TargetView>(module, "TargetView")
+        .def(nb::init<const std::array<std::uint32_t, 8>&, std::uint32_t, std::uint32_t, const nb::bytes&>(), "format_hash"_a, "first"_a, "end"_a, "file"_a)
+        .def("set_camera", &TargetView::setCamera, "position"_a, "rotation"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a)
+        .def("set_object", &TargetView::setObject, "position"_a, "rotation"_a)
+        .def("set_light", &TargetView::setLight, "index"_a, "position"_a, "colour"_a, "reach"_a)
+        .def("frame", &TargetView::frame)
+        .def("accept", &TargetView::accept)
+        .def("forget", &TargetView::forget);
+    module.def("target_rotation", &rotationOf, "quaternion"_a);
+}

@@ -1,0 +1,147 @@
+/* Frames of random poses from the view file in view_table.h: prints a hash of all writes. It is the same on every processor.
+ * On a bare RISC-V it calls Linux by itself, and needs no library. With HOSTILE it reads that many damaged files instead. */
+#include "colonnade_view.h"
+#include "view_table.h"
+
+#ifndef FRAMES
+#define FRAMES 0
+#endif
+#ifndef HOSTILE
+#define HOSTILE 0
+#endif
+
+static uint32_t state = 0x2545F491u;
+
+static uint32_t next(void) {
+    state ^= state << 13;
+    state ^= state >> 17;
+    state ^= state << 5;
+    return state;
+}
+
+static uint32_t hash = 0x811C9DC5u;
+
+static void add(uint32_t word) {
+    for (int byte = 0; byte < 4; ++byte) hash = (hash ^ (word >> (8 * byte) & 255)) * 16777619u;
+}
+
+static uint64_t root(uint64_t value) {
+    uint64_t result = 0;
+    for (uint64_t bit = (uint64_t)1 << 31; bit != 0; bit >>= 1)
+        if ((result | bit) * (result | bit) <= value) result |= bit;
+    return result;
+}
+
+/* A position up to 2^bits / 2^32 metres from the origin on each axis, and any rotation. */
+static struct colonnade_pose make_pose(int bits) {
+    struct colonnade_pose pose;
+    for (int axis = 0; axis < 3; ++axis) pose.position[axis] = (int64_t)(next() % 2048) * ((int64_t)1 << (bits - 10));
+    for (int axis = 0; axis < 3; ++axis) pose.position[axis] += (int64_t)next() % 4096 - ((int64_t)1 << bits);
+    int32_t quaternion[4];
+    int64_t parts[4], square = 0;
+    for (int i = 0; i < 4; ++i) parts[i] = (int64_t)(next() % 65535) - 32767, square += parts[i] * parts[i];
+    const int64_t length = (int64_t)root((uint64_t)square << 28);
+    for (int i = 0; i < 4; ++i) {
+        const int64_t part = length == 0 ? 0 : parts[i] * ((int64_t)1 << 44) / length;
+        quaternion[i] = (int32_t)part;
+    }
+    add((uint32_t)colonnade_rotation(pose.rotation, quaternion));
+    return pose;
+}
+
+static void check(enum colonnade_error error) { add((uint32_t)error); }
+
+static uint8_t writes[8 * 4096];
+
+static void run(struct colonnade_view *view, int frames) {
+    struct colonnade_frame frame;
+    for (int i = 0; i < frames; ++i) {
+        const struct colonnade_pose object = make_pose(31);
+        const struct colonnade_camera camera = {make_pose(36), (next() % 4000 + 20) << 16, (next() % 4000 + 20) << 16,
+                                                (int32_t)(next() % 640) << 16, (int32_t)(next() % 480) << 16, 640, 480};
+        check(colonnade_view_set_object(view, &object));
+        check(colonnade_view_set_camera(view, &camera));
+        for (uint32_t light = 0; light < view->scene.lights; ++light) {
+            struct colonnade_light value = {{0}, {next() >> 14, next() >> 14, next() >> 14}, next()};
+            const struct colonnade_pose place = make_pose(34);
+            for (int axis = 0; axis < 3; ++axis) value.position[axis] = place.position[axis];
+            check(colonnade_view_set_light(view, light, &value));
+        }
+        const enum colonnade_error error = colonnade_view_frame(view, writes, sizeof writes / 8, &frame);
+        check(error);
+        if (error != COLONNADE_OK) continue;
+        for (size_t byte = 0; byte < 8 * (size_t)frame.count; ++byte) hash = (hash ^ writes[byte]) * 16777619u;
+        colonnade_view_accept(view);
+    }
+}
+
+static struct colonnade_design make_design(void) {
+    struct colonnade_design design = {.frame_registers = FRAME_REGISTERS, .device_end = DEVICE_END};
+    for (size_t i = 0; i < 32; ++i) design.format_hash[i / 4] |= (uint32_t)view_table[16 + i] << (8 * (i % 4));
+    return design;
+}
+
+static void read_damaged(const struct colonnade_design *design) {
+    static uint8_t copy[sizeof view_table];
+    static const uint32_t extremes[] = {0, 1, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 32, 63, 64};
+    for (int i = 0; i < HOSTILE; ++i) {
+        for (size_t byte = 0; byte < sizeof copy; ++byte) copy[byte] = view_table[byte];
+        for (uint32_t words = next() % 4; words < 4; ++words) {
+            const size_t at = 48 + 4 * (next() % ((sizeof copy - 48) / 4) % 200);
+            const uint32_t value = next() % 2 == 0 ? next() >> next() % 32 : extremes[next() % 8];
+            for (uint32_t byte = 0; byte < 4; ++byte) copy[at + byte] = (uint8_t)(value >> (8 * byte));
+        }
+        struct colonnade_view view;
+        if (colonnade_view_open(&view, design, copy, sizeof copy) != COLONNADE_OK) continue;
+        struct colonnade_frame frame;
+        if (colonnade_view_most_writes(&view) <= sizeof writes / 8)
+            check(colonnade_view_frame(&view, writes, sizeof writes / 8, &frame));
+        run(&view, 1);
+    }
+}
+
+static uint32_t result(void) {
+    const struct colonnade_design design = make_design();
+    struct colonnade_view view;
+    check(colonnade_view_open(&view, &design, view_table, sizeof view_table));
+    run(&view, FRAMES);
+    read_damaged(&design);
+    return hash;
+}
+
+#ifdef __riscv
+static long call(long number, long a, long b, long c) {
+    register long a0 __asm__("a0") = a, a1 __asm__("a1") = b, a2 __asm__("a2") = c, a7 __asm__("a7") = number;
+    __asm__ volatile("ecall" : "+r"(a0) : "r"(a1), "r"(a2), "r"(a7) : "memory");
+    return a0;
+}
+
+/* What the compiler calls for structures. */
+void *memset(void *to, int value, size_t bytes) {
+    for (size_t i = 0; i < bytes; ++i) ((volatile uint8_t *)to)[i] = (uint8_t)value;
+    return to;
+}
+
+void *memcpy(void *to, const void *from, size_t bytes) {
+    for (size_t i = 0; i < bytes; ++i) ((volatile uint8_t *)to)[i] = ((const uint8_t *)from)[i];
+    return to;
+}
+
+void _start(void) {
+    char text[9];
+    const uint32_t value = result();
+    for (int i = 0; i < 8; ++i) text[i] = "0123456789abcdef"[value >> (28 - 4 * i) & 15];
+    text[8] = '\n';
+    call(64, 1, (long)text, 9);
+    call(93, 0, 0, 0);
+    for (;;) {
+    }
+}
+#else
+#include <stdio.h>
+
+int main(void) {
+    printf("%08x\n", (unsigned)result());
+    return 0;
+}
+#endif
