@@ -15,7 +15,7 @@ PRESETS = {
     "lean": ("as `edge`, narrower arithmetic, finer vertices", "`make verify`"),
     "diffuse": ("as `edge`, diffuse objects only", "`make verify`"),
     "textured": ("textures, colours at corners, emission", "`make test`, by feature"),
-    "small": ("the simulator: rooms, mirrors, glass", "`make test`, eight meshes"),
+    "small": ("the simulator: rooms, mirrors, glass", "`make test`"),
     "tiny": ("tests, the smallest array", "`make test`"),
     "fpga": ("an ECP5 board", "`make verify`"),
 }
