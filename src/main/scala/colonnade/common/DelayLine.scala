@@ -1,22 +1,22 @@
 package colonnade.common
 
 import chisel3._
-import chisel3.util.log2Ceil
+import chisel3.util.{log2Ceil, RegEnable}
 
 /** Ports of [[DelayLine]]. */
 final class DelayLineIO[T <: Data](value: T) extends Bundle {
   val moves  = Input(Bool()) // the pipeline moves on by one stage
   val writes = Input(Bool()) // `in` is valid and must come out later
   val in     = Input(value)
-  val reads  = Input(Bool()) // `out` is needed in the next cycle, after this cycle's move if there is one
+  val reads  = Input(Bool()) // with this move the next value comes out
   val out    = Output(value)
 }
 
 /** Carries values along a pipeline that may stall, in a memory of `delay` words in place of shift registers.
   *
-  * A value written with a move comes out `delay` moves later; it is `in` before the first of them. Between moves `out`
-  * stays, as long as it is read. It is undefined in a cycle after one without `reads`. A word is never read in the cycle in
-  * which it is written.
+  * A value written with a move comes out `delay` moves later; it is `in` before the first of them. `out` stays until the
+  * next move with `reads`: a register holds it, so that a stall costs no read of the memory. A word is never read in the
+  * cycle in which it is written.
   */
 final class DelayLine[T <: Data](value: T, delay: Int) extends Module {
   require(delay >= 2, s"a delay line of $delay moves; it must have at least 2")
@@ -30,5 +30,9 @@ final class DelayLine[T <: Data](value: T, delay: Int) extends Module {
 
   when(io.moves) { current := next }
   when(io.moves && io.writes) { memory.write(current, io.in) }
-  io.out := memory.read(Mux(io.moves, next, current), io.reads)
+
+  private val reads  = io.moves && io.reads
+  private val isRead = RegNext(reads, false.B)
+  private val out    = memory.read(next, reads)
+  io.out := Mux(isRead, out, RegEnable(out, isRead))
 }

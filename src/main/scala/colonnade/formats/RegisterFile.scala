@@ -76,16 +76,19 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   // Settings are read from a memory of copies: registers all over the device need no way back
   private val masks = settings.flatMap { case (r, _) =>
     (0 until r.words).map(word => r.address + word -> ((BigInt(1) << wordBits(r, word)) - 1))
-  }.toMap.withDefaultValue(BigInt(0))
-  private val copies    = SyncReadMem(addresses, UInt(RegisterMap.dataBits.W))
-  private val isSetting = masks.keys.map(address => BigInt(1) << address).sum.U(addresses.W)
-  private val isWritten = RegInit(0.U(addresses.W))
-  private val mask      = VecInit(Seq.tabulate(addresses)(masks(_).U(RegisterMap.dataBits.W)))
-  private val isCopy    = RegNext(io.register.read && isWritten(io.register.address), false.B)
-  private val copy      = copies.read(io.register.address, io.register.read)
-  when(writes) {
-    copies.write(io.register.address, io.register.writeData & mask(io.register.address))
-    isWritten := isWritten | (UIntToOH(io.register.address, addresses) & isSetting)
+  }.toMap
+  private val first     = masks.keys.min
+  private val count     = masks.keys.max + 1 - first
+  private val index     = (io.register.address - first.U)(log2Ceil(count) - 1, 0)
+  private val isSetting = VecInit(Seq.tabulate(addresses)(masks.contains(_).B))(io.register.address)
+  private val mask      = VecInit(Seq.tabulate(addresses)(masks.getOrElse(_, BigInt(0)).U(RegisterMap.dataBits.W)))
+  private val copies    = SyncReadMem(count, UInt(RegisterMap.dataBits.W))
+  private val isWritten = RegInit(0.U(count.W))
+  private val isCopy    = RegNext(io.register.read && isSetting && (isWritten >> index)(0), false.B)
+  private val copy      = copies.read(index, io.register.read && isSetting)
+  when(writes && isSetting) {
+    copies.write(index, io.register.writeData & mask(io.register.address))
+    isWritten := isWritten | UIntToOH(index, count)
   }
   when(isCopy) { readData := copy }
   io.register.readData := Mux(isCopy, copy, readData)

@@ -4,13 +4,13 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, DecoupledIO}
 import colonnade.config.ColonnadeConfig
 
-/** The first pixel of a square of `frame.tileSize`, or of one of its quarters: [[TileDivider]]. */
+/** The first pixel of a square of `frame.tileSize`, or of one of the squares of [[TileDivider]]. */
 sealed class Tile(config: ColonnadeConfig) extends Bundle {
   val x = UInt(config.numbers.coordinateBits.W)
   val y = UInt(config.numbers.coordinateBits.W)
 }
 
-/** A tile, or a quarter of one, that meets the object. */
+/** A tile, or a square of one, that meets the object. */
 final class ObjectTile(config: ColonnadeConfig) extends Tile(config) {
 
   /** Those of the whole tile. */

@@ -8,7 +8,7 @@ import colonnade.formats.{FrameSettings, PixelPosition}
 final class TileScanIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
 
-  /** Tiles are quarters of a tile. */
+  /** Tiles are squares of a [[TileDivider]]. */
   val isDivided = Input(Bool())
   val tiles     = Flipped(Decoupled(new Tile(config)))
   val positions = Decoupled(new PixelPosition(config))
@@ -41,7 +41,7 @@ final class TileScan(config: ColonnadeConfig) extends Module {
 
   /** The size of a tile in one direction. */
   private def clipped(frame: UInt, first: UInt): UInt = {
-    val size = Mux(io.isDivided, (config.frame.tileSize / 2).U, config.frame.tileSize.U)
+    val size = Mux(io.isDivided, TileDivider.edge(config).U, config.frame.tileSize.U)
     val left = frame - first
     Mux(left < size, left, size)
   }

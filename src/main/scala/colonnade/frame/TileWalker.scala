@@ -71,7 +71,7 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
     mixer.positions
   }
 
-  io.positions :<>= TimingSlice.queue(positions)
+  io.positions :<>= Queue(positions, 1, pipe = true) // one pixel at most is chosen before a context is free
   io.isIdle := scan.io.isIdle && outline.io.isIdle && !tested.valid && !io.others.valid && !io.positions.valid
 }
 

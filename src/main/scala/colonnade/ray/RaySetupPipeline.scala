@@ -32,7 +32,7 @@ final class RaySetupPipeline(config: PathConfig) extends RaySetup(config) {
     line.moves  := shifts
     line.writes := holdsRay(from)
     line.in     := value
-    line.reads  := Mux(moves, holdsRay(to - 1), holdsRay(to))
+    line.reads  := holdsRay(to - 1)
     line.out
   }
 

@@ -5,6 +5,7 @@ import chiseltest._
 import colonnade.config.{ColonnadeConfig, UnitsConfig}
 import colonnade.environment.EnvironmentImage
 import colonnade.formats.{FrameRegisters, LoadTarget, Pixel}
+import colonnade.frame.TileDivider
 import colonnade.unit.{SmallEnvironment, SmallScene}
 import colonnade.{Always, Matrix, Model, Packed, Simulation, TestConfigs}
 import org.scalatest.Tag
@@ -209,7 +210,7 @@ private class ColumnFrame(
   dut.io.start.poke(false)
 
   /** First pixels of the tiles by kind: of the object, of the environment, of the background. In frames with an
-    * environment, those of the object are quarters.
+    * environment, those of the object are divided.
     */
   private val Seq(ofObject, ofEnvironment, ofBackground) = {
     val hasEnvironment = registers.get("environment.enabled").contains(BigInt(1))
@@ -220,9 +221,9 @@ private class ColumnFrame(
     }
     val (objects, others) = all.partition(meets("frame.objectRect", _, tileSize))
     val (rooms, rest)     = others.partition(hasEnvironment && meets("environment.window", _, tileSize))
-    val half              = tileSize / 2
-    val quarters          = for ((x, y) <- objects; dx <- Seq(0, half); dy <- Seq(0, half)) yield (x + dx, y + dy)
-    val parts = if (hasEnvironment) quarters.filter { case (x, y) => x < size(0) && y < size(1) } else objects
+    val first             = 0 until tileSize by TileDivider.edge(config)
+    val squares           = for ((x, y) <- objects; dx <- first; dy <- first) yield (x + dx, y + dy)
+    val parts = if (hasEnvironment) squares.filter { case (x, y) => x < size(0) && y < size(1) } else objects
     Seq(parts, rooms, rest).map(random.shuffle(_))
   }
 

@@ -126,7 +126,7 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
           .map { case (x, y) => (x * tileSize, y * tileSize) }
       val (objects, others)           = tiles.partition(isObjects)
       val (environments, backgrounds) = others.partition(isEnvironments)
-      val parts                       = if (isDivided) Seq((0, 0), (4, 0), (0, 4), (4, 4)) else Seq((0, 0))
+      val parts = if (isDivided) Morton.cells(4, 4).map { case (x, y) => (2 * x, 2 * y) } else Seq((0, 0))
       expectDealt(
         objects.flatMap { case (x, y) => parts.map(part => (x + part._1, y + part._2)) },
         columns.map(_.tiles)

@@ -11,7 +11,7 @@ class TileScanSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "TileScan"
 
   for (tileSize <- Seq(4, 8, 16))
-    it should s"give the pixels of clipped tiles of $tileSize, and of their quarters, once, in Morton order, under stalls" in {
+    it should s"give the pixels of clipped tiles of $tileSize, and of their squares, once, in Morton order, under stalls" in {
       val size   = (2 * tileSize + 3, tileSize + 1)
       val config = TileScanSpec.config(tileSize)
       test(new TileScan(config)) { dut =>
@@ -20,7 +20,7 @@ class TileScanSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.frame.pixelsHigh.poke(size._2)
         for ((willing, isDivided, seed) <- Seq((1.0, false, 1), (0.3, false, 2), (0.3, true, 3))) {
           val random = new Random(seed)
-          val edge   = if (isDivided) tileSize / 2 else tileSize
+          val edge   = if (isDivided) TileDivider.edge(config) else tileSize
           val tiles  = TileScanSpec.tiles(size, edge)
           dut.io.isDivided.poke(isDivided)
           val visited = TileScanSpec.walk(dut.clock, dut.io.tiles, dut.io.positions, () => dut.io.isIdle.peekBoolean())(

@@ -106,8 +106,8 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
           }
           val inWindow = (pixel: (Int, Int)) =>
             hasWindow && pixel._1 >= 2 && pixel._2 >= 3 && pixel._1 < 12 && pixel._2 < 15
-          // With a window the object's tiles are quarters
-          val size  = if (hasWindow) 4 else 8
+          // With a window the object's tiles are divided
+          val size  = if (hasWindow) 2 else 8
           val tiles =
             for (first <- Seq(0, 8); y <- 0 until 8 by size; x <- 0 until 8 by size) yield (first + x, first + y)
           var claims         = Map.empty[(Int, Int), Boolean]
