@@ -1,8 +1,8 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Decoupled, Queue, Valid}
-import colonnade.common.{Context, First, TimingSlice}
+import chisel3.util.{Decoupled, Valid}
+import colonnade.common.{Context, First, ReservedQueue, TimingSlice}
 import colonnade.config.{AttributeFetchConfig, ColonnadeConfig, PathConfig}
 import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 
@@ -60,15 +60,22 @@ final class AttributeFetch(config: PathConfig, most: Int = AttributeFetch.slots)
   fetch.readyNext  := VecInit(false.B, false.B, io.readyNext)
   io.requests :<>= TimingSlice.queue(fetch.requests)
 
-  // Queue hits for a slot; there are never more than contexts
-  private val waiting = Module(new Queue(new AttributeRequest(config), config.contexts, useSyncReadMem = true))
-  waiting.io.enq.valid := io.hits.valid
-  waiting.io.enq.bits  := io.hits.bits
-  assert(!io.hits.valid || waiting.io.enq.ready, "more hits than contexts")
-
-  private val hit  = waiting.io.deq
-  private val free = First(isUsed.map(!_)).bits
+  // The first hit waits for a slot in a register, those behind it in a memory; there are never more than contexts
+  private val waiting = Module(new ReservedQueue(new AttributeRequest(config), config.contexts.max(2))).io
+  private val first   = RegInit(0.U.asTypeOf(Valid(new AttributeRequest(config))))
+  private val hit     = Wire(Decoupled(new AttributeRequest(config)))
+  private val free    = First(isUsed.map(!_)).bits
+  private val isFirst = (!first.valid || hit.ready) && !waiting.validNext
+  when(!first.valid || hit.ready)(first.valid := io.hits.valid && isFirst)
+  when(io.hits.valid && isFirst)(first.bits   := io.hits.bits)
+  waiting.in.valid := io.hits.valid && !isFirst
+  waiting.in.bits := io.hits.bits
+  waiting.mayTakeNext := !first.valid || hit.ready
+  waiting.out.ready := hit.ready
+  hit.valid := first.valid || waiting.out.valid
+  hit.bits := Mux(first.valid, first.bits, waiting.out.bits)
   hit.ready := !isUsed.asUInt.andR
+  assert(!(first.valid && waiting.out.valid), "two hits are the first")
   fetch.fetches.foreach(_ := 0.U.asTypeOf(fetch.fetches.head))
   fetch.fetches.head.valid        := hit.fire
   fetch.fetches.head.bits.context := free

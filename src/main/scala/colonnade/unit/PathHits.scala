@@ -96,7 +96,8 @@ final class PathHits(config: PathConfig) extends Module {
   private val closest = ContextTable(paths, new ClosestHit(config))
   private val hits    = ContextTable(paths, new TriangleHit(config))
   private val rays    = ContextTable(paths, new TriangleRay(config.numbers))
-  when(io.rays.fire) { rays.write(ray.context, ray.ray.forTriangles) }
+  private val writes  = io.rays.fire && !ray.isShadow // nobody shades what a shadow ray hits
+  when(writes) { rays.write(ray.context, ray.ray.forTriangles) }
   when(io.results.valid && result.hasHit) {
     val entry = Wire(new ClosestHit(config))
     entry.id := result.hit.id
@@ -121,7 +122,7 @@ final class PathHits(config: PathConfig) extends Module {
   trace.surfaceHit.bits.t         := hit.t
   for (measured <- trace.surfaceHit.bits.distance) {
     val entries = ContextTable(paths, UInt(config.numbers.entryBits.W))
-    when(io.rays.fire) { entries.write(ray.context, ray.tEntry.natural) }
+    when(writes) { entries.write(ray.context, ray.tEntry.natural) }
     measured := SurfaceHit.distance(config, entries.read(readHit, reads), hit.t)
   }
   assert(!(shades && distance.valid), "one hit is read in a cycle")
