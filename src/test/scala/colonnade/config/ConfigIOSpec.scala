@@ -60,13 +60,18 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
       "columnBvhMemory.readLatency" -> (1, 16),
       "frame.maxWidth"              -> (8, 4096),
       "frame.maxHeight"             -> (8, 4096),
-      "frame.materials"             -> (1, 256)
+      "frame.materials"             -> (1, 256),
+      "frame.lights"                -> (1, 8),
+      "frame.maxBounces"            -> (0, 15)
     )
+    def isRefused(field: String, value: Int, range: (Int, Int)) =
+      refusal("tiny", s"$field=$value") == s"$field is $value; it must be from ${range._1} to ${range._2}"
+    for ((field, range) <- ranges; value <- Seq(range._1 - 1, range._2 + 1)) assert(isRefused(field, value, range), field)
     val wrong = for {
       (field, (low, high)) <- Gen.oneOf(ranges)
       value                <- Gen.oneOf(Gen.chooseNum(Int.MinValue, low - 1), Gen.chooseNum(high + 1, Int.MaxValue))
-    } yield (field, value, s"$field is $value; it must be from $low to $high")
-    Prop.forAllNoShrink(wrong) { case (field, value, message) => refusal("tiny", s"$field=$value") == message }
+    } yield (field, value, (low, high))
+    Prop.forAllNoShrink(wrong) { case (field, value, range) => isRefused(field, value, range) }
   }
 
   it should "load a file" in {

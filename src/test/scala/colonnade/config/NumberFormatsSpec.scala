@@ -6,8 +6,11 @@ import org.scalatest.matchers.should.Matchers
 class NumberFormatsSpec extends AnyFlatSpec with Matchers {
   behavior of "NumberFormats"
 
-  private def numbers(mac: Int, sqrt: Int, div: Int, vertexBits: Int): NumberFormats =
-    ConfigIO.load(s"${mac}b${sqrt}s${div}d", Seq(s"geometry.vertexBits=$vertexBits")).numbers
+  private def numbers(mac: Int, sqrt: Int, div: Int, vertexBits: Int, triangleBits: String = "null"): NumberFormats =
+    ConfigIO.load(
+      s"${mac}b${sqrt}s${div}d",
+      Seq(s"geometry.vertexBits=$vertexBits", s"geometry.triangleBits=$triangleBits")
+    ).numbers
 
   it should "give the reference widths for 32b32s64d" in {
     val reference = numbers(32, 32, 64, 16)
@@ -24,8 +27,9 @@ class NumberFormatsSpec extends AnyFlatSpec with Matchers {
       sqrt       <- Seq(16, 17, 64)
       div        <- 16 to 64 by 6
       vertexBits <- Seq(10, 16, 24)
-    } withClue(s"${mac}b${sqrt}s${div}d, $vertexBits vertex bits: ") {
-      val n = numbers(mac, sqrt, div, vertexBits)
+      triangles  <- Seq("null", "16", "64")
+    } withClue(s"${mac}b${sqrt}s${div}d, $vertexBits vertex bits, triangle tests of $triangles: ") {
+      val n = numbers(mac, sqrt, div, vertexBits, triangles)
       n.gridBits - n.gridFraction shouldBe vertexBits + 3
       n.directionBits should be > n.sceneBits
       Seq(n.shearDigits, n.reciprocalDigits, n.distanceDigits, n.weightBits, n.cosineFraction).min should be >= 8

@@ -41,7 +41,7 @@ final class EnvironmentImage(config: ColonnadeConfig, random: Random, illegal: D
     val mode      = random.nextInt(8)
     val cells     = 4 << (2 * (mode % 4))
     val maskWords = if (mode < 4) (cells + 15) / 16 else 1 + (2 * cells + 15) / 16
-    val pointer = if (mode == 0 || isIllegal()) randomPointer() else random.nextInt(layout.mapHeapWords - maskWords + 1)
+    val pointer = if (mode == 0) randomPointer() else pointerTo(maskWords, layout.mapHeapWords)
     new Packed(new MapDescriptor).pack(
       Map(
         "mode"       -> mode,
@@ -55,13 +55,15 @@ final class EnvironmentImage(config: ColonnadeConfig, random: Random, illegal: D
   private def planeDescriptor(): BigInt = {
     val mode    = random.nextInt(8)
     val words   = Map(1 -> 2, 2 -> 5, 3 -> 4, 4 -> 10, 5 -> 17, 6 -> 34).get(mode)
-    val pointer = words.filterNot(_ => isIllegal()).fold(randomPointer())(count =>
-      random.nextInt(layout.planeHeapWords - count + 1)
-    )
+    val pointer = words.fold(randomPointer())(pointerTo(_, layout.planeHeapWords))
     new Packed(new PlaneDescriptor).pack(Map("mode" -> mode, "pointer" -> pointer))
   }
 
-  private def isIllegal(): Boolean = random.nextDouble() < illegal
+  /** A pointer to words of a heap; an illegal one is arbitrary, or the last of its words is the first beyond the heap. */
+  private def pointerTo(words: Int, heapWords: Int): Int =
+    if (random.nextDouble() >= illegal) random.nextInt(heapWords - words + 1)
+    else if (random.nextBoolean()) randomPointer()
+    else heapWords - words + 1
 
   private def randomPointer(): Int = random.nextInt(1 << AttributeLayout.pointerBits)
 }

@@ -216,10 +216,11 @@ class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
     val larger  = manifest("array.rows=2", "precision.sqrt=40", "columnBvhMemory.readLatency=4")
     val narrow  = manifest("geometry.vertexBits=15")
     val precise = manifest("precision.div=62")
+    val flat    = manifest("geometry.bvh=false")
     base("formatHash").str should fullyMatch regex "[0-9a-f]{64}"
     larger("formatHash") shouldBe base("formatHash")
     larger("configHash") should not be base("configHash")
-    Seq(narrow, precise).foreach(_("formatHash") should not be base("formatHash"))
+    Seq(narrow, precise, flat).foreach(_("formatHash") should not be base("formatHash"))
   }
 
   it should "be written as JSON that reads back the same" in {

@@ -176,18 +176,19 @@ class MicroprogramSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "not let a step raise two signals that exclude each other" in refuse(
-    "two operations of the adder in step 0"
-  ) {
-    (program, operand) =>
+  for ((how, raise) <- Seq[(String, (Microprogram[TestLabel], Bool) => Unit)](
+      "raise two signals that exclude each other"       -> (_.raise(_)),
+      "raise two signals early that exclude each other" -> (_.raiseEarly(_))
+    ))
+    it should s"not let a step $how" in refuse("two operations of the adder in step 0") { (program, operand) =>
       val signals = Seq.fill(2)(Wire(Bool()))
       program.exclusive("adder", signals)
       program.step(Begin) {
-        signals.foreach(signal => program.raise(signal))
+        signals.foreach(raise(program, _))
         operand.choose(1.S)
         program.goto(Begin)
       }
-  }
+    }
 
   it should "not let a step branch twice" in refuse("two branches in step 1") { (program, operand) =>
     program.step(Begin)(operand.choose(1.S))

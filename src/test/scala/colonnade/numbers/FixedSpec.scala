@@ -37,6 +37,7 @@ class FixedSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   private val distance = FixedPointFormat.signed(width = 32, fraction = 13)
   private val colour   = FixedPointFormat.unsigned(width = 16, fraction = 12)
   private val coarse   = FixedPointFormat.signed(width = 16, fraction = -3)
+  private val slope    = FixedPointFormat.signed(width = 10, fraction = 12) // narrower than `colour`
 
   it should "be labelled by integer and fraction bits" in {
     distance.label shouldBe "q18_13"
@@ -73,7 +74,9 @@ class FixedSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
     }
   }
 
-  for ((left, right) <- Seq((distance, coarse), (colour, colour), (distance, colour), (colour, coarse)))
+  private val pairs =
+    Seq((distance, coarse), (colour, colour), (distance, colour), (colour, coarse), (colour, slope), (slope, colour))
+  for ((left, right) <- pairs)
     it should s"compute exactly with $left and $right" in {
       val random                                        = new Random(6)
       def values(format: FixedPointFormat): Seq[BigInt] =

@@ -11,10 +11,11 @@ class PipelinedDividerSpec extends AnyFlatSpec with ChiselScalatestTester with M
 
   private type Operands = (BigInt, BigInt)
 
-  /** A division a cycle: two lanes, the second one divides the numerators in reverse. */
+  /** A division a cycle, but when nothing loads: two lanes, the second one divides the numerators in reverse. */
   private def check(mantissaBits: Int, digits: Int, operands: Seq[Operands]): Unit =
     test(new PipelinedDivider(mantissaBits, digits, lanes = 2)) { divider =>
       divider.io.loads.foreach(_.poke(true))
+      val random  = new Random(2)
       val latency = PipelinedDivider.stages(digits)
       val lanes   = operands.map(_._1).zip(operands.map(_._1).reverse)
       for (cycle <- 0 until operands.size + latency) {
@@ -27,6 +28,11 @@ class PipelinedDividerSpec extends AnyFlatSpec with ChiselScalatestTester with M
           val ((one, other), (_, denominator)) = (lanes(cycle - latency), operands(cycle - latency))
           divider.io.quotients(0).expect((one << digits) / denominator)
           divider.io.quotients(1).expect((other << digits) / denominator)
+        }
+        if (random.nextInt(4) == 0) {
+          divider.io.loads.foreach(_.poke(false))
+          divider.clock.step()
+          divider.io.loads.foreach(_.poke(true))
         }
         divider.clock.step()
       }
