@@ -66,7 +66,8 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     )
     def isRefused(field: String, value: Int, range: (Int, Int)) =
       refusal("tiny", s"$field=$value") == s"$field is $value; it must be from ${range._1} to ${range._2}"
-    for ((field, range) <- ranges; value <- Seq(range._1 - 1, range._2 + 1)) assert(isRefused(field, value, range), field)
+    for ((field, range) <- ranges; value <- Seq(range._1 - 1, range._2 + 1))
+      assert(isRefused(field, value, range), field)
     val wrong = for {
       (field, (low, high)) <- Gen.oneOf(ranges)
       value                <- Gen.oneOf(Gen.chooseNum(Int.MinValue, low - 1), Gen.chooseNum(high + 1, Int.MaxValue))

@@ -41,7 +41,7 @@ final class EnvironmentImage(config: ColonnadeConfig, random: Random, illegal: D
     val mode      = random.nextInt(8)
     val cells     = 4 << (2 * (mode % 4))
     val maskWords = if (mode < 4) (cells + 15) / 16 else 1 + (2 * cells + 15) / 16
-    val pointer = if (mode == 0) randomPointer() else pointerTo(maskWords, layout.mapHeapWords)
+    val pointer   = if (mode == 0) randomPointer() else pointerTo(maskWords, layout.mapHeapWords)
     new Packed(new MapDescriptor).pack(
       Map(
         "mode"       -> mode,

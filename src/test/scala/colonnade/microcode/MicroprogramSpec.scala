@@ -176,10 +176,12 @@ class MicroprogramSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  for ((how, raise) <- Seq[(String, (Microprogram[TestLabel], Bool) => Unit)](
+  for (
+    (how, raise) <- Seq[(String, (Microprogram[TestLabel], Bool) => Unit)](
       "raise two signals that exclude each other"       -> (_.raise(_)),
       "raise two signals early that exclude each other" -> (_.raiseEarly(_))
-    ))
+    )
+  )
     it should s"not let a step $how" in refuse("two operations of the adder in step 0") { (program, operand) =>
       val signals = Seq.fill(2)(Wire(Bool()))
       program.exclusive("adder", signals)
