@@ -75,13 +75,7 @@ def record(memory: Memory, index: int) -> tuple[list[int], list[tuple[int, int]]
 def check_orbit(poses: list[int], start: list[int], centre: list[int], turns: float) -> None:
     """The camera looks at the object from the place of the start, turned around its upright axis; so does the light."""
     angle = 2 * np.pi * turns
-    turned = np.array(
-        [
-            [np.cos(angle), 0, np.sin(angle)],
-            [0, 1, 0],
-            [-np.sin(angle), 0, np.cos(angle)],
-        ]
-    )
+    turned = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     for first in (0, 18):
         begin, found = (np.array(values[first : first + 3]) - centre for values in (start, poses))
         if np.abs(turned @ begin - found).max() > TOLERANCE * np.linalg.norm(begin):
@@ -117,14 +111,11 @@ def main() -> None:
         if target.writes() != words:
             fail(f"the processor has computed other registers of frame {index} than the host")
         expected = framebuffer_bytes(render_model(manifest, image, target.accept(words)), XRGB8888)
-        lines = memory.take(
-            layout["framebuffers"] + index * layout["frame_bytes"],
-            layout["frame_bytes"],
-        )
+        lines = memory.take(layout["framebuffers"] + index * layout["frame_bytes"], layout["frame_bytes"])
         if int(seen.get(str(index).encode(), b"0"), 16) != zlib.crc32(lines.tobytes()):
             fail(f"the processor does not see frame {index} as it is in memory")
         shown.append(lines.reshape(layout["height"], layout["stride"])[:, : 4 * layout["width"]])
-        different += np.count_nonzero(shown[-1] != expected)
+        different += int(np.count_nonzero(shown[-1] != expected))
     if memory.written_elsewhere():
         fail(f"{memory.written_elsewhere()} bytes outside the framebuffers were written")
 
