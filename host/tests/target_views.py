@@ -35,10 +35,10 @@ EDGES = ("x0", "y0", "x1", "y1")
 
 
 class Design:
-    """A golden design with a packed mesh, and the view file of its scene."""
+    """A design with a packed mesh, and the view file of its scene."""
 
-    def __init__(self, name: str) -> None:
-        self.manifest = Manifest.load(GOLDEN / f"{name}.json")
+    def __init__(self, manifest: Manifest) -> None:
+        self.manifest = manifest
         lights = int(self.manifest.config["frame"]["lights"])
         self.scene = dataclasses.replace(SCENE, more_lights=SCENE.more_lights[: lights - 1])
         self.image: SceneImage = pack(load_mesh("teapot:3"), self.manifest)
@@ -47,6 +47,10 @@ class Design:
         self.registers = frame_registers(self.scene, self.header, self.manifest, WIDTH, HEIGHT)
         self.file = view_file(self.placed, self.registers, (WIDTH, HEIGHT), self.header, self.manifest)
         self.view = make_view(self.scene, self.header.extent, WIDTH, HEIGHT, self.header.materials)
+
+    @classmethod
+    def golden(cls, name: str) -> Design:
+        return cls(Manifest.load(GOLDEN / f"{name}.json"))
 
     def target(self) -> TargetView:
         return TargetView(self.file, self.manifest)

@@ -8,9 +8,9 @@ from target_views import Design
 
 @pytest.fixture(scope="module", params=["tiny", "lean", "edge"])
 def design(request: pytest.FixtureRequest) -> Design:
-    return Design(request.param)
+    return Design.golden(request.param)
 
 
 @pytest.fixture(scope="module")
 def small_design() -> Design:
-    return Design("edge")
+    return Design.golden("edge")

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from target_views import EDGES, HEIGHT, LENS, METRE, ONE, PIXEL, POSES, ROOT, UNIT, WIDTH, rotation, whole
+from target_views import EDGES, GOLDEN, HEIGHT, LENS, METRE, ONE, PIXEL, POSES, ROOT, UNIT, WIDTH, rotation, whole
 
+from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.environment.load import load_environment
@@ -61,8 +62,8 @@ def decoded_with_noise(name: str) -> Any:
 class Room:
     """A room with exact and with decoded depth, and the view file of an object in it."""
 
-    def __init__(self, name: str) -> None:
-        self.manifest = Manifest.load(ROOT / "configs" / "golden" / "small.json")
+    def __init__(self, name: str, widths: Sequence[str] = ()) -> None:
+        self.manifest = manifest_for("small", widths).manifest if widths else Manifest.load(GOLDEN / "small.json")
         self.maps: Any = (
             EncodedEnvironment.of(load_environment(ROOMS / name), self.manifest, "live")
             if name in ENCODED
@@ -118,9 +119,11 @@ class Room:
         )
 
 
-@pytest.fixture(scope="module", params=["attic", *ENCODED])
+@pytest.fixture(scope="module", params=["attic", *ENCODED, "attic 24 64", "attic 64 64"])
 def room(request: pytest.FixtureRequest) -> Room:
-    return Room(request.param)
+    name, *widths = request.param.split()
+    keys = ("precision.mac", "geometry.triangleBits")
+    return Room(name, [f"{key}={value}" for key, value in zip(keys, widths, strict=False)])
 
 
 def room_views(room: Room, seed: int, count: int = max(20, POSES // 10)) -> Iterator[tuple[dict[str, int], View]]:
@@ -135,17 +138,21 @@ def test_the_projection_to_the_maps_is_the_float_one(room: Room) -> None:
     """But for rotations that are none, by the rounding of their entries: floats invert them, the target transposes."""
     axes = room.to_world[:, :3]
     error = 2.0**-26 + 2 * np.abs(axes @ axes.T - np.eye(3)).max()
+    low_bits = max(0, room.manifest.numbers["macBits"] - 32)
     for found, view in room_views(room, 6):
         expected = environment_registers(view, room.maps, room.header, room.manifest, True)
 
-        def numbers(registers: dict[str, int]) -> tuple[Any, Any, float]:
-            unit = 2.0 ** -registers["environment.exponent"]
+        def numbers(registers: dict[str, int]) -> list[tuple[Any, float]]:
+            unit = 2.0 ** (low_bits - registers["environment.exponent"])
             step = unit * 2.0 ** registers["environment.offsetShift"]
-            matrix = [registers[f"environment.matrix[{i}].{axis}"] * unit for i in range(3) for axis in "xyz"]
-            return np.array(matrix), np.array([registers[f"environment.offset.{axis}"] * step for axis in "xyz"]), step
+            names = [f"environment.matrix[{i}].{axis}" for i in range(3) for axis in "xyz"]
+            offset = [f"environment.offset.{axis}" for axis in "xyz"]
+            return [
+                (np.array([registers[name] / 2.0**low_bits for name in group]) * least, least)
+                for group, least in ((names, unit), (offset, step))
+            ]
 
-        (matrix, offset, step), (exact_matrix, exact_offset, _) = numbers(found), numbers(expected)
-        for ours, theirs, least in ((matrix, exact_matrix, 0.0), (offset, exact_offset, step)):
+        for (ours, least), (theirs, _) in zip(numbers(found), numbers(expected), strict=True):
             np.testing.assert_allclose(ours, theirs, rtol=0, atol=max(least, error * np.abs(theirs).max()))
         for name in (name for name in expected if "rotation" in name):
             assert abs(found[name] - expected[name]) <= 1

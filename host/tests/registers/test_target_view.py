@@ -11,14 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from target_views import LENS, ONE, PIXEL, POSES, UNIT, Design, Poses, both, random_poses
 
-from colonnade.common.errors import UserError
-from colonnade.mesh.load import load_mesh
-from colonnade.registers.frame import frame_registers
+from colonnade.design.generator import manifest_for
+from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.registers.target_view import TargetView, rotation_of
-from colonnade.registers.view_file import camera_names, light_names, view_file
-from colonnade.scene.model import MeshSource, Scene
-from colonnade.scene.view import place
-from colonnade.scene_image.packer import pack
+from colonnade.registers.view_file import camera_names, light_names
 
 
 def test_the_scene_of_the_file_is_that_of_the_host(design: Design) -> None:
@@ -30,9 +26,24 @@ def test_the_scene_of_the_file_is_that_of_the_host(design: Design) -> None:
     assert {name: found[name] for name in same} == {name: design.registers[name] for name in same}
 
 
-def test_camera_and_lights_are_within_1_of_the_float_ones(design: Design) -> None:
-    """Where one is shifted by a place more than the other, its unit is the larger one."""
-    words = others = 0
+#: precision.mac, geometry.triangleBits, geometry.vertexBits.
+WIDTHS = [(16, 16, 24), (24, 64, 10), (48, 48, 16), (64, 24, 16), (64, 64, 24)]
+
+
+@pytest.fixture(scope="module", params=["tiny", "lean", "edge", *WIDTHS], ids=str)
+def any_design(request: pytest.FixtureRequest) -> Design:
+    if isinstance(request.param, str):
+        return Design.golden(request.param)
+    keys = ("precision.mac", "geometry.triangleBits", "geometry.vertexBits")
+    widths = [f"{key}={value}" for key, value in zip(keys, request.param, strict=True)]
+    return Design(manifest_for("small", widths).manifest)
+
+
+def test_camera_and_lights_are_within_1_of_the_float_ones(any_design: Design) -> None:
+    """Where one is shifted by a place more than the other, its unit is the larger one; of wide operands it is that of
+    the upper 32 bits."""
+    words, others, design = 0, 0, any_design
+    more = max(0, design.manifest.numbers["macBits"] - 32)
     for found, expected in both(design, POSES, 1):
         for name in (*camera_names(), "frame.unitShift", *light_names(len(design.view.lights))):
             kind = "frame.unitShift" if name.endswith(("position.x", "position.y", "position.z")) else None
@@ -42,10 +53,21 @@ def test_camera_and_lights_are_within_1_of_the_float_ones(design: Design) -> Non
                 ours, theirs = -ours, -theirs
             low = min(ours, theirs)
             difference = (found[name] << (ours - low)) - (expected[name] << (theirs - low))
-            assert abs(difference) <= 1 << (max(ours, theirs) - low), (name, found[name], expected[name])
+            low_bits = more if kind is not None or "direction" in name else 0
+            assert abs(difference) <= 1 << (max(ours + low_bits, theirs) - low), (name, found[name], expected[name])
             words, others = words + 1, others + (difference != 0)
-    print(f"{others} of {words} words differ, by 1")
-    assert others < 0.02 * words
+    print(f"{others} of {words} words differ, by 1 at most")
+    assert more > 0 or others < 0.02 * words
+
+
+def test_frames_are_those_of_the_floats(any_design: Design) -> None:
+    """The model's frames; camera and lights differ by their roundings, which move few pixels."""
+    model, objects, others = loaded_model(any_design.manifest, any_design.image), 0, 0
+    for found, floats in both(any_design, 8, 5):
+        frame, expected = model_frame(model, found), model_frame(model, found | floats)
+        others += int((frame.colour != expected.colour).any(axis=2).sum())
+        objects += int(expected.is_object.sum())
+    assert objects > 50 and others < 0.02 * objects
 
 
 Move = st.tuples(st.sampled_from(["object", "camera", "light", "all"]), st.booleans(), st.integers(0, 99))
@@ -131,7 +153,10 @@ def test_other_files_are_refused_by_name(small_design: Design) -> None:
         return changed.tobytes()
 
     cases = {
-        "notAView": (b"CLNDFRAM" + file[8:], with_word(2, 2), with_word(12, 33), with_word(30, 0)),
+        "notAView": (
+            *(b"CLNDFRAM" + file[8:], with_word(2, 2), with_word(12, 15), with_word(12, 65), with_word(13, 73)),
+            *(with_word(14, 52), with_word(14, 1 << 31), with_word(30, 0)),
+        ),
         "otherFormat": (with_word(5, 0),),
         "truncated": (file[:-4], file + bytes(8), file[:40], with_word(28, int(words[28]) + 1)),
         "badRegister": (with_word(22, 0), with_word(24, 1 << 30)),
@@ -141,12 +166,3 @@ def test_other_files_are_refused_by_name(small_design: Design) -> None:
         for changed in files:
             with pytest.raises(ValueError, match=name):
                 TargetView(changed, manifest)
-
-
-def test_wide_designs_are_refused(make_manifest: Any) -> None:
-    manifest = make_manifest(mac=48)
-    image = pack(load_mesh("cube"), manifest)
-    scene = Scene(MeshSource(name="cube"))
-    registers = frame_registers(scene, image.header, manifest, 64, 48)
-    with pytest.raises(UserError, match="lower precision"):
-        view_file(place(scene, image.header.extent, 64, 48), registers, (64, 48), image.header, manifest)
