@@ -102,7 +102,7 @@ def main() -> None:
     centre = list(struct.unpack_from("<3q", view, 4 * 44))
     seen = dict(re.findall(rb"frame (\d+): crc32 ([0-9a-f]{8})", console.read_bytes()))
     start = [*struct.unpack_from("<3q9i2I2i2I", view, 4 * 59), *struct.unpack_from("<3q3IQ", view, 4 * 80)]
-    different, shown = 0, []
+    different, frames = 0, []
     for index in range(layout["frames"]):
         poses, words = record(memory, index)
         check_orbit(poses, start, centre, index / 8)
@@ -114,16 +114,16 @@ def main() -> None:
         lines = memory.take(layout["framebuffers"] + index * layout["frame_bytes"], layout["frame_bytes"])
         if int(seen.get(str(index).encode(), b"0"), 16) != zlib.crc32(lines.tobytes()):
             fail(f"the processor does not see frame {index} as it is in memory")
-        shown.append(lines.reshape(layout["height"], layout["stride"])[:, : 4 * layout["width"]])
-        different += int(np.count_nonzero(shown[-1] != expected))
+        frames.append(lines.reshape(layout["height"], layout["stride"])[:, : 4 * layout["width"]])
+        different += int(np.count_nonzero(frames[-1] != expected))
     if memory.written_elsewhere():
         fail(f"{memory.written_elsewhere()} bytes outside the framebuffers were written")
 
-    pixels = [frame.reshape(layout["height"], layout["width"], 4)[:, :, 2::-1] for frame in shown]
+    pixels = [frame.reshape(layout["height"], layout["width"], 4)[:, :, 2::-1] for frame in frames]
     rows = [np.hstack(pixels[at : at + FRAMES_IN_A_ROW]) for at in range(0, len(pixels), FRAMES_IN_A_ROW)]
     Image.fromarray(np.ascontiguousarray(np.vstack(rows))).save(picture)
-    size = sum(frame.size for frame in shown)
-    print(f"soc: {different} of {size} bytes of {len(shown)} framebuffers differ from the model's: {picture}")
+    size = sum(frame.size for frame in frames)
+    print(f"soc: {different} of {size} bytes of {len(frames)} framebuffers differ from the model's: {picture}")
     raise SystemExit(1 if different else 0)
 
 
