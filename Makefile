@@ -37,7 +37,7 @@ bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where
 	@mkdir -p out
 	@$(venv)/colonnade bench --config $(BENCH_CONFIG) --json out/bench.json --plot out/bench.png
 
-soc: setup ## a LiteX SoC in the simulator: boots, renders by the driver, compares the framebuffer with the model's
+soc: setup ## a LiteX SoC in the simulator: boots, computes views, renders by the driver, compares with the model
 	@tools/soc
 
 check: setup ## formatters, linters, types, layers, derived files

@@ -13,12 +13,13 @@ extern "C" {
 enum {
     COLONNADE_VIEW_LIGHTS = 8,
     COLONNADE_VIEW_EDGES = 6, /* half-planes of frame.objectOutline */
-    /* Words that are computed: those of frame, camera, lights, environment and its window. */
+    /* Words that are computed, at most: those of frame, camera, lights, environment and its window. Numbers of more than 32
+     * bits have two. */
     COLONNADE_VIEW_FRAME = 7 + 3 * COLONNADE_VIEW_EDGES,
-    COLONNADE_VIEW_CAMERA = 13,
-    COLONNADE_VIEW_LIGHT = 8,
-    COLONNADE_VIEW_ENVIRONMENT = 23,
-    COLONNADE_VIEW_WINDOW = 6,
+    COLONNADE_VIEW_CAMERA = 2 * 12 + 1,
+    COLONNADE_VIEW_LIGHT = 2 * 3 + 5,
+    COLONNADE_VIEW_ENVIRONMENT = 2 * 12 + 11,
+    COLONNADE_VIEW_WINDOW = 7,
     COLONNADE_VIEW_WORDS = COLONNADE_VIEW_FRAME + COLONNADE_VIEW_CAMERA + COLONNADE_VIEW_LIGHTS * COLONNADE_VIEW_LIGHT +
                            COLONNADE_VIEW_ENVIRONMENT + COLONNADE_VIEW_WINDOW
 };
@@ -51,7 +52,9 @@ struct colonnade_factor {
 
 /* Numbers of the design, of the mesh and of the room, from the view file. */
 struct colonnade_view_scene {
+    /* Operands of at most 32 bits, positions of at most 40 */
     int32_t mac_bits, scene_bits, grid_fraction, coordinate_bits, box_pad_log, mantissa_bits, vertex_bits;
+    int32_t more_mac_bits, more_grid_bits; /* that the design has below these; they are 0 */
     uint32_t max_width, max_height;
     uint32_t exposure; /* of lights, 2^-16 */
     uint32_t frame_address, camera_address, lights_address, environment_address, window_address;

@@ -1,24 +1,27 @@
-"""Compares the memory of the simulated SoC with the bit-exact model, byte by byte, and writes the frame as a PNG.
+"""Compares the memory of the simulated SoC with the bit-exact model, byte by byte, and writes the frames as a PNG.
 
-Usage: compare.py DESIGN SCENE FRAME OUTPUT CONSOLE PICTURE
+Usage: compare.py DESIGN SCENE VIEW OUTPUT CONSOLE PICTURE
 
-SCENE and FRAME come from ``colonnade pack``, OUTPUT and CONSOLE from simulation.py; PICTURE is written. The exit status
-is 1 if a byte differs, of the frame, of the files, or of what lies between, or if the processor saw another frame.
+SCENE and VIEW come from ``colonnade pack``, OUTPUT and CONSOLE from simulation.py; PICTURE is written. The exit status
+is 1 if a byte differs, of the frames, of the registers that the processor computed, of the files, or of what lies
+between, if the camera left its orbit, or if the processor saw other frames.
 """
 
 from __future__ import annotations
 
 import json
 import re
+import struct
 import sys
 import zlib
 from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 from colonnade.common.framebuffer_formats import framebuffer_bytes
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.registers.frame_file import read_frame_file
+from colonnade.registers.target_view import TargetView
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.file import SceneImage
@@ -26,41 +29,101 @@ from PIL import Image
 
 XRGB8888 = 0
 UNWRITTEN = 0xA5
+#: The program's ``struct record``: camera, light, number of words, and then the words.
+RECORD = struct.Struct("<3q9i4x2I2i2I 3q3I4xQ I")
+METRE, ONE = 1 << 32, 1 << 30
+#: Of the orbit's poses, in parts of the distance, and of 1.
+TOLERANCE = 2.0**-26
+FRAMES_IN_A_ROW = 4
+
+
+def fail(why: str) -> NoReturn:
+    """End with status 1."""
+    raise SystemExit(f"soc: {why}")
+
+
+class Memory:
+    """The main memory behind the program, at the end of the simulation."""
+
+    def __init__(self, output: Path) -> None:
+        self.layout: dict[str, int] = json.loads((output / "layout.json").read_text())
+        words = (output / "gateware" / "memory.hex").read_text().split()
+        values = [int(word, 16) for word in words if not word.startswith(("@", "//"))]
+        self._bytes = np.array(values, dtype="<u4").view(np.uint8)
+        self._explained = np.zeros(len(self._bytes), dtype=bool)
+        self._explained[: self.layout["view"] - self.layout["main_ram"]] = True
+
+    def take(self, address: int, size: int) -> Any:
+        """Bytes that may have been written."""
+        place = slice(address - self.layout["main_ram"], address - self.layout["main_ram"] + size)
+        self._explained[place] = True
+        return self._bytes[place]
+
+    def written_elsewhere(self) -> int:
+        """How many bytes have changed that were never taken."""
+        return int(np.count_nonzero((self._bytes != UNWRITTEN) & ~self._explained))
+
+
+def record(memory: Memory, index: int) -> tuple[list[int], list[tuple[int, int]]]:
+    """Camera and light of a frame, and the words that were set."""
+    address = memory.layout["records"] + index * memory.layout["record_bytes"]
+    *poses, count = RECORD.unpack(memory.take(address, RECORD.size).tobytes())
+    words = memory.take(address + RECORD.size, 8 * count).view("<u4").reshape(count, 2)
+    return poses, [(int(place), int(value)) for place, value in words]
+
+
+def check_orbit(poses: list[int], start: list[int], centre: list[int], turns: float) -> None:
+    """The camera looks at the object from the place of the start, turned around its upright axis; so does the light."""
+    angle = 2 * np.pi * turns
+    turned = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    for first in (0, 18):
+        begin, found = (np.array(values[first : first + 3]) - centre for values in (start, poses))
+        if np.abs(turned @ begin - found).max() > TOLERANCE * np.linalg.norm(begin):
+            fail(f"camera or light is not where a turn of {360 * turns:.0f} degrees brings it")
+    begin, found = (np.array(values[3:12]).reshape(3, 3) / ONE for values in (start, poses))
+    if np.abs(turned @ begin - found).max() > TOLERANCE or poses[12:18] != start[12:18]:
+        fail("the camera looks elsewhere, or its lens has changed")
 
 
 def main() -> None:
     """Compare, write the picture."""
-    design, scene, frame_path, output, console, picture = (Path(argument) for argument in sys.argv[1:])
+    design, scene, view_path, output, console, picture = (Path(argument) for argument in sys.argv[1:])
     manifest = Manifest.load(design)
-    frame = frame_path.read_bytes()
-    image = SceneImage.load(scene, manifest)
-    expected = framebuffer_bytes(render_model(manifest, image, read_frame_file(frame, manifest)), XRGB8888)
-    layout = json.loads((output / "layout.json").read_text())
-    words = (output / "gateware" / "memory.hex").read_text().split()
-    memory = np.array([int(word, 16) for word in words if not word.startswith(("@", "//"))], dtype="<u4").view(np.uint8)
-
-    files = {"frame": frame, "image": device_image(image, manifest)}
+    view, memory = view_path.read_bytes(), Memory(output)
+    layout, image = memory.layout, SceneImage.load(scene, manifest)
+    files = {"view": view, "image": device_image(image, manifest)}
     if "scene" in layout:
         files["scene"] = dram_image(image, manifest)
-    untouched = memory[layout["frame"] - layout["main_ram"] :].copy()
-    for name in (*files, "framebuffer"):
-        start, size = layout[name] - layout["frame"], layout[f"{name}_bytes"]
-        if name in files and untouched[start : start + size].tobytes() != files[name]:
-            raise SystemExit(f"soc: the {name} in memory has changed")
-        untouched[start : start + size] = UNWRITTEN
-    if (untouched != UNWRITTEN).any():
-        raise SystemExit(f"soc: {np.count_nonzero(untouched != UNWRITTEN)} bytes outside the framebuffer were written")
+    for name, content in files.items():
+        if memory.take(layout[name], layout[f"{name}_bytes"]).tobytes() != content:
+            fail(f"the {name} in memory has changed")
 
-    start = layout["framebuffer"] - layout["main_ram"]
-    lines = memory[start : start + layout["framebuffer_bytes"]].reshape(layout["height"], layout["stride"])
-    seen = re.search(rb"crc32 ([0-9a-f]{8})", console.read_bytes())
-    if seen is None or int(seen[1], 16) != zlib.crc32(lines.tobytes()):
-        raise SystemExit("soc: the processor does not see the frame that is in memory")
-    shown = lines[:, : 4 * layout["width"]]
-    pixels = shown.reshape(layout["height"], layout["width"], 4)
-    Image.fromarray(np.ascontiguousarray(pixels[:, :, 2::-1])).save(picture)
-    different = np.count_nonzero(shown != expected)
-    print(f"soc: {different} of {shown.size} bytes of the framebuffer differ from the model's: {picture}")
+    target = TargetView(view, manifest)
+    centre = list(struct.unpack_from("<3q", view, 4 * 44))
+    seen = dict(re.findall(rb"frame (\d+): crc32 ([0-9a-f]{8})", console.read_bytes()))
+    start = [*struct.unpack_from("<3q9i2I2i2I", view, 4 * 59), *struct.unpack_from("<3q3IQ", view, 4 * 80)]
+    different, frames = 0, []
+    for index in range(layout["frames"]):
+        poses, words = record(memory, index)
+        check_orbit(poses, start, centre, index / 8)
+        target.set_camera(poses[0:3], poses[3:12], poses[12:16], (poses[16], poses[17]))
+        target.set_light(0, poses[18:21], poses[21:24], poses[24])
+        if target.writes() != words:
+            fail(f"the processor has computed other registers of frame {index} than the host")
+        expected = framebuffer_bytes(render_model(manifest, image, target.accept(words)), XRGB8888)
+        lines = memory.take(layout["framebuffers"] + index * layout["frame_bytes"], layout["frame_bytes"])
+        if int(seen.get(str(index).encode(), b"0"), 16) != zlib.crc32(lines.tobytes()):
+            fail(f"the processor does not see frame {index} as it is in memory")
+        frames.append(lines.reshape(layout["height"], layout["stride"])[:, : 4 * layout["width"]])
+        different += int(np.count_nonzero(frames[-1] != expected))
+    if memory.written_elsewhere():
+        fail(f"{memory.written_elsewhere()} bytes outside the framebuffers were written")
+
+    pixels = [frame.reshape(layout["height"], layout["width"], 4)[:, :, 2::-1] for frame in frames]
+    rows = [np.hstack(pixels[at : at + FRAMES_IN_A_ROW]) for at in range(0, len(pixels), FRAMES_IN_A_ROW)]
+    Image.fromarray(np.ascontiguousarray(np.vstack(rows))).save(picture)
+    size = sum(frame.size for frame in frames)
+    print(f"soc: {different} of {size} bytes of {len(frames)} framebuffers differ from the model's: {picture}")
     raise SystemExit(1 if different else 0)
 
 

@@ -1,8 +1,8 @@
-"""A SoC in LiteX's simulator: VexRiscv, main memory, console, Colonnade. Its program renders a frame (docs/soc.md).
+"""A SoC in LiteX's simulator: VexRiscv, main memory, console, Colonnade. Its program renders an orbit (docs/soc.md).
 
-Usage: simulation.py DESIGN REGISTERS IMAGE FRAME OUTPUT CONSOLE [SCENE]
+Usage: simulation.py DESIGN REGISTERS IMAGE VIEW OUTPUT CONSOLE [SCENE]
 
-DESIGN and REGISTERS are folders of ``colonnade generate --axi 4`` and ``colonnade registers``, IMAGE and FRAME files of
+DESIGN and REGISTERS are folders of ``colonnade generate --axi 4`` and ``colonnade registers``, IMAGE and VIEW files of
 ``colonnade pack``, and SCENE its DRAM image if the design has a cache. OUTPUT receives the build, gateware/memory.hex,
 and layout.json, which says where things are in it.
 CONSOLE is a file for what the SoC prints.
@@ -37,8 +37,11 @@ MAIN_RAM_BYTES = 1 << 21
 PAGE = 4096
 #: Of host time, for the simulation.
 SECONDS = 3600
-#: The program is at the beginning of the memory; then come files and framebuffer, with a page between.
+#: The program is at the beginning of the memory; then come files, records and framebuffers, with a page between.
 PROGRAM_BYTES = 1 << 17
+#: Frames of the orbit, an eighth of a turn each, and what the program records of one.
+FRAMES = 8
+RECORD_BYTES = 1 << 13
 
 _UART = ("source_valid", "source_ready", "sink_valid", "sink_ready")
 _IO = [
@@ -110,15 +113,17 @@ class ProgramBuilder(Builder):  # type: ignore[misc]
 
 def memory_layout(files: dict[str, bytes]) -> dict[str, int]:
     """Addresses and sizes; every part has an untouched page behind it."""
-    width, height = struct.unpack_from("<2I", files["frame"], 48)
+    width, height = struct.unpack_from("<2I", files["view"], 4 * 78)
     stride = -(-width // 16) * 16 * 4
-    layout = {"width": width, "height": height, "stride": stride}
+    layout = {"frames": FRAMES, "width": width, "height": height, "stride": stride}
+    layout |= {"record_bytes": RECORD_BYTES, "frame_bytes": stride * height}
     place = MAIN_RAM + PROGRAM_BYTES
-    for name, size in {**{name: len(file) for name, file in files.items()}, "framebuffer": stride * height}.items():
+    sizes = {name: len(file) for name, file in files.items()}
+    for name, size in {**sizes, "records": FRAMES * RECORD_BYTES, "framebuffers": FRAMES * stride * height}.items():
         layout |= {name: place, f"{name}_bytes": size}
         place += -(-size // PAGE) * PAGE + PAGE
     if place > MAIN_RAM + MAIN_RAM_BYTES:
-        raise SystemExit(f"files and framebuffer need {place - MAIN_RAM} bytes, the memory has {MAIN_RAM_BYTES}")
+        raise SystemExit(f"files and framebuffers need {place - MAIN_RAM} bytes, the memory has {MAIN_RAM_BYTES}")
     return layout
 
 
@@ -126,8 +131,8 @@ def main() -> None:
     """Build, simulate."""
     if len(sys.argv) not in (7, 8):
         raise SystemExit(__doc__)
-    design, registers, image, frame, output, console, *scene = (Path(argument).resolve() for argument in sys.argv[1:])
-    names = {"frame": frame, "image": image} | dict(zip(("scene",), scene, strict=False))
+    design, registers, image, view, output, console, *scene = (Path(argument).resolve() for argument in sys.argv[1:])
+    names = {"view": view, "image": image} | dict(zip(("scene",), scene, strict=False))
     files = {name: file.read_bytes() for name, file in names.items()}
     layout = memory_layout(files)
     output.mkdir(parents=True, exist_ok=True)

@@ -3,7 +3,7 @@
 #include "colonnade_words.h"
 
 enum { HEADER_WORDS = 12, FIXED_WORDS = 80, LIGHT_WORDS = 11, ROOM_WORDS = 29, TILE_WORDS = 2 };
-enum { OUTLINE_NORMAL = 2047, WORLD_BITS = 60, ROTATION_BITS = 30 };
+enum { OUTLINE_NORMAL = 2047, WORLD_BITS = 60, ROTATION_BITS = 30, MAC_BITS = 32, SCENE_BITS = 40 };
 
 /* Reads a view file word by word; its length is checked before. */
 struct reader {
@@ -39,10 +39,19 @@ static bool is_within(int64_t value, int64_t low, int64_t high) { return low <= 
 
 static bool is_place(const int64_t position[3]) { return colonnade_block_length(position) <= WORLD_BITS; }
 
+/* A width of at most `most` bits, limited to what is computed; the rest goes to `more`. */
+static int32_t read_width(struct reader *reader, int32_t limit, int32_t most, int32_t *more) {
+    const int32_t bits = read_signed(reader);
+    *more = bits > limit && bits <= most ? bits - limit : 0;
+    return bits - *more;
+}
+
 static bool read_numbers(struct reader *reader, struct colonnade_view_scene *scene) {
-    scene->mac_bits = read_signed(reader);
-    scene->scene_bits = read_signed(reader);
-    scene->grid_fraction = read_signed(reader);
+    scene->mac_bits = read_width(reader, MAC_BITS, 64, &scene->more_mac_bits);
+    scene->scene_bits = read_width(reader, SCENE_BITS, 72, &scene->more_grid_bits);
+    const int32_t fraction = read_signed(reader);
+    const bool is_fraction = is_within(fraction, -12, 64);
+    scene->grid_fraction = is_fraction ? fraction - scene->more_grid_bits : 0;
     scene->coordinate_bits = read_signed(reader);
     scene->box_pad_log = read_signed(reader);
     scene->mantissa_bits = read_signed(reader);
@@ -55,9 +64,9 @@ static bool read_numbers(struct reader *reader, struct colonnade_view_scene *sce
     scene->lights_address = read_word(reader);
     scene->environment_address = read_word(reader);
     scene->window_address = read_word(reader);
-    return is_within(scene->mac_bits, 16, 32) && is_within(scene->scene_bits, 16, 40) &&
-           is_within(scene->grid_fraction, -12, 16) && is_within(scene->coordinate_bits, 4, 13) &&
-           is_within(scene->box_pad_log, 0, 8) && is_within(scene->mantissa_bits, 8, 32) &&
+    return is_within(scene->mac_bits, 16, MAC_BITS) && is_within(scene->scene_bits, 16, SCENE_BITS) && is_fraction &&
+           is_within(scene->grid_fraction, -12, 19) && is_within(scene->coordinate_bits, 4, 13) &&
+           is_within(scene->box_pad_log, 0, 24) && is_within(scene->mantissa_bits, 8, 32) &&
            is_within(scene->vertex_bits, 8, 24) && scene->max_width <= 4096 && scene->max_height <= 4096;
 }
 
@@ -123,6 +132,21 @@ static enum colonnade_error check_camera(const struct colonnade_view_scene *scen
     return camera->width > scene->max_width || camera->height > scene->max_height ? COLONNADE_TOO_LARGE : COLONNADE_OK;
 }
 
+/* The words that a device of this scene has, block by block. */
+struct block {
+    uint32_t address, place, count;
+};
+
+static int find_blocks(const struct colonnade_view_scene *scene, struct block blocks[5]) {
+    const uint32_t words = colonnade_mac_words(scene);
+    blocks[0] = (struct block){scene->frame_address, VIEW_FRAME, COLONNADE_VIEW_FRAME};
+    blocks[1] = (struct block){scene->camera_address, VIEW_CAMERA, 12 * words + 1};
+    blocks[2] = (struct block){scene->lights_address, VIEW_LIGHTS, (3 * words + 5) * scene->lights};
+    blocks[3] = (struct block){scene->environment_address, VIEW_ENVIRONMENT, 12 * words + 11};
+    blocks[4] = (struct block){scene->window_address, VIEW_WINDOW, scene->scene_bits + scene->more_grid_bits > 42 ? 7 : 6};
+    return scene->environment_address == 0 ? 3 : 5;
+}
+
 enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design,
                                          const void *data, size_t bytes) {
     const size_t words = bytes / 4;
@@ -167,13 +191,10 @@ enum colonnade_error colonnade_view_open(struct colonnade_view *view, const stru
     scene->tiles = reader.bytes + 4 * reader.next;
     scene->writes = scene->tiles + 4 * TILE_WORDS * tiles;
 
-    const uint32_t places[][2] = {{scene->frame_address, COLONNADE_VIEW_FRAME},
-                                  {scene->camera_address, COLONNADE_VIEW_CAMERA},
-                                  {scene->lights_address, COLONNADE_VIEW_LIGHT * scene->lights},
-                                  {scene->environment_address, COLONNADE_VIEW_ENVIRONMENT},
-                                  {scene->window_address, COLONNADE_VIEW_WINDOW}};
-    for (size_t i = 0; i < (has_room ? 5 : 3); ++i)
-        if (!colonnade_are_frame_registers(design, places[i][0], places[i][1])) return COLONNADE_BAD_REGISTER;
+    struct block blocks[5];
+    const int block_count = find_blocks(scene, blocks);
+    for (int i = 0; i < block_count; ++i)
+        if (!colonnade_are_frame_registers(design, blocks[i].address, blocks[i].count)) return COLONNADE_BAD_REGISTER;
     for (size_t i = 0; i < scene->constants; ++i)
         if (!colonnade_are_frame_registers(design, colonnade_word(scene->writes, 2 * i), 1)) return COLONNADE_BAD_REGISTER;
 
@@ -252,8 +273,13 @@ static bool find_on_grid(const struct colonnade_view *view, const int64_t point[
     return true;
 }
 
+/* The words of a light. */
+static uint32_t *find_light(struct colonnade_view *view, uint32_t index) {
+    return colonnade_computed(view) + VIEW_LIGHTS + (3 * colonnade_mac_words(&view->scene) + 5) * index;
+}
+
 /* Camera and lights, shifted right until the largest fits its register. */
-static void set_positions(struct colonnade_view *view, const struct colonnade_work *work) {
+static void set_positions(struct colonnade_view *view, struct colonnade_work *work) {
     const struct colonnade_view_scene *scene = &view->scene;
     const int64_t limit = ((int64_t)1 << (scene->mac_bits - 1)) - 1;
     uint64_t most = colonnade_largest(work->eye);
@@ -263,27 +289,32 @@ static void set_positions(struct colonnade_view *view, const struct colonnade_wo
     }
     int shift = 0;
     while (colonnade_nearest((int64_t)most, 16 + shift) > limit) ++shift;
-    uint32_t *words = colonnade_computed(view);
-    words[VIEW_UNIT_SHIFT] = (uint32_t)shift;
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-        const int64_t eye = colonnade_nearest(work->eye[axis], 16 + shift);
-        words[VIEW_CAMERA + axis] = colonnade_bits(eye, scene->mac_bits);
-        for (uint32_t i = 0; i < scene->lights; ++i) {
-            const int64_t light = colonnade_nearest(work->lights[i][axis], 16 + shift);
-            words[VIEW_LIGHTS + COLONNADE_VIEW_LIGHT * i + axis] = colonnade_bits(light, scene->mac_bits);
-        }
+    work->unit_shift = shift;
+    /* A wider register takes the shift as low bits of 0 */
+    const int in_steps = shift + scene->more_grid_bits;
+    const int low_bits = in_steps < scene->more_mac_bits ? in_steps : scene->more_mac_bits;
+    uint32_t *words = colonnade_computed(view), *to = words + VIEW_CAMERA;
+    words[VIEW_UNIT_SHIFT] = (uint32_t)(in_steps - low_bits);
+    for (int axis = 0; axis < 3; ++axis)
+        to = colonnade_set_mac(scene, to, colonnade_nearest(work->eye[axis], 16 + shift), low_bits);
+    for (uint32_t i = 0; i < scene->lights; ++i) {
+        to = find_light(view, i);
+        for (int axis = 0; axis < 3; ++axis)
+            to = colonnade_set_mac(scene, to, colonnade_nearest(work->lights[i][axis], 16 + shift), low_bits);
     }
 }
 
 /* A light's colour, and its squared reach in grid steps, as mantissa and exponent. */
-static void set_light(const struct colonnade_view *view, const struct colonnade_light *light, uint32_t words[]) {
+static void set_light(struct colonnade_view *view, uint32_t index) {
     const struct colonnade_view_scene *scene = &view->scene;
+    const struct colonnade_light *light = &view->lights[index];
+    uint32_t *words = find_light(view, index) + 3 * colonnade_mac_words(scene);
     for (int channel = 0; channel < 3; ++channel) {
         const uint64_t colour = (uint64_t)light->colour[channel] * scene->exposure; /* 2^-32; the register has 2^-12 */
         const uint64_t rounded = (colour >> 20) + (colour >> 19 & 1);
-        words[3 + channel] = rounded > 0xFFFF ? 0xFFFF : (uint32_t)rounded;
+        words[channel] = rounded > 0xFFFF ? 0xFFFF : (uint32_t)rounded;
     }
-    words[6] = words[7] = 0;
+    words[3] = words[4] = 0;
     if (light->reach == 0) return;
     int up = 64 - colonnade_bit_length(light->reach);
     uint64_t steps = colonnade_multiply_high(light->reach << up, scene->steps.mantissa);
@@ -298,11 +329,12 @@ static void set_light(const struct colonnade_view *view, const struct colonnade_
     const int down = 64 - scene->mantissa_bits;
     uint64_t mantissa = ((square >> (down - 1)) + 1) >> 1;
     if (mantissa >> scene->mantissa_bits != 0) mantissa >>= 1, ++exponent;
-    exponent -= scene->mantissa_bits;
+    exponent += 2 * scene->more_grid_bits - scene->mantissa_bits;
     /* Beyond the register's range the light has all or none of its intensity */
-    if (exponent > 127) return;
-    words[6] = (uint32_t)mantissa;
-    words[7] = colonnade_bits(exponent < -128 ? -128 : exponent, 8);
+    const int32_t limit = colonnade_exponent_limit(scene);
+    if (exponent > limit) return;
+    words[3] = (uint32_t)mantissa;
+    words[4] = (uint32_t)(exponent < -limit - 1 ? -limit - 1 : exponent) & (2 * (uint32_t)limit + 1);
 }
 
 /* The scaled rays of a picture, as whole numbers: those of the registers. */
@@ -310,11 +342,6 @@ struct rays {
     int32_t first[3], step_x[3], step_y[3];
     int shift; /* of `first` */
 };
-
-static void set_vector(struct colonnade_view *view, int place, const int32_t vector[3]) {
-    uint32_t *words = colonnade_computed(view) + place;
-    for (int axis = 0; axis < 3; ++axis) words[axis] = colonnade_bits(vector[axis], view->scene.mac_bits);
-}
 
 /* Directions times fx * fy need no division: (x + 1/2 - cx) * fy * right + (y + 1/2 - cy) * fx * down + fx * fy * forward.
  * One division scales them, so that the largest component in the frame is 2^(macBits - 2). */
@@ -366,10 +393,11 @@ static void set_directions(struct colonnade_view *view, const struct colonnade_w
     for (int i = 0; i < 3; ++i)
         for (int axis = 0; axis < 3; ++axis)
             results[i][axis] = (int32_t)colonnade_nearest(vectors[i][axis], 63 - bits - (i > 0 ? rays->shift : 0));
-    set_vector(view, VIEW_CAMERA + 3, rays->first);
-    set_vector(view, VIEW_CAMERA + 6, rays->step_x);
-    set_vector(view, VIEW_CAMERA + 9, rays->step_y);
-    colonnade_computed(view)[VIEW_CAMERA + 12] = (uint32_t)rays->shift;
+    uint32_t *to = colonnade_computed(view) + VIEW_CAMERA + 3 * colonnade_mac_words(scene);
+    for (int i = 0; i < 3; ++i)
+        for (int axis = 0; axis < 3; ++axis)
+            to = colonnade_set_mac(scene, to, results[i][axis], scene->more_mac_bits);
+    *to = (uint32_t)rays->shift;
 }
 
 /* The object's padded box, relative to the eye, rounded outwards to 30 bits. */
@@ -379,7 +407,7 @@ struct box {
 
 static void find_box(struct colonnade_view *view, const struct colonnade_work *work, struct box *box) {
     const struct colonnade_view_scene *scene = &view->scene;
-    const int shift = (int)colonnade_computed(view)[VIEW_UNIT_SHIFT], fraction = scene->grid_fraction;
+    const int shift = work->unit_shift, fraction = scene->grid_fraction;
     const int64_t pad = ((int64_t)1 << scene->box_pad_log) + 1;
     int64_t planes[3][2];
     uint64_t most = 0;
@@ -534,8 +562,7 @@ static enum colonnade_error compute(struct colonnade_view *view) {
     colonnade_computed(view)[VIEW_FRAME] = view->camera.width;
     colonnade_computed(view)[VIEW_FRAME + 1] = view->camera.height;
     set_positions(view, &work);
-    for (uint32_t i = 0; i < scene->lights; ++i)
-        set_light(view, &view->lights[i], colonnade_computed(view) + VIEW_LIGHTS + COLONNADE_VIEW_LIGHT * i);
+    for (uint32_t i = 0; i < scene->lights; ++i) set_light(view, i);
     struct rays rays;
     struct box box;
     set_directions(view, &work, &rays);
@@ -543,20 +570,6 @@ static enum colonnade_error compute(struct colonnade_view *view) {
     set_outline(view, &rays, &box);
     set_rectangle(view, &rays, &box);
     return scene->environment_address == 0 ? COLONNADE_OK : colonnade_view_room(view, &work);
-}
-
-/* The words that a device of this scene has, block by block. */
-struct block {
-    uint32_t address, place, count;
-};
-
-static int find_blocks(const struct colonnade_view_scene *scene, struct block blocks[5]) {
-    blocks[0] = (struct block){scene->frame_address, VIEW_FRAME, COLONNADE_VIEW_FRAME};
-    blocks[1] = (struct block){scene->camera_address, VIEW_CAMERA, COLONNADE_VIEW_CAMERA};
-    blocks[2] = (struct block){scene->lights_address, VIEW_LIGHTS, COLONNADE_VIEW_LIGHT * scene->lights};
-    blocks[3] = (struct block){scene->environment_address, VIEW_ENVIRONMENT, COLONNADE_VIEW_ENVIRONMENT};
-    blocks[4] = (struct block){scene->window_address, VIEW_WINDOW, COLONNADE_VIEW_WINDOW};
-    return scene->environment_address == 0 ? 3 : 5;
 }
 
 uint32_t colonnade_view_most_writes(const struct colonnade_view *view) {

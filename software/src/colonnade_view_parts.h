@@ -20,6 +20,7 @@ enum {
 struct colonnade_work {
     int64_t axes[3][3]; /* right, down and forward in the object's axes, 2^-60 */
     int64_t eye[3];     /* 2^-16 steps */
+    int unit_shift;     /* of the registers' positions, to steps */
     int64_t lights[COLONNADE_VIEW_LIGHTS][3];
 };
 
@@ -29,6 +30,30 @@ static inline uint32_t *colonnade_computed(struct colonnade_view *view) { return
 /* A value of a register of `width` bits. */
 static inline uint32_t colonnade_bits(int64_t value, int width) {
     return (uint32_t)value & (width < 32 ? ((uint32_t)1 << width) - 1 : UINT32_MAX);
+}
+
+/* Words of a register of `mac_bits` and those below. */
+static inline uint32_t colonnade_mac_words(const struct colonnade_view_scene *scene) {
+    return scene->more_mac_bits > 0 ? 2 : 1;
+}
+
+/* Sets such a register to value * 2^shift, which has `more_mac_bits` below at most, and answers the place behind it. */
+static inline uint32_t *colonnade_set_mac(const struct colonnade_view_scene *scene, uint32_t *words, int64_t value,
+                                          int shift) {
+    const uint64_t bits = (uint64_t)value << shift;
+    if (scene->more_mac_bits == 0) {
+        *words++ = colonnade_bits(value, scene->mac_bits);
+        return words;
+    }
+    *words++ = (uint32_t)bits;
+    *words++ = colonnade_bits((int64_t)(bits >> 32), scene->more_mac_bits);
+    return words;
+}
+
+/* The largest exponent of a register of exponents. */
+static inline int32_t colonnade_exponent_limit(const struct colonnade_view_scene *scene) {
+    const uint32_t bits = (uint32_t)(scene->scene_bits + scene->more_grid_bits);
+    return ((int32_t)1 << colonnade_bit_length(2 * bits)) - 1;
 }
 
 /* The registers of the environment, of the view's map camera. */

@@ -41,15 +41,19 @@ static bool set_projection(struct colonnade_view *view, const struct colonnade_w
             offset[row] -= colonnade_product(matrix[row][axis], colonnade_shift_left(work->eye[axis], eye_up));
     const int whole = -(power + 48 - eye_up + exponent), least = find_shift(colonnade_largest(offset), bits - 1);
     const int shift = least > whole ? least - whole : 0;
-    if (shift > scene->scene_bits || exponent < -128 || exponent > 127) return false;
+    /* Of the device's steps */
+    const int32_t more = scene->more_mac_bits, limit = colonnade_exponent_limit(scene);
+    const int32_t scaled = exponent + scene->more_grid_bits + more;
+    if (shift > scene->scene_bits || scaled < -limit - 1 || scaled > limit) return false;
 
-    uint32_t *words = colonnade_computed(view) + VIEW_ENVIRONMENT;
-    for (int i = 0; i < 9; ++i) words[i] = colonnade_bits(colonnade_nearest(matrix[i / 3][i % 3], down), bits);
-    for (int row = 0; row < 3; ++row) words[9 + row] = colonnade_bits(colonnade_nearest(offset[row], whole + shift), bits);
-    words[12] = (uint32_t)shift;
-    words[13] = colonnade_bits(exponent, 8);
+    uint32_t *to = colonnade_computed(view) + VIEW_ENVIRONMENT;
+    for (int i = 0; i < 9; ++i) to = colonnade_set_mac(scene, to, colonnade_nearest(matrix[i / 3][i % 3], down), more);
+    for (int row = 0; row < 3; ++row)
+        to = colonnade_set_mac(scene, to, colonnade_nearest(offset[row], whole + shift), more);
+    *to++ = (uint32_t)(shift + scene->more_grid_bits);
+    *to++ = (uint32_t)scaled & (2 * (uint32_t)limit + 1);
     for (int i = 0; i < 9; ++i)
-        words[14 + i] = colonnade_bits(colonnade_nearest(work->axes[i % 3][i / 3], 60 - ROTATION_FRACTION), 16);
+        *to++ = colonnade_bits(colonnade_nearest(work->axes[i % 3][i / 3], 60 - ROTATION_FRACTION), 16);
     return true;
 }
 
@@ -268,7 +272,7 @@ static struct cover find_cover(const struct colonnade_view *view, const struct l
 static void set_occlusion(struct colonnade_view *view, const struct colonnade_work *work, const struct lengths *lengths) {
     const struct colonnade_view_scene *scene = &view->scene;
     uint32_t *words = colonnade_computed(view) + VIEW_WINDOW + 4;
-    words[0] = words[1] = 0;
+    words[0] = words[1] = words[2] = 0;
     if (scene->occlusion == 0) return;
     const struct cover around = find_cover(view, lengths, (int32_t)1 << (scene->vertex_bits - 1));
     const struct cover box = find_cover(view, lengths, 0);
@@ -297,8 +301,11 @@ static void set_occlusion(struct colonnade_view *view, const struct colonnade_wo
     int64_t tolerance = colonnade_scaled((int64_t)error << 17, &scene->steps, 32, high);
     if (!is_near) tolerance = high;
     if (tolerance < low) tolerance = low;
+    if (tolerance > scene->max_tolerance) tolerance = scene->max_tolerance;
+    const uint64_t in_steps = (uint64_t)tolerance << scene->more_grid_bits;
     words[0] = 1;
-    words[1] = tolerance < scene->max_tolerance ? (uint32_t)tolerance : scene->max_tolerance;
+    words[1] = (uint32_t)in_steps;
+    words[2] = (uint32_t)(in_steps >> 32);
 }
 
 enum colonnade_error colonnade_view_room(struct colonnade_view *view, const struct colonnade_work *work) {

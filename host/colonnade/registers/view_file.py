@@ -30,6 +30,8 @@ AXES = "xyz"
 #: Fraction bits of positions in metres, of rotations, of lenses and lights, of depths in a tile.
 POSITION_FRACTION, ROTATION_FRACTION, LENS_FRACTION, DEPTH_FRACTION = 32, 30, 16, 10
 WORLD_BITS = 60
+#: Of a grid position that the target computes, its low bits are 0 in a wider one.
+SCENE_BITS = 40
 #: Contents of `environment.window`, and the largest error of a tile, 2^-16 m.
 WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE = range(3)
 MAX_TILE_ERROR = (1 << 24) - 1
@@ -98,18 +100,16 @@ def view_file(
         occlusion: The room hides the object where it is nearer.
 
     Raises:
-        UserError: The design's numbers or the scene's places are out of the target's range.
+        UserError: The scene's places are out of the target's range.
     """
     numbers = manifest.numbers
-    if numbers["macBits"] > 32 or numbers["sceneBits"] > 40:
-        raise UserError("a target computes registers of at most 32 bits: lower precision.mac and geometry.triangleBits")
     frame, lights = manifest.config["frame"], placed.lights
     blocks = computed_blocks(len(lights), room is not None)
     addresses = [_address(manifest, block) for block in blocks]
     computed = {name for block in blocks for name in block}
     others = {name: value for name, value in registers.items() if name not in computed}
     constants = [pair for name, value in others.items() for pair in manifest.registers[name].encode(value)]
-    step = header.frame.scale * 2.0 ** numbers["gridFraction"]
+    step = _step(header, manifest)
     words = [
         *(numbers[name] for name in _NUMBERS),
         *(int(frame["maxWidth"]), int(frame["maxHeight"]), 1 << LENS_FRACTION),
@@ -195,12 +195,22 @@ def _factor(value: float) -> tuple[int, int, int]:
 
 
 def _address(manifest: Manifest, names: Iterable[str]) -> int:
-    """Address of the first of registers that follow each other, a word each."""
+    """Address of the first of registers that follow each other."""
     registers = [manifest.registers[name] for name in names]
     for index, register in enumerate(registers):
-        if register.address != registers[0].address + index or register.words != 1:
-            raise ValueError(f"{register.name} does not follow {registers[0].name}")
+        if index > 0 and register.address != registers[index - 1].address + registers[index - 1].words:
+            raise ValueError(f"{register.name} does not follow {registers[index - 1].name}")
     return registers[0].address
+
+
+def _more_grid_bits(manifest: Manifest) -> int:
+    """Low bits of a grid position that the target does not compute."""
+    return max(0, manifest.numbers["sceneBits"] - SCENE_BITS)
+
+
+def _step(header: ImageHeader, manifest: Manifest) -> float:
+    """The target's grid steps in a mesh unit."""
+    return float(header.frame.scale * 2.0 ** (manifest.numbers["gridFraction"] - _more_grid_bits(manifest)))
 
 
 def _room(
@@ -214,13 +224,13 @@ def _room(
 ) -> list[int]:
     environment, unit = room.environment, room.image.depth_unit
     depth = room.image.decoded_depth(PlaneProjection.of(environment, unit))
-    step = header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
+    step = _step(header, manifest)
     metres = placed.pose.scale / step
     lens = (environment.fx, environment.fy, environment.cx, environment.cy)
     low, high = _bounds(environment, depth, size)
     shadowed = WINDOW_SHADOW if registers["shading.shadows"] else WINDOW_NONE
     window = [registers[name] for name in window_names()[:4]]
-    limit = (1 << manifest.registers["environment.occlusionTolerance"].width) - 1
+    limit = (1 << manifest.registers["environment.occlusionTolerance"].width) - 1 >> _more_grid_bits(manifest)
     tile = int(manifest.config["physicalAttributeMemory"]["tileSize"])
     tiles = tile_errors(environment, depth, tile)
     return [
