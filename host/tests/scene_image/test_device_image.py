@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 
 from colonnade.design.manifest import Manifest
+from colonnade.environment.load import load_environment
+from colonnade.maps.encoded import EncodedEnvironment
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.live import encode_still
 from colonnade.mesh.load import load_mesh
-from colonnade.scene_image.device_image import ALIGNMENT, device_image
+from colonnade.scene_image.device_image import ALIGNMENT, device_image, maps_image
+from colonnade.scene_image.environment import map_memories, with_environment
 from colonnade.scene_image.file import LoadSection
 from colonnade.scene_image.packer import pack
 
 ROOT = Path(__file__).resolve().parents[3]
+ROOM = ROOT / "scenes" / "rooms" / "living"
 
 
 @pytest.fixture(scope="module")
@@ -41,3 +47,23 @@ def test_an_image_has_a_header_and_a_section_for_each_memory(hardware: Manifest)
     entries = rest[4 : 4 + 2 * 256].view(np.uint8).reshape(256, 8)
     assert (entries[:, :5] == palette).all() and not entries[:, 5:].any()
     assert not rest[4 + 2 * 256 :].any() and len(rest[4 + 2 * 256 :]) < 32
+
+
+def test_an_image_of_maps_is_the_device_image_without_the_scene(hardware: Manifest) -> None:
+    layout = AttributeLayout.from_config(hardware.config["physicalAttributeMemory"])
+    room = load_environment(ROOM)
+    maps = EncodedEnvironment(room, encode_still(room, layout, rounds=1))
+    scene = pack(load_mesh("cube"), hardware)
+    whole, alone = (
+        np.frombuffer(each, dtype="<u4")
+        for each in (device_image(with_environment(scene, maps, hardware), hardware), maps_image(maps.image, hardware))
+    )
+    assert alone[2:4].tolist() == [1, 4 * len(alone)] and alone[12] == whole[12] - 1 == len(map_memories(hardware))
+    start = 36 + len(scene.records) * hardware.record_bits // 32
+    size = sum(
+        4 + shape["depth"] * -(-shape["bits"] // 32)
+        for name in map_memories(hardware)
+        for shape in (hardware.memories[name],)
+    )
+    np.testing.assert_array_equal(alone[32 : 32 + size], whole[start : start + size])
+    assert not alone[32 + size :].any() and len(alone) - 32 - size < 32
