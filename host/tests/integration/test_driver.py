@@ -177,9 +177,10 @@ def test_frames_by_the_driver_are_those_of_the_model(tmp_path: Path, case: str) 
 
 ROOM_SCENE = """
 mesh.name = "torus"
-background = {{room = "{room}", colours = "albedo"}}
+background = {{room = "rooms/{room}", colours = "albedo"}}
 object.size = 0.5
 material.kind = "mirror"
+paths.bounces = 1
 light.position = [0.1, 2.0, 1.0]
 """
 
@@ -193,7 +194,7 @@ def test_maps_of_another_view_are_loaded_between_frames(tmp_path: Path, mode: st
     manifest = design.manifest
     views = []
     for name, walked in (("first", 0.0), ("second", 0.4)):
-        write_room(tmp_path / name, generated_room(4, maps["width"], maps["height"], walked).environment)
+        write_room(tmp_path / "rooms" / name, generated_room(4, maps["width"], maps["height"], walked).environment)
         (tmp_path / f"{name}.toml").write_text(ROOM_SCENE.format(room=name))
         views.append(DeviceScene.of(load_scene(tmp_path / f"{name}.toml"), manifest, encoder="live"))
     registers = [view.registers((WIDTH, HEIGHT)) for view in views]
