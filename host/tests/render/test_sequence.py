@@ -21,6 +21,7 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
+from colonnade.environment.derived_albedo import derived_albedo, hue_lights
 from colonnade.environment.load import load_environment
 from colonnade.environment.sequence import load_sequence
 from colonnade.lab.evaluation.studies.generated_rooms import generated_room
@@ -161,6 +162,17 @@ def test_colours_of_the_photo_keep_the_light_of_the_first_frame(folder: Path) ->
     assert any(one[name] != other[name] for name in one if name.startswith("camera"))
     np.testing.assert_array_equal(first.image.records, second.image.records)
     assert second.environment is not None and not np.array_equal(second.environment.albedo, rooms[1].albedo)
+
+
+def test_albedos_that_a_sequence_lacks_have_one_light(folder: Path) -> None:
+    text = (folder / "sequence.toml").read_text()
+    (folder / "photos.toml").write_text("\n".join(line for line in text.splitlines() if not line.startswith("albedo")))
+    known, lacking = load_sequence(folder / "sequence.toml"), load_sequence(folder / "photos.toml")
+    light = hue_lights(known.room(0))
+    for number in (2, 0):
+        room = lacking.room(number)
+        np.testing.assert_array_equal(room.albedo, derived_albedo(known.room(number), light))
+        assert np.array_equal(room.albedo, derived_albedo(known.room(number))) is (number == 0)
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
