@@ -13,7 +13,7 @@ from colonnade.lab.figures.data import Data
 
 def live_rooms(data: Data) -> str:
     """Maps of stills: the offline encoder and the live one."""
-    found = data.result("live")
+    found = data.result("live-rooms")
     rows = []
     for name, report in (found["rooms"] | found["generated"]).items():
         offline, live = report["offline"], report["live"]
@@ -36,7 +36,7 @@ def live_paths(data: Data) -> str:
             *(f"{scale * report[key][0]:.2f}, {scale * report[key][1]:.2f}" for key, scale in _PATH),
             f"{report['psnr'][1] - report['psnr'][0]:+.2f} dB, {report['degrees'][1] - report['degrees'][0]:+.2f}°",
         ]
-        for name, report in data.result("live")["paths"].items()
+        for name, report in data.result("live-paths").items()
     ]
     titles = ["path", "albedo, dB: mean, worst", "normals, °", "planes off by 5 cm, %", "worst against mean"]
     return markdown(titles, rows)
