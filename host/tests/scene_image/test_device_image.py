@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 
+from colonnade.cli.main import cli
 from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
+from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import encode_still
@@ -67,3 +70,23 @@ def test_an_image_of_maps_is_the_device_image_without_the_scene(hardware: Manife
     )
     np.testing.assert_array_equal(alone[32 : 32 + size], whole[start : start + size])
     assert not alone[32 + size :].any() and len(alone) - 32 - size < 32
+
+
+def test_pack_writes_the_maps_of_a_room_alone(tmp_path: Path) -> None:
+    write_attic(tmp_path / "attic", 96, 72)
+    (tmp_path / "scene.toml").write_text('mesh.name = "cube"\n')
+    memory = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
+    settings = [word for key, value in memory.items() for word in ("--set", f"physicalAttributeMemory.{key}={value}")]
+    command = ["pack", tmp_path / "scene.toml", "--output", tmp_path / "out", "--encoder", "live", *settings]
+    files = ["--device-image", tmp_path / "image", "--maps-image", tmp_path / "maps"]
+
+    def run(*arguments: object) -> Result:
+        return CliRunner().invoke(cli, [str(argument) for argument in arguments])
+
+    refused = run(*command, *files)
+    assert refused.exit_code == 2 and "has none: give background.room or --background" in refused.output
+    assert not (tmp_path / "maps").exists()
+    done = run(*command, *files, "--background", tmp_path / "attic")
+    assert done.exit_code == 0, done.output
+    whole, alone = ((tmp_path / name).read_bytes() for name in ("image", "maps"))
+    assert alone[128:-128] in whole and 128 < len(alone) < len(whole)
