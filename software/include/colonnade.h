@@ -48,6 +48,8 @@ enum colonnade_error {
 /* Bits of `interrupt.status` and `interrupt.enable`. */
 enum { COLONNADE_FRAME_DONE = 1, COLONNADE_IMAGE_DONE = 2, COLONNADE_ERROR = 4 };
 
+enum { COLONNADE_MAX_MAPS = 10 };
+
 enum colonnade_format { COLONNADE_XRGB8888, COLONNADE_RGB565, COLONNADE_LINEAR16 };
 
 /* Access to the registers, at byte addresses from 0 to 0xFFFF. Accesses take effect in the order of the calls. */
@@ -57,6 +59,11 @@ struct colonnade_bus {
     /* Sleeps until an interrupt or for a while; NULL: the driver polls without a pause. */
     void (*wait)(void *context);
     void *context;
+};
+
+/* A memory: at most `records` records, each of `words` words of 32 bits in an image. */
+struct colonnade_memory {
+    uint32_t words, records;
 };
 
 /* One design, as the generated colonnade_design.h describes it. */
@@ -72,6 +79,8 @@ struct colonnade_design {
     uint32_t posted_writes;   /* writes to the device's registers that the shell takes while a frame runs */
     uint32_t scene_page;      /* byte address of `dram.page` and of `control.invalidate`; 0 if no scene lies in DRAM */
     uint32_t invalidate;
+    uint32_t map_count; /* memories of a room's maps; 0: the device has no room */
+    struct colonnade_memory maps[COLONNADE_MAX_MAPS]; /* an image's section for maps[i] has the target i + 1 */
 };
 
 struct colonnade {
@@ -90,7 +99,7 @@ struct colonnade_window {
     uint64_t base, end;
 };
 
-/* A device image, which `colonnade pack --device-image` writes.
+/* A device image, which `colonnade pack --device-image` or `--maps-image` writes.
  * `data` is where the processor sees it; NULL if it does not: the device alone checks the image then. */
 struct colonnade_image {
     const void *data;
@@ -128,8 +137,15 @@ enum colonnade_error colonnade_probe(struct colonnade *device, const struct colo
 /* Checks an image without a device: `bytes` bytes at `data`. */
 enum colonnade_error colonnade_check_image(const struct colonnade_design *design, const void *data, size_t bytes);
 
+/* Checks an image of maps without a device: all of its sections are for memories of a room's maps, and fill it. */
+enum colonnade_error colonnade_check_maps(const struct colonnade_design *design, const void *data, size_t bytes);
+
 /* Loads an image and waits for its end, `attempts` polls or waits at most. Acknowledges imageDone and error. */
 enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
+
+/* Loads the maps of another view or room, as colonnade_load does. The scene, textures and registers stay. The registers of
+ * the next frame have to be those of these maps. An image that the processor does not see must hold maps alone. */
+enum colonnade_error colonnade_load_maps(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
 
 /* Reads a frame file of `bytes` bytes, and fills `frame`, which points into it. */
 enum colonnade_error colonnade_open_frame(const struct colonnade_design *design, const void *data, size_t bytes,

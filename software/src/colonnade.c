@@ -53,11 +53,14 @@ static enum colonnade_error image_error(uint32_t bits) {
     return COLONNADE_OK;
 }
 
-enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts) {
+typedef enum colonnade_error image_check(const struct colonnade_design *design, const void *data, size_t bytes);
+
+static enum colonnade_error load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts,
+                                 image_check *check) {
     if (image->address % IMAGE_ALIGNMENT != 0 || image->bytes % IMAGE_ALIGNMENT != 0) return COLONNADE_MISALIGNED;
     if (!contains(&image->window, image->address, image->bytes)) return COLONNADE_TOO_LARGE;
     if (image->data != NULL) {
-        enum colonnade_error error = colonnade_check_image(device->design, image->data, image->bytes);
+        enum colonnade_error error = check(device->design, image->data, image->bytes);
         if (error != COLONNADE_OK) return error;
     }
     if (get(device, REGISTER(status)) != 0) return COLONNADE_BUSY;
@@ -72,6 +75,14 @@ enum colonnade_error colonnade_load(struct colonnade *device, const struct colon
     if (error != COLONNADE_OK) return error;
     colonnade_acknowledge(device, COLONNADE_IMAGE_DONE | COLONNADE_ERROR);
     return image_error(get(device, REGISTER(image_errors)));
+}
+
+enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts) {
+    return load(device, image, attempts, colonnade_check_image);
+}
+
+enum colonnade_error colonnade_load_maps(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts) {
+    return load(device, image, attempts, colonnade_check_maps);
 }
 
 static uint32_t word(const uint8_t *at) {

@@ -3,7 +3,7 @@
 
 #include "colonnade_words.h"
 
-enum { HEADER_BYTES = 128, FRAME_HEADER_BYTES = 64, IMAGE_ALIGNMENT = 128, VERSION = 1 };
+enum { HEADER_BYTES = 128, SECTION_BYTES = 16, FRAME_HEADER_BYTES = 64, IMAGE_ALIGNMENT = 128, VERSION = 1 };
 
 static bool is_magic(const uint8_t *bytes, const char *magic) {
     for (int i = 0; i < 8; ++i)
@@ -34,6 +34,24 @@ enum colonnade_error colonnade_check_image(const struct colonnade_design *design
         colonnade_check_header(design, data, bytes, HEADER_BYTES, "CLNDLOAD", COLONNADE_NOT_AN_IMAGE);
     if (error != COLONNADE_OK) return error;
     return bytes % IMAGE_ALIGNMENT == 0 ? COLONNADE_OK : COLONNADE_MISALIGNED;
+}
+
+enum colonnade_error colonnade_check_maps(const struct colonnade_design *design, const void *data, size_t bytes) {
+    const uint8_t *at = data;
+    enum colonnade_error error = colonnade_check_image(design, data, bytes);
+    if (error != COLONNADE_OK) return error;
+    size_t place = HEADER_BYTES;
+    for (uint32_t sections = colonnade_word(at, 12); sections > 0; --sections) {
+        if (bytes - place < SECTION_BYTES) return COLONNADE_BAD_LENGTH;
+        const uint32_t target = colonnade_word(at + place, 0), records = colonnade_word(at + place, 1);
+        if (target == 0 || target > design->map_count) return COLONNADE_BAD_SECTION;
+        const struct colonnade_memory *memory = &design->maps[target - 1];
+        if (records > memory->records) return COLONNADE_BAD_SECTION;
+        place += SECTION_BYTES;
+        if (4 * (size_t)memory->words * records > bytes - place) return COLONNADE_BAD_LENGTH;
+        place += 4 * (size_t)memory->words * records;
+    }
+    return bytes - place < IMAGE_ALIGNMENT ? COLONNADE_OK : COLONNADE_BAD_LENGTH;
 }
 
 enum colonnade_error colonnade_open_frame(const struct colonnade_design *design, const void *data, size_t bytes,

@@ -81,6 +81,15 @@ static uint8_t *make_file(const char *magic, size_t words, size_t *size) {
             put(file, *size, 16 + 2 * i, FIRST + (seed + (uint32_t)i) % FRAME_WORDS);
             put(file, *size, 17 + 2 * i, seed << 8 | (uint32_t)i);
         }
+    } else {
+        const uint32_t sections = take() % 4;
+        put(file, *size, 12, sections);
+        for (size_t i = 0, at = 32; i < sections && at + 1 < words; ++i) {
+            const uint32_t target = take() % 4, records = take() % 10;
+            put(file, *size, at, target);
+            put(file, *size, at + 1, records);
+            at += 4 + (size_t)records * (target == 0 || target > 2 ? 1 : shell.design->maps[target - 1].words);
+        }
     }
     for (uint32_t i = wrong < 4 ? 0 : wrong - 3; i > 0 && *size > 0; --i) {
         const size_t at = (take() << 8 | take()) % *size;
@@ -115,8 +124,9 @@ static void load(struct colonnade *device) {
     uint8_t *file = make_file("CLNDLOAD", 32 * (1 + take() % 4), &bytes);
     const uint64_t address = take_address();
     const struct colonnade_image image = {take() < 192 ? file : NULL, (uint32_t)bytes, address, take_window(address, bytes)};
-    const bool is_right = colonnade_check_image(device->design, file, bytes) == COLONNADE_OK;
-    const enum colonnade_error error = colonnade_load(device, &image, take() % 16);
+    const bool maps = take() % 2 != 0;
+    const bool is_right = (maps ? colonnade_check_maps : colonnade_check_image)(device->design, file, bytes) == COLONNADE_OK;
+    const enum colonnade_error error = (maps ? colonnade_load_maps : colonnade_load)(device, &image, take() % 16);
     REQUIRE(error != COLONNADE_BUSY || shell.writes == writes);
     REQUIRE(error != COLONNADE_OK || is_right || image.data == NULL);
     free(file);
@@ -216,6 +226,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         .counter_count = 10,
         .tile_size = 16,
         .posted_writes = 64,
+        .map_count = 2,
+        .maps = {{1, 4}, {3, 8}},
     };
     input = data;
     left = size;

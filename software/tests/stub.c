@@ -26,6 +26,8 @@ static const struct colonnade_design design = {
     .counter_count = 2,
     .tile_size = 16,
     .posted_writes = 5, /* less than a device has, for short tests */
+    .map_count = 2,
+    .maps = {{1, 4}, {3, 8}},
 };
 
 static void put(uint8_t *bytes, size_t word, uint32_t value) {
@@ -122,6 +124,63 @@ static void test_images(struct shell *shell, struct colonnade *device) {
     shell->registers[AT(image_errors)] = 0;
     CHECK(colonnade_load(device, &image, 3) == COLONNADE_OK && shell->registers[AT(interrupt_status)] == 0);
     CHECK(shell->registers[AT(image_base_low)] == 4096 && shell->registers[AT(image_bytes)] == 256);
+    free(file);
+}
+
+/* An image of maps with a section for each memory, in a file of `bytes` bytes; 384 are right. */
+enum { FIRST = 32, SECOND = FIRST + 4 + 4 * 1, MAPS_END = SECOND + 4 + 8 * 3 };
+
+static uint8_t *make_maps(size_t bytes) {
+    uint8_t *file = make_file("CLNDLOAD", bytes);
+    put(file, 12, 2);
+    put(file, FIRST, 1);
+    put(file, FIRST + 1, 4);
+    put(file, SECOND, 2);
+    put(file, SECOND + 1, 8);
+    return file;
+}
+
+/* No section is for another memory, too long or cut; what is refused reaches no register. */
+static void test_maps(struct shell *shell, struct colonnade *device) {
+    for (uint32_t bytes = 256; bytes <= 512; bytes += 128) {
+        uint8_t *file = make_maps(bytes);
+        const bool is_right = MAPS_END <= bytes / 4 && bytes / 4 < MAPS_END + 32;
+        CHECK(colonnade_check_image(&design, file, bytes) == COLONNADE_OK);
+        CHECK(colonnade_check_maps(&design, file, bytes) == (is_right ? COLONNADE_OK : COLONNADE_BAD_LENGTH));
+        free(file);
+    }
+    static const struct {
+        uint32_t word, value;
+        enum colonnade_error error;
+    } wrong[] = {
+        {0, 0, COLONNADE_NOT_AN_IMAGE},         {11, 8, COLONNADE_OTHER_FORMAT},
+        {FIRST, 0, COLONNADE_BAD_SECTION},      {FIRST, 3, COLONNADE_BAD_SECTION},
+        {FIRST, UINT32_MAX, COLONNADE_BAD_SECTION},      {SECOND + 1, 9, COLONNADE_BAD_SECTION},
+        {SECOND + 1, UINT32_MAX, COLONNADE_BAD_SECTION}, {12, 3, COLONNADE_BAD_SECTION},
+        {12, UINT32_MAX, COLONNADE_BAD_SECTION},
+    };
+    struct colonnade_image image = {NULL, 384, 4096, {4096, 4096 + 384}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+        uint8_t *file = make_maps(384);
+        put(file, wrong[i].word, wrong[i].value);
+        image.data = file;
+        CHECK(colonnade_load_maps(device, &image, 3) == wrong[i].error);
+        free(file);
+    }
+    uint8_t *file = make_maps(384);
+    image.data = file;
+    image.window.end -= 1;
+    CHECK(colonnade_load_maps(device, &image, 3) == COLONNADE_TOO_LARGE);
+    image.window.end += 1;
+    shell->registers[AT(status)] = 1;
+    CHECK(colonnade_load_maps(device, &image, 3) == COLONNADE_BUSY && shell->writes == 0);
+    shell->registers[AT(status)] = 0;
+    shell->outcome = COLONNADE_IMAGE_DONE;
+    device->width = 10;
+    CHECK(colonnade_load_maps(device, &image, 3) == COLONNADE_OK && device->width == 10);
+    CHECK(shell->registers[AT(image_base_low)] == 4096 && shell->registers[AT(image_bytes)] == 384);
+    image.data = NULL;
+    CHECK(colonnade_load_maps(device, &image, 3) == COLONNADE_OK);
     free(file);
 }
 
@@ -356,6 +415,7 @@ int main(int argc, char **argv) {
         {"scenes", test_scenes}, {"posted writes", test_posted_writes},
         {"events", test_events}, {"long frame files", test_long_frame_files},
         {"names", test_names},   {"refused frame files", test_refused_frame_files},
+        {"maps", test_maps},
     };
     struct shell *shell = calloc(1, sizeof *shell);
     CHECK(argc == 2 && shell != NULL);

@@ -11,7 +11,7 @@ import click
 
 from colonnade.common.errors import UserError
 from colonnade.common.terminal_text import plain
-from colonnade.maps.encoders import ENCODERS
+from colonnade.maps.encoders import ENCODERS, Encoder
 
 if TYPE_CHECKING:
     _NumberType = click.ParamType[float]
@@ -118,15 +118,15 @@ def background_option(command: Command) -> Command:
     )(command)
 
 
-def encoder_option(command: Command) -> Command:
-    """Add ``--encoder``."""
+def encoder_option(command: Command, default: Encoder | None = "offline", note: str = "") -> Command:
+    """Add ``--encoder``, with a note on its default."""
     return click.option(
         "--encoder",
         type=click.Choice(ENCODERS),
-        default="offline",
+        default=default,
         show_default=True,
         help="Encoder of a room's maps and of textures. offline: the best maps; live: the encoder of a moving camera,"
-        " much faster.",
+        f" much faster.{note}",
     )(command)
 
 

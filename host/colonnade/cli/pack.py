@@ -33,6 +33,12 @@ from colonnade.maps.encoders import Encoder
 )
 @click.option("--device-image", type=FILE, metavar="FILE", help="Also write the image that the AXI4 shell loads.")
 @click.option(
+    "--maps-image",
+    type=FILE,
+    metavar="FILE",
+    help="Also write the maps of the room alone, for a device that holds the scene already.",
+)
+@click.option(
     "--dram-image",
     type=FILE,
     metavar="FILE",
@@ -52,6 +58,7 @@ def pack(
     encoder: Encoder,
     output: Path,
     device_image: Path | None,
+    maps_image: Path | None,
     dram_image: Path | None,
     frame_file: Path | None,
     view_file: Path | None,
@@ -64,6 +71,7 @@ def pack(
 
     from colonnade.common import progress
     from colonnade.common.atomic_files import replacing
+    from colonnade.common.errors import UserError
     from colonnade.common.frame_size import parse_size
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
@@ -71,6 +79,7 @@ def pack(
     from colonnade.registers.frame_file import frame_file as encode_frame_file
     from colonnade.scene.parser import load_scene
     from colonnade.scene_image.device_image import device_image as encode_device_image
+    from colonnade.scene_image.device_image import maps_image as encode_maps_image
     from colonnade.scene_image.dram_image import dram_image as encode_dram_image
     from colonnade.scene_image.dram_image import line_layout
     from colonnade.scene_image.file import check_image_file, image_file
@@ -79,7 +88,7 @@ def pack(
 
     file = image_file(output)
     check_image_file(file)
-    require_outputs(json_file, device_image, dram_image, frame_file, view_file, folders=[file.parent])
+    require_outputs(json_file, device_image, maps_image, dram_image, frame_file, view_file, folders=[file.parent])
     declare_output(file)
     terminal = progress.for_terminal()
     pixels = parse_size(size) if size is not None else None
@@ -88,6 +97,10 @@ def pack(
         described = described.with_mesh(mesh)
     if background is not None:
         described = described.with_environment(background)
+    if maps_image is not None and described.background.room is None:
+        raise UserError(
+            f"--maps-image holds the maps of a room, and {scene} has none: give background.room or --background"
+        )
     manifest = manifest_for(config, overrides, terminal).manifest
     if dram_image is not None:
         line_layout(manifest)
@@ -98,6 +111,8 @@ def pack(
         others: list[tuple[str, Path, bytes]] = []
         if device_image is not None:
             others.append(("for a bus", device_image, encode_device_image(image, manifest)))
+        if maps_image is not None and prepared.maps is not None:
+            others.append(("maps", maps_image, encode_maps_image(prepared.maps.image, manifest)))
         if dram_image is not None:
             others.append(("for DRAM", dram_image, encode_dram_image(image, manifest)))
         width, height = pixels or (described.frame.width, described.frame.height)

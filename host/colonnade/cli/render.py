@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 @size_option("Frame size in pixels, e.g. 640x480.  [default: that of the scene]")
 @mesh_option
 @background_option
-@encoder_option
+@partial(encoder_option, default=None, note="  [default: offline; with --sequence live]")
 @click.option("--relit", is_flag=True, help="Show the room shaded by the scene's lights instead of its photo.")
 @click.option(
     "--truth",
@@ -54,7 +56,16 @@ if TYPE_CHECKING:
     "--frames",
     type=click.IntRange(min=1, max=MAX_FRAMES),
     metavar="N",
-    help="Render N frames of the scene's [motion], or of one full turn of the object. Output files are numbered.",
+    help="Render N frames of the scene's [motion], or of one full turn of the object; or the first N frames of"
+    " --sequence. Output files are numbered.",
+)
+@click.option(
+    "--sequence",
+    "sequence_file",
+    type=FILE,
+    metavar="FILE",
+    help="Render the object in every frame of a moving camera: a sequence.toml that colonnade capture writes."
+    " It stands where the first frame has a place for it. Output files are numbered.",
 )
 @click.option(
     "--samples",
@@ -63,7 +74,10 @@ if TYPE_CHECKING:
     help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene; if it names none, 4 in"
     " the photo of a room, otherwise 1]",
 )
-@click.option("--output", type=FILE, metavar="FILE", help="Write a PNG picture, or with --frames a .webp animation.")
+@click.option(
+    "--output", type=FILE, metavar="FILE", help="Write a PNG picture, or of several frames a .webp animation."
+)
+@click.option("--video", "video_file", type=FILE, metavar="FILE", help="Of several frames also write an .mp4 video.")
 @click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances as .npz.")
 @click.option(
     "--waveform",
@@ -81,22 +95,34 @@ def render(
     size: str | None,
     mesh: str | None,
     background: Path | None,
-    encoder: Encoder,
+    encoder: Encoder | None,
     relit: bool,
     truth: Path | None,
     frames: int | None,
+    sequence_file: Path | None,
     samples: int | None,
     output: Path | None,
+    video_file: Path | None,
     hits_file: Path | None,
     waveform: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Render SCENE, a TOML file, and print its rays, cycles and seconds. With --frames the object or a light moves."""
+    """Render SCENE, a TOML file, and print its rays, cycles and seconds.
+
+    With --frames the object or a light moves, with --sequence the camera.
+    """
+    from colonnade.common.extras import require_extra
     from colonnade.common.frame_size import parse_size
     from colonnade.common.input_files import require_regular
     from colonnade.render.sequence import numbered, picture_files
 
     pixels = parse_size(size) if size is not None else None
+    sequence = None
+    if sequence_file is not None:
+        from colonnade.environment.sequence import load_sequence
+
+        sequence = load_sequence(sequence_file)
+        frames = frames or len(sequence)
     pictures = [output] if output is not None else []
     hits_files = [hits_file] if hits_file is not None else []
     if frames is not None:
@@ -104,18 +130,24 @@ def render(
         hits_files = numbered(hits_file, frames) if hits_file is not None else []
     else:
         require_suffix("--output", output, ".png")
+        if video_file is not None:
+            raise click.UsageError("--video needs --frames or --sequence", click.get_current_context())
+    require_suffix("--video", video_file, ".mp4")
     require_suffix("--hits", hits_file, ".npz")
     require_suffix("--waveform", waveform, ".vcd")
-    require_outputs(*pictures, *hits_files, waveform, json_file)
+    require_outputs(*pictures, *hits_files, video_file, waveform, json_file)
+    if video_file is not None:
+        require_extra("capture", "--video")
     if truth is not None:
         require_regular(truth, "the room's geometry")
 
     from colonnade.common.hits import write_hits
-    from colonnade.common.image_io import encode_srgb, write_png, write_webp
+    from colonnade.common.image_io import FRAME_MILLISECONDS, encode_srgb, write_png, write_webp
     from colonnade.common.progress import for_terminal
     from colonnade.render.frames import render_frames
     from colonnade.render.report import sequence_report
     from colonnade.render.request import RenderRequest
+    from colonnade.render.video import video
 
     progress = for_terminal()
     request = RenderRequest(
@@ -128,7 +160,8 @@ def render(
         samples=samples,
         mesh=mesh,
         background=background,
-        encoder=encoder,
+        sequence=sequence,
+        encoder=encoder or ("offline" if sequence is None else "live"),
         hits=hits_file is not None,
         relit=relit,
         truth=truth,
@@ -136,15 +169,22 @@ def render(
     )
     results = render_frames(request, progress)
     is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"
+    rate = 1e3 / FRAME_MILLISECONDS if sequence is None else sequence.content.rate
     reports, film = [], []
-    for index, result in enumerate(results):
-        if is_film:
-            film.append(encode_srgb(result.image))
-        elif pictures:
-            write_png(pictures[index], result.image)
-        if hits_files:
-            write_hits(hits_files[index], result.hits())
-        reports.append(result.report)
+    with ExitStack() as stack:
+        take_frame = None
+        for index, result in enumerate(results):
+            if is_film:
+                film.append(encode_srgb(result.image))
+            elif pictures:
+                write_png(pictures[index], result.image)
+            if hits_files:
+                write_hits(hits_files[index], result.hits())
+            if video_file is not None:
+                height, width = result.image.shape[:2]
+                take_frame = take_frame or stack.enter_context(video(video_file, width, height, rate))
+                take_frame(encode_srgb(result.image))
+            reports.append(result.report)
     if is_film:
         with progress.step(f"writing {pictures[0].name}"):
             write_webp(pictures[0], film)

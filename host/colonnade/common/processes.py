@@ -103,15 +103,17 @@ def started(
     *,
     cwd: Path | None = None,
     env: Mapping[str, str] | None = None,
+    stdin: _Stream = subprocess.DEVNULL,
     stdout: _Stream = None,
     stderr: _Stream = None,
 ) -> Iterator[subprocess.Popen[str]]:
-    """Start a program without standard input and wait for it after the block; an error in the block ends it.
+    """Start a program and wait for it after the block; an error in the block ends it.
 
     Args:
         command: the program and its arguments, strings or paths.
-        cwd: see `subprocess.Popen`, as for the next three.
+        cwd: see `subprocess.Popen`, as for the next four.
         env: the environment.
+        stdin: where its input comes from; by default it has none.
         stdout: where its output goes.
         stderr: where its errors go.
 
@@ -122,7 +124,7 @@ def started(
     process: subprocess.Popen[str] | None = None
     try:
         with signals_deferred():
-            process = _start(group, command, cwd, env, stdout, stderr)
+            process = _start(group, command, cwd, env, stdin, stdout, stderr)
         yield process
         process.wait()
         _refuse_ended(group)
@@ -132,9 +134,10 @@ def started(
         raise
     finally:
         if process is not None:
-            for stream in (process.stdout, process.stderr):
+            for stream in (process.stdin, process.stdout, process.stderr):
                 if stream is not None:
-                    stream.close()
+                    with contextlib.suppress(BrokenPipeError):
+                        stream.close()
             with _lock:
                 _running.pop(process, None)
 
@@ -165,6 +168,7 @@ def _start(
     command: Sequence[object],
     cwd: Path | None,
     env: Mapping[str, str] | None,
+    stdin: _Stream,
     stdout: _Stream,
     stderr: _Stream,
 ) -> subprocess.Popen[str]:
@@ -184,7 +188,7 @@ def _start(
             list(map(str, command)),
             cwd=cwd,
             env=env,
-            stdin=subprocess.DEVNULL,
+            stdin=stdin,
             stdout=stdout,
             stderr=stderr,
             text=True,

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from colonnade.common.progress import QUIET, Progress
-from colonnade.maps.encoded import EncodedEnvironment, check_layout
+from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.view_file import view_file
 from colonnade.scene.cameras import environment_camera
-from colonnade.scene.lit_room import device_room, lit_room
+from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.view import View, make_view, place, with_overrides
 from colonnade.scene_image.environment import with_environment
@@ -51,6 +51,8 @@ class DeviceScene:
         size: tuple[int, int] | None = None,
         relit: bool = False,
         encoder: Encoder = "offline",
+        room: Environment | None = None,
+        encode: Encode | None = None,
         progress: Progress = QUIET,
     ) -> DeviceScene:
         """Load a scene's room and mesh, light them, encode the room's maps and pack the mesh.
@@ -62,12 +64,15 @@ class DeviceScene:
             size: Width and height of frames, pixels; a size that the room cannot have is refused before long work.
             relit: Frames show the room under the scene's lights, not its photo.
             encoder: Of the room's maps and of textures.
+            room: In place of the room in the scene's folder.
+            encode: In place of `encoder` for the room's maps.
             progress: Shows the fit of lights, and notes what was fitted.
 
         Raises:
             UserError: Mesh or room cannot be read, or the design cannot render them.
         """
-        room = device_room(scene, manifest)
+        if room is None:
+            room = device_room(scene, manifest)
         if mesh is None:
             mesh = object_mesh(scene, room, manifest.corner_colours)
         if room is not None:
@@ -75,13 +80,27 @@ class DeviceScene:
             if size is not None:
                 environment_camera(room, *size)
         lit = lit_room(scene, room, mesh.extent, int(manifest.config["frame"]["lights"]), relit, progress)
-        maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest, encoder)
+        maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest, encode or encoder)
         mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
         materials = with_overrides(mesh.materials, lit.scene.material)
         image = pack(mesh, manifest, materials, lit.scene.headroom, encoder)
         if maps is not None:
             image = with_environment(image, maps, manifest)
         return cls(lit.scene, manifest, image, maps)
+
+    def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
+        """The scene in another view of its room: object and lights stay in the world, camera and maps are new.
+
+        Args:
+            room: The view.
+            encode: Encodes its maps.
+            relit: As in `of`.
+        """
+        assert self.environment is not None
+        extent = self.image.header.extent
+        scene = fixed_in_world(self.scene, extent, self.environment)
+        maps = EncodedEnvironment.of(next_view(scene, extent, room, relit), self.manifest, encode)
+        return replace(self, scene=scene, image=with_environment(self.image, maps, self.manifest), maps=maps)
 
     @property
     def environment(self) -> Environment | None:

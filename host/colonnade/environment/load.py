@@ -28,6 +28,7 @@ from colonnade.environment.camera import check_size, read_camera
 from colonnade.environment.depth_estimation import DEFAULT_CAMERA_HEIGHT, depth_from_normals
 from colonnade.environment.depth_normals import normals_of_depth
 from colonnade.environment.derived_albedo import derived_albedo
+from colonnade.environment.lights import RoomLights
 from colonnade.environment.model import Environment, EnvironmentCamera
 from colonnade.environment.repair import holes_of, repair_depth, repair_normals
 
@@ -99,6 +100,7 @@ def load_maps(
     maps: RoomFiles,
     sizes: tuple[dict[str, Any], Path],
     camera_height: float | None = None,
+    lights: RoomLights | None = None,
 ) -> Environment:
     """Load a room's maps, and derive those that are missing.
 
@@ -108,6 +110,7 @@ def load_maps(
         maps: Their files.
         sizes: An object that may hold the ``width`` and ``height`` of the maps, and the file that it is from.
         camera_height: See `load_environment`.
+        lights: For a missing albedo, see `derived_albedo`.
     """
     first = maps.albedo or maps.photo
     assert first is not None
@@ -165,7 +168,7 @@ def load_maps(
     colours = np.zeros((height, width, 3)) if albedo is None else albedo
     room = Environment(name, colours, normals, depth, maps.depth is not None, camera, photo, tuple(notes))
     if albedo is None:
-        room = replace(room, albedo=derived_albedo(room), notes=(*notes, _ALBEDO_NOTE))
+        room = replace(room, albedo=derived_albedo(room, lights), notes=(*notes, _ALBEDO_NOTE))
     return room
 
 

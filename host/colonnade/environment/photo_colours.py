@@ -39,13 +39,20 @@ class PhotoColours:
     clamped: float
 
 
-def photo_colours(environment: Environment, lights: RoomLights) -> PhotoColours:
-    """The colours of a room with a photo, under the lights of a scene, unshadowed."""
+def photo_colours(environment: Environment, lights: RoomLights, headroom: float | None = None) -> PhotoColours:
+    """The colours of a room with a photo, under the lights of a scene, unshadowed.
+
+    Args:
+        environment: The room.
+        lights: Of the scene.
+        headroom: That of another view of the room; None: that of this one.
+    """
     assert environment.photo is not None
     light = irradiance(*world_surface(environment), lights)
     colours = np.where(light > _DARK, decode_srgb(environment.photo) / light.clip(min=_DARK), environment.albedo)
     brightest = colours.max(axis=2)
-    headroom = float(np.clip(np.quantile(brightest, 1 - MAX_CLAMPED), 1.0, _max_headroom(lights)))
+    if headroom is None:
+        headroom = float(np.clip(np.quantile(brightest, 1 - MAX_CLAMPED), 1.0, _max_headroom(lights)))
     clamped = float(((brightest > headroom * 1.0001) | (light <= _DARK).any(axis=2)).mean())
     return PhotoColours(replace(environment, albedo=(colours / headroom).clip(max=1.0)), headroom, clamped)
 

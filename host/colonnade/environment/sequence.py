@@ -6,6 +6,7 @@ The schema is `Sequence` and `SequenceFrame`: keys, ranges and defaults. Unknown
 from __future__ import annotations
 
 import sys
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,6 +19,8 @@ from colonnade.common.errors import UserError
 from colonnade.common.input_files import check_values, read_input
 from colonnade.common.limits import MAX_CAPTURE_TEXT_BYTES, MAX_DEPTH, MAX_FRAMES
 from colonnade.environment.camera import read_camera
+from colonnade.environment.derived_albedo import hue_lights
+from colonnade.environment.lights import RoomLights
 from colonnade.environment.load import DEFAULT_DEPTH_STEP, MAX_DEPTH_STEP, MAX_EDGE, RoomFiles, load_maps
 from colonnade.environment.model import Environment, EnvironmentCamera
 
@@ -102,9 +105,19 @@ class Sequence:
     def room(self, number: int) -> Environment:
         """The maps of a frame; those that the sequence does not hold are derived.
 
+        Albedos are derived with one light, which is fitted to the first frame without an albedo.
+
         Raises:
             UserError: A picture is missing, unreadable or of another size.
         """
+        return self._room(number, None if self.content.frame[number].albedo else self._lights)
+
+    @cached_property
+    def _lights(self) -> RoomLights:
+        first = next(number for number, frame in enumerate(self.content.frame) if frame.albedo is None)
+        return hue_lights(self._room(first, None))
+
+    def _room(self, number: int, lights: RoomLights | None) -> Environment:
         frame = self.content.frame[number]
         maps = RoomFiles(
             self._file(frame.albedo),
@@ -115,7 +128,9 @@ class Sequence:
             "srgb",
         )
         sizes = {"width": self.content.width, "height": self.content.height}
-        return load_maps(f"{self.path.parent.name} {number}", self.cameras[number], maps, (sizes, self.path))
+        return load_maps(
+            f"{self.path.parent.name} {number}", self.cameras[number], maps, (sizes, self.path), lights=lights
+        )
 
     def _file(self, name: str | None) -> Path | None:
         return None if name is None else self.path.parent / name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from colonnade.design.manifest import Manifest
 from colonnade.integration.register_table import RegisterTable, identifier
+from colonnade.scene_image.environment import map_memories
 
 
 def design_header(table: RegisterTable, manifest: Manifest) -> str:
@@ -35,6 +36,7 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
         f"    .tile_size = {manifest.config['frame']['tileSize']},",
         f"    .posted_writes = {table.posted_writes},",
         *_scene_in_dram(table, manifest),
+        *_maps(manifest),
         "};",
         "",
         "#endif",
@@ -74,6 +76,17 @@ def _scene_in_dram(table: RegisterTable, manifest: Manifest) -> list[str]:
         f"    .scene_page = {_place(table, manifest, 'dram.page')},",
         f"    .invalidate = {_place(table, manifest, 'control.invalidate')},",
     ]
+
+
+def _maps(manifest: Manifest) -> list[str]:
+    """The memories of a room's maps in the order of their load targets, which begin at 1."""
+    shapes = [manifest.memories[name] for name in map_memories(manifest)]
+    if [int(shape["target"]) for shape in shapes] != list(range(1, len(shapes) + 1)):
+        raise ValueError("the load targets of the maps do not count from 1")
+    if not shapes:
+        return []
+    entries = [f"{{{-(-int(shape['bits']) // 32)}, {shape['depth']}}}" for shape in shapes]
+    return [f"    .map_count = {len(entries)},", f"    .maps = {{{', '.join(entries)}}},"]
 
 
 def _constant(name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,9 @@ from colonnade.maps.cache import encoded_environment
 from colonnade.maps.encoders import Encoder
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.layout import AttributeLayout
+
+#: Encodes the maps of a room.
+Encode = Callable[[Environment], AttributeImage]
 
 
 @dataclass(frozen=True)
@@ -32,15 +36,16 @@ class EncodedEnvironment:
         return EncodedEnvironment.of(load_environment(folder), manifest)
 
     @staticmethod
-    def of(environment: Environment, manifest: Manifest, encoder: Encoder = "offline") -> EncodedEnvironment:
-        """Encode a room's maps for a design.
+    def of(environment: Environment, manifest: Manifest, encoder: Encoder | Encode = "offline") -> EncodedEnvironment:
+        """Encode a room's maps for a design; a function is one that encodes a room.
 
         Raises:
             UserError: The design has no memory for maps of this size.
         """
         check_layout(environment, manifest)
-        image = encoded_environment(environment, layout_of(manifest), encoder=encoder)
-        return EncodedEnvironment(environment, image)
+        if callable(encoder):
+            return EncodedEnvironment(environment, encoder(environment))
+        return EncodedEnvironment(environment, encoded_environment(environment, layout_of(manifest), encoder=encoder))
 
 
 def check_layout(environment: Environment, manifest: Manifest) -> None:

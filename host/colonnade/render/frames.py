@@ -19,6 +19,13 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.scene import DeviceScene
+from colonnade.environment.model import Environment
+from colonnade.environment.sequence import Sequence
+from colonnade.maps.cache import encoded_environment
+from colonnade.maps.encoded import Encode, layout_of
+from colonnade.maps.image import AttributeImage
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
 from colonnade.mesh.mesh import Mesh
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport, frame_report
@@ -58,6 +65,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     scene = load_scene(request.scene)
     if request.background is not None:
         scene = scene.with_environment(request.background)
+    if request.sequence is not None:
+        scene = scene.with_environment(request.sequence.path.parent)
     if request.mesh is not None:
         scene = scene.with_mesh(request.mesh)
     note = _DEFAULT_SAMPLES if _has_default_samples(scene, request) else None
@@ -66,13 +75,17 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size(size, manifest)
     _check_frames(request, scene, size, manifest)
+    if request.sequence is not None:
+        return _sequence_frames(request, request.sequence, scene, manifest, size, note, progress)
     frames = _reference_frames if request.backend == "reference" else _device_frames
     return frames(request, scene, manifest, size, note, progress)
 
 
 def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Manifest) -> None:
     """Raise a `UserError` for what the backend cannot show."""
-    if request.frames > 1 and scene.objects and scene.motion.is_still:
+    if request.sequence is not None:
+        _check_sequence(request, request.sequence, scene)
+    elif request.frames > 1 and scene.objects and scene.motion.is_still:
         raise UserError(
             f"nothing moves in these {request.frames} frames, since several objects stand still: give motion.light, or"
             " motion.turn or motion.translate, which move all of them"
@@ -87,6 +100,18 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
         from colonnade.device.verilator import require_hits
 
         require_hits(manifest)
+
+
+def _check_sequence(request: RenderRequest, sequence: Sequence, scene: Scene) -> None:
+    """Raise a `UserError` for what does not go with a sequence."""
+    if request.backend == "reference":
+        raise UserError("--sequence is for the rtl and the model backend: render single rooms with the reference")
+    if request.background is not None:
+        raise UserError("--sequence and --background both replace the scene's background: give one of them")
+    if request.frames > len(sequence):
+        raise UserError(f"{sequence.path} has {len(sequence)} frames, fewer than the {request.frames} of --frames")
+    if not scene.motion.is_closed or scene.motion.shutter > 0:
+        raise UserError("the camera moves in a sequence, the object and lights stay in the world: leave out [motion]")
 
 
 def _reference_frames(
@@ -121,18 +146,93 @@ def _device_frames(
         ]
         if note is not None:
             progress.note(note)
-    packed = time.perf_counter() - begun
+    seconds = {"pack": time.perf_counter() - begun, "build": None}
+    for pose, result in zip(poses, _rendered(request, prepared, size, passes, registers, progress), strict=True):
+        report = replace(result.report, share=pose.motion_progress, seconds=seconds | dict(result.report.seconds))
+        yield replace(result, report=report)
+
+
+def _sequence_frames(
+    request: RenderRequest,
+    sequence: Sequence,
+    scene: Scene,
+    manifest: Manifest,
+    size: Size,
+    note: str | None,
+    progress: Progress,
+) -> Iterator[RenderResult]:
+    """The frames of a sequence: each with the camera, the photo and the maps of its view."""
+    layout = layout_of(manifest)
+    encode = _encoder_of(request, sequence, layout)
+    prepared: DeviceScene | None = None
+    for number in range(request.frames):
+        title = f"frame {number + 1} of {request.frames}"
+        begun = time.perf_counter()
+        try:
+            with progress.step(f"{title}: encoding its maps"):
+                room = sequence.room(number)
+                if prepared is None:
+                    prepared = DeviceScene.of(
+                        scene,
+                        manifest,
+                        size=size,
+                        relit=request.relit,
+                        encoder=request.encoder,
+                        room=room,
+                        encode=encode,
+                        progress=progress,
+                    )
+                else:
+                    prepared = prepared.seen_in(room, encode, request.relit)
+                passes = prepared.scene.passes()
+                registers = [prepared.registers(size, one, composited=not request.relit) for one in passes]
+            if note is not None and number == 0:
+                progress.note(note)
+            seconds = {"maps": time.perf_counter() - begun}
+            (result,) = _rendered(request, prepared, size, [passes], [registers], progress.of(title))
+        except UserError as error:
+            raise UserError(f"frame {number} of {sequence.path}: {error}") from None
+        report = replace(
+            result.report, time=sequence.content.frame[number].time, seconds=seconds | dict(result.report.seconds)
+        )
+        yield replace(result, report=report)
+
+
+def _encoder_of(request: RenderRequest, sequence: Sequence, layout: AttributeLayout) -> Encode:
+    """The encoder of a sequence's maps. The live encoder begins as with a still."""
+    if request.encoder == "offline":
+        return lambda room: encoded_environment(room, layout)
+    live = LiveEncoder(layout, sequence.content.depth_noise)
+    rounds = iter([STILL_ROUNDS])
+
+    def encode(room: Environment) -> AttributeImage:
+        frame = LiveFrame.of(room)
+        for _ in range(next(rounds, 1)):
+            maps = live.encode(frame)
+        return maps.image
+
+    return encode
+
+
+def _rendered(
+    request: RenderRequest,
+    prepared: DeviceScene,
+    size: Size,
+    passes: list[list[Scene]],
+    registers: list[list[dict[str, int]]],
+    progress: Progress,
+) -> Iterator[RenderResult]:
+    """Render the passes of each frame with the model or the RTL."""
     if request.backend == "rtl":
         design = design_for(request.config, request.overrides, progress)
         rendered = _rtl_frames(design, prepared.image, registers, progress, request.waveform)
     else:
-        rendered = _model_frames(manifest, prepared.image, registers, progress)
-    for pose, of_frame, (rendered_passes, seconds, rate) in zip(poses, passes, rendered, strict=True):
+        rendered = _model_frames(prepared.manifest, prepared.image, registers, progress)
+    for of_frame, (rendered_passes, seconds, rate) in zip(passes, rendered, strict=True):
         require_no_errors(rendered_passes.frame)
         report = replace(
-            frame_report(request.backend, manifest, prepared.image.header, rendered_passes.frame),
-            share=pose.motion_progress,
-            seconds={"pack": packed, "build": None} | seconds,
+            frame_report(request.backend, prepared.manifest, prepared.image.header, rendered_passes.frame),
+            seconds=seconds,
             simulated_cycles_per_second=rate,
             bytes=None if prepared.maps is None else prepared.maps.image.byte_counts(),
             samples=len(of_frame),

@@ -56,6 +56,7 @@ class FrameReport:
         errors: Names of the error bits that are set.
         room: Environment lookups; None without a room, and from backends that do not count cycles.
         share: Position along the scene's motion, 0.0 to 1.0.
+        time: Of a sequence's frame, seconds.
         seconds: Seconds of packing, building the simulator, and rendering.
         simulated_cycles_per_second: Simulation speed of the RTL.
         bytes: Sizes of the encoded maps.
@@ -73,6 +74,7 @@ class FrameReport:
     errors: Sequence[str] = ()
     room: EnvironmentReport | None = None
     share: float | None = None
+    time: float | None = None
     seconds: Mapping[str, float | None] = field(default_factory=dict)
     simulated_cycles_per_second: float | None = None
     bytes: Mapping[str, int] | None = None
@@ -124,6 +126,7 @@ class FrameReport:
             values["room"] = None if self.room is None else asdict(self.room)
             optional = {
                 "share": self.share,
+                "time": self.time,
                 "simulated_cycles_per_second": self.simulated_cycles_per_second,
                 "seconds": dict(self.seconds) or None,
             }
@@ -165,6 +168,9 @@ def _environment_report(manifest: Manifest, counters: Mapping[str, int]) -> Envi
 def sequence_report(frames: Sequence[FrameReport]) -> FrameReport:
     """The report of a sequence: sums over its frames."""
     first = frames[0]
+    sums = {
+        step: sum(frame.seconds[step] or 0.0 for frame in frames) for step in ("maps", "run") if step in first.seconds
+    }
     return FrameReport(
         backend=first.backend,
         config=first.config,
@@ -172,7 +178,7 @@ def sequence_report(frames: Sequence[FrameReport]) -> FrameReport:
         size=first.size,
         rays={kind: sum(frame.rays.get(kind) or 0 for frame in frames) for kind in first.rays},
         cycles=None if first.cycles is None else sum(frame.cycles or 0 for frame in frames),
-        seconds=dict(first.seconds) | {"run": sum(frame.seconds["run"] or 0.0 for frame in frames)},
+        seconds=dict(first.seconds) | sums,
         bytes=first.bytes,
         frames=tuple(frames),
         samples=first.samples,

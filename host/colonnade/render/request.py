@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
 
 Backend = Literal["rtl", "model", "reference"]
@@ -23,10 +24,11 @@ class RenderRequest:
         overrides: Changes to the configuration, ``key=value``.
         backend: ``rtl``: the generated Verilog in a simulator; ``model``: its bit-exact model; ``reference``: Embree.
         size: (width, height), pixels; None: that of the scene.
-        frames: Number of frames, from 1. The first shows the scene at rest.
+        frames: Number of frames, from 1. The first shows the scene at rest. Of a sequence its first ones.
         samples: Samples of a pixel, from 1; None: those of the scene, or a default.
         mesh: Name or file of a mesh that replaces the scene's.
         background: Folder of a room that replaces the scene's background.
+        sequence: Views of a room, one for each frame, which replace the scene's background and motion.
         hits: Whether the caller needs hit triangles; the configuration must then have them.
         relit: Whether the scene's lights shade the room even if it has a photo.
         truth: Mesh file of the room's real geometry, in its world space; for the reference.
@@ -43,6 +45,7 @@ class RenderRequest:
     samples: int | None = None
     mesh: str | None = None
     background: Path | None = None
+    sequence: RoomSequence | None = None
     hits: bool = False
     relit: bool = False
     truth: Path | None = None

@@ -11,7 +11,9 @@ from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
 from colonnade.maps.encoded import layout_of
 from colonnade.scene.object_pose import object_pose, with_free_placement
-from colonnade.scene.room_lights import lights_of, with_lights
+from colonnade.scene.room_lights import as_vector, lights_of, with_lights
+from colonnade.scene.standing import surface_point
+from colonnade.scene.view import world_positions
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
@@ -83,18 +85,54 @@ def lit_room(
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     if not scene.names_light:
         scene = _with_fitted_lights(scene, room, max_lights, progress)
-    wanted = scene.background.colours
-    if wanted == "photo" and room.photo is None:
-        raise UserError(f"background.colours is photo, but room {room.name} has no photo.png or render.png")
-    if wanted == "albedo" or room.photo is None or (wanted is None and relit):
+    colours = _photo_colours(scene, room, extent, relit)
+    if colours is None:
         return LitRoom(scene, room, room)
-    colours = photo_colours(room, lights_of(scene, extent, room))
     if colours.clamped > _REPORTED_CLAMPED:
         progress.note(
             f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
             " photo in reflections: raise the ambient light, or leave out all lights so that they are fitted"
         )
     return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours)
+
+
+def fixed_in_world(scene: Scene, extent: Extent, room: Environment) -> Scene:
+    """The scene with object and lights at their places in the world, for other views of its room.
+
+    Args:
+        scene: With a place for the object and lights, as in `LitRoom`; one that is fixed stays so.
+        extent: Bounds of the mesh.
+        room: The view from which they are placed.
+    """
+    first, *more = world_positions(scene, extent, room)
+    if scene.standing_point is None and scene.placement is not None and scene.placement.stand_at is not None:
+        point = surface_point(scene.placement.stand_at, room, "object.stand_at")
+        scene = replace(scene, standing_point=as_vector(point))
+    lights = tuple(
+        replace(light, position=as_vector(place)) for light, place in zip(scene.more_lights, more, strict=True)
+    )
+    return replace(scene, light=replace(scene.light, position=as_vector(first)), more_lights=lights)
+
+
+def next_view(scene: Scene, extent: Extent, room: Environment, relit: bool) -> Environment:
+    """Another view of a room, with the colours that rays see; the scene is `fixed_in_world`.
+
+    Lights and headroom are the scene's, so that only the room changes.
+    """
+    colours = _photo_colours(scene, room, extent, relit, scene.headroom)
+    return room if colours is None else colours.environment
+
+
+def _photo_colours(
+    scene: Scene, room: Environment, extent: Extent, relit: bool, headroom: float | None = None
+) -> PhotoColours | None:
+    """The colours that show a room's photo; None where rays see its albedo."""
+    wanted = scene.background.colours
+    if wanted == "photo" and room.photo is None:
+        raise UserError(f"background.colours is photo, but room {room.name} has no photo.png or render.png")
+    if wanted == "albedo" or room.photo is None or (wanted is None and relit):
+        return None
+    return photo_colours(room, lights_of(scene, extent, room), headroom)
 
 
 def _with_fitted_lights(scene: Scene, room: Environment, max_lights: int, progress: Progress) -> Scene:

@@ -320,7 +320,8 @@ class Scene:
     With a room, the camera is the room's, and the world is the room's world, in metres.
 
     Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass
-    over the frame. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
+    over the frame. ``standing_point`` is the world point on which the object stands, if that is known from another view
+    of its room. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
     fitted to its photo. ``headroom`` scales all lights up and diffuse albedos of the object down
     (`colonnade.environment.photo_colours`).
     """
@@ -340,6 +341,7 @@ class Scene:
     motion: Motion = field(default_factory=Motion)
     motion_progress: float = 0.0
     sample: Sample = CENTRE
+    standing_point: Vector | None = None
     names_light: bool = True
     headroom: float = 1.0
 

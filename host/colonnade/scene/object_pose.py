@@ -69,8 +69,11 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
         return Pose(turned, scale, np.array(moved) + fixed_order.product(scale * (rotation - turned), extent.centre))
     if motion.translate is not None:
         raise UserError("motion.translate is for an object that does not stand in a room: give motion.stand_at")
-    assert placement.stand_at is not None
-    point = surface_point(placement.stand_at, environment, "object.stand_at")
+    if scene.standing_point is not None:
+        point = np.array(scene.standing_point)
+    else:
+        assert placement.stand_at is not None
+        point = surface_point(placement.stand_at, environment, "object.stand_at")
     if motion.stand_at is not None:
         point = (1.0 - progress) * point + progress * surface_point(motion.stand_at, environment, "motion.stand_at")
     return standing_pose(placement, rotation, extent, point, motion.turn * progress)

@@ -36,16 +36,17 @@ def with_lights(scene: Scene, lights: RoomLights) -> Scene:
     return replace(
         scene,
         light=Light(
-            _vector(first.position),
-            colour=_vector(first.colour),
+            as_vector(first.position),
+            colour=as_vector(first.colour),
             falloff=first.falloff,
             shadows=scene.light.shadows,
             shadow_offset=scene.light.shadow_offset,
         ),
         more_lights=tuple(
-            PointLight(_vector(light.position), colour=_vector(light.colour), falloff=light.falloff) for light in more
+            PointLight(as_vector(light.position), colour=as_vector(light.colour), falloff=light.falloff)
+            for light in more
         ),
-        ambient=Colour(_vector(lights.ambient)),
+        ambient=Colour(as_vector(lights.ambient)),
     )
 
 
@@ -60,7 +61,8 @@ def scene_text(lights: RoomLights) -> str:
     return "\n".join(lines)
 
 
-def _vector(values: Floats) -> Vector:
+def as_vector(values: Floats) -> Vector:
+    """An array of three numbers as a vector of the scene model."""
     x, y, z = (float(value) for value in values)
     return x, y, z
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from colonnade.design.manifest import Manifest
-from colonnade.scene_image.file import SceneImage
+from colonnade.maps.image import AttributeImage
+from colonnade.scene_image.environment import map_sections
+from colonnade.scene_image.file import LoadSection, SceneImage
 
 MAGIC = b"CLNDLOAD"
 VERSION = 1
@@ -22,11 +26,16 @@ def device_image(image: SceneImage, manifest: Manifest) -> bytes:
 
     With a cache the scene lies in DRAM, and the image has the environment's maps only.
     """
-    sections = []
-    if not manifest.config["columnBvhMemory"]["cache"]:
-        sections.append(_section(0, image.records))
-    for memory in image.attributes:
-        sections.append(_section(int(manifest.memories[memory.memory]["target"]), memory.words))
+    sections = [_section(0, image.records)] if not manifest.config["columnBvhMemory"]["cache"] else []
+    return _image([*sections, *_attributes(image.attributes, manifest)], manifest)
+
+
+def maps_image(image: AttributeImage, manifest: Manifest) -> bytes:
+    """The image with the encoded maps of a room alone, which a shell loads between two frames of a scene."""
+    return _image(_attributes(map_sections(image, manifest), manifest), manifest)
+
+
+def _image(sections: Sequence[npt.NDArray[np.uint32]], manifest: Manifest) -> bytes:
     body = np.concatenate(sections) if sections else np.zeros(0, dtype="<u4")
     words = _HEADER_WORDS * (1 + -(-len(body) // _HEADER_WORDS))
     content = np.zeros(words, dtype="<u4")
@@ -36,6 +45,10 @@ def device_image(image: SceneImage, manifest: Manifest) -> bytes:
     content[12] = len(sections)
     content[_HEADER_WORDS : _HEADER_WORDS + len(body)] = body
     return content.tobytes()
+
+
+def _attributes(sections: Sequence[LoadSection], manifest: Manifest) -> list[npt.NDArray[np.uint32]]:
+    return [_section(int(manifest.memories[each.memory]["target"]), each.words) for each in sections]
 
 
 def _section(target: int, records: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:

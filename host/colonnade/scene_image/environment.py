@@ -8,7 +8,7 @@ import numpy as np
 
 from colonnade.design.manifest import Manifest
 from colonnade.maps.encoded import EncodedEnvironment, layout_of
-from colonnade.maps.image import SOURCE_BYTES_PER_PIXEL, memory_words
+from colonnade.maps.image import SOURCE_BYTES_PER_PIXEL, AttributeImage, memory_words
 from colonnade.maps.layout import POINTER_BITS
 from colonnade.maps.plane_map import PLANE_MODES
 from colonnade.maps.two_level import MODES
@@ -17,21 +17,39 @@ from colonnade.scene_image.header import EnvironmentHeader, ImageHeader, LoadedM
 
 
 def with_environment(image: SceneImage, environment: EncodedEnvironment, manifest: Manifest) -> SceneImage:
-    """Add a room's maps to a mesh's image.
+    """Add a room's maps to a mesh's image, or replace those of another room.
+
+    Raises:
+        ValueError: The words do not fit the manifest's memories.
+    """
+    sections = map_sections(environment.image, manifest)
+    memories = tuple(LoadedMemory(section.memory, *section.words.shape) for section in sections)
+    header = EnvironmentHeader(environment.environment.name, environment.image.depth_unit, memories)
+    textures = (each for each in image.attributes if each.memory not in map_memories(manifest))
+    return replace(image, header=replace(image.header, room=header), attributes=(*sections, *textures))
+
+
+def map_memories(manifest: Manifest) -> list[str]:
+    """The names of the memories of a room's maps, by load target; empty for a design without a room."""
+    maps = ("albedo.", "normals.", "planes.")
+    names = [name for name in manifest.memories if name.startswith(maps)]
+    return sorted(names, key=lambda name: int(manifest.memories[name]["target"]))
+
+
+def map_sections(image: AttributeImage, manifest: Manifest) -> list[LoadSection]:
+    """The encoded maps of a room as contents of a design's memories.
 
     Raises:
         ValueError: The words do not fit the manifest's memories.
     """
     sections = []
-    for memory, words in memory_words(environment.image):
+    for memory, words in memory_words(image):
         shape = manifest.memories[memory]
         word_bytes = -(-int(shape["bits"]) // 8)
         if len(words) != int(shape["depth"]) or words[:, word_bytes:].any():
             raise ValueError(f"{memory}: {words.shape} bytes do not fit {shape['depth']} words of {shape['bits']} bits")
         sections.append(LoadSection(memory, np.ascontiguousarray(words[:, :word_bytes])))
-    memories = tuple(LoadedMemory(section.memory, *section.words.shape) for section in sections)
-    header = EnvironmentHeader(environment.environment.name, environment.image.depth_unit, memories)
-    return replace(image, header=replace(image.header, room=header), attributes=(*sections, *image.attributes))
+    return sections
 
 
 def tiles_beyond_heap(image: SceneImage) -> dict[str, int]:

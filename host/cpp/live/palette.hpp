@@ -33,6 +33,8 @@ public:
         }
     }
     static constexpr int highest = 255 * 16;
+    /// Whether the palette of the frame before takes a step before it encodes a frame.
+    static constexpr bool stepsFirst = false;
     std::uint64_t word(Point& point) const {
         std::uint64_t word = 0;
         for (int a = 0; a < 3; ++a) {
@@ -51,6 +53,8 @@ private:
 /// The storage of normals: unit vectors in view space, y down and z forward; the codes have y up and z towards the viewer.
 class NormalFields {
 public:
+    /// New surfaces come into view with normals of their own, and walls fill their tiles with one.
+    static constexpr bool stepsFirst = true;
     static constexpr int length = 2040, one = (1 << (fieldBits - 1)) - 1;
     std::uint64_t word(Point& point) const {
         std::int64_t square = product(point, point);
@@ -146,15 +150,11 @@ public:
             }
             seed = farthest;
         }
-        for (int round = 0; round < 4; ++round) {
-            std::vector<std::uint64_t> ignored(size_);
-            store(Unrounded{}, ignored.data());
-            std::vector<EntrySums> sums(size_);
-            for (const Bin& bin : bins) sums[nearest(bin.mean)].add(bin.sums);
-            for (int i = 0; i < size_; ++i)
-                if (sums[i].weight > 0) entries_[i] = mean(sums[i]);
-        }
+        for (int round = 0; round < 4; ++round) step(bins);
     }
+
+    /// One of Lloyd's steps on the cells of all tiles.
+    void step(const std::vector<TileSums>& tiles) { step(histogram(tiles)); }
 
 private:
     struct Unrounded {
@@ -165,6 +165,15 @@ private:
         EntrySums sums;
         Point mean;
     };
+
+    void step(const std::vector<Bin>& bins) {
+        std::vector<std::uint64_t> ignored(size_);
+        store(Unrounded{}, ignored.data());
+        std::vector<EntrySums> sums(size_);
+        for (const Bin& bin : bins) sums[nearest(bin.mean)].add(bin.sums);
+        for (int i = 0; i < size_; ++i)
+            if (sums[i].weight > 0) entries_[i] = mean(sums[i]);
+    }
 
     static Point mean(const EntrySums& sums) {
         Point point;

@@ -40,6 +40,7 @@ public:
             tiles_[tile].read(codes + row * sizes_.tileSize * stride + 3 * column * sizes_.tileSize, stride, sizes_.tileSize, Fields::space());
         }
         if (!isWarm_) palette_.fit(tiles_);
+        else if (Fields::stepsFirst) palette_.step(tiles_);
         palette_.store(fields_, palette);
         const std::int64_t least = isWarm_ ? budget_.price() * 5 / 8 : 0;
         for (int tile = 0; tile < sizes_.tiles(); ++tile) fit(tile, least);

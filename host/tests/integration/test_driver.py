@@ -5,23 +5,29 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from colonnade.common.framebuffer import Frame
 from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
+from colonnade.device.scene import DeviceScene
 from colonnade.device.shell_build import build_shell_simulator
 from colonnade.integration.design_header import design_header
 from colonnade.integration.register_table import register_table
+from colonnade.lab.evaluation.studies.generated_rooms import generated_room
+from colonnade.lab.evaluation.studies.synthetic_attic import write_room
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
 from colonnade.scene.parser import load_scene
-from colonnade.scene_image.device_image import device_image
+from colonnade.scene_image.device_image import device_image, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.packer import pack
 
@@ -59,7 +65,18 @@ def stub(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 #: Every error has its name, and no access is made that the shell refuses.
-TESTS = ("probe", "images", "frames", "photos", "scenes", "names", "events", "posted writes", "long frame files")
+TESTS = (
+    "probe",
+    "images",
+    "frames",
+    "photos",
+    "scenes",
+    "names",
+    "events",
+    "posted writes",
+    "long frame files",
+    "maps",
+)
 
 
 @pytest.mark.parametrize("test", (*TESTS, "refused frame files"))
@@ -82,6 +99,52 @@ def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> 
     compile_c([SOFTWARE / "examples" / "uio.c", *DRIVER], tmp_path / "uio")
 
 
+def run_driver(
+    folder: Path, design: GeneratedDesign, files: Mapping[str, bytes], *arguments: str
+) -> tuple[NDArray[np.uint8], list[list[str]]]:
+    """Run the driver with files against the Verilated shell: the memory at the end, and the lines that it prints."""
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    (folder / "colonnade_design.h").write_text(design_header(register_table(design), design.manifest))
+    driver = compile_c([SOFTWARE / "tests" / "simulated.c", *DRIVER], folder / "driver")
+    options = {"bus": 16, "memory": 1 << 22, "latency": 20, "stall": 10, "seed": 4}
+    command = [
+        build_shell_simulator(design),
+        *(text for key, value in options.items() for text in (f"--{key}", str(value))),
+    ]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "cwd": folder}
+    with subprocess.Popen([*command, "-"], stderr=subprocess.PIPE, **pipes) as device:
+        done = subprocess.run(
+            [driver, *arguments], stdin=device.stdout, stdout=device.stdin, stderr=subprocess.PIPE, cwd=folder
+        )
+        assert device.stdin is not None and device.stderr is not None
+        device.stdin.close()
+        problems = device.stderr.read()
+        assert (device.wait(), done.returncode, problems) == (0, 0, b""), done.stderr.decode()
+    memory = np.frombuffer((folder / "memory").read_bytes(), dtype=np.uint8).copy()
+    return memory, [line.split() for line in done.stderr.decode().splitlines()]
+
+
+def take_file(memory: NDArray[np.uint8], place: int, content: bytes) -> None:
+    """Check that a file is in the memory, and erase it."""
+    assert memory[place : place + len(content)].tobytes() == content
+    memory[place : place + len(content)] = UNWRITTEN
+
+
+def take_frame(memory: NDArray[np.uint8], line: list[str], expected: Frame, code: int) -> None:
+    """Check that a frame is in the memory, and erase it."""
+    _, place, stride, _, hits = line
+    lines = memory[int(place) : int(place) + int(stride) * HEIGHT].reshape(HEIGHT, int(stride))
+    used = lines[:, : WIDTH * PIXEL_BYTES[code]]
+    np.testing.assert_array_equal(used, framebuffer_bytes(expected, code))
+    used[:] = UNWRITTEN
+    assert int(hits) == expected.counters["hits"]
+
+
+def of_another_format(image: bytes) -> bytes:
+    return image[:44] + bytes([image[44] ^ 1]) + image[45:]
+
+
 #: A design, and how the driver waits.
 CASES = {
     "by interrupts": ((), "interrupt"),
@@ -101,44 +164,52 @@ def test_frames_by_the_driver_are_those_of_the_model(tmp_path: Path, case: str) 
     registers = frame_registers(scene, image.header, manifest, WIDTH, HEIGHT)
     expected = render_model(manifest, image, registers)
     data = device_image(image, manifest)
-    records = dram_image(image, manifest) if overrides else b""
-    files = {"image": data, "other": data[:44] + bytes([data[44] ^ 1]) + data[45:], "scene": records}
-    files["frame"] = frame_file(registers, manifest)
-    for name, content in files.items():
-        (tmp_path / name).write_bytes(content)
-    (tmp_path / "colonnade_design.h").write_text(design_header(register_table(design), manifest))
-    driver = compile_c([SOFTWARE / "tests" / "simulated.c", *DRIVER], tmp_path / "driver")
+    files = {"image": data, "other": of_another_format(data), "frame": frame_file(registers, manifest)}
+    files |= {"scene": dram_image(image, manifest)} if overrides else {}
+    memory, lines = run_driver(tmp_path, design, files, "image", "frame", mode, *(["scene"] if overrides else []))
+    take_file(memory, PAGE, data)
+    if overrides:
+        take_file(memory, int(lines.pop(0)[1]), files["scene"])
+    for code, line in zip((0, 1, 2, 0), lines, strict=True):
+        take_frame(memory, line, expected, code)
+    assert (memory == UNWRITTEN).all()
 
-    simulator = build_shell_simulator(design)
-    options = {"bus": 16, "memory": 1 << 22, "latency": 20, "stall": 10, "seed": 4}
-    arguments = [text for name, value in options.items() for text in (f"--{name}", str(value))]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "cwd": tmp_path}
-    with subprocess.Popen([simulator, *arguments, "-"], stderr=subprocess.PIPE, **pipes) as device:
-        done = subprocess.run(
-            [driver, "image", "frame", mode, *(["scene"] if records else [])],
-            stdin=device.stdout,
-            stdout=device.stdin,
-            stderr=subprocess.PIPE,
-            cwd=tmp_path,
-        )
-        assert device.stdin is not None and device.stderr is not None
-        device.stdin.close()
-        problems = device.stderr.read()
-        assert (device.wait(), done.returncode, problems) == (0, 0, b""), done.stderr.decode()
 
-    memory = np.frombuffer((tmp_path / "memory").read_bytes(), dtype=np.uint8).copy()
-    np.testing.assert_array_equal(memory[PAGE : PAGE + len(data)], np.frombuffer(data, dtype=np.uint8))
-    memory[PAGE : PAGE + len(data)] = UNWRITTEN
-    frames = [line.split() for line in done.stderr.decode().splitlines()]
-    if records:
-        place = int(frames.pop(0)[1])
-        assert memory[place : place + len(records)].tobytes() == records
-        memory[place : place + len(records)] = UNWRITTEN
-    assert len(frames) == 4
-    for code, (_, place, stride, _, hits) in zip((0, 1, 2, 0), frames, strict=True):
-        lines = memory[int(place) : int(place) + int(stride) * HEIGHT].reshape(HEIGHT, int(stride))
-        used = lines[:, : WIDTH * PIXEL_BYTES[code]]
-        np.testing.assert_array_equal(used, framebuffer_bytes(expected, code))
-        used[:] = UNWRITTEN
-        assert int(hits) == expected.counters["hits"]
+ROOM_SCENE = """
+mesh.name = "torus"
+background = {{room = "rooms/{room}", colours = "albedo"}}
+object.size = 0.5
+material.kind = "mirror"
+paths.bounces = 1
+light.position = [0.1, 2.0, 1.0]
+"""
+
+
+@pytest.mark.parametrize("mode", ["interrupt", "poll"])
+def test_maps_of_another_view_are_loaded_between_frames(tmp_path: Path, mode: str) -> None:
+    """The frame after that is the one of a device that has never had others; a soft reset keeps the maps."""
+    maps = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
+    overrides = ("array.columns=2", "frame.maxBounces=1", f"physicalAttributeMemory={json.dumps(maps)}")
+    design = shell_design_for("tiny", overrides, bus_bytes=16)
+    manifest = design.manifest
+    views = []
+    for name, walked in (("first", 0.0), ("second", 0.4)):
+        write_room(tmp_path / "rooms" / name, generated_room(4, maps["width"], maps["height"], walked).environment)
+        (tmp_path / f"{name}.toml").write_text(ROOM_SCENE.format(room=name))
+        views.append(DeviceScene.of(load_scene(tmp_path / f"{name}.toml"), manifest, encoder="live"))
+    registers = [view.registers((WIDTH, HEIGHT)) for view in views]
+    expected = [render_model(manifest, view.image, of_view) for view, of_view in zip(views, registers, strict=True)]
+    data, (first, second) = device_image(views[0].image, manifest), (frame_file(each, manifest) for each in registers)
+    assert views[1].maps is not None
+    loaded = maps_image(views[1].maps.image, manifest)
+    assert len(loaded) < len(data) and not np.array_equal(*(frame.colour for frame in expected))
+    files = {"image": data, "other": of_another_format(data), "frame": first, "second": second}
+    files |= {"maps": loaded, "other-maps": of_another_format(loaded)}
+    memory, lines = run_driver(tmp_path, design, files, "image", "frame", mode, "maps", "other-maps", "second")
+    take_file(memory, PAGE, data)
+    (stored,) = (line for line in lines if line[0] == "stored")
+    take_file(memory, int(stored[1]), loaded)
+    lines.remove(stored)
+    for code, view, line in zip((0, 1, 2, 0, 0), (0, 0, 0, 1, 1), lines, strict=True):
+        take_frame(memory, line, expected[view], code)
     assert (memory == UNWRITTEN).all()

@@ -18,6 +18,8 @@ from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment, EnvironmentCamera
+from colonnade.lab.evaluation.studies.generated_rooms import generated_room
+from colonnade.lab.evaluation.studies.synthetic_attic import write_room
 from colonnade.maps.image import AttributeImage, memory_words
 from colonnade.maps.layout import POINTER_BITS, AttributeLayout
 from colonnade.maps.live import (
@@ -208,6 +210,20 @@ def test_losses_of_rooms_are_near_those_of_the_offline_encoder(room: str, decibe
     assert angles(environment.normals, image.decoded_normals()).mean() < normals + degrees
     errors = ray_errors(environment, image.decoded_depth(PlaneProjection.of(environment, image.depth_unit)))
     assert np.mean(errors > 0.05) < 0.01
+
+
+def test_normals_of_the_next_view_are_as_good_as_those_of_a_first_one(tmp_path: Path) -> None:
+    """The palette of the view before is no worse a start than none."""
+    for name, walked in (("first", 0.0), ("second", 0.05)):
+        write_room(tmp_path / name, generated_room(2, walked=walked).environment)
+    first, second = (load_environment(tmp_path / name) for name in ("first", "second"))
+    warm, cold = (LiveEncoder(AttributeLayout()) for _ in range(2))
+    warm.encode(LiveFrame.of(first))
+    errors = [
+        float(angles(second.normals, encoder.encode(LiveFrame.of(second)).image.decoded_normals()).mean())
+        for encoder in (warm, cold)
+    ]
+    assert errors[0] < 1.1 * errors[1]
 
 
 @pytest.mark.parametrize("tile", [8, 16, 32])

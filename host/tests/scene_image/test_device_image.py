@@ -7,14 +7,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 
+from colonnade.cli.main import cli
 from colonnade.design.manifest import Manifest
+from colonnade.environment.load import load_environment
+from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
+from colonnade.maps.encoded import EncodedEnvironment
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.live import encode_still
 from colonnade.mesh.load import load_mesh
-from colonnade.scene_image.device_image import ALIGNMENT, device_image
+from colonnade.scene_image.device_image import ALIGNMENT, device_image, maps_image
+from colonnade.scene_image.environment import map_memories, with_environment
 from colonnade.scene_image.file import LoadSection
 from colonnade.scene_image.packer import pack
 
 ROOT = Path(__file__).resolve().parents[3]
+ROOM = ROOT / "scenes" / "rooms" / "living"
 
 
 @pytest.fixture(scope="module")
@@ -41,3 +50,43 @@ def test_an_image_has_a_header_and_a_section_for_each_memory(hardware: Manifest)
     entries = rest[4 : 4 + 2 * 256].view(np.uint8).reshape(256, 8)
     assert (entries[:, :5] == palette).all() and not entries[:, 5:].any()
     assert not rest[4 + 2 * 256 :].any() and len(rest[4 + 2 * 256 :]) < 32
+
+
+def test_an_image_of_maps_is_the_device_image_without_the_scene(hardware: Manifest) -> None:
+    layout = AttributeLayout.from_config(hardware.config["physicalAttributeMemory"])
+    room = load_environment(ROOM)
+    maps = EncodedEnvironment(room, encode_still(room, layout, rounds=1))
+    scene = pack(load_mesh("cube"), hardware)
+    whole, alone = (
+        np.frombuffer(each, dtype="<u4")
+        for each in (device_image(with_environment(scene, maps, hardware), hardware), maps_image(maps.image, hardware))
+    )
+    assert alone[2:4].tolist() == [1, 4 * len(alone)] and alone[12] == whole[12] - 1 == len(map_memories(hardware))
+    start = 36 + len(scene.records) * hardware.record_bits // 32
+    size = sum(
+        4 + shape["depth"] * -(-shape["bits"] // 32)
+        for name in map_memories(hardware)
+        for shape in (hardware.memories[name],)
+    )
+    np.testing.assert_array_equal(alone[32 : 32 + size], whole[start : start + size])
+    assert not alone[32 + size :].any() and len(alone) - 32 - size < 32
+
+
+def test_pack_writes_the_maps_of_a_room_alone(tmp_path: Path) -> None:
+    write_attic(tmp_path / "attic", 96, 72)
+    (tmp_path / "scene.toml").write_text('mesh.name = "cube"\n')
+    memory = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
+    settings = [word for key, value in memory.items() for word in ("--set", f"physicalAttributeMemory.{key}={value}")]
+    command = ["pack", tmp_path / "scene.toml", "--output", tmp_path / "out", "--encoder", "live", *settings]
+    files = ["--device-image", tmp_path / "image", "--maps-image", tmp_path / "maps"]
+
+    def run(*arguments: object) -> Result:
+        return CliRunner().invoke(cli, [str(argument) for argument in arguments])
+
+    refused = run(*command, *files)
+    assert refused.exit_code == 2 and "has none: give background.room or --background" in refused.output
+    assert not (tmp_path / "maps").exists()
+    done = run(*command, *files, "--background", tmp_path / "attic")
+    assert done.exit_code == 0, done.output
+    whole, alone = ((tmp_path / name).read_bytes() for name in ("image", "maps"))
+    assert alone[128:-128] in whole and 128 < len(alone) < len(whole)

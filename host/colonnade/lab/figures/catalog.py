@@ -67,6 +67,10 @@ def _study(name: str, *libraries: str) -> Entry:
 _TWO = ("--mesh", "bunny", "--mesh", "armadillo")
 
 _ROOMS = ("scenes/rooms/living", "scenes/rooms/office")
+_ATTIC = "scenes/rooms/attic"
+
+#: A generated room on which no encoder is tuned.
+_SEEDS = "100"
 
 
 #: Samples a pixel of the table of samples.
@@ -112,6 +116,16 @@ def catalog() -> dict[str, Entry]:
                 },
             },
         ),
+        Entry(
+            "live-rooms",
+            "small",
+            {
+                "rooms": ("colonnade", "study", "--live", *_ROOMS, _ATTIC, "--json", REPORT),
+                "generated": ("colonnade", "study", "--live", "--rooms", _SEEDS, "--json", REPORT),
+            },
+        ),
+        Entry("live-paths", "small", _colonnade("study", "--live", "--path", "--rooms", _SEEDS)),
+        Entry("captures", "small", _colonnade("study", "--capture", *_ROOMS, _ATTIC)),
         _samples(),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),

@@ -94,6 +94,22 @@ def room(name: str) -> dict[str, Any]:
     return maps | {"room": name, "normals": {"mean_degrees": 1.5}}
 
 
+def maps(dists: float | None) -> dict[str, Any]:
+    return {"dists": dists, "psnr": 30.0, "degrees": 1.25, "off": 0.005, "mirror": 0.9784}
+
+
+def captured(noise: float | None) -> dict[str, Any]:
+    return {
+        "noise": noise,
+        "estimated": 0.0048,
+        "degrees": 7.8,
+        "rays": 1234,
+        "depth": 0.9,
+        "planes": 0.95,
+        "device": 0.94,
+    }
+
+
 @pytest.fixture
 def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
     """A folder with a data file for every table."""
@@ -123,6 +139,15 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         "environments": {
             "accuracy": {"Room, device": {"mirror": {"ok": 0.97}, "mean_steps": 18.0}},
             "living": room("Room"),
+        },
+        "live-rooms": {
+            "rooms": {"r": {"offline": maps(0.05), "live": maps(0.06), "first": 30.0, "milliseconds": 15.0}},
+            "generated": {"seed 1": {"offline": maps(None), "live": maps(None)}},
+        },
+        "live-paths": {"seed 1": {"psnr": [30.0, 29.5], "degrees": [2.0, 2.25], "off": [0.02, 0.03]}},
+        "captures": {
+            "r, own maps": captured(None),
+            "r, phone": captured(0.005),
         },
         "samples": {str(number): {"psnr": 30.0 + number} for number in SAMPLES},
         "fpga": {
@@ -187,7 +212,13 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| hit triangles and distances of 2 meshes on `small` | 2 |" in table(docs, "equality")
     assert "| **8** | 1.1 | 1.10 |" in table(docs, "energy-area")
     assert "**32b32s64d**" in table(docs, "precision")
-    assert "| all | 22.5 |" in table(docs, "measuring")
+    assert "| all | 27.0 |" in table(docs, "measuring")
+    live = table(docs, "live-rooms")
+    assert "| r | 0.050, 0.060 (×1.20) | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
+    assert "| seed 1 | –, – |" in live and "15.0" not in live
+    assert "| seed 1 | 30.00, 29.50 | 2.00, 2.25 | 2.00, 3.00 | -0.50 dB, +0.25° |" in table(docs, "live-paths")
+    assert "| r, own maps | – | 7.8° | 90.0 % | 95.0 % | 94.0 % | 1,234 |" in table(docs, "captures")
+    assert "| r, phone | 0.48% |" in table(docs, "captures")
 
 
 def test_a_single_figure_stands_in_a_sentence(docs: Path) -> None:

@@ -1,0 +1,68 @@
+"""The tables of ``docs/live-encoder.md`` and ``docs/captures.md``: maps of the live encoder, and rooms of a phone.
+
+Reports also have times, which are those of one machine; no table shows them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from colonnade.lab.common.markdown import markdown
+from colonnade.lab.figures.data import Data
+
+
+def live_rooms(data: Data) -> str:
+    """Maps of stills: the offline encoder and the live one."""
+    found = data.result("live-rooms")
+    rows = []
+    for name, report in (found["rooms"] | found["generated"]).items():
+        offline, live = report["offline"], report["live"]
+
+        def both(key: str, form: str, scale: float = 1.0, own: tuple[dict[str, float], ...] = (offline, live)) -> str:
+            return ", ".join("–" if each[key] is None else format(scale * each[key], form) for each in own)
+
+        ratio = "" if None in (offline["dists"], live["dists"]) else f" (×{live['dists'] / offline['dists']:.2f})"
+        cells = (both("psnr", ".2f"), both("degrees", ".2f"), both("off", ".2f", 100), both("mirror", ".1f", 100))
+        rows.append([name, both("dists", ".3f") + ratio, *cells])
+    titles = ["room", "albedo DISTS: offline, live", "PSNR, dB", "normals off by, °", "planes off by 5 cm, %"]
+    return markdown([*titles, "mirror rays right, %"], rows)
+
+
+def live_paths(data: Data) -> str:
+    """The live encoder along paths: mean and worst view."""
+    rows = [
+        [
+            name,
+            *(f"{scale * report[key][0]:.2f}, {scale * report[key][1]:.2f}" for key, scale in _PATH),
+            f"{report['psnr'][1] - report['psnr'][0]:+.2f} dB, {report['degrees'][1] - report['degrees'][0]:+.2f}°",
+        ]
+        for name, report in data.result("live-paths").items()
+    ]
+    titles = ["path", "albedo, dB: mean, worst", "normals, °", "planes off by 5 cm, %", "worst against mean"]
+    return markdown(titles, rows)
+
+
+_PATH = (("psnr", 1), ("degrees", 1), ("off", 100))
+
+
+def captures(data: Data) -> str:
+    """Mirror rays in rooms as a phone captures them."""
+    rows = [
+        [
+            name,
+            "–" if report["noise"] is None else f"{report['estimated']:.2%}",
+            f"{report['degrees']:.1f}°",
+            *(f"{100 * report[march]:.1f} %" for march in ("depth", "planes", "device")),
+            f"{report['rays']:,}",
+        ]
+        for name, report in data.result("captures").items()
+    ]
+    titles = ["room", "noise found", "normals off by", "mirror rays right: depth map", "planes", "device", "rays"]
+    return markdown(titles, rows)
+
+
+TABLES: Mapping[str, Callable[[Data], str]] = {
+    "live-rooms": live_rooms,
+    "live-paths": live_paths,
+    "captures": captures,
+}

@@ -1,0 +1,261 @@
+"""An object in the frames of a moving camera: it stays in the world, and each frame is that of its room."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+
+from colonnade.capture.video import frames_of_video
+from colonnade.cli.main import cli
+from colonnade.common import extras
+from colonnade.common.accumulation import Accumulation
+from colonnade.common.image_io import encode_srgb
+from colonnade.design.generator import manifest_for
+from colonnade.device.bit_exact import render_model
+from colonnade.device.scene import DeviceScene
+from colonnade.environment.derived_albedo import derived_albedo, hue_lights
+from colonnade.environment.load import load_environment
+from colonnade.environment.sequence import load_sequence
+from colonnade.lab.evaluation.studies.generated_rooms import generated_room
+from colonnade.lab.evaluation.studies.synthetic_attic import DEPTH_STEP, write_room
+from colonnade.maps.encoded import layout_of
+from colonnade.maps.image import AttributeImage
+from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
+from colonnade.mesh.load import load_mesh
+from colonnade.render.composite import composited
+from colonnade.render.frames import render, render_frames
+from colonnade.render.request import RenderRequest
+from colonnade.render.result import RenderResult
+from colonnade.scene.model import Transform
+from colonnade.scene.object_pose import object_pose
+from colonnade.scene.parser import load_scene
+
+SIZE, VIEWS, STEP, NOISE = (96, 72), 3, 0.2, 0.004
+#: An attribute memory for maps of this size.
+MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
+ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
+SCENE = """
+mesh.name = "teapot:3"
+object.size = 0.5
+material.kind = "mirror"
+paths.bounces = 1
+background.colours = "{colours}"
+background.room = "unused"
+light = {{offset = [1.0, 1.5, 0.5]}}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sequence whose frames are the rooms in folders of their numbers."""
+    folder = tmp_path_factory.mktemp("sequence")
+    lines = [f"width = {SIZE[0]}\nheight = {SIZE[1]}\nrate = 12.5\ndepth_step = {DEPTH_STEP}\ndepth_noise = {NOISE}"]
+    for number in range(VIEWS):
+        room = generated_room(4, *SIZE, walked=STEP * number).environment
+        write_room(folder / f"{number}", room)
+        names = {"photo": "photo", "depth": "depth", "albedo": "albedo", "normal": "normal"}
+        lines += ["[[frame]]", f"time = {number / 12.5}"]
+        lines += [f'{key} = "{number}/{name}.png"' for key, name in names.items()]
+        lines += [f"{key} = {getattr(room, key)}" for key in ("fx", "fy", "cx", "cy")]
+        lines += [f"cam_to_world = {room.camera_to_world.tolist()}"]
+    (folder / "sequence.toml").write_text("\n".join(lines) + "\n")
+    for colours in ("albedo", "photo"):
+        (folder / f"{colours}.toml").write_text(SCENE.format(colours=colours))
+    return folder
+
+
+def request_of(folder: Path, colours: str, backend: str = "model") -> RenderRequest:
+    sequence = load_sequence(folder / "sequence.toml")
+    request = RenderRequest(folder / f"{colours}.toml", "small", ROOM, samples=1, sequence=sequence, frames=VIEWS)
+    return replace(request, backend=backend, size=SIZE, encoder="live")  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def frames(folder: Path) -> list[RenderResult]:
+    return list(render_frames(request_of(folder, "albedo")))
+
+
+def test_the_first_frame_is_the_still_of_its_room(folder: Path, frames: list[RenderResult]) -> None:
+    still = replace(request_of(folder, "albedo"), sequence=None, frames=1, background=folder / "0")
+    # The sequence's noise is that of a sensor, and a still has exact depth: only the tolerance of planes differs
+    exact = load_sequence(folder / "sequence.toml")
+    exact.content = replace(exact.content, depth_noise=0.0)
+    (first,) = render_frames(replace(request_of(folder, "albedo"), sequence=exact, frames=1))
+    np.testing.assert_array_equal(render(still).image, first.image)
+    assert not np.array_equal(first.image, frames[0].image)
+
+
+def test_a_frame_is_the_still_of_its_room_with_the_object_in_the_world(
+    folder: Path, frames: list[RenderResult]
+) -> None:
+    """The maps are those of an encoder that has seen the frames before."""
+    manifest = manifest_for("small", ROOM).manifest
+    rooms = [load_environment(folder / str(number)) for number in range(VIEWS)]
+    first = DeviceScene.of(load_scene(folder / "albedo.toml"), manifest, room=rooms[0], encoder="live").scene
+    mesh = load_mesh("teapot:3")
+    pose = object_pose(first, mesh.extent, rooms[0])
+    x, y, z = pose.translate
+    centre, edge = pose.to_world(mesh.extent.centre), mesh.extent.edge * pose.scale
+    axes = rooms[0].camera_to_world[:, :3] * [1, -1, -1]
+    lamp = centre + edge * (axes @ np.array([1.0, 1.5, 0.5]))
+    transform = Transform(scale=pose.scale, translate=(x, y, z))
+    light = replace(first.light, position=tuple(lamp.tolist()))
+    scene = replace(first, placement=None, transform=transform, light=light)
+
+    encoder = LiveEncoder(layout_of(manifest), NOISE)
+    for number, room in enumerate(rooms):
+        images: list[AttributeImage] = []
+        for _ in range(1 if number else STILL_ROUNDS):
+            images.append(encoder.encode(LiveFrame.of(room)).image)
+        prepared = DeviceScene.of(scene, manifest, room=room, encode=lambda room, image=images[-1]: image)
+        frame = render_model(manifest, prepared.image, prepared.registers(SIZE, composited=True))
+        assert prepared.environment is not None
+        expected = composited(Accumulation.of_frame(frame), prepared.environment)
+        np.testing.assert_array_equal(frames[number].object_mask, frame.is_object)
+        np.testing.assert_array_equal(encode_srgb(frames[number].image), encode_srgb(expected))
+
+
+def test_the_object_stays_where_it_is_while_the_camera_moves(folder: Path, frames: list[RenderResult]) -> None:
+    sequence = load_sequence(folder / "sequence.toml")
+    scene = DeviceScene.of(
+        load_scene(folder / "albedo.toml"), manifest_for("small", ROOM).manifest, room=sequence.room(0), encoder="live"
+    ).scene
+    extent = load_mesh("teapot:3").extent
+    centre = object_pose(scene, extent, sequence.room(0)).to_world(extent.centre)
+    places = []
+    for camera, frame in zip(sequence.cameras, frames, strict=True):
+        seen = (centre - camera.to_world[:, 3]) @ camera.to_world[:, :3]
+        expected = seen[:2] / seen[2] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
+        rows, columns = np.nonzero(frame.object_mask)
+        places.append((columns.mean() + 0.5, rows.mean() + 0.5))
+        np.testing.assert_allclose(places[-1], expected, atol=2.0)
+    assert np.ptp([place[0] for place in places]) > 6, "the camera moves"
+    assert [frame.report.time for frame in frames] == pytest.approx([0.0, 0.08, 0.16])
+
+
+def test_colours_of_the_photo_keep_the_light_of_the_first_frame(folder: Path) -> None:
+    """The object's registers do not change: only the room does."""
+    manifest = manifest_for("small", ROOM).manifest
+    rooms = [load_environment(folder / str(number)) for number in range(2)]
+    encoder = LiveEncoder(layout_of(manifest))
+
+    def encode(room: object) -> AttributeImage:
+        return encoder.encode(LiveFrame.of(room)).image  # type: ignore[arg-type]
+
+    first = DeviceScene.of(load_scene(folder / "photo.toml"), manifest, room=rooms[0], encode=encode)
+    second = first.seen_in(rooms[1], encode)
+    assert first.scene.headroom > 1 and second.scene.headroom == first.scene.headroom
+    one, other = (prepared.registers(SIZE) for prepared in (first, second))
+    fixed = [
+        name for name in one if name.startswith(("materials", "lights[0].colour", "lights[0].position", "ambient"))
+    ]
+    shift = one["frame.unitShift"] - other["frame.unitShift"]
+    assert shift == 0 and {name: one[name] for name in fixed} == {name: other[name] for name in fixed}
+    assert any(one[name] != other[name] for name in one if name.startswith("camera"))
+    np.testing.assert_array_equal(first.image.records, second.image.records)
+    assert second.environment is not None and not np.array_equal(second.environment.albedo, rooms[1].albedo)
+
+
+def test_albedos_that_a_sequence_lacks_have_one_light(folder: Path) -> None:
+    text = (folder / "sequence.toml").read_text()
+    (folder / "photos.toml").write_text("\n".join(line for line in text.splitlines() if not line.startswith("albedo")))
+    known, lacking = load_sequence(folder / "sequence.toml"), load_sequence(folder / "photos.toml")
+    light = hue_lights(known.room(0))
+    for number in (2, 0):
+        room = lacking.room(number)
+        np.testing.assert_array_equal(room.albedo, derived_albedo(known.room(number), light))
+        assert np.array_equal(room.albedo, derived_albedo(known.room(number))) is (number == 0)
+
+
+@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+def test_the_hardware_renders_the_frames_of_the_model(folder: Path) -> None:
+    small = [replace(request_of(folder, "albedo", backend), size=(32, 24), frames=2) for backend in ("rtl", "model")]
+    for rtl, model in zip(*map(render_frames, small), strict=True):
+        np.testing.assert_array_equal(rtl.image, model.image)
+        assert rtl.report.counters["hits"] == model.report.counters["hits"] > 0
+
+
+def run(folder: Path, *arguments: object) -> Result:
+    settings = [word for each in ROOM for word in ("--set", each)]
+    common = ("render", folder / "albedo.toml", "--config", "small", *settings, "--backend", "model", "--size", "96x72")
+    return CliRunner().invoke(cli, [str(argument) for argument in (*common, "--samples", 1, *arguments)])
+
+
+def test_files_of_a_sequence(folder: Path, tmp_path: Path, frames: list[RenderResult]) -> None:
+    outputs = ("--output", tmp_path / "f.png", "--video", tmp_path / "v.mp4", "--json", tmp_path / "r.json")
+    result = run(folder, "--sequence", folder / "sequence.toml", *outputs)
+    assert result.exit_code == 0 and "3 frames" in result.output, result.output
+    assert sorted(file.name for file in tmp_path.iterdir()) == [*(f"f_000{n}.png" for n in range(3)), "r.json", "v.mp4"]
+    pictures = [np.asarray(Image.open(tmp_path / f"f_000{number}.png")) for number in range(VIEWS)]
+    for shown, frame, picture in zip(frames_of_video(tmp_path / "v.mp4", range(VIEWS)), frames, pictures, strict=True):
+        np.testing.assert_array_equal(picture, encode_srgb(frame.image))
+        assert shown.shape == picture.shape
+        assert np.abs(shown.astype(int) - picture).mean() < 6
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert [one["time"] for one in report["frames"]] == pytest.approx([0.0, 0.08, 0.16])
+    assert [one["counters"]["hits"] for one in report["frames"]] == [frame.object_mask.sum() for frame in frames]
+    assert all(one["seconds"]["maps"] > 0 for one in report["frames"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--sequence", "none.toml"), "sequence none.toml does not exist"),
+        (("--sequence", "FILE", "--frames", 4), "has 3 frames, fewer than the 4 of --frames"),
+        (("--sequence", "FILE", "--background", "FOLDER/0"), "both replace the scene's background"),
+        (("--sequence", "FILE", "--backend", "reference"), "--sequence is for the rtl and the model backend"),
+        (("--sequence", "FILE", "--set", "physicalAttributeMemory.width=64"), "set its width and height"),
+        (("--video", "v.mp4"), "--video needs --frames or --sequence"),
+        (("--frames", 2, "--video", "v.avi"), "is written as MP4"),
+    ],
+)
+def test_what_does_not_go_with_a_sequence_is_one_line(
+    folder: Path, arguments: tuple[object, ...], message: str
+) -> None:
+    named = [
+        str(each).replace("FILE", str(folder / "sequence.toml")).replace("FOLDER", str(folder)) for each in arguments
+    ]
+    result = run(folder, *named)
+    assert result.exit_code == 2 and message in " ".join(re.sub("[│╭╮╰╯─]", " ", result.output).split()), result.output
+
+
+def test_the_object_does_not_move_in_a_sequence(folder: Path) -> None:
+    (folder / "moving.toml").write_text((folder / "albedo.toml").read_text() + "[motion]\nturn = 30.0\n")
+    result = run(folder, "--sequence", folder / "sequence.toml")
+    assert result.exit_code == 0
+    moved = CliRunner().invoke(
+        cli, ["render", str(folder / "moving.toml"), "--backend", "model", "--sequence", str(folder / "sequence.toml")]
+    )
+    assert moved.exit_code == 2 and "leave out [motion]" in moved.output
+
+
+def test_without_its_package_a_video_is_refused_before_work(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    find = extras.find_spec
+    monkeypatch.setattr(extras, "find_spec", lambda name: None if name == "imageio_ffmpeg" else find(name))
+    result = run(folder, "--sequence", folder / "sequence.toml", "--video", tmp_path / "v.mp4")
+    assert result.exit_code == 2 and "pip install 'colonnade[capture]'" in result.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_video_of_an_odd_size_has_a_black_line_more(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text('mesh.name = "teapot:2"\nbackground.colour = [0.5, 0.5, 0.5]\n')
+    common = ("render", tmp_path / "scene.toml", "--config", "tiny", "--backend", "model", "--size", "31x23")
+    outputs = ("--output", tmp_path / "f.webp", "--video", tmp_path / "v.mp4")
+    result = CliRunner().invoke(cli, [str(each) for each in (*common, "--frames", 2, *outputs)])
+    assert result.exit_code == 0, result.output
+    (first, _) = frames_of_video(tmp_path / "v.mp4", range(2))
+    with Image.open(tmp_path / "f.webp") as film:
+        picture = np.asarray(film.convert("RGB"))
+    assert first.shape == (24, 32, 3)
+    assert np.abs(first[:22, :30].astype(int) - picture[:22, :30]).mean() < 6
+    assert first[23].max() < 60
