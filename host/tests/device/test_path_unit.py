@@ -38,10 +38,7 @@ SHAPES = [
             *("units.triangleRows=2", "units.triangleLanes=2"),
         ),
     ),
-    pytest.param(
-        ("sequential parts", "tiny", ("array.rows=2", "units.pathContexts=7", "columnBvhMemory.snooping=false")),
-        marks=pytest.mark.matrix,
-    ),
+    ("sequential parts", "tiny", ("array.rows=2", "units.pathContexts=7", "columnBvhMemory.snooping=false")),
     pytest.param(
         (
             "one context, no tree, narrow",

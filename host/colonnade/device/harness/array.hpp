@@ -38,6 +38,11 @@ public:
             }
             columns_.back()->eval();
         }
+        for (std::size_t i = 0; i < units_.size(); ++i) { // constants, too
+            const UnitVariables& variables = unitVariables_[i];
+            VUnitModel& inner = *units_[i];
+            Unit_INPUTS(INWARD)
+        }
     }
     ~Array() {
         for (auto& unit : units_) unit->final();
