@@ -55,7 +55,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the albedo of the first frame, whose lights take seconds to fit."""
     from colonnade.environment import load
 
-    monkeypatch.setattr(load, "derived_albedo", lambda room: np.full((room.height, room.width, 3), 0.5))
+    monkeypatch.setattr(load, "derived_albedo", lambda room, light=None: np.full((room.height, room.width, 3), 0.5))
 
 
 def test_every_format_gives_poses_lens_and_depth(living: Recording, tmp_path: Path, quick: None) -> None:
