@@ -195,10 +195,12 @@ def test_files_of_a_sequence(folder: Path, tmp_path: Path, frames: list[RenderRe
     assert result.exit_code == 0 and "3 frames" in result.output, result.output
     assert sorted(file.name for file in tmp_path.iterdir()) == [*(f"f_000{n}.png" for n in range(3)), "r.json", "v.mp4"]
     pictures = [np.asarray(Image.open(tmp_path / f"f_000{number}.png")) for number in range(VIEWS)]
-    for shown, frame, picture in zip(frames_of_video(tmp_path / "v.mp4", range(VIEWS)), frames, pictures, strict=True):
+    for decoded, frame, picture in zip(
+        frames_of_video(tmp_path / "v.mp4", range(VIEWS)), frames, pictures, strict=True
+    ):
         np.testing.assert_array_equal(picture, encode_srgb(frame.image))
-        assert shown.shape == picture.shape
-        assert np.abs(shown.astype(int) - picture).mean() < 6
+        assert decoded.shape == picture.shape
+        assert np.abs(decoded.astype(int) - picture).mean() < 6
     report = json.loads((tmp_path / "r.json").read_text())
     assert [one["time"] for one in report["frames"]] == pytest.approx([0.0, 0.08, 0.16])
     assert [one["counters"]["hits"] for one in report["frames"]] == [frame.object_mask.sum() for frame in frames]
