@@ -49,8 +49,8 @@ final class PathUnit(config: PathConfig) extends Module {
   private val raySources    = Seq(shadowRays.ray) ++ bounces.map(_.ray) :+ tracedPrimary
   private val rayArbiter    = Module(new Arbiter(new RayRequest(config), raySources.size)).io
   rayArbiter.in.zip(raySources).foreach { case (in, rays) => in :<>= rays }
-  raySetup.request :<>= TimingSlice.queue(rayArbiter.out) // no path leads from set-up to the tiles
-  trace.rays :<>= raySetup.ray
+  raySetup.request :<>= TimingSlice.queue(rayArbiter.out)       // no path leads from ray set-up to the tiles
+  trace.rays :<>= TimingSlice.extra(config).queue(raySetup.ray) // nor from the traversal units to it
 
   // Shading: a lit surface ends its path, after a shadow ray to each light; a mirror or glass continues it
   private val lit = Wire(Valid(new LitSurface(config)))
