@@ -28,7 +28,7 @@ public:
 
     void load(const std::string& memory, const Records& words) { image_.load(memory, words.data(), words.shape(0), words.shape(1)); }
 
-    nb::dict march(const Values& registers, const Vectors& origins, const Vectors& directions) {
+    nb::dict march(const Values& registers, const Vectors& origins, const Vectors& directions, bool isFromCamera) {
         const EnvironmentView view = viewOf(registers);
         const EnvironmentMarch march(numbers_, image_);
         const std::size_t count = origins.shape(0);
@@ -51,7 +51,7 @@ public:
                 origin[a] = origins(i, a);
                 direction[a] = directions(i, a);
             }
-            const EnvironmentPoint point = march.findHit(origin, direction, view);
+            const EnvironmentPoint point = isFromCamera ? march.cameraView(origin, direction, view) : march.findHit(origin, direction, view);
             kind[i] = static_cast<std::int64_t>(point.kind);
             x[i] = point.x;
             y[i] = point.y;
@@ -75,8 +75,8 @@ void bind_environment(nb::module_& module) {
         .def(nb::init<const Values&, const Values&, const FieldTuples&>(), "numbers"_a, "sizes"_a, "layouts"_a,
              "From the manifest's numbers, and its attributes' sizes and layouts: word -> field -> (offset, width, signed).")
         .def("load", &EnvironmentModel::load, "memory"_a, "words"_a, "Loads a memory, by its name in the manifest: uint8 [words, bytes], low byte first.")
-        .def("march", &EnvironmentModel::march, "registers"_a, "origins"_a, "directions"_a,
-             "Finds where rays hit the environment. Origins int64 [n, 3], grid steps; directions int64 [n, 3], components of shadeBits bits and a sign. Registers: "
+        .def("march", &EnvironmentModel::march, "registers"_a, "origins"_a, "directions"_a, "is_from_camera"_a = false,
+             "Finds where rays hit the environment, or what a camera's rays see of its maps. Origins int64 [n, 3], grid steps; directions int64 [n, 3], components of shadeBits bits and a sign. Registers: "
              "matrix[0..2].{x,y,z}, offset.{x,y,z}, offsetShift, exponent, boundingPlanes. Returns kind int64 [n] (0 miss, 1 map, 2 bounding plane), the map's pixel "
              "x, y, the bounding plane's entry, is_hidden bool, travel float64 (in ray directions from the origin), steps.");
 }

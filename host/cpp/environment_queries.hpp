@@ -9,9 +9,10 @@
 //   cell   x y                                            -> id isIllegal
 //   plane  id                                             -> a b c exponent
 //   boundingPlane index                                     -> a b c exponent albedo[3] normal[3]
-//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY boundingPlanes tolerance isSeen pixel[2] hitDistance origin[3] direction[3]
+//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY boundingPlanes tolerance isMapCamera isSeen pixel[2] hitDistance origin[3] direction[3]
 //                                                         -> kind x y entry isHidden travel travelExponent steps point[3] albedo[3] normal[3] hidesObject isIllegal
-//          the point hit by the ray, or with isSeen the point visible in the pixel; all 0 for a miss. hidesObject: it is nearer than hitDistance
+//          the point hit by the ray, or with isSeen the point visible in the pixel, whose ray it is; all 0 for a miss. hidesObject: it is nearer
+//          than hitDistance
 #pragma once
 #include <map>
 #include <optional>
@@ -90,6 +91,7 @@ private:
         for (auto& step : view.step) step = query.number();
         view.boundingPlanes = static_cast<int>(query.number());
         view.occlusionTolerance = query.number();
+        view.isMapCamera = query.number() != 0;
         const bool isSeen = query.number() != 0;
         const std::int64_t x = query.number(), y = query.number();
         const Wide hitDistance = query.wide();
@@ -97,7 +99,9 @@ private:
         Vector direction;
         blockScale(query.wideVector(), numbers.shadeBits, direction);
         const EnvironmentMarch march(numbers, image());
-        const EnvironmentPoint point = isSeen ? march.directView(x, y, direction, view) : march.findHit(origin, direction, view);
+        const EnvironmentPoint point = !isSeen            ? march.findHit(origin, direction, view)
+                                       : view.isMapCamera ? march.directView(x, y, direction, view)
+                                                          : march.cameraView(origin, direction, view);
         Reply reply;
         reply << static_cast<int>(point.kind) << point.x << point.y << point.entry << point.isHidden;
         reply << point.travel << point.travelExponent << point.steps;

@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.view_file import view_file
-from colonnade.scene.cameras import environment_camera
-from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view
+from colonnade.scene.cameras import check_camera
+from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, view_photo
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.view import View, make_view, place, with_overrides
 from colonnade.scene_image.environment import with_environment
@@ -34,12 +38,14 @@ class DeviceScene:
         manifest: The design's manifest.
         image: Records of the mesh, textures, and maps of the room.
         maps: The room and its encoded maps; None without a room.
+        photo: The photo of the frames' view, sRGB, uint8 [rows, columns, 3]; None without one.
     """
 
     scene: Scene
     manifest: Manifest
     image: SceneImage
     maps: EncodedEnvironment | None
+    photo: NDArray[np.uint8] | None = None
 
     @classmethod
     def of(
@@ -78,7 +84,8 @@ class DeviceScene:
         if room is not None:
             check_layout(room, manifest)
             if size is not None:
-                environment_camera(room, *size)
+                check_camera(scene, room, size)
+        photo = view_photo(scene, room, size)
         lit = lit_room(scene, room, mesh.extent, int(manifest.config["frame"]["lights"]), relit, progress)
         maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest, encode or encoder)
         mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
@@ -86,7 +93,7 @@ class DeviceScene:
         image = pack(mesh, manifest, materials, lit.scene.headroom, encoder)
         if maps is not None:
             image = with_environment(image, maps, manifest)
-        return cls(lit.scene, manifest, image, maps)
+        return cls(lit.scene, manifest, image, maps, photo)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
         """The scene in another view of its room: object and lights stay in the world, camera and maps are new.
@@ -100,7 +107,8 @@ class DeviceScene:
         extent = self.image.header.extent
         scene = fixed_in_world(self.scene, extent, self.environment)
         maps = EncodedEnvironment.of(next_view(scene, extent, room, relit), self.manifest, encode)
-        return replace(self, scene=scene, image=with_environment(self.image, maps, self.manifest), maps=maps)
+        image = with_environment(self.image, maps, self.manifest)
+        return replace(self, scene=scene, image=image, maps=maps, photo=room.photo)
 
     @property
     def environment(self) -> Environment | None:
@@ -115,18 +123,23 @@ class DeviceScene:
         Args:
             size: Width and height, pixels.
             scene: Another moment or sample of `scene`; None: `scene` itself.
-            composited: The frame is composited with the room's photo, if it has one: of the room, only pixels whose
-                light the object may block are rendered.
+            composited: The frame is composited with the photo of its view, if there is one: of the room, only pixels
+                whose light the object may block are rendered.
 
         Raises:
             UserError: The frame or a distance is out of the hardware's range, or the design lacks a feature.
         """
-        room = self.environment
-        shows_room = not composited or room is None or room.photo is None
+        shows_room = not composited or self.environment is None or self.photo is None
         return frame_registers(scene or self.scene, self.image.header, self.manifest, *size, self.maps, shows_room)
 
     def view_file(self, size: tuple[int, int], *, composited: bool = False) -> bytes:
-        """The file with which a processor computes frames of other poses (`view_file`); arguments as in `registers`."""
+        """The file with which a processor computes frames of other poses (`view_file`); arguments as in `registers`.
+
+        Raises:
+            UserError: See `view_file`; or the scene places the camera of a room.
+        """
+        if self.environment is not None and self.scene.places_camera:
+            raise UserError("in a room a target's camera is that of the maps: leave out [camera] and motion.camera")
         placed = place(self.scene, self.image.header.extent, *size, self.environment)
         registers = self.registers(size, composited=composited)
         occlusion = self.scene.background.occlusion

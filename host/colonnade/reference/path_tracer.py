@@ -65,11 +65,13 @@ class PathTracer:
         colours, t, ratio = np.empty((count, 3)), np.full(count, np.nan), np.ones((count, 3))
         outside = np.zeros(count, dtype=np.bool_)
         missed = np.flatnonzero(~is_object)
-        if self._backdrop is None:
-            colours[missed] = self._view.background
-        else:
-            points = self._to_mesh_space(self._backdrop.visible_points(*pixels[missed].T))
-            colours[missed], ratio[missed] = self._shade_background(points)
+        colours[missed] = self._view.background
+        if self._backdrop is not None:
+            points = self._to_mesh_space(self._seen_points(origins[missed], directions[missed], pixels[missed]))
+            outside[missed] = points.outside
+            known = np.flatnonzero(~points.outside)
+            seen = missed[known]
+            colours[seen], ratio[seen] = self._shade_background(_select(points, known))
 
         # Active paths: their index, the ray that hit the object, and the face it hit.
         path = np.flatnonzero(is_object)
@@ -154,7 +156,7 @@ class PathTracer:
         if pixels is None:
             surface = self._backdrop.geometry.intersect(starts, unit_vectors(directions[hit] @ matrix.T))
         else:
-            surface = self._backdrop.visible_points(*pixels[hit].T)
+            surface = self._seen_points(origins[hit], directions[hit], pixels[hit])
         # In metres: along the ray to the object and to the room, and the tolerance at the object
         ends = position @ matrix.T + shift
         to_object, to_room = (np.linalg.norm(points - starts, axis=1) for points in (ends, surface.position))
@@ -165,6 +167,14 @@ class PathTracer:
         visible = faces.copy()
         visible[hit[is_hidden]] = -1
         return visible
+
+    def _seen_points(self, origins: Floats, directions: Floats, pixels: Floats) -> BackdropPoints:
+        """Points of the room that primary rays see, view space; arguments as in `trace`."""
+        assert self._backdrop is not None
+        if self._view.is_map_camera:
+            return self._backdrop.visible_points(*pixels.T)
+        matrix, shift = self._mesh_to_view()
+        return self._backdrop.seen_points(origins @ matrix.T + shift, directions @ matrix.T)
 
     def _first_hits(self, origins: Floats, directions: Floats) -> Indices:
         self.rays["in_box"] += int(np.count_nonzero(self._object.tracer.enters_box(origins, directions)[0]))

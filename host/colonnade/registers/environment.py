@@ -86,7 +86,11 @@ def projection_registers(
     ):
         registers[f"environment.step{name}"] = round(map_pixels / frame_pixels / (2 * SLOPE_PIXELS) * 2.0**fraction)
     used = int(image.planes.bounding.any(axis=1).sum())
-    return registers | {"environment.boundingPlanes": used, "environment.enabled": 1}
+    return registers | {
+        "environment.boundingPlanes": used,
+        "environment.enabled": 1,
+        "environment.isMapCamera": int(view.is_map_camera),
+    }
 
 
 def projection_of(environment: Environment, image: AttributeImage) -> Floats:

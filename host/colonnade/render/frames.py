@@ -351,8 +351,7 @@ def render_model(scene: Scene, mesh: Mesh, manifest: Manifest, size: Size, progr
 
 def _composited(result: RenderResult, prepared: DeviceScene) -> RenderResult:
     """The result in the photo of its room; as it is without a room."""
-    room = prepared.environment
-    return result if room is None else replace(result, image=composited(result.sums, room))
+    return result if prepared.environment is None else replace(result, image=composited(result.sums, prepared.photo))
 
 
 def require_no_errors(frame: Frame) -> None:

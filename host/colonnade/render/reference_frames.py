@@ -23,8 +23,8 @@ from colonnade.reference.render import ReferenceResult, render_reference
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
-from colonnade.scene.cameras import environment_camera
-from colonnade.scene.lit_room import LitRoom, lit_room, scene_room
+from colonnade.scene.cameras import check_camera
+from colonnade.scene.lit_room import LitRoom, lit_room, scene_room, view_photo
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.view import make_view
@@ -122,8 +122,8 @@ def traced_frames(
     progress: Progress = QUIET,
 ) -> Iterator[TracedFrame]:
     """Trace poses of a scene in the room ``maps``, with bounding planes of ``layout`` or else of the default one."""
-    if maps is not None:
-        environment_camera(maps, *size)
+    check_camera(poses[0], maps, size)
+    photo = view_photo(poses[0], maps, size)
     room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)
     backdrop = room_backdrop(room, layout, options.truth, progress)
     for pose in poses:
@@ -136,8 +136,7 @@ def traced_frames(
             other = render_reference(mesh, view, progress, backdrop)
             sums += _accumulated(other)
             rays = {kind: count + other.rays[kind] for kind, count in rays.items()}
-        shows_photo = room.environment is not None and not options.relit
-        image = composited(sums, room.environment) if shows_photo and room.environment else sums.image()
+        image = composited(sums, None if options.relit else photo)
         yield TracedFrame(image, first, sums, rays, time.perf_counter() - begun)
 
 

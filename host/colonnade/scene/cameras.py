@@ -1,8 +1,9 @@
-"""World-space cameras: at a given position, framing the object, or a room's camera."""
+"""World-space cameras: at a given position, framing the object, a room's camera, or one that moves."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import numpy as np
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
-from colonnade.scene.model import Camera, Vector
+from colonnade.scene.model import Camera, Scene
 from colonnade.scene.object_pose import Pose
 from colonnade.scene.samples import Point
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Largest fraction of the picture's width that a framed object covers.
 MAX_WIDTH = 0.9
+#: Vertical field of view without a room, degrees.
+FIELD_OF_VIEW = 40.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,61 @@ class WorldCamera:
     axes: Floats
 
 
+def start_camera(
+    scene: Scene, pose: Pose, extent: Extent, width: int, height: int, environment: Environment | None
+) -> WorldCamera:
+    """The camera at the start of a scene's motion, for an object with the pose of the start.
+
+    Raises:
+        UserError: The camera's position equals its target, or the frame does not have the proportions of the room.
+    """
+    camera = scene.camera
+    if environment is None:
+        return scene_camera(camera, pose, extent, width, height)
+    if camera.position is None:
+        return environment_camera(environment, width, height)
+    target = pose.to_world(extent.centre) if camera.target is None else np.array(camera.target)
+    return _looking(camera, np.array(camera.position), target, _lens(camera, width, height, environment))
+
+
+def moved_camera(
+    scene: Scene, start: WorldCamera, centre: Floats, width: int, height: int, environment: Environment | None
+) -> WorldCamera:
+    """The camera at a scene's progress.
+
+    Args:
+        scene: The scene; its motion may move the camera.
+        start: The camera of the start.
+        centre: Centre of the object's cube at the start, world space; its depth is that of the start's target if the
+            scene names none.
+        width, height: Size of the frame, pixels.
+        environment: The room of the scene.
+
+    Raises:
+        UserError: The camera's position equals its target.
+    """
+    keys, progress = scene.motion.camera, scene.motion_progress
+    if not keys or (progress == 0.0 and keys[0].at > 0.0):
+        return start
+    camera, forward = scene.camera, -start.axes[2]
+    target = start.position + max(float((centre - start.position) @ forward), 1e-3) * forward
+    if camera.target is not None:
+        target = np.array(camera.target)
+    if environment is not None and camera.position is None:
+        x, y, z = (float(value) for value in start.axes[1])  # the room's camera may be tilted
+        camera = replace(camera, up=(x, y, z))
+    before, place = 0.0, start.position
+    for key in keys:
+        then = target if key.target is None else np.array(key.target)
+        if progress <= key.at:
+            part = 1.0 if key.at == before else (progress - before) / (key.at - before)
+            place = (1.0 - part) * place + part * np.array(key.position)
+            target = (1.0 - part) * target + part * then
+            break
+        before, place, target = key.at, np.array(key.position), then
+    return _looking(camera, place, target, _lens(camera, width, height, environment))
+
+
 def scene_camera(camera: Camera, pose: Pose, extent: Extent, width: int, height: int) -> WorldCamera:
     """The camera of a scene without a room, for a frame of ``width`` by ``height`` pixels.
 
@@ -47,22 +105,54 @@ def scene_camera(camera: Camera, pose: Pose, extent: Extent, width: int, height:
         UserError: The camera's position equals its target.
     """
     centre, edge = pose.to_world(extent.centre), extent.edge * pose.scale
-    slope = math.tan(math.radians(camera.fov) / 2)
+    lens = _lens(camera, width, height, None)
     if camera.position is not None:
-        position = np.array(camera.position)
         target = centre if camera.target is None else np.array(camera.target)
-        if not (target - position).any():
-            raise UserError("the camera's position is its target: move one of them")
-        right, up, toward = camera_axes(position - target, camera.up)
-    else:
-        right, up, toward = camera_axes(np.array(camera.direction), camera.up)
-        outline = pose.to_world(extent.outline) - centre
-        max_height, max_width = camera.framing * 2 * slope, MAX_WIDTH * 2 * slope * width / height
-        x, y, distance = _frame(outline @ right, outline @ up, outline @ toward, max_width, max_height, edge)
-        position = centre + x * right + y * up + distance * toward
-    pixel = 2 * slope / height
-    corner = -toward + (0.5 - width / 2) * pixel * right + (height / 2 - 0.5) * pixel * up
-    return WorldCamera(position, corner, pixel * right, -pixel * up, np.stack([right, up, toward]))
+        return _looking(camera, np.array(camera.position), target, lens)
+    right, up, toward = camera_axes(np.array(camera.direction), camera.up)
+    outline = pose.to_world(extent.outline) - centre
+    slope = _slope(camera)
+    max_height, max_width = camera.framing * 2 * slope, MAX_WIDTH * 2 * slope * width / height
+    x, y, distance = _frame(outline @ right, outline @ up, outline @ toward, max_width, max_height, edge)
+    return lens.at(centre + x * right + y * up + distance * toward, right, up, toward)
+
+
+@dataclass(frozen=True)
+class _Lens:
+    """Where the middles of pixels lie at depth 1: of the first one, right and down; and the steps between them."""
+
+    x: float
+    y: float
+    step_x: float
+    step_y: float
+
+    def at(self, position: Floats, right: Floats, up: Floats, toward: Floats) -> WorldCamera:
+        corner = -toward + self.x * right - self.y * up
+        return WorldCamera(position, corner, self.step_x * right, -self.step_y * up, np.stack([right, up, toward]))
+
+
+def _slope(camera: Camera) -> float:
+    return math.tan(math.radians(FIELD_OF_VIEW if camera.fov is None else camera.fov) / 2)
+
+
+def _lens(camera: Camera, width: int, height: int, environment: Environment | None) -> _Lens:
+    if environment is not None and camera.fov is None:
+        _check_proportions(environment, width, height)
+        scale_x, scale_y = environment.width / width, environment.height / height
+        return _Lens(
+            (0.5 * scale_x - environment.cx) / environment.fx,
+            (0.5 * scale_y - environment.cy) / environment.fy,
+            scale_x / environment.fx,
+            scale_y / environment.fy,
+        )
+    pixel = 2 * _slope(camera) / height
+    return _Lens((0.5 - width / 2) * pixel, (0.5 - height / 2) * pixel, pixel, pixel)
+
+
+def _looking(camera: Camera, position: Floats, target: Floats, lens: _Lens) -> WorldCamera:
+    if not (target - position).any():
+        raise UserError("the camera's position is its target: move one of them")
+    return lens.at(position, *camera_axes(position - target, camera.up))
 
 
 def through_lens(world: WorldCamera, camera: Camera, centre: Floats, on_lens: Point) -> WorldCamera:
@@ -86,11 +176,7 @@ def environment_camera(environment: Environment, width: int, height: int) -> Wor
     Raises:
         UserError: The frame has another aspect ratio.
     """
-    if abs(width * environment.height - height * environment.width) >= max(environment.width, environment.height):
-        raise UserError(
-            f"a frame of {width}x{height} pixels does not have the proportions of room {environment.name},"
-            f" {environment.width}x{environment.height}: give another size"
-        )
+    _check_proportions(environment, width, height)
     axes, position = environment.camera_to_world[:, :3], environment.camera_to_world[:, 3]
     right, down, forward = axes.T
     scale_x, scale_y = environment.width / width, environment.height / height
@@ -103,7 +189,21 @@ def environment_camera(environment: Environment, width: int, height: int) -> Wor
     return WorldCamera(position, corner, step_x, step_y, np.stack([right, -down, -forward]))
 
 
-def camera_axes(toward: Floats, up: Vector) -> tuple[Floats, Floats, Floats]:
+def check_camera(scene: Scene, environment: Environment | None, size: tuple[int, int]) -> None:
+    """Raise a `UserError` if frames of a size cannot have the lens of a scene's room."""
+    if environment is not None and scene.camera.fov is None:
+        _check_proportions(environment, *size)
+
+
+def _check_proportions(environment: Environment, width: int, height: int) -> None:
+    if abs(width * environment.height - height * environment.width) >= max(environment.width, environment.height):
+        raise UserError(
+            f"a frame of {width}x{height} pixels does not have the proportions of room {environment.name},"
+            f" {environment.width}x{environment.height}: give another size"
+        )
+
+
+def camera_axes(toward: Floats, up: Sequence[float]) -> tuple[Floats, Floats, Floats]:
     """Unit vectors right, up and towards the viewer; another axis replaces an ``up`` parallel to the view."""
     back = unit_vectors(toward)
     for candidate in (up, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)):

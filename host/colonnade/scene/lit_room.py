@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from colonnade.common.errors import UserError
+from colonnade.common.image_io import read_picture
 from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
@@ -58,6 +62,26 @@ def device_room(scene: Scene, manifest: Manifest) -> Environment | None:
     return scene_room(scene)
 
 
+def view_photo(scene: Scene, room: Environment | None, size: tuple[int, int] | None) -> NDArray[np.uint8] | None:
+    """The photo of a frame's view, sRGB: that of the room, or for a camera that the scene places, of the scene.
+
+    Raises:
+        UserError: It cannot be read, or does not have the proportions of the frame.
+    """
+    if room is None or not scene.places_camera:
+        return None if room is None else room.photo
+    if scene.background.photo is None:
+        return None
+    photo = read_picture(scene.background.photo)
+    height, width = photo.shape[:2]
+    if size is not None and abs(width * size[1] - height * size[0]) >= max(width, height):
+        raise UserError(
+            f"{scene.background.photo} is {width}x{height} pixels, which does not have the proportions of a frame of"
+            f" {size[0]}x{size[1]}: give another size"
+        )
+    return photo
+
+
 def lit_room(
     scene: Scene,
     room: Environment | None,
@@ -85,6 +109,17 @@ def lit_room(
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     if not scene.names_light:
         scene = _with_fitted_lights(scene, room, max_lights, progress)
+    if scene.places_camera:
+        drawn = scene.background.photo is None or relit
+        progress.note(
+            f"the camera is not that of room {room.name}: "
+            + (
+                "its maps are drawn, and what they do not show has the background's colour; background.photo is for a"
+                " photo of this view"
+                if drawn
+                else "where its maps show nothing, background.photo has no shadow of the object"
+            )
+        )
     colours = _photo_colours(scene, room, extent, relit)
     if colours is None:
         return LitRoom(scene, room, room)

@@ -102,7 +102,7 @@ class Camera:
         direction: From the centre of the object's cube towards a framing camera.
         framing: Fraction of the picture's height that the object's outline covers; less if its width would not fit.
         up: Up direction.
-        fov: Vertical field of view, degrees.
+        fov: Vertical field of view, degrees; None: 40, in a room the lens of its maps.
         aperture: Diameter of the lens, world units; 0: a pinhole, everything is in focus.
         focus: Distance of the plane in focus along the view, world units; None: the plane through the target, or
             through the centre of the object's cube.
@@ -113,7 +113,7 @@ class Camera:
     direction: _Vector = (0.45, 0.35, 1.0)
     framing: Annotated[_Float, Interval(ge=0.01, le=4.0)] = 0.7
     up: _Vector = (0.0, 1.0, 0.0)
-    fov: Annotated[_Float, Interval(ge=1.0, le=150.0)] = 40.0
+    fov: Annotated[_Float, Interval(ge=1.0, le=150.0)] | None = None
     aperture: _Diameter = 0.0
     focus: Annotated[_Float, Interval(ge=1e-6, le=1e9)] | None = None
 
@@ -127,6 +127,21 @@ class Camera:
             if not any(value):
                 raise ValueError(f"camera.{name} must not be zero")
         return self
+
+
+@dataclass(frozen=True, config=_STRICT)
+class CameraKey:
+    """A camera's place at a moment of the motion: a table ``[[motion.camera]]``.
+
+    Attributes:
+        at: Progress of the motion.
+        position: World position.
+        target: World point at the picture's centre; None: that of the key before, or of the start.
+    """
+
+    position: _Vector = field(kw_only=True)
+    target: _Vector | None = None
+    at: _Fraction = 1.0
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -232,6 +247,7 @@ class Motion:
         translate: Last value of ``transform.translate``, for an object that does not stand in a room; of several
             objects, the shift of all.
         light: Last world position of the first light.
+        camera: Places of the camera by ascending progress; straight ways in between, from the scene's camera on.
         shutter: How long each frame is exposed, as a fraction of the interval to the next one.
     """
 
@@ -239,7 +255,15 @@ class Motion:
     stand_at: _Pixel | None = None
     translate: _Vector | None = None
     light: _Vector | None = None
+    camera: tuple[CameraKey, ...] = ()
     shutter: _Fraction = 0.0
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Self:
+        times = [key.at for key in self.camera]
+        if sorted(set(times)) != times:
+            raise ValueError("motion.camera.at must ascend from key to key")
+        return self
 
     @property
     def is_still(self) -> bool:
@@ -249,7 +273,8 @@ class Motion:
     @property
     def is_closed(self) -> bool:
         """Whether the last state equals the first."""
-        return self.turn % 360.0 == 0.0 and self.stand_at is None and self.translate is None and self.light is None
+        still = self.stand_at is None and self.translate is None and self.light is None and not self.camera
+        return self.turn % 360.0 == 0.0 and still
 
     def frame_progress(self, frames: int) -> list[float]:
         """Progress of each frame along the motion, evenly spaced from 0.0 to 1.0.
@@ -293,6 +318,8 @@ class Background:
     Attributes:
         colour: Linear.
         room: The folder of a room, relative to the scene file.
+        photo: In a room whose camera the scene places: the picture that this camera took, relative to the scene file.
+            None: the room is drawn from its maps.
         occlusion: The room hides the object where it is nearer.
         colours: Colours of the room in reflections and refractions: ``photo``, those of its photo, or ``albedo``, its
             albedo under the scene's lights. None: ``photo`` in a frame that shows the photo, else ``albedo``.
@@ -300,6 +327,7 @@ class Background:
 
     colour: _Colour = (0.0, 0.0, 0.0)
     room: _File | None = None
+    photo: _File | None = None
     occlusion: StrictBool = True
     colours: Literal["photo", "albedo"] | None = None
 
@@ -317,7 +345,7 @@ class FrameSize:
 class Scene:
     """One object or several, one camera, at least one light.
 
-    With a room, the camera is the room's, and the world is the room's world, in metres.
+    With a room, the camera is the room's unless the scene places it, and the world is the room's world, in metres.
 
     Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass
     over the frame. ``standing_point`` is the world point on which the object stands, if that is known from another view
@@ -369,7 +397,7 @@ class Scene:
         """The keys that only several samples show."""
         keys = {
             "light.radius": any(light.radius > 0 for light in self.lights),
-            "camera.aperture": self.camera.aperture > 0 and self.background.room is None,
+            "camera.aperture": self.camera.aperture > 0,
             "motion.shutter": self.motion.shutter > 0,
         }
         return [key for key, is_used in keys.items() if is_used]
@@ -386,6 +414,11 @@ class Scene:
     def with_environment(self, folder: Path) -> Scene:
         """The scene in the room of a folder."""
         return replace(self, background=replace(self.background, room=folder))
+
+    @property
+    def places_camera(self) -> bool:
+        """Whether the camera may be elsewhere than that of the room's maps."""
+        return self.camera.position is not None or bool(self.motion.camera)
 
     @property
     def lights(self) -> tuple[PointLight, ...]:

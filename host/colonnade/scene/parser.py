@@ -56,6 +56,8 @@ def load_scene(path: str | Path) -> Scene:
     scene = replace(scene, mesh=objects[0].mesh if objects else _beside(scene.mesh, file), objects=objects)
     if background.room is not None:
         scene = scene.with_environment(file.parent / background.room)
+    if background.photo is not None:
+        scene = replace(scene, background=replace(scene.background, photo=file.parent / background.photo))
     return scene
 
 
@@ -99,8 +101,14 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     lights = data.get("light", {})
     lights = lights if isinstance(lights, list) else [lights]
     camera, transform, background = (data.get(name, {}) for name in ("camera", "transform", "background"))
-    if "room" in background and "camera" in data:
-        raise ValueError("the camera is the room's: leave out [camera], or background.room")
+    if "room" in background and "camera" in data and "position" not in camera:
+        raise ValueError("the camera is the room's: give camera.position, or leave out [camera]")
+    if "photo" in background and "room" not in background:
+        raise ValueError("background.photo is a view of a room: it needs background.room")
+    if "photo" in background and "camera" not in data:
+        raise ValueError("background.photo is for a camera that the scene places: give [camera]; a room has its photo")
+    if "photo" in background and "camera" in _table(data, "motion"):
+        raise ValueError("background.photo is the view of one camera: leave out motion.camera")
     if "room" not in background and "colours" in background:
         raise ValueError("background.colours chooses the colours of a room: it needs background.room")
     if "room" not in background and "object" in data:
@@ -112,7 +120,7 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     if any(isinstance(light, dict) and "position" in light and "offset" in light for light in lights):
         raise ValueError("[light] takes a position or an offset, not both")
     if "motion" in data and not data["motion"]:
-        raise ValueError("[motion] moves nothing: give turn, stand_at, translate or light")
+        raise ValueError("[motion] moves nothing: give turn, stand_at, translate, light or camera")
     if "light" in data.get("motion", {}) and isinstance(lights[0], dict) and "position" not in lights[0]:
         raise ValueError("motion.light starts at the first light's position: give light.position")
 
@@ -159,6 +167,13 @@ def _message(error: ErrorDetails) -> str:
         name, node = f"object.{inner}", _plain(node["properties"][inner])
         if error["type"] == "dataclass_type":
             return f"{name} must be a table"
+    if table == "motion" and rest[:1] == ["camera"]:
+        rest = rest[1:]
+        name, node = "motion.camera", _plain(_plain(node["properties"]["camera"])["items"])
+        if not rest or error["type"] == "dataclass_type":
+            return "motion.camera must be tables: [[motion.camera]]"
+        if error["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
+            return f"{name} needs {rest[0]}"
     if error["type"] == "dataclass_type":
         return f"{name} must be a table: [{name}]"
     if error["type"] == "unexpected_keyword_argument":

@@ -14,7 +14,14 @@ import numpy as np
 from colonnade.common.types import Floats
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Extent
-from colonnade.scene.cameras import WorldCamera, camera_axes, environment_camera, scene_camera, through_lens
+from colonnade.scene.cameras import (
+    WorldCamera,
+    camera_axes,
+    environment_camera,
+    moved_camera,
+    start_camera,
+    through_lens,
+)
 from colonnade.scene.model import Material, PointLight, Scene
 from colonnade.scene.object_pose import Pose, object_pose
 from colonnade.scene.samples import Point
@@ -62,6 +69,7 @@ class View:
         view_to_mesh: Transform from a room's view space, metres, to mesh space, float64 [3, 4]; None without a room.
         shift: Where the rays cross the picture, from the pixels' centres: pixels right and down.
         occlusion: The room hides the object where it is nearer.
+        is_map_camera: In a room: the camera is that of its maps.
     """
 
     width: int
@@ -82,6 +90,7 @@ class View:
     view_to_mesh: Floats | None = None
     shift: tuple[float, float] = (0.0, 0.0)
     occlusion: bool = True
+    is_map_camera: bool = True
 
     @property
     def light(self) -> Floats:
@@ -123,14 +132,14 @@ def place(scene: Scene, extent: Extent, width: int, height: int, environment: En
     pose = object_pose(scene, extent, environment)
     start = object_pose(scene.at(0.0), extent, environment)
     centre, edge = start.to_world(extent.centre), extent.edge * start.scale
-    if environment is not None:
-        camera = environment_camera(environment, width, height)
-    else:
-        camera = scene_camera(scene.camera, start, extent, width, height)
-        if scene.camera.aperture > 0:
-            camera = through_lens(camera, scene.camera, centre, scene.sample.lens)
+    first = start_camera(scene, start, extent, width, height, environment)
+    camera = moved_camera(scene, first, centre, width, height, environment)
+    if scene.camera.aperture > 0:
+        camera = through_lens(camera, scene.camera, centre, scene.sample.lens)
+    # In a room, light does not depend on where the scene's camera stands
+    axes = first.axes if environment is None else environment.camera_to_world[:, :3].T * [[1.0], [-1.0], [-1.0]]
     lights = tuple(
-        _placed(light, camera, centre, edge, scene.sample.light(index), scene.headroom)
+        _placed(light, axes, centre, edge, scene.sample.light(index), scene.headroom)
         for index, light in enumerate(scene.lights)
     )
     shift_x, shift_y = scene.sample.pixel
@@ -154,7 +163,7 @@ def make_view(
         width: Width of the frame, pixels.
         height: Height of the frame, pixels.
         materials: Materials of the mesh; the scene's values override them.
-        environment: The room of `scene.background`, whose camera is then used.
+        environment: The room of `scene.background`, whose camera is then used unless the scene places one.
     """
     placed = place(scene, extent, width, height, environment)
     pose, camera = placed.pose, placed.camera
@@ -182,6 +191,7 @@ def make_view(
         view_to_mesh=None if environment is None else pose.from_view(environment.camera_to_world),
         shift=scene.sample.pixel,
         occlusion=scene.background.occlusion,
+        is_map_camera=not scene.places_camera,
     )
 
 
@@ -201,23 +211,23 @@ def world_positions(scene: Scene, extent: Extent, environment: Environment) -> l
     camera = environment_camera(environment, environment.width, environment.height)
     start = object_pose(scene.at(0.0), extent, environment)
     centre, edge = start.to_world(extent.centre), extent.edge * start.scale
-    return [_world_position(light, camera, centre, edge) for light in scene.lights]
+    return [_world_position(light, camera.axes, centre, edge) for light in scene.lights]
 
 
-def _world_position(light: PointLight, camera: WorldCamera, centre: Floats, edge: float) -> Floats:
+def _world_position(light: PointLight, axes: Floats, centre: Floats, edge: float) -> Floats:
     if light.position is not None:
         return np.array(light.position)
-    return np.asarray(centre + edge * (np.array(light.offset) @ camera.axes))
+    return np.asarray(centre + edge * (np.array(light.offset) @ axes))
 
 
 def _placed(
-    light: PointLight, camera: WorldCamera, centre: Floats, edge: float, on_disc: Point, headroom: float
+    light: PointLight, axes: Floats, centre: Floats, edge: float, on_disc: Point, headroom: float
 ) -> PlacedLight:
     """A light in world space; of one with a radius the point ``on_disc``, of a disc that faces `centre`."""
-    position = _world_position(light, camera, centre, edge)
+    position = _world_position(light, axes, centre, edge)
     if light.radius > 0:
         away = position - centre
-        right, up, _ = camera_axes(away if away.any() else camera.axes[2], _UP)
+        right, up, _ = camera_axes(away if away.any() else axes[2], _UP)
         position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
     return PlacedLight(position, np.array(light.colour) * headroom, light.falloff)
 

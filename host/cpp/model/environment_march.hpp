@@ -1,5 +1,6 @@
 // The environment march: finds where a ray hits the environment (docs/background.md).
 #pragma once
+#include "ray_clip.hpp"
 #include "tile_march.hpp"
 
 namespace colonnade {
@@ -13,6 +14,22 @@ public:
         const MapRay ray = project(origin, direction, view);
         EnvironmentPoint point{};
         if (ray.isInFront && !marchTiles(ray, view, point)) hitBoundingPlanes(ray, view, point);
+        return point;
+    }
+
+    /// The point of the maps that a ray from any camera sees; a miss where they show nothing.
+    EnvironmentPoint cameraView(const WideVector& origin, const Vector& direction, const EnvironmentView& view) const {
+        MapRay ray = projected(origin, direction, view, RayClip::leastExponent(view));
+        EnvironmentPoint point{};
+        const std::optional<Way> clipped = RayClip(f_, sizes_).clip(ray, view);
+        if (!clipped) return point;
+        for (int a = 0; a < 3; ++a) ray.from[a] += static_cast<std::int64_t>(inMap(Wide(clipped->mantissa) * ray.dir[a], -clipped->exponent));
+        placeInMap(ray, view);
+        if (!ray.isInFront || !marchTiles(ray, view, point)) return point;
+        const int start = clipped->mantissa == 0 ? RayClip::none : clipped->exponent + ray.fromShift - ray.dirShift;
+        const int longer = std::max(start, point.travelExponent) + 1;
+        point.travel = floorShift(clipped->mantissa, longer - start) + floorShift(point.travel, longer - point.travelExponent);
+        point.travelExponent = longer;
         return point;
     }
 

@@ -20,6 +20,8 @@ struct EnvironmentView {
     /// The environment may hide the object; by how much its point must then be nearer, grid steps along the ray's dominant axis.
     bool occlusion;
     std::int64_t occlusionTolerance;
+    /// The frame's camera is that of the maps; otherwise its rays march.
+    bool isMapCamera;
 
     bool shows(std::int64_t x, std::int64_t y) const { return x >= window[0] && x < window[2] && y >= window[1] && y < window[3]; }
 };
@@ -54,9 +56,8 @@ struct MapRay {
     int fromShift, dirShift, directionShift;
 };
 
-/// Scales a vector so that its components fit `bits` bits and a sign; returns the right shift.
-inline int blockScale(const WideVector& v, int bits, Vector& scaled) {
-    int length = 0;
+/// Scales a vector so that its components fit `bits` bits and a sign, as if one of them had at least `length` bits; returns the right shift.
+inline int blockScale(const WideVector& v, int bits, Vector& scaled, int length = 0) {
     for (const Wide component : v) length = std::max(length, bitLength(UnsignedWide(component < 0 ? ~component : component)));
     for (int a = 0; a < 3; ++a) scaled[a] = static_cast<std::int64_t>(floorShift(v[a], length - bits));
     return length - bits;

@@ -190,7 +190,8 @@ private:
     EnvironmentHit findDirectView(std::int64_t x, std::int64_t y, const RayRequest& ray) {
         Vector direction;
         blockScale(ray.direction, numbers_.shadeBits, direction);
-        return lookedUp(direction, march_->directView(x, y, direction, frame_.environment));
+        const EnvironmentView& view = frame_.environment;
+        return lookedUp(direction, view.isMapCamera ? march_->directView(x, y, direction, view) : march_->cameraView(ray.origin, direction, view));
     }
 
     bool hasEnvironment() const { return frame_.hasEnvironment && march_.has_value(); }

@@ -7,6 +7,10 @@ namespace colonnade {
 
 /// Geometry in map space for maps of given sizes; positions have shadeBits fraction bits.
 class MapGeometry {
+public:
+    /// Log2 of the unit of u and v, pixels.
+    static constexpr int mapLog = 10;
+
 protected:
     /// Signed distance in w between a ray and a plane: value + slope · s, in units of 2^(exponent − 22); positive in front of the plane.
     struct PlaneDistance {
@@ -16,9 +20,6 @@ protected:
     };
 
     static constexpr int planeFraction = 22;
-    /// Log2 of the unit of u and v, pixels.
-    static constexpr int mapLog = 10;
-
     MapGeometry(const Numbers& numbers, const AttributeSizes& sizes) : f_(numbers.shadeBits), sceneBits_(numbers.sceneBits), sizes_(sizes) {}
 
     /// The largest position, and the largest distance along a ray.
@@ -33,6 +34,13 @@ protected:
 
     /// Projects a ray. If its origin is behind the camera, only `from` and `dir` are valid.
     MapRay project(const WideVector& origin, const Vector& direction, const EnvironmentView& view) const {
+        MapRay ray = projected(origin, direction, view, 0);
+        placeInMap(ray, view);
+        return ray;
+    }
+
+    /// Matrix products; `least` is the least exponent of the origin's block.
+    MapRay projected(const WideVector& origin, const Vector& direction, const EnvironmentView& view, int least) const {
         MapRay ray{};
         WideVector from, dir;
         for (int i = 0; i < 3; ++i) {
@@ -40,10 +48,15 @@ protected:
             from[i] = Wide(UnsignedWide(times(view.matrix[i], origin)) + UnsignedWide(offset));
             dir[i] = times(view.matrix[i], {direction[0], direction[1], direction[2]});
         }
-        ray.fromShift = blockScale(from, f_, ray.from);
+        ray.fromShift = blockScale(from, f_, ray.from, least);
         ray.dirShift = blockScale(dir, f_, ray.dir);
+        return ray;
+    }
+
+    /// Completes a ray from its projection: its position and direction in the map.
+    void placeInMap(MapRay& ray, const EnvironmentView& view) const {
         ray.isInFront = ray.from[2] > 0;
-        if (!ray.isInFront) return ray;
+        if (!ray.isInFront) return;
 
         // 1 / p2 = inverse · 2^(1 - f - length)
         const Normalised depth = normalise(UnsignedWide(ray.from[2]), f_);
@@ -55,7 +68,6 @@ protected:
         for (int i = 0; i < 2; ++i) way[i] = shiftLeft<Wide>(ray.dir[i], f_) - Wide(ray.position[i]) * ray.dir[2];
         way[2] = -Wide(ray.position[2]) * ray.dir[2];
         ray.directionShift = blockScale(way, f_, ray.direction);
-        return ray;
     }
 
     /// value / 2^drop, saturated to the range of map positions. |value| must be below 2^64.

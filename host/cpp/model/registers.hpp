@@ -98,6 +98,7 @@ struct Frame {
         environment.window = {take("environment.window.x0"), take("environment.window.y0"), take("environment.window.x1"), take("environment.window.y1")};
         environment.occlusion = take("environment.occlusion") != 0;
         environment.occlusionTolerance = take("environment.occlusionTolerance");
+        environment.isMapCamera = take("environment.isMapCamera") != 0;
     }
 
     /// Name prefix of a table entry's registers.

@@ -10,16 +10,32 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from colonnade.common.types import Floats
 from colonnade.design.generator import design_for, manifest_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.lab.evaluation.environment_march import DeviceMarch
 from colonnade.lab.evaluation.studies.ar_losses import PLACEMENTS
 from colonnade.maps.encoded import EncodedEnvironment
+from colonnade.maps.planes import PlaneProjection
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Extent
+from colonnade.reference.environment.ray_march import HIT
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.occlusion import tolerance_registers
-from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene, Transform
+from colonnade.scene.model import (
+    Background,
+    Camera,
+    Colour,
+    Light,
+    Material,
+    MeshSource,
+    Paths,
+    Placement,
+    Scene,
+    Transform,
+    Vector,
+)
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.samples import CENTRE, Sample
 from colonnade.scene.view import make_view, with_overrides
@@ -94,6 +110,74 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, 
     assert differs.any() == (kind != "diffuse"), "the room hides hits of later rays"
 
 
+def moved(scene: Scene, held: EncodedEnvironment, by: tuple[float, float, float], degrees: float = 0.0) -> Scene:
+    """The scene from a camera beside that of the maps: metres right, down and forward; turned right."""
+    to_world = held.environment.camera_to_world
+    position = to_world[:, 3] + to_world[:, :3] @ by
+    target = position + 2.0 * to_world[:, :3] @ (np.sin(np.radians(degrees)), 0.0, np.cos(np.radians(degrees)))
+    camera = Camera(position=vector(position), target=vector(target), up=vector(-to_world[:, 1]))
+    return replace(scene, camera=camera)
+
+
+def vector(values: Floats) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+#: Cameras beside that of the maps: at it, before and behind it, far aside, turned away.
+MOVES = (
+    ((0.0, 0.0, 0.0), 0.0),
+    ((0.15, 0.0, 0.2), 3.0),
+    ((-0.15, -0.05, -0.2), -3.0),
+    ((1.5, 0.3, 0.5), -40.0),
+    ((0.1, 0.0, -0.1), 100.0),
+)
+
+
+@NEEDS_SIMULATOR
+@pytest.mark.long_simulation
+@pytest.mark.parametrize("kind", ["diffuse", "glass"])
+def test_hardware_sees_the_rooms_of_the_model_from_any_camera(kind: str) -> None:
+    """Relit and in the shadow window, with an object that the room hides; and maps whose registers are any bits."""
+    design = design_for("small", ("units.marches=2",))
+    held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
+    mesh, material = load_mesh("teapot:4"), Material(kind=kind)
+    image = with_environment(
+        pack(mesh, design.manifest, with_overrides(mesh.materials, material)), held, design.manifest
+    )
+    scene = replace(TABLE, material=material)
+    registers: list[dict[str, int]] = [
+        frame_registers(moved(scene, held, *move), image.header, design.manifest, 48, 36, held, relit)
+        for move in MOVES
+        for relit in (True, False)
+    ]
+    low = moved(sunken(scene, held, image.header.extent), held, *MOVES[1])
+    sunk = frame_registers(low, image.header, design.manifest, 48, 36, held, False)
+    assert sunk["environment.occlusion"] == 1
+    registers += [sunk, sunk | {"environment.occlusion": 0}]
+    random = np.random.default_rng(1)
+    for _ in range(4):
+        wild = {
+            name: int(random.integers(-(1 << (register.width - 1)), 1 << (register.width - 1)))
+            if register.signed
+            else int(random.integers(0, 1 << register.width))
+            for name, register in design.manifest.registers.items()
+            if name.startswith(("environment.matrix", "environment.offset", "environment.exponent"))
+        }
+        registers.append(registers[2] | wild)
+    simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
+    for frame, settings in zip(simulated.frames, registers, strict=True):
+        model = render_model(design.manifest, image, settings)
+        assert frame.errors == model.errors == []
+        np.testing.assert_array_equal(frame.colour, model.colour)
+        np.testing.assert_array_equal(frame.ratio, model.ratio)
+        np.testing.assert_array_equal(frame.triangle, model.triangle)
+        assert {name: frame.counters[name] for name in model.counters} == model.counters
+    assert all(frame.counters["marchSteps"] > 0 for frame in simulated.frames[:8:2])
+    hidden, whole = simulated.frames[2 * len(MOVES) : 2 * len(MOVES) + 2]
+    assert 0 < hidden.is_object.sum() < whole.is_object.sum()
+
+
 @NEEDS_SIMULATOR
 @pytest.mark.long_simulation
 def test_a_room_after_an_abort_is_right() -> None:
@@ -159,6 +243,41 @@ def test_occlusion_is_off_where_the_room_cannot_hide_the_object() -> None:
     sunk = sunken(TABLE, held, header.extent)
     assert occlusion(free) == 0 and occlusion(sunk) == 1
     assert occlusion(replace(sunk, background=replace(sunk.background, occlusion=False))) == 0
+
+
+@pytest.mark.parametrize("room", ["living", "office", "attic"])
+def test_a_march_from_the_camera_of_the_maps_sees_what_its_pixels_show(room: str) -> None:
+    """Points agree within a millimetre; in tiles of several planes few pixels see another plane."""
+    manifest = manifest_for("small").manifest
+    held = EncodedEnvironment.load(ROOMS / room, manifest)
+    march = DeviceMarch(held.environment, held.image, manifest, is_from_camera=True)
+    directions = held.environment.camera.directions(held.environment.width, held.environment.height).reshape(-1, 3)
+    decoded = held.image.decoded_depth(PlaneProjection.of(held.environment, held.image.depth_unit)).ravel()
+    hits = march(np.zeros_like(directions), directions)
+    assert (hits.kind == HIT).mean() > 0.999
+    with np.errstate(invalid="ignore"):
+        near = np.abs(hits.z / decoded - 1.0) < 1e-3
+    assert near.mean() > 0.99
+    rows, columns = np.divmod(np.arange(len(directions)), held.environment.width)
+    assert (np.maximum(np.abs(hits.seen_u - columns - 0.5), np.abs(hits.seen_v - rows - 0.5)) <= 1.0).mean() > 0.999
+
+
+@pytest.mark.parametrize("move", MOVES[1:3])
+def test_shadows_lie_within_the_shadow_window_of_another_camera(move: tuple[tuple[float, float, float], float]) -> None:
+    manifest = manifest_for("small").manifest
+    held = EncodedEnvironment.load(ROOMS / "living", manifest)
+    image = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest)
+    scene = moved(TABLE, held, *move)
+    registers = frame_registers(scene, image.header, manifest, 320, 240, held, relit=False)
+    assert registers["environment.isMapCamera"] == 0
+    x0, y0, x1, y1 = (registers[f"environment.window.{edge}"] for edge in ("x0", "y0", "x1", "y1"))
+    assert 0 < (x1 - x0) * (y1 - y0) < 320 * 240 / 2
+    frame = render_model(manifest, image, frame_registers(scene, image.header, manifest, 320, 240, held))
+    assert frame.ratio is not None
+    darker = (frame.ratio < 4096).any(axis=2)
+    assert darker.any()
+    darker[y0:y1, x0:x1] = False
+    assert not darker.any()
 
 
 @pytest.mark.parametrize("light", [TABLE.light, Light((1.2, 2.0, 2.0)), Light((0.1, 0.9, 2.4), radius=0.3)])

@@ -88,9 +88,9 @@ def test_a_room_in_memory_is_that_of_the_model() -> None:
     (frame,) = render_shell(design, image, [registers], [0], Bus(latency=40, stall=10, seed=3))
     assert_bytes(frame, framebuffer_bytes(expected, 0), PIXEL_BYTES[0])
 
-    photo = resized_photo(prepared.environment, WIDTH, HEIGHT)
+    photo = resized_photo(prepared.photo, WIDTH, HEIGHT)
     frames = render_shell(design, image, [registers] * 3, [0, 1, 2], Bus(latency=40, stall=10, seed=4), photo=photo)
     for code, frame in enumerate(frames):
         assert_bytes(frame, framebuffer_bytes(expected, code, photo), PIXEL_BYTES[code])
-    host = encode_srgb(composited(Accumulation.of_frame(expected), prepared.environment))
+    host = encode_srgb(composited(Accumulation.of_frame(expected), prepared.photo))
     np.testing.assert_array_equal(frames[0].lines[:, : 4 * WIDTH].reshape(HEIGHT, WIDTH, 4)[..., 2::-1], host)

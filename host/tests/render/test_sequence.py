@@ -118,7 +118,7 @@ def test_a_frame_is_the_still_of_its_room_with_the_object_in_the_world(
         prepared = DeviceScene.of(scene, manifest, room=room, encode=lambda room, image=images[-1]: image)
         frame = render_model(manifest, prepared.image, prepared.registers(SIZE, composited=True))
         assert prepared.environment is not None
-        expected = composited(Accumulation.of_frame(frame), prepared.environment)
+        expected = composited(Accumulation.of_frame(frame), prepared.photo)
         np.testing.assert_array_equal(frames[number].object_mask, frame.is_object)
         np.testing.assert_array_equal(encode_srgb(frames[number].image), encode_srgb(expected))
 

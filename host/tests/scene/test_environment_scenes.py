@@ -151,7 +151,7 @@ THREE = LAMP.replace("light = ", "[[light]]\n").replace("{", "").replace("}", ""
         ),
         (STANDING.replace("[48, 43]", "[96, 43]"), (), r"object.stand_at is \(96, 43\), outside the maps"),
         (STANDING.replace("[48, 43]", "[nan, 43]"), (), "object.stand_at must be two numbers"),
-        (STANDING + "camera.fov = 30\n", (), "the camera is the room's: leave out"),
+        (STANDING + "camera.fov = 30\n", (), "the camera is the room's: give camera.position"),
     ],
 )
 def test_what_cannot_be_is_one_line(

@@ -23,6 +23,7 @@ from colonnade.cli.options import FILE, dists_option, echo_lines, finish, json_o
 @click.option("--light", is_flag=True, help="Measure relit rooms and mirrors against the photo.")
 @click.option("--live", is_flag=True, help="Measure the live encoder against the offline encoder.")
 @click.option("--path", is_flag=True, help="With --live and --rooms: the live encoder along a path through each room.")
+@click.option("--views", is_flag=True, help="With --rooms: what cameras beside that of the maps see.")
 @click.option("--capture", is_flag=True, help="Measure rays in the rooms as a phone would capture them.")
 @click.option("--rooms", "seeds", metavar="SEEDS", help="Measure generated rooms, such as 0-9,100, without ROOMS.")
 @dists_option
@@ -35,6 +36,7 @@ def study(
     light: bool,
     live: bool,
     path: bool,
+    views: bool,
     capture: bool,
     seeds: str | None,
     no_dists: bool,
@@ -52,6 +54,7 @@ def study(
     With --capture it takes depth of 256x192 from each room, adds noise, derives normals, and prints the share of mirror
     rays that are right in the room itself.
     With --rooms it measures rays and encoded maps in rooms that a seed generates, and counts why rays are wrong.
+    With --views and --rooms it measures the pixels of cameras that are not that of the maps: the share that is right.
     With --live it measures the encoder of a moving camera: time, loss and rays, in ROOMS or in the rooms of --rooms.
     Tables are in Markdown.
     """
@@ -61,6 +64,8 @@ def study(
         raise click.UsageError("give one of --frames, --occlusion, --light, --live, --capture and --rooms", context)
     if path and not (live and generated):
         raise click.UsageError("--path needs --live and --rooms", context)
+    if views and (not generated or occlusion or live):
+        raise click.UsageError("--views needs --rooms, without --occlusion and --live", context)
     if output is not None and not (frames or occlusion or light):
         raise click.UsageError("--output needs --frames, --occlusion or --light", context)
     if (occlusion or generated) and rooms:
@@ -110,6 +115,12 @@ def study(
                 frame: {loss: {part: asdict(value) for part, value in parts.items()} for loss, parts in by_loss.items()}
                 for frame, by_loss in by_frame.items()
             }
+        elif views and seeds is not None:
+            from colonnade.lab.evaluation.studies import moved_views
+
+            moved = moved_views.study_seeds(parse_seeds(seeds), progress=progress.for_terminal())
+            echo_lines(moved_views.table(moved))
+            report = {str(seed): asdict(value) for seed, value in moved.items()}
         elif seeds is not None:
             from colonnade.lab.evaluation.studies import unseen_rooms
 

@@ -27,8 +27,17 @@ _MAP, _SHELL = 1, 2
 class DeviceMarch:
     """The ray march of ``cpp/model/environment.hpp`` through an attribute image."""
 
-    def __init__(self, environment: Environment, image: AttributeImage, manifest: Manifest) -> None:
-        """Load the image into a model. The manifest's physical-attribute memory must have the image's layout."""
+    def __init__(
+        self, environment: Environment, image: AttributeImage, manifest: Manifest, is_from_camera: bool = False
+    ) -> None:
+        """Load the image into a model. The manifest's physical-attribute memory must have the image's layout.
+
+        Args:
+            environment: The room.
+            image: Its encoded maps.
+            manifest: Of the device.
+            is_from_camera: Rays are those of a camera: they see the maps, or nothing.
+        """
         from colonnade import _core
 
         attributes = manifest.attributes
@@ -38,7 +47,7 @@ class DeviceMarch:
         self._model: Any = _core.EnvironmentModel(numbers, dict(attributes.sizes), field_places(attributes.layouts))
         for memory, words in memory_words(image):
             self._model.load(memory, words)
-        self._environment = environment
+        self._environment, self._is_from_camera = environment, is_from_camera
         self._component = 1 << (manifest.numbers["shadeBits"] - 1)
         registers = view_registers(projection_of(environment, image) / 2.0**GRID_LOG, np.zeros(3), manifest)
         self._registers = {name.removeprefix("environment."): value for name, value in registers.items()}
@@ -50,7 +59,7 @@ class DeviceMarch:
         grid_origins = np.rint(origins * grid).astype(np.int64)
         scaled = directions / np.abs(directions).max(axis=1, keepdims=True)
         fixed = np.ascontiguousarray(np.rint(scaled * self._component).astype(np.int64))
-        hits = self._model.march(self._registers, np.ascontiguousarray(grid_origins), fixed)
+        hits = self._model.march(self._registers, np.ascontiguousarray(grid_origins), fixed, self._is_from_camera)
         points = (grid_origins + hits["travel"][:, None] * fixed) / grid
         kind = np.where(hits["kind"] == _MAP, np.where(hits["is_hidden"], HIDDEN, HIT), LOST)
         kind = np.where(hits["kind"] == _SHELL, LEFT_VIEW, kind)

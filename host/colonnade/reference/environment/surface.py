@@ -94,6 +94,11 @@ class Backdrop:
         position = np.stack([x, y, np.ones(len(u))], axis=1) * depth[row, column, None]
         return self._of_texels(position, row, column, np.zeros(len(u), dtype=np.bool_))
 
+    def seen_points(self, origins: Floats, directions: Floats) -> BackdropPoints:
+        """Points of the maps that rays of another camera see, view space, float64 [n, 3] each; others are outside."""
+        hits = self.geometry.intersect(origins, unit_vectors(directions))
+        return self._of_texels(hits.position, *self._texels(hits.u, hits.v), hits.outside)
+
     def intersect(self, origins: Floats, directions: Floats) -> BackdropPoints:
         """Points where rays of view space, float64 [n, 3] each, hit the room."""
         hits = self.geometry.intersect(origins, directions)

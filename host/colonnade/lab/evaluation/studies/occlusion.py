@@ -146,14 +146,14 @@ def measure(
     registers = registers_of(view, packed.header, manifest)
     registers |= environment_registers(view, encoded, packed.header, manifest, relit=False)
     frame = render_model(manifest, packed, registers)
-    picture = composited(Accumulation.of_frame(frame), environment)
+    picture = composited(Accumulation.of_frame(frame), environment.photo)
     if output is not None:
         write_png(output, picture)
 
     meets, visible = true_occlusion(mesh, view, made)
     truth = _true_frame(mesh, view, made, encoded)
     sums = Accumulation.of_pixels(truth.image, truth.object_mask, truth.shadow_ratio)
-    pair = encode_srgb(composited(sums, environment)), encode_srgb(picture)
+    pair = encode_srgb(composited(sums, environment.photo)), encode_srgb(picture)
     steps = packed.header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
     shown, visible = frame.is_object[meets], visible[meets]
     return OcclusionResult(

@@ -7,7 +7,8 @@ import colonnade.microcode.{Microprogram, Repeat}
 
 /** Finds the point of the environment that a ray hits, with its albedo and normal. It projects the ray into the map, where
   * the ray is straight, and steps from tile to tile until the ray is no longer in front of the map's surfaces. A ray that
-  * leaves the map hits a bounding plane. A ray from the camera hits what its pixel shows: it goes to [[DirectView]].
+  * leaves the map hits a bounding plane. A ray from the maps' camera hits what its pixel shows: it goes to
+  * [[DirectView]]. One from another camera is clipped to the maps' frustum; it hits what the maps show, or misses.
   *
   * One ray at a time; its request is taken together with its result. docs/march.md describes the steps and their latency.
   */
@@ -27,8 +28,9 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   private val cells      = prefix("cells")(new CellProgram(operations, stepper, planes, dda, hitPixel, io.maps.cells))
   private val texel      = prefix("texel")(new TexelFetch(operations, planes, hitPixel, io.maps))
   private val resolver   = prefix("resolver")(
-    new HitResolver(operations, stepper, planes, hitPixel, texel, planeTest.hitDistance, io.view)
+    new HitResolver(operations, stepper, planes, hitPixel, texel, planeTest.hitDistance, io.view, request)
   )
+  private val clip    = prefix("clip")(new RayClip(operations, stepper, resolver, io.view))
   private val surface = prefix("surface")(new SurfacePoint(operations, stepper, texel, resolver, io.view, request))
   private val isBusy  = WireInit(true.B)
 
@@ -48,6 +50,7 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
 
   program.step(MarchLabel.Idle) {
     program.set(isIllegal, false.B)
+    projection.clear()
     stepper.clear()
     planes.clear()
     hitPixel.clear()
@@ -66,6 +69,7 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   resolver.describeHit()
   hitPixel.describe()
   resolver.describeBoundingPlanes()
+  clip.describe()
   surface.describe()
   program.step(MarchLabel.Finish) {
     when(program.now) {

@@ -14,7 +14,8 @@ final class StoredRay(config: PathConfig) extends Bundle {
 
 /** Ports of [[EnvironmentRays]]. */
 final class EnvironmentRaysIO(config: PathConfig) extends Bundle {
-  val ray     = Flipped(Valid(new StoredRay(config)))              // stored in place of the context's previous ray
+  val isMapCamera = Input(Bool())                         // direct views are for the pipeline, not for the marches
+  val ray         = Flipped(Valid(new StoredRay(config))) // stored in place of the context's previous ray
   val req     = Flipped(Decoupled(new EnvironmentRequest(config))) // ready as `accepts` says of its kind
   val accepts = Output(new EnvironmentAccepts)
   val hitDistance = Input(HitDistance(config)) // of an occlusion test, in the cycle after its `req`
@@ -51,7 +52,7 @@ final class EnvironmentRays(config: PathConfig) extends Module {
   }
 
   // A request of each kind waits until the column takes it; its ray is read then
-  private val isDirect = io.req.bits.isDirectView
+  private val isDirect = io.req.bits.isDirectView && io.isMapCamera
   private val march    = new Waiting(column.march, !isDirect)
   private val direct   = new Waiting(column.direct, isDirect)
   private val kinds    = Seq(direct, march)
@@ -59,7 +60,7 @@ final class EnvironmentRays(config: PathConfig) extends Module {
   private val taken    = Mux1H(kinds.map(kind => kind.isTaken -> kind.request.bits))
   private val leaves   = kinds.map(kind => RegNext(kind.isTaken, false.B))
   io.accepts.march         := march.accepts
-  io.accepts.directView    := direct.accepts
+  io.accepts.directView    := Mux(io.isMapCamera, direct.accepts, march.accepts)
   io.req.ready             := Mux(isDirect, direct.accepts, march.accepts)
   column.order.request     := RegEnable(taken, isTaken)
   column.order.hitDistance := Mux1H(leaves, kinds.map(_.hitDistance))

@@ -12,7 +12,8 @@ final class HitResolver(
     hitPixel:    HitPixel,
     texel:       TexelFetch,
     hitDistance: UInt,
-    view:        EnvironmentView
+    view:        EnvironmentView,
+    request:     MarchRequest
 ) {
   import MarchLabel._
   import m.formats._
@@ -22,9 +23,13 @@ final class HitResolver(
   val boundingPlane: UInt = Reg(UInt(layout.boundingPlaneIndexBits.W))
   val exponent:      SInt = Reg(SInt(shiftBits.W)) // the distance is quotient · 2^exponent times the scaled direction
 
-  private val index           = Reg(UInt(view.boundingPlanes.getWidth.W))
-  private val nearestMantissa = Reg(UInt((f + 1).W))
-  private val nearestExponent = Reg(SInt(shiftBits.W))
+  val index: UInt = Reg(UInt(view.boundingPlanes.getWidth.W)) // of a bounding plane, or of a plane of the frustum
+
+  /** The largest rate so far: of approach to distance of the bounding planes, or of distance to approach of the frustum's
+    * planes, which is the way to the last one.
+    */
+  val rateMantissa: UInt = Reg(UInt((f + 1).W))
+  val rateExponent: SInt = Reg(SInt(shiftBits.W))
 
   /** In a step: nothing is hit yet. */
   def clear(): Unit = {
@@ -81,7 +86,10 @@ final class HitResolver(
 
   /** Steps from `BoundingPlanes` on: the nearest bounding plane that the ray approaches. */
   def describeBoundingPlanes(): Unit = {
-    step(BoundingPlanes)(m.multiply(m.projectedDir(2), m.constant(sizes(0))))
+    step(BoundingPlanes) {
+      m.multiply(m.projectedDir(2), m.constant(sizes(0)))
+      branch(Finish.when(request.isFromCamera, "from a camera"))
+    }
     step {
       m.multiply(m.projectedDir(2), m.constant(sizes(1)))
       set(m.uvwDir(0), m.combine(m.projectedDir(0), fromCentre, subtract = true))
@@ -104,21 +112,21 @@ final class HitResolver(
       m.load(planes.depth.value)
     }
     step(m.normalise())
-    step(set(m.mantissa, m.sumMantissa))
+    step(Rate)(set(m.mantissa, m.sumMantissa))
     m.divide(m.numerator, m.mantissa)
     step {
-      val mantissa = Mux(m.quotient(f), m.quotient, (m.quotient << 1)(f, 0))
+      val quotient = Mux(m.quotient(f), m.quotient, (m.quotient << 1)(f, 0))
       val rate     = m.exponents(0).zext - m.exponent.zext +& Mux(m.quotient(f), (f + 1).S, f.S)
-      val isFirst  = kind === HitKind.miss.U
-      val isNearer = isFirst || rate > nearestExponent || (rate === nearestExponent && mantissa > nearestMantissa)
-      set(kind, HitKind.boundingPlane.U)
-      set(nearestMantissa, mantissa, isNearer)
-      set(nearestExponent, rate, isNearer)
-      set(boundingPlane, index, isNearer)
+      val isFirst  = kind === HitKind.miss.U && !request.isFromCamera
+      val isNearer = isFirst || rate > rateExponent || (rate === rateExponent && quotient > rateMantissa)
+      set(kind, HitKind.boundingPlane.U, !request.isFromCamera)
+      set(rateMantissa, quotient, isNearer)
+      set(rateExponent, rate, isNearer)
+      set(boundingPlane, index, isNearer && !request.isFromCamera)
     }
     step(NextBoundingPlane) {
       set(index, index + 1.U)
-      goto(BoundingPlane)
+      branch(ClipPlane.when(request.isFromCamera, "from a camera"), BoundingPlane.otherwise)
     }
     step(BoundingPlanesDone) {
       val isMiss = kind === HitKind.miss.U
@@ -126,8 +134,8 @@ final class HitResolver(
       branch(Finish.when(isMiss, "miss"), Repeat.until(texel.isRequested, "planes.req is ready"))
     }
     step {
-      m.startDivision(m.depthMantissa, (nearestMantissa >> 1)(f - 1, 0))
-      set(exponent, m.depthExponent.zext +& m.uvwOriginExponent.zext - nearestExponent - m.projectedDirExponent.zext)
+      m.startDivision(m.depthMantissa, (rateMantissa >> 1)(f - 1, 0))
+      set(exponent, m.depthExponent.zext +& m.uvwOriginExponent.zext - rateExponent - m.projectedDirExponent.zext)
       goto(Point)
     }
   }

@@ -15,6 +15,12 @@ object MarchLabel {
   case object ProjectDir    extends MarchLabel
   case object UvwRay        extends MarchLabel
 
+  // RayClip: moves the origin of a camera's ray into the maps' frustum, plane by plane
+  case object NearPlane   extends MarchLabel
+  case object ClipPlane   extends MarchLabel
+  case object MovedOrigin extends MarchLabel
+  case object Rate        extends MarchLabel
+
   // DdaSetup: distances to tile edges, one axis at a time
   case object FirstTile extends MarchLabel
   case object AxisSetup extends MarchLabel
@@ -56,5 +62,6 @@ object MarchLabel {
 
   case object Pixel  extends MarchLabel // HitPixel: projects a point of the ray to a pixel
   case object Point  extends MarchLabel // SurfacePoint: the point and its normal
+  case object Way    extends MarchLabel // SurfacePoint: the offset of each axis
   case object Finish extends MarchLabel // offers the result
 }

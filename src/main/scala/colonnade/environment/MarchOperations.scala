@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import colonnade.config.PathConfig
-import colonnade.microcode.{Microprogram, Operand, StepEncoding}
+import colonnade.microcode.{Exit, Microprogram, Operand, Repeat, StepEncoding}
 import colonnade.numbers.Rounding
 
 /** The program of the march, the registers of its ray, and the operations that its steps have of the datapath. */
@@ -71,6 +71,12 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   /** Adds the product to the sum, or subtracts it. */
   def accumulate(subtract: Boolean = false): Unit = add(sum, product, subtract)
 
+  /** Adds the product to the sum, or subtracts it if the condition holds. */
+  def accumulate(subtracted: Bool): Unit = {
+    add(sum, product)
+    subtracts.choose(subtracted.asSInt)
+  }
+
   /** Shifts the sum up by a digit and adds the product. */
   def shiftAccumulate(): Unit = add((sum << digitBits).asSInt, product)
 
@@ -120,10 +126,10 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   }
 
   /** Adds a step after which the quotient is ready. */
-  def awaitDivision(): Unit = program.step {
+  def awaitDivision(exits: => Seq[Exit[MarchLabel]] = Nil): Unit = program.step {
     program.set(quotient, datapath.quotient.bits)
     when(program.now)(datapath.takeQuotient := true.B)
-    program.await(datapath.quotient.valid, "quotient")
+    program.branch(Repeat.until(datapath.quotient.valid, "quotient") +: exits: _*)
   }
 
   /** Adds two steps. */

@@ -21,7 +21,8 @@ final class EnvironmentRay(config: PathConfig) extends Bundle {
 final class MarchRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
 
-  val ray         = new EnvironmentRay(config)
+  val ray          = new EnvironmentRay(config)
+  val isFromCamera = Bool() // the ray comes from a camera, which may be anywhere: it sees the maps or misses
   val hitDistance = HitDistance(config) // the distance of the object on this ray; see `MarchResult.hidesObject`
 }
 

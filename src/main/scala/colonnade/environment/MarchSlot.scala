@@ -25,11 +25,12 @@ final class MarchSlot(config: PathConfig) extends Module {
   when(io.order.valid) { isHeld := true.B }.elsewhen(march.io.request.ready) { isHeld := false.B }
   io.isEmpty := !isHeld
 
-  march.io.view                     := io.view
-  march.io.request.valid            := isHeld
-  march.io.request.bits.context     := order.request.context
-  march.io.request.bits.ray         := order.ray
-  march.io.request.bits.hitDistance := order.hitDistance
+  march.io.view                      := io.view
+  march.io.request.valid             := isHeld
+  march.io.request.bits.context      := order.request.context
+  march.io.request.bits.ray          := order.ray
+  march.io.request.bits.isFromCamera := order.request.isDirectView
+  march.io.request.bits.hitDistance  := order.hitDistance
   io.maps <> march.io.maps
   io.events := march.io.events
 

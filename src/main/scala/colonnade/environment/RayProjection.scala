@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import colonnade.formats.EnvironmentView
-import colonnade.microcode.Overlap
+import colonnade.microcode.{Exit, Overlap}
 import colonnade.numbers.Rounding
 
 /** Projects a ray into the map: (u, v, w) of its origin and along its direction. In this space the ray is straight.
@@ -50,7 +50,9 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
   /** Steps that project the ray. They end at `Finish` if the origin is behind the camera. */
   def describe(): Unit = {
     val offsetTerm = (offset, digitsOf(offsetPower.zext))
-    matrixProduct(ProjectOrigin, m.uvwOrigin, m.uvwOriginExponent)(terms(origin) :+ offsetTerm)
+    matrixProduct(ProjectOrigin, m.uvwOrigin, m.uvwOriginExponent)(terms(origin) :+ offsetTerm) {
+      ProjectDir.when(request.isFromCamera, "from a camera")
+    }
     step(OriginDepth) {
       m.load(m.uvwOrigin(2))
       branch(Finish.when(m.uvwOrigin(2) <= 0.S, "behind the camera"))
@@ -61,8 +63,13 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
       set(m.depthMantissa, m.sumMantissa)
       set(m.depthExponent, m.exponent)
     }
-    step(m.startDivision(m.one, m.mantissa))
-    matrixProduct(ProjectDir, m.projectedDir, m.projectedDirExponent)(terms(m.dir))
+    step {
+      m.startDivision(m.one, m.mantissa)
+      branch(UvwRay.when(request.isFromCamera, "from a camera"))
+    }
+    matrixProduct(ProjectDir, m.projectedDir, m.projectedDirExponent)(terms(m.dir)) {
+      NearPlane.when(request.isFromCamera, "from a camera")
+    }
     label(UvwRay)
     m.awaitDivision()
     overlap { at =>
@@ -102,10 +109,20 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
     normalise(at, m.uvwDir, m.uvwDirExponent, axis, begin + 3)
   }
 
+  /** In a step before `ProjectOrigin`: the least exponent of the origin's block, which for a camera also holds the depth of
+    * the near plane.
+    */
+  def clear(): Unit = {
+    val most = ((BigInt(1) << exponentBits) - 1).U
+    val next = (view.exponent +& 1.S(2.W)).asUInt
+    val some = if (view.exponent.getWidth > exponentBits) Mux(next > most, most, next) else next
+    set(m.uvwOriginExponent, Mux(request.isFromCamera && view.exponent >= 0.S, some, 0.U))
+  }
+
   /** The matrix times a vector, row by row; `axis` is 0 before and after. */
   private def matrixProduct(name: MarchLabel, vector: Vec[SInt], maxExponent: UInt)(
       factors: Seq[(SInt, Seq[SInt])]
-  ): Unit = {
+  )(exit: => Exit[MarchLabel]): Unit = {
     label(name)
     row(factors)
     step(m.normalise())
@@ -114,7 +131,10 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
       selectRow(Mux(m.axis === 2.U, 0.U, m.axis + 1.U))
       branch(name.when(m.axis =/= 2.U, "next row"))
     }
-    overlap(align(_, vector, maxExponent, begin = 0))
+    overlap { at =>
+      align(at, vector, maxExponent, begin = 0)
+      at(3)(branch(exit))
+    }
   }
 
   /** A sum of products, digit by digit. */
@@ -148,7 +168,7 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
   private def latch(vector: Vec[SInt], maxExponent: UInt, axis: UInt): Unit = {
     set(vector(axis), component(vector))
     set(m.exponents(axis), m.exponent)
-    set(maxExponent, m.exponent, axis === 0.U || m.exponent > maxExponent)
+    set(maxExponent, m.exponent, (axis === 0.U && !(vector eq m.uvwOrigin).B) || m.exponent > maxExponent)
   }
 
   /** Aligns components to the largest one. Four cycles. */

@@ -55,13 +55,34 @@ final class SurfacePoint(
     overlap { at =>
       at(0) {
         set(isNearer, true.B)
-        set(isAway, false.B)
+        set(isAway, request.isFromCamera) // a camera stands on no surface
         await(texel.isReady, "texel")
       }
       for (axis <- 0 until 3) rotateNormal(at, axis, begin = 3 * axis)
     }
-    m.awaitDivision()
+    m.awaitDivision(Seq(Way.when(!request.isFromCamera, "not from a camera")))
+    addClippedWay()
+    label(Way)
     overlap(at => for (axis <- 0 until 3) hitPoint(at, axis, begin = 2 * axis))
+  }
+
+  /** Adds the way from the camera to the frustum of the maps. */
+  private def addClippedWay(): Unit = {
+    val later = resolver.rateExponent +& -resolver.exponent
+    step {
+      m.load(distance)
+      m.setShift((f + 1).S +& Mux(later > 0.S, later, 0.S))
+    }
+    step {
+      set(offset, m.shifted)
+      m.load(resolver.rateMantissa.zext)
+      m.setShift((f + 1).S +& Mux(later < 0.S, -later, 0.S))
+    }
+    step(set(m.mantissa, m.sumMantissa))
+    step {
+      set(m.quotient, m.combine(offset, m.mantissa.zext).asUInt)
+      set(resolver.exponent, Mux(later > 0.S, resolver.rateExponent, resolver.exponent) + 1.S)
+    }
   }
 
   /** Six cycles. */

@@ -39,6 +39,11 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
     */
   val occlusion          = Bool()
   val occlusionTolerance = UInt((numbers.gridBits - 2).W)
+
+  /** The frame's camera is that of the maps, so the pixel of the map follows from that of the frame. Otherwise rays from
+    * the camera march, and those that the maps show nothing of miss.
+    */
+  val isMapCamera = Bool()
 }
 
 object EnvironmentView {

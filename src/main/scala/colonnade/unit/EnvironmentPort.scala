@@ -38,6 +38,7 @@ final class EnvironmentPort(config: PathConfig) extends Module {
   private val control = io.control
   control.enabled   := io.view.enabled
   control.occlusion := io.view.occlusion
+  stage.isMapCamera := io.view.isMapCamera
   io.marches :<>= stage.marches
 
   // March

@@ -32,6 +32,9 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
       (0.8, 7, true, false, true)
     )
 
+  /** Those of a camera that is not the maps'. */
+  private val movedRounds = Seq((0.7, 8, true, true, false), (0.4, 9, true, true, true))
+
   private def render(name: String, of: ColonnadeConfig, tag: Tag = Always): Unit =
     it should s"give each pixel once, equal to the model's: $name" taggedAs tag in {
       val config = of.copy(
@@ -39,11 +42,20 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
         frame = of.frame.copy(tileSize = 4)
       )
       test(new ColumnHarness(config)).withAnnotations(Simulation.verilator) { dut =>
-        val all = if (config.hasEnvironment) rounds ++ environmentRounds else rounds
-        for ((willing, seed, shadows, hasEnvironment, occlusion) <- all) withClue(s"seed $seed: ") {
+        val ofMaps = if (config.hasEnvironment) rounds ++ environmentRounds else rounds
+        val all    = ofMaps.map(_ -> true) ++ (if (config.hasEnvironment) movedRounds.map(_ -> false) else Nil)
+        for (((willing, seed, shadows, hasEnvironment, occlusion), isMapCamera) <- all) withClue(s"seed $seed: ") {
           val scene       = new SmallScene(config, seed, wide, high, triangleCount = 15, shadows)
           val environment = Option.when(config.hasEnvironment)(
-            new SmallEnvironment(config, scene, new Random(seed), Seq(wide, high), hasEnvironment, occlusion)
+            new SmallEnvironment(
+              config,
+              scene,
+              new Random(seed),
+              Seq(wide, high),
+              hasEnvironment,
+              occlusion,
+              isMapCamera
+            )
           )
           // Beside the pixels that show something are a few of the background, in a last tile that is clipped
           val width     = wide + 3

@@ -59,11 +59,13 @@ final class EnvironmentImage(config: ColonnadeConfig, random: Random, illegal: D
     new Packed(new PlaneDescriptor).pack(Map("mode" -> mode, "pointer" -> pointer))
   }
 
-  /** A pointer to words of a heap; an illegal one is arbitrary, or the last of its words is the first beyond the heap. */
+  /** A pointer to words of a heap; an illegal one is arbitrary, or the last of its words is the first beyond the heap,
+    * where pointers reach that word.
+    */
   private def pointerTo(words: Int, heapWords: Int): Int =
     if (random.nextDouble() >= illegal) random.nextInt(heapWords - words + 1)
     else if (random.nextBoolean()) randomPointer()
-    else heapWords - words + 1
+    else (heapWords - words + 1).min((1 << AttributeLayout.pointerBits) - 1)
 
   private def randomPointer(): Int = random.nextInt(1 << AttributeLayout.pointerBits)
 }

@@ -48,12 +48,15 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     val (request, result) = (new Packed(new MarchRequest(config)), new Packed(new MarchResult(config)))
     unit.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
-    val inputs = rays.map(ray => request.pack(ray.fields - "isDirectView"))
-    val found  = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
+    val inputs = rays.map { ray =>
+      request.pack(ray.fields - "isDirectView" + ("isFromCamera" -> BigInt(if (ray.isDirectView) 1 else 0)))
+    }
+    val found = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),
       (port: UInt) => port.peekInt()
     )(random, if (isSlow) 0.5 else 0, 20000)
-    val answers = Model.attributes(config, words, rays.map(ray => view.words ++ ray.words), "march")
+    val marching = view.copy(isMapCamera = false)
+    val answers  = Model.attributes(config, words, rays.map(ray => marching.words ++ ray.words), "march")
     for (((bits, answer), ray) <- found.zip(answers).zip(rays)) {
       val expected = names.zip(answer).toMap + ("context" -> BigInt(ray.context))
       assert(result.unpack(bits) == expected, s"of $ray in $view with ${config.precision}")
@@ -86,12 +89,16 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             scene.words,
             camera.view,
-            Seq.fill(60)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.behindBox(camera)),
+            Seq.fill(60)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.behindBox(camera)) ++
+              Seq.fill(60)(stimulus.fromElsewhere(camera)),
             random,
             isSlow = round == 1
           )
         }
         val kinds = hits.flatten.map(_("kind").toInt)
+        val seen  = hits.flatMap(_.takeRight(60))
+        assert(seen.count(_("kind") == HitKind.map) > 40 && seen.count(_("kind") == HitKind.miss) > 20, "cameras see")
+        assert(!seen.exists(_("kind") == HitKind.boundingPlane), "a camera sees no bounding plane")
         assert(Seq(HitKind.miss, HitKind.map, HitKind.boundingPlane).forall(kinds.contains), "every kind of result")
         // With the widest formats the way to each point is saturated
         for (isHidden <- if (config.numbers.sceneBits < 56) Seq(0, 1) else Seq(0))
@@ -107,7 +114,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             image.words,
             camera.view,
-            Seq.fill(30)(stimulus.inRoom(camera)),
+            Seq.fill(30)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.fromElsewhere(camera)),
             random,
             isSlow = round == 1
           )
@@ -116,7 +123,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             image.words,
             stimulus.anyView(),
-            Seq.fill(20)(stimulus.anyRay()),
+            Seq.fill(20)(stimulus.anyRay()) ++ Seq.fill(20)(stimulus.anyPixel()),
             random,
             isSlow = round == 1
           )
@@ -132,7 +139,8 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
             config,
             illegal.words,
             if (round < 4) camera.view else stimulus.wildView(),
-            Seq.fill(20)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.anyRay()),
+            Seq.fill(20)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.fromElsewhere(camera)) ++
+              Seq.fill(20)(stimulus.anyRay()) ++ Seq.fill(20)(stimulus.anyPixel()),
             random,
             isSlow = round == 1
           )

@@ -171,6 +171,27 @@ final class MarchStimulus(config: ColonnadeConfig, random: Random) {
     scaled.copy(dir = scaled.dir.map(_ << shift), pixel = pixel.map(BigInt(_)), isDirectView = true)
   }
 
+  /** A ray of a camera that is not the maps': near that one, at it, on its near plane, beside what it sees, behind it.
+    * Directions to a point of the room, along an axis, at random.
+    */
+  def fromElsewhere(camera: Camera): MarchCase = {
+    val from = random.nextInt(8) match {
+      case 0 => Seq(0.0, 0.0, 0.0)
+      case 1 => Seq(spread(0.3), spread(0.3), EnvironmentScene.depthUnit)
+      case 2 => Seq(spread(3), spread(3), random.nextDouble() * 4)
+      case 3 => Seq(spread(0.5), spread(0.5), -random.nextDouble() * 2)
+      case 4 => Seq(0.0, spread(0.01), spread(0.01))
+      case _ => Seq.fill(3)(spread(0.4))
+    }
+    val target = Seq(spread(1.8), spread(1.1), 1 + random.nextDouble() * 3)
+    val dir    = random.nextInt(8) match {
+      case 0 => Seq.fill(3)(spread(1))
+      case 1 => Seq.tabulate(3)(i => if (i == random.nextInt(3)) 1.0 else 0.0).updated(2, spread(1))
+      case _ => target.zip(from).map { case (t, f) => t - f }
+    }
+    ray(camera, from, if (dir.forall(_ == 0)) Seq(0.0, 0, 1) else dir).copy(isDirectView = true)
+  }
+
   /** A pixel's ray with a random direction. */
   def anyPixel(): MarchCase =
     anyRay().copy(pixel = frame.map(BigInt(_)).map(BigInt(8, random).min(_)), isDirectView = true)

@@ -13,13 +13,14 @@ final case class ViewCase(
     boundingPlanes: Int,
 
     /** Grid steps. */
-    occlusionTolerance: BigInt = 0
+    occlusionTolerance: BigInt = 0,
+    isMapCamera:        Boolean = true
 ) {
   def words: Seq[BigInt] =
     matrix ++ offset ++ Seq[BigInt](
       offsetShift,
       exponent
-    ) ++ rotation ++ steps :+ BigInt(boundingPlanes) :+ occlusionTolerance
+    ) ++ rotation ++ steps :+ BigInt(boundingPlanes) :+ occlusionTolerance :+ mapCamera
 
   def fields: Map[String, BigInt] =
     matrix.zipWithIndex.map { case (value, i) => s"matrix[${i / 3}].${"xyz" (i % 3)}" -> value }.toMap ++
@@ -30,8 +31,11 @@ final case class ViewCase(
         "offsetShift"        -> BigInt(offsetShift),
         "exponent"           -> BigInt(exponent),
         "boundingPlanes"     -> BigInt(boundingPlanes),
-        "occlusionTolerance" -> occlusionTolerance
+        "occlusionTolerance" -> occlusionTolerance,
+        "isMapCamera"        -> mapCamera
       )
+
+  private def mapCamera = BigInt(if (isMapCamera) 1 else 0)
 }
 
 object ViewCase {

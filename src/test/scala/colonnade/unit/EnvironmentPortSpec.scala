@@ -27,6 +27,7 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
       var (objects, bypassing) = (0, 0)
       dut.clock.setTimeout(0)
       port.view.enabled.poke(true)
+      port.view.isMapCamera.poke(true)
       port.surfaces.ready.poke(false)
 
       var offered = Option.empty[Map[String, BigInt]]

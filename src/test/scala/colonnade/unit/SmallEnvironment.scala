@@ -10,6 +10,7 @@ import scala.util.Random
   *
   * @param hasEnvironment the frame has an environment; otherwise only the maps are loaded
   * @param occlusion      the environment may hide the object, which is then larger, and partly behind the walls
+  * @param isMapCamera    the frame's camera is that of the maps; otherwise it stands aside and behind
   */
 final class SmallEnvironment(
     config:         ColonnadeConfig,
@@ -17,7 +18,8 @@ final class SmallEnvironment(
     random:         Random,
     frame:          Seq[Int],
     hasEnvironment: Boolean,
-    occlusion:      Boolean
+    occlusion:      Boolean,
+    isMapCamera:    Boolean = true
 ) {
   private val numbers = config.numbers
   private val maps    = new EnvironmentScene(config, random)
@@ -34,12 +36,14 @@ final class SmallEnvironment(
     val camera    = "xyz".map(axis => scene.registers(s"camera.position.$axis") << unitShift)
     val metre     = (BigInt(1) << (numbers.vertexBits + numbers.gridFraction)).toDouble / (if (occlusion) 2.6 else 1.1)
     val axes      = Seq(Seq(1.0, 0, 0), Seq(0, -1.0, 0), Seq(0, 0, 1.0))
+    val moved     = if (isMapCamera) Seq(0.0, 0.0, 0.0) else Seq(0.15, -0.05, 0.1)
+    val ofMaps    = camera.zip(moved).map { case (from, by) => from + BigDecimal(by * metre).toBigInt }
     val view      = ViewCase.of(
       config,
       maps.focal,
       maps.middle,
       axes,
-      camera,
+      ofMaps,
       metre,
       ViewCase.stepWidths(config, frame)
     )
@@ -50,7 +54,9 @@ final class SmallEnvironment(
     val light = "xyz".zip(camera.zip(Seq(-0.6, 0.25, 0.2))).map { case (axis, (from, by)) =>
       s"lights[0].position.$axis" -> ((from + BigDecimal(by * metre).toBigInt) >> unitShift)
     }
-    scene.registers ++ light ++ view.fields.map { case (name, value) => s"environment.$name" -> value } ++ Map[
+    scene.registers ++ light ++ view.copy(isMapCamera = isMapCamera).fields.map { case (name, value) =>
+      s"environment.$name" -> value
+    } ++ Map[
       String,
       BigInt
     ](
