@@ -22,8 +22,8 @@ final class TileRow(config: ColonnadeConfig, wordBits: Int = 8 * PixelFormat.max
 
 /** Gathers the pixels of a column, which come in any order, to rows of a tile: a write-combining buffer.
   *
-  * A row leaves when it is whole, when another one needs its place, or at `flush`. A pixel enters per cycle, in two cycles:
-  * in the first one it is compared with the rows. A row leaves in three, and is chosen in the cycle before.
+  * A row leaves when it is whole, when another one needs its place, or at `flush`. A pixel enters per cycle, in three cycles:
+  * it is compared with the rows, joins one, and is written. A row leaves in three, and is chosen in the cycle before.
   */
 final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Module {
   private val tileBits = log2Ceil(config.frame.tileSize)
@@ -60,7 +60,10 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
     tags(index)  := tagOf(pixel)
     masks(index) := Mux(isHit, masks(index), 0.U) | column
   }
-  when(joins.orR) { data.write(OHToUInt(joins), VecInit.fill(config.frame.tileSize)(pixel.data), column.asBools) }
+  private val isWriting = TimingSlice.flag(joins.orR)
+  private val columns   = TimingSlice(column)
+  private val written   = VecInit.fill(config.frame.tileSize)(TimingSlice(pixel.data))
+  when(isWriting) { data.write(TimingSlice(OHToUInt(joins)), written, columns.asBools) }
 
   // A row leaves. It is chosen in the cycle before: no other one leaves then
   private val isReading = RegInit(false.B)
@@ -72,7 +75,7 @@ final class RowBuffer(config: ColonnadeConfig, shell: ShellConfig) extends Modul
   private val victim    = RegInit(0.U(log2Ceil(shell.rows).W))
   private val isForced  = TimingSlice.flag(hasPixel && !isHit && !hasFree)
   private val hasWhole  = TimingSlice.flag(whole.orR)
-  private val isFlushed = flush && !pixels.valid && !hasPixel && TimingSlice.flag(valid.asUInt.orR)
+  private val isFlushed = flush && !pixels.valid && !hasPixel && !isWriting && TimingSlice.flag(valid.asUInt.orR)
   private val firstOf   = (rows: UInt) => TimingSlice(PriorityEncoder(rows))
   private val evicted   = Mux(hasWhole, firstOf(whole), Mux(isForced, victim, firstOf(valid.asUInt)))
   private val evicts    = !isReading && !isOut && (hasWhole || isForced || isFlushed)

@@ -29,6 +29,8 @@ private[unit] final class RecordFill(
   private val slice    = TimingSlice.extra(config)
   private val snooping = config.columnBvhMemory.snooping.B
 
+  private val isHit = hits.map(_.reduce(_ || _))
+
   val broadcasts: Seq[Valid[RecordBroadcast]] = incoming.map(slice.valid(_))
 
   /** By bank: its broadcast has this address, which with the slice is that of the cycle before. Only the bank of the address
@@ -51,21 +53,25 @@ private[unit] final class RecordFill(
   val awaiting: Seq[Seq[Bool]] =
     buffers.map(buffer => brings(buffer.address).map(_ && buffer.state === BufferState.reserved)).transpose
 
-  /** The buffers that are available after the fill, and by broadcast and buffer: the buffer takes it. */
-  val (stillAvailable, fills) =
-    broadcasts.zip(waiters.zip(awaiting)).foldLeft((isAvailable, Seq.empty[Seq[Bool]])) {
-      case ((available, fills), (broadcast, (waits, awaits))) =>
+  /** The buffers that are available after the fill; by broadcast and buffer: the buffer takes its record, and takes it for a
+    * context that misses it.
+    */
+  private val (remaining, places) =
+    broadcasts.zip(waiters.zip(awaiting)).foldLeft((isAvailable, Seq.empty[(Seq[Bool], Seq[Bool])])) {
+      case ((available, places), (broadcast, (waits, awaits))) =>
         val isRecord   = broadcast.valid && !broadcast.bits.isLater.getOrElse(false.B)
         val isReserved = awaits.map(_ && (snooping || broadcast.bits.row === row))
-        val isMissing  = waits.zip(hits).map { case (waits, hits) => waits && !hits.reduce(_ || _) }
-        val isSnooped  = snooping && !isReserved.reduce(_ || _) && isMissing.reduce(_ || _)
-        val snoopedOH  = PriorityEncoderOH(available).map(_ && isSnooped && isRecord)
         val reservedOH = PriorityEncoderOH(isReserved).map(_ && isRecord)
+        val freeOH     = PriorityEncoderOH(available).map(_ && snooping && !isReserved.reduce(_ || _) && isRecord)
+        val isMissing  = waits.zip(isHit).map { case (waits, isHit) => waits && !isHit }.reduce(_ || _)
+        val snoopedOH  = freeOH.map(_ && isMissing)
         (
           available.zip(snoopedOH).map { case (isFree, isTaken) => isFree && !isTaken },
-          fills :+ snoopedOH.zip(reservedOH).map { case (snooped, reserved) => snooped || reserved }
+          places :+ ((either(snoopedOH, reservedOH), either(freeOH, reservedOH)))
         )
     }
+  val stillAvailable: Seq[Bool] = remaining
+  private val (fills, fillsIfMissed) = places.unzip
 
   /** By buffer. */
   val isFilled: Seq[Bool] = fills.transpose.map(_.reduce(_ || _))
@@ -74,8 +80,8 @@ private[unit] final class RecordFill(
   val found: Seq[Seq[Bool]] = fetches.zipWithIndex.map { case (fetch, context) =>
     buffers.indices.map { index =>
       val isOwnRead = fetch.isPending && fetch.isIssued && fetch.bufferOH(index)
-      val arrives   = fills.zip(waiters).map { case (fill, waits) =>
-        fill(index) && Mux(snooping, waits(context), isOwnRead)
+      val arrives   = fillsIfMissed.zip(waiters).map { case (fill, waits) =>
+        fill(index) && Mux(snooping, waits(context) && !isHit(context), isOwnRead)
       }
       hits(context)(index) || arrives.reduce(_ || _)
     }
@@ -92,4 +98,6 @@ private[unit] final class RecordFill(
     fetch.hasRecord := true.B
     fetch.buffer    := PriorityEncoder(found)
   }
+
+  private def either(some: Seq[Bool], others: Seq[Bool]): Seq[Bool] = some.zip(others).map { case (a, b) => a || b }
 }
