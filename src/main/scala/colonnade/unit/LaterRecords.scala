@@ -19,12 +19,12 @@ private[unit] final class LaterRecords(
     for ((buffer, awaits) <- buffers.zip(awaits)) when(isLater && awaits && !buffer.isPinned.get) {
       buffer.state := BufferState.empty
     }
-    for (((fetch, waits), found) <- fetches.zip(waits).zip(fill.found)) {
+    for (((fetch, waits), isFound) <- fetches.zip(waits).zip(fill.isFound)) {
       when(waits && isLater && !isPinned) {
         fetch.awaitsFill.get := true.B
         fetch.isExpected     := false.B
       }
-      when(waits && !isLater && !found.reduce(_ || _)) {
+      when(waits && !isLater && !isFound) {
         fetch.awaitsFill.get := false.B
         fetch.retries.get    := true.B
       }

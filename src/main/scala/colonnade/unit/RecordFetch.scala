@@ -89,9 +89,7 @@ final class RecordFetch(config: PartConfig) extends Module {
   when(io.start) { buffers.foreach(_.state := BufferState.empty) }
 
   // Events
-  private val snoopHits = VecInit(fetches.zip(fill.found).map { case (fetch, found) =>
-    found.reduce(_ || _) && !fetch.isIssued
-  })
+  private val snoopHits = VecInit(fetches.zip(fill.isFound).map { case (fetch, isFound) => isFound && !fetch.isIssued })
   io.snoopHits         := PopCount(TimingSlice(snoopHits))
   io.waitsForTriangles := fetches.map(fetch => fetch.hasRecord && fetch.kind === RecordKind.triangles).reduce(_ || _)
   io.stalledContexts   := PopCount(fetches.map(_.isPending))

@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Mux1H, PriorityEncoder, PriorityEncoderOH, Valid}
+import chisel3.util.{Mux1H, OHToUInt, PriorityEncoder, PriorityEncoderOH, Valid}
 import colonnade.common.TimingSlice
 import colonnade.config.PartConfig
 import colonnade.formats.{Banks, RecordBroadcast}
@@ -53,39 +53,39 @@ private[unit] final class RecordFill(
   val awaiting: Seq[Seq[Bool]] =
     buffers.map(buffer => brings(buffer.address).map(_ && buffer.state === BufferState.reserved)).transpose
 
-  /** The buffers that are available after the fill; by broadcast and buffer: the buffer takes its record, and takes it for a
-    * context that misses it.
+  /** The buffers that are available after the fills; by broadcast and buffer: the buffer takes the record, and its place if a
+    * context misses it.
     */
-  private val (remaining, places) =
-    broadcasts.zip(waiters.zip(awaiting)).foldLeft((isAvailable, Seq.empty[(Seq[Bool], Seq[Bool])])) {
-      case ((available, places), (broadcast, (waits, awaits))) =>
+  val (stillAvailable, fills, places) =
+    broadcasts.zip(waiters.zip(awaiting)).foldLeft((isAvailable, Seq.empty[Seq[Bool]], Seq.empty[Seq[Bool]])) {
+      case ((available, fills, places), (broadcast, (waits, awaits))) =>
         val isRecord   = broadcast.valid && !broadcast.bits.isLater.getOrElse(false.B)
         val isReserved = awaits.map(_ && (snooping || broadcast.bits.row === row))
-        val reservedOH = PriorityEncoderOH(isReserved).map(_ && isRecord)
-        val freeOH     = PriorityEncoderOH(available).map(_ && snooping && !isReserved.reduce(_ || _) && isRecord)
+        val isFree     = snooping && !isReserved.reduce(_ || _)
         val isMissing  = waits.zip(isHit).map { case (waits, isHit) => waits && !isHit }.reduce(_ || _)
+        val reservedOH = PriorityEncoderOH(isReserved).map(_ && isRecord)
+        val freeOH     = PriorityEncoderOH(available).map(_ && isFree && isRecord)
         val snoopedOH  = freeOH.map(_ && isMissing)
         (
           available.zip(snoopedOH).map { case (isFree, isTaken) => isFree && !isTaken },
-          places :+ ((either(snoopedOH, reservedOH), either(freeOH, reservedOH)))
+          fills :+ snoopedOH.zip(reservedOH).map { case (snooped, reserved) => snooped || reserved },
+          places :+ freeOH.zip(reservedOH).map { case (free, reserved) => free || reserved }
         )
     }
-  val stillAvailable: Seq[Bool] = remaining
-  private val (fills, fillsIfMissed) = places.unzip
 
   /** By buffer. */
   val isFilled: Seq[Bool] = fills.transpose.map(_.reduce(_ || _))
 
-  /** By context and buffer: the context finds the record in the buffer, or takes it from there as it comes. */
-  val found: Seq[Seq[Bool]] = fetches.zipWithIndex.map { case (fetch, context) =>
-    buffers.indices.map { index =>
-      val isOwnRead = fetch.isPending && fetch.isIssued && fetch.bufferOH(index)
-      val arrives   = fillsIfMissed.zip(waiters).map { case (fill, waits) =>
-        fill(index) && Mux(snooping, waits(context) && !isHit(context), isOwnRead)
-      }
-      hits(context)(index) || arrives.reduce(_ || _)
+  /** By context and broadcast: the context takes the record as it comes, if it does not find it in a buffer. */
+  private val arrives = fetches.zip(waiters.transpose).map { case (fetch, waits) =>
+    waits.zip(places).map { case (waits, places) =>
+      val isOwnRead = fetch.isPending && fetch.isIssued && Mux1H(fetch.bufferOH, places)
+      Mux(snooping, waits && places.reduce(_ || _), isOwnRead)
     }
   }
+
+  /** By context: it has its record. */
+  val isFound: Seq[Bool] = isHit.zip(arrives).map { case (isHit, arrives) => isHit || arrives.reduce(_ || _) }
 
   for (((buffer, isFilled), from) <- buffers.zip(isFilled).zip(fills.transpose)) when(isFilled) {
     val broadcast = Mux1H(from, broadcasts.map(_.bits))
@@ -93,11 +93,10 @@ private[unit] final class RecordFill(
     buffer.address := broadcast.address
     buffer.record  := broadcast.record
   }
-  for ((fetch, found) <- fetches.zip(found)) when(found.reduce(_ || _)) {
-    fetch.isPending := false.B
-    fetch.hasRecord := true.B
-    fetch.buffer    := PriorityEncoder(found)
-  }
-
-  private def either(some: Seq[Bool], others: Seq[Bool]): Seq[Bool] = some.zip(others).map { case (a, b) => a || b }
+  for ((((fetch, isFound), arrives), (hits, isHit)) <- fetches.zip(isFound).zip(arrives).zip(hits.zip(isHit)))
+    when(isFound) {
+      fetch.isPending := false.B
+      fetch.hasRecord := true.B
+      fetch.buffer    := Mux(isHit, PriorityEncoder(hits), Mux1H(arrives, places.map(OHToUInt(_))))
+    }
 }
