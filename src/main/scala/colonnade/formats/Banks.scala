@@ -2,6 +2,7 @@ package colonnade.formats
 
 import chisel3._
 import chisel3.util.log2Ceil
+import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 
 /** Banks are interleaved by record, those of a cache by line. */
@@ -25,9 +26,10 @@ object Banks {
   def recordOf(config: ColonnadeConfig, addressIn: UInt, bank: UInt): UInt =
     (addressIn >> wordBits(config)).asUInt ## bank(numberBits(config) - 1, 0) ## addressIn(wordBits(config) - 1, 0)
 
-  /** Most reads that a bank has in flight; a cache answers after two cycles. */
+  /** Most reads that a bank has in flight; a cache answers after two cycles, or three with an extra slice. */
   def readsInFlight(config: ColonnadeConfig): Int =
-    if (config.columnBvhMemory.cache.nonEmpty) 3 else config.columnBvhMemory.readLatency + 1
+    if (config.columnBvhMemory.cache.nonEmpty) 3 + TimingSlice.extra(config).cycles
+    else config.columnBvhMemory.readLatency + 1
 
   private def numberBits(config: ColonnadeConfig): Int = log2Ceil(config.columnBvhMemory.banks)
 

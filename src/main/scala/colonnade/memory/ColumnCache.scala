@@ -110,23 +110,23 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val fills      = firstComes || word =/= 0.U
   when(fills) { word := word + 1.U }
 
-  private val data = records.readWrite(
-    Mux(fills, placeNow ## word, tags.place(lineOf(address), hitWay) ## address(Lines.wordBits - 1, 0)),
-    io.lines.record,
-    fills || isHit,
-    fills
-  )
-  io.port.fill.get.valid        := fills
-  io.port.fill.get.bits.address := lineNow ## word
-  io.port.fill.get.bits.record  := checked(io.lines.record)
+  // An extra slice lies behind the comparison: then answers and broadcasts are a cycle later
+  private val reads   = slice.flag(isHit)
+  private val readNow = tags.place(slice(lineOf(address)), slice(hitWay)) ## slice(address(Lines.wordBits - 1, 0))
+  private val data    = records.readWrite(Mux(fills, placeNow ## word, readNow), io.lines.record, fills || reads, fills)
+  private val fill    = Wire(chiselTypeOf(io.port.fill.get))
+  fill.valid        := fills
+  fill.bits.address := lineNow ## word
+  fill.bits.record  := checked(io.lines.record)
+  io.port.fill.get  := slice.valid(fill)
 
   // Cycle c + 2: answer
-  io.port.response.valid            := RegNext(accepted, false.B)
+  io.port.response.valid            := RegNext(slice.flag(accepted), false.B)
   io.port.response.bits.record      := checked(data)
-  io.port.response.bits.isLater.get := RegNext(isMiss, false.B)
+  io.port.response.bits.isLater.get := RegNext(slice.flag(isMiss), false.B)
 
   for (error <- io.error)
-    error := RegNext((fills && io.lines.record.xorR) || (RegNext(isHit, false.B) && data.xorR), false.B)
+    error := RegNext((fills && io.lines.record.xorR) || (RegNext(reads, false.B) && data.xorR), false.B)
 
   // Request awaited lines, one after the other; an extra slice lies behind the choice
   private def isOpen(entry: AwaitedLine): Bool = entry.isUsed && !entry.isRequested
@@ -139,6 +139,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   }
 
   when(io.invalidate) { tags.clear() }
-  io.isIdle := !(accepted || io.port.response.valid || fills || blocked =/= 0.U || awaited.map(_.isUsed).reduce(_ || _))
+  io.isIdle := !(accepted || slice.flag(accepted) || io.port.response.valid || fills || io.port.fill.get.valid ||
+    blocked =/= 0.U || awaited.map(_.isUsed).reduce(_ || _))
   assert(!(io.invalidate && !io.isIdle), "lines are forgotten while some are awaited")
 }
