@@ -13,9 +13,7 @@ import colonnade.memory.{DramPort, SceneMemory, SharedCache}
 
 final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   val register = new RegisterPort(RegisterFile.addressBits(config))
-
-  /** Ready while no frame runs. */
-  val load = Flipped(Decoupled(new Load(config)))
+  val load     = Flipped(Decoupled(new Load(config))) // ready while no frame runs
 
   /** One stream per column, in any order; each pixel of a frame comes once. */
   val pixels = Vec(config.array.columns, Decoupled(new Pixel(config)))
@@ -28,8 +26,7 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   /** With a cache: reads of the scene in DRAM. */
   val memory = config.columnBvhMemory.cache.map(_ => DramPort(config))
 
-  /** The frame is complete; cleared by the next start. */
-  val done = Output(Bool())
+  val done = Output(Bool()) // the frame is complete; cleared by the next start
 }
 
 /** The device: columns of render units, run frame by frame.

@@ -62,7 +62,7 @@ class ShellBench(dut: ColonnadeAxi, config: ColonnadeConfig, shell: ShellConfig,
     host.set("image.windowEnd", end)
     host.set("control", 2)
     until("imageDone")
-    names(host("image.errors"), ImageError.names)
+    names(host("image.errors"), ShellMap.bitsOf("image.errors"))
   }
 
   def framebuffer(base: BigInt, stride: Int, format: Int, window: (BigInt, BigInt)): Unit = {
@@ -73,7 +73,7 @@ class ShellBench(dut: ColonnadeAxi, config: ColonnadeConfig, shell: ShellConfig,
     host.set("framebuffer.windowEnd", window._2)
   }
 
-  def framebufferErrors: Set[String] = names(host("framebuffer.errors"), FramebufferError.names)
+  def framebufferErrors: Set[String] = names(host("framebuffer.errors"), ShellMap.bitsOf("framebuffer.errors"))
 
   /** Waits for an event and clears its interrupt; returns the other ones. */
   def until(event: String, most: Int = 20000): Set[String] = {

@@ -5,15 +5,9 @@ import chisel3.util.{log2Ceil, Decoupled}
 
 /** Numbers of AXI4 that all ports share. */
 object Axi {
-
-  /** Byte addresses: 1 TB. */
-  val addressBits: Int = 40
-
-  /** `burst` of incrementing addresses; the ports use no other kind. */
-  val incr: UInt = 1.U(2.W)
-
-  /** `prot` of all accesses: data, unprivileged and non-secure. */
-  val protection: UInt = 2.U(3.W)
+  val addressBits: Int  = 40       // byte addresses: 1 TB
+  val incr:        UInt = 1.U(2.W) // `burst` of incrementing addresses; the ports use no other kind
+  val protection:  UInt = 2.U(3.W) // `prot` of all accesses: data, unprivileged and non-secure
 
   /** Answers (`resp`): success, and an error of the addressed device. */
   val okay:       UInt = 0.U(2.W)

@@ -6,9 +6,7 @@ import colonnade.axi.{Axi, AxiLite, AxiLitePort}
 
 /** One access to a register. */
 final class RegisterRequest(addressBits: Int) extends Bundle {
-
-  /** Word address. */
-  val address = UInt((addressBits - 2).W)
+  val address = UInt((addressBits - 2).W) // word address
   val isWrite = Bool()
   val data    = UInt(AxiLite.dataBits.W)
 

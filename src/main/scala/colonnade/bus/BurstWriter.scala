@@ -7,14 +7,10 @@ import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 final class BurstWriterIO(config: ColonnadeConfig, shell: ShellConfig) extends Bundle {
-
-  /** Constant while rows are written. */
-  val settings = Input(new FramebufferSettings)
+  val settings = Input(new FramebufferSettings) // constant while rows are written
   val rows     = Flipped(Decoupled(new TileRow(config)))
   val axi      = new AxiWritePort(BurstWriter.idBits, shell.busBytes)
-
-  /** Rows are dropped: a write has failed. */
-  val drop = Input(Bool())
+  val drop     = Input(Bool())                  // rows are dropped: a write has failed
 
   /** A pulse: a row lies outside the window, and is dropped. */
   val isOutside = Output(Bool())

@@ -9,13 +9,6 @@ object Interrupts {
   def count: Int = names.size
 }
 
-/** Bits of `framebuffer.errors`, bit 0 first. */
-object FramebufferError {
-  val names: Seq[String] =
-    Seq("window", "response", "alignment", "format", "photoWindow", "photoResponse")
-  def count: Int = names.size
-}
-
 /** Errors of a frame's way to memory, bit 0 last. */
 final class FramebufferError extends Bundle {
   val photoResponse = Bool()
@@ -24,13 +17,6 @@ final class FramebufferError extends Bundle {
   val alignment     = Bool()
   val response      = Bool()
   val window        = Bool()
-}
-
-/** Bits of `image.errors`, bit 0 first. */
-object ImageError {
-  val names: Seq[String] =
-    Seq("window", "response", "alignment", "magic", "formatHash", "section", "length")
-  def count: Int = names.size
 }
 
 /** Why an image was refused, bit 0 last. Sticky until the next load starts. */
@@ -62,14 +48,12 @@ final class ImageSettings extends Bundle {
 
 /** Where pixels go. */
 final class FramebufferSettings extends Bundle {
-  val base   = UInt(Axi.addressBits.W)
-  val stride = UInt(24.W)
-  val format = UInt(PixelFormat.getWidth.W)
-  val window = new AddressWindow
-  val photo  = new PhotoSettings
-
-  /** To the pixel stream, not to memory. */
-  val toStream = Bool()
+  val base     = UInt(Axi.addressBits.W)
+  val stride   = UInt(24.W)
+  val format   = UInt(PixelFormat.getWidth.W)
+  val window   = new AddressWindow
+  val photo    = new PhotoSettings
+  val toStream = Bool() // to the pixel stream, not to memory
 }
 
 /** The camera's photo, XRGB8888 in sRGB, for the pixels that do not show the object. */

@@ -26,15 +26,13 @@ final class FramebufferWriterIO(config: ColonnadeConfig, shell: ShellConfig) ext
   val photo  = Option.when(config.hasEnvironment)(new AxiReadPort(BurstWriter.idBits, shell.busBytes))
   val stream = Option.when(shell.pixelStream)(Decoupled(new PixelBeat(shell.busBytes)))
 
-  /** A pulse, while idle. */
-  val clearErrors = Input(Bool())
+  val clearErrors = Input(Bool()) // a pulse, while idle
 
   /** All pixels of the frame have come; until idle. */
   val flush  = Input(Bool())
   val isIdle = Output(Bool())
 
-  /** Until cleared. */
-  val errors = Output(new WriterErrors)
+  val errors = Output(new WriterErrors) // until cleared
 }
 
 /** Writes pixels to the framebuffer: encodes them, gathers them to rows of tiles, puts the photo into the pixels that do

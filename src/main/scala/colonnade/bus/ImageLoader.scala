@@ -16,8 +16,7 @@ final class ImageLoaderIO(config: ColonnadeConfig, shell: ShellConfig) extends B
   val axi      = new AxiReadPort(BurstWriter.idBits, shell.busBytes)
   val isIdle   = Output(Bool())
 
-  /** Sticky until the next start. */
-  val errors = Output(new ImageError)
+  val errors = Output(new ImageError) // sticky until the next start
 }
 
 /** Loads a device image from memory: a header, then sections of words for the device's memories; docs/bus-shell.md.

@@ -5,8 +5,7 @@ import chisel3._
 final class InterruptControllerIO extends Bundle {
   private def bits = UInt(Interrupts.count.W)
 
-  /** Pulses of the sources. */
-  val events = Input(bits)
+  val events = Input(bits) // pulses of the sources
 
   /** Writes of the host, 0 without one: status bits to clear, status bits to set. */
   val clear  = Input(bits)
@@ -14,8 +13,7 @@ final class InterruptControllerIO extends Bundle {
   val enable = Input(bits)
   val status = Output(bits)
 
-  /** High while an enabled status bit is set. */
-  val interrupt = Output(Bool())
+  val interrupt = Output(Bool()) // high while an enabled status bit is set
 }
 
 /** A level interrupt. A status bit stays until the host clears it; an event in the same cycle wins. */

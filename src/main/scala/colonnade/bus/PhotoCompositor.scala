@@ -6,9 +6,7 @@ import colonnade.axi.{Axi, AxiReadPort}
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 final class PhotoCompositorIO(config: ColonnadeConfig, shell: ShellConfig) extends Bundle {
-
-  /** Constant while rows are under way. */
-  val settings = Input(new FramebufferSettings)
+  val settings = Input(new FramebufferSettings) // constant while rows are under way
   val rows     = Flipped(Decoupled(new TileRow(config, PixelWord.bits(config))))
   val out      = Decoupled(new TileRow(config))
   val axi      = new AxiReadPort(BurstWriter.idBits, shell.busBytes)
@@ -124,10 +122,6 @@ final class PendingRow(config: ColonnadeConfig, shell: ShellConfig) extends Bund
 }
 
 object PhotoCompositor {
-
-  /** A pixel of the photo, XRGB8888. */
-  val photoBytes: Int = 4
-
-  /** Rows that wait for their part of the photo. */
-  val maxRows: Int = 16
+  val photoBytes: Int = 4  // a pixel of the photo, XRGB8888
+  val maxRows:    Int = 16 // rows that wait for their part of the photo
 }

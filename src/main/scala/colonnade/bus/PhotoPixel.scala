@@ -18,8 +18,7 @@ final class PhotoPixel(config: ColonnadeConfig) extends Module {
   /** See [[PixelWord]]: a shadow ratio, or a pixel that passes as it is. */
   val word = IO(Input(UInt(PixelWord.bits(config).W)))
 
-  /** XRGB8888 */
-  val photo = IO(Input(UInt(32.W)))
+  val photo = IO(Input(UInt(32.W))) // XRGB8888
   val out   = IO(Output(UInt((8 * PixelFormat.maxBytes).W)))
 
   private val ratioBits = FrameRegisters.weight.format.width
@@ -46,10 +45,6 @@ final class PhotoPixel(config: ColonnadeConfig) extends Module {
 }
 
 object PhotoPixel {
-
-  /** Of a linear channel of the photo; all ones is 1.0. */
-  val linearBits: Int = 16
-
-  /** Cycles from a pixel to its word. */
-  val latency: Int = 3 + SrgbEncoder.latency
+  val linearBits: Int = 16                      // of a linear channel of the photo; all ones is 1.0
+  val latency:    Int = 3 + SrgbEncoder.latency // cycles from a pixel to its word
 }

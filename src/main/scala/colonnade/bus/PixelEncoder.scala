@@ -8,11 +8,9 @@ import colonnade.formats.Pixel
 
 /** A pixel as it lies in memory, or the shadow ratio of a pixel that will show the photo. */
 final class EncodedPixel(config: ColonnadeConfig) extends Bundle {
-  val x = UInt(config.numbers.coordinateBits.W)
-  val y = UInt(config.numbers.coordinateBits.W)
-
-  /** See [[PixelWord]]. */
-  val data = UInt(PixelWord.bits(config).W)
+  val x    = UInt(config.numbers.coordinateBits.W)
+  val y    = UInt(config.numbers.coordinateBits.W)
+  val data = UInt(PixelWord.bits(config).W) // see [[PixelWord]]
 }
 
 /** A pixel's word: the low bytes are those of the format. With an environment the highest bit says that the word is a

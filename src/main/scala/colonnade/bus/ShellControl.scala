@@ -6,11 +6,9 @@ import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 final class ShellControlIO extends Bundle {
-  val commands = Input(new ShellCommands)
-  val settings = Input(new FramebufferSettings)
-
-  /** The device has all of its registers. */
-  val writesAreDone = Input(Bool())
+  val commands      = Input(new ShellCommands)
+  val settings      = Input(new FramebufferSettings)
+  val writesAreDone = Input(Bool()) // the device has all of its registers
   val status        = Output(new ShellStatus)
   val events        = Output(UInt(Interrupts.count.W))
 
@@ -30,8 +28,7 @@ final class ShellControlIO extends Bundle {
   val writerIsIdle = Input(Bool())
   val writerErrors = Input(new WriterErrors)
 
-  /** A pulse. */
-  val load         = Output(Bool())
+  val load         = Output(Bool()) // a pulse
   val loaderIsIdle = Input(Bool())
   val loadError    = Input(Bool())
 

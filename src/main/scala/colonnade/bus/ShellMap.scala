@@ -28,13 +28,9 @@ final case class ShellRegister(
 object ShellMap {
   import Access.{ReadOnly, ReadWrite, WriteOnly}
 
-  val addressBits: Int = 16
-
-  /** Word 0 of the device's [[colonnade.formats.RegisterMap]]. */
-  val deviceBase: Int = 0x8000
-
-  /** "CLND" */
-  val identity: BigInt = 0x434c4e44
+  val addressBits: Int    = 16
+  val deviceBase:  Int    = 0x8000     // word 0 of the device's [[colonnade.formats.RegisterMap]]
+  val identity:    BigInt = 0x434c4e44 // "CLND"
 
   /** Major and minor version of these registers. A driver refuses another major version. */
   val version: BigInt = 0x00010002
@@ -59,8 +55,8 @@ object ShellMap {
     interrupt("status", 0x48, ReadWrite, "Events; a written 1 clears its bit."),
     interrupt("enable", 0x4c, ReadWrite, "Events that raise irq."),
     interrupt("test", 0x50, WriteOnly, "A written 1 sets the bit of interrupt.status."),
-    errors("framebuffer", 0x54, FramebufferError.names, "Errors of the last frame that has ended."),
-    errors("image", 0x58, ImageError.names, "Errors of the last load."),
+    errors("framebuffer", 0x54, new FramebufferError, "Errors of the last frame that has ended."),
+    errors("image", 0x58, new ImageError, "Errors of the last load."),
     setting("framebuffer.base", 0x80, byteAddress, "Address of the pixel (0, 0)."),
     setting("framebuffer.windowBase", 0x88, byteAddress, "No frame is written below this address."),
     setting("framebuffer.windowEnd", 0x90, byteAddress, "No frame is written from this address on."),
@@ -78,11 +74,14 @@ object ShellMap {
     setting("stream.enabled", 0x100, 1, "1: frames go to the pixel stream, not to the framebuffer.")
   )
 
+  /** Names of a register's parts, the lowest first. */
+  def bitsOf(register: String): Seq[String] = registers.filter(_.name == register).flatMap(_.fields).map(_.name)
+
   private def interrupt(name: String, address: Int, access: Access, description: String): ShellRegister =
     ShellRegister(s"interrupt.$name", address, Interrupts.count, access, description, bits(Interrupts.names))
 
-  private def errors(of: String, address: Int, names: Seq[String], description: String): ShellRegister =
-    ShellRegister(s"$of.errors", address, names.size, ReadOnly, description, bits(names))
+  private def errors(of: String, address: Int, bits: Bundle, description: String): ShellRegister =
+    ShellRegister(s"$of.errors", address, bits.getWidth, ReadOnly, description, fieldsOf(bits))
 
   private def setting(name: String, address: Int, width: Int, description: String): ShellRegister =
     ShellRegister(name, address, width, ReadWrite, description)
@@ -138,8 +137,8 @@ object ShellMap {
         )
       }),
       "interrupts"        -> ujson.Arr.from(Interrupts.names),
-      "framebufferErrors" -> ujson.Arr.from(FramebufferError.names),
-      "imageErrors"       -> ujson.Arr.from(ImageError.names)
+      "framebufferErrors" -> ujson.Arr.from(bitsOf("framebuffer.errors")),
+      "imageErrors"       -> ujson.Arr.from(bitsOf("image.errors"))
     )
   )
 

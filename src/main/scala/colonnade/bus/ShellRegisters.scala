@@ -192,7 +192,5 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
 }
 
 private object ShellRegisters {
-
-  /** From a request to its answer, which may come from the device. */
-  val answerCycles: Int = 2
+  val answerCycles: Int = 2 // from a request to its answer, which may come from the device
 }

@@ -21,8 +21,7 @@ import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
 final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 
-  /** Constant while a frame runs. */
-  val registers = Input(new FrameRegisters(config))
+  val registers = Input(new FrameRegisters(config)) // constant while a frame runs
 
   /** A frame starts, before its first tile. A load comes only while idle. */
   val start = Input(Bool())
@@ -49,8 +48,7 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   /** If columns share the maps of the environment. */
   val environment = Option.when(config.columnsPerCopy > 1)(AttributePort.ofColumn(config))
 
-  /** Delayed by one cycle. */
-  val events = Output(new EventSums(config, 1))
+  val events = Output(new EventSums(config, 1)) // delayed by one cycle
 }
 
 /** A column: a path tracer, its record memory, the environment's marches and maps, and the textures. A reset clears all but

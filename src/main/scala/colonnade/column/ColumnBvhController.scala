@@ -13,13 +13,10 @@ final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {
   /** By row; a request may be withdrawn until it is accepted. */
   val requests = Vec(config.recordRequesters, Flipped(Decoupled(new RecordRequest(config))))
 
-  /** By bank. */
-  val broadcasts = Output(Vec(banks, Valid(new RecordBroadcast(config))))
+  val broadcasts = Output(Vec(banks, Valid(new RecordBroadcast(config)))) // by bank
   val memory     = Vec(banks, new BankPort(config))
   val events     = Output(new ColumnBvhEvents(config))
-
-  /** No read is in flight. */
-  val isIdle = Output(Bool())
+  val isIdle     = Output(Bool())                                         // no read is in flight
 }
 
 /** Reads records for the render units of a column and broadcasts each one to all of them.

@@ -25,9 +25,7 @@ final class PathTracerIO(config: ColonnadeConfig) extends Bundle {
   val registers = Input(new FrameRegisters(config))
   val start     = Input(Bool())
   val positions = Flipped(Decoupled(new UnitPosition(config)))
-
-  /** In any order. */
-  val pixels = Decoupled(new Pixel(config))
+  val pixels    = Decoupled(new Pixel(config)) // in any order
 
   /** To the column's records: of each traversal unit, and of the path unit for attributes. */
   val requests   = Vec(config.recordRequesters, Decoupled(new RecordRequest(config)))

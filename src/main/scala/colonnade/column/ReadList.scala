@@ -11,7 +11,6 @@ final class Read(config: ColonnadeConfig) extends Bundle {
   val row     = UInt(log2Ceil(config.recordRequesters.max(2)).W)
 }
 
-/** Ports of [[ReadList]]. */
 final class ReadListIO(config: ColonnadeConfig) extends Bundle {
   val push   = Flipped(Decoupled(new Read(config)))
   val oldest = Decoupled(new Read(config))

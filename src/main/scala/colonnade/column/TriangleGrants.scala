@@ -4,11 +4,8 @@ import chisel3._
 import chisel3.util.{log2Ceil, RegEnable}
 import colonnade.common.RoundRobin
 
-/** Ports of [[TriangleGrants]]. */
 final class TriangleGrantsIO(count: Int) extends Bundle {
-
-  /** By row: a record waits. */
-  val waits = Input(UInt(count.W))
+  val waits = Input(UInt(count.W)) // by row: a record waits
 
   /** Records in the queue, at most [[TriangleGroup.queueDepth]], and whether a triangle unit takes one in the next cycle. */
   val queued    = Input(UInt(log2Ceil(TriangleGroup.queueDepth + 1).W))

@@ -10,8 +10,7 @@ final class TriangleGroupIO(config: ColonnadeConfig, count: Int) extends Bundle 
   /** By row. `busy` of the first row counts for all. */
   val rows = Vec(count, new TriangleLanesIO(TraversalConfig(config)))
 
-  /** By row: a record waits for a triangle unit. */
-  val waits = Input(Vec(count, Bool()))
+  val waits = Input(Vec(count, Bool())) // by row: a record waits for a triangle unit
 }
 
 /** Triangle units of a group of rows: docs/triangle.md, triangle groups. A row is chosen one cycle before it may grant a
@@ -60,7 +59,5 @@ final class TriangleGroup(config: ColonnadeConfig, count: Int) extends Module {
 }
 
 object TriangleGroup {
-
-  /** Records that wait for a triangle unit. */
-  val queueDepth: Int = 1
+  val queueDepth: Int = 1 // records that wait for a triangle unit
 }

@@ -3,7 +3,6 @@ package colonnade.common
 import chisel3._
 import chisel3.util.{log2Ceil, RegEnable}
 
-/** Ports of [[DelayLine]]. */
 final class DelayLineIO[T <: Data](value: T) extends Bundle {
   val moves  = Input(Bool()) // the pipeline moves on by one stage
   val writes = Input(Bool()) // `in` is valid and must come out later

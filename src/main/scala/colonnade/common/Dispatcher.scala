@@ -3,7 +3,6 @@ package colonnade.common
 import chisel3._
 import chisel3.util.Decoupled
 
-/** Ports of [[Dispatcher]]. */
 final class DispatcherIO[T <: Data](private val item: T, count: Int) extends Bundle {
   val items  = Flipped(Decoupled(item))
   val takers = Vec(count, Decoupled(item)) // valid only where ready is set: ready must not depend on valid

@@ -3,7 +3,6 @@ package colonnade.common
 import chisel3._
 import chisel3.util.{isPow2, log2Ceil, Decoupled, Valid}
 
-/** Ports of [[ReservedQueue]]. */
 final class ReservedQueueIO[T <: Data](item: T) extends Bundle {
   val in  = Flipped(Valid(item)) // only while the queue has space
   val out = Decoupled(item)

@@ -95,19 +95,15 @@ object AttributeLayout {
   val pointerBits: Int = 13
   val modeBits:    Int = 3
 
-  /** Width of a stored index into a palette or into the plane table. */
-  val indexBits: Int = 8
-
-  /** Width of a component of a palette entry. */
-  val componentBits: Int = 12
+  val indexBits:     Int = 8  // width of a stored index into a palette or into the plane table
+  val componentBits: Int = 12 // width of a component of a palette entry
   val entryBits:     Int = 3 * componentBits
 
   val mapDescriptorBits:   Int = modeBits + pointerBits + 2 * indexBits
   val planeDescriptorBits: Int = modeBits + pointerBits
 
-  /** Width of the exponent that the coefficients of a plane share. */
   val coefficientBits: Int = 20
-  val exponentBits:    Int = 4
+  val exponentBits:    Int = 4 // of the exponent that the coefficients of a plane share
   val planeBits:       Int = 3 * coefficientBits + exponentBits
 
   /** Size of a bounding plane, rounded up to heap words. */

@@ -20,8 +20,7 @@ object ArrayConfig {
   val maxRows:     Int = 256
   val maxColumns:  Int = 256
 
-  /** Maximum number of traversal units: twelve times `edge`. */
-  val maxUnits: Int = 1024
+  val maxUnits: Int = 1024 // maximum number of traversal units: twelve times `edge`
 }
 
 /** Operand widths, the paper's mixed precision: `32b32s64d` is mac 32, sqrt 32, div 64.

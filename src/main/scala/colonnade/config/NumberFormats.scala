@@ -131,19 +131,14 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
 }
 
 object NumberFormats {
-
-  /** The scene reaches this many doublings beyond the object's cube. */
-  val reachBits: Int = 8
+  val reachBits: Int = 8 // the scene reaches this many doublings beyond the object's cube
 
   /** A stored normal component: signed, [[normalFraction]] fraction bits. */
   val normalBits:     Int = 12
   val normalFraction: Int = 11
 
-  /** A linear colour channel, unsigned; all ones is 1.0. */
-  val colourBits: Int = 12
-
-  /** A light's intensity per channel, unsigned. */
-  val lightBits:     Int = 16
+  val colourBits:    Int = 12 // a linear colour channel, unsigned; all ones is 1.0
+  val lightBits:     Int = 16 // a light's intensity per channel, unsigned
   val lightFraction: Int = 12
 
   /** A relative refractive index, or its reciprocal, unsigned: below 8, and so is its square up to 2.8. */

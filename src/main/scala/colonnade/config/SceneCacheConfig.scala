@@ -73,9 +73,7 @@ final case class SceneCacheConfig(
 }
 
 object SceneCacheConfig {
-
-  /** Records of a line. */
-  val lineRecords: Int = 4
+  val lineRecords: Int = 4 // records of a line
 
   /** Records of the smallest scene memory: a line in each of four banks, twice. */
   val leastDepth: Int = 32

@@ -44,9 +44,7 @@ final case class TextureLayout(bytes: Int) extends TileGrid {
 }
 
 object TextureLayout {
-
-  /** Edge of the atlas, texels. */
-  val edge: Int = 512
+  val edge: Int = 512 // edge of the atlas, texels
 
   /** The layout of a configuration with textures. */
   def of(config: ColonnadeConfig): TextureLayout =

@@ -4,7 +4,6 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Mux1H, OHToUInt, Pipe, Queue}
 import colonnade.common.RoundRobin
 
-/** Ports of [[AttributeArbiter]]. */
 final class AttributeArbiterIO[Q <: Data, R <: Data](request: Q, response: R, count: Int, tagBits: Int) extends Bundle {
   val requesters = Vec(count, Flipped(new AttributeChannel(request, response, tagBits)))
 

@@ -3,7 +3,6 @@ package colonnade.environment
 import chisel3._
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 
-/** Ports of [[AttributeConcentrator]]. */
 final class AttributeConcentratorIO(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Bundle {
   private val layout = AttributeLayout.of(config)
 

@@ -5,7 +5,6 @@ import chisel3.util.{log2Ceil, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{AttributeMemories, AttributeMemory, Load}
 
-/** Ports of [[AttributeStore]]. */
 final class AttributeStoreIO(config: ColonnadeConfig, memory: AttributeMemory) extends Bundle {
   val load = Flipped(Valid(new Load(config))) // only while no frame runs
   val read = Flipped(Valid(UInt(log2Ceil(memory.depth).W)))

@@ -5,7 +5,6 @@ import chisel3.util.{Cat, Pipe, RegEnable, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{Load, PlaneDescriptor}
 
-/** Ports of [[CellLookup]]. */
 final class CellLookupIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   private val layout = AttributeLayout.of(config)
 

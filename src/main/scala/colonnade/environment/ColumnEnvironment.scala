@@ -5,7 +5,6 @@ import chisel3.util.Valid
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{AttributeEvents, Load}
 
-/** Ports of [[ColumnEnvironment]]. */
 final class ColumnEnvironmentIO(config: ColonnadeConfig) extends Bundle {
   val load = Flipped(Valid(new Load(config))) // only while no request is in flight
 

@@ -15,7 +15,6 @@ final class DirectDistance(config: PathConfig) extends Bundle {
   val distance = UInt((formats.f + 1).W)
 }
 
-/** Ports of [[DirectDepth]]. */
 final class DirectDepthIO(config: PathConfig) extends Bundle {
   val view = Input(new EnvironmentView(config.numbers))
 

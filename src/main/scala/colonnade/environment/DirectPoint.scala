@@ -16,7 +16,6 @@ final class DirectPixel(config: PathConfig) extends Bundle {
   val hitDistance = HitDistance(config)
 }
 
-/** Ports of [[DirectPoint]]. */
 final class DirectPointIO(config: PathConfig) extends Bundle {
   val view   = Input(new EnvironmentView(config.numbers))
   val origin = Input(Vec3(new Fixed(new RayFormats(config.numbers).scene))) // the camera's position, grid steps

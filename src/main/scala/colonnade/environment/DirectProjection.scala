@@ -23,7 +23,6 @@ final class DirectRate(config: PathConfig) extends Bundle {
   val isReceding = Bool()
 }
 
-/** Ports of [[DirectProjection]]. */
 final class DirectProjectionIO(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config)
 

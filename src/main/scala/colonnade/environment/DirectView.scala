@@ -6,7 +6,6 @@ import colonnade.common.ReservedQueue
 import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.{AlbedoEntry, EnvironmentView, NormalEntry, Plane}
 
-/** Ports of [[DirectView]]. */
 final class DirectViewIO(config: PathConfig) extends Bundle {
   val view = Input(new EnvironmentView(config.numbers)) // constant while a frame runs
 

@@ -14,7 +14,6 @@ final class MarchSums(config: PathConfig) extends Bundle {
   val illegalRecord   = Bool()
 }
 
-/** Ports of [[EnvironmentMarches]]. */
 final class EnvironmentMarchesIO(config: PathConfig) extends Bundle {
   val view  = Input(new EnvironmentView(config.numbers)) // constant while a frame runs
   val paths = Flipped(new MarchPort(config))

@@ -12,7 +12,6 @@ final class StoredRay(config: PathConfig) extends Bundle {
   val ray     = new EnvironmentRay(config)
 }
 
-/** Ports of [[EnvironmentRays]]. */
 final class EnvironmentRaysIO(config: PathConfig) extends Bundle {
   val isMapCamera = Input(Bool())                         // direct views are for the pipeline, not for the marches
   val ray         = Flipped(Valid(new StoredRay(config))) // stored in place of the context's previous ray

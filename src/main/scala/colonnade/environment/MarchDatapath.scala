@@ -21,17 +21,13 @@ final class MarchAddition(bits: Int) extends Bundle {
     Rounding.narrow(base + (addend ^ Mux(subtract, (-1).S(bits.W), 0.S(bits.W))) + Cat(0.U(1.W), subtract).asSInt, bits)
 }
 
-/** Ports of [[MarchDatapath]]. */
 final class MarchDatapathIO(formats: MarchFormats) extends Bundle {
   import formats._
 
-  /** Latches a product. */
-  val multiply = Flipped(Valid(new MarchFactors(formats)))
+  val multiply = Flipped(Valid(new MarchFactors(formats)))  // latches a product
   val product  = Output(SInt(productBits.W))
-
-  /** Latches a sum. */
-  val add = Flipped(Valid(new MarchAddition(sumBits)))
-  val sum = Output(SInt(sumBits.W))
+  val add      = Flipped(Valid(new MarchAddition(sumBits))) // latches a sum
+  val sum      = Output(SInt(sumBits.W))
 
   /** Bits of the sum without its sign, in this cycle; and as latched. */
   val sumExponent   = Output(UInt(exponentBits.W))

@@ -81,7 +81,6 @@ final class MarchEvents extends Bundle {
   val illegal = Bool() // a response to the current ray was illegal
 }
 
-/** Ports of [[EnvironmentMarch]]. */
 final class EnvironmentMarchIO(config: PathConfig) extends Bundle {
   private val layout = AttributeLayout.of(config)
 

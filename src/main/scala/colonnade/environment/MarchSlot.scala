@@ -5,7 +5,6 @@ import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.EnvironmentView
 
-/** Ports of [[MarchSlot]]. */
 final class MarchSlotIO(config: PathConfig) extends Bundle {
   val view    = Input(new EnvironmentView(config.numbers)) // constant while a frame runs
   val order   = Flipped(Valid(new MarchOrder(config)))     // only in a cycle after one with `isEmpty`

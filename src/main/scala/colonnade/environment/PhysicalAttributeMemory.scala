@@ -5,7 +5,6 @@ import chisel3.util.Valid
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{AlbedoEntry, AttributeEvents, Load, NormalEntry}
 
-/** Ports of [[PhysicalAttributeMemory]]. */
 final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Bundle {
   val load   = Flipped(Valid(new Load(config))) // only while no request is in flight
   val ports  = Vec(requesters, Flipped(new AttributePort(AttributeLayout.of(config), tagBits)))

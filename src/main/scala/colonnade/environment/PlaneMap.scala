@@ -5,7 +5,6 @@ import chisel3.util.Valid
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{BoundingPlaneEntry, Load}
 
-/** Ports of [[PlaneMap]]. */
 final class PlaneMapIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   private val layout = AttributeLayout.of(config)
 

@@ -5,7 +5,6 @@ import chisel3.util.{RegEnable, Valid}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
 import colonnade.formats.{BoundingPlaneEntry, Load, Plane}
 
-/** Ports of [[PlaneTable]]. */
 final class PlaneTableIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   val load   = Flipped(Valid(new Load(config)))
   val planes =

@@ -99,13 +99,7 @@ final class RayClip(m: MarchOperations, stepper: TileStepper, resolver: HitResol
 }
 
 object RayClip {
-
-  /** Near, left, right, top, bottom. */
-  val planes: Int = 5
-
-  /** Log2 of the planes within a pixel. */
-  val insetLog: Int = 2
-
-  /** The exponent of no way; less than that of any way. */
-  val noWay: Int = -1024
+  val planes:   Int = 5     // near, left, right, top, bottom
+  val insetLog: Int = 2     // log2 of the planes within a pixel
+  val noWay:    Int = -1024 // the exponent of no way; less than that of any way
 }

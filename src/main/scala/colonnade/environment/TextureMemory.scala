@@ -6,7 +6,6 @@ import colonnade.config.{PathConfig, TextureLayout}
 import colonnade.formats.{AlbedoEntry, Load}
 import colonnade.shading.TexturePort
 
-/** Ports of [[TextureMemory]]. */
 final class TextureMemoryIO(config: PathConfig) extends Bundle {
   val load = Flipped(Valid(new Load(config))) // only while no request is in flight
 

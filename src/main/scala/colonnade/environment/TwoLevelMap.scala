@@ -5,7 +5,6 @@ import chisel3.util.{Cat, MuxLookup, Pipe, RegEnable, Valid}
 import colonnade.config.{ColonnadeConfig, TileGrid}
 import colonnade.formats.{Load, MapDescriptor}
 
-/** Ports of [[TwoLevelMap]]. */
 final class TwoLevelMapIO[T <: Data](config: ColonnadeConfig, layout: TileGrid, entry: T, tagBits: Int)
     extends Bundle {
   val load   = Flipped(Valid(new Load(config)))

@@ -49,7 +49,5 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
 object EnvironmentView {
   val rotationBits:     Int = 16
   val rotationFraction: Int = 14
-
-  /** Fraction bits of a step beyond those of a position in the map. */
-  val stepGuard: Int = 12
+  val stepGuard:        Int = 12 // fraction bits of a step beyond those of a position in the map
 }

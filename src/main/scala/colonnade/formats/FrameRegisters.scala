@@ -122,11 +122,8 @@ object SceneInDram {
   val pageBits:    Int = addressBits - pageLog
 }
 
-/** The registers that the host writes before a frame. Constant while a frame runs.
-  *
-  * A record, not a bundle, because `environment` exists only with a physical-attribute memory.
-  */
-final class FrameRegisters(config: ColonnadeConfig) extends Record {
+/** The registers that the host writes before a frame. Constant while a frame runs. */
+final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
   private val numbers = config.numbers
 
   val frame       = new FrameSettings(numbers)
@@ -140,26 +137,10 @@ final class FrameRegisters(config: ColonnadeConfig) extends Record {
   val scene       = new SceneMap(RecordFormats.idBits(config))
   val environment = config.physicalAttributeMemory.map(_ => new EnvironmentView(numbers))
   val dram        = config.columnBvhMemory.cache.map(_ => new SceneInDram)
-
-  val elements: SeqMap[String, Data] = FrameRegisters.fields(
-    Seq(
-      "frame"      -> frame,
-      "camera"     -> camera,
-      "lights"     -> lights,
-      "ambient"    -> ambient,
-      "shading"    -> shading,
-      "background" -> background,
-      "materials"  -> materials,
-      "bounds"     -> bounds,
-      "scene"      -> scene
-    ) ++ environment.map("environment" -> _) ++ dram.map("dram" -> _): _*
-  )
 }
 
 object FrameRegisters {
-
-  /** The outline of a box has at most this many edges. */
-  val outlineEdges: Int = 6
+  val outlineEdges: Int = 6 // the outline of a box has at most this many edges
 
   /** A light's intensity in one channel. */
   def intensity: Fixed = new Fixed(FixedPointFormat.unsigned(NumberFormats.lightBits, NumberFormats.lightFraction))

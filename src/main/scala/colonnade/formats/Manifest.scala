@@ -8,9 +8,7 @@ import colonnade.formats.Access.ReadWrite
   * records, registers and streams. The generator writes it beside the Verilog; packer, model and harness read it.
   */
 object Manifest {
-
-  /** Incremented when a key changes its meaning or leaves. */
-  val version: Int = 2
+  val version: Int = 2 // incremented when a key changes its meaning or leaves
 
   def apply(config: ColonnadeConfig): ujson.Obj = {
     val formats = new RecordFormats(config)

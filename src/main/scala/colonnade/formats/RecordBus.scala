@@ -13,9 +13,7 @@ final class RecordRequest(config: ColonnadeConfig) extends Bundle {
 final class RecordBroadcast(config: ColonnadeConfig) extends Bundle {
   val address = UInt(RecordFormats.addressBits(config).W)
   val record  = new RecordFormats(config).record
-
-  /** The row that requested it. */
-  val row = UInt(log2Ceil(config.recordRequesters.max(2)).W)
+  val row     = UInt(log2Ceil(config.recordRequesters.max(2)).W) // the row that requested it
 
   /** With a cache: this is no record. The cache awaits it, and another broadcast will bring it. */
   val isLater = if (config.columnBvhMemory.cache.nonEmpty) Some(Bool()) else None

@@ -29,11 +29,9 @@ final class NodeRecord(config: ColonnadeConfig) extends Bundle {
   val exponent       = Vec3(UInt(RecordFormats.exponentBits(config).W))
   val firstChild     = UInt(address.W)
   val firstTriangles = UInt(address.W)
-
-  /** See [[ChildKind]]. */
-  val kinds = Vec(geometry.arity, UInt(ChildKind.bits.W))
-  val low   = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
-  val high  = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
+  val kinds          = Vec(geometry.arity, UInt(ChildKind.bits.W)) // see [[ChildKind]]
+  val low            = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
+  val high           = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
 
   /** The guarantees that every reader relies on: known kinds, boxes within two cubes, and child nodes at higher addresses,
     * so that no traversal returns to a node. The record fetch reports other illegal child addresses.
@@ -53,8 +51,7 @@ final class NodeRecord(config: ColonnadeConfig) extends Bundle {
 final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
   private val geometry = config.geometry
 
-  /** Packed id of triangle 0. */
-  val firstTriangle = UInt(RecordFormats.idBits(config).W)
+  val firstTriangle = UInt(RecordFormats.idBits(config).W) // packed id of triangle 0
 
   /** From 1 to `trianglesPerRecord`. */
   val count = UInt(NumberFormats.bitLength(geometry.trianglesPerRecord).W)
@@ -65,7 +62,6 @@ final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
   /** Three per triangle, in vertex units. */
   val vertices = Vec(3 * geometry.trianglesPerRecord, Vec3(UInt(geometry.vertexBits.W)))
 
-  /** `count` is in range. */
   def isLegal: Bool = count =/= 0.U && count <= geometry.trianglesPerRecord.U
 }
 
@@ -73,8 +69,7 @@ final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
 final class Face(config: ColonnadeConfig) extends Bundle {
   private val component = new Fixed(FixedPointFormat.signed(NumberFormats.normalBits, NumberFormats.normalFraction))
 
-  /** One per vertex. */
-  val normals         = Vec(3, Vec3(component))
+  val normals         = Vec(3, Vec3(component)) // one per vertex
   val geometricNormal = Vec3(component)
 
   /** The linear albedo at each vertex, for materials with `hasCornerColours`; for those with `hasTexture` red and
@@ -82,8 +77,7 @@ final class Face(config: ColonnadeConfig) extends Bundle {
     */
   val colours = if (config.geometry.cornerColours) Some(Vec(3, Rgb(FrameRegisters.colour))) else None
 
-  /** Index into the material table. */
-  val material = UInt(RecordFormats.materialBits.W)
+  val material = UInt(RecordFormats.materialBits.W) // index into the material table
 }
 
 /** Faces in the order of packed ids: face t is in record `attributeBase + t / facesPerRecord`, slot `t % facesPerRecord`. */
@@ -94,7 +88,6 @@ final class AttributesRecord(config: ColonnadeConfig) extends Bundle {
 /** The records of the column BVH memory. All kinds have one width; a kind uses the low bits that it needs. */
 final class RecordFormats(config: ColonnadeConfig) {
 
-  /** Width of a record address. */
   val addressBits: Int = RecordFormats.addressBits(config)
 
   /** Width of a number of records, and of a packed triangle id. */
@@ -107,7 +100,6 @@ final class RecordFormats(config: ColonnadeConfig) {
   /** The widest kind, rounded up to whole 32-bit words. */
   val recordBits: Int = (Seq(node, triangles, attributes).map(_.getWidth).max + 31) / 32 * 32
 
-  /** A record in memory. */
   def record: UInt = UInt(recordBits.W)
 
   def asNode(record:       UInt): NodeRecord       = as(record, node)
@@ -119,7 +111,6 @@ final class RecordFormats(config: ColonnadeConfig) {
 
 object RecordFormats {
 
-  /** Width of a material index. */
   val materialBits: Int = 8
 
   /** Faces per attribute record: a power of two, so that a packed id splits into record and slot. */

@@ -6,11 +6,9 @@ import colonnade.config.ColonnadeConfig
 
 /** The host's port to the registers: one word per cycle. */
 final class RegisterPort(addressBits: Int) extends Bundle {
-  val write = Input(Bool())
-  val read  = Input(Bool())
-
-  /** Word address. */
-  val address   = Input(UInt(addressBits.W))
+  val write     = Input(Bool())
+  val read      = Input(Bool())
+  val address   = Input(UInt(addressBits.W)) // word address
   val writeData = Input(UInt(RegisterMap.dataBits.W))
 
   /** Result of the last read, from one cycle after it until the next read. Unused bits and unknown addresses read as 0. */

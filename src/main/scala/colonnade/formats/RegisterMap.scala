@@ -35,9 +35,7 @@ final case class Register(
   * as 0.
   */
 object RegisterMap {
-
-  /** Width of a word. */
-  val dataBits: Int = 32
+  val dataBits: Int = 32 // of a word
 
   /** A kind of register.
     *

@@ -17,11 +17,9 @@ final class PixelHit(config: ColonnadeConfig) extends Bundle {
 
 /** A finished pixel. */
 final class Pixel(config: ColonnadeConfig) extends Bundle {
-  val x = UInt(config.numbers.coordinateBits.W)
-  val y = UInt(config.numbers.coordinateBits.W)
-
-  /** A linear colour. */
-  val colour   = Rgb(FrameRegisters.colour)
+  val x        = UInt(config.numbers.coordinateBits.W)
+  val y        = UInt(config.numbers.coordinateBits.W)
+  val colour   = Rgb(FrameRegisters.colour) // a linear colour
   val isObject = Bool()
 
   /** The shadow ratio: the fraction of the light that the object leaves to a pixel of the environment; 1 for others. */
@@ -31,9 +29,7 @@ final class Pixel(config: ColonnadeConfig) extends Bundle {
 
 /** The target memory of a [[Load]]. */
 object LoadTarget {
-
-  /** The first of the [[AttributeMemories]]. */
-  val firstAttributes: Int = 1
+  val firstAttributes: Int = 1 // the first of the [[AttributeMemories]]
 
   def bits(config: ColonnadeConfig): Int = log2Ceil(firstAttributes + AttributeMemories(config).size).max(2)
 
@@ -50,6 +46,5 @@ final class Load(config: ColonnadeConfig) extends Bundle {
   /** Wide enough for the deepest memory. */
   val address = UInt((formats.addressBits +: AttributeMemories(config).map(m => log2Ceil(m.depth))).max.W)
 
-  /** A word of another memory is in the low bits. */
-  val record = formats.record
+  val record = formats.record // a word of another memory is in the low bits
 }

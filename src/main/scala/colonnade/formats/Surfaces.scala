@@ -4,8 +4,6 @@ import chisel3._
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
-import scala.collection.immutable.SeqMap
-
 /** A point light. `colour` is its intensity at the squared distance `reachMantissa · 2^reachExponent`, in grid steps; the
   * intensity falls with the squared distance. A mantissa of 0 disables falloff.
   */
@@ -16,8 +14,7 @@ final class Light(numbers: NumberFormats) extends Bundle {
   val reachExponent = SInt((NumberFormats.bitLength(2 * numbers.sceneBits) + 1).W)
 }
 
-/** A record, not a bundle, because some fields exist only with bounces. */
-final class Shading(config: ColonnadeConfig) extends Record {
+final class Shading(config: ColonnadeConfig) extends Bundle {
   private def ifBounces[T](field: => T): Option[T] = if (config.frame.hasBounces) Some(field) else None
 
   /** Shade with geometric normals instead of vertex normals; send shadow rays. */
@@ -35,11 +32,6 @@ final class Shading(config: ColonnadeConfig) extends Record {
 
   /** Transmittance of transmissive triangles for shadow rays. */
   val shadowTransmittance = ifBounces(FrameRegisters.weight)
-
-  val elements: SeqMap[String, Data] = FrameRegisters.fields(
-    Seq("flat" -> flat, "shadows" -> shadows, "lights" -> lights, "offset" -> offset) ++
-      bounces.map("bounces" -> _) ++ shadowTransmittance.map("shadowTransmittance" -> _): _*
-  )
 }
 
 /** The interaction of a ray with a surface. */
@@ -53,12 +45,10 @@ object MaterialKind {
   /** Refracts, and reflects by Schlick's approximation. */
   def glass: UInt = last.U(bits.W)
 
-  /** The last kind. */
   val last: BigInt = 2
 }
 
-/** A record, not a bundle, because a material without bounces has no kind. */
-final class Material(config: ColonnadeConfig) extends Record {
+final class Material(config: ColonnadeConfig) extends Bundle {
   private def ifBounces[T](field: => T): Option[T] = if (config.frame.hasBounces) Some(field) else None
   private def eta = new Fixed(FixedPointFormat.unsigned(NumberFormats.etaBits, NumberFormats.etaFraction))
 
@@ -84,10 +74,4 @@ final class Material(config: ColonnadeConfig) extends Record {
 
   /** Glass: reflectance at normal incidence. */
   val reflectance = ifBounces(FrameRegisters.weight)
-
-  val elements: SeqMap[String, Data] = FrameRegisters.fields(
-    Seq("albedo" -> albedo) ++ hasCornerColours.map("hasCornerColours" -> _) ++
-      hasTexture.map("hasTexture" -> _) ++ emission.map("emission" -> _) ++ kind.map("kind" -> _) ++
-      etaFront.map("etaFront" -> _) ++ etaBack.map("etaBack" -> _) ++ reflectance.map("reflectance" -> _): _*
-  )
 }

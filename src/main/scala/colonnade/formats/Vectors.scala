@@ -8,7 +8,6 @@ final class Vec3[T <: Data](private val component: T) extends Bundle {
   val y = component.cloneType
   val z = component.cloneType
 
-  /** Axis 0, 1, 2. */
   def axes: Seq[T] = Seq(x, y, z)
 }
 
@@ -16,13 +15,13 @@ object Vec3 {
   def apply[T <: Data](component: T): Vec3[T] = new Vec3(component)
 
   /** A wire with these components. */
-  def of[T <: Data](x: T, y: T, z: T): Vec3[T] = {
-    val vector = Wire(new Vec3(chiselTypeOf(x)))
-    vector.x := x
-    vector.y := y
-    vector.z := z
+  def of[T <: Data](components: Seq[T]): Vec3[T] = {
+    val vector = Wire(new Vec3(chiselTypeOf(components.head)))
+    vector.axes.zip(components).foreach { case (to, from) => to := from }
     vector
   }
+
+  def of[T <: Data](x: T, y: T, z: T): Vec3[T] = of(Seq(x, y, z))
 }
 
 /** Red, green and blue; `r` is the most significant. */

@@ -15,8 +15,7 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val others = Vec(TileKind.all(config).size - 1, Flipped(Decoupled(new PixelPosition(config))))
   val pixels = Decoupled(new Pixel(config))
 
-  /** No pixel of a tile is left. */
-  val isIdle = Output(Bool())
+  val isIdle = Output(Bool()) // no pixel of a tile is left
 }
 
 /** Colours the pixels that show the background, in parallel with the render units: all pixels of its own tiles, and those

@@ -15,8 +15,7 @@ final class EnvironmentWalkerIO(config: ColonnadeConfig) extends Bundle {
   val positions = Decoupled(new PixelPosition(config))
   val others    = Decoupled(new PixelPosition(config))
 
-  /** No pixel of a tile is left. */
-  val isIdle = Output(Bool())
+  val isIdle = Output(Bool()) // no pixel of a tile is left
 }
 
 /** Walks the tiles that show the environment and not the object, and sorts out their pixels outside the window.

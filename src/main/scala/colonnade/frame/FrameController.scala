@@ -35,22 +35,18 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   /** No read of the scene is in flight outside the columns. */
   val memoryIsIdle = Input(Bool())
 
-  /** A frame starts: resets the state of the previous one. */
-  val frameStart = Output(Bool())
+  val frameStart = Output(Bool()) // a frame starts: resets the state of the previous one
 
   /** From the cycle after the start to the cycle of the last pixel. */
   val isRunning = Output(Bool())
 
-  /** Resets the columns. */
-  val aborts = Output(Bool())
+  val aborts = Output(Bool()) // resets the columns
 
   /** A frame ends without the answers to its reads, see [[memoryIsIdle]]. */
   val memoryTimeout = Output(Bool())
 
-  val status = Output(new Status)
-
-  /** Sticky until the next start. */
-  val watchdogError = Output(Bool())
+  val status        = Output(new Status)
+  val watchdogError = Output(Bool()) // sticky until the next start
 }
 
 /** Runs frames: dispatches tiles of all kinds in parallel, waits for the last pixel, and ends the

@@ -15,11 +15,9 @@ final class GridCell(levels: Int) extends Bundle {
 }
 
 final class MortonScanIO(levels: Int) extends Bundle {
-  val size  = Flipped(Decoupled(new GridSize(levels)))
-  val cells = Decoupled(new GridCell(levels))
-
-  /** No cell is left. */
-  val isIdle = Output(Bool())
+  val size   = Flipped(Decoupled(new GridSize(levels)))
+  val cells  = Decoupled(new GridCell(levels))
+  val isIdle = Output(Bool()) // no cell is left
 }
 
 /** Scans the cells of a grid in Morton order, so that consecutive cells are close to each other.

@@ -51,13 +51,9 @@ private[frame] final class TwoStages(in: DecoupledIO[Data], out: DecoupledIO[Dat
 final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
   val frame  = Input(new FrameSettings(config.numbers))
   val window = Input(new EnvironmentWindow(config))
-
-  /** The first pixels of tiles. */
-  val tiles  = Flipped(Decoupled(new PixelPosition(config)))
+  val tiles  = Flipped(Decoupled(new PixelPosition(config))) // the first pixels of tiles
   val tested = Decoupled(new TestedTile(config))
-
-  /** No tile is inside. */
-  val isIdle = Output(Bool())
+  val isIdle = Output(Bool())                                // no tile is inside
 }
 
 /** Tests tiles against the object's rectangle and outline. A tile meets the object unless it is outside the rectangle or

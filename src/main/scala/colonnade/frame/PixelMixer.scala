@@ -12,8 +12,7 @@ final class PixelMixerIO(config: ColonnadeConfig) extends Bundle {
   val environment = Flipped(Decoupled(new PixelPosition(config)))
   val positions   = Decoupled(new UnitPosition(config))
 
-  /** A pixel of `environment` has left the column. */
-  val leaves = Input(Bool())
+  val leaves = Input(Bool()) // a pixel of `environment` has left the column
 }
 
 /** Mixes the pixels of two tiles: those of the environment use units that those of the object leave idle, and the other

@@ -14,8 +14,7 @@ final class PixelTestIO(config: ColonnadeConfig) extends Bundle {
   val edgeValues = Input(EdgeValues(config))
   val tested     = Decoupled(new TestedSquare(config))
 
-  /** No pixel is inside. */
-  val isIdle = Output(Bool())
+  val isIdle = Output(Bool()) // no pixel is inside
 }
 
 /** Tests pixels of tiles that meet the object, like [[OutlineTest]]: exactly, but from the edge functions of the tile, so

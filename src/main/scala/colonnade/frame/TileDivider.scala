@@ -5,12 +5,9 @@ import chisel3.util.{log2Ceil, Cat, Decoupled}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.FrameSettings
 
-/** Ports of [[TileDivider]]. */
 final class TileDividerIO(config: ColonnadeConfig) extends Bundle {
-  val frame = Input(new FrameSettings(config.numbers))
-
-  /** Off: tiles pass as they are. */
-  val divides = Input(Bool())
+  val frame   = Input(new FrameSettings(config.numbers))
+  val divides = Input(Bool()) // off: tiles pass as they are
   val tiles   = Flipped(Decoupled(new ObjectTile(config)))
   val parts   = Decoupled(new ObjectTile(config))
 }

@@ -6,15 +6,11 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{FrameSettings, PixelPosition}
 
 final class TileScanIO(config: ColonnadeConfig) extends Bundle {
-  val frame = Input(new FrameSettings(config.numbers))
-
-  /** Tiles are squares of a [[TileDivider]]. */
-  val isDivided = Input(Bool())
+  val frame     = Input(new FrameSettings(config.numbers))
+  val isDivided = Input(Bool())  // tiles are squares of a [[TileDivider]]
   val tiles     = Flipped(Decoupled(new Tile(config)))
   val positions = Decoupled(new PixelPosition(config))
-
-  /** No pixel is left. */
-  val isIdle = Output(Bool())
+  val isIdle    = Output(Bool()) // no pixel is left
 }
 
 /** The pixels of a tile, clipped at the frame's edge, in Morton order.

@@ -9,15 +9,12 @@ import colonnade.formats.FrameSettings
 final class TileSchedulerIO(config: ColonnadeConfig, kind: TileKind.Value) extends Bundle {
   val frame  = Input(new FrameSettings(config.numbers))
   val window = Input(new EnvironmentWindow(config))
-
-  /** Starts the tiles of a frame; only while idle. */
-  val start = Input(Bool())
+  val start  = Input(Bool()) // starts the tiles of a frame; only while idle
 
   /** Valid only where ready is set, see `Dispatcher`. */
   val tiles = Vec(config.array.columns, Decoupled(Tile(config, kind)))
 
-  /** No tile is left. */
-  val isIdle = Output(Bool())
+  val isIdle = Output(Bool()) // no tile is left
 }
 
 /** Dispatches the tiles of a frame that are of one kind, in Morton order, to ready columns, round-robin. A [[TileDivider]]

@@ -18,11 +18,8 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val positions = Decoupled(new UnitPosition(config))
   val window    = Input(new EnvironmentWindow(config))
 
-  /** Pixels that show the background. */
-  val others = Decoupled(new PixelPosition(config))
-
-  /** No pixel is left. */
-  val isIdle = Output(Bool())
+  val others = Decoupled(new PixelPosition(config)) // pixels that show the background
+  val isIdle = Output(Bool())                       // no pixel is left
 }
 
 /** Sorts the pixels of a tile, in the order of [[TileScan]]: those that may show the object or the environment are rendered,
@@ -76,9 +73,7 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
 }
 
 object TileWalker {
-
-  /** Pixels outside the object that wait for the background walker. */
-  val maxOthers: Int = 64
+  val maxOthers: Int = 64 // pixels outside the object that wait for the background walker
 
   /** Pixels of a tile of the environment that are in flight at most: about those that the pipelines of the marches hold. */
   def maxEnvironment(config: ColonnadeConfig): Int = (config.units.pathContexts * 3 / 8).max(1)

@@ -2,17 +2,13 @@ package colonnade.frame
 
 import chisel3._
 
-/** Ports of [[Watchdog]]. */
 final class WatchdogIO(bits: Int) extends Bundle {
 
   /** Cycles without progress until it expires; 0 disables it. */
   val limit = Input(UInt(bits.W))
 
-  /** Resets the count. */
-  val restart = Input(Bool())
-
-  /** Do not count this cycle. */
-  val hold = Input(Bool())
+  val restart = Input(Bool()) // resets the count
+  val hold    = Input(Bool()) // do not count this cycle
 
   val isExpired = Output(Bool())
 }

@@ -15,9 +15,7 @@ final class BankResponse(config: ColonnadeConfig) extends Bundle {
 
 /** The read port of one bank. Responses come in the order of requests, and cannot be stalled. */
 final class BankPort(config: ColonnadeConfig) extends Bundle {
-
-  /** Address in the bank. */
-  val request  = Decoupled(UInt(Banks.addressBits(config).W))
+  val request  = Decoupled(UInt(Banks.addressBits(config).W)) // address in the bank
   val response = Flipped(Valid(new BankResponse(config)))
 
   /** From a cache: a record that nobody requests in this cycle, and its address in the bank; never with a response. */

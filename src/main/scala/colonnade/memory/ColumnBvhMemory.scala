@@ -6,9 +6,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.formats.{Banks, Load, LoadTarget, RecordFormats}
 
 final class ColumnBvhMemoryIO(config: ColonnadeConfig) extends Bundle {
-
-  /** Only while no read is in flight. */
-  val load = Flipped(Valid(new Load(config)))
+  val load = Flipped(Valid(new Load(config))) // only while no read is in flight
 
   /** By bank: the bank neither accepts nor responds. */
   val holds = if (config.columnBvhMemory.holdable) Some(Input(UInt(config.columnBvhMemory.banks.W))) else None

@@ -12,14 +12,12 @@ final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
   val request = Decoupled(UInt(Lines.lineBits(config).W))
   val lines   = Input(new LineBroadcast(config))
 
-  /** Forgets all lines; only while idle. */
-  val invalidate = Input(Bool())
+  val invalidate = Input(Bool()) // forgets all lines; only while idle
 
   /** With parity: that of a record which was answered or filled in the cycle before is wrong. */
   val error = Option.when(Lines.hasParity(config))(Output(Bool()))
 
-  /** No request is in flight, and no line is awaited. */
-  val isIdle = Output(Bool())
+  val isIdle = Output(Bool()) // no request is in flight, and no line is awaited
 }
 
 /** One bank of a column's cache; docs/scene-cache.md has a table of its cycles.

@@ -97,7 +97,5 @@ private object DramReader {
     val busBytes = config.columnBvhMemory.cache.get.busBytes
     (SceneLines.bytes(config) + busBytes - 1) / busBytes
   }
-
-  /** Beats of a line that waits beside the next one. */
-  val maxBeats: Int = 16
+  val maxBeats: Int = 16 // beats of a line that waits beside the next one
 }

@@ -31,14 +31,10 @@ object Lines {
   * four cycles later, or later than that. A column that awaits the line takes it; no column can delay it.
   */
 final class LineBroadcast(config: ColonnadeConfig) extends Bundle {
-
-  /** The line's number in its bank. */
-  val announced = Valid(UInt(Lines.lineBits(config).W))
+  val announced = Valid(UInt(Lines.lineBits(config).W)) // the line's number in its bank
   val record    = Lines.stored(config)
 }
 
 object LineBroadcast {
-
-  /** Cycles from an announcement to the line's first record. */
-  val latency: Int = 3
+  val latency: Int = 3 // cycles from an announcement to the line's first record
 }

@@ -23,8 +23,7 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
   val reads = Decoupled(UInt(Lines.lineBits(config).W))
   val data  = Flipped(Decoupled(new ReadLine(config)))
 
-  /** Forgets all lines; only while idle. */
-  val invalidate = Input(Bool())
+  val invalidate = Input(Bool()) // forgets all lines; only while idle
 
   /** No request is looked up, and no line is awaited or announced. */
   val isIdle = Output(Bool())

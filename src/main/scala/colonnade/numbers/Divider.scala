@@ -13,7 +13,6 @@ final class Division(mantissaBits: Int) extends Bundle {
   val denominator = UInt(mantissaBits.W)
 }
 
-/** Ports of [[Divider]]. */
 final class DividerIO(mantissaBits: Int, digits: Int) extends Bundle {
   val division = Flipped(Decoupled(new Division(mantissaBits)))
   val quotient = Decoupled(UInt((digits + 1).W)) // ⌊numerator · 2^digits / denominator⌋

@@ -3,7 +3,6 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.Cat
 
-/** Ports of [[FoldedDivider]]. */
 final class FoldedDividerIO(numeratorBits: Int, denominatorBits: Int, digits: Int) extends Bundle {
 
   /** In one of `interval` cycles, always the same: the operands are there, and a quotient changes in the next cycle. */

@@ -3,7 +3,6 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.Cat
 
-/** Ports of [[FoldedSquareRoot]]. */
 final class FoldedSquareRootIO(radicandBits: Int) extends Bundle {
 
   /** In one of `interval` cycles, always the same: the radicand is there, and a root changes in the next cycle. */

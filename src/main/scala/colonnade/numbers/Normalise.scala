@@ -34,6 +34,9 @@ object Normalise {
     result
   }
 
+  /** As wide as the number: the most negative one has its magnitude there. */
+  def magnitude(x: SInt): UInt = Mux(x < 0.S, 0.S -% x, x).asUInt
+
   /** The position of the highest set bit plus one; 0 for zero. */
   def bitLength(x: UInt): UInt = {
     val (zero, zeros) = countLeadingZeros(x)

@@ -3,7 +3,6 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.{Cat, RegEnable}
 
-/** Ports of [[PipelinedDivider]]. */
 final class PipelinedDividerIO(mantissaBits: Int, digits: Int, lanes: Int) extends Bundle {
   val loads = Input(Vec(PipelinedDivider.stages(digits), Bool())) // stage i loads from the stage before
 

@@ -14,7 +14,6 @@ final class RootOrDivision(radicandBits: Int, mantissaBits: Int) extends Bundle 
   val numerator  = UInt(mantissaBits.W)
 }
 
-/** Ports of [[RootDivider]]. */
 final class RootDividerIO(radicandBits: Int, mantissaBits: Int, digits: Int) extends Bundle {
   val operation = Flipped(Decoupled(new RootOrDivision(radicandBits, mantissaBits)))
 

@@ -3,7 +3,6 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled}
 
-/** Ports of [[SquareRoot]]. */
 final class SquareRootIO(radicandBits: Int) extends Bundle {
   val radicand = Flipped(Decoupled(UInt(radicandBits.W)))
   val root     = Decoupled(UInt(SquareRoot.rootBits(radicandBits).W)) // ⌊√radicand⌋

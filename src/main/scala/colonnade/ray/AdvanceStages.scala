@@ -35,8 +35,7 @@ final class AdvanceStagesIO(config: PathConfig) extends Bundle {
   val ray    = Input(new AdvancingRay(config))
   val enters = Input(Bool())
 
-  /** In [[SetupStages.preparedRay]]. */
-  val output = Output(new PreparedRay(config))
+  val output = Output(new PreparedRay(config)) // in [[SetupStages.preparedRay]]
 }
 
 /** Scales the shear factors and moves a ray's origin to its entry into the box: a ray a cycle, all axes in parallel.

@@ -102,10 +102,9 @@ final class DirectionNormaliser(config: PathConfig) extends Module {
   private val negative = Reg(Vec(3, Bool()))
   private val largest  = Reg(UInt(numbers.directionBits.W))
 
-  // The magnitude of the most negative component is as wide as the component.
   private val isBetween       = step === idle || step === settled
   private val measured        = Mux(isBetween, io.request.bits.dir.x, dir.head)
-  private val counted         = RegEnable(magnitudeOf(measured), measures)
+  private val counted         = RegEnable(Normalise.magnitude(measured), measures)
   private val hasSign         = RegEnable(measured < 0.S, measures)
   private val magnitude       = ShiftRegister(counted, delay)
   private val isNegative      = ShiftRegister(hasSign, delay)
@@ -148,8 +147,6 @@ final class DirectionNormaliser(config: PathConfig) extends Module {
   io.ray.bits.origin := origin
   private val unlimited = ((BigInt(1) << (numbers.sceneBits + 1)) - 1).U
   io.ray.bits.tMax := Mux(isShadow, Rounding.saturate(largest, numbers.sceneBits + 1), unlimited)
-
-  private def magnitudeOf(component: SInt): UInt = Mux(component < 0.S, 0.S -% component, component).asUInt
 
   private def shift[T <: Data](queue: Vec[T], last: T): Unit = {
     queue.zip(queue.tail).foreach { case (to, from) => to := from }

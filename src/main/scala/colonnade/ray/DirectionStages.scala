@@ -22,14 +22,11 @@ final class DirectionStages(config: PathConfig) extends Module {
 
   val io = IO(new DirectionStagesIO(config))
 
-  // The magnitude of the most negative component is as wide as the component.
-  private def magnitudeOf(component: SInt): UInt = Mux(component < 0.S, 0.S -% component, component).asUInt
-
   private val request    = io.request
   private val context    = RegEnable(request.context, io.loads(0))
   private val isShadow   = RegEnable(request.isShadow, io.loads(0))
   private val origin     = request.origin.axes.map(RegEnable(_, io.loads(0)))
-  private val magnitudes = request.dir.axes.map(component => RegEnable(magnitudeOf(component), io.loads(0)))
+  private val magnitudes = request.dir.axes.map(component => RegEnable(Normalise.magnitude(component), io.loads(0)))
   private val negative   = request.dir.axes.map(component => RegEnable(component < 0.S, io.loads(0)))
 
   // Ties go to the lowest axis

@@ -6,9 +6,7 @@ import colonnade.common.TimingSlice
 
 /** Control signals of the [[EntryDatapath]] for one cycle; `side` is 0 for x', 1 for y'. */
 final class EntryCommand(slices: Int) extends Bundle {
-
-  /** Load a new ray. */
-  val loads = Bool()
+  val loads = Bool() // load a new ray
 
   /** Round the first axis of the origin to units; rotate its axes without a change. */
   val roundsOrigin  = Bool()
@@ -41,8 +39,7 @@ final class EntryCommand(slices: Int) extends Bundle {
   val scales    = Bool()
   val scalesFar = Bool()
 
-  /** What is scaled limits the exit. */
-  val boundsFar = Bool()
+  val boundsFar = Bool() // what is scaled limits the exit
   val limits    = Bool()
   val limitsFar = Bool()
 

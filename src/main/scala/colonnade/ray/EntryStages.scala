@@ -19,8 +19,7 @@ final class EntryStagesIO(config: PathConfig) extends Bundle {
   /** The entry, in units along z', in [[SetupStages.entry]]; a grid step may be longer than a unit. */
   val tNear = Output(UInt(numbers.entryBits.W))
 
-  /** In [[SetupStages.enters]]. */
-  val enters = Output(Bool())
+  val enters = Output(Bool()) // in [[SetupStages.enters]]
 }
 
 /** Computes where a ray enters the object's box: a ray a cycle, one wide addition or one product a stage.

@@ -30,9 +30,7 @@ final class RayGeneratorIO(config: PathConfig) extends Bundle {
   val registers = Input(new CameraRegisters(config))
   val position  = Flipped(Decoupled(new RayPosition(config)))
   val ray       = Decoupled(new RayRequest(config))
-
-  /** The pixel of the offered ray. */
-  val pixel = Output(new RayPosition(config))
+  val pixel     = Output(new RayPosition(config)) // the pixel of the offered ray
 }
 
 /** Generates primary rays: `dir = (camera.dir << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.

@@ -7,10 +7,8 @@ import colonnade.formats.Bounds
 
 final class RaySetupIO(config: PathConfig) extends Bundle {
   val request = Flipped(Decoupled(new RayRequest(config)))
-
-  /** Constant while a ray is in the unit. */
-  val bounds = Input(new Bounds(config.numbers))
-  val ray    = Decoupled(new PreparedRay(config))
+  val bounds  = Input(new Bounds(config.numbers)) // constant while a ray is in the unit
+  val ray     = Decoupled(new PreparedRay(config))
 
   /** The longest stage, [[RayEntry]], holds a ray; of a [[RaySetupPipeline]]: a ray enters. */
   val busy = Output(Bool())

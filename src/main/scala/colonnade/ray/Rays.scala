@@ -111,9 +111,7 @@ final class PreparedRay(config: PartConfig) extends Bundle {
   val enters   = Bool()
   val ray      = new TracedRay(numbers)
   val tEntry   = new Fixed(formats.entry)
-
-  /** Hits with t < `tMax` count; never negative. */
-  val tMax = new Fixed(formats.grid)
+  val tMax     = new Fixed(formats.grid) // hits with t < `tMax` count; never negative
 }
 
 object PermutedFrame {

@@ -5,7 +5,6 @@ import chisel3.util.{Cat, Mux1H}
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.numbers.Rounding
 
-/** Ports of [[BounceAdder]]. */
 final class BounceAdderIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new BounceFormats(numbers)

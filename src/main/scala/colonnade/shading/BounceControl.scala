@@ -120,7 +120,6 @@ final class BounceState {
   val hasFresnel:   Bool = Reg(Bool()) // the result has a Fresnel term
 }
 
-/** Ports of [[BounceDatapath]]. */
 final class BounceDatapathIO(config: PathConfig) extends Bundle {
   val control      = Input(new BounceControl(new BounceFormats(config.numbers)))
   val request      = Input(new BounceRequest(config))

@@ -230,6 +230,6 @@ final class BounceDatapath(config: PathConfig) extends Module {
   io.result.isRefraction := io.isRefraction
   io.result.origin       := Vec3.of(originX, originY, originZ)
   io.result.dir          := Vec3.of(x, y, z)
-  io.result.reflection   := Vec3.of(reflection(0), reflection(1), reflection(2))
+  io.result.reflection   := Vec3.of(reflection)
   io.result.fresnel.raw  := sum.asUInt(oneBits, 0)
 }

@@ -4,7 +4,6 @@ import chisel3._
 import chisel3.util.{log2Ceil, Cat, Mux1H}
 import colonnade.numbers.Rounding
 
-/** Ports of [[BounceMultiplier]]. */
 final class BounceMultiplierIO(formats: BounceFormats) extends Bundle {
   val enable = Input(Bool())
 

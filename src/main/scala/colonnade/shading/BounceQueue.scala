@@ -30,7 +30,6 @@ final class BouncePoint(config: PathConfig) extends Bundle {
   val isSmooth = Bool()
 }
 
-/** Ports of [[BounceQueue]]. */
 final class BounceQueueIO(config: PathConfig) extends Bundle {
   val materials = Input(Vec(config.frame.materials, new Material(config)))
 
@@ -81,11 +80,11 @@ final class BounceQueue(config: PathConfig, places: Int) extends Module {
   all.foreach(_.ready := io.request.fire)
 
   request.context           := hit.context
-  request.origin            := vector(points.map(_.bits.origin))
-  request.normal            := vector(points.map(_.bits.normal))
+  request.origin            := Vec3.of(points.map(_.bits.origin))
+  request.normal            := Vec3.of(points.map(_.bits.normal))
   request.isSmooth          := points.head.bits.isSmooth
-  request.faceForwardNormal := vector(directions.map(_.bits.faceForwardNormal))
-  request.dir               := vector(directions.map(_.bits.dir))
+  request.faceForwardNormal := Vec3.of(directions.map(_.bits.faceForwardNormal))
+  request.dir               := Vec3.of(directions.map(_.bits.dir))
   request.backSide          := hit.backSide
   request.isGlass           := material.kind.get === MaterialKind.glass
   request.eta               := Mux(hit.backSide, material.etaBack.get, material.etaFront.get)
@@ -111,6 +110,4 @@ final class BounceQueue(config: PathConfig, places: Int) extends Module {
   bounced.isTinted := !surface.backSide || ofRay.kind.get === MaterialKind.mirror
   for (to <- bounced.fresnelOrigin; (axis, from) <- to.axes.zip(surface.origin.get))
     axis := Fixed(new RayFormats(config.numbers).scene, from)
-
-  private def vector(components: Seq[SInt]): Vec3[SInt] = Vec3.of[SInt](components(0), components(1), components(2))
 }

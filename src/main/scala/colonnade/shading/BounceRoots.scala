@@ -5,7 +5,6 @@ import chisel3.util.Cat
 import colonnade.config.NumberFormats
 import colonnade.numbers.{RootDivider, Rounding, SquareRoot}
 
-/** Ports of [[BounceRoots]]. */
 final class BounceRootsIO(numbers: NumberFormats) extends Bundle {
   private val formats = new BounceFormats(numbers)
 

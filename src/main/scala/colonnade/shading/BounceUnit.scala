@@ -5,7 +5,6 @@ import chisel3.util.Decoupled
 import colonnade.config.PathConfig
 import colonnade.microcode.Microprogram
 
-/** Ports of [[BounceUnit]]. */
 final class BounceUnitIO(config: PathConfig) extends Bundle {
 
   /** The register `shading.offset`; constant while the unit is busy. */

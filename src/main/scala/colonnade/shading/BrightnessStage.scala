@@ -8,7 +8,6 @@ import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.{Fixed, FoldedDivider, FoldedSquareRoot, Normalise, Rounding, SquareRoot}
 
-/** Ports of [[BrightnessStage]]. */
 final class BrightnessStageIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)

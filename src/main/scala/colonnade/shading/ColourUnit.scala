@@ -7,7 +7,6 @@ import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
 import colonnade.numbers.{Fixed, Rounding}
 
-/** Ports of [[ColourUnit]]. */
 final class ColourUnitIO(config: PathConfig) extends Bundle {
   val ambient    = Input(Rgb(FrameRegisters.intensity))
   val background = Input(Rgb(FrameRegisters.colour))

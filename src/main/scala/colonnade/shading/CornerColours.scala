@@ -7,7 +7,6 @@ import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.{DigitRecurrence, Fixed, Rounding}
 import colonnade.ray.RayFormats
 
-/** Ports of [[CornerColours]]. */
 final class CornerColoursIO(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 

@@ -8,7 +8,6 @@ import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.DigitRecurrence
 
-/** Ports of [[CornerStage]]. */
 final class CornerStageIO(config: PathConfig) extends Bundle {
   val phase = Input(ModuloSchedule.phase())
 

@@ -11,7 +11,6 @@ final class Brightness(numbers: NumberFormats) extends Bundle {
   val falloff = Falloff()                                     // see Falloff; meaningless if the cosine is 0
 }
 
-/** Ports of [[CosineUnit]]. */
 final class CosineUnitIO(numbers: NumberFormats) extends Bundle {
   private val formats = new ShaderFormats(numbers)
 

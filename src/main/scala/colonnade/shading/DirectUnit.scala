@@ -6,7 +6,6 @@ import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb}
 import colonnade.numbers.{Fixed, Rounding}
 
-/** Ports of [[DirectUnit]]. */
 final class DirectUnitIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)

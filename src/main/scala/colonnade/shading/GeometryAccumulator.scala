@@ -5,7 +5,6 @@ import chisel3.util.{Cat, Mux1H, PriorityEncoder, Reverse}
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.numbers.Rounding
 
-/** Ports of [[GeometryAccumulator]]. */
 final class GeometryAccumulatorIO(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 

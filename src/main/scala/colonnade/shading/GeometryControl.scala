@@ -61,7 +61,6 @@ final class GeometryControl(formats: ShaderFormats) extends Bundle {
   def shifts: Seq[Bool] = alignLight ++ Seq(scaleNormal, scaleLight)
 }
 
-/** Ports of [[GeometryDatapath]]. */
 final class GeometryDatapathIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)

@@ -220,10 +220,10 @@ final class GeometryDatapath(config: PathConfig) extends Module {
   io.surface.context           := context
   io.surface.material          := material
   io.surface.isEnvironment     := isEnvironment
-  io.surface.origin            := Vec3.of(point(0), point(1), point(2))
-  io.surface.normal            := vector(normal.map(Rounding.narrow(_, formats.narrowBits)))
+  io.surface.origin            := Vec3.of(point)
+  io.surface.normal            := Vec3.of(normal.map(Rounding.narrow(_, formats.narrowBits)))
   io.surface.isSmooth          := !io.isFlat
-  io.surface.faceForwardNormal := vector(geometricNormal.map { component =>
+  io.surface.faceForwardNormal := Vec3.of(geometricNormal.map { component =>
     val outward = component.pad(normalBits + 1)
     Mux(backSide, -outward, outward)
   })
@@ -235,6 +235,4 @@ final class GeometryDatapath(config: PathConfig) extends Module {
     Rounding.narrow(Rounding.floor(factor, numbers.shearFraction - (formats.shadeBits - 1)), formats.shadeBits + 1)
   ) :+ Mux(isNegative, -one, one)
   io.surface.dir := PermutedFrame.back(dir, axis)
-
-  private def vector(components: Seq[SInt]): Vec3[SInt] = Vec3.of[SInt](components(0), components(1), components(2))
 }

@@ -25,7 +25,6 @@ final class LightOnSurface(config: PathConfig) extends Bundle {
   val needsShadowRay = Bool()
 }
 
-/** Ports of [[LitAssembler]]. */
 final class LitAssemblerIO(config: PathConfig) extends Bundle {
   val materials = Input(Vec(config.frame.materials, new Material(config)))
 

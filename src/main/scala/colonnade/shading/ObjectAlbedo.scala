@@ -52,7 +52,6 @@ final class TexturedHit(config: PathConfig) extends Bundle {
   val isBounce = Bool() // its material is a mirror or glass
 }
 
-/** Ports of [[TexelReader]]. */
 final class TexelReaderIO(config: PathConfig) extends Bundle {
   val hit  = Flipped(Valid(new TexturedHit(config))) // only while there is space
   val port = new TexturePort(config)

@@ -6,7 +6,6 @@ import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{Light, Shading}
 import colonnade.microcode.Microprogram
 
-/** Ports of [[ShaderGeometry]]. */
 final class ShaderGeometryIO(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
   private val formats = new ShaderFormats(numbers)

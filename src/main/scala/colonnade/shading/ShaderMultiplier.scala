@@ -5,7 +5,6 @@ import chisel3.util.{Decoupled, ShiftRegister, Valid}
 import colonnade.common.TimingSlice
 import colonnade.config.PathConfig
 
-/** Ports of [[ShaderMultiplier]]. */
 final class ShaderMultiplierIO(formats: ShaderFormats, hasCornerColours: Boolean) extends Bundle {
   val geometry = Flipped(Valid(new MultiplierOperands(formats)))     // has priority; never waits
   val colour   = Flipped(Decoupled(new MultiplierOperands(formats))) // uses the cycles that the geometry leaves free

@@ -14,7 +14,6 @@ final class ShadowRequest(config: PathConfig) extends Bundle {
   val light   = UInt(log2Ceil(config.frame.lights.max(2)).W)
 }
 
-/** Ports of [[ShadowRays]]. */
 final class ShadowRaysIO(config: PathConfig) extends Bundle {
   val lights    = Input(Vec(config.frame.lights, new Light(config.numbers)))
   val unitShift = Input(UInt(NumberFormats.bitLength(config.numbers.sceneBits).W))

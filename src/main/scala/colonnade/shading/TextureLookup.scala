@@ -23,7 +23,6 @@ final class TexturePort(config: PathConfig) extends Bundle {
   val resp = Flipped(Valid(new Texel))
 }
 
-/** Ports of [[TextureLookup]]. */
 final class TextureLookupIO(config: PathConfig) extends Bundle {
   val start = Input(Bool()) // a hit enters; the one before must be done, or must not use its texture
 

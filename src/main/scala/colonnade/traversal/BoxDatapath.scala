@@ -31,15 +31,11 @@ final class NodeDistance(config: TraversalConfig) extends Bundle {
 }
 
 final class BoxDatapathIO(config: TraversalConfig, lanes: Int) extends Bundle {
-  val node = Input(new NodeOperands(config))
-
-  /** New children are at the input. */
-  val isValid   = Input(Bool())
+  val node      = Input(new NodeOperands(config))
+  val isValid   = Input(Bool())                    // new children are at the input
   val children  = Input(Vec(lanes, new ChildPlanes(config)))
   val intervals = Output(Vec(lanes, new BoxInterval(config)))
-
-  /** With `intervals`. */
-  val distance = Output(new NodeDistance(config))
+  val distance  = Output(new NodeDistance(config)) // with `intervals`
 }
 
 /** Slab test of one ray against `lanes` boxes in padded integers (docs/numbers.md, section 3), without control logic.

@@ -9,14 +9,10 @@ import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
 final class BoxUnitIO(config: TraversalConfig) extends Bundle {
-  val in = Flipped(Decoupled(new BoxCandidate(config)))
-
-  /** `in` will be ready in the next cycle. */
-  val readyNext = Output(Bool())
+  val in        = Flipped(Decoupled(new BoxCandidate(config)))
+  val readyNext = Output(Bool()) // `in` will be ready in the next cycle
   val out       = Decoupled(new BoxResult(config))
-
-  /** The datapath accepts children in this cycle. */
-  val busy = Output(Bool())
+  val busy      = Output(Bool()) // the datapath accepts children in this cycle
 }
 
 /** Tests one ray against the children of one node (docs/numbers.md, section 3). The result lists the children that the

@@ -6,13 +6,9 @@ import colonnade.config.NumberFormats
 import colonnade.numbers.{Fixed, Rounding}
 
 final class EdgeStageIO(formats: TriangleFormats) extends Bundle {
-
-  /** The pipeline moves by a slot. */
-  val advances = Input(Bool())
+  val advances = Input(Bool())                          // the pipeline moves by a slot
   val slot     = Input(new TriangleSlot)
-
-  /** x and y of the vertex of `slot`. */
-  val sheared = Input(Vec(2, new Fixed(formats.grid)))
+  val sheared  = Input(Vec(2, new Fixed(formats.grid))) // x and y of the vertex of `slot`
 
   /** All edges of a triangle are known, and the other outputs valid: it is the second one of a pair; the ray's line crosses
     * it.
@@ -94,9 +90,7 @@ final class EdgeStage(numbers: NumberFormats) extends Module {
 /** The edge function that a stage computes; at most one of the first three. */
 final private class EdgeSlot extends Bundle {
   val edge2, edge0, edge1 = Bool()
-
-  /** With `edge1`: of the second triangle of a pair. */
-  val isSecond = Bool()
+  val isSecond            = Bool() // with `edge1`: of the second triangle of a pair
 
   def isValid: Bool = edge2 || edge0 || edge1
 }

@@ -10,8 +10,7 @@ import colonnade.ray.{PermutedFrame, TriangleRay}
 final class ShearStageIO(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
-  /** The pipeline moves by a slot. */
-  val advances = Input(Bool())
+  val advances = Input(Bool()) // the pipeline moves by a slot
   val slot     = Input(new TriangleSlot)
 
   /** The vertex of `slot` and its ray. */

@@ -28,15 +28,13 @@ final class TraversalStackIO(config: TraversalConfig) extends Bundle {
   val tMax  = new TMaxReader(config)
   val steps = Decoupled(new TraversalStep(config))
 
-  /** An entry was dropped because the stack was full. */
-  val overflow = Output(Bool())
+  val overflow = Output(Bool()) // an entry was dropped because the stack was full
 
   /** Resets `deepest`, the maximum number of entries of any stack. */
   val clear   = Input(Bool())
   val deepest = Output(StackLevel(config))
 
-  /** An operation is in flight. */
-  val busy = Output(Bool())
+  val busy = Output(Bool()) // an operation is in flight
 }
 
 /** The stacks of all contexts for depth-first traversal, in one single-port memory.

@@ -68,18 +68,14 @@ object TriangleStep extends ChiselEnum {
 
 /** What a stage of the [[TriangleUnit]] processes in a cycle. */
 final class TriangleSlot extends Bundle {
-  val step = TriangleStep()
-
-  /** The round tests a pair of triangles; valid from `third` on. */
-  val isPair = Bool()
+  val step   = TriangleStep()
+  val isPair = Bool() // the round tests a pair of triangles; valid from `third` on
 }
 
 /** Identifies a round's triangle, or its pair of triangles. */
 final class TriangleTag(config: PartConfig) extends Bundle {
   val context = Context(config)
-
-  /** Of the first triangle. */
-  val id = UInt(RecordFormats.idBits(config).W)
+  val id      = UInt(RecordFormats.idBits(config).W) // of the first triangle
 
   /** The round is the last of its record; it tests a pair, whose second triangle has the next id. */
   val isLast = Bool()
@@ -128,8 +124,7 @@ final class WeightedTriangle(config: PartConfig) extends Bundle {
 final class DistanceRequest(config: PartConfig) extends Bundle {
   private val formats = new TriangleFormats(config.numbers)
 
-  /** Zero, or its top bit is set. */
-  val dividend = UInt(formats.mantissaBits.W)
+  val dividend = UInt(formats.mantissaBits.W) // zero, or its top bit is set
   val divisor  = UInt(formats.mantissaBits.W)
   val terms    = new DistanceTerms(config)
 }

@@ -7,9 +7,7 @@ import colonnade.config.PartConfig
 
 final class TriangleLanesIO(config: PartConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
-
-  /** `candidate` will be ready in the next cycle. */
-  val readyNext = Output(Bool())
+  val readyNext = Output(Bool()) // `candidate` will be ready in the next cycle
 
   /** The results of one record stay in order. */
   val result = Decoupled(new TriangleResult(config))

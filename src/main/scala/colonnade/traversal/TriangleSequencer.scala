@@ -8,13 +8,9 @@ import colonnade.ray.TriangleRay
 
 final class TriangleSequencerIO(config: PartConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
-
-  /** `candidate` will be ready in the next cycle. */
-  val readyNext = Output(Bool())
-
-  /** The stages after this one accept `slot`. */
-  val advances = Input(Bool())
-  val slot     = Output(new TriangleSlot)
+  val readyNext = Output(Bool()) // `candidate` will be ready in the next cycle
+  val advances  = Input(Bool())  // the stages after this one accept `slot`
+  val slot      = Output(new TriangleSlot)
 
   /** The vertex of `slot`, to be loaded in this cycle even if the pipeline stalls. */
   val vertex = Valid(Vec3(UInt(config.geometry.vertexBits.W)))

@@ -18,10 +18,8 @@ final class TriangleCandidate(config: PartConfig) extends Bundle {
 final class TriangleHit(config: PartConfig) extends Bundle {
   private val formats = new RayFormats(config.numbers)
 
-  val t = new Fixed(formats.grid)
-
-  /** Packed triangle id. */
-  val id = UInt(RecordFormats.idBits(config).W)
+  val t  = new Fixed(formats.grid)
+  val id = UInt(RecordFormats.idBits(config).W) // packed triangle id
 
   /** Barycentric weights of the vertices, up to a common factor. */
   val weights  = Vec(3, new Fixed(formats.weight))
@@ -31,10 +29,8 @@ final class TriangleHit(config: PartConfig) extends Bundle {
 /** The result of one triangle. Results follow the order of candidates, and of triangles in a record. */
 final class TriangleResult(config: PartConfig) extends Bundle {
   val context = Context(config)
-
-  /** The ray intersects the triangle at `hit.t` ≥ 0. */
-  val isHit = Bool()
-  val hit   = new TriangleHit(config)
+  val isHit   = Bool() // the ray intersects the triangle at `hit.t` ≥ 0
+  val hit     = new TriangleHit(config)
 
   /** The material transmits light; this is the last triangle of the record. */
   val isTransmissive = Bool()

@@ -8,12 +8,8 @@ import colonnade.config.PartConfig
 final class TriangleUnitIO(config: PartConfig) extends Bundle {
   val candidate = Flipped(Decoupled(new TriangleCandidate(config)))
   val result    = Decoupled(new TriangleResult(config))
-
-  /** `candidate` will be ready in the next cycle. */
-  val readyNext = Output(Bool())
-
-  /** A round of vertices enters the unit. */
-  val busy = Output(Bool())
+  val readyNext = Output(Bool()) // `candidate` will be ready in the next cycle
+  val busy      = Output(Bool()) // a round of vertices enters the unit
 }
 
 /** A triangle that waits for its place in the order of results; a crossed one also waits for its distance. */

@@ -11,9 +11,7 @@ import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay}
 
 /** Ports of [[BounceScheduler]] that an environment adds. */
 final class DeferredBounceIO(config: PathConfig) extends Bundle {
-
-  /** This frame has an environment. */
-  val enabled = Input(Bool())
+  val enabled = Input(Bool()) // this frame has an environment
 
   /** A context whose bounce is deferred until its Fresnel reflection is resolved; a context whose bounce may resume. */
   val fresnelReflection = Valid(Context(config))
@@ -25,17 +23,14 @@ final class DeferredBounceIO(config: PathConfig) extends Bundle {
 
 final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val shading = Input(new Shading(config))
-
-  /** A context gets a new pixel. */
-  val start = Flipped(Valid(Context(config)))
+  val start   = Flipped(Valid(Context(config))) // a context gets a new pixel
 
   /** From the shader; to the colour unit and to ray set-up. */
   val in     = Flipped(Decoupled(new BouncedRay(config)))
   val update = Decoupled(new BounceUpdate(config))
   val ray    = Decoupled(new RayRequest(config))
 
-  /** A bounce that is issued. */
-  val bounced      = Valid(new Bounced(config))
+  val bounced      = Valid(new Bounced(config)) // a bounce that is issued
   val isRefraction = Output(Bool())
   val environment  = if (config.hasEnvironment) Some(new DeferredBounceIO(config)) else None
 }

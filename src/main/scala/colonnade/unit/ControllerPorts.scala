@@ -48,10 +48,8 @@ final class Bounced(config: PathConfig) extends Bundle {
 
 /** A context whose deferred Fresnel reflection is complete, so that its bounce may resume. */
 final class ResumedBounce(config: PathConfig) extends Bundle {
-  val context = Context(config)
-
-  /** The reflection shows the background. */
-  val isBackground = Bool()
+  val context      = Context(config)
+  val isBackground = Bool() // the reflection shows the background
 }
 
 /** Control of rays that miss the object or whose hit may be hidden, if there may be an environment. */
@@ -61,8 +59,7 @@ final class EnvironmentControl(config: PathConfig) extends Bundle {
   val enabled   = Input(Bool())
   val occlusion = Input(Bool())
 
-  /** A primary ray that cannot hit the object. */
-  val bypass = Flipped(Valid(Context(config)))
+  val bypass = Flipped(Valid(Context(config))) // a primary ray that cannot hit the object
 
   /** A Fresnel reflection that is resolved first, while its path's bounce is deferred. */
   val fresnelReflection = Flipped(Valid(Context(config)))
@@ -76,8 +73,7 @@ final class EnvironmentControl(config: PathConfig) extends Bundle {
   val miss    = Flipped(Valid(Context(config)))
   val visible = Flipped(Valid(Context(config)))
 
-  /** A deferred bounce that may resume. */
-  val resume = Decoupled(new ResumedBounce(config))
+  val resume = Decoupled(new ResumedBounce(config)) // a deferred bounce that may resume
 }
 
 /** Allocation of a context, seen from the stage that gives it a pixel. */
@@ -90,9 +86,7 @@ final class AllocationControl(config: PathConfig) extends Bundle {
 
 /** Control of traces, seen from the stage that traces rays. */
 final class TraceControl(config: PathConfig) extends Bundle {
-
-  /** A prepared ray that enters the object's box. */
-  val entered = Valid(Context(config))
+  val entered = Valid(Context(config)) // a prepared ray that enters the object's box
 
   /** Traces that have ended: the ray misses the box; it has its result. */
   val missesBox = Valid(Context(config))
@@ -135,8 +129,7 @@ final class RtControllerIO(config: PathConfig) extends Bundle {
   /** A hit whose attributes have an illegal address: the path ends in the background. */
   val fetchFailed = Flipped(Valid(Context(config)))
 
-  /** The next shadow ray of a context. */
-  val shadow = Decoupled(new ShadowRequest(config))
+  val shadow = Decoupled(new ShadowRequest(config)) // the next shadow ray of a context
 
   /** A path that has ended, and a context whose colour is complete. */
   val end         = Decoupled(new PathTermination(config))

@@ -26,9 +26,7 @@ final class IntersectorEvents(config: TraversalConfig) extends Bundle {
 }
 
 final class IntersectorIO(config: TraversalConfig) extends Bundle {
-
-  /** A frame starts. */
-  val start = Input(Bool())
+  val start = Input(Bool()) // a frame starts
   val scene = Input(new SceneMap(RecordFormats.idBits(config)))
 
   /** A ray that enters the object's box, for an idle context; by context: its ray is a shadow ray. */

@@ -30,9 +30,7 @@ final class PathEvents(config: PathConfig) extends Bundle {
   val contextsShading     = contexts
   val raysEnvironment     = Option.when(config.hasEnvironment)(Bool())
   val contextsEnvironment = Option.when(config.hasEnvironment)(contexts)
-
-  /** An illegal texel. */
-  val illegalRecord = Bool()
+  val illegalRecord       = Bool() // an illegal texel
 }
 
 /** Collects the events of a path unit from its stages. */

@@ -15,10 +15,8 @@ import colonnade.traversal.TriangleHit
 final class SurfaceHit(config: PathConfig) extends Bundle {
   val context   = Context(config)
   val isPrimary = Bool()
-
-  /** Packed triangle id. */
-  val id = UInt(RecordFormats.idBits(config).W)
-  val t  = new Fixed(new RayFormats(config.numbers).grid)
+  val id        = UInt(RecordFormats.idBits(config).W) // packed triangle id
+  val t         = new Fixed(new RayFormats(config.numbers).grid)
 
   /** From the ray's origin along its dominant axis. */
   val distance = Option.when(config.frame.hits || config.hasEnvironment)(HitDistance(config))
@@ -42,9 +40,7 @@ object SurfaceHit {
 final class PathHitsIO(config: PathConfig) extends Bundle {
   val start = Input(Bool())
   val scene = Input(new SceneMap(RecordFormats.idBits(config)))
-
-  /** To the path unit. */
-  val trace = Flipped(new TracePort(config))
+  val trace = Flipped(new TracePort(config)) // to the path unit
 
   /** Rays that enter the object's box, to the traversal units; what they have met. */
   val rays    = Decoupled(new PreparedRay(config))

@@ -8,9 +8,7 @@ import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
 import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalStack, TraversalStep}
 
 final class TraversalIO(config: TraversalConfig) extends Bundle {
-
-  /** Resets `deepest`. */
-  val clear = Input(Bool())
+  val clear = Input(Bool()) // resets `deepest`
   val scene = Input(new SceneMap(RecordFormats.idBits(config)))
 
   /** A ray enters the object's box; its first record is [[Traversal.root]]. */
@@ -31,8 +29,7 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
   val deepest  = Output(UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W))
   val overflow = Output(Bool())
 
-  /** A node was illegal and treated as empty. */
-  val illegal = Output(Bool())
+  val illegal = Output(Bool()) // a node was illegal and treated as empty
 }
 
 /** Decides which record each ray visits next: BoxUnit and TraversalStack, or LinearScan without a BVH. */
