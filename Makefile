@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup render test test-hardware test-host verify bench soc check docs lock format clean
+.PHONY: help setup render test test-hardware test-host verify bench soc live check docs lock format clean
 
 venv := .venv/bin
 SCENE ?= scenes/room.toml
@@ -39,6 +39,9 @@ bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where
 
 soc: setup ## a LiteX SoC in the simulator: boots, computes views, renders by the driver, compares with the model
 	@tools/soc
+
+live: setup ## a mirror in a room before a moving camera: videos, time and energy a frame, out/live/index.html
+	@$(venv)/python tools/live
 
 check: setup ## formatters, linters, types, layers, derived files
 	@tools/check

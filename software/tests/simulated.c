@@ -8,62 +8,7 @@
  *
  * Memory: the image at PAGE, scene or maps behind it, then framebuffers, each in a window of its size.
  * A page of untouched memory is around each of them. */
-#include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "colonnade.h"
-#include "colonnade_design.h"
-
-enum { PAGE = 4096, ATTEMPTS = 1000000 };
-
-static bool waits_for_interrupt;
-
-static void fail(const char *what) {
-    fprintf(stderr, "failed: %s\n", what);
-    exit(1);
-}
-
-static uint32_t bus_read(void *context, uint32_t address) {
-    (void)context;
-    uint32_t value;
-    printf("read x %" PRIu32 " 1\n", address);
-    fflush(stdout);
-    if (scanf(" value x %" SCNu32, &value) != 1) fail("the simulator does not answer a read");
-    return value;
-}
-
-static void bus_write(void *context, uint32_t address, uint32_t value) {
-    (void)context;
-    printf("write %" PRIu32 " %" PRIu32 "\n", address, value);
-}
-
-static void bus_wait(void *context) {
-    (void)context;
-    uint64_t cycles;
-    puts(waits_for_interrupt ? "wait 50000000" : "run 1000");
-    fflush(stdout);
-    if (scanf(" %*s %" SCNu64, &cycles) != 1) fail("the simulator does not answer a wait");
-}
-
-static void *read_file(const char *name, size_t *bytes) {
-    FILE *file = fopen(name, "rb");
-    if (file == NULL || fseek(file, 0, SEEK_END) != 0) fail(name);
-    *bytes = (size_t)ftell(file);
-    rewind(file);
-    void *data = malloc(*bytes);
-    if (data == NULL || fread(data, 1, *bytes, file) != *bytes) fail(name);
-    fclose(file);
-    return data;
-}
-
-static void expect(enum colonnade_error error, enum colonnade_error expected, const char *what) {
-    if (error != expected) {
-        fprintf(stderr, "%s: %s, expected %s\n", what, colonnade_error_name(error), colonnade_error_name(expected));
-        exit(1);
-    }
-}
+#include "simulator.h"
 
 /* Renders the frame that is set and prints its place. */
 static void render(struct colonnade *device, const struct colonnade_framebuffer *framebuffer, const char *what) {
@@ -94,8 +39,6 @@ static void load_maps(struct colonnade *device, const struct colonnade_image *sc
     free(data);
     free(other_data);
 }
-
-static uint64_t pages(uint64_t bytes) { return (bytes + PAGE - 1) / PAGE * PAGE; }
 
 int main(int argc, char **argv) {
     static const struct colonnade_bus bus = {bus_read, bus_write, bus_wait, NULL};

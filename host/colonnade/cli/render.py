@@ -68,6 +68,12 @@ if TYPE_CHECKING:
     " It stands where the first frame has a place for it. Output files are numbered.",
 )
 @click.option(
+    "--keyframes",
+    type=click.IntRange(min=1, max=MAX_FRAMES),
+    metavar="N",
+    help="With --sequence: encode the room's maps in every Nth frame only.  [default: maps.every of the file, or 1]",
+)
+@click.option(
     "--samples",
     type=click.IntRange(min=1, max=MAX_SAMPLES),
     metavar="N",
@@ -100,6 +106,7 @@ def render(
     truth: Path | None,
     frames: int | None,
     sequence_file: Path | None,
+    keyframes: int | None,
     samples: int | None,
     output: Path | None,
     video_file: Path | None,
@@ -123,6 +130,8 @@ def render(
 
         sequence = load_sequence(sequence_file)
         frames = frames or len(sequence)
+    elif keyframes is not None:
+        raise click.UsageError("--keyframes needs --sequence", click.get_current_context())
     pictures = [output] if output is not None else []
     hits_files = [hits_file] if hits_file is not None else []
     if frames is not None:
@@ -161,6 +170,7 @@ def render(
         mesh=mesh,
         background=background,
         sequence=sequence,
+        keyframes=keyframes,
         encoder=encoder or ("offline" if sequence is None else "live"),
         hits=hits_file is not None,
         relit=relit,

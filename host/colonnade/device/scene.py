@@ -23,7 +23,7 @@ from colonnade.scene_image.packer import pack
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
-    from colonnade.environment.model import Environment
+    from colonnade.environment.model import Environment, EnvironmentCamera
     from colonnade.mesh.mesh import Mesh
     from colonnade.scene.model import Scene
     from colonnade.scene_image.file import SceneImage
@@ -105,10 +105,21 @@ class DeviceScene:
         """
         assert self.environment is not None
         extent = self.image.header.extent
-        scene = fixed_in_world(self.scene, extent, self.environment)
+        scene = replace(fixed_in_world(self.scene, extent, self.environment), frame_camera=None)
         maps = EncodedEnvironment.of(next_view(scene, extent, room, relit), self.manifest, encode)
         image = with_environment(self.image, maps, self.manifest)
         return replace(self, scene=scene, image=image, maps=maps, photo=room.photo)
+
+    def seen_by(self, camera: EnvironmentCamera, photo: NDArray[np.uint8] | None) -> DeviceScene:
+        """The scene from another camera: object, lights and maps stay in the world, primary rays march.
+
+        Args:
+            camera: Its lens, for pictures of the maps' size, and its pose.
+            photo: The picture that it took; None: the room is drawn from its maps.
+        """
+        assert self.environment is not None
+        scene = fixed_in_world(self.scene, self.image.header.extent, self.environment)
+        return replace(self, scene=replace(scene, frame_camera=camera), photo=photo)
 
     @property
     def environment(self) -> Environment | None:

@@ -12,13 +12,15 @@ from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Gt, Interval, Len
+from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from colonnade.common.errors import UserError
+from colonnade.common.image_io import read_picture
 from colonnade.common.input_files import check_values, read_input
 from colonnade.common.limits import MAX_CAPTURE_TEXT_BYTES, MAX_DEPTH, MAX_FRAMES
-from colonnade.environment.camera import read_camera
+from colonnade.environment.camera import check_size, read_camera
 from colonnade.environment.derived_albedo import hue_lights
 from colonnade.environment.lights import RoomLights
 from colonnade.environment.load import DEFAULT_DEPTH_STEP, MAX_DEPTH_STEP, MAX_EDGE, RoomFiles, load_maps
@@ -61,6 +63,17 @@ class SequenceFrame:
 
 
 @dataclass(frozen=True, config=_STRICT)
+class SequenceMaps:
+    """Which frames have maps.
+
+    Attributes:
+        every: Each frame of this number, from the first one on. The frames between see its maps from their cameras.
+    """
+
+    every: Annotated[int, Strict(), Interval(ge=1, le=MAX_FRAMES)] = 1
+
+
+@dataclass(frozen=True, config=_STRICT)
 class SequenceFile:
     """The content of the file.
 
@@ -70,6 +83,7 @@ class SequenceFile:
         rate: Frames a second.
         depth_step: Metres of a step of a depth picture.
         depth_noise: Error of the depth on flat surfaces, as a share of it.
+        maps: Which frames have maps.
     """
 
     width: _Pixels
@@ -78,6 +92,7 @@ class SequenceFile:
     rate: Annotated[_Float, Interval(gt=0, le=1e6)] = 30.0
     depth_step: Annotated[_Float, Gt(0), Interval(le=MAX_DEPTH_STEP)] = DEFAULT_DEPTH_STEP
     depth_noise: Annotated[_Float, Interval(ge=0.0, le=1.0)] = 0.005
+    maps: SequenceMaps = SequenceMaps()
 
 
 _SCHEMA = TypeAdapter(SequenceFile)
@@ -112,6 +127,21 @@ class Sequence:
         """
         return self._room(number, None if self.content.frame[number].albedo else self._lights)
 
+    def photo(self, number: int) -> NDArray[np.uint8]:
+        """The photo of a frame, sRGB, uint8 [height, width, 3].
+
+        Raises:
+            UserError: It is missing, unreadable or of another size.
+        """
+        file = self.path.parent / self.content.frame[number].photo
+        photo = read_picture(file)
+        check_size(self._sizes, (photo.shape[1], photo.shape[0]), self.path, file)
+        return photo
+
+    @property
+    def _sizes(self) -> dict[str, Any]:
+        return {"width": self.content.width, "height": self.content.height}
+
     @cached_property
     def _lights(self) -> RoomLights:
         first = next(number for number, frame in enumerate(self.content.frame) if frame.albedo is None)
@@ -127,10 +157,8 @@ class Sequence:
             self.content.depth_step,
             "srgb",
         )
-        sizes = {"width": self.content.width, "height": self.content.height}
-        return load_maps(
-            f"{self.path.parent.name} {number}", self.cameras[number], maps, (sizes, self.path), lights=lights
-        )
+        name = f"{self.path.parent.name} {number}"
+        return load_maps(name, self.cameras[number], maps, (self._sizes, self.path), lights=lights)
 
     def _file(self, name: str | None) -> Path | None:
         return None if name is None else self.path.parent / name

@@ -23,6 +23,7 @@ from colonnade.environment.model import Environment
 from colonnade.environment.sequence import Sequence
 from colonnade.maps.cache import encoded_environment
 from colonnade.maps.encoded import Encode, layout_of
+from colonnade.maps.encoders import Encoder
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
@@ -40,6 +41,8 @@ from colonnade.scene_image.inspect import coarse_line
 
 Size = tuple[int, int]
 
+#: What keyframes cost.
+_BETWEEN = "between keyframes, where their maps show nothing, a frame is its photo without the object's shadow"
 #: Names the default to who has not chosen.
 _DEFAULT_SAMPLES = f"{PHOTO_SAMPLES} samples a pixel, the default in a room: --samples 1 takes a quarter of the time"
 
@@ -110,6 +113,8 @@ def _check_sequence(request: RenderRequest, sequence: Sequence, scene: Scene) ->
         raise UserError("--sequence and --background both replace the scene's background: give one of them")
     if request.frames > len(sequence):
         raise UserError(f"{sequence.path} has {len(sequence)} frames, fewer than the {request.frames} of --frames")
+    if scene.places_camera and not scene.motion.camera:
+        raise UserError("each frame of a sequence has its own camera: leave out [camera]")
     if not scene.motion.is_closed or scene.motion.shutter > 0:
         raise UserError("the camera moves in a sequence, the object and lights stay in the world: leave out [motion]")
 
@@ -161,33 +166,24 @@ def _sequence_frames(
     note: str | None,
     progress: Progress,
 ) -> Iterator[RenderResult]:
-    """The frames of a sequence: each with the camera, the photo and the maps of its view."""
-    layout = layout_of(manifest)
-    encode = _encoder_of(request, sequence, layout)
-    prepared: DeviceScene | None = None
+    """The frames of a sequence: each with its camera and photo, and with its own maps or those of the last keyframe."""
+    every = request.keyframes or sequence.content.maps.every
+    encode = _encoder_of(request, sequence, layout_of(manifest))
+    relit, encoder = request.relit, request.encoder
+    scenes = sequence_scenes(
+        sequence, scene, manifest, size, encode, every=every, relit=relit, encoder=encoder, progress=progress
+    )
     for number in range(request.frames):
         title = f"frame {number + 1} of {request.frames}"
         begun = time.perf_counter()
         try:
-            with progress.step(f"{title}: encoding its maps"):
-                room = sequence.room(number)
-                if prepared is None:
-                    prepared = DeviceScene.of(
-                        scene,
-                        manifest,
-                        size=size,
-                        relit=request.relit,
-                        encoder=request.encoder,
-                        room=room,
-                        encode=encode,
-                        progress=progress,
-                    )
-                else:
-                    prepared = prepared.seen_in(room, encode, request.relit)
+            with progress.step(f"{title}: reading and encoding"):
+                prepared = next(scenes)
                 passes = prepared.scene.passes()
                 registers = [prepared.registers(size, one, composited=not request.relit) for one in passes]
-            if note is not None and number == 0:
-                progress.note(note)
+            for line in (note, _BETWEEN if every > 1 else None):
+                if line is not None and number == 0:
+                    progress.note(line)
             seconds = {"maps": time.perf_counter() - begun}
             (result,) = _rendered(request, prepared, size, [passes], [registers], progress.of(title))
         except UserError as error:
@@ -196,6 +192,50 @@ def _sequence_frames(
             result.report, time=sequence.content.frame[number].time, seconds=seconds | dict(result.report.seconds)
         )
         yield replace(result, report=report)
+
+
+def sequence_scenes(
+    sequence: Sequence,
+    scene: Scene,
+    manifest: Manifest,
+    size: Size,
+    encode: Encode,
+    *,
+    every: int = 1,
+    relit: bool = False,
+    encoder: Encoder = "live",
+    progress: Progress = QUIET,
+) -> Iterator[DeviceScene]:
+    """A scene in each frame of a sequence: with its camera and photo, and the maps of the last keyframe.
+
+    Args:
+        sequence: The frames.
+        scene: The scene; object and lights stay where the first frame has them.
+        manifest: The design's manifest.
+        size: Width and height of frames, pixels.
+        encode: Encodes the maps of each keyframe, in their order.
+        every: Number of frames from a keyframe to the next.
+        relit: As in `DeviceScene.of`.
+        encoder: Of textures.
+        progress: Shows the fit of lights.
+    """
+    prepared = DeviceScene.of(
+        scene,
+        manifest,
+        size=size,
+        relit=relit,
+        encoder=encoder,
+        room=sequence.room(0),
+        encode=encode,
+        progress=progress,
+    )
+    yield prepared
+    for number in range(1, len(sequence)):
+        if number % every == 0:
+            prepared = prepared.seen_in(sequence.room(number), encode, relit)
+        else:
+            prepared = prepared.seen_by(sequence.cameras[number], sequence.photo(number))
+        yield prepared
 
 
 def _encoder_of(request: RenderRequest, sequence: Sequence, layout: AttributeLayout) -> Encode:

@@ -29,6 +29,7 @@ class RenderRequest:
         mesh: Name or file of a mesh that replaces the scene's.
         background: Folder of a room that replaces the scene's background.
         sequence: Views of a room, one for each frame, which replace the scene's background and motion.
+        keyframes: Of a sequence, every so many frames have maps; None: as its file says.
         hits: Whether the caller needs hit triangles; the configuration must then have them.
         relit: Whether the scene's lights shade the room even if it has a photo.
         truth: Mesh file of the room's real geometry, in its world space; for the reference.
@@ -46,6 +47,7 @@ class RenderRequest:
     mesh: str | None = None
     background: Path | None = None
     sequence: RoomSequence | None = None
+    keyframes: int | None = None
     hits: bool = False
     relit: bool = False
     truth: Path | None = None

@@ -17,7 +17,7 @@ from colonnade.scene.object_pose import Pose
 from colonnade.scene.samples import Point
 
 if TYPE_CHECKING:
-    from colonnade.environment.model import Environment
+    from colonnade.environment.model import Environment, EnvironmentCamera
     from colonnade.mesh.mesh import Extent
 
 
@@ -54,8 +54,8 @@ def start_camera(
     camera = scene.camera
     if environment is None:
         return scene_camera(camera, pose, extent, width, height)
-    if camera.position is None:
-        return environment_camera(environment, width, height)
+    if scene.frame_camera is not None or camera.position is None:
+        return environment_camera(environment, width, height, scene.frame_camera)
     target = pose.to_world(extent.centre) if camera.target is None else np.array(camera.target)
     return _looking(camera, np.array(camera.position), target, _lens(camera, width, height, environment))
 
@@ -170,22 +170,20 @@ def through_lens(world: WorldCamera, camera: Camera, centre: Floats, on_lens: Po
     return replace(world, position=world.position + offset, corner=world.corner - offset / focus)
 
 
-def environment_camera(environment: Environment, width: int, height: int) -> WorldCamera:
-    """The camera of a room's maps, for a frame with the maps' aspect ratio.
+def environment_camera(
+    environment: Environment, width: int, height: int, camera: EnvironmentCamera | None = None
+) -> WorldCamera:
+    """The camera of a room's maps, or another one for pictures of their size, for a frame with their aspect ratio.
 
     Raises:
         UserError: The frame has another aspect ratio.
     """
     _check_proportions(environment, width, height)
-    axes, position = environment.camera_to_world[:, :3], environment.camera_to_world[:, 3]
-    right, down, forward = axes.T
+    camera = camera or environment.camera
+    right, down, forward, position = camera.to_world.T
     scale_x, scale_y = environment.width / width, environment.height / height
-    step_x, step_y = scale_x / environment.fx * right, scale_y / environment.fy * down
-    corner = (
-        forward
-        + (0.5 * scale_x - environment.cx) / environment.fx * right
-        + (0.5 * scale_y - environment.cy) / environment.fy * down
-    )
+    step_x, step_y = scale_x / camera.fx * right, scale_y / camera.fy * down
+    corner = forward + (0.5 * scale_x - camera.cx) / camera.fx * right + (0.5 * scale_y - camera.cy) / camera.fy * down
     return WorldCamera(position, corner, step_x, step_y, np.stack([right, -down, -forward]))
 
 

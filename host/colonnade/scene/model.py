@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Interval
-from pydantic import BeforeValidator, ConfigDict, Field, Strict, StrictBool, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, InstanceOf, Strict, StrictBool, WithJsonSchema, model_validator
 from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
 from colonnade.common.errors import UserError
 from colonnade.common.limits import MAX_COORDINATE, MAX_SAMPLES
+from colonnade.environment.model import EnvironmentCamera
 from colonnade.mesh.materials import Kind
 from colonnade.scene.samples import CENTRE, Sample, samples_of_frame
 
@@ -349,7 +350,8 @@ class Scene:
 
     Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass
     over the frame. ``standing_point`` is the world point on which the object stands, if that is known from another view
-    of its room. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
+    of its room. ``frame_camera`` is that of a sequence's frame with the maps of another frame: a lens for their size,
+    and a pose. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
     fitted to its photo. ``headroom`` scales all lights up and diffuse albedos of the object down
     (`colonnade.environment.photo_colours`).
     """
@@ -370,6 +372,7 @@ class Scene:
     motion_progress: float = 0.0
     sample: Sample = CENTRE
     standing_point: Vector | None = None
+    frame_camera: Annotated[InstanceOf[EnvironmentCamera], WithJsonSchema({})] | None = None
     names_light: bool = True
     headroom: float = 1.0
 
@@ -418,7 +421,7 @@ class Scene:
     @property
     def places_camera(self) -> bool:
         """Whether the camera may be elsewhere than that of the room's maps."""
-        return self.camera.position is not None or bool(self.motion.camera)
+        return self.frame_camera is not None or self.camera.position is not None or bool(self.motion.camera)
 
     @property
     def lights(self) -> tuple[PointLight, ...]:

@@ -35,6 +35,11 @@ def maps_image(image: AttributeImage, manifest: Manifest) -> bytes:
     return _image(_attributes(map_sections(image, manifest), manifest), manifest)
 
 
+def load_cycles(image: AttributeImage, manifest: Manifest) -> int:
+    """Cycles in which the load port takes a room's maps: one for each word of a record, and one for the record."""
+    return sum(len(section) - 4 + int(section[1]) for section in _attributes(map_sections(image, manifest), manifest))
+
+
 def _image(sections: Sequence[npt.NDArray[np.uint32]], manifest: Manifest) -> bytes:
     body = np.concatenate(sections) if sections else np.zeros(0, dtype="<u4")
     words = _HEADER_WORDS * (1 + -(-len(body) // _HEADER_WORDS))

@@ -19,15 +19,22 @@ from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
 from colonnade.device.shell_build import build_shell_simulator
+from colonnade.environment.sequence import load_sequence
 from colonnade.integration.design_header import design_header
 from colonnade.integration.register_table import register_table
+from colonnade.lab.evaluation.demonstration.walk import walk_scene, write_walk
 from colonnade.lab.evaluation.studies.generated_rooms import generated_room
 from colonnade.lab.evaluation.studies.synthetic_attic import write_room
+from colonnade.maps.encoded import layout_of
+from colonnade.maps.live import LiveEncoder, LiveFrame
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
+from colonnade.registers.target_view import TargetView
+from colonnade.render.composite import resized_photo
+from colonnade.render.frames import sequence_scenes
 from colonnade.scene.parser import load_scene
-from colonnade.scene_image.device_image import device_image, maps_image
+from colonnade.scene_image.device_image import device_image, load_cycles, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.packer import pack
 
@@ -100,13 +107,13 @@ def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> 
 
 
 def run_driver(
-    folder: Path, design: GeneratedDesign, files: Mapping[str, bytes], *arguments: str
+    folder: Path, design: GeneratedDesign, files: Mapping[str, bytes], *arguments: str, program: str = "simulated"
 ) -> tuple[NDArray[np.uint8], list[list[str]]]:
     """Run the driver with files against the Verilated shell: the memory at the end, and the lines that it prints."""
     for name, content in files.items():
         (folder / name).write_bytes(content)
     (folder / "colonnade_design.h").write_text(design_header(register_table(design), design.manifest))
-    driver = compile_c([SOFTWARE / "tests" / "simulated.c", *DRIVER], folder / "driver")
+    driver = compile_c([SOFTWARE / "tests" / f"{program}.c", *DRIVER], folder / "driver")
     options = {"bus": 16, "memory": 1 << 22, "latency": 20, "stall": 10, "seed": 4}
     command = [
         build_shell_simulator(design),
@@ -185,16 +192,18 @@ light.position = [0.1, 2.0, 1.0]
 """
 
 
+MAPS = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
+MAP_OVERRIDES = ("array.columns=2", "frame.maxBounces=1", f"physicalAttributeMemory={json.dumps(MAPS)}")
+
+
 @pytest.mark.parametrize("mode", ["interrupt", "poll"])
 def test_maps_of_another_view_are_loaded_between_frames(tmp_path: Path, mode: str) -> None:
     """The frame after that is the one of a device that has never had others; a soft reset keeps the maps."""
-    maps = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
-    overrides = ("array.columns=2", "frame.maxBounces=1", f"physicalAttributeMemory={json.dumps(maps)}")
-    design = shell_design_for("tiny", overrides, bus_bytes=16)
+    design = shell_design_for("tiny", MAP_OVERRIDES, bus_bytes=16)
     manifest = design.manifest
     views = []
     for name, walked in (("first", 0.0), ("second", 0.4)):
-        write_room(tmp_path / "rooms" / name, generated_room(4, maps["width"], maps["height"], walked).environment)
+        write_room(tmp_path / "rooms" / name, generated_room(4, MAPS["width"], MAPS["height"], walked).environment)
         (tmp_path / f"{name}.toml").write_text(ROOM_SCENE.format(room=name))
         views.append(DeviceScene.of(load_scene(tmp_path / f"{name}.toml"), manifest, encoder="live"))
     registers = [view.registers((WIDTH, HEIGHT)) for view in views]
@@ -213,3 +222,53 @@ def test_maps_of_another_view_are_loaded_between_frames(tmp_path: Path, mode: st
     for code, view, line in zip((0, 1, 2, 0, 0), (0, 0, 0, 1, 1), lines, strict=True):
         take_frame(memory, line, expected[view], code)
     assert (memory == UNWRITTEN).all()
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_frames_of_a_moving_camera_are_those_of_the_model(tmp_path: Path, every: int) -> None:
+    """Twelve frames of the demonstration: maps of each keyframe, registers from poses or from files, photos."""
+    size, design = (48, 36), shell_design_for("tiny", MAP_OVERRIDES, bus_bytes=16)
+    manifest = design.manifest
+    sequence = load_sequence(write_walk(tmp_path / "room", (MAPS["width"], MAPS["height"]), 12))
+    scene = walk_scene(MAPS["width"], MAPS["height"])
+    (tmp_path / "scene.toml").write_text(f"{scene}paths.bounces = 1\n")
+    encoder = LiveEncoder(layout_of(manifest))
+    scenes = sequence_scenes(
+        sequence,
+        load_scene(tmp_path / "scene.toml"),
+        manifest,
+        size,
+        lambda room: encoder.encode(LiveFrame.of(room)).image,
+        every=every,
+    )
+    files, expected, loads = dict[str, bytes](), list[NDArray[np.uint8]](), list[int]()
+    for number, prepared in enumerate(scenes):
+        if number == 0:
+            files["image"] = device_image(prepared.image, manifest)
+        assert prepared.maps is not None and prepared.photo is not None
+        loads.append(0)
+        if number % every == 0:
+            files[f"maps.{number}"] = maps_image(prepared.maps.image, manifest)
+            loads[-1] = load_cycles(prepared.maps.image, manifest)
+            files[f"view.{number}"] = prepared.view_file(size, composited=True)
+            registers = TargetView(files[f"view.{number}"], manifest).registers()
+        else:
+            registers = prepared.registers(size, composited=True)
+            files[f"frame.{number}"] = frame_file(registers, manifest)
+        assert registers["environment.isMapCamera"] == int(number % every == 0)
+        photo = resized_photo(prepared.photo, *size)
+        lines = np.zeros((size[1], size[0], 4), np.uint8)
+        lines[..., :3] = photo[..., ::-1]
+        files[f"photo.{number}"] = lines.tobytes()
+        frame = render_model(manifest, prepared.image, registers)
+        expected.append(framebuffer_bytes(frame, 0, photo))
+        assert (expected[-1] != framebuffer_bytes(frame, 0)).any() and (
+            expected[-1].reshape(lines.shape) != lines
+        ).any()
+    memory, printed = run_driver(tmp_path, design, files, "image", "12", program="live")
+    for line, wanted, load in zip(printed, expected, loads, strict=True):
+        _, place, stride, _, loading, _, rendering = line
+        found = memory[int(place) : int(place) + int(stride) * size[1]].reshape(size[1], int(stride))
+        np.testing.assert_array_equal(found[:, : wanted.shape[1]], wanted)
+        assert load <= int(loading) <= 1.2 * load and int(rendering) > 0
+    assert len({each.tobytes() for each in expected}) == 12

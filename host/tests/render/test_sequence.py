@@ -7,6 +7,7 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from colonnade.capture.video import frames_of_video
 from colonnade.cli.main import cli
 from colonnade.common import extras
 from colonnade.common.accumulation import Accumulation
+from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import render_model
@@ -30,6 +32,7 @@ from colonnade.maps.encoded import layout_of
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
 from colonnade.mesh.load import load_mesh
+from colonnade.render import frames as module
 from colonnade.render.composite import composited
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
@@ -175,11 +178,68 @@ def test_albedos_that_a_sequence_lacks_have_one_light(folder: Path) -> None:
         assert np.array_equal(room.albedo, derived_albedo(known.room(number))) is (number == 0)
 
 
+def test_between_keyframes_a_frame_has_its_camera_and_photo_and_the_maps_before(
+    folder: Path, frames: list[RenderResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[tuple[DeviceScene, dict[str, int]]] = []
+    rendered = module._rendered
+
+    def watched(
+        request: RenderRequest, prepared: DeviceScene, size: object, passes: object, registers: list[Any], *rest: Any
+    ) -> Any:
+        seen.append((prepared, registers[0][0]))
+        return rendered(request, prepared, size, passes, registers, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(module, "_rendered", watched)
+    request, sequence = request_of(folder, "albedo"), load_sequence(folder / "sequence.toml")
+    found = list(render_frames(replace(request, keyframes=2)))
+    assert [values["environment.isMapCamera"] for _, values in seen] == [1, 0, 1]
+    assert seen[1][0].image is seen[0][0].image and seen[2][0].image is not seen[0][0].image
+    np.testing.assert_array_equal(found[0].image, frames[0].image)
+    # The object is where it is with maps of its own; the picture is the frame's own photo, but for its shadow
+    assert (found[1].object_mask != frames[1].object_mask).sum() <= 2
+    for number, frame in enumerate(found):
+        room = ~frame.object_mask
+        own, other = (encode_srgb(frame.image)[room] == sequence.photo(each)[room] for each in (number, number - 1))
+        assert own.all(axis=1).mean() > 0.7 and other.all(axis=1).mean() < 0.5
+    shadows = [
+        (encode_srgb(one[1].image) != sequence.photo(1)).any(axis=2) & ~one[1].object_mask for one in (found, frames)
+    ]
+    assert (shadows[0] & shadows[1]).sum() > 0.7 * (shadows[0] | shadows[1]).sum() > 50
+
+
+def test_a_camera_of_a_capture_has_any_pose_and_lens(folder: Path) -> None:
+    """Rolled, with its centre aside: the rays of a frame between keyframes are those of its camera."""
+    text = re.sub(
+        r"^(cx|fy) = (.*)$",
+        lambda found: f"{found[1]} = {1.1 * float(found[2])}",
+        (folder / "sequence.toml").read_text(),
+        flags=re.M,
+    )
+    (folder / "aside.toml").write_text(text)
+    sequence = load_sequence(folder / "aside.toml")
+    camera = sequence.cameras[1]
+    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    camera = replace(camera, to_world=np.column_stack([camera.to_world[:, :3] @ turn, camera.to_world[:, 3]]))
+    prepared = DeviceScene.of(
+        load_scene(folder / "albedo.toml"), manifest_for("small", ROOM).manifest, room=sequence.room(0), encoder="live"
+    )
+    view = prepared.seen_by(camera, None).view(SIZE)
+    pose = object_pose(prepared.scene, prepared.image.header.extent, sequence.room(0))
+    np.testing.assert_allclose(view.origin, pose.to_mesh(camera.to_world[:, 3]), atol=1e-9)
+    x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
+    rays = view.direction + x[..., None] * view.step_x + y[..., None] * view.step_y
+    np.testing.assert_allclose(rays, camera.directions(*SIZE) @ camera.to_world[:, :3].T @ pose.rotation, atol=1e-9)
+
+
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
-def test_the_hardware_renders_the_frames_of_the_model(folder: Path) -> None:
-    small = [replace(request_of(folder, "albedo", backend), size=(32, 24), frames=2) for backend in ("rtl", "model")]
+@pytest.mark.parametrize("keyframes", [1, 2])
+def test_the_hardware_renders_the_frames_of_the_model(folder: Path, keyframes: int) -> None:
+    common = {"size": (32, 24), "frames": 2, "keyframes": keyframes}
+    small = [replace(request_of(folder, "albedo", backend), **common) for backend in ("rtl", "model")]  # type: ignore[arg-type]
     for rtl, model in zip(*map(render_frames, small), strict=True):
         np.testing.assert_array_equal(rtl.image, model.image)
+        np.testing.assert_array_equal(rtl.object_mask, model.object_mask)
         assert rtl.report.counters["hits"] == model.report.counters["hits"] > 0
 
 
@@ -215,6 +275,7 @@ def test_files_of_a_sequence(folder: Path, tmp_path: Path, frames: list[RenderRe
         (("--sequence", "FILE", "--background", "FOLDER/0"), "both replace the scene's background"),
         (("--sequence", "FILE", "--backend", "reference"), "--sequence is for the rtl and the model backend"),
         (("--sequence", "FILE", "--set", "physicalAttributeMemory.width=64"), "set its width and height"),
+        (("--keyframes", 2), "--keyframes needs --sequence"),
         (("--video", "v.mp4"), "--video needs --frames or --sequence"),
         (("--frames", 2, "--video", "v.avi"), "is written as MP4"),
     ],
@@ -229,14 +290,32 @@ def test_what_does_not_go_with_a_sequence_is_one_line(
     assert result.exit_code == 2 and message in " ".join(re.sub("[│╭╮╰╯─]", " ", result.output).split()), result.output
 
 
-def test_the_object_does_not_move_in_a_sequence(folder: Path) -> None:
-    (folder / "moving.toml").write_text((folder / "albedo.toml").read_text() + "[motion]\nturn = 30.0\n")
-    result = run(folder, "--sequence", folder / "sequence.toml")
-    assert result.exit_code == 0
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("[motion]\nturn = 30.0\n", "leave out [motion]"),
+        ("[camera]\nposition = [0.0, 1.0, 2.0]\n", "each frame of a sequence has its own camera: leave out [camera]"),
+        ("[[motion.camera]]\nposition = [0.0, 1.0, 2.0]\n", "leave out [motion]"),
+    ],
+)
+def test_object_and_camera_of_a_scene_stay_in_a_sequence(folder: Path, table: str, message: str) -> None:
+    (folder / "moving.toml").write_text((folder / "albedo.toml").read_text() + table)
     moved = CliRunner().invoke(
         cli, ["render", str(folder / "moving.toml"), "--backend", "model", "--sequence", str(folder / "sequence.toml")]
     )
-    assert moved.exit_code == 2 and "leave out [motion]" in moved.output
+    assert moved.exit_code == 2 and message in " ".join(moved.output.split())
+
+
+def test_a_sequence_chooses_its_keyframes(folder: Path) -> None:
+    text = (folder / "sequence.toml").read_text()
+    (folder / "keyframes.toml").write_text("maps.every = 2\n" + text)
+    result = run(folder, "--sequence", folder / "keyframes.toml", "--frames", 2)
+    assert result.exit_code == 0 and result.stderr.count("between keyframes") == 1
+    every = run(folder, "--sequence", folder / "keyframes.toml", "--frames", 2, "--keyframes", 1)
+    assert every.exit_code == 0 and "between keyframes" not in every.stderr
+    (folder / "keyframes.toml").write_text("maps.every = 0\n" + text)
+    with pytest.raises(UserError, match=r"maps\.every"):
+        load_sequence(folder / "keyframes.toml")
 
 
 def test_without_its_package_a_video_is_refused_before_work(

@@ -145,7 +145,7 @@ def test_without_keys_one_pass_is_the_scene() -> None:
         ("[camera]\naperture = -0.1", "camera.aperture must be a number from 0"),
         ("[camera]\naperture = 0.1\nfocus = 0", "camera.focus must be a number from 1e-06"),
         ("[camera]\nfocus = 2.0", "camera.focus needs camera.aperture"),
-        ('[background]\nroom = "r"\n[camera]\naperture = 0.1', r"the camera is the room's: leave out \[camera\]"),
+        ('[background]\nroom = "r"\n[camera]\naperture = 0.1', r"the camera is the room's: give camera.position"),
         ("[motion]\nshutter = 1.5", "motion.shutter must be a number from 0 to 1"),
     ],
 )

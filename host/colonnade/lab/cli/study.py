@@ -55,18 +55,19 @@ def study(
     rays that are right in the room itself.
     With --rooms it measures rays and encoded maps in rooms that a seed generates, and counts why rays are wrong.
     With --views and --rooms it measures the pixels of cameras that are not that of the maps: the share that is right.
+    With --frames too it measures frames with an object by three ways to the maps of a camera that has moved.
     With --live it measures the encoder of a moving camera: time, loss and rays, in ROOMS or in the rooms of --rooms.
     Tables are in Markdown.
     """
     context = click.get_current_context()
     generated = seeds is not None
-    if frames + occlusion + light + live + capture > 1 or (generated and (frames or light or capture)):
+    if frames + occlusion + light + live + capture > 1 or (generated and (light or capture or (frames and not views))):
         raise click.UsageError("give one of --frames, --occlusion, --light, --live, --capture and --rooms", context)
     if path and not (live and generated):
         raise click.UsageError("--path needs --live and --rooms", context)
     if views and (not generated or occlusion or live):
         raise click.UsageError("--views needs --rooms, without --occlusion and --live", context)
-    if output is not None and not (frames or occlusion or light):
+    if output is not None and not ((frames and not views) or occlusion or light):
         raise click.UsageError("--output needs --frames, --occlusion or --light", context)
     if (occlusion or generated) and rooms:
         option = "--occlusion" if occlusion else "--rooms"
@@ -104,6 +105,12 @@ def study(
                 )
                 echo_lines(live_maps.table(maps))
                 report = {name: asdict(value) for name, value in maps.items()}
+        elif views and frames and seeds is not None:
+            from colonnade.lab.evaluation.studies import moving_frames
+
+            errors = moving_frames.study_seeds(parse_seeds(seeds), not no_dists, progress.for_terminal())
+            echo_lines(moving_frames.table(errors))
+            report = {name: {way: asdict(one) for way, one in ways.items()} for name, ways in errors.items()}
         elif frames:
             from colonnade.lab.evaluation.studies import ar_losses
 

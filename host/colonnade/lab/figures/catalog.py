@@ -71,6 +71,8 @@ _ATTIC = "scenes/rooms/attic"
 
 #: A generated room on which no encoder is tuned.
 _SEEDS = "100"
+#: Generated rooms in which a camera moves: one of each kind.
+_MOVED = "100-103"
 
 
 #: Samples a pixel of the table of samples.
@@ -125,6 +127,7 @@ def catalog() -> dict[str, Entry]:
             },
         ),
         Entry("live-paths", "small", _colonnade("study", "--live", "--path", "--rooms", _SEEDS)),
+        Entry("moving-frames", "small", _colonnade("study", "--views", "--frames", "--rooms", _MOVED)),
         Entry("captures", "small", _colonnade("study", "--capture", *_ROOMS, _ATTIC)),
         _samples(),
         _bench("small", *_TWO, "--no-mirror"),

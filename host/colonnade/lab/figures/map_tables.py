@@ -45,6 +45,29 @@ def live_paths(data: Data) -> str:
 _PATH = (("psnr", 1), ("degrees", 1), ("off", 100))
 
 
+def moving_frames(data: Data) -> str:
+    """Frames of a camera that has moved, by three ways to its maps."""
+    keys = (("frame", ".1f"), ("object", ".1f"), ("shadow", ".1f"), ("displacement", ".1f"), ("dists", ".4f"))
+    rows = [
+        [
+            moved,
+            *(
+                ", ".join("–" if ways[way][key] is None else format(ways[way][key], form) for way in ways)
+                for key, form in keys
+            ),
+        ]
+        for moved, ways in data.result("moving-frames").items()
+    ]
+    titles = [
+        "moved",
+        "frame, dB: fresh, marched, stale",
+        "object, dB",
+        "shadow, dB",
+        "shadow off by, pixels of 320×240",
+    ]
+    return markdown([*titles, "frame, DISTS"], rows)
+
+
 def captures(data: Data) -> str:
     """Mirror rays in rooms as a phone captures them."""
     rows = [
@@ -64,5 +87,6 @@ def captures(data: Data) -> str:
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "live-rooms": live_rooms,
     "live-paths": live_paths,
+    "moving-frames": moving_frames,
     "captures": captures,
 }

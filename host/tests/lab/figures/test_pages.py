@@ -145,6 +145,12 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "generated": {"seed 1": {"offline": maps(None), "live": maps(None)}},
         },
         "live-paths": {"seed 1": {"psnr": [30.0, 29.5], "degrees": [2.0, 2.25], "off": [0.02, 0.03]}},
+        "moving-frames": {
+            "0.1 m, 3.3°": {
+                way: {"frame": 40.0, "object": 30.25, "shadow": None, "displacement": 1.5, "dists": 0.01}
+                for way in ("fresh", "marched", "stale")
+            }
+        },
         "captures": {
             "r, own maps": captured(None),
             "r, phone": captured(0.005),
@@ -212,11 +218,13 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| hit triangles and distances of 2 meshes on `small` | 2 |" in table(docs, "equality")
     assert "| **8** | 1.1 | 1.10 |" in table(docs, "energy-area")
     assert "**32b32s64d**" in table(docs, "precision")
-    assert "| all | 27.0 |" in table(docs, "measuring")
+    assert "| all | 28.5 |" in table(docs, "measuring")
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 (×1.20) | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
     assert "| seed 1 | –, – |" in live and "15.0" not in live
     assert "| seed 1 | 30.00, 29.50 | 2.00, 2.25 | 2.00, 3.00 | -0.50 dB, +0.25° |" in table(docs, "live-paths")
+    moved = "| 0.1 m, 3.3° | 40.0, 40.0, 40.0 | 30.2, 30.2, 30.2 | –, –, – | 1.5, 1.5, 1.5 |"
+    assert moved in table(docs, "moving-frames")
     assert "| r, own maps | – | 7.8° | 90.0 % | 95.0 % | 94.0 % | 1,234 |" in table(docs, "captures")
     assert "| r, phone | 0.48% |" in table(docs, "captures")
 

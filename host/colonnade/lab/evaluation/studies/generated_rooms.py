@@ -10,11 +10,13 @@ legs, clutter and strong patterns. Encoders are tuned on `TUNING` alone; `REPORT
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from colonnade.common.types import Floats
 from colonnade.lab.evaluation.studies.attic_paints import Paint, Rgb, boards, plaster, rings, spiral, stripes
 from colonnade.lab.evaluation.studies.generated_paints import checkers, marble, poster
 from colonnade.lab.evaluation.studies.synthetic_attic import (
@@ -45,15 +47,37 @@ OVERLAP = 0.05
 
 def generated_room(seed: int, width: int = 640, height: int = 480, walked: float = 0.0) -> SyntheticRoom:
     """Render the maps of the room of a seed; the camera has ``walked`` so many metres to the right, and turned left."""
+    made, aside = plan_of(seed), np.array([walked, 0.0, 0.0])
+    camera = camera_at(made.eye + aside, made.target + 0.4 * aside, width, height, made.focal)
+    return synthetic_room(f"seed-{seed}", made.parts, camera, width, height, made.lamp)
+
+
+@dataclass(frozen=True)
+class Furnished:
+    """The parts of a generated room, its camera and its lamp.
+
+    Attributes:
+        parts: The room.
+        eye, target, lamp: Points in the world, float64 [3].
+        focal: Focal length in picture widths.
+    """
+
+    parts: list[Part]
+    eye: Floats
+    target: Floats
+    lamp: Floats
+    focal: float
+
+
+def plan_of(seed: int) -> Furnished:
+    """The room of a seed."""
     plan = Plan(seed)
     eye = np.array([plan.uniform(-0.25, 0.25) * plan.width, plan.uniform(1.25, 1.7), plan.length / 2 - 0.3])
     target = np.array([plan.uniform(-0.2, 0.2) * plan.width, plan.uniform(0.35, 0.9), eye[2] - plan.uniform(3.0, 4.5)])
     focal = 0.5 / np.tan(np.radians(plan.uniform(*LENSES)) / 2)
     parts = [*plan.shell(), *plan.furniture(), *plan.thin_things(), *plan.clutter(), *plan.pictures()]
     lamp = np.array([plan.uniform(-0.2, 0.2) * plan.width, 0.8 * plan.top(0.0), plan.uniform(0.0, 0.25) * plan.length])
-    aside = np.array([walked, 0.0, 0.0])
-    camera = camera_at(eye + aside, target + 0.4 * aside, width, height, float(focal))
-    return synthetic_room(f"seed-{seed}", parts, camera, width, height, lamp)
+    return Furnished(parts, eye, target, lamp, float(focal))
 
 
 class Plan:

@@ -63,7 +63,7 @@ class SyntheticRoom:
 
 def attic(width: int = 640, height: int = 480) -> SyntheticRoom:
     """Render the attic's maps."""
-    return synthetic_room("attic", _parts(), camera_at(EYE, TARGET, width, height), width, height)
+    return synthetic_room("attic", attic_parts(), camera_at(EYE, TARGET, width, height), width, height)
 
 
 def synthetic_room(
@@ -74,45 +74,81 @@ def synthetic_room(
     Raises:
         ValueError: The camera sees through the room.
     """
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts])
-    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
-    owner = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
-    surface = Triangles(np.concatenate([part.vertices for part in parts]), faces.astype(np.int32))
-    tracer = RayTracer(surface)
+    model = RoomModel(name, parts)
+    return SyntheticRoom(model.seen_by(camera, width, height, lamp), model.surface)
 
-    rotation, eye = camera.to_world[:, :3], camera.to_world[:, 3]
-    directions = camera.directions(width, height).reshape(-1, 3) @ rotation.T
-    origins = np.broadcast_to(eye, directions.shape)
-    hit_faces = tracer.first_hits(origins, directions)
-    if (hit_faces < 0).any():
-        raise ValueError(f"the {name} has a hole")
-    points = tracer.surface_points(hit_faces, origins, directions)
-    corners = tracer.corners[hit_faces]
-    normals = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    albedo = np.empty_like(normals)
-    for index, part in enumerate(parts):
-        rows = np.flatnonzero(owner[hit_faces] == index)
-        albedo[rows] = part.paint(points.position[rows] - np.array(part.centre or (0.0, 0.0, 0.0)))
-        if part.centre is not None:
-            normals[rows] = _smooth(points.position[rows], normals[rows], part)
-    normals *= np.where(np.einsum("ni,ni->n", normals, directions) > 0, -1.0, 1.0)[:, None]
 
-    to_lamp = lamp - points.position
-    cosine = np.einsum("ni,ni->n", normals, unit_vectors(to_lamp)).clip(min=0)
-    lit = ~tracer.occluded(points.position + 1e-3 * normals, to_lamp)
-    falloff = 1 / np.einsum("ni,ni->n", to_lamp, to_lamp).clip(min=0.25)
-    light = albedo * (AMBIENT + LAMP_COLOUR * (cosine * lit * falloff)[:, None])
-    shape = (height, width, 3)
-    environment = Environment(
-        name=name,
-        albedo=albedo.reshape(shape),
-        normals=(normals @ rotation).reshape(shape),
-        depth=points.t.reshape(height, width),
-        has_depth=True,
-        camera=camera,
-        photo=encode_srgb(light).reshape(shape),
-    )
-    return SyntheticRoom(environment, surface)
+@dataclass(frozen=True)
+class SeenPoints:
+    """What rays see of a room, float64 [n, 3] each but for t, float64 [n]; normals are towards the rays' origins."""
+
+    t: Floats
+    position: Floats
+    normals: Floats
+    albedo: Floats
+
+
+class RoomModel:
+    """A room that is made of parts, for views from any camera."""
+
+    def __init__(self, name: str, parts: Sequence[Part]) -> None:
+        self.name, self._parts = name, parts
+        starts = np.cumsum([0] + [len(part.vertices) for part in parts])
+        faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
+        self._owner = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
+        self.surface = Triangles(np.concatenate([part.vertices for part in parts]), faces.astype(np.int32))
+        self.tracer = RayTracer(self.surface)
+
+    def look(self, origins: Floats, directions: Floats) -> SeenPoints:
+        """What rays see, world space, float64 [n, 3].
+
+        Raises:
+            ValueError: A ray leaves the room.
+        """
+        tracer = self.tracer
+        hit_faces = tracer.first_hits(origins, directions)
+        if (hit_faces < 0).any():
+            raise ValueError(f"the {self.name} has a hole")
+        points = tracer.surface_points(hit_faces, origins, directions)
+        corners = tracer.corners[hit_faces]
+        normals = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+        albedo = np.empty_like(normals)
+        for index, part in enumerate(self._parts):
+            rows = np.flatnonzero(self._owner[hit_faces] == index)
+            albedo[rows] = part.paint(points.position[rows] - np.array(part.centre or (0.0, 0.0, 0.0)))
+            if part.centre is not None:
+                normals[rows] = _smooth(points.position[rows], normals[rows], part)
+        normals *= np.where(np.einsum("ni,ni->n", normals, directions) > 0, -1.0, 1.0)[:, None]
+        return SeenPoints(points.t, points.position, normals, albedo)
+
+    def seen_by(self, camera: EnvironmentCamera, width: int, height: int, lamp: Floats = LAMP) -> Environment:
+        """The maps of a camera, with a photo by the light of a lamp at a point, float64 [3].
+
+        Raises:
+            ValueError: The camera sees through the room.
+        """
+        rotation, eye = camera.to_world[:, :3], camera.to_world[:, 3]
+        directions = camera.directions(width, height).reshape(-1, 3) @ rotation.T
+        seen = self.look(np.broadcast_to(eye, directions.shape), directions)
+        light = AMBIENT + self.lamp_light(seen, lamp)
+        shape = (height, width, 3)
+        return Environment(
+            name=self.name,
+            albedo=seen.albedo.reshape(shape),
+            normals=(seen.normals @ rotation).reshape(shape),
+            depth=seen.t.reshape(height, width),
+            has_depth=True,
+            camera=camera,
+            photo=encode_srgb(seen.albedo * light).reshape(shape),
+        )
+
+    def lamp_light(self, seen: SeenPoints, lamp: Floats = LAMP) -> Floats:
+        """Light of a lamp at a point on what is seen, float64 [n, 3]."""
+        to_lamp = lamp - seen.position
+        cosine = np.einsum("ni,ni->n", seen.normals, unit_vectors(to_lamp)).clip(min=0)
+        lit = ~self.tracer.occluded(seen.position + 1e-3 * seen.normals, to_lamp)
+        falloff = 1 / np.einsum("ni,ni->n", to_lamp, to_lamp).clip(min=0.25)
+        return np.asarray(LAMP_COLOUR * (cosine * lit * falloff)[:, None])
 
 
 def write_room(folder: Path, environment: Environment) -> None:
@@ -156,7 +192,8 @@ def camera_at(eye: Floats, target: Floats, width: int, height: int, focal: float
     return EnvironmentCamera(focal * width, focal * width, width / 2, height / 2, pose)
 
 
-def _parts() -> list[Part]:
+def attic_parts() -> list[Part]:
+    """The parts of the attic."""
     knee, ridge, front, back, far = 1.1, 3.1, 3.0, -2.4, -4.9
     west, east, bend = -2.5, 2.5, 0.4
     walls, floor = plaster((0.72, 0.68, 0.60)), boards((0.52, 0.36, 0.22), 0, 2, 0.16)
