@@ -68,10 +68,12 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val address   = RegEnable(request.bits, request.fire)
   private val freeCount = PopCount(awaited.map(!_.isUsed))
   // An extra slice lies between the comparison and the entry of a line that misses
-  private val enters   = WireInit(false.B)
-  private val missed   = slice(lineOf(address))
-  private val isMissed = if (slice.isEnabled) enters else false.B // in the cycle before
-  request.ready := blocked === 0.U && freeCount > accepted +& isMissed
+  private val enters    = WireInit(false.B)
+  private val missed    = slice(lineOf(address))
+  private val isMissed  = if (slice.isEnabled) enters else false.B // in the cycle before
+  private val blocksNow =
+    if (slice.isEnabled) io.lines.announced.valid else false.B // the answer would meet the first record
+  request.ready := blocked === 0.U && !blocksNow && freeCount > accepted +& isMissed
 
   // Cycle c + 1: compare. A line is never both held and awaited
   private val hitOH  = tags.hitOH(lineOf(address))
@@ -108,15 +110,13 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   private val fills      = firstComes || word =/= 0.U
   when(fills) { word := word + 1.U }
 
-  // An extra slice lies behind the comparison: then answers and broadcasts are a cycle later
+  // An extra slice lies behind the comparison: then answers are a cycle later
   private val reads   = slice.flag(isHit)
   private val readNow = tags.place(slice(lineOf(address)), slice(hitWay)) ## slice(address(Lines.wordBits - 1, 0))
   private val data    = records.readWrite(Mux(fills, placeNow ## word, readNow), io.lines.record, fills || reads, fills)
-  private val fill    = Wire(chiselTypeOf(io.port.fill.get))
-  fill.valid        := fills
-  fill.bits.address := lineNow ## word
-  fill.bits.record  := checked(io.lines.record)
-  io.port.fill.get  := slice.valid(fill)
+  io.port.fill.get.valid        := fills
+  io.port.fill.get.bits.address := lineNow ## word
+  io.port.fill.get.bits.record  := checked(io.lines.record)
 
   // Cycle c + 2: answer
   io.port.response.valid            := RegNext(slice.flag(accepted), false.B)
@@ -137,7 +137,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   }
 
   when(io.invalidate) { tags.clear() }
-  io.isIdle := !(accepted || slice.flag(accepted) || io.port.response.valid || fills || io.port.fill.get.valid ||
-    blocked =/= 0.U || awaited.map(_.isUsed).reduce(_ || _))
+  io.isIdle := !(accepted || slice.flag(accepted) || io.port.response.valid || fills || blocked =/= 0.U ||
+    awaited.map(_.isUsed).reduce(_ || _))
   assert(!(io.invalidate && !io.isIdle), "lines are forgotten while some are awaited")
 }

@@ -138,10 +138,9 @@ class ColumnCacheSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       }
       if (fill.valid.peekBoolean()) {
         due shouldBe empty
-        val filled = bus(now - later)
-        fill.bits.address.expect(filled)
-        fill.bits.record.expect(contentOf(filled))
-        owed -= filled
+        fill.bits.address.expect(bus(now))
+        fill.bits.record.expect(contentOf(bus(now)))
+        owed -= bus(now)
       }
 
       // Lines that the cache awaits
