@@ -85,8 +85,8 @@ def _directions(view: View, manifest: Manifest) -> dict[str, int]:
 def _light(name: str, light: Any, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
     numbers = manifest.numbers
     colour = np.rint(light.colour * (1 << numbers["lightFraction"])).astype(int)
-    most = (1 << numbers["lightBits"]) - 1
-    result = {f"{name}.colour.{channel}": min(most, int(colour[c])) for c, channel in enumerate("rgb")}
+    largest = (1 << numbers["lightBits"]) - 1
+    result = {f"{name}.colour.{channel}": min(largest, int(colour[c])) for c, channel in enumerate("rgb")}
     bits = numbers["mantissaBits"]
     if light.reach is None:
         return result | {f"{name}.reachMantissa": 0, f"{name}.reachExponent": 0}
