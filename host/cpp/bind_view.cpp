@@ -43,7 +43,7 @@ public:
         writes_.resize(8 * std::size_t{colonnade_view_most_writes(&view_)});
     }
 
-    void setCamera(const Position& position, const Rotation& rotation, std::uint32_t fx, std::uint32_t fy, std::int32_t cx, std::int32_t cy, std::uint32_t width,
+    void setCamera(const Position& position, const Rotation& rotation, std::int64_t fx, std::int64_t fy, std::int64_t cx, std::int64_t cy, std::uint32_t width,
                    std::uint32_t height) {
         const colonnade_camera camera{poseOf(position, rotation), fx, fy, cx, cy, width, height};
         check(colonnade_view_set_camera(&view_, &camera));

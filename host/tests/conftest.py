@@ -83,7 +83,7 @@ def manifest_data(
         "streams": {"pixel": [], "load": []},
         "memories": {"columnBvh": {"depth": depth, "bits": -(-widest // 32) * 32, "banks": 2}},
         "attributes": None,
-        "formatHash": f"{vertex_bits:02x}{box_bits:02x}{mac:02x}{arity}{per_record}{bvh:d}",
+        "formatHash": f"{vertex_bits:02x}{box_bits:02x}{mac:02x}{arity}{per_record}{bvh:d}".ljust(64, "0"),
         "configHash": "0" * 64,
     }
 
@@ -134,7 +134,10 @@ def _registers(vertex: int, mac: int, address: int, coordinate: int) -> list[dic
     for light in range(2):
         fields += _vector(f"lights[{light}].position", mac, True)
         fields += [(f"lights[{light}].colour.{c}", 16, False) for c in "rgb"]
-        fields += [(f"lights[{light}].reachMantissa", 32, False), (f"lights[{light}].reachExponent", 9, True)]
+        fields += [
+            (f"lights[{light}].reachMantissa", 32, False),
+            (f"lights[{light}].reachExponent", (2 * mac + 16).bit_length() + 1, True),
+        ]
     fields += [("shading.flat", 1, False), ("shading.shadows", 1, False), ("shading.lights", 2, False)]
     fields += [
         ("shading.offset", mac - 2, False),

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from float_registers import OutOfReach, float_registers
 
-from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import load_mesh
-from colonnade.registers.frame import frame_registers, registers_of
+from colonnade.registers.frame import frame_registers
 from colonnade.registers.target_view import TargetView, rotation_of
 from colonnade.registers.view_file import view_file
 from colonnade.scene.model import Light, MeshSource, Scene
@@ -27,7 +27,7 @@ GOLDEN = ROOT / "configs" / "golden"
 #: Random poses for each design; 10000 for all.
 POSES = int(os.environ.get("COLONNADE_VIEW_POSES", "300"))
 SCENE = Scene(MeshSource(name="teapot:3"), light=Light(falloff=2.5), more_lights=(Light((-0.7, 1.1, 0.4)),))
-ONE, METRE, PIXEL = 1 << 30, 1 << 32, 1 << 16
+ONE, METRE, PIXEL, COLOUR = 1 << 30, 1 << 32, 1 << 32, 1 << 16
 WIDTH, HEIGHT = 160, 120
 UNIT = [ONE, 0, 0, 0, ONE, 0, 0, 0, ONE]
 LENS = [500 * PIXEL, 500 * PIXEL, 80 * PIXEL, 60 * PIXEL]
@@ -100,7 +100,7 @@ def random_poses(
     lights = [
         (
             whole(random.normal(size=3) * edge * 30 * random.random() ** 3, METRE),
-            whole(random.random(3) * 4, PIXEL),
+            whole(random.random(3) * 4, COLOUR),
             0 if random.random() < 0.3 else round(edge * 20 * random.random() ** 2 * METRE) + 1,
         )
         for _ in design.view.lights
@@ -138,7 +138,7 @@ def float_view(design: Design, poses: Poses) -> View:
         step_x=right / fx @ turned,
         step_y=down / fy @ turned,
         lights=tuple(
-            PlacedLight(to_mesh(p), np.array(c) / PIXEL, None if reach == 0 else reach / METRE / scale)
+            PlacedLight(to_mesh(p), np.array(c) / COLOUR, None if reach == 0 else reach / METRE / scale)
             for p, c, reach in poses.lights
         ),
     )
@@ -147,14 +147,14 @@ def float_view(design: Design, poses: Poses) -> View:
 def both(
     design: Design, count: int, seed: int, nearest: float = 0.7
 ) -> Iterator[tuple[dict[str, int], dict[str, int]]]:
-    """Registers of random poses, by the target and by the host."""
+    """Registers of random poses, by the target and in floats."""
     random, target = np.random.default_rng(seed), design.target()
     for _ in range(count):
         poses = random_poses(design, random, nearest)
         poses.give(target)
         try:
-            expected = registers_of(float_view(design, poses), design.header, design.manifest)
-        except UserError:
+            expected = float_registers(float_view(design, poses), design.header, design.manifest)
+        except OutOfReach:
             with pytest.raises(ValueError, match="tooFar"):
                 target.writes()
             continue

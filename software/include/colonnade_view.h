@@ -19,7 +19,7 @@ enum {
     COLONNADE_VIEW_CAMERA = 2 * 12 + 1,
     COLONNADE_VIEW_LIGHT = 2 * 3 + 5,
     COLONNADE_VIEW_ENVIRONMENT = 2 * 12 + 11,
-    COLONNADE_VIEW_WINDOW = 7,
+    COLONNADE_VIEW_WINDOW = 8,
     COLONNADE_VIEW_WORDS = COLONNADE_VIEW_FRAME + COLONNADE_VIEW_CAMERA + COLONNADE_VIEW_LIGHTS * COLONNADE_VIEW_LIGHT +
                            COLONNADE_VIEW_ENVIRONMENT + COLONNADE_VIEW_WINDOW
 };
@@ -33,8 +33,8 @@ struct colonnade_pose {
 /* A pinhole camera; its own axes are x right, y down, z forward. The centre of pixel (x, y) is at (x + 1/2, y + 1/2). */
 struct colonnade_camera {
     struct colonnade_pose pose;
-    uint32_t fx, fy; /* focal lengths, 2^-16 pixels, from 1 to 32767 pixels */
-    int32_t cx, cy;  /* principal point, 2^-16 pixels, up to 16383 pixels from pixel 0 */
+    int64_t fx, fy; /* focal lengths, 2^-32 pixels, from 1/16 to 2^24 pixels */
+    int64_t cx, cy; /* principal point, 2^-32 pixels, up to 2^24 pixels from pixel 0 */
     uint32_t width, height;
 };
 
@@ -64,9 +64,10 @@ struct colonnade_view_scene {
     int32_t low[3], high[3];        /* the object's bounds, vertex units */
     struct colonnade_factor metres; /* metres in a grid step */
     struct colonnade_factor projection; /* 1 / (1024 * depthUnit), in a grid step */
-    int32_t map_lens[4];                /* fx, fy, cx, cy of the maps, 2^-16 of their pixels */
+    int64_t map_lens[4];                /* fx, fy, cx, cy of the maps, 2^-32 of their pixels */
+    struct colonnade_pose map_pose;     /* of the maps' camera */
     int64_t room_low[3], room_high[3];  /* all of the room's surface, 2^-32 m */
-    uint32_t window;                    /* 0: none, 1: the pixels that the object may darken, 2: the whole frame */
+    uint32_t window; /* 0: none, 1: the pixels that the object may darken, 2: the whole frame, 3: constant registers */
     uint32_t occlusion, edge, max_tolerance; /* edge and tolerance in grid steps */
     uint32_t tile_size, tile_columns, tile_rows;
     const uint8_t *tiles, *writes;
@@ -79,9 +80,10 @@ struct colonnade_view {
     struct colonnade_pose object;
     struct colonnade_light lights[COLONNADE_VIEW_LIGHTS];
     uint32_t words[2][COLONNADE_VIEW_WORDS];
-    bool accepted;    /* which of them the device has */
-    bool is_known;    /* it has them */
-    bool is_computed; /* the others are a whole frame */
+    bool is_map_camera; /* in a room: the camera is that of its maps */
+    bool accepted;      /* which of `words` the device has */
+    bool is_known;      /* it has them */
+    bool is_computed;   /* the others are a whole frame */
 };
 
 /* Reads a view file, which `colonnade pack --view-file` writes. Poses and lights are those of its scene. */
@@ -91,6 +93,7 @@ enum colonnade_error colonnade_view_open(struct colonnade_view *view, const stru
 /* The rotation of a unit quaternion x, y, z, w, 2^-30 each. */
 enum colonnade_error colonnade_rotation(int32_t rotation[3][3], const int32_t quaternion[4]);
 
+/* In a room the device marches from this camera; until the first call the camera is the file's. */
 enum colonnade_error colonnade_view_set_camera(struct colonnade_view *view, const struct colonnade_camera *camera);
 enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, const struct colonnade_pose *object);
 enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index,

@@ -30,7 +30,7 @@ from PIL import Image
 XRGB8888 = 0
 UNWRITTEN = 0xA5
 #: The program's ``struct record``: camera, light, number of words, and then the words.
-RECORD = struct.Struct("<3q9i4x2I2i2I 3q3I4xQ I")
+RECORD = struct.Struct("<3q9i4x4q2I 3q3I4xQ I")
 METRE, ONE = 1 << 32, 1 << 30
 #: Of the orbit's poses, in parts of the distance, and of 1.
 TOLERANCE = 2.0**-26
@@ -101,7 +101,7 @@ def main() -> None:
     target = TargetView(view, manifest)
     centre = list(struct.unpack_from("<3q", view, 4 * 44))
     seen = dict(re.findall(rb"frame (\d+): crc32 ([0-9a-f]{8})", console.read_bytes()))
-    start = [*struct.unpack_from("<3q9i2I2i2I", view, 4 * 59), *struct.unpack_from("<3q3IQ", view, 4 * 80)]
+    start = [*struct.unpack_from("<3q9i4q2I", view, 4 * 59), *struct.unpack_from("<3q3IQ", view, 4 * 84)]
     different, frames = 0, []
     for index in range(layout["frames"]):
         poses, words = record(memory, index)

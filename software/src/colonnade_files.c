@@ -12,11 +12,11 @@ static bool is_magic(const uint8_t *bytes, const char *magic) {
 }
 
 enum colonnade_error colonnade_check_header(const struct colonnade_design *design, const uint8_t *bytes, size_t size,
-                                            size_t least, const char *magic, enum colonnade_error other) {
+                                            size_t least, const char *magic, uint32_t version, enum colonnade_error other) {
     if (size < 8) return COLONNADE_TRUNCATED;
     if (!is_magic(bytes, magic)) return other;
     if (size < least) return COLONNADE_TRUNCATED;
-    if (colonnade_word(bytes, 2) != VERSION) return other;
+    if (colonnade_word(bytes, 2) != version) return other;
     if (colonnade_word(bytes, 3) != size) return COLONNADE_TRUNCATED;
     for (size_t i = 0; i < 8; ++i)
         if (colonnade_word(bytes, 4 + i) != design->format_hash[i]) return COLONNADE_OTHER_FORMAT;
@@ -31,7 +31,7 @@ bool colonnade_are_frame_registers(const struct colonnade_design *design, uint32
 
 enum colonnade_error colonnade_check_image(const struct colonnade_design *design, const void *data, size_t bytes) {
     enum colonnade_error error =
-        colonnade_check_header(design, data, bytes, HEADER_BYTES, "CLNDLOAD", COLONNADE_NOT_AN_IMAGE);
+        colonnade_check_header(design, data, bytes, HEADER_BYTES, "CLNDLOAD", VERSION, COLONNADE_NOT_AN_IMAGE);
     if (error != COLONNADE_OK) return error;
     return bytes % IMAGE_ALIGNMENT == 0 ? COLONNADE_OK : COLONNADE_MISALIGNED;
 }
@@ -58,7 +58,7 @@ enum colonnade_error colonnade_open_frame(const struct colonnade_design *design,
                                           struct colonnade_frame *frame) {
     const uint8_t *at = data;
     enum colonnade_error error =
-        colonnade_check_header(design, at, bytes, FRAME_HEADER_BYTES, "CLNDFRAM", COLONNADE_NOT_A_FRAME);
+        colonnade_check_header(design, at, bytes, FRAME_HEADER_BYTES, "CLNDFRAM", VERSION, COLONNADE_NOT_A_FRAME);
     if (error != COLONNADE_OK) return error;
     const uint8_t *writes = at + FRAME_HEADER_BYTES;
     const uint32_t count = colonnade_word(at, 14);

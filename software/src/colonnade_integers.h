@@ -56,9 +56,12 @@ static inline uint64_t colonnade_multiply_high(uint64_t a, uint64_t b) {
     return a1 * b1 + (cross >> 32) + (middle >> 32);
 }
 
-/* a * b / 2^64, towards zero; both are below 2^63. */
+/* a * b / 2^64 to within 8: of the lower halves only what signed multiplications of 32 bits give. |a|, |b| <= 2^62. */
 static inline int64_t colonnade_product(int64_t a, int64_t b) {
-    return colonnade_signed(colonnade_multiply_high(colonnade_magnitude(a), colonnade_magnitude(b)), (a < 0) != (b < 0));
+    const int32_t a1 = (int32_t)(a >> 32), b1 = (int32_t)(b >> 32);
+    const int32_t a0 = (int32_t)((uint32_t)a >> 1), b0 = (int32_t)((uint32_t)b >> 1);
+    const int32_t cross = (int32_t)((int64_t)a1 * b0 >> 32), other = (int32_t)((int64_t)b1 * a0 >> 32);
+    return (int64_t)a1 * b1 + 2 * ((int64_t)cross + other);
 }
 
 /* 2^126 / value, at most 2^-60 of it less; the top bit of value is set. */

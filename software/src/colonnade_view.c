@@ -2,7 +2,7 @@
 #include "colonnade_view_parts.h"
 #include "colonnade_words.h"
 
-enum { HEADER_WORDS = 12, FIXED_WORDS = 80, LIGHT_WORDS = 11, ROOM_WORDS = 29, TILE_WORDS = 2 };
+enum { VERSION = 2, HEADER_WORDS = 12, FIXED_WORDS = 84, LIGHT_WORDS = 11, ROOM_WORDS = 49, TILE_WORDS = 2 };
 enum { OUTLINE_NORMAL = 2047, WORLD_BITS = 60, ROTATION_BITS = 30, MAC_BITS = 32, SCENE_BITS = 40 };
 
 /* Reads a view file word by word; its length is checked before. */
@@ -36,6 +36,11 @@ static bool read_factor(struct reader *reader, struct colonnade_factor *factor) 
 }
 
 static bool is_within(int64_t value, int64_t low, int64_t high) { return low <= value && value <= high; }
+
+static bool is_lens(int64_t fx, int64_t fy, int64_t cx, int64_t cy) {
+    const int64_t least = COLONNADE_PIXEL / 16, most = COLONNADE_PIXEL << 24;
+    return is_within(fx, least, most) && is_within(fy, least, most) && is_within(cx, -most, most) && is_within(cy, -most, most);
+}
 
 static bool is_place(const int64_t position[3]) { return colonnade_block_length(position) <= WORLD_BITS; }
 
@@ -84,8 +89,10 @@ static bool read_mesh(struct reader *reader, struct colonnade_view_scene *scene)
 static bool read_room(struct reader *reader, struct colonnade_view_scene *scene) {
     bool is_good = read_factor(reader, &scene->metres);
     is_good &= read_factor(reader, &scene->projection);
-    for (int i = 0; i < 4; ++i) scene->map_lens[i] = read_signed(reader);
-    is_good &= scene->map_lens[0] > 0 && scene->map_lens[1] > 0;
+    int64_t *lens = scene->map_lens;
+    for (int i = 0; i < 4; ++i) lens[i] = (int64_t)read_wide(reader);
+    is_good &= is_lens(lens[0], lens[1], lens[2], lens[3]);
+    read_pose(reader, &scene->map_pose);
     read_vector(reader, scene->room_low);
     read_vector(reader, scene->room_high);
     scene->window = read_word(reader);
@@ -123,11 +130,8 @@ static bool is_pose(const struct colonnade_pose *pose) {
 }
 
 static enum colonnade_error check_camera(const struct colonnade_view_scene *scene, const struct colonnade_camera *camera) {
-    const int64_t pixel = 1 << 16, most = (int64_t)1 << 30;
     if (!is_pose(&camera->pose)) return COLONNADE_BAD_POSE;
-    if (!is_within(camera->fx, pixel, 2 * most - pixel) || !is_within(camera->fy, pixel, 2 * most - pixel) ||
-        !is_within(camera->cx, -most, most) || !is_within(camera->cy, -most, most) || camera->width == 0 ||
-        camera->height == 0)
+    if (!is_lens(camera->fx, camera->fy, camera->cx, camera->cy) || camera->width == 0 || camera->height == 0)
         return COLONNADE_BAD_LENS;
     return camera->width > scene->max_width || camera->height > scene->max_height ? COLONNADE_TOO_LARGE : COLONNADE_OK;
 }
@@ -143,15 +147,15 @@ static int find_blocks(const struct colonnade_view_scene *scene, struct block bl
     blocks[1] = (struct block){scene->camera_address, VIEW_CAMERA, 12 * words + 1};
     blocks[2] = (struct block){scene->lights_address, VIEW_LIGHTS, (3 * words + 5) * scene->lights};
     blocks[3] = (struct block){scene->environment_address, VIEW_ENVIRONMENT, 12 * words + 11};
-    blocks[4] = (struct block){scene->window_address, VIEW_WINDOW, scene->scene_bits + scene->more_grid_bits > 42 ? 7 : 6};
-    return scene->environment_address == 0 ? 3 : 5;
+    blocks[4] = (struct block){scene->window_address, VIEW_WINDOW, scene->scene_bits + scene->more_grid_bits > 42 ? 8 : 7};
+    return scene->environment_address == 0 ? 3 : scene->window == WINDOW_CONSTANT ? 4 : 5;
 }
 
 enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design,
                                          const void *data, size_t bytes) {
     const size_t words = bytes / 4;
     enum colonnade_error error =
-        colonnade_check_header(design, data, bytes, 4 * FIXED_WORDS, "CLNDVIEW", COLONNADE_NOT_A_VIEW);
+        colonnade_check_header(design, data, bytes, 4 * FIXED_WORDS, "CLNDVIEW", VERSION, COLONNADE_NOT_A_VIEW);
     if (error != COLONNADE_OK) return error;
     if (bytes % 4 != 0) return COLONNADE_TRUNCATED;
     struct reader reader = {data, HEADER_WORDS};
@@ -166,10 +170,10 @@ enum colonnade_error colonnade_view_open(struct colonnade_view *view, const stru
     struct colonnade_camera camera;
     read_pose(&reader, &object);
     read_pose(&reader, &camera.pose);
-    camera.fx = read_word(&reader);
-    camera.fy = read_word(&reader);
-    camera.cx = read_signed(&reader);
-    camera.cy = read_signed(&reader);
+    camera.fx = (int64_t)read_wide(&reader);
+    camera.fy = (int64_t)read_wide(&reader);
+    camera.cx = (int64_t)read_wide(&reader);
+    camera.cy = (int64_t)read_wide(&reader);
     camera.width = read_word(&reader);
     camera.height = read_word(&reader);
     const bool has_room = scene->environment_address != 0;
@@ -182,7 +186,9 @@ enum colonnade_error colonnade_view_open(struct colonnade_view *view, const stru
     }
     size_t tiles = 0;
     if (has_room) {
+        found.is_map_camera = read_word(&reader) != 0;
         if (!read_room(&reader, scene)) return COLONNADE_NOT_A_VIEW;
+        if (!is_pose(&scene->map_pose)) return COLONNADE_BAD_POSE;
         tiles = (size_t)scene->tile_columns * scene->tile_rows;
     }
     const size_t left = words - reader.next;
@@ -234,10 +240,11 @@ enum colonnade_error colonnade_rotation(int32_t rotation[3][3], const int32_t qu
 }
 
 enum colonnade_error colonnade_view_set_camera(struct colonnade_view *view, const struct colonnade_camera *camera) {
-    if (view->scene.environment_address != 0) return COLONNADE_MAP_CAMERA;
-    enum colonnade_error error = check_camera(&view->scene, camera);
-    if (error == COLONNADE_OK) view->camera = *camera;
-    return error;
+    const enum colonnade_error error = check_camera(&view->scene, camera);
+    if (error != COLONNADE_OK) return error;
+    view->camera = *camera;
+    view->is_map_camera = false;
+    return COLONNADE_OK;
 }
 
 enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, const struct colonnade_pose *object) {
@@ -287,8 +294,9 @@ static void set_positions(struct colonnade_view *view, struct colonnade_work *wo
         const uint64_t size = colonnade_largest(work->lights[i]);
         if (size > most) most = size;
     }
-    int shift = 0;
-    while (colonnade_nearest((int64_t)most, 16 + shift) > limit) ++shift;
+    int shift = colonnade_bit_length(most) - scene->mac_bits - 15;
+    if (shift < 0) shift = 0;
+    if (colonnade_nearest((int64_t)most, 16 + shift) > limit) ++shift;
     work->unit_shift = shift;
     /* A wider register takes the shift as low bits of 0 */
     const int in_steps = shift + scene->more_grid_bits;
@@ -349,12 +357,13 @@ static void set_directions(struct colonnade_view *view, const struct colonnade_w
     const struct colonnade_view_scene *scene = &view->scene;
     const struct colonnade_camera *camera = &view->camera;
     const int bits = scene->mac_bits;
-    int64_t factors[5] = {((1 << 15) - (int64_t)camera->cx) * camera->fy, ((1 << 15) - (int64_t)camera->cy) * camera->fx,
-                          (int64_t)camera->fx * camera->fy, (int64_t)camera->fy << 16, (int64_t)camera->fx << 16};
-    const int up = 62 - colonnade_bit_length(colonnade_magnitude(factors[0]) | colonnade_magnitude(factors[1]) |
-                                             (uint64_t)factors[2] | (uint64_t)factors[3] * camera->width |
-                                             (uint64_t)factors[4] * camera->height);
-    for (int i = 0; i < 5; ++i) factors[i] = colonnade_shift_left(factors[i], up);
+    const int64_t to_x = COLONNADE_PIXEL / 2 - camera->cx, to_y = COLONNADE_PIXEL / 2 - camera->cy;
+    const int up = 62 - colonnade_bit_length((uint64_t)camera->fx | (uint64_t)camera->fy | colonnade_magnitude(to_x) |
+                                             colonnade_magnitude(to_y) | (uint64_t)(camera->width | camera->height) << 32);
+    const int64_t fx = camera->fx << up, fy = camera->fy << up;
+    const int64_t factors[5] = {colonnade_product(colonnade_shift_left(to_x, up), fy),
+                                colonnade_product(colonnade_shift_left(to_y, up), fx), colonnade_product(fx, fy),
+                                fy >> (32 - up), fx >> (32 - up)}; /* a pixel has 33 bits */
     int64_t vectors[3][3], *first = vectors[0], *along_x = vectors[1], *along_y = vectors[2];
     int32_t *results[3] = {rays->first, rays->step_x, rays->step_y};
     uint64_t most = 0;
@@ -388,11 +397,16 @@ static void set_directions(struct colonnade_view *view, const struct colonnade_w
             if (i > 0 && size > largest_step) largest_step = size;
             vectors[i][axis] = colonnade_signed((uint64_t)size, value < 0);
         }
-    rays->shift = 0;
-    while (rays->shift < scene->coordinate_bits && bound >> (rays->shift + 1) >= largest_step) ++rays->shift;
-    for (int i = 0; i < 3; ++i)
-        for (int axis = 0; axis < 3; ++axis)
-            results[i][axis] = (int32_t)colonnade_nearest(vectors[i][axis], 63 - bits - (i > 0 ? rays->shift : 0));
+    /* The bound has 62 bits */
+    rays->shift = 61 - colonnade_bit_length((uint64_t)largest_step);
+    if (rays->shift < 0) rays->shift = 0;
+    while (bound >> (rays->shift + 1) >= largest_step && rays->shift < scene->coordinate_bits) ++rays->shift;
+    if (rays->shift > scene->coordinate_bits) rays->shift = scene->coordinate_bits;
+    for (int i = 0; i < 3; ++i) {
+        const int down = 63 - bits - (i > 0 ? rays->shift : 0);
+        const int64_t half = (int64_t)1 << (down - 1);
+        for (int axis = 0; axis < 3; ++axis) results[i][axis] = (int32_t)((vectors[i][axis] + half) >> down);
+    }
     uint32_t *to = colonnade_computed(view) + VIEW_CAMERA + 3 * colonnade_mac_words(scene);
     for (int i = 0; i < 3; ++i)
         for (int axis = 0; axis < 3; ++axis)
@@ -547,18 +561,22 @@ static void set_rectangle(struct colonnade_view *view, const struct rays *rays, 
         for (int i = 0; i < 4; ++i) words[i] = 0;
 }
 
+bool colonnade_find_sight(const struct colonnade_view *view, const struct colonnade_pose *pose, struct colonnade_work *work) {
+    for (int i = 0; i < 3; ++i)
+        for (int axis = 0; axis < 3; ++axis) {
+            work->axes[i][axis] = 0;
+            for (int row = 0; row < 3; ++row)
+                work->axes[i][axis] += (int64_t)pose->rotation[row][i] * view->object.rotation[row][axis];
+        }
+    return find_on_grid(view, pose->position, work->eye);
+}
+
 static enum colonnade_error compute(struct colonnade_view *view) {
     const struct colonnade_view_scene *scene = &view->scene;
     struct colonnade_work work;
-    if (!find_on_grid(view, view->camera.pose.position, work.eye)) return COLONNADE_TOO_FAR;
+    if (!colonnade_find_sight(view, &view->camera.pose, &work)) return COLONNADE_TOO_FAR;
     for (uint32_t i = 0; i < scene->lights; ++i)
         if (!find_on_grid(view, view->lights[i].position, work.lights[i])) return COLONNADE_TOO_FAR;
-    for (int i = 0; i < 3; ++i)
-        for (int axis = 0; axis < 3; ++axis) {
-            work.axes[i][axis] = 0;
-            for (int row = 0; row < 3; ++row)
-                work.axes[i][axis] += (int64_t)view->camera.pose.rotation[row][i] * view->object.rotation[row][axis];
-        }
     colonnade_computed(view)[VIEW_FRAME] = view->camera.width;
     colonnade_computed(view)[VIEW_FRAME + 1] = view->camera.height;
     set_positions(view, &work);

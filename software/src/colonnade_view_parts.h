@@ -4,6 +4,11 @@
 
 #include "colonnade_integers.h"
 
+#define COLONNADE_PIXEL ((int64_t)1 << 32) /* of a lens */
+
+/* Contents of `environment.window`. */
+enum { WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE, WINDOW_CONSTANT };
+
 /* Places in the computed words. */
 enum {
     VIEW_FRAME = 0,
@@ -56,7 +61,10 @@ static inline int32_t colonnade_exponent_limit(const struct colonnade_view_scene
     return ((int32_t)1 << colonnade_bit_length(2 * bits)) - 1;
 }
 
-/* The registers of the environment, of the view's map camera. */
+/* Axes and eye of a pose. Answers whether the eye is in the hardware's range. */
+bool colonnade_find_sight(const struct colonnade_view *view, const struct colonnade_pose *pose, struct colonnade_work *work);
+
+/* The registers of the environment. */
 enum colonnade_error colonnade_view_room(struct colonnade_view *view, const struct colonnade_work *work);
 
 #endif

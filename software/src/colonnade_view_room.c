@@ -3,7 +3,6 @@
 #include "colonnade_words.h"
 
 enum { SLOPE_PIXELS = 1024, ROTATION_FRACTION = 14, LENGTH_BITS = 28, MARGIN_PARTS = 50 };
-enum { WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE };
 
 /* The least shift right, also a negative one, after which magnitudes of at most `most` fit `bits` bits and a sign. */
 static int find_shift(uint64_t most, int bits) {
@@ -13,11 +12,11 @@ static int find_shift(uint64_t most, int bits) {
     return shift;
 }
 
-/* A grid position p is at matrix * p + offset in the maps; the offset is -matrix * eye. */
+/* A grid position p is at matrix * p + offset in the maps; the offset is -matrix * eye. The sight is that of the maps. */
 static bool set_projection(struct colonnade_view *view, const struct colonnade_work *work) {
     const struct colonnade_view_scene *scene = &view->scene;
     const int bits = scene->mac_bits;
-    const int64_t along[3] = {scene->map_lens[0], scene->map_lens[1], (int64_t)SLOPE_PIXELS << 16};
+    const int64_t along[3] = {scene->map_lens[0], scene->map_lens[1], SLOPE_PIXELS * COLONNADE_PIXEL};
     const int64_t centre[3] = {scene->map_lens[2], scene->map_lens[3], 0};
     const int length_along = colonnade_block_length(along), length_centre = colonnade_block_length(centre);
     const int up = 61 - (length_along > length_centre ? length_along : length_centre);
@@ -32,7 +31,7 @@ static bool set_projection(struct colonnade_view *view, const struct colonnade_w
             matrix[row][axis] = colonnade_signed(size, sum < 0);
         }
     /* The matrix is these numbers * 2^power */
-    const int power = 48 + scene->projection.exponent - up;
+    const int power = 32 + scene->projection.exponent - up;
     const int down = find_shift(most, bits - 1), exponent = -(power + down);
 
     const int eye_up = 62 - colonnade_block_length(work->eye);
@@ -71,7 +70,8 @@ static int32_t find_along(const int32_t row[3], const int32_t x, const int32_t y
     return (int32_t)colonnade_nearest((int64_t)row[0] * x + (int64_t)row[1] * y + (int64_t)row[2] * z, 30);
 }
 
-static void find_lengths(const struct colonnade_view *view, const struct colonnade_work *work, struct lengths *lengths) {
+static void find_lengths(const struct colonnade_view *view, const struct colonnade_pose *pose,
+                         const struct colonnade_work *work, struct lengths *lengths) {
     const struct colonnade_view_scene *scene = &view->scene;
     const int64_t limit = (int64_t)1 << 60;
     int64_t planes[3][2], walls[3][2];
@@ -80,7 +80,7 @@ static void find_lengths(const struct colonnade_view *view, const struct colonna
         const int fraction = scene->grid_fraction + 16;
         planes[axis][0] = colonnade_shift_left(scene->low[axis], fraction) - work->eye[axis];
         planes[axis][1] = colonnade_shift_left(scene->high[axis], fraction) - work->eye[axis];
-        const int64_t eye = view->camera.pose.position[axis];
+        const int64_t eye = pose->position[axis];
         walls[axis][0] = colonnade_scaled(scene->room_low[axis] - eye, &scene->steps, 16, limit);
         walls[axis][1] = colonnade_scaled(scene->room_high[axis] - eye, &scene->steps, 16, limit);
         for (int side = 0; side < 2; ++side)
@@ -190,12 +190,13 @@ static struct region find_shadow(const struct lengths *lengths, uint32_t light, 
     return region;
 }
 
-/* floor of a picture's coordinate: focal * ratio + centre, 2^-16 pixels; within +-2^28. */
-static int32_t find_pixel(struct colonnade_ratio ratio, int32_t focal, int32_t centre) {
-    const uint64_t size = colonnade_magnitude(ratio.over) * (uint32_t)focal / (uint32_t)ratio.under;
-    const uint64_t limit = (uint64_t)1 << 44;
+/* floor of a picture's coordinate: focal * ratio + centre, within +-2^28. The focal length is rounded to 32 bits. */
+static int32_t find_pixel(struct colonnade_ratio ratio, int64_t focal, int64_t centre) {
+    const int down = focal >> 48 == 0 ? 16 : 25, fraction = 32 - down;
+    const uint64_t size = colonnade_magnitude(ratio.over) * (uint64_t)(focal >> down) / (uint32_t)ratio.under;
+    const uint64_t limit = (uint64_t)1 << (27 + fraction);
     const int64_t from = colonnade_signed(size < limit ? size : limit, ratio.over < 0) - (ratio.over < 0);
-    return (int32_t)colonnade_floor(from + centre, 16);
+    return (int32_t)colonnade_floor(from + (centre >> down), fraction);
 }
 
 static uint32_t clip(int32_t pixel, uint32_t size) {
@@ -207,7 +208,7 @@ static void set_window(struct colonnade_view *view, const struct lengths *length
     const struct colonnade_view_scene *scene = &view->scene;
     const struct colonnade_camera *camera = &view->camera;
     const uint32_t size[2] = {camera->width, camera->height};
-    const int32_t focal[2] = {(int32_t)camera->fx, (int32_t)camera->fy}, centre[2] = {camera->cx, camera->cy};
+    const int64_t focal[2] = {camera->fx, camera->fy}, centre[2] = {camera->cx, camera->cy};
     struct region window = {{.is_empty = true}, scene->window == WINDOW_WHOLE};
     if (scene->window == WINDOW_SHADOW) {
         const int32_t margin = ((int32_t)1 << scene->vertex_bits) / MARGIN_PARTS + 1;
@@ -258,7 +259,8 @@ static struct cover find_cover(const struct colonnade_view *view, const struct l
     cover.near_depth = colonnade_scaled(near_depth, &scene->metres, 6 - lengths->unit, limit) - 1;
     cover.far_depth = colonnade_scaled(far_depth, &scene->metres, 6 - lengths->unit, limit) + 1;
     for (int i = 0; i < 2; ++i) {
-        const int32_t focal = scene->map_lens[i], centre = scene->map_lens[2 + i], tile = (int32_t)scene->tile_size;
+        const int64_t focal = scene->map_lens[i], centre = scene->map_lens[2 + i];
+        const int32_t tile = (int32_t)scene->tile_size;
         const int32_t low = is_before ? find_pixel(extent.low[i], focal, centre) - 1 : 0;
         const int32_t high = is_before ? find_pixel(extent.high[i], focal, centre) + 1 : INT32_MAX;
         cover.low[i] = clip(low < 0 ? 0 : low / tile, tiles[i]);
@@ -267,17 +269,20 @@ static struct cover find_cover(const struct colonnade_view *view, const struct l
     return cover;
 }
 
-/* The room may hide the object where a tile under its box is nearer than the box's end. The tolerance is twice the largest
- * error of the tiles around the object, from 1/400 of the distance to a tenth of the edge. */
+/* The room may hide the object where a tile under its box is nearer than the box's end; from a camera that is not that of
+ * the maps, always. The tolerance is twice the largest error of the tiles around the object, from 1/400 of the distance to
+ * a tenth of the edge. The lengths are from the maps' camera. */
 static void set_occlusion(struct colonnade_view *view, const struct colonnade_work *work, const struct lengths *lengths) {
     const struct colonnade_view_scene *scene = &view->scene;
     uint32_t *words = colonnade_computed(view) + VIEW_WINDOW + 4;
+    const int tolerance_words = scene->scene_bits + scene->more_grid_bits > 42 ? 2 : 1;
     words[0] = words[1] = words[2] = 0;
+    words[1 + tolerance_words] = view->is_map_camera;
     if (scene->occlusion == 0) return;
     const struct cover around = find_cover(view, lengths, (int32_t)1 << (scene->vertex_bits - 1));
     const struct cover box = find_cover(view, lengths, 0);
     uint32_t error = 0;
-    bool is_near = false, may_hide = false;
+    bool is_near = false, may_hide = !view->is_map_camera;
     for (uint32_t row = around.low[1]; row < around.high[1]; ++row)
         for (uint32_t column = around.low[0]; column < around.high[0]; ++column) {
             const size_t tile = 2 * ((size_t)row * scene->tile_columns + column);
@@ -305,14 +310,18 @@ static void set_occlusion(struct colonnade_view *view, const struct colonnade_wo
     const uint64_t in_steps = (uint64_t)tolerance << scene->more_grid_bits;
     words[0] = 1;
     words[1] = (uint32_t)in_steps;
-    words[2] = (uint32_t)(in_steps >> 32);
+    if (tolerance_words > 1) words[2] = (uint32_t)(in_steps >> 32);
 }
 
 enum colonnade_error colonnade_view_room(struct colonnade_view *view, const struct colonnade_work *work) {
+    struct colonnade_work maps = *work;
     struct lengths lengths;
-    if (!set_projection(view, work)) return COLONNADE_TOO_FAR;
-    find_lengths(view, work, &lengths);
+    if (!view->is_map_camera && !colonnade_find_sight(view, &view->scene.map_pose, &maps)) return COLONNADE_TOO_FAR;
+    if (!set_projection(view, &maps)) return COLONNADE_TOO_FAR;
+    if (view->scene.window == WINDOW_CONSTANT) return COLONNADE_OK;
+    find_lengths(view, &view->camera.pose, work, &lengths);
     set_window(view, &lengths);
+    if (!view->is_map_camera) find_lengths(view, &view->scene.map_pose, &maps, &lengths);
     set_occlusion(view, work, &lengths);
     return COLONNADE_OK;
 }

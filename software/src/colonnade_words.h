@@ -11,9 +11,9 @@ static inline uint32_t colonnade_word(const uint8_t *bytes, size_t index) {
     return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
-/* A name of eight letters, the version 1, the size, and the format hash. `other` answers another name or version. */
+/* A name of eight letters, the version, the size, and the format hash. `other` answers another name or version. */
 enum colonnade_error colonnade_check_header(const struct colonnade_design *design, const uint8_t *bytes, size_t size,
-                                            size_t least, const char *magic, enum colonnade_error other);
+                                            size_t least, const char *magic, uint32_t version, enum colonnade_error other);
 
 /* Whether `count` words from a word address on are frame registers. */
 bool colonnade_are_frame_registers(const struct colonnade_design *design, uint32_t address, uint32_t count);

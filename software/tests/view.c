@@ -57,8 +57,11 @@ static void run(struct colonnade_view *view, int frames) {
     struct colonnade_frame frame;
     for (int i = 0; i < frames; ++i) {
         const struct colonnade_pose object = make_pose(31);
-        const struct colonnade_camera camera = {make_pose(36), (next() % 4000 + 20) << 16, (next() % 4000 + 20) << 16,
-                                                (int32_t)(next() % 640) << 16, (int32_t)(next() % 480) << 16, 640, 480};
+        struct colonnade_camera camera = {make_pose(36), 0, 0, 0, 0, 640, 480};
+        camera.fx = (int64_t)(next() % 4000 + 20) << 32 | next();
+        camera.fy = (int64_t)(next() % 4000 + 20) << 32 | next();
+        camera.cx = (int64_t)(next() % 640) << 32 | next();
+        camera.cy = (int64_t)(next() % 480) << 32 | next();
         check(colonnade_view_set_object(view, &object));
         check(colonnade_view_set_camera(view, &camera));
         for (uint32_t light = 0; light < view->scene.lights; ++light) {

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
@@ -147,10 +146,8 @@ class DeviceScene:
         """The file with which a processor computes frames of other poses (`view_file`); arguments as in `registers`.
 
         Raises:
-            UserError: See `view_file`; or the scene places the camera of a room.
+            UserError: See `view_file`.
         """
-        if self.environment is not None and self.scene.places_camera:
-            raise UserError("in a room a target's camera is that of the maps: leave out [camera] and motion.camera")
         placed = place(self.scene, self.image.header.extent, *size, self.environment)
         registers = self.registers(size, composited=composited)
         occlusion = self.scene.background.occlusion

@@ -1,8 +1,6 @@
-"""Registers of lights, materials and paths (docs/numbers.md, sections 5 and 6)."""
+"""Registers of ambient light, materials and paths (docs/numbers.md, sections 5 and 6)."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -11,7 +9,7 @@ from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.registers.surface_offset import surface_offset
-from colonnade.scene.view import PlacedLight, View
+from colonnade.scene.view import View
 from colonnade.scene_image.header import ImageHeader
 
 CHANNELS = "rgb"
@@ -54,7 +52,7 @@ def check_surfaces(view: View, manifest: Manifest) -> None:
 
 
 def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
-    """Compute the registers of lights, ambient light, background, materials and shading."""
+    """Compute the registers of ambient light, background, materials and shading."""
     numbers = manifest.numbers
     white = (1 << numbers["colourBits"]) - 1
     step = header.frame.scale * 2.0 ** numbers["gridFraction"]
@@ -72,9 +70,6 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
     max_light = (1 << numbers["lightBits"]) - 1
     result |= _colour("ambient", view.ambient * one, max_light)
     result |= _colour("background", view.background * white, white)
-    for index, light in enumerate(view.lights):
-        result |= _colour(f"lights[{index}].colour", light.colour * one, max_light)
-        result |= _reach(f"lights[{index}]", light, step, numbers["mantissaBits"])
     for index, material in enumerate(view.materials):
         result |= _colour(f"materials[{index}].albedo", np.array(material.albedo) * white, white)
         if manifest.corner_colours:
@@ -90,17 +85,6 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
         for index, material in enumerate(view.materials):
             result |= _kind(f"materials[{index}]", material, numbers["etaFraction"], one)
     return result
-
-
-def _reach(name: str, light: PlacedLight, step: float, mantissa_bits: int) -> dict[str, int]:
-    """A light's squared reach, grid steps, as mantissa and exponent; a zero mantissa means no falloff."""
-    if light.reach is None:
-        return {}
-    mantissa, exponent = math.frexp((light.reach * step) ** 2)
-    whole = round(math.ldexp(mantissa, mantissa_bits))
-    if whole == 1 << mantissa_bits:
-        whole, exponent = whole >> 1, exponent + 1
-    return {f"{name}.reachMantissa": whole, f"{name}.reachExponent": exponent - mantissa_bits}
 
 
 def _kind(name: str, material: MeshMaterial, fraction: int, one: int) -> dict[str, int]:

@@ -40,7 +40,7 @@ class TargetView:
         self._view.set_object(position, rotation)
 
     def set_camera(self, position: Position, rotation: Rotation, lens: Rotation, size: tuple[int, int]) -> None:
-        """Move the camera: as `set_object`, then fx, fy, cx, cy, 2^-16 pixels, and width and height."""
+        """Move the camera: as `set_object`, then fx, fy, cx, cy, 2^-32 pixels, and width and height."""
         self._view.set_camera(position, rotation, *lens, *size)
 
     def set_light(self, index: int, position: Position, colour: Position, reach: int = 0) -> None:

@@ -114,7 +114,7 @@ def test_wrong_poses_are_refused_by_name(small_design: Design) -> None:
         target.set_object([1 << 60, 0, 0], UNIT)
     with pytest.raises(ValueError, match="badPose"):
         target.set_light(0, [0, -(1 << 62), 0], [0, 0, 0])
-    for index, value in ((0, PIXEL - 1), (1, (1 << 31) - 1), (2, (1 << 30) + 1), (3, -(1 << 31))):
+    for index, value in ((0, PIXEL // 16 - 1), (1, (1 << 56) + 1), (2, (1 << 56) + 1), (3, -(1 << 63))):
         lens = list(LENS)
         lens[index] = value
         with pytest.raises(ValueError, match="badLens"):
@@ -154,7 +154,7 @@ def test_other_files_are_refused_by_name(small_design: Design) -> None:
 
     cases = {
         "notAView": (
-            *(b"CLNDFRAM" + file[8:], with_word(2, 2), with_word(12, 15), with_word(12, 65), with_word(13, 73)),
+            *(b"CLNDFRAM" + file[8:], with_word(2, 1), with_word(12, 15), with_word(12, 65), with_word(13, 73)),
             *(with_word(14, 52), with_word(14, 1 << 31), with_word(30, 0)),
         ),
         "otherFormat": (with_word(5, 0),),

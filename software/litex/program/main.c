@@ -23,7 +23,7 @@ struct record {
     struct colonnade_camera camera;
     struct colonnade_light light;
     uint32_t count;
-    uint8_t writes[RECORD_BYTES - 140];
+    uint8_t writes[RECORD_BYTES - 156];
 };
 _Static_assert(sizeof(struct record) == RECORD_BYTES, "records follow each other as compare.py expects");
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import field_places
 from colonnade.maps.image import memory_words
+from colonnade.maps.planes import SLOPE_PIXELS
 from colonnade.reference.environment.ray_march import HIDDEN, HIT, LEFT_VIEW, LOST, MarchHits
-from colonnade.registers.environment import projection_of, view_registers
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
@@ -70,3 +72,25 @@ class DeviceMarch:
         u = np.where(is_ahead, points[:, 0] / depth * environment.fx + environment.cx, seen_u)
         v = np.where(is_ahead, points[:, 1] / depth * environment.fy + environment.cy, seen_v)
         return MarchHits(u, v, z, seen_u, seen_v, kind.astype(np.int64), hits["steps"])
+
+
+def projection_of(environment: Environment, image: AttributeImage) -> Floats:
+    """Projection from view space, metres, to p with pixel 1024 · (p0, p1) / p2 and w = 1 / p2: float64 [3, 3]."""
+    camera = np.array(
+        [[environment.fx, 0.0, environment.cx], [0.0, environment.fy, environment.cy], [0.0, 0.0, SLOPE_PIXELS]]
+    )
+    return np.asarray(camera / (SLOPE_PIXELS * image.depth_unit), dtype=np.float64)
+
+
+def view_registers(matrix: Floats, offset: Floats, manifest: Manifest) -> dict[str, int]:
+    """Encode a projection of grid positions as ``environment.matrix``, ``environment.offset`` and their exponents."""
+    maximum = (1 << (manifest.numbers["macBits"] - 1)) - 1
+    exponent = math.floor(math.log2(maximum / float(np.abs(matrix).max())))
+    scaled = offset * 2.0**exponent
+    shift = max(0, math.ceil(math.log2(float(np.abs(scaled).max()) / maximum + 1e-300)))
+    if shift > manifest.numbers["sceneBits"]:
+        raise UserError("the object is too small for the room: make it larger")
+    whole = np.rint(matrix * 2.0**exponent).astype(np.int64)
+    registers = {f"environment.matrix[{i}].{axis}": int(whole[i, a]) for i in range(3) for a, axis in enumerate("xyz")}
+    registers |= {f"environment.offset.{axis}": int(np.rint(scaled[a] / 2.0**shift)) for a, axis in enumerate("xyz")}
+    return registers | {"environment.offsetShift": shift, "environment.exponent": exponent}

@@ -20,7 +20,6 @@ from colonnade.common.types import Floats
 from colonnade.lab.evaluation.region_metrics import RegionDifference, compare_regions, frame_regions
 from colonnade.reference.environment.decoded import backdrops
 from colonnade.reference.render import ReferenceResult, render_reference
-from colonnade.registers.environment import environment_registers
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Placement, Scene, Transform
 
 if TYPE_CHECKING:
@@ -156,10 +155,7 @@ def device_frame(mesh: Mesh, view: View, encoded: EncodedEnvironment, manifest: 
     from colonnade.scene_image.packer import pack
 
     packed = with_environment(pack(mesh, manifest, view.materials), encoded, manifest)
-    registers = registers_of(view, packed.header, manifest)
-    frame = render_model(
-        manifest, packed, registers | environment_registers(view, encoded, packed.header, manifest, relit=True)
-    )
+    frame = render_model(manifest, packed, registers_of(view, packed.header, manifest, encoded))
     require_no_errors(frame)
     return frame.colour / float((1 << manifest.numbers["colourBits"]) - 1)
 

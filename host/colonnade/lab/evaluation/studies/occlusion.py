@@ -128,7 +128,6 @@ def measure(
     from colonnade.maps.cache import encoded_environment
     from colonnade.maps.encoded import EncodedEnvironment
     from colonnade.maps.layout import AttributeLayout
-    from colonnade.registers.environment import environment_registers
     from colonnade.registers.frame import registers_of
     from colonnade.render.composite import composited
     from colonnade.scene.view import make_view
@@ -143,8 +142,7 @@ def measure(
     scene = standing(case, mesh)
     view = make_view(scene, mesh.extent, environment.width, environment.height, mesh.materials, environment)
     packed = with_environment(pack(mesh, manifest, view.materials), encoded, manifest)
-    registers = registers_of(view, packed.header, manifest)
-    registers |= environment_registers(view, encoded, packed.header, manifest, relit=False)
+    registers = registers_of(view, packed.header, manifest, encoded, relit=False)
     frame = render_model(manifest, packed, registers)
     picture = composited(Accumulation.of_frame(frame), environment.photo)
     if output is not None:
