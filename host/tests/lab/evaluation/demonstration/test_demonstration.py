@@ -27,8 +27,8 @@ def test_the_camera_loops_by_30_centimetres_and_10_degrees() -> None:
     np.testing.assert_allclose(first, walk.camera_of(1.0, *SIZE).to_world, atol=1e-12)
     aside = np.array([(pose[:, 3] - first[:, 3]) @ first[:, 0] for pose in poses])
     turns = np.degrees([np.arctan2(pose[:, 2] @ first[:, 0], pose[:, 2] @ first[:, 2]) for pose in poses])
-    for values, most in ((aside, 0.3), (turns, 10.0)):
-        assert values.max() == pytest.approx(most, rel=0.15) and values.min() == pytest.approx(-most, rel=0.15)
+    for values, maximum in ((aside, 0.3), (turns, 10.0)):
+        assert values.max() == pytest.approx(maximum, rel=0.15) and values.min() == pytest.approx(-maximum, rel=0.15)
     assert max(np.linalg.norm(b[:, 3] - a[:, 3]) for a, b in itertools.pairwise(poses)) < 0.03
 
 

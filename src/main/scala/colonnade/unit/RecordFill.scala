@@ -53,12 +53,12 @@ private[unit] final class RecordFill(
   val awaiting: Seq[Seq[Bool]] =
     buffers.map(buffer => brings(buffer.address).map(_ && buffer.state === BufferState.reserved)).transpose
 
-  /** The buffers that are available after the fills; by broadcast and buffer: the buffer takes the record, and its place if a
-    * context misses it.
+  /** The buffers that are available after the fills; by broadcast and buffer: the buffer takes the record; it would if a context
+    * missed it.
     */
-  val (stillAvailable, fills, places) =
+  val (stillAvailable, fills, candidates) =
     broadcasts.zip(waiters.zip(awaiting)).foldLeft((isAvailable, Seq.empty[Seq[Bool]], Seq.empty[Seq[Bool]])) {
-      case ((available, fills, places), (broadcast, (waits, awaits))) =>
+      case ((available, fills, candidates), (broadcast, (waits, awaits))) =>
         val isRecord   = broadcast.valid && !broadcast.bits.isLater.getOrElse(false.B)
         val isReserved = awaits.map(_ && (snooping || broadcast.bits.row === row))
         val isFree     = snooping && !isReserved.reduce(_ || _)
@@ -69,7 +69,7 @@ private[unit] final class RecordFill(
         (
           available.zip(snoopedOH).map { case (isFree, isTaken) => isFree && !isTaken },
           fills :+ snoopedOH.zip(reservedOH).map { case (snooped, reserved) => snooped || reserved },
-          places :+ freeOH.zip(reservedOH).map { case (free, reserved) => free || reserved }
+          candidates :+ freeOH.zip(reservedOH).map { case (free, reserved) => free || reserved }
         )
     }
 
@@ -78,9 +78,9 @@ private[unit] final class RecordFill(
 
   /** By context and broadcast: the context takes the record as it comes, if it does not find it in a buffer. */
   private val arrives = fetches.zip(waiters.transpose).map { case (fetch, waits) =>
-    waits.zip(places).map { case (waits, places) =>
-      val isOwnRead = fetch.isPending && fetch.isIssued && Mux1H(fetch.bufferOH, places)
-      Mux(snooping, waits && places.reduce(_ || _), isOwnRead)
+    waits.zip(candidates).map { case (waits, candidates) =>
+      val isOwnRead = fetch.isPending && fetch.isIssued && Mux1H(fetch.bufferOH, candidates)
+      Mux(snooping, waits && candidates.reduce(_ || _), isOwnRead)
     }
   }
 
@@ -97,6 +97,6 @@ private[unit] final class RecordFill(
     when(isFound) {
       fetch.isPending := false.B
       fetch.hasRecord := true.B
-      fetch.buffer    := Mux(isHit, PriorityEncoder(hits), Mux1H(arrives, places.map(OHToUInt(_))))
+      fetch.buffer    := Mux(isHit, PriorityEncoder(hits), Mux1H(arrives, candidates.map(OHToUInt(_))))
     }
 }
