@@ -24,8 +24,10 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, inMemo
   private val isValid     = RegInit(VecInit(Seq.fill(sets)(0.U((if (inMemory) 1 else ways).W))))
   private val validMemory = Option.when(inMemory)(Mem(sets, UInt(ways.W)))
 
-  /** The valid bits of a set are read with its tags: no set changes in the cycle in which it is read. */
-  private val foundValid = Wire(UInt(ways.W))
+  /** The valid bits of a set are read with its tags, or in the next cycle from the memory: no set changes in the cycle in
+    * which its tags are read.
+    */
+  private val foundValid = Option.unless(inMemory)(Wire(UInt(ways.W)))
 
   private def setOf(line: UInt): UInt = line.pad(setBits + 1)(setBits - 1, 0)
   private def tagOf(line: UInt): UInt = (line >> setBits).asUInt.pad(tagBits)(tagBits - 1, 0)
@@ -37,7 +39,7 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, inMemo
 
   /** Uses the port: writes the tag of a line, or else reads the tags of its set for the next cycle. Call it once. */
   def access(line: UInt, way: UInt, isRead: Bool, isWrite: Bool): Unit = {
-    foundValid := RegNext(validOf(line))
+    foundValid.foreach(_ := RegNext(validOf(line)))
     val written = VecInit(Seq.fill(ways)(tagOf(line)))
     val mask    = UIntToOH(way, ways).asBools
     for (memory <- tags) found := memory.readWrite(setOf(line), written, mask, isRead || isWrite, isWrite)
@@ -48,9 +50,7 @@ private[memory] final class TagStore(sets: Int, ways: Int, lineBits: Int, inMemo
   }
 
   /** The way that holds a line, one-hot; 0 if none does. The tags of its set were read in the cycle before. */
-  def hitOH(line: UInt): UInt = VecInit(found.zipWithIndex.map { case (tag, way) =>
-    foundValid(way) && tag === tagOf(line)
-  }).asUInt
+  def hitOH(line: UInt): UInt = VecInit(found.map(_ === tagOf(line))).asUInt & foundValid.getOrElse(validOf(line))
 
   /** The way for a new line: an empty one, or the one to replace. */
   def victim(line: UInt): UInt = {
