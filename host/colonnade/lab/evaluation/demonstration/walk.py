@@ -54,7 +54,7 @@ OBJECT = 0.6
 
 
 def walk_scene(width: int, height: int) -> str:
-    """The scene file of a mirror teapot on the table, by the light of the photos; size of the maps, pixels."""
+    """The scene file of a mirror teapot on the floor, by the light of the photos; size of the maps, pixels."""
     camera = camera_of(0.0, width, height)
     place = (STAND - camera.to_world[:, 3]) @ camera.to_world[:, :3]
     x, y = place[:2] / place[2] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
