@@ -95,4 +95,4 @@ def test_the_model_of_a_room_is_defined_on_all_words_and_registers(manifest: Man
         origins = random.integers(-(1 << scene), 1 << scene, (rays, 3))
         ways = random.integers(-(1 << direction), 1 << direction, (rays, 3))
         met = model.march(registers, origins, ways)
-        assert met["steps"].max() <= 128 and met["entry"].max() < manifest.attributes.sizes["boundingPlanes"]
+        assert met["steps"].max() <= 512 and met["entry"].max() < manifest.attributes.sizes["boundingPlanes"]
