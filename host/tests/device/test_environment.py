@@ -147,12 +147,12 @@ def test_hardware_sees_the_rooms_of_the_model_from_any_camera(kind: str) -> None
     )
     scene = replace(TABLE, material=material)
     registers: list[dict[str, int]] = [
-        frame_registers(moved(scene, held, *move), image.header, design.manifest, 48, 36, held, relit)
+        frame_registers(moved(scene, held, *move), image.header, design.manifest, 32, 24, held, relit)
         for move in MOVES
         for relit in (True, False)
     ]
     low = moved(sunken(scene, held, image.header.extent), held, *MOVES[1])
-    sunk = frame_registers(low, image.header, design.manifest, 48, 36, held, False)
+    sunk = frame_registers(low, image.header, design.manifest, 32, 24, held, False)
     assert sunk["environment.occlusion"] == 1
     registers += [sunk, sunk | {"environment.occlusion": 0}]
     random = np.random.default_rng(1)

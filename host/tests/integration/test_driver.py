@@ -224,12 +224,12 @@ def test_maps_of_another_view_are_loaded_between_frames(tmp_path: Path, mode: st
     assert (memory == UNWRITTEN).all()
 
 
-@pytest.mark.parametrize("every", [1, 4])
-def test_frames_of_a_moving_camera_are_those_of_the_model(tmp_path: Path, every: int) -> None:
-    """Twelve frames of the demonstration: maps of each keyframe, registers from poses or from files, photos."""
+@pytest.mark.parametrize(("every", "frames"), [(1, 4), (4, 12)])
+def test_frames_of_a_moving_camera_are_those_of_the_model(tmp_path: Path, every: int, frames: int) -> None:
+    """Frames of the demonstration: maps of each keyframe, registers from poses or from files, photos."""
     size, design = (48, 36), shell_design_for("tiny", MAP_OVERRIDES, bus_bytes=16)
     manifest = design.manifest
-    sequence = load_sequence(write_walk(tmp_path / "room", (MAPS["width"], MAPS["height"]), 12))
+    sequence = load_sequence(write_walk(tmp_path / "room", (MAPS["width"], MAPS["height"]), frames))
     scene = walk_scene(MAPS["width"], MAPS["height"])
     (tmp_path / "scene.toml").write_text(f"{scene}paths.bounces = 1\n")
     encoder = LiveEncoder(layout_of(manifest))
@@ -265,10 +265,10 @@ def test_frames_of_a_moving_camera_are_those_of_the_model(tmp_path: Path, every:
         assert (expected[-1] != framebuffer_bytes(frame, 0)).any() and (
             expected[-1].reshape(lines.shape) != lines
         ).any()
-    memory, printed = run_driver(tmp_path, design, files, "image", "12", program="live")
+    memory, printed = run_driver(tmp_path, design, files, "image", str(frames), program="live")
     for line, wanted, load in zip(printed, expected, loads, strict=True):
         _, place, stride, _, loading, _, rendering = line
         found = memory[int(place) : int(place) + int(stride) * size[1]].reshape(size[1], int(stride))
         np.testing.assert_array_equal(found[:, : wanted.shape[1]], wanted)
         assert load <= int(loading) <= 1.2 * load and int(rendering) > 0
-    assert len({each.tobytes() for each in expected}) == 12
+    assert len({each.tobytes() for each in expected}) == frames
