@@ -23,7 +23,7 @@ object Rounding {
     if (bits <= 0) shiftedLeft(x, -bits)
     else {
       val wide = x.pad(bits + 1)
-      floor(wide, bits) +& roundsUp(wide.asUInt, bits).zext
+      floor(wide, bits) +& roundsUp(wide, bits).zext
     }
 
   /** Drops `bits` low bits to nearest, ties to even; one bit wider than `floor`, for the carry. */
@@ -84,6 +84,9 @@ object Rounding {
   private def shiftedLeft(x: SInt, bits: Int): SInt = if (bits == 0) x else (x << bits).asSInt
 
   private def shiftedLeft(x: UInt, bits: Int): UInt = if (bits == 0) x else (x << bits).asUInt
+
+  /** Whether `nearestEven` is one above `floor`. */
+  def roundsUp(x: SInt, bits: Int): Bool = if (bits <= 0) false.B else roundsUp(x.pad(bits + 1).asUInt, bits)
 
   /** The dropped bits are more than half a step, or exactly half a step above an odd number. */
   private def roundsUp(x: UInt, bits: Int): Bool = {

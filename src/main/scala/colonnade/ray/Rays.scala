@@ -50,12 +50,15 @@ final class RayOrientation extends Bundle {
   val negative = Vec(3, Bool())
 }
 
-/** A ray for the box test, in its own frame. */
+/** A ray for the box test, in its own frame. Its origin is rounded to units: the unit below it, or the next one if it
+  * `roundsUp`, which is the carry of the subtraction that follows.
+  */
 final class BoxRay(numbers: NumberFormats) extends Bundle {
   private val formats = new RayFormats(numbers)
 
   val orientation = new RayOrientation
   val origin      = Vec(3, new Fixed(formats.units))
+  val roundsUp    = Vec(3, Bool())
   val reciprocal  = Vec(2, new Fixed(formats.reciprocal))
   val exponent    = Vec(2, UInt(formats.exponentBits.W))
 }
@@ -87,15 +90,17 @@ final class TracedRay(numbers: NumberFormats) extends Bundle {
     ray
   }
 
-  /** The origin rounded to units; it is close to the object, so it fits the format of the box test. */
+  /** The origin is close to the object, so it fits the format of the box test. */
   def forBoxes: BoxRay = {
     val ray = Wire(new BoxRay(numbers))
     ray.orientation := orientation
     ray.reciprocal  := reciprocal
     ray.exponent    := exponent
-    ray.origin.zip(origin).foreach { case (units, position) =>
-      val rounded = Rounding.nearestEven(position.integer, numbers.gridFraction)
-      units := Fixed(formats.units, Rounding.narrow(rounded, numbers.boxDistanceBits))
+    for (axis <- 0 until 3) {
+      val position = origin(axis).integer
+      val whole    = Rounding.floor(position, numbers.gridFraction)
+      ray.origin(axis)   := Fixed(formats.units, Rounding.narrow(whole, numbers.boxDistanceBits))
+      ray.roundsUp(axis) := Rounding.roundsUp(position, numbers.gridFraction)
     }
     ray
   }

@@ -1,6 +1,7 @@
 package colonnade.traversal
 
 import chisel3._
+import chisel3.util.Cat
 import colonnade.config.TraversalConfig
 import colonnade.formats.{ChildKind, NodeRecord, RecordFormats, Vec3}
 import colonnade.ray.{PermutedFrame, RayFormats}
@@ -59,7 +60,8 @@ object BoxOperands {
 
     val origin = PermutedFrame(candidate.node.origin, ray.orientation.axis)
     for (axis <- 0 until 3) {
-      val difference = origin(axis).zext -& ray.origin(axis).integer
+      val complement = Cat(~ray.origin(axis).integer.asUInt, !ray.roundsUp(axis)).asSInt
+      val difference = (Cat(origin(axis), true.B).zext +& complement) >> 1
       operands.corner(axis) := difference.asUInt(numbers.vertexBits + 1, 0).asSInt
     }
     for (axis <- 0 until 2) {

@@ -92,7 +92,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       if (shown != offered) offer(setup.io.request.bits, requests(shown))
       offered = shown
       if (accepts && setup.io.ray.valid.peekBoolean()) {
-        expect(setup.io.ray.bits, setup.forBoxes.origin, requests(left.size), answers(left.size))
+        expect(setup.io.ray.bits, setup.forBoxes, requests(left.size), answers(left.size))
         left :+= cycle
       }
       if (offers && setup.io.request.ready.peekBoolean()) sent += 1
@@ -104,7 +104,7 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
   private def expect(
       ray:     PreparedRay,
-      units:   Seq[Fixed],
+      boxes:   BoxRay,
       request: SetupRequest,
       answer:  Seq[BigInt]
   ): Unit = withClue(s"$request: ") {
@@ -113,8 +113,9 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     ray.enters.peekInt() shouldBe answer.head
     if (answer.head == 1) {
       val traced  = ray.ray
+      val units   = boxes.origin.zip(boxes.roundsUp).map { case (below, up) => raw(below) + up.peekInt() }
       val numbers = Seq(traced.orientation.axis.peekInt()) ++ traced.orientation.negative.map(_.peekInt()) ++
-        traced.origin.map(raw) ++ units.map(raw) ++ traced.shear.map(raw) ++ traced.reciprocal.map(raw) ++
+        traced.origin.map(raw) ++ units ++ traced.shear.map(raw) ++ traced.reciprocal.map(raw) ++
         traced.exponent.map(_.peekInt()) ++ Seq(raw(ray.tEntry), raw(ray.tMax))
       numbers shouldBe answer.tail
     }

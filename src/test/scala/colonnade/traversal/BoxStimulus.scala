@@ -31,8 +31,9 @@ final case class BoxCase(
       Seq(tMax) ++ origin ++ shift.map(BigInt(_)) ++ Seq(firstChild, firstTriangles) ++
       kinds.indices.flatMap(slot => BigInt(kinds(slot)) +: (low(slot) ++ high(slot)))
 
-  /** The fields of [[BoxCandidate]] by name. */
+  /** The fields of [[BoxCandidate]] by name. Half of the origins are the unit below, and round up. */
   def fields(tMaxUnits: BigInt): Map[String, BigInt] = {
+    val roundsUp = boxOrigin.map(value => BigInt(if (value.testBit(1)) 1 else 0))
     def vector(name: String, values: Seq[BigInt]) = Seq("x", "y", "z").zip(values).map { case (axis, value) =>
       s"$name.$axis" -> value
     }
@@ -42,8 +43,8 @@ final case class BoxCase(
     Map("context" -> BigInt(context), "tMax" -> tMaxUnits, "ray.orientation.axis" -> BigInt(axis)) ++
       indexed("ray.orientation.negative", negative.map(sign => BigInt(if (sign) 1 else 0))) ++ indexed(
         "ray.origin",
-        boxOrigin
-      ) ++
+        boxOrigin.zip(roundsUp).map { case (value, up) => value - up }
+      ) ++ indexed("ray.roundsUp", roundsUp) ++
       indexed("ray.reciprocal", reciprocal) ++ indexed("ray.exponent", exponent.map(BigInt(_))) ++
       vector("node.origin", origin) ++ vector("node.exponent", shift.map(BigInt(_))) ++
       Map("node.firstChild" -> firstChild, "node.firstTriangles" -> firstTriangles) ++ indexed(
